@@ -1,0 +1,124 @@
+// The step: two frames of positions in, sorted contacts and statistics out.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "deformable_ccd/contact.h"
+#include "deformable_ccd/elementary.h"
+#include "deformable_ccd/topology.h"
+#include "deformable_ccd/voxel_surface.h"
+
+namespace deformable_ccd {
+
+/// The stages of the flow, in order. Names by toString().
+enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
+/// What a scene can call for (DESIGN.md, Effects). Names by toString().
+enum class Effect : std::uint8_t { SELF_COLLISION, BODY_BODY, OBSTACLE, START_STATE, COUNT };
+const char* toString(Stage stage);
+const char* toString(Effect effect);
+
+/// Pairs into and out of a stage or an effect, and its time summed over the workers.
+struct StageStats {
+  std::uint64_t in = 0;
+  std::uint64_t out = 0;
+  double ms = 0;
+};
+
+struct StepStats {
+  std::array<StageStats, static_cast<std::size_t>(Stage::COUNT)> stages{};
+  std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effects{};
+  TierCounters tiers;
+  double total_ms = 0;
+  std::uint64_t vf_candidates = 0, ee_candidates = 0;  ///< out of the linear filter
+  std::uint64_t undecided = 0, initial = 0, leaving = 0;
+  std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
+  const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
+  StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
+  const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
+  StageStats& operator[](Effect e) { return effects[static_cast<std::size_t>(e)]; }
+};
+
+/// Do surfaces already cross at t=0? (DESIGN.md, Start state)
+enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
+const char* toString(StartState state);
+
+/// An edge through a face at t=0 (kind EDGE_FACE: body[0], v[0..1] edge; body[1], v[2..4] face), or a
+/// mesh vertex inside occupied space (body[1] = OBSTACLE_BODY, v[0] the vertex).
+struct StartIntersection {
+  std::array<std::uint16_t, 2> body{0, 0};
+  std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};
+};
+
+enum class BroadPhase : std::uint8_t { CLUSTERED = 0, BRUTE_FORCE = 1, PAPER = 2 };
+
+struct DetectorOptions {
+  AccuracyOptions accuracy;
+  BroadPhase broad_phase = BroadPhase::CLUSTERED;
+  int num_threads = 1;            ///< 1 or more
+  double step_budget_ms = 0;      ///< 0: none
+  bool earliest_only = false;     ///< only the contacts with the earliest TOC cell are returned
+  bool check_start_state = true;  ///< run the static tests when the step needs them
+};
+
+/// A body as the detector sees it; fixed until setBodies is called again.
+struct BodySetup {
+  std::string name;
+  std::shared_ptr<const Topology> topology;
+  bool self_collision = true;
+  bool against_bodies = true;
+  bool against_obstacle = true;
+  double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
+  std::vector<std::uint8_t> vertex_active;  ///< empty: all; 0: the vertex and every feature on it is left out
+};
+
+/// One body's positions at both ends of the step, in the fixed frame [m]. Non-finite ones are unchecked.
+struct BodyMotion {
+  const Positions* t0 = nullptr;
+  const Positions* t1 = nullptr;
+};
+
+/// One step of all bodies, in the order of setBodies.
+struct MotionStep {
+  std::vector<BodyMotion> bodies;
+  std::shared_ptr<const VoxelSurface> obstacle;                         ///< null: none
+  Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();     ///< held for the whole step
+  bool continues = false;  ///< t0 is the t1 of the previous run(), so the start state can be carried over
+};
+
+struct StepResult {
+  std::vector<Contact> contacts;  ///< canonical order (canonicalLess)
+  StartState start_state = StartState::NOT_CHECKED;
+  std::vector<StartIntersection> intersections;
+  bool complete = true;  ///< false: the budget ran out
+  /// complete == false: nothing that was left out can touch before this; otherwise infinity.
+  double unchecked_toc_lower = std::numeric_limits<double>::infinity();
+  StepStats stats;
+
+  /// The earliest possible TOC over contacts, undecided pairs and what was left out; infinity when none.
+  double earliestToc() const;
+};
+
+/// Runs steps. Keeps all scratch; after warm-up a step allocates nothing that grows with the number of steps.
+/// Not thread-safe; its own workers are inside.
+class Detector {
+ public:
+  /// Throws std::invalid_argument naming the option and value that is out of range.
+  explicit Detector(const DetectorOptions& options);
+  ~Detector();
+  const DetectorOptions& options() const;
+  void setOptions(const DetectorOptions& options);  ///< applies from the next step on
+  /// Positions of the first frame guide the order of features in memory; any will do.
+  void setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions);
+  const StepResult& run(const MotionStep& step);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace deformable_ccd

@@ -1,0 +1,81 @@
+// Occupied space of a map as what a mesh can touch: exposed faces, convex edges, corners. No OctoMap here.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "deformable_ccd/contact.h"
+#include "deformable_ccd/topology.h"
+#include "deformable_ccd/types.h"
+
+namespace deformable_ccd {
+
+/// An occupied leaf: a cube of `size` finest voxels a side, its smallest key `min`. Pruned leaves are not expanded.
+struct OccupiedLeaf {
+  VoxelKey min;
+  std::uint32_t size = 1;
+};
+
+/// Coordinate of plane k in the map's frame, in metres; this double is the truth (DESIGN.md, Maps).
+inline double voxelPlane(std::int64_t k, double resolution_m) {
+  return static_cast<double>(k - 32768) * resolution_m;
+}
+
+/// The surface of the occupied space of one map, in the map's frame. Immutable once built.
+class VoxelSurface {
+ public:
+  struct Impl;
+  /// Throws std::invalid_argument naming the value when resolution_m is not finite and > 0 or leaves overlap.
+  static std::shared_ptr<const VoxelSurface> build(double resolution_m, std::vector<OccupiedLeaf> leaves);
+  explicit VoxelSurface(std::unique_ptr<Impl> impl);
+  ~VoxelSurface();
+
+  double resolution() const;            ///< [m]
+  std::size_t leafCount() const;
+  std::size_t faceCount() const;        ///< exposed faces (pieces)
+  std::size_t edgeCount() const;        ///< convex edges (pieces)
+  std::size_t cornerCount() const;
+  std::size_t memoryBytes() const;
+  const Box& bounds() const;            ///< [m], map frame; empty when nothing is occupied
+  /// Leaves, sorted by key.
+  const std::vector<OccupiedLeaf>& leaves() const;
+  /// The leaf that contains the point (closed), or null. Ties on shared planes: the smallest key.
+  const OccupiedLeaf* leafAt(const Vec3& point_map) const;
+  const Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+struct ObstacleStats {
+  std::uint64_t vertex_pairs_in = 0, edge_pairs_in = 0, corner_pairs_in = 0;  ///< candidates past the bounds
+  std::uint64_t vertex_contacts = 0, edge_contacts = 0, corner_contacts = 0;
+  std::uint64_t initial = 0, leaving = 0;
+  double ms = 0;
+};
+
+struct ObstacleOptions {
+  AccuracyOptions accuracy;
+  double minimum_separation_m = 0;  ///< contact when closer than this; conservative only when > 0
+  bool earliest_only = false;
+};
+
+/// One body's step against the surface, in the map's frame. Reusable scratch inside: after warm-up a run
+/// allocates nothing that grows with the number of steps. Not thread-safe; one per thread or body.
+class ObstacleTest {
+ public:
+  explicit ObstacleTest(const ObstacleOptions& options);
+  ~ObstacleTest();
+  /// Appends contacts (body index in Contact::body[0], OBSTACLE_BODY in [1]) in canonical order.
+  /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
+  void run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
+           const std::uint8_t* vertex_active, std::uint16_t body, std::vector<Contact>& contacts,
+           ObstacleStats& stats);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace deformable_ccd
