@@ -1,0 +1,51 @@
+#include "deformable_ccd/topology.h"
+
+#include <gtest/gtest.h>
+
+namespace deformable_ccd {
+namespace {
+
+TEST(Topology, EdgesOfASharedSideAreUnique) {
+  const Topology t = Topology::fromTriangles(4, {{0, 1, 2}, {2, 1, 3}});
+  const std::vector<Edge> expected{{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}};
+  EXPECT_EQ(t.edges(), expected);
+  EXPECT_EQ(t.usedVertices(), (std::vector<Index>{0, 1, 2, 3}));
+}
+
+TEST(Topology, FaceGivenTwiceIsKeptOnceInItsFirstForm) {
+  const Topology t = Topology::fromTriangles(5, {{2, 1, 0}, {0, 1, 2}, {1, 2, 4}});
+  ASSERT_EQ(t.faces().size(), 2u);
+  EXPECT_EQ(t.faces()[0], (Face{2, 1, 0}));
+  EXPECT_EQ(t.usedVertices(), (std::vector<Index>{0, 1, 2, 4})) << "vertex 3 carries no feature";
+}
+
+TEST(Topology, RefusesWhatIsNoMeshAndNamesIt) {
+  try {
+    Topology::fromTriangles(3, {{0, 1, 2}, {0, 1, 7}});
+    FAIL() << "an index out of range was accepted";
+  } catch (const TopologyError& e) {
+    EXPECT_NE(std::string(e.what()).find("face 1 (0, 1, 7)"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("index 7"), std::string::npos) << e.what();
+  }
+  EXPECT_THROW(Topology::fromTriangles(3, {{0, 1, 1}}), TopologyError);
+  EXPECT_THROW(Topology::grid(1, 5), TopologyError);
+  EXPECT_THROW(Topology::grid(70000, 70000), TopologyError);
+  EXPECT_THROW(Topology::polyline(1), TopologyError);
+}
+
+TEST(Topology, GridCountsFollowEuler) {
+  const std::size_t rows = 4, cols = 6;
+  const Topology t = Topology::grid(rows, cols);
+  EXPECT_EQ(t.faces().size(), 2 * (rows - 1) * (cols - 1));
+  // A disc: V - E + F = 1.
+  EXPECT_EQ(t.vertexCount() - t.edges().size() + t.faces().size(), 1u);
+}
+
+TEST(Topology, PolylineHasNoFaces) {
+  const Topology t = Topology::polyline(3);
+  EXPECT_FALSE(t.hasFaces());
+  EXPECT_EQ(t.edges(), (std::vector<Edge>{{0, 1}, {1, 2}}));
+}
+
+}  // namespace
+}  // namespace deformable_ccd
