@@ -24,6 +24,10 @@ struct VoxelKey {
   }
 };
 
+// The package's messages generate classes deformable_ccd::Contact and deformable_ccd::StepStats. The core's own
+// live in an inline namespace, so that code without messages need not care and code with them says core::Contact.
+inline namespace core {
+
 /// One contact. VF: body[0] owns the vertex, body[1] the face. EE: the edge that sorts first is first
 /// (body, then the edge's vertex indices); within an edge the smaller index is first.
 struct Contact {
@@ -39,8 +43,10 @@ struct Contact {
   bool leaving = false;  ///< crossing outwards of what started inside an obstacle
 };
 
+}  // namespace core
+
 /// The canonical order of contacts: kind, bodies, vertex indices, voxel; independent of threads and targets.
-inline bool canonicalLess(const Contact& a, const Contact& b) {
+inline bool canonicalLess(const core::Contact& a, const core::Contact& b) {
   return std::tie(a.kind, a.body, a.vertex, a.voxel, a.toc_lower) <
          std::tie(b.kind, b.body, b.vertex, b.voxel, b.toc_lower);
 }

@@ -29,6 +29,8 @@ struct StageStats {
   double ms = 0;
 };
 
+inline namespace core {  // see contact.h
+
 struct StepStats {
   std::array<StageStats, static_cast<std::size_t>(Stage::COUNT)> stages{};
   std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effects{};
@@ -42,6 +44,8 @@ struct StepStats {
   const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
   StageStats& operator[](Effect e) { return effects[static_cast<std::size_t>(e)]; }
 };
+
+}  // namespace core
 
 /// Do surfaces already cross at t=0? (DESIGN.md, Start state)
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
@@ -91,13 +95,13 @@ struct MotionStep {
 };
 
 struct StepResult {
-  std::vector<Contact> contacts;  ///< canonical order (canonicalLess)
+  std::vector<core::Contact> contacts;  ///< canonical order (canonicalLess)
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
   bool complete = true;  ///< false: the budget ran out
   /// complete == false: nothing that was left out can touch before this; otherwise infinity.
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
-  StepStats stats;
+  core::StepStats stats;
 
   /// The earliest possible TOC over contacts, undecided pairs and what was left out; infinity when none.
   double earliestToc() const;

@@ -70,7 +70,7 @@ class ObstacleTest {
   /// Appends contacts (body index in Contact::body[0], OBSTACLE_BODY in [1]) in canonical order.
   /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
   void run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
-           const std::uint8_t* vertex_active, std::uint16_t body, std::vector<Contact>& contacts,
+           const std::uint8_t* vertex_active, std::uint16_t body, std::vector<core::Contact>& contacts,
            ObstacleStats& stats);
 
  private:
