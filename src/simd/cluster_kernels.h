@@ -1,0 +1,66 @@
+// Kernels of the clustered broad phase over raw arrays (DESIGN.md, "Two forms of the same filter", clustered form).
+//
+// Every vertex has a record of 16 int16: its projections onto the 8 directions at t0, then at t1. Sixteen nodes
+// (features, or groups of the level below) form a group, stored as structure of arrays:
+//   soa[k * 16 + lane]        smallest record value k of the node in that lane  (k < 16)
+//   soa[256 + k * 16 + lane]  largest
+// and as the bounds of the group itself: aos[k] smallest, aos[16 + k] largest. Unused lanes are empty
+// (smallest EMPTY_LO, largest EMPTY_HI) and separated from everything.
+//
+// Why the test on quantised numbers is conservative: a record value is a composition of monotone non-decreasing
+// functions of the exact projection n.x of the vertex: one rounded sum, minus a constant, times a positive constant,
+// plus a constant, truncated. So q(a) > q(b) implies n.a > n.b exactly, with no margin at all. A node's smallest and
+// largest value are attained by its vertices. If all of A's values exceed all of B's strictly, at t0 and at t1,
+// then every vertex difference keeps its sign over the step (it is linear in t), and so do convex combinations of
+// them: the features never meet (paper, Corollary 2).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace deformable_ccd {
+namespace simd {
+
+constexpr std::size_t GROUP = 16;         ///< nodes in a group
+constexpr std::size_t DIRECTIONS = 8;     ///< x, y, z, x+y, x+z, y+z, x-y, y-z
+constexpr std::size_t RECORD = 16;        ///< int16 of a vertex
+constexpr std::size_t SOA_SIZE = 512;     ///< int16 of a group
+constexpr std::size_t AOS_SIZE = 32;      ///< int16 of a group's bounds
+constexpr std::int16_t EMPTY_LO = 32767;  ///< larger than any record value
+constexpr std::int16_t EMPTY_HI = -32767; ///< smaller than any record value
+constexpr double RECORD_RANGE = 65528.0;  ///< record values lie in [-32764, 32764]
+
+/// Smallest and largest projection per direction over both times. vertices: n x 8 doubles (x0 y0 z0 0 x1 y1 z1 0).
+/// min8 and max8 are read first, so that calls over pieces can be chained.
+void projectionBounds(const double* vertices, std::size_t n, double* min8, double* max8);
+
+/// Records of n vertices: trunc((projection - low[d]) * scale[d]) - 32764, scale > 0, low <= every projection.
+void quantize(const double* vertices, std::size_t n, const double* low8, const double* scale8, std::int16_t* records);
+
+/// Groups of features with `arity` vertices each (1 to 3). indices: count x arity, UINT32_MAX in the first place
+/// marks an empty lane; count is a multiple of 16. margin16: widens both sides of value k (minimum separation), or null.
+void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos);
+
+/// Groups of the level above: child_aos holds child_count bounds; groups are filled up with empty lanes.
+void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos);
+
+/// One level of a tree for testGroupPairs.
+struct GroupsView {
+  const std::int16_t* soa;
+  const std::int16_t* aos;
+};
+
+/// Which (lane i, lane j) to report for a pair of a group with itself.
+enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UPPER = 2 };
+
+/// Linear filter between the nodes of each group pair (a[2p], b[2p+1]). Writes the surviving node pairs as
+/// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs), stops before it could overflow.
+/// diagonal applies to pairs with equal indices when self is true. times: 2 tests t0 and t1, 1 tests t0 alone.
+/// Returns the number of pairs written; *consumed is the number of group pairs done.
+std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs, std::size_t count,
+                           bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out, std::size_t capacity,
+                           std::size_t* consumed);
+
+}  // namespace simd
+}  // namespace deformable_ccd

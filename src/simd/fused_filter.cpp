@@ -1,0 +1,189 @@
+#include "simd/fused_filter.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "simd/fused_filter.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace deformable_ccd {
+namespace simd {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using DF = hn::CappedTag<float, 16>;
+using VF = hn::Vec<DF>;
+constexpr size_t MAX_LANES = 16;
+constexpr float UNIT = 1.0f / 16777216.0f;            // 2^-24
+constexpr float UNDERFLOW_MARGIN = 7.888609e-31f;     // 2^-100
+constexpr float LARGEST_M = 1073741824.0f;            // 2^30
+
+struct Vec3V {
+  VF x, y, z;
+};
+
+HWY_INLINE Vec3V operator+(const Vec3V& a, const Vec3V& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+HWY_INLINE Vec3V cross(const Vec3V& a, const Vec3V& b) {
+  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+HWY_INLINE VF dot(const Vec3V& a, const Vec3V& b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+
+// A quadratic vector in (unscaled) Bernstein form: values at t=0 and t=1 and twice the middle coefficient.
+struct Quadratic {
+  Vec3V A, B, C;
+};
+HWY_INLINE Quadratic cross(const Vec3V& a0, const Vec3V& a1, const Vec3V& b0, const Vec3V& b1) {
+  return {cross(a0, b0), cross(a0, b1) + cross(a1, b0), cross(a1, b1)};
+}
+HWY_INLINE Quadratic operator+(const Quadratic& p, const Quadratic& q) { return {p.A + q.A, p.B + q.B, p.C + q.C}; }
+
+// Smallest and largest coefficient of one scalar quadratic.
+struct Range {
+  VF lo, hi;
+};
+HWY_INLINE Range rangeOf(VF a, VF b, VF c) {
+  return {hn::Min(hn::Min(a, b), c), hn::Max(hn::Max(a, b), c)};
+}
+
+// Largest lower end and smallest upper end over the four quantities: opposite strict signs when both are beyond the margin.
+struct Opposite {
+  VF largest_lo, smallest_hi;
+  HWY_INLINE void add(const Range& r) {
+    largest_lo = hn::Max(largest_lo, r.lo);
+    smallest_hi = hn::Min(smallest_hi, r.hi);
+  }
+};
+
+template <bool EDGE_EDGE, class Component>
+HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const Quadratic& ab, const Quadratic& T,
+                                 const Component& component, VF margin) {
+  const DF d;
+  const auto range = [&](const Quadratic& q) { return rangeOf(component(q.A), component(q.B), component(q.C)); };
+  const Range first = range(bc);
+  Opposite o{first.lo, first.hi};
+  o.add(range(ca));
+  const Range r = range(ab);
+  o.add(EDGE_EDGE ? Range{hn::Neg(r.hi), hn::Neg(r.lo)} : r);
+  o.add(range(T));
+  (void)d;
+  return hn::And(hn::Gt(o.largest_lo, margin), hn::Lt(o.smallest_hi, hn::Neg(margin)));
+}
+
+// Differences to the origin point, rounded once in double and once to float: out[(time * 3 + point) * 3 + axis][lane].
+template <bool EDGE_EDGE>
+HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
+                       float (*HWY_RESTRICT out)[MAX_LANES]) {
+  const double* o = vertices + size_t{quad[EDGE_EDGE ? 3 : 0]} * 8;
+  for (size_t i = 0; i < 3; ++i) {
+    const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
+    for (size_t t = 0; t < 2; ++t) {
+      for (size_t k = 0; k < 3; ++k) out[(t * 3 + i) * 3 + k][lane] = static_cast<float>(v[4 * t + k] - o[4 * t + k]);
+    }
+  }
+}
+
+template <bool EDGE_EDGE>
+HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[MAX_LANES], FusedPlanes planes) {
+  const DF d;
+  Vec3V p[2][3];
+  VF M = hn::Zero(d);
+  for (size_t t = 0; t < 2; ++t) {
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t row = (t * 3 + i) * 3;
+      p[t][i] = {hn::Load(d, in[row]), hn::Load(d, in[row + 1]), hn::Load(d, in[row + 2])};
+      M = hn::Max(M, hn::Max(hn::Max(hn::Abs(p[t][i].x), hn::Abs(p[t][i].y)), hn::Abs(p[t][i].z)));
+    }
+  }
+  const VF tiny = hn::Set(d, UNDERFLOW_MARGIN);
+  const VF M_sq = hn::Mul(M, M);
+  const VF margin = hn::Add(hn::Mul(hn::Set(d, 128 * UNIT), M_sq), tiny);
+
+  const Quadratic bc = cross(p[0][1], p[1][1], p[0][2], p[1][2]);
+  const Quadratic ca = cross(p[0][2], p[1][2], p[0][0], p[1][0]);
+  const Quadratic ab = cross(p[0][0], p[1][0], p[0][1], p[1][1]);
+  const Quadratic bc_ca = bc + ca;
+  const Quadratic T = bc_ca + ab;
+
+  // Non-penetration.
+  const VF f0 = dot(p[0][0], bc.A);
+  const VF f1 = hn::Add(dot(p[1][0], bc.A), dot(p[0][0], bc.B));
+  const VF f2 = hn::Add(dot(p[1][0], bc.B), dot(p[0][0], bc.C));
+  const VF f3 = dot(p[1][0], bc.C);
+  const VF cubic_margin = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 192 * UNIT), M_sq), M), tiny);
+  const VF f_lo = hn::Min(hn::Min(f0, f1), hn::Min(f2, f3)), f_hi = hn::Max(hn::Max(f0, f1), hn::Max(f2, f3));
+  auto out = hn::Or(hn::Gt(f_lo, cubic_margin), hn::Lt(f_hi, hn::Neg(cubic_margin)));
+
+  out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.x; }, margin));
+  out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.y; }, margin));
+  out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.z; }, margin));
+  if (planes != FusedPlanes::COORDINATE) {
+    const Quadratic& N = EDGE_EDGE ? bc_ca : T;
+    const Vec3V n = N.A + N.B + N.C;
+    const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
+    const VF adaptive_margin = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 128 * UNIT), M_sq), size), tiny);
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return dot(n, v); }, adaptive_margin));
+  }
+  if (planes == FusedPlanes::ALL && !hn::AllTrue(d, out)) {
+    const VF two = hn::Mul(hn::Set(d, 2.0f), margin), three = hn::Mul(hn::Set(d, 3.0f), margin);
+    const auto plus = [](VF a, VF b) { return hn::Add(a, b); };
+    const auto minus = [](VF a, VF b) { return hn::Sub(a, b); };
+    // Normals of the paper's planes Z|X+Y, X-Y|Z, Y+Z|X+Z, X+Y|Y-Z, Y-Z|X-Y (Fig. 8), up to sign.
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return minus(v.x, v.y); }, two));
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return plus(v.x, v.y); }, two));
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return minus(plus(v.x, v.y), v.z); }, three));
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return plus(minus(v.y, v.x), v.z); }, three));
+    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return plus(plus(v.x, v.y), v.z); }, three));
+  }
+  return hn::And(out, hn::Le(M, hn::Set(d, LARGEST_M)));
+}
+
+template <bool EDGE_EDGE>
+HWY_INLINE size_t filterAll(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quads, size_t count,
+                            FusedPlanes planes, uint32_t* HWY_RESTRICT kept) {
+  const DF d;
+  const size_t lanes = hn::Lanes(d);
+  HWY_ALIGN_MAX float in[18][MAX_LANES] = {};
+  size_t out = 0;
+  for (size_t first = 0; first < count; first += lanes) {
+    const size_t n = count - first < lanes ? count - first : lanes;
+    for (size_t lane = 0; lane < n; ++lane) gather<EDGE_EDGE>(vertices, quads + 4 * (first + lane), lane, in);
+    uint8_t bits[8] = {0};
+    hn::StoreMaskBits(d, rejected<EDGE_EDGE>(in, planes), bits);
+    for (size_t lane = 0; lane < n; ++lane) {
+      kept[out] = static_cast<uint32_t>(first + lane);
+      out += 1 - ((bits[lane / 8] >> (lane % 8)) & 1);
+    }
+  }
+  return out;
+}
+
+size_t FusedFilterVf(const double* vertices, const uint32_t* quads, size_t count, FusedPlanes planes, uint32_t* kept) {
+  return filterAll<false>(vertices, quads, count, planes, kept);
+}
+size_t FusedFilterEe(const double* vertices, const uint32_t* quads, size_t count, FusedPlanes planes, uint32_t* kept) {
+  return filterAll<true>(vertices, quads, count, planes, kept);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace simd
+}  // namespace deformable_ccd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace deformable_ccd {
+namespace simd {
+HWY_EXPORT(FusedFilterVf);
+HWY_EXPORT(FusedFilterEe);
+std::size_t fusedFilter(const double* vertices, const std::uint32_t* quads, std::size_t count, bool edge_edge,
+                        FusedPlanes planes, std::uint32_t* kept) {
+  return edge_edge ? HWY_DYNAMIC_DISPATCH(FusedFilterEe)(vertices, quads, count, planes, kept)
+                   : HWY_DYNAMIC_DISPATCH(FusedFilterVf)(vertices, quads, count, planes, kept);
+}
+}  // namespace simd
+}  // namespace deformable_ccd
+#endif
