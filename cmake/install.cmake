@@ -1,0 +1,32 @@
+# The install tree works without the source: libraries, tools, headers, launch files, configurations.
+include(GNUInstallDirs)
+set(LIBRARY_TARGETS deformable_ccd)
+foreach(library deformable_ccd_octomap deformable_ccd_ros)
+  if(TARGET ${library})
+    list(APPEND LIBRARY_TARGETS ${library})
+  endif()
+endforeach()
+
+if(DEFORMABLE_CCD_CORE_ONLY)
+  install(TARGETS ${LIBRARY_TARGETS} ${TOOL_TARGETS})
+  install(DIRECTORY include/deformable_ccd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+  return()
+endif()
+
+install(TARGETS ${LIBRARY_TARGETS}
+  ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
+if(TOOL_TARGETS)
+  install(TARGETS ${TOOL_TARGETS} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endif()
+install(DIRECTORY include/ DESTINATION ${CATKIN_GLOBAL_INCLUDE_DESTINATION} FILES_MATCHING PATTERN "*.h")
+foreach(folder launch config)
+  if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/${folder})
+    install(DIRECTORY ${folder}/ DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/${folder})
+  endif()
+endforeach()
+file(GLOB PLUGIN_FILES CONFIGURE_DEPENDS *_plugin.xml *_plugins.xml)
+if(PLUGIN_FILES)
+  install(FILES ${PLUGIN_FILES} DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+endif()

@@ -1,0 +1,31 @@
+# Scenes with known contacts (src/scene/*.cpp: no dependency but the core), and the physics that records moving ones
+# (src/scene/physics: Bullet soft bodies in double precision, never part of the node).
+file(GLOB SCENE_SOURCES CONFIGURE_DEPENDS src/scene/*.cpp)
+if(SCENE_SOURCES)
+  add_library(deformable_ccd_scene STATIC ${SCENE_SOURCES})
+  target_include_directories(deformable_ccd_scene PUBLIC src)
+  target_link_libraries(deformable_ccd_scene PUBLIC deformable_ccd)
+endif()
+
+file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)
+if(NOT DEFORMABLE_CCD_CORE_ONLY AND PHYSICS_SOURCES)
+  # Two builds of Bullet can be installed side by side; single precision would make the recorded cloth jitter.
+  find_package(PkgConfig REQUIRED)
+  pkg_check_modules(BULLET_DOUBLE QUIET IMPORTED_TARGET bullet-float64)
+  if(NOT BULLET_DOUBLE_FOUND)
+    pkg_check_modules(BULLET_DOUBLE QUIET IMPORTED_TARGET bullet)
+    if(NOT "${BULLET_DOUBLE_CFLAGS}" MATCHES "BT_USE_DOUBLE_PRECISION")
+      set(BULLET_DOUBLE_FOUND FALSE)
+    endif()
+  endif()
+  find_package(yaml-cpp REQUIRED)
+  if(BULLET_DOUBLE_FOUND)
+    add_library(deformable_ccd_physics STATIC ${PHYSICS_SOURCES})
+    target_include_directories(deformable_ccd_physics PUBLIC src)
+    # Bullet's headers raise warnings of their own under -Wextra.
+    target_include_directories(deformable_ccd_physics SYSTEM PRIVATE ${BULLET_DOUBLE_INCLUDE_DIRS})
+    target_link_libraries(deformable_ccd_physics PUBLIC deformable_ccd PRIVATE PkgConfig::BULLET_DOUBLE yaml-cpp)
+  else()
+    message(STATUS "No Bullet in double precision: make_scene_bag is left out")
+  endif()
+endif()

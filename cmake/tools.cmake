@@ -1,0 +1,12 @@
+# Tools that need the core alone. Every other file in src/apps is built by ros.cmake.
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+set(CORE_TOOLS check_step run_queries)
+foreach(tool ${CORE_TOOLS})
+  if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/src/apps/${tool}.cpp)
+    add_executable(${tool} src/apps/${tool}.cpp)
+    target_include_directories(${tool} PRIVATE src)
+    target_link_libraries(${tool} deformable_ccd CLI11::CLI11 nlohmann_json::nlohmann_json)
+    list(APPEND TOOL_TARGETS ${tool})
+  endif()
+endforeach()
