@@ -1,0 +1,31 @@
+// The tiers of the exact rung one by one. Each answers CONTACT (with the TOC's cell), NO_CONTACT or UNDECIDED; which one
+// answers first changes nothing in the answer. Rounding must be to nearest, denormals on.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "deformable_ccd/elementary.h"
+
+namespace deformable_ccd {
+namespace exact {
+
+/// Bits per coordinate, after scaling the pair to integers, up to which the fixed-width integers are wide enough.
+constexpr int FIXED_INTEGER_LIMBS = 64;
+constexpr int FIXED_INTEGER_MAX_BITS = (64 * FIXED_INTEGER_LIMBS - 66) / 18;
+
+/// The result that says contact in cell k of the 2^-toc_bits grid; k = 2^toc_bits means a TOC of exactly 1.
+ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier);
+ElementaryResult noContact(Tier tier);
+ElementaryResult undecided(Tier tier);
+
+ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int toc_bits);
+ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
+ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
+
+/// One tier alone, for tests and for measuring what each is worth. Throws std::invalid_argument for a tier that does
+/// not exist or a kind that is not VERTEX_FACE or EDGE_EDGE.
+ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair, int toc_bits);
+
+}  // namespace exact
+}  // namespace deformable_ccd
