@@ -3,15 +3,18 @@
 # In a catkin workspace tests are built by the target `tests`, not by `all`, as catkin users expect.
 find_package(GTest REQUIRED)
 find_package(rapidcheck QUIET)
+find_package(ZLIB REQUIRED)
 enable_testing()
 
 file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS test/support/*.cpp)
+list(REMOVE_ITEM SUPPORT_SOURCES ${ORACLE_SOURCES})
 add_library(deformable_ccd_test_support STATIC EXCLUDE_FROM_ALL ${SUPPORT_SOURCES})
 target_include_directories(deformable_ccd_test_support PUBLIC src test)
 target_compile_definitions(deformable_ccd_test_support PUBLIC
   DEFORMABLE_CCD_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
 target_link_libraries(deformable_ccd_test_support PUBLIC
-  deformable_ccd GTest::gtest TBB::tbb nlohmann_json::nlohmann_json ${HWY_LIBRARY} ${GMP_LIBRARY})
+  deformable_ccd_oracle deformable_ccd GTest::gtest ZLIB::ZLIB TBB::tbb nlohmann_json::nlohmann_json ${HWY_LIBRARY}
+  ${GMP_LIBRARY})
 if(TARGET deformable_ccd_scene)
   target_link_libraries(deformable_ccd_test_support PUBLIC deformable_ccd_scene)
 endif()
