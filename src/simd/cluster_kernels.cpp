@@ -52,8 +52,9 @@ void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_R
   for (size_t i = 0; i < 2 * n; ++i) {
     project(vertices + 4 * i, p);
     for (size_t d = 0; d < 8; d += hn::Lanes(dd)) {
-      const auto centred = hn::Mul(hn::Sub(hn::Load(dd, p + d), hn::LoadU(dd, low8 + d)), hn::LoadU(dd, scale8 + d));
-      hn::Store(hn::DemoteTo(di, centred), di, q + d);
+      const auto value = hn::Mul(hn::Sub(hn::Load(dd, p + d), hn::LoadU(dd, low8 + d)), hn::LoadU(dd, scale8 + d));
+      // A sum that overflowed meets a scale of 0 only; the direction then says nothing about any vertex.
+      hn::Store(hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(value, value), value)), di, q + d);
     }
     for (int d = 0; d < 8; ++d) records[8 * i + d] = static_cast<int16_t>(q[d] - 32764);
   }

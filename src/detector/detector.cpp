@@ -1,0 +1,381 @@
+#include "deformable_ccd/detector.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "detector/float_mode.h"
+#include "detector/hit_order.h"
+#include "detector/pair_worker.h"
+#include "detector/scene_arrays.h"
+#include "detector/start_state.h"
+
+namespace deformable_ccd {
+namespace {
+
+constexpr std::size_t TASK_SUPERCLUSTERS = 16;  // supercluster pairs in a unit of work: about a millisecond
+constexpr std::size_t PIECE = 256;              // groups or vertices x 16 in a unit of refitting
+
+FeatureKind firstKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
+FeatureKind secondKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
+
+void check(const DetectorOptions& o) {
+  const auto refuse = [](const std::string& text) { throw std::invalid_argument(text); };
+  if (o.num_threads < 1 || o.num_threads > 1024) {
+    refuse("num_threads = " + std::to_string(o.num_threads) + " is out of range; 1 to 1024");
+  }
+  if (!(o.step_budget_ms >= 0) || !std::isfinite(o.step_budget_ms)) {
+    refuse("step_budget_ms = " + std::to_string(o.step_budget_ms) + " is out of range; 0 (none) or a positive time");
+  }
+}
+
+}  // namespace
+
+const char* toString(Stage stage) {
+  static const char* const NAMES[] = {"record", "bounds", "broad_phase", "planar", "elementary", "obstacle", "start_state", "sort"};
+  return NAMES[static_cast<std::size_t>(stage)];
+}
+const char* toString(Effect effect) {
+  static const char* const NAMES[] = {"self_collision", "body_body", "obstacle", "start_state"};
+  return NAMES[static_cast<std::size_t>(effect)];
+}
+const char* toString(StartState state) {
+  static const char* const NAMES[] = {"CLEAR", "INTERSECTING", "NOT_CHECKED"};
+  return NAMES[static_cast<std::size_t>(state)];
+}
+
+double StepResult::earliestToc() const {
+  double earliest = unchecked_toc_lower;
+  for (const core::Contact& c : contacts) earliest = std::min(earliest, c.toc_lower);
+  return earliest;
+}
+
+struct Detector::Impl {
+  explicit Impl(const DetectorOptions& o) { setOptions(o); }
+
+  void setOptions(const DetectorOptions& o) {
+    check(o);
+    std::unique_ptr<ElementaryTest> test;
+    if (o.accuracy.rung != Accuracy::SCREEN) test = makeElementaryTest(o.accuracy);
+    checkSeparation(o, scene.largestSeparation());
+    if (!arena || o.num_threads != options.num_threads) arena.emplace(o.num_threads);
+    elementary = std::move(test);
+    options = o;
+    obstacle_tests.clear();
+  }
+
+  static void checkSeparation(const DetectorOptions& o, double separation) {
+    if (separation > 0 && o.accuracy.rung != Accuracy::CONSERVATIVE && o.accuracy.rung != Accuracy::SCREEN) {
+      throw std::invalid_argument(std::string("accuracy = ") + toString(o.accuracy.rung) + " with minimum_separation_m = " +
+                                  std::to_string(separation) + "; a separation above 0 needs accuracy = conservative");
+    }
+  }
+
+  const StepResult& run(const MotionStep& step);
+  void findPairs(const StepContext& context);
+  void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
+  void runPairs(StepContext& context);
+  void runObstacle(const MotionStep& step);
+  void collect();
+  const Positions& inMap(const MotionStep& step, const Positions& fixed, Positions& scratch) const;
+  template <class Body>
+  void parallel(std::size_t n, std::size_t piece, const Body& body);
+
+  DetectorOptions options;
+  std::unique_ptr<ElementaryTest> elementary;
+  std::optional<tbb::task_arena> arena;
+  SceneArrays scene;
+  tbb::enumerable_thread_specific<PairWorker> workers;
+  std::vector<PairTask> tasks;
+  std::vector<std::uint32_t> group_pairs, found_groups, scratch;
+  std::vector<std::uint32_t> body_pairs;
+  HitOrder order;
+  StartStateTest start_state;
+  std::vector<std::unique_ptr<ObstacleTest>> obstacle_tests;
+  Positions map_t0, map_t1;
+  std::vector<std::uint8_t> obstacle_active;
+  StepResult result;
+};
+
+template <class Body>
+void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body) {
+  if (options.num_threads == 1 || n <= piece) {
+    body(0, n);
+    return;
+  }
+  arena->execute([&] {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece), [&](const tbb::blocked_range<std::size_t>& r) {
+      const ScopedFloatMode mode;
+      body(r.begin(), r.end());
+    }, tbb::simple_partitioner());
+  });
+}
+
+const StepResult& Detector::Impl::run(const MotionStep& step) {
+  const ScopedFloatMode mode;
+  const Clock::time_point begin = Clock::now();
+  result.contacts.clear();
+  result.intersections.clear();
+  result.start_state = StartState::NOT_CHECKED;
+  result.complete = true;
+  result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
+  result.stats = core::StepStats();
+  core::StepStats& stats = result.stats;
+
+  Clock::time_point start = Clock::now();
+  scene.record(step, stats);
+  stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
+
+  start = Clock::now();
+  scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); });
+  stats[Stage::BOUNDS].ms = msSince(start);
+
+  if (options.check_start_state) {
+    start = Clock::now();
+    result.intersections = start_state.run(scene, step.continues, stats);
+    result.start_state = result.intersections.empty() ? StartState::CLEAR : StartState::INTERSECTING;
+    stats[Stage::START_STATE].ms += msSince(start);
+  }
+
+  StepContext context;
+  context.scene = &scene;
+  context.elementary = elementary.get();
+  context.earliest_only = options.earliest_only;
+  if (options.step_budget_ms > 0) {
+    context.deadline = begin + std::chrono::duration_cast<Clock::duration>(
+                                   std::chrono::duration<double, std::milli>(options.step_budget_ms));
+  }
+  for (PairWorker& w : workers) w.beginStep();
+  findPairs(context);
+  runPairs(context);
+  collect();
+  if (step.obstacle) runObstacle(step);
+  if (options.earliest_only && !result.contacts.empty()) {
+    double best = 2;
+    for (const core::Contact& c : result.contacts) {
+      if (c.certainty == Certainty::CERTAIN) best = std::min(best, c.toc_upper);
+    }
+    auto late = [&](const core::Contact& c) { return c.toc_lower > best || (c.certainty == Certainty::CERTAIN && c.toc_upper > best); };
+    result.contacts.erase(std::remove_if(result.contacts.begin(), result.contacts.end(), late), result.contacts.end());
+  }
+  if (options.check_start_state) {
+    start = Clock::now();
+    // With earliest_only the later contacts are unknown, so nothing may be concluded about the end of the step.
+    start_state.remember(scene, result.contacts, result.complete && !options.earliest_only && stats.unchecked_vertices == 0);
+    stats[Stage::START_STATE].ms += msSince(start);
+  }
+  stats.total_ms = msSince(begin);
+  return result;
+}
+
+void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context) {
+  const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
+  if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
+  const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
+  PairTask task{kind, a, b, a == b, 0, 0};
+  if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
+    tasks.push_back(task);
+    return;
+  }
+  const TreePair trees{&ta, &tb, same_tree, false};
+  superclusterPairs(trees, found_groups, scratch);
+  if (context.deadline != Clock::time_point::max()) {
+    // What the deadline leaves over should be what can touch last.
+    std::vector<std::array<std::uint32_t, 2>> pairs(found_groups.size() / 2);
+    for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i] = {found_groups[2 * i], found_groups[2 * i + 1]};
+    std::stable_sort(pairs.begin(), pairs.end(), [&](const auto& x, const auto& y) {
+      return superclusterTocBound(trees, x[0], x[1]) < superclusterTocBound(trees, y[0], y[1]);
+    });
+    for (std::size_t i = 0; i < pairs.size(); ++i) std::copy(pairs[i].begin(), pairs[i].end(), &found_groups[2 * i]);
+  }
+  const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
+  const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);
+  group_pairs.insert(group_pairs.end(), found_groups.begin(), found_groups.end());
+  for (std::uint32_t first = 0; first < count; first += TASK_SUPERCLUSTERS) {
+    task.first = base + first;
+    task.last = base + std::min<std::uint32_t>(count, first + TASK_SUPERCLUSTERS);
+    tasks.push_back(task);
+  }
+}
+
+void Detector::Impl::findPairs(const StepContext& context) {
+  const Clock::time_point start = Clock::now();
+  tasks.clear();
+  group_pairs.clear();
+  const std::size_t n = scene.bodies().size();
+  for (std::size_t b = 0; b < n; ++b) {
+    if (!scene.bodies()[b].setup.self_collision) continue;
+    const std::uint16_t i = static_cast<std::uint16_t>(b);
+    addTasks(PairKind::VERTEX_FACE, i, i, context);
+    addTasks(PairKind::EDGE_EDGE, i, i, context);
+  }
+  if (n > 1) {
+    // The upper level of the hierarchy: bodies against bodies, by the same test.
+    body_pairs.assign({0, 0});
+    for (std::size_t l = scene.bodyLevels(); l-- > 0;) {
+      const simd::GroupsView view = scene.bodyLevel(l).view();
+      scratch.clear();
+      std::size_t done = 0;
+      while (done < body_pairs.size() / 2) {
+        constexpr std::size_t STEP = 4096;
+        const std::size_t used = scratch.size();
+        scratch.resize(used + 2 * STEP);
+        std::size_t consumed = 0;
+        const std::size_t found = simd::testGroupPairs(
+            view, view, body_pairs.data() + 2 * done, body_pairs.size() / 2 - done, true,
+            l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, false, scratch.data() + used, STEP,
+            &consumed);
+        scratch.resize(used + 2 * found);
+        done += consumed;
+      }
+      std::swap(body_pairs, scratch);
+    }
+    for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
+      const std::uint16_t a = static_cast<std::uint16_t>(std::min(body_pairs[p], body_pairs[p + 1]));
+      const std::uint16_t b = static_cast<std::uint16_t>(std::max(body_pairs[p], body_pairs[p + 1]));
+      if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
+      addTasks(PairKind::VERTEX_FACE, a, b, context);
+      addTasks(PairKind::VERTEX_FACE, b, a, context);
+      addTasks(PairKind::EDGE_EDGE, a, b, context);
+    }
+  }
+  result.stats[Stage::BROAD_PHASE].ms += msSince(start);
+}
+
+void Detector::Impl::runPairs(StepContext& context) {
+  parallel(tasks.size(), 1, [&](std::size_t first, std::size_t last) {
+    PairWorker& worker = workers.local();
+    for (std::size_t t = first; t < last; ++t) {
+      if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
+        worker.runBruteForce(context, tasks[t]);
+      } else {
+        worker.run(context, tasks[t], group_pairs, tasks[t].first, tasks[t].last);
+      }
+    }
+  });
+  result.complete = !context.expired;
+}
+
+void Detector::Impl::collect() {
+  const Clock::time_point start = Clock::now();
+  core::StepStats& stats = result.stats;
+  std::vector<const std::vector<Hit>*> parts;
+  for (const PairWorker& w : workers) {
+    for (std::size_t s = 0; s < stats.stages.size(); ++s) {
+      stats.stages[s].in += w.stats().stages[s].in;
+      stats.stages[s].out += w.stats().stages[s].out;
+      stats.stages[s].ms += w.stats().stages[s].ms;
+    }
+    for (std::size_t e = 0; e < stats.effects.size(); ++e) {
+      stats.effects[e].in += w.stats().effects[e].in;
+      stats.effects[e].out += w.stats().effects[e].out;
+      stats.effects[e].ms += w.stats().effects[e].ms;
+    }
+    stats.tiers += w.stats().tiers;
+    stats.undecided += w.stats().undecided;
+    stats.vf_candidates += w.stats().vf_candidates;
+    stats.ee_candidates += w.stats().ee_candidates;
+    result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
+  }
+  for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
+    parts.clear();
+    for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
+    const std::vector<const Hit*>& sorted = order.sort(parts);
+    const std::size_t base = result.contacts.size();
+    result.contacts.resize(base + sorted.size());
+    const std::size_t n_first = kind == PairKind::VERTEX_FACE ? 1 : 2, n_second = kind == PairKind::VERTEX_FACE ? 3 : 2;
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      const Hit& hit = *sorted[i];
+      const auto first = scene.ranked(firstKind(kind), static_cast<Index>(hit.key >> 32));
+      const auto second = scene.ranked(secondKind(kind), static_cast<Index>(hit.key));
+      core::Contact& c = result.contacts[base + i];
+      c = core::Contact();
+      c.kind = kind;
+      c.toc_lower = hit.toc_lower;
+      c.toc_upper = hit.toc_upper;
+      c.certainty = hit.certainty;
+      c.body = {first.body, second.body};
+      std::copy_n(first.v, n_first, c.vertex.begin());
+      std::copy_n(second.v, n_second, c.vertex.begin() + n_first);
+    }
+  }
+  stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
+}
+
+const Positions& Detector::Impl::inMap(const MotionStep& step, const Positions& fixed, Positions& out) const {
+  if (step.map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix()) return fixed;
+  out.resize(fixed.size());
+  const Eigen::Matrix3d R = step.map_from_fixed.linear();
+  const Vec3 p = step.map_from_fixed.translation();
+  for (std::size_t i = 0; i < fixed.size(); ++i) out[i] = R * fixed[i] + p;
+  return out;
+}
+
+void Detector::Impl::runObstacle(const MotionStep& step) {
+  const Clock::time_point start = Clock::now();
+  const std::size_t n = scene.bodies().size();
+  obstacle_tests.resize(n);
+  ObstacleStats total;
+  const std::size_t before = result.contacts.size();
+  for (std::size_t b = 0; b < n; ++b) {
+    const SceneBody& body = scene.bodies()[b];
+    if (!body.setup.against_obstacle) continue;
+    if (!obstacle_tests[b]) {
+      ObstacleOptions o;
+      o.accuracy = options.accuracy;
+      o.minimum_separation_m = body.setup.minimum_separation_m;
+      obstacle_tests[b] = std::make_unique<ObstacleTest>(o);
+    }
+    const std::uint8_t* active = nullptr;
+    if (body.masked) {
+      obstacle_active.assign(body.setup.topology->vertexCount(), 0);
+      for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];
+      active = obstacle_active.data();
+    }
+    obstacle_tests[b]->run(*step.obstacle, *body.setup.topology, inMap(step, *step.bodies[b].t0, map_t0),
+                           inMap(step, *step.bodies[b].t1, map_t1), active, static_cast<std::uint16_t>(b), result.contacts,
+                           total);
+  }
+  const std::uint64_t in = total.vertex_pairs_in + total.edge_pairs_in + total.corner_pairs_in;
+  const std::uint64_t out = result.contacts.size() - before;
+  result.stats[Stage::OBSTACLE] = {in, out, msSince(start)};
+  result.stats[Effect::OBSTACLE] = result.stats[Stage::OBSTACLE];
+  for (std::size_t i = before; i < result.contacts.size(); ++i) {
+    const core::Contact& c = result.contacts[i];
+    result.stats.initial += c.initial;
+    result.stats.leaving += c.leaving;
+    result.stats.undecided += c.certainty == Certainty::UNDECIDED;
+    if (c.initial && options.check_start_state) {
+      result.start_state = StartState::INTERSECTING;
+      if (c.kind == PairKind::VERTEX_VOXEL_FACE) {
+        StartIntersection s;
+        s.body = {c.body[0], OBSTACLE_BODY};
+        s.vertex[0] = c.vertex[0];
+        result.intersections.push_back(s);
+      }
+    }
+  }
+}
+
+Detector::Detector(const DetectorOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+Detector::~Detector() = default;
+const DetectorOptions& Detector::options() const { return impl_->options; }
+void Detector::setOptions(const DetectorOptions& options) { impl_->setOptions(options); }
+
+void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions) {
+  double separation = 0;
+  for (const BodySetup& b : bodies) separation = std::max(separation, b.minimum_separation_m);
+  Impl::checkSeparation(impl_->options, separation);
+  impl_->scene.setBodies(std::move(bodies), rest_positions);
+  impl_->start_state.forget();
+  impl_->obstacle_tests.clear();
+}
+
+const StepResult& Detector::run(const MotionStep& step) { return impl_->run(step); }
+
+}  // namespace deformable_ccd

@@ -1,0 +1,26 @@
+// Hits of all workers into the canonical order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "detector/pair_worker.h"
+
+namespace deformable_ccd {
+
+/// Sorts hits by key (radix sort on the digits in use; keys are unique). Keeps its buffers.
+class HitOrder {
+ public:
+  /// The result is valid until the next call; its elements point into the workers' vectors.
+  const std::vector<const Hit*>& sort(const std::vector<const std::vector<Hit>*>& parts);
+
+ private:
+  struct Entry {
+    std::uint64_t key;
+    const Hit* hit;
+  };
+  std::vector<Entry> a_, b_;
+  std::vector<const Hit*> sorted_;
+};
+
+}  // namespace deformable_ccd

@@ -1,0 +1,225 @@
+#include "detector/pair_worker.h"
+
+#include <algorithm>
+
+#include "detector/toc_bound.h"
+#include "simd/fused_filter.h"
+
+namespace deformable_ccd {
+namespace {
+
+constexpr std::size_t CHUNK = 2048;                              // pairs that stay in the first-level cache's reach
+constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
+
+FeatureKind kindA(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
+FeatureKind kindB(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
+
+}  // namespace
+
+PairWorker::PairWorker()
+    : quads_(CAPACITY), keys_(CAPACITY), kept_(CAPACITY), results_(CAPACITY), separations_(CAPACITY) {}
+
+void PairWorker::beginStep() {
+  for (auto& h : hits_) h.clear();
+  stats_ = core::StepStats();
+  unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
+}
+
+double PairWorker::separation() const {
+  return std::max(a_->setup.minimum_separation_m, b_->setup.minimum_separation_m);
+}
+
+Clock::time_point PairWorker::lap(Stage stage, Clock::time_point start) {
+  const Clock::time_point now = Clock::now();
+  stats_[stage].ms += std::chrono::duration<double, std::milli>(now - start).count();
+  return now;
+}
+
+void PairWorker::begin(StepContext& context, const PairTask& task) {
+  context_ = &context;
+  task_ = &task;
+  a_ = &context.scene->bodies()[task.body_a];
+  b_ = &context.scene->bodies()[task.body_b];
+  count_ = 0;
+}
+
+void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
+  begin(context, task);
+  const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
+  const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(kindA(task.kind)).featureCount());
+  const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(kindB(task.kind)).featureCount());
+  std::uint32_t slots[2 * ClusterPairStream::CHUNK];
+  std::size_t n = 0;
+  for (std::uint32_t i = 0; i < na; ++i) {
+    for (std::uint32_t j = same_tree ? i + 1 : 0; j < nb; ++j) {
+      if (!a_->holds(kindA(task.kind), i) || !b_->holds(kindB(task.kind), j)) continue;
+      slots[2 * n] = i;
+      slots[2 * n + 1] = j;
+      if (++n == ClusterPairStream::CHUNK) {
+        take(slots, n);
+        n = 0;
+      }
+    }
+  }
+  take(slots, n);
+  flush();
+}
+
+void PairWorker::run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs,
+                     std::size_t first, std::size_t last) {
+  begin(context, task);
+  const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)), task.self && task.kind == PairKind::EDGE_EDGE,
+                       false};
+  Clock::time_point start = Clock::now();
+  for (std::size_t p = first; p < last; ++p) {
+    if (context.timeIsUp()) {
+      // Nothing of these was looked at: all that is known is when their groups can meet.
+      for (; p < last; ++p) {
+        unchecked_toc_lower_ = std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
+      }
+      break;
+    }
+    stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
+      start = lap(Stage::BROAD_PHASE, start);
+      take(slots, n);
+      start = Clock::now();
+    });
+  }
+  lap(Stage::BROAD_PHASE, start);
+  flush();
+  stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
+  stream_.clearCounters();
+}
+
+void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
+  const Clock::time_point start = Clock::now();
+  std::size_t n = count_;
+  if (task_->kind == PairKind::EDGE_EDGE) {
+    const ClusterTree &ta = a_->tree(FeatureKind::EDGE), &tb = b_->tree(FeatureKind::EDGE);
+    const std::vector<Index>&ra = a_->rank(FeatureKind::EDGE), &rb = b_->rank(FeatureKind::EDGE);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
+      const Index *ea = ta.feature(sa), *eb = tb.feature(sb);
+      const Index rank_a = ra[sa], rank_b = rb[sb];
+      const bool shared = (ea[0] == eb[0]) | (ea[0] == eb[1]) | (ea[1] == eb[0]) | (ea[1] == eb[1]);
+      const bool swap = rank_b < rank_a;
+      const Index *first = swap ? eb : ea, *second = swap ? ea : eb;
+      quads_[n] = {first[0], first[1], second[0], second[1]};
+      keys_[n] = swap ? std::uint64_t{rank_b} << 32 | rank_a : std::uint64_t{rank_a} << 32 | rank_b;
+      n += !shared;
+    }
+  } else {
+    const ClusterTree &ta = a_->tree(FeatureKind::VERTEX), &tb = b_->tree(FeatureKind::FACE);
+    const std::vector<Index>&ra = a_->rank(FeatureKind::VERTEX), &rb = b_->rank(FeatureKind::FACE);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
+      const Index v = *ta.feature(sa);
+      const Index* f = tb.feature(sb);
+      quads_[n] = {v, f[0], f[1], f[2]};
+      keys_[n] = std::uint64_t{ra[sa]} << 32 | rb[sb];
+      n += !((v == f[0]) | (v == f[1]) | (v == f[2]));
+    }
+  }
+  (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
+  stats_[Stage::BROAD_PHASE].out += n - count_;
+  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].in += n - count_;
+  count_ = n;
+  lap(Stage::BROAD_PHASE, start);
+  if (count_ >= CHUNK) flush();
+}
+
+void PairWorker::flush() {
+  if (count_ == 0) return;
+  const Clock::time_point start = Clock::now();
+  filter();
+  if (context_->earliest_only) dropLate();
+  if (!context_->elementary || context_->timeIsUp()) {
+    keepUndecided();
+  } else {
+    decide();
+  }
+  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].ms += msSince(start);
+  count_ = 0;
+}
+
+void PairWorker::filter() {
+  if (separation() > 0) return;  // the planar filter proves "never touch", not "never closer than d"
+  const Clock::time_point start = Clock::now();
+  stats_[Stage::PLANAR].in += count_;
+  const std::size_t kept = simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_,
+                                             task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ADAPTIVE, kept_.data());
+  for (std::size_t i = 0; i < kept; ++i) {
+    quads_[i] = quads_[kept_[i]];
+    keys_[i] = keys_[kept_[i]];
+  }
+  count_ = kept;
+  stats_[Stage::PLANAR].out += kept;
+  lap(Stage::PLANAR, start);
+}
+
+void PairWorker::dropLate() {
+  const double best = context_->best_toc_upper.load(std::memory_order_relaxed);
+  if (best >= 2) return;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separation()) > best) continue;
+    quads_[n] = quads_[i];
+    keys_[n++] = keys_[i];
+  }
+  count_ = n;
+}
+
+void PairWorker::keepUndecided() {
+  const Clock::time_point start = Clock::now();
+  auto& hits = hits_[static_cast<int>(task_->kind)];
+  std::size_t out = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double bound = linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separation());
+    if (bound > 1) continue;
+    hits.push_back({keys_[i], bound, 1, Certainty::UNDECIDED});
+    ++out;
+  }
+  stats_.undecided += out;
+  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].out += out;
+  lap(Stage::ELEMENTARY, start);
+}
+
+void PairWorker::decide() {
+  const Clock::time_point start = Clock::now();
+  PairBatch batch;
+  batch.kind = task_->kind;
+  batch.vertices = context_->scene->vertices();
+  batch.pairs = quads_.data();
+  batch.count = count_;
+  if (separation() > 0) {
+    std::fill_n(separations_.begin(), count_, separation());
+    batch.minimum_separation_m = separations_.data();
+  }
+  context_->elementary->run(batch, results_.data(), stats_.tiers);
+  auto& hits = hits_[static_cast<int>(task_->kind)];
+  const std::size_t before = hits.size();
+  for (std::size_t i = 0; i < count_; ++i) {
+    const ElementaryResult& r = results_[i];
+    if (r.verdict == Verdict::NO_CONTACT) continue;
+    const bool certain = r.verdict == Verdict::CONTACT;
+    hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, certain ? Certainty::CERTAIN : Certainty::UNDECIDED});
+    stats_.undecided += !certain;
+    if (certain && context_->earliest_only) {
+      double best = context_->best_toc_upper.load(std::memory_order_relaxed);
+      while (r.toc_upper < best && !context_->best_toc_upper.compare_exchange_weak(best, r.toc_upper)) {
+      }
+    }
+  }
+  stats_[Stage::ELEMENTARY].in += count_;
+  stats_[Stage::ELEMENTARY].out += hits.size() - before;
+  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].out += hits.size() - before;
+  lap(Stage::ELEMENTARY, start);
+}
+
+std::size_t PairWorker::memoryBytes() const {
+  return quads_.capacity() * sizeof(Quad) + keys_.capacity() * 8 + kept_.capacity() * 4 +
+         results_.capacity() * sizeof(ElementaryResult) + separations_.capacity() * 8 +
+         (hits_[0].capacity() + hits_[1].capacity()) * sizeof(Hit);
+}
+
+}  // namespace deformable_ccd

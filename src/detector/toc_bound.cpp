@@ -1,0 +1,77 @@
+#include "detector/toc_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace deformable_ccd {
+namespace {
+
+constexpr double DOWN = 1 - 8 * std::numeric_limits<double>::epsilon();
+constexpr double UP = 1 + 8 * std::numeric_limits<double>::epsilon();
+constexpr double SQRT2_UP = 1.4142135623730952;
+
+void project(const double* x, double* p) {
+  p[0] = x[0];
+  p[1] = x[1];
+  p[2] = x[2];
+  p[3] = x[0] + x[1];
+  p[4] = x[0] + x[2];
+  p[5] = x[1] + x[2];
+  p[6] = x[0] - x[1];
+  p[7] = x[1] - x[2];
+}
+
+// First time at which the point u -> (1-t) u0 + t u1 is not above l -> (1-t) l0 + t l1 + margin, rounded down; 2 if never.
+double meets(double u0, double u1, double l0, double l1, double margin) {
+  // The sums of the projections were rounded, by at most half an ulp of the larger one each; so was the difference.
+  const double slack0 = std::numeric_limits<double>::epsilon() * std::max(std::abs(u0), std::abs(l0));
+  const double slack1 = std::numeric_limits<double>::epsilon() * std::max(std::abs(u1), std::abs(l1));
+  // Strict comparison of the rounded sums is exact evidence of order; the slack only enters the time.
+  if (!(u0 - margin > l0)) return 0;
+  const double gap0 = (u0 - l0) - margin - slack0, gap1_low = (u1 - l1) - margin - slack1;
+  if (margin == 0 ? u1 > l1 : gap1_low > 0) return gap0 > 0 || margin == 0 ? 2 : 0;
+  if (!(gap0 > 0)) return 0;
+  const double t = gap0 * DOWN / ((gap0 - gap1_low) * UP);
+  return t > 0 ? std::min(t * DOWN, 1.0) : 0;
+}
+
+double bound(const double (*p0)[8], const double (*p1)[8], int first_count, double separation) {
+  double latest = 0;
+  for (int d = 0; d < 8; ++d) {
+    const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * UP : 0;
+    // Every vertex of one feature against every vertex of the other; the features' projections meet when the first pair
+    // of opposite ends does.
+    double above = 3, below = 3;
+    for (int i = 0; i < first_count; ++i) {
+      for (int j = first_count; j < 4; ++j) {
+        above = std::min(above, meets(p0[i][d], p1[i][d], p0[j][d], p1[j][d], margin));
+        below = std::min(below, meets(p0[j][d], p1[j][d], p0[i][d], p1[i][d], margin));
+      }
+    }
+    latest = std::max(latest, std::max(above, below));
+  }
+  return latest;
+}
+
+}  // namespace
+
+double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& pair, double minimum_separation_m) {
+  double p0[4][8], p1[4][8];
+  for (int i = 0; i < 4; ++i) {
+    project(vertices[pair[i]].t0, p0[i]);
+    project(vertices[pair[i]].t1, p1[i]);
+  }
+  return bound(p0, p1, kind == PairKind::VERTEX_FACE ? 1 : 2, minimum_separation_m);
+}
+
+double linearTocBound(PairKind kind, const PairMotion& pair, double minimum_separation_m) {
+  double p0[4][8], p1[4][8];
+  for (int i = 0; i < 4; ++i) {
+    project(pair.x[0][i], p0[i]);
+    project(pair.x[1][i], p1[i]);
+  }
+  return bound(p0, p1, kind == PairKind::VERTEX_FACE ? 1 : 2, minimum_separation_m);
+}
+
+}  // namespace deformable_ccd
