@@ -141,6 +141,12 @@ void MeshStore::positionsAt(StampNs stamp_ns, Positions& out) const {
     return;
   }
   const MeshFrame& a = *frames_[i - 1].frame;
+  if (b.rigid) {
+    const Eigen::Isometry3d moved = poseAt(stamp_ns) * b.pose.inverse();
+    out.resize(b.positions.size());
+    for (std::size_t v = 0; v < out.size(); ++v) out[v] = moved * b.positions[v];
+    return;
+  }
   interpolate(a.positions, b.positions, fraction(a.stamp_ns, b.stamp_ns, stamp_ns), out);
 }
 

@@ -1,0 +1,252 @@
+#include "detector/step_runner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace deformable_ccd {
+
+namespace {
+
+double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  const Eigen::Quaterniond turn(a.linear().transpose() * b.linear());
+  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+}
+
+void add(const core::StepStats& part, core::StepStats& sum) {
+  for (std::size_t i = 0; i < sum.stages.size(); ++i) {
+    sum.stages[i].in += part.stages[i].in;
+    sum.stages[i].out += part.stages[i].out;
+    sum.stages[i].ms += part.stages[i].ms;
+  }
+  for (std::size_t i = 0; i < sum.effects.size(); ++i) {
+    sum.effects[i].in += part.effects[i].in;
+    sum.effects[i].out += part.effects[i].out;
+    sum.effects[i].ms += part.effects[i].ms;
+  }
+  sum.tiers += part.tiers;
+  sum.total_ms += part.total_ms;
+  sum.vf_candidates += part.vf_candidates;
+  sum.ee_candidates += part.ee_candidates;
+  sum.undecided += part.undecided;
+  sum.initial += part.initial;
+  sum.leaving += part.leaving;
+  // The same vertices in every part.
+  sum.unchecked_vertices = std::max(sum.unchecked_vertices, part.unchecked_vertices);
+  sum.unchecked_faces = std::max(sum.unchecked_faces, part.unchecked_faces);
+}
+
+bool samePair(const core::Contact& a, const core::Contact& b) {
+  return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex && a.voxel == b.voxel;
+}
+
+/// toc of part i of n as a fraction of the whole step. The division is rounded, so one step outwards.
+double scaleDown(double toc, std::size_t i, std::size_t n) {
+  return n == 1 ? toc : std::max(0.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 0.0));
+}
+double scaleUp(double toc, std::size_t i, std::size_t n) {
+  return n == 1 ? toc : std::min(1.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 2.0));
+}
+
+bool inAny(const std::vector<Box>& boxes, const Vec3& point) {
+  return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
+    return (point.array() >= box.min.array()).all() && (point.array() <= box.max.array()).all();
+  });
+}
+
+Vec3 voxelCentre(const core::Contact& contact, double resolution_m) {
+  const double half = 0.5 * contact.voxel_size * resolution_m;
+  return Vec3(voxelPlane(contact.voxel.x, resolution_m), voxelPlane(contact.voxel.y, resolution_m),
+              voxelPlane(contact.voxel.z, resolution_m)) + Vec3::Constant(half);
+}
+
+void exclude(const std::vector<Box>& boxes, const StepInput& input, StepOutcome& outcome) {
+  if (boxes.empty() || !outcome.obstacle) return;
+  const Eigen::Isometry3d fixed_from_map = outcome.map_from_fixed.inverse();
+  const auto excluded = [&](const core::Contact& contact) {
+    return contact.body[1] == OBSTACLE_BODY &&
+           inAny(boxes, fixed_from_map * voxelCentre(contact, outcome.obstacle->resolution()));
+  };
+  auto& contacts = outcome.contacts;
+  const auto kept = std::remove_if(contacts.begin(), contacts.end(), excluded);
+  outcome.excluded = static_cast<std::size_t>(contacts.end() - kept);
+  contacts.erase(kept, contacts.end());
+  auto& found = outcome.intersections;
+  found.erase(std::remove_if(found.begin(), found.end(), [&](const StartIntersection& at) {
+    return at.body[1] == OBSTACLE_BODY && inAny(boxes, input.t0[at.body[0]][at.vertex[0]]);
+  }), found.end());
+  if (outcome.start_state == StartState::INTERSECTING && found.empty()) outcome.start_state = StartState::CLEAR;
+}
+
+void keepEarliest(std::size_t count, std::vector<core::Contact>& contacts) {
+  if (contacts.size() <= count) return;
+  std::stable_sort(contacts.begin(), contacts.end(),
+                   [](const core::Contact& a, const core::Contact& b) { return a.toc_lower < b.toc_lower; });
+  contacts.resize(count);
+  std::sort(contacts.begin(), contacts.end(), canonicalLess);
+}
+
+/// What of the raw contacts is reported, and what the step may be called.
+void conclude(const MonitorOptions& options, const StepInput& input, StepOutcome& outcome) {
+  exclude(options.exclude_boxes, input, outcome);
+  auto& contacts = outcome.contacts;
+  const bool touched = !contacts.empty();
+  if (options.suppress_initial) {
+    const auto kept = std::remove_if(contacts.begin(), contacts.end(), [](const core::Contact& c) {
+      return c.initial && c.body[1] == OBSTACLE_BODY;
+    });
+    outcome.suppressed = static_cast<std::size_t>(contacts.end() - kept);
+    contacts.erase(kept, contacts.end());
+  }
+  outcome.total_contacts = contacts.size();
+  outcome.earliest_toc = outcome.unchecked_toc_lower;
+  for (const auto& contact : contacts) outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
+  keepEarliest(options.max_contacts, contacts);
+
+  outcome.status = StepStatus::OK;
+  if (outcome.stats.unchecked_vertices > 0) {
+    outcome.status = StepStatus::PARTIAL;
+    outcome.reason = std::to_string(outcome.stats.unchecked_vertices) + " vertices are not finite and were not checked";
+  }
+  if (contacts.size() < outcome.total_contacts) {
+    outcome.status = StepStatus::TRUNCATED;
+    outcome.reason = "the earliest " + std::to_string(contacts.size()) + " of " +
+                     std::to_string(outcome.total_contacts) + " contacts are listed";
+  }
+  if (!outcome.complete) {
+    outcome.status = StepStatus::DEADLINE;
+    outcome.reason = "the step budget ran out; nothing that was left out touches before toc " +
+                     std::to_string(outcome.unchecked_toc_lower);
+  }
+  outcome.answered = true;
+  outcome.clear = outcome.status == StepStatus::OK && outcome.start_state == StartState::CLEAR && !touched;
+}
+
+}  // namespace
+
+void StepInput::resize(std::size_t bodies) {
+  t0.resize(bodies);
+  t1.resize(bodies);
+  topologies.resize(bodies);
+  rigid.resize(bodies, 0);
+  pose_t0.resize(bodies, Eigen::Isometry3d::Identity());
+  pose_t1.resize(bodies, Eigen::Isometry3d::Identity());
+}
+
+std::size_t requiredSubsteps(const StepInput& input, double tolerance_m) {
+  double parts = 1;
+  for (std::size_t b = 0; b < input.t0.size(); ++b) {
+    if (!input.rigid[b]) continue;
+    const double angle = rotationAngle(input.pose_t0[b], input.pose_t1[b]);
+    double radius = 0;
+    for (const Vec3& p : input.t0[b]) radius = std::max(radius, (p - input.pose_t0[b].translation()).norm());
+    // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
+    if (radius * (1 - std::cos(std::min(angle, M_PI) / 2)) <= tolerance_m) continue;
+    parts = std::max(parts, std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius))));
+  }
+  return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
+}
+
+StepRunner::StepRunner(const DetectorOptions& options) : detector_(options) {}
+
+void StepRunner::setOptions(const DetectorOptions& options) { detector_.setOptions(options); }
+
+void StepRunner::setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies) {
+  std::vector<BodySetup> setups;
+  std::vector<const Positions*> rest;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const MonitorBody& body = bodies[b];
+    BodySetup setup{body.name, input.topologies[b], body.self_collision && !body.rigid, body.against_bodies,
+                    body.against_obstacle, body.minimum_separation_m, {}};
+    if (!body.vertex_mask.empty()) setup.vertex_active.assign(input.topologies[b]->vertexCount(), 1);
+    for (const Index v : body.vertex_mask) {
+      if (v >= setup.vertex_active.size()) {
+        throw std::invalid_argument("vertex_mask of body '" + body.name + "' names vertex " + std::to_string(v) +
+                                    ", but the mesh has " + std::to_string(setup.vertex_active.size()));
+      }
+      setup.vertex_active[v] = 0;
+    }
+    setups.push_back(std::move(setup));
+    rest.push_back(&input.t0[b]);
+  }
+  detector_.setBodies(std::move(setups), rest);
+  set_topologies_ = input.topologies;
+}
+
+void StepRunner::runPart(const std::vector<Positions>& t0, const std::vector<Positions>& t1, bool continues,
+                         std::size_t part, std::size_t parts, StepOutcome& outcome) {
+  step_.bodies.resize(t0.size());
+  for (std::size_t b = 0; b < t0.size(); ++b) step_.bodies[b] = {&t0[b], &t1[b]};
+  step_.continues = continues;
+  const StepResult& result = detector_.run(step_);
+  if (part == 0) {
+    outcome.start_state = result.start_state;
+    outcome.intersections = result.intersections;
+  }
+  for (core::Contact contact : result.contacts) {
+    contact.toc_lower = scaleDown(contact.toc_lower, part, parts);
+    contact.toc_upper = scaleUp(contact.toc_upper, part, parts);
+    contact.initial = contact.initial && part == 0;
+    outcome.contacts.push_back(contact);
+  }
+  if (!result.complete) {
+    outcome.complete = false;
+    outcome.unchecked_toc_lower =
+        std::min(outcome.unchecked_toc_lower, scaleDown(std::min(result.unchecked_toc_lower, 1.0), part, parts));
+  }
+  add(result.stats, outcome.stats);
+}
+
+void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts,
+                          StepOutcome& outcome) {
+  step_.obstacle = map.surface;
+  step_.map_from_fixed = map.map_from_fixed;
+  if (parts == 1) return runPart(input.t0, input.t1, continues, 0, 1, outcome);
+  part_.resize(input.t0.size());
+  part_.t1 = input.t0;
+  for (std::size_t i = 0; i < parts; ++i) {
+    part_.t0.swap(part_.t1);
+    const double u = static_cast<double>(i + 1) / static_cast<double>(parts);
+    for (std::size_t b = 0; b < input.t0.size(); ++b) {
+      if (!input.rigid[b] || i + 1 == parts) {
+        interpolate(input.t0[b], input.t1[b], u, part_.t1[b]);
+        continue;
+      }
+      const Eigen::Isometry3d moved =
+          interpolate(input.pose_t0[b], input.pose_t1[b], u) * input.pose_t0[b].inverse();
+      part_.t1[b].resize(input.t0[b].size());
+      for (std::size_t v = 0; v < part_.t1[b].size(); ++v) part_.t1[b][v] = moved * input.t0[b][v];
+    }
+    runPart(part_.t0, part_.t1, i > 0 || continues, i, parts, outcome);
+  }
+  auto& contacts = outcome.contacts;
+  std::sort(contacts.begin(), contacts.end(), canonicalLess);
+  contacts.erase(std::unique(contacts.begin(), contacts.end(), samePair), contacts.end());
+}
+
+void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
+                     const MonitorMap& map, bool continues, StepOutcome& outcome) {
+  if (set_topologies_ != input.topologies) {
+    setBodies(input, bodies);
+    continues = false;
+  }
+  const std::size_t wanted = requiredSubsteps(input, options.rigid_tolerance_m);
+  const std::size_t parts = std::min(wanted, options.max_substeps);
+  outcome.substeps = parts;
+  outcome.obstacle = map.surface;
+  outcome.map_from_fixed = map.map_from_fixed;
+  outcome.map_stamp_ns = map.stamp_ns;
+  runParts(input, map, continues, parts, outcome);
+  outcome.positions_t0 = &input.t0;
+  outcome.positions_t1 = &input.t1;
+  outcome.topologies = &input.topologies;
+  conclude(options, input, outcome);
+  if (parts < wanted) {
+    outcome.status = StepStatus::PARTIAL;
+    outcome.clear = false;
+    outcome.reason = "a rigid body turns so far that " + std::to_string(wanted) + " parts are needed; max_substeps is " +
+                     std::to_string(parts);
+  }
+}
+
+}  // namespace deformable_ccd

@@ -1,0 +1,50 @@
+// One step of the monitor's bodies: splits it where a rigid body turns far, runs the detector, and turns its result into
+// an outcome.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "deformable_ccd/monitor.h"
+
+namespace deformable_ccd {
+
+/// All bodies at both ends of a step.
+struct StepInput {
+  std::vector<Positions> t0, t1;  ///< [m] fixed frame, one a body
+  std::vector<std::shared_ptr<const Topology>> topologies;
+  std::vector<std::uint8_t> rigid;  ///< one a body: moves from pose_t0 to pose_t1 along the rotation
+  std::vector<Eigen::Isometry3d> pose_t0, pose_t1;
+
+  void resize(std::size_t bodies);
+};
+
+/// Parts that the step must be cut into so that each rigid body's straight vertex paths stay within the tolerance of its
+/// arc [m]: 1 where nothing turns. Not limited.
+std::size_t requiredSubsteps(const StepInput& input, double tolerance_m);
+
+class StepRunner {
+ public:
+  explicit StepRunner(const DetectorOptions& options);
+
+  void setOptions(const DetectorOptions& options);
+
+  /// Fills the outcome's result from the step. `continues`: t0 is the t1 of the last run here, nothing else changed.
+  /// Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
+  void run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
+           const MonitorMap& map, bool continues, StepOutcome& outcome);
+
+ private:
+  Detector detector_;
+  std::vector<std::shared_ptr<const Topology>> set_topologies_;
+  StepInput part_;
+  MotionStep step_;
+
+  void setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies);
+  void runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts, StepOutcome& outcome);
+  void runPart(const std::vector<Positions>& t0, const std::vector<Positions>& t1, bool continues, std::size_t part,
+               std::size_t parts, StepOutcome& outcome);
+};
+
+}  // namespace deformable_ccd
