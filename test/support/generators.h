@@ -1,0 +1,67 @@
+// Hard pairs made on purpose, and what must not change an answer. Free of any test framework: the property tests, the
+// fuzz targets and the tools draw from here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "io/query_file.h"
+
+namespace deformable_ccd {
+namespace test {
+
+/// What makes a pair hard.
+enum class Hardness : std::uint8_t {
+  GENERAL = 0,      ///< random coordinates of one scale
+  SMALL_GRID,       ///< integers of -3 to 3 at both times: degenerate in every way
+  GRAZING,          ///< a contact made on a vertex, an edge or inside, at a dyadic time; sometimes one ulp off
+  AT_THE_ENDS,      ///< the same at exactly t=0 or t=1
+  PARALLEL,         ///< edges that stay parallel; faces that move along their own planes
+  COLLINEAR,        ///< everything on one line
+  SLIVER,           ///< faces and edge pairs whose normal is nearly zero
+  TURNING,          ///< faces that turn over, edges that become parallel in mid-step
+  ONE_ULP,          ///< coordinates that move by one representable number or not at all
+  HUGE_TRANSLATION, ///< far from the origin, or far away motion, and tiny relative motion
+  COINCIDENT,       ///< vertices of both features in the same place, at one time or both
+  AT_REST,          ///< no motion at all
+  COPLANAR,         ///< everything in one plane during the whole step
+  SUBNORMAL,        ///< coordinates below the smallest normal double
+  MIXED_15,         ///< each coordinate of its own scale, 1e-15 to 1e15
+  MIXED_150,        ///< the same from 1e-150 to 1e150
+  EXTREME,          ///< coordinates near the largest double
+  COUNT
+};
+const char* toString(Hardness hardness);
+
+/// The random numbers of the generators.
+using RandomSource = std::mt19937_64;
+
+/// A hard pair of random hardness (MIXED_150 and EXTREME are rare, since they are slow to judge), kind and symmetry.
+/// `contact` is left false. All coordinates are finite.
+Query hardQuery(RandomSource& random);
+Query hardQuery(RandomSource& random, PairKind kind, Hardness hardness);
+
+/// Simpler pairs in the order to try: points at rest or at the origin, fewer digits, coordinates of zero.
+std::vector<Query> simplerQueries(const Query& query);
+
+/// Orders of the four points that name the same pair: 6 for vertex-face, 8 for edge-edge; the first is the identity.
+std::vector<std::array<int, 4>> vertexPermutations(PairKind kind);
+
+/// One of the 48 signed permutations of the axes: new axis i is the old axis[i] times sign[i].
+struct AxisPermutation {
+  std::array<int, 3> axis;
+  std::array<double, 3> sign;
+};
+std::vector<AxisPermutation> axisPermutations();
+
+Query permuted(const Query& query, const std::array<int, 4>& order);
+Query permuted(const Query& query, const AxisPermutation& axes);
+Query timeReversed(const Query& query);
+
+/// All coordinates times 2^exponent. False, and `scaled` undefined, where that is not exact.
+bool scaledExactly(const Query& query, int exponent, Query& scaled);
+
+}  // namespace test
+}  // namespace deformable_ccd
