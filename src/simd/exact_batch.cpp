@@ -1,0 +1,35 @@
+#include "simd/exact_batch.h"
+
+#include <cstring>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "simd/exact_batch.cpp"
+#include <hwy/foreach_target.h>
+// The kernel needs Highway's definitions for the target first.
+#include <hwy/cache_control.h>
+#include <hwy/highway.h>
+
+#include "simd/exact_batch-inl.h"
+
+#if HWY_ONCE
+namespace deformable_ccd {
+namespace simd {
+
+HWY_EXPORT(exactBatchOn);
+HWY_EXPORT(fastBatchOn);
+HWY_EXPORT(targetName);
+
+void exactBatch(const BatchInput& input, const BatchOutput& output) {
+  HWY_DYNAMIC_DISPATCH(exactBatchOn)(input, output);
+}
+
+void fastBatch(const BatchInput& input, const BatchOutput& output) {
+  HWY_DYNAMIC_DISPATCH(fastBatchOn)(input, output);
+}
+
+const char* batchTargetName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
+
+}  // namespace simd
+}  // namespace deformable_ccd
+#endif

@@ -1,0 +1,56 @@
+// Rounding bounds of the batched elementary test (exact_batch-inl.h), with their derivation.
+//
+// Notation. eps = 2^-53; every operation is correctly rounded: fl(x op y) = (x op y)(1+d), |d| <= eps. "k factors" means
+// a product of at most k such (1+d); (1+eps)^k - 1 <= k eps (1 + 2^-40) for the k <= 12 below. u, v, w are the pair's
+// difference vectors, linear in t; f = det(u, v, w) = (u x v).w.
+//   VF (p; a b c): u = b-a, v = c-a, w = p-a.     EE (a b; c d): u = b-a, v = d-c, w = c-a.
+// U, V, W are the largest absolute values of the *rounded* difference components over both ends of the step. The true
+// ones are at most U(1+2 eps); such second-order terms, the underflow terms and the rounding of the bounds' own
+// evaluation (at most 5 factors) are covered by rounding each constant up by more than 0.5 %.
+//
+// Bernstein coefficients f0, f1, f2, f3 of f, kept as F0 = f0, F1 = 3 f1, F2 = 3 f2, F3 = f3:
+//   a difference component                                   1 factor
+//   n0 = u0 x v0, n2 = u1 x v1: fl(fl(a b) - fl(c d))        2 + 1 + 1 = 4 factors on each of the 2 products
+//   m1 = fl(u0 x v1 + u1 x v0)                               5 factors on each of the 4 products
+//   a dot product with w, fl(fl(x + y) + z)                  1 (w) + 1 (product) + 2 (sums) = 4 more
+//   F0 = n0.w0, F3 = n2.w1:            6 products with 8 factors                  error <=  48 eps U V W
+//   F1 = fl(m1.w0 + n0.w1):            12 products with 10, 6 with 9 factors      error <= 174 eps U V W
+//   F2 = fl(m1.w1 + n2.w0):            the same
+// Every product is at most U V W in absolute value.
+//
+// Values of f at t, and Bernstein coefficients of f over [a, b] inside [0, 1], are convex combinations of f0..f3:
+//   f(t) = ((F0 s + F1 t) s + F2 t^2) s + F3 t^3, where s = 1-t is exact because t is a multiple of 2^-52:
+//     at most 6 factors on each term (F0: 3 products, 3 sums), and the terms' absolute values sum to at most max|fi|;
+//     the coefficients' errors contribute at most 174/3 = 58 eps U V W.
+//   de Casteljau with f1 = fl(F1 fl(1/3)): 2 more factors on F1, so (12*12 + 6*11)/3 = 70 eps U V W from the
+//     coefficients; three levels fl(fl(p s) + fl(q t)) give 6 factors on each.
+// One bound serves both: 70 eps U V W + 6 eps max(|F0|, |f1|, |f2|, |F3|).
+//
+// The inside test evaluates, at one t = m, two-by-two minors q = x_i y_j - x_j y_i of vectors x, y out of {u, v, w}
+// with absolute bounds X, Y, on one coordinate plane:
+//   x(m) = fl(fl(x0 s) + fl(x1 m))                           1 + 1 + 1 = 3 factors, absolute value at most X
+//   q = fl(fl(a b) - fl(c d))                                3 + 3 + 1 + 1 = 8 factors on 2 products: 16 eps X Y
+//   over |t - m| <= h: |q(t) - q(m)| <= h max|q'|, |x'| = |x1 - x0| <= 2 X, so |q'| <= 8 X Y.
+//   sums n - B - C of three minors round twice more: at most 2 eps (|n| + |B| + |C|) <= 4 eps (sum of the X Y).
+// So each minor is known to (20 eps + 8 h) X Y, sums of minors to the sum of those.
+//
+// Underflow: the guard demands 2^-150 <= U, V, W <= 2^150, so that U V W >= 2^-450, while each of fewer than 200
+// operations that underflows errs by at most 2^-1075, multiplied later by at most one factor of U, V, W <= 2^150. No
+// overflow: everything, squares of values of f included, stays below 2^910.
+#pragma once
+
+namespace deformable_ccd {
+namespace simd {
+
+constexpr double BATCH_EPS = 0x1p-53;
+constexpr double BATCH_END_ERROR = 48.5 * BATCH_EPS;       ///< of F0 and F3, times U V W
+constexpr double BATCH_MIDDLE_ERROR = 175.5 * BATCH_EPS;   ///< of F1 and F2, times U V W
+constexpr double BATCH_VALUE_ERROR = 70.5 * BATCH_EPS;     ///< of f(t) and coefficients over [a, b], times U V W
+constexpr double BATCH_VALUE_ROUNDING = 6.25 * BATCH_EPS;  ///< the same, times max |fi|
+constexpr double BATCH_MINOR_ERROR = 20.5 * BATCH_EPS;     ///< of a minor, times X Y
+constexpr double BATCH_MINOR_SLOPE = 8.125;                ///< of a minor, times h X Y
+constexpr double BATCH_SMALLEST = 0x1p-150;                ///< guard on U, V, W
+constexpr double BATCH_LARGEST = 0x1p150;
+
+}  // namespace simd
+}  // namespace deformable_ccd
