@@ -1,11 +1,14 @@
 #include "elementary/exact.h"
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
+#include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
 #include "elementary/rungs.h"
+#include "simd/exact_batch.h"
 
 namespace deformable_ccd {
 namespace {
@@ -19,12 +22,38 @@ PairMotion gather(const VertexMotion* vertices, const Quad& quad) {
   return pair;
 }
 
-ElementaryResult decide(PairKind kind, const PairMotion& pair, int toc_bits) {
-  for (const auto tier : {exact::decideByCoincidence, exact::decideByFixedIntegers}) {
-    const ElementaryResult result = tier(kind, pair, toc_bits);
-    if (result.verdict != Verdict::UNDECIDED) return result;
+/// Pairs that the batched double tier left, by the tiers after it.
+ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
+  ElementaryResult result = exact::decideByCoincidence(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = exact::decideByFixedIntegers(kind, pair, toc_bits);
+  return result.verdict == Verdict::UNDECIDED ? exact::decideByBigIntegers(kind, pair, toc_bits) : result;
+}
+
+constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched tier lie on the stack at once
+
+/// The batched tier's outputs for one block.
+struct BlockOutput {
+  std::uint8_t verdict[BLOCK];
+  std::uint64_t cell[BLOCK];
+  double lo[BLOCK], hi[BLOCK];
+};
+
+ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const BlockOutput& output, std::size_t i,
+                        int toc_bits) {
+  switch (output.verdict[i]) {
+    case simd::BATCH_NO:
+      return exact::noContact(Tier::DOUBLE_BATCH);
+    case simd::BATCH_YES:
+      return exact::contactInCell(static_cast<std::int64_t>(output.cell[i]), toc_bits, Tier::DOUBLE_BATCH);
+    default:
+      break;
   }
-  return exact::decideByBigIntegers(kind, pair, toc_bits);
+  const PairMotion pair = gather(batch.vertices, batch.pairs[pair_index]);
+  if (output.verdict[i] == simd::BATCH_YES_BRACKET) {
+    const std::int64_t cell = exact::cellOfRoot(batch.kind, pair, output.lo[i], output.hi[i], toc_bits);
+    if (cell >= 0) return exact::contactInCell(cell, toc_bits, Tier::DOUBLE_DOUBLE);
+  }
+  return decideUncertain(batch.kind, pair, toc_bits);
 }
 
 }  // namespace
@@ -37,9 +66,20 @@ void ExactTest::run(const PairBatch& batch, ElementaryResult* results, TierCount
   if (batch.minimum_separation_m != nullptr) {
     throw std::invalid_argument("exact test: a minimum separation needs the rung conservative");
   }
-  for (std::size_t i = 0; i < batch.count; ++i) {
-    results[i] = decide(batch.kind, gather(batch.vertices, batch.pairs[i]), toc_bits_);
-    ++counters.settled[static_cast<std::size_t>(results[i].tier)];
+  static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
+  BlockOutput output;
+  simd::BatchInput input;
+  input.vertices = batch.vertices->t0;
+  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
+  input.toc_bits = toc_bits_;
+  for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
+    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
+    input.count = std::min(BLOCK, batch.count - begin);
+    simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
+    for (std::size_t i = 0; i < input.count; ++i) {
+      results[begin + i] = finish(batch, begin + i, output, i, toc_bits_);
+      ++counters.settled[static_cast<std::size_t>(results[begin + i].tier)];
+    }
   }
 }
 

@@ -1,0 +1,163 @@
+// Bounds. e = 2^-53, every operation correctly rounded; U, V, W: largest |rounded difference component| of u, v, w at
+// t = 0 and 1, between 2^-300 and 2^300. "p + q exactly" is an error-free transform (two-sum, Dekker's product).
+//   A difference D = h + l exactly, |l| <= e |h|. With t and s = 1-t exact, x(t) = s D0 + t D1 is kept as a pair:
+//     s h0 + t h1 exactly into one leading and three trailing terms, which like s l0, t l1 sum to at most 3 e U;
+//     rounding two products and four sums of such terms: at most 8 e^2 U. |x| <= U (1 + 3 e).
+//   A product x y of pairs: leading parts exactly, cross terms rounded, x.lo y.lo dropped: at most 8 e^2 |x||y| (bounds),
+//     its trailing part at most 3 e.
+//   n_k, a difference of two products: 2 * 8 + (6 + 8) for adding the trailing parts, + 2 * 2 * 8 from the errors of
+//     x and y: at most 62 e^2 U V; |n_k| <= 2 U V.
+//   f, a sum of three products: 3 * 16 + (12 + 18 + 10 + 28) for adding, 3 * 62 + 3 * 2 * 8 from the errors of n_k and
+//     w: at most 350 e^2 U V W. 512 covers terms of higher order, the bound's own rounding, and underflow: fewer than
+//     200 operations that each err by at most 2^-1074, times at most two of U, V, W, against 100 * 2^-106 U V W.
+//   The last sum to one double rounds once more, which changes no sign.
+// In plain double with x = fl(fl(s h0) + fl(t h1)): x errs by at most 4 e U; n_k by 2 * (2*4 + 1) + 2 = 20 e U V; f by
+//   3 * (20 + 2*4 + 2) + (4 + 6) = 100 e U V W; 128 is used.
+#include "elementary/exact_double_double.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace deformable_ccd {
+namespace exact {
+namespace {
+
+DoubleDouble twoSum(double a, double b) {
+  const double sum = a + b, part = sum - a;
+  return {sum, (a - (sum - part)) + (b - part)};
+}
+
+/// A double in two halves of at most 26 bits each, so that products of halves are exact.
+struct Halves {
+  double hi, lo;
+  explicit Halves(double x) {
+    const double scaled = 134217729.0 * x;  // 2^27 + 1
+    hi = scaled - (scaled - x);
+    lo = x - hi;
+  }
+};
+
+/// A factor of products: the pair and the halves of its leading part.
+struct Factor {
+  DoubleDouble value;
+  Halves halves;
+  explicit Factor(const DoubleDouble& x) : value(x), halves(x.hi) {}
+};
+
+/// fl(a b) and its error, exactly.
+DoubleDouble twoProduct(double a, const Halves& ah, double b, const Halves& bh) {
+  const double product = a * b;
+  return {product, ((ah.hi * bh.hi - product) + ah.hi * bh.lo + ah.lo * bh.hi) + ah.lo * bh.lo};
+}
+
+DoubleDouble product(const Factor& a, const Factor& b) {
+  const DoubleDouble p = twoProduct(a.value.hi, a.halves, b.value.hi, b.halves);
+  return {p.hi, p.lo + (a.value.hi * b.value.lo + a.value.lo * b.value.hi)};
+}
+
+/// s D0 + t D1, the leading and the trailing part not overlapping.
+Factor interpolate(const DoubleDouble& d0, const DoubleDouble& d1, double s, const Halves& s_halves, double t,
+                   const Halves& t_halves) {
+  const DoubleDouble p0 = twoProduct(d0.hi, Halves(d0.hi), s, s_halves);
+  const DoubleDouble p1 = twoProduct(d1.hi, Halves(d1.hi), t, t_halves);
+  const DoubleDouble sum = twoSum(p0.hi, p1.hi);
+  return Factor(twoSum(sum.hi, ((p0.lo + p1.lo) + (d0.lo * s + d1.lo * t)) + sum.lo));
+}
+
+/// a b - c d.
+Factor minor(const Factor& a, const Factor& b, const Factor& c, const Factor& d) {
+  const DoubleDouble p = product(a, b), q = product(c, d);
+  const DoubleDouble difference = twoSum(p.hi, -q.hi);
+  return Factor(twoSum(difference.hi, (p.lo - q.lo) + difference.lo));
+}
+
+}  // namespace
+
+CoplanarityCubic::CoplanarityCubic(PairKind kind, const PairMotion& pair) {
+  static constexpr int ENDS[2][3][2] = {{{1, 2}, {1, 3}, {1, 0}}, {{0, 1}, {2, 3}, {0, 2}}};  // from, to
+  const auto& ends = ENDS[kind == PairKind::VERTEX_FACE ? 0 : 1];
+  constexpr double SMALLEST = 0x1p-300, LARGEST = 0x1p300;
+  double volume = 1;
+  bool in_range = true;
+  for (int i = 0; i < 3; ++i) {
+    double size = 0;
+    for (int time = 0; time < 2; ++time) {
+      for (int k = 0; k < 3; ++k) {
+        const DoubleDouble d = twoSum(pair.x[time][ends[i][1]][k], -pair.x[time][ends[i][0]][k]);
+        difference_[time][i][k] = d;
+        size = std::max(size, std::fabs(d.hi));
+      }
+    }
+    in_range = in_range && size >= SMALLEST && size <= LARGEST;
+    volume *= size;
+  }
+  constexpr double INFINITE = std::numeric_limits<double>::infinity();
+  error_ = in_range ? 0x1p-97 * volume : INFINITE;
+  rough_error_ = in_range ? 0x1p-46 * volume : INFINITE;
+}
+
+double CoplanarityCubic::roughValueAt(double t) const {
+  double x[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) x[i][k] = difference_[0][i][k].hi * (1 - t) + difference_[1][i][k].hi * t;
+  }
+  const auto term = [&](int k, int i, int j) { return (x[0][i] * x[1][j] - x[0][j] * x[1][i]) * x[2][k]; };
+  return term(0, 1, 2) + term(1, 2, 0) + term(2, 0, 1);
+}
+
+double CoplanarityCubic::valueAt(double t) const {
+  const double s = 1 - t;
+  const Halves s_halves(s), t_halves(t);
+  const auto at = [&](int i, int k) {
+    return interpolate(difference_[0][i][k], difference_[1][i][k], s, s_halves, t, t_halves);
+  };
+  const Factor ux = at(0, 0), uy = at(0, 1), uz = at(0, 2), vx = at(1, 0), vy = at(1, 1), vz = at(1, 2);
+  const DoubleDouble x = product(minor(uy, vz, uz, vy), at(2, 0));
+  const DoubleDouble y = product(minor(uz, vx, ux, vz), at(2, 1));
+  const DoubleDouble z = product(minor(ux, vy, uy, vx), at(2, 2));
+  const DoubleDouble xy = twoSum(x.hi, y.hi), xyz = twoSum(xy.hi, z.hi);
+  return xyz.hi + (((x.lo + y.lo) + z.lo) + (xy.lo + xyz.lo));
+}
+
+int CoplanarityCubic::signAt(double t) const {
+  const double rough = roughValueAt(t);
+  if (std::fabs(rough) > rough_error_) return rough > 0 ? 1 : -1;
+  const double value = valueAt(t);
+  return value > error_ ? 1 : value < -error_ ? -1 : 0;
+}
+
+std::int64_t cellOfRoot(PairKind kind, const PairMotion& pair, double lo, double hi, int toc_bits) {
+  constexpr int MOST_STEPS = 16;  // regula falsi on a piece where f is nearly straight needs two or three
+  const double cells = std::ldexp(1.0, toc_bits), width = 1 / cells;
+  auto low = static_cast<std::int64_t>(lo * cells);  // exact, like all of these
+  auto high = static_cast<std::int64_t>(std::ceil(hi * cells));
+  if (high - low == 1) return low;
+  const CoplanarityCubic f(kind, pair);
+  const int before = f.signAt(lo);
+  if (before == 0) return -1;
+  double value_lo = 0, value_hi = 0;
+  if (high - low > 2) {
+    value_lo = f.valueAt(lo);
+    value_hi = f.valueAt(hi);
+  }
+  for (int step = 0; high - low > 1 && step < MOST_STEPS; ++step) {
+    std::int64_t k = low + 1;
+    if (high - low > 2) {  // the guessed cell's lower border, then its upper one, then what the new values suggest
+      const double guess = lo + (hi - lo) * (value_lo / (value_lo - value_hi));
+      k = static_cast<std::int64_t>(guess * cells) + (step % 2);
+      k = std::min(std::max(k, low + 1), high - 1);
+    }
+    const double t = static_cast<double>(k) * width;
+    const double value = f.valueAt(t);
+    if (std::fabs(value) <= f.error()) return -1;
+    const bool is_before = (value > 0) == (before > 0);
+    (is_before ? low : high) = k;
+    (is_before ? lo : hi) = t;
+    (is_before ? value_lo : value_hi) = value;
+  }
+  return high - low == 1 ? low : -1;
+}
+
+}  // namespace exact
+}  // namespace deformable_ccd
