@@ -1,0 +1,63 @@
+// What the accepted message types say about a mesh, as views into the message's bytes (wire.h).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "deformable_ccd/mesh_store.h"
+#include "ros/wire.h"
+
+namespace deformable_ccd {
+
+struct HeaderView {
+  StampNs stamp_ns = 0;
+  std::string_view frame_id;
+};
+
+/// sensor_msgs/PointCloud2. Fields are located by name and datatype; strides are held against the data.
+struct CloudView {
+  HeaderView header;
+  std::size_t height = 0, width = 0, point_step = 0, row_step = 0;
+  const std::uint8_t* data = nullptr;
+  struct Coordinate {
+    std::size_t offset = 0;
+    bool is_double = false;
+  };
+  std::array<Coordinate, 3> xyz;
+  std::size_t size() const { return height * width; }
+  Vec3 point(std::size_t i) const;
+};
+CloudView readCloud(WireReader& wire);
+
+/// Triangles by index: MeshStamped, shape_msgs/Mesh, pcl_msgs/PolygonMesh.
+struct IndexedView {
+  std::optional<HeaderView> header;
+  std::optional<CloudView> cloud;                       ///< PolygonMesh: the vertices
+  WireSpan<std::array<double, 3>> points;               ///< otherwise
+  WireSpan<std::array<std::uint32_t, 3>> triangles;     ///< otherwise
+  std::vector<WireSpan<std::uint32_t>> polygons;        ///< PolygonMesh
+  std::size_t size() const { return cloud ? cloud->size() : points.size; }
+};
+IndexedView readMeshStamped(WireReader& wire);
+IndexedView readShapeMesh(WireReader& wire);
+IndexedView readPolygonMesh(WireReader& wire);
+
+/// One visualization_msgs/Marker.
+struct MarkerView {
+  HeaderView header;
+  std::string_view ns;
+  std::int32_t id = 0, type = 0, action = 0;
+  std::array<double, 7> pose{};  ///< position x y z, quaternion x y z w
+  std::array<double, 3> scale{};
+  WireSpan<std::array<double, 3>> points;
+};
+constexpr std::int32_t MARKER_TRIANGLE_LIST = 11;
+constexpr std::int32_t MARKER_ADD = 0;
+MarkerView readMarker(WireReader& wire);
+std::vector<MarkerView> readMarkerArray(WireReader& wire);
+
+}  // namespace deformable_ccd
