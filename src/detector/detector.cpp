@@ -165,9 +165,15 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   }
   if (options.check_start_state) {
     start = Clock::now();
-    // With earliest_only the later contacts are unknown, so nothing may be concluded about the end of the step.
-    start_state.remember(scene, result.contacts, result.complete && !options.earliest_only && stats.unchecked_vertices == 0);
+    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the
+    // end of the step.
+    start_state.remember(scene, result.contacts, result.complete && !options.earliest_only &&
+                                                     stats.unchecked_vertices == 0 &&
+                                                     options.accuracy.rung != Accuracy::FAST);
     stats[Stage::START_STATE].ms += msSince(start);
+    stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
+  } else {
+    start_state.skip();
   }
   stats.total_ms = msSince(begin);
   return result;
@@ -215,29 +221,9 @@ void Detector::Impl::findPairs(const StepContext& context) {
     addTasks(PairKind::EDGE_EDGE, i, i, context);
   }
   if (n > 1) {
-    // The upper level of the hierarchy: bodies against bodies, by the same test.
-    body_pairs.assign({0, 0});
-    for (std::size_t l = scene.bodyLevels(); l-- > 0;) {
-      const simd::GroupsView view = scene.bodyLevel(l).view();
-      scratch.clear();
-      std::size_t done = 0;
-      while (done < body_pairs.size() / 2) {
-        constexpr std::size_t STEP = 4096;
-        const std::size_t used = scratch.size();
-        scratch.resize(used + 2 * STEP);
-        std::size_t consumed = 0;
-        const std::size_t found = simd::testGroupPairs(
-            view, view, body_pairs.data() + 2 * done, body_pairs.size() / 2 - done, true,
-            l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, false, scratch.data() + used, STEP,
-            &consumed);
-        scratch.resize(used + 2 * found);
-        done += consumed;
-      }
-      std::swap(body_pairs, scratch);
-    }
+    scene.overlappingBodies(false, body_pairs, scratch);
     for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
-      const std::uint16_t a = static_cast<std::uint16_t>(std::min(body_pairs[p], body_pairs[p + 1]));
-      const std::uint16_t b = static_cast<std::uint16_t>(std::max(body_pairs[p], body_pairs[p + 1]));
+      const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]), b = static_cast<std::uint16_t>(body_pairs[p + 1]);
       if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
       addTasks(PairKind::VERTEX_FACE, a, b, context);
       addTasks(PairKind::VERTEX_FACE, b, a, context);

@@ -237,6 +237,32 @@ void SceneArrays::refitBodies() {
   }
 }
 
+void SceneArrays::overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs,
+                                    std::vector<std::uint32_t>& scratch) const {
+  pairs.assign({0, 0});
+  for (std::size_t l = body_levels_.size(); l-- > 0;) {
+    const simd::GroupsView view = body_levels_[l].view();
+    scratch.clear();
+    std::size_t done = 0;
+    while (done < pairs.size() / 2) {
+      constexpr std::size_t STEP = 4096;
+      const std::size_t used = scratch.size();
+      scratch.resize(used + 2 * STEP);
+      std::size_t consumed = 0;
+      const std::size_t found = simd::testGroupPairs(
+          view, view, pairs.data() + 2 * done, pairs.size() / 2 - done, true,
+          l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, t0_only, scratch.data() + used, STEP,
+          &consumed);
+      scratch.resize(used + 2 * found);
+      done += consumed;
+    }
+    std::swap(pairs, scratch);
+  }
+  for (std::size_t p = 0; p < pairs.size(); p += 2) {
+    if (pairs[p] > pairs[p + 1]) std::swap(pairs[p], pairs[p + 1]);
+  }
+}
+
 std::uint16_t SceneArrays::bodyOf(FeatureKind kind, Index rank) const {
   const auto begin = [kind](const SceneBody& b) {
     return kind == FeatureKind::VERTEX ? b.vertex_begin : kind == FeatureKind::EDGE ? b.edge_begin : b.face_begin;

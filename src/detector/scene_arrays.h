@@ -71,6 +71,8 @@ class SceneArrays {
   /// Bounds of the bodies as a tree whose features are the bodies.
   const ClusterTree::Level& bodyLevel(std::size_t l) const { return body_levels_[l]; }
   std::size_t bodyLevels() const { return body_levels_.size(); }
+  /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
+  void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
   std::size_t height() const { return height_; }
   double largestSeparation() const { return largest_separation_; }
 

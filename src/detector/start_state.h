@@ -1,7 +1,9 @@
 // The start state of a step (DESIGN.md): do an edge and a face already meet at t=0?
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 #include "broad_phase/cluster_pairs.h"
@@ -10,40 +12,72 @@
 namespace deformable_ccd {
 
 /// Exact: do the closed segment pq and the closed triangle abc meet? Any finite doubles, degenerate ones included.
+/// Each argument: x, y, z.
 bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c);
 
-/// Keeps what is known from step to step, so that only the first frame, frames after a reset and surroundings of pairs in
-/// contact are tested: a pair that starts apart and whose features never touch during the step ends apart.
+/// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those of
+/// the bodies' setups: within bodies with self_collision, between bodies with against_bodies.
+///
+/// What is known at the start of one step is carried over to the next, so that only the first frame, frames after a reset
+/// and the surroundings of contacts are tested. Why that is complete: let edge e and face f, which share no vertex, be
+/// apart at t=0 and meet during the step, first at t* > 0. Suppose that at t* neither end of e is on f and e meets no edge
+/// of f. Then the common point is inside of f, so f has an area (a face without area is the union of its edges), and inside
+/// of e. Were e in the plane of f, it would leave f across an edge of f or end on f; so it crosses the plane there, and
+/// still does so inside of f a little earlier: not the first time. Hence whatever starts to meet during a step shows a
+/// contact of an end of e with f (VF) or of e with an edge of f (EE), and neither pair shares a vertex, since e and f do
+/// not. So after a step in which every pair was decided, or kept where it was not, the next start needs to look at:
+///   EE contact (e, e'): e against the faces at e', e' against the faces at e;
+///   VF contact (v, f): the edges at v against f;
+///   and the pairs that met already at the step's start.
 class StartStateTest {
  public:
-  /// Edges that meet faces at t=0; pairs that share a vertex are left out. Full test unless `carry` says that the
-  /// step continues the last one, whose contacts were given to remember().
-  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool carry, core::StepStats& stats);
+  /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
+  /// Sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and effect START_STATE.
+  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, core::StepStats& stats);
 
-  /// Contacts of the step just done (undecided ones included). complete: false forgets everything.
+  /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete);
-  void forget() { known_ = false; }
+
+  /// The bodies are about to change: everything is forgotten.
+  void forget();
+  /// A step was done without run() and remember(): the next run() is a full test.
+  void skip() { known_ = false; }
 
  private:
+  /// By slot in the bodies' trees, so that sorted candidates are also near each other in memory.
   struct EdgeFace {
-    std::uint32_t body_edge, edge, body_face, face;  ///< local edge and face index
-    friend bool operator<(const EdgeFace& x, const EdgeFace& y) {
-      return std::tie(x.body_edge, x.edge, x.body_face, x.face) < std::tie(y.body_edge, y.edge, y.body_face, y.face);
+    std::uint32_t edge_body, edge, face_body, face;
+    std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t> key() const {
+      return {edge_body, edge, face_body, face};
     }
-    friend bool operator==(const EdgeFace& x, const EdgeFace& y) { return !(x < y) && !(y < x); }
+    friend bool operator<(const EdgeFace& x, const EdgeFace& y) { return x.key() < y.key(); }
+    friend bool operator==(const EdgeFace& x, const EdgeFace& y) { return x.key() == y.key(); }
   };
-  struct Adjacency;
+  /// Slots of the features at each used vertex of a body: those of vertex i are slots[begin[i]] to slots[begin[i + 1]].
+  struct SlotsAtVertex {
+    std::vector<std::uint32_t> begin, slots;
+    void build(const SceneBody& body, FeatureKind kind);
+  };
+  struct Neighbourhood {
+    std::vector<Index> internal_of_local;
+    SlotsAtVertex edges, faces;
+  };
+
   void testAll(const SceneArrays& scene);
+  void testBodies(const SceneArrays& scene, std::uint32_t edge_body, std::uint32_t face_body);
   void testCandidates(const SceneArrays& scene);
-  bool test(const SceneArrays& scene, const EdgeFace& pair) const;
-  void report(const SceneArrays& scene, const EdgeFace& pair);
+  void test(const SceneArrays& scene, const EdgeFace& pair);
+  void addCandidates(const SceneArrays& scene, const core::Contact& contact);
+  void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
+                      const Index* other_edge);
+  void learnNeighbourhoods(const SceneArrays& scene);
 
   bool known_ = false;
   std::vector<EdgeFace> candidates_, found_;
   std::vector<StartIntersection> intersections_;
-  std::vector<std::uint32_t> groups_, scratch_;
+  std::vector<std::uint32_t> groups_, scratch_, body_pairs_;
   ClusterPairStream stream_;
-  std::vector<std::shared_ptr<const Adjacency>> adjacency_;
+  std::vector<Neighbourhood> neighbourhoods_;  // one a body; empty until a step has contacts
   std::uint64_t tested_ = 0;
 };
 

@@ -1,0 +1,201 @@
+#include "detector/start_state.h"
+
+#include <algorithm>
+
+namespace deformable_ccd {
+namespace {
+
+// More candidates than this many an edge, and the full test is no dearer.
+constexpr std::size_t CANDIDATES_PER_EDGE = 2;
+
+bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
+bool shareVertex(const Index* edge, const Index* face) { return contains(face, edge[0]) | contains(face, edge[1]); }
+
+std::size_t edgeCount(const SceneArrays& scene) {
+  std::size_t n = 0;
+  for (const SceneBody& body : scene.bodies()) n += body.tree(FeatureKind::EDGE).featureCount();
+  return n;
+}
+
+}  // namespace
+
+void StartStateTest::SlotsAtVertex::build(const SceneBody& body, FeatureKind kind) {
+  const ClusterTree& tree = body.tree(kind);
+  begin.assign(body.usedCount() + 1, 0);
+  slots.resize(tree.featureCount() * tree.arity());
+  for (std::size_t i = 0; i < slots.size(); ++i) ++begin[tree.feature(0)[i] - body.internal_begin];
+  std::uint32_t sum = 0;
+  for (std::uint32_t& n : begin) n = sum += n;  // ends, moved down to begins below
+  for (std::size_t i = slots.size(); i-- > 0;) {
+    slots[--begin[tree.feature(0)[i] - body.internal_begin]] = static_cast<std::uint32_t>(i / tree.arity());
+  }
+}
+
+const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& scene, bool continues,
+                                                          core::StepStats& stats) {
+  tested_ = 0;
+  if (continues && known_) {
+    testCandidates(scene);
+  } else {
+    testAll(scene);
+  }
+  known_ = false;  // until remember() has this step's contacts
+
+  const auto order = [&](const EdgeFace& x) {
+    return std::make_tuple(x.edge_body, scene.bodies()[x.edge_body].rank(FeatureKind::EDGE)[x.edge], x.face_body,
+                           scene.bodies()[x.face_body].rank(FeatureKind::FACE)[x.face]);
+  };
+  std::sort(found_.begin(), found_.end(), [&](const EdgeFace& x, const EdgeFace& y) { return order(x) < order(y); });
+  intersections_.clear();
+  for (const EdgeFace& pair : found_) {
+    const SceneBody &a = scene.bodies()[pair.edge_body], &b = scene.bodies()[pair.face_body];
+    const auto edge = scene.ranked(FeatureKind::EDGE, a.rank(FeatureKind::EDGE)[pair.edge]);
+    const auto face = scene.ranked(FeatureKind::FACE, b.rank(FeatureKind::FACE)[pair.face]);
+    intersections_.push_back({{edge.body, face.body}, {edge.v[0], edge.v[1], face.v[0], face.v[1], face.v[2]}});
+  }
+  stats[Stage::START_STATE].in += tested_;
+  stats[Stage::START_STATE].out += found_.size();
+  stats[Effect::START_STATE].in += tested_;
+  stats[Effect::START_STATE].out += found_.size();
+  return intersections_;
+}
+
+void StartStateTest::testAll(const SceneArrays& scene) {
+  found_.clear();
+  const std::size_t n = scene.bodies().size();
+  for (std::size_t b = 0; b < n; ++b) {
+    if (scene.bodies()[b].setup.self_collision) {
+      testBodies(scene, static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b));
+    }
+  }
+  if (n < 2) return;
+  scene.overlappingBodies(true, body_pairs_, scratch_);
+  for (std::size_t p = 0; p < body_pairs_.size(); p += 2) {
+    const std::uint32_t a = body_pairs_[p], b = body_pairs_[p + 1];
+    if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
+    testBodies(scene, a, b);
+    testBodies(scene, b, a);
+  }
+}
+
+void StartStateTest::testBodies(const SceneArrays& scene, std::uint32_t edge_body, std::uint32_t face_body) {
+  const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
+  const ClusterTree& faces = scene.bodies()[face_body].tree(FeatureKind::FACE);
+  if (edges.featureCount() == 0 || faces.featureCount() == 0) return;
+  TreePair trees;
+  trees.a = &edges;
+  trees.b = &faces;
+  trees.t0_only = true;
+  superclusterPairs(trees, groups_, scratch_);
+  stream_.run(trees, groups_.data(), groups_.size() / 2, [&](const std::uint32_t* slots, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (shareVertex(edges.feature(slots[2 * i]), faces.feature(slots[2 * i + 1]))) continue;
+      test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
+    }
+  });
+  stream_.clearCounters();
+}
+
+void StartStateTest::testCandidates(const SceneArrays& scene) {
+  candidates_.insert(candidates_.end(), found_.begin(), found_.end());
+  std::sort(candidates_.begin(), candidates_.end());
+  candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
+  found_.clear();
+  for (const EdgeFace& pair : candidates_) {
+    // What was active in the last step may have become unchecked.
+    if (scene.bodies()[pair.edge_body].holds(FeatureKind::EDGE, pair.edge) &&
+        scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face)) {
+      test(scene, pair);
+    }
+  }
+}
+
+void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
+  const Index* e = scene.bodies()[pair.edge_body].tree(FeatureKind::EDGE).feature(pair.edge);
+  const Index* f = scene.bodies()[pair.face_body].tree(FeatureKind::FACE).feature(pair.face);
+  const VertexMotion* x = scene.vertices();
+  ++tested_;
+  if (segmentMeetsTriangle(x[e[0]].t0, x[e[1]].t0, x[f[0]].t0, x[f[1]].t0, x[f[2]].t0)) found_.push_back(pair);
+}
+
+void StartStateTest::remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete) {
+  known_ = false;
+  candidates_.clear();
+  if (!complete) return;
+  const std::size_t limit = CANDIDATES_PER_EDGE * edgeCount(scene);
+  for (const core::Contact& contact : contacts) {
+    if (contact.kind != PairKind::VERTEX_FACE && contact.kind != PairKind::EDGE_EDGE) continue;
+    if (candidates_.size() > limit) return;
+    addCandidates(scene, contact);
+  }
+  known_ = true;
+}
+
+void StartStateTest::addCandidates(const SceneArrays& scene, const core::Contact& contact) {
+  learnNeighbourhoods(scene);
+  const std::uint32_t a = contact.body[0], b = contact.body[1];
+  Index v[4];  // internal numbers
+  for (int i = 0; i < 4; ++i) {
+    const bool first = i < (contact.kind == PairKind::VERTEX_FACE ? 1 : 2);
+    v[i] = neighbourhoods_[first ? a : b].internal_of_local[contact.vertex[i]];
+  }
+  if (contact.kind == PairKind::EDGE_EDGE) {
+    addFacesAtEdge(scene, a, v, b, v + 2);
+    addFacesAtEdge(scene, b, v + 2, a, v);
+    return;
+  }
+  const SceneBody &body = scene.bodies()[a], &face_body = scene.bodies()[b];
+  const SlotsAtVertex &edges = neighbourhoods_[a].edges, &faces = neighbourhoods_[b].faces;
+  const Index at = v[0] - body.internal_begin, corner = v[1] - face_body.internal_begin;
+  const std::uint32_t* face = std::find_if(&faces.slots[faces.begin[corner]], faces.slots.data() + faces.begin[corner + 1],
+                                           [&](std::uint32_t slot) {
+    const Index* f = face_body.tree(FeatureKind::FACE).feature(slot);
+    return contains(f, v[2]) && contains(f, v[3]);
+  });
+  for (std::uint32_t i = edges.begin[at]; i < edges.begin[at + 1]; ++i) {
+    const Index* e = body.tree(FeatureKind::EDGE).feature(edges.slots[i]);
+    if (!shareVertex(e, v + 1)) candidates_.push_back({a, edges.slots[i], b, *face});
+  }
+}
+
+void StartStateTest::addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge,
+                                    std::uint32_t face_body, const Index* other_edge) {
+  const SceneBody &a = scene.bodies()[edge_body], &b = scene.bodies()[face_body];
+  const SlotsAtVertex &edges = neighbourhoods_[edge_body].edges, &faces = neighbourhoods_[face_body].faces;
+  const Index at = edge[0] - a.internal_begin, other = other_edge[0] - b.internal_begin;
+  const std::uint32_t* slot = std::find_if(&edges.slots[edges.begin[at]], edges.slots.data() + edges.begin[at + 1],
+                                           [&](std::uint32_t s) {
+    const Index* e = a.tree(FeatureKind::EDGE).feature(s);
+    return (e[0] == edge[0] && e[1] == edge[1]) || (e[0] == edge[1] && e[1] == edge[0]);
+  });
+  for (std::uint32_t i = faces.begin[other]; i < faces.begin[other + 1]; ++i) {
+    const Index* f = b.tree(FeatureKind::FACE).feature(faces.slots[i]);
+    if (contains(f, other_edge[1]) && !shareVertex(edge, f)) {
+      candidates_.push_back({edge_body, *slot, face_body, faces.slots[i]});
+    }
+  }
+}
+
+void StartStateTest::learnNeighbourhoods(const SceneArrays& scene) {
+  if (!neighbourhoods_.empty()) return;
+  neighbourhoods_.resize(scene.bodies().size());
+  for (std::size_t b = 0; b < neighbourhoods_.size(); ++b) {
+    const SceneBody& body = scene.bodies()[b];
+    Neighbourhood& n = neighbourhoods_[b];
+    n.internal_of_local.assign(body.setup.topology->vertexCount(), NO_INDEX);
+    for (std::size_t i = 0; i < body.usedCount(); ++i) {
+      n.internal_of_local[body.slot_vertex[i]] = body.internal_begin + static_cast<Index>(i);
+    }
+    n.edges.build(body, FeatureKind::EDGE);
+    n.faces.build(body, FeatureKind::FACE);
+  }
+}
+
+void StartStateTest::forget() {
+  known_ = false;
+  found_.clear();
+  candidates_.clear();
+  neighbourhoods_.clear();
+}
+
+}  // namespace deformable_ccd
