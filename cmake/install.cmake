@@ -1,4 +1,6 @@
 # The install tree works without the source: libraries, tools, headers, launch files, configurations.
+# scripts/ serve the checkout and are no part of the installed package.
+#catkin_lint: ignore uninstalled_script
 include(GNUInstallDirs)
 set(LIBRARY_TARGETS deformable_ccd)
 foreach(library deformable_ccd_octomap deformable_ccd_ros)

@@ -10,8 +10,9 @@ file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS test/support/*.cpp)
 list(REMOVE_ITEM SUPPORT_SOURCES ${ORACLE_SOURCES})
 add_library(deformable_ccd_test_support STATIC EXCLUDE_FROM_ALL ${SUPPORT_SOURCES})
 target_include_directories(deformable_ccd_test_support PUBLIC src test)
-target_compile_definitions(deformable_ccd_test_support PUBLIC
-  DEFORMABLE_CCD_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+# The true path, not that of a workspace's link: the truth data lie beside the checkout.
+get_filename_component(TRUE_SOURCE_DIR ${CMAKE_CURRENT_SOURCE_DIR} REALPATH)
+target_compile_definitions(deformable_ccd_test_support PUBLIC DEFORMABLE_CCD_SOURCE_DIR="${TRUE_SOURCE_DIR}")
 target_link_libraries(deformable_ccd_test_support PUBLIC
   deformable_ccd_oracle deformable_ccd GTest::gtest ZLIB::ZLIB TBB::tbb nlohmann_json::nlohmann_json ${HWY_LIBRARY}
   ${GMP_LIBRARY})
@@ -31,6 +32,7 @@ function(add_gtest_suite name)
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE deformable_ccd_test_support ${arg_LIBRARIES} GTest::gtest_main)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/gtest)
+  file(APPEND ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "${name}\n")
   add_test(NAME ${name} COMMAND ${name})
   if(NOT DEFORMABLE_CCD_CORE_ONLY)
     target_include_directories(${name} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
@@ -40,6 +42,8 @@ function(add_gtest_suite name)
   endif()
 endfunction()
 
+# scripts/test reads this list: a suite that is on it but was not built counts as failed.
+file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "")
 set(PARTS_BEYOND_CORE octomap physics ros)
 foreach(suite unit property truth)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS test/${suite}/*.cpp)

@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+"""Runs every test that the build made and adds the results up.
+
+Runners: gtest binaries (listed by CMake in gtest_suites.txt, so that one that was not built counts as failed),
+Python unittest files (test/**/*_test.py), roslaunch-check on every launch file, rostest on test/ros/*.test.
+A runner that starts fewer tests than it has, crashes or runs out of time adds failures. The last line printed is
+`N passed, N failed, N skipped`.
+"""
+import argparse
+import concurrent.futures
+import dataclasses
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+import xml.etree.ElementTree as ElementTree
+
+CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
+# No runner is near this; it ends one that hangs (a rostest waits for its node), so that the rest still count.
+TIME_LIMIT_S = 1500 if not os.environ.get('DEFORMABLE_CCD_LONG') else 6 * 3600
+
+
+@dataclasses.dataclass
+class Result:
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+    notes: list = dataclasses.field(default_factory=list)
+
+    def fail(self, note, count=1):
+        self.failed += count
+        self.notes.append(note)
+
+
+def run(command, log, environment=None):
+    """Runs a command with its output in the file `log`; returns the exit status, or None when out of time."""
+    with open(log, 'w') as output:
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+                                   env={**os.environ, **(environment or {})}, start_new_session=True)
+        try:
+            return process.wait(timeout=TIME_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            # The runner's own children too, which its session holds.
+            os.killpg(process.pid, 15)
+            try:
+                process.wait(timeout=20)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, 9)
+                process.wait()
+            return None
+
+
+def count_junit(path, result):
+    """Adds the test cases of a JUnit file (gtest's, rostest's); returns how many it holds."""
+    cases = list(ElementTree.parse(path).getroot().iter('testcase'))
+    for case in cases:
+        name = '%s.%s' % (case.get('classname', ''), case.get('name', ''))
+        bad = case.find('failure') if case.find('failure') is not None else case.find('error')
+        skipped = case.find('skipped')
+        if bad is not None:
+            result.fail('failed: ' + name)
+        elif skipped is not None or case.get('status') == 'notrun' or case.get('result') == 'skipped':
+            result.skipped += 1
+            reason = (skipped.get('message') or '').strip().splitlines() if skipped is not None else []
+            result.notes.append('skipped: %s%s' % (name, ' (%s)' % reason[-1].strip() if reason else ''))
+        else:
+            result.passed += 1
+    return len(cases)
+
+
+class GtestRunner:
+    """One shard of a gtest binary."""
+
+    def __init__(self, binary, shard, shards, pattern):
+        self.binary, self.shard, self.shards, self.pattern = binary, shard, shards, pattern
+        self.name = binary.name if shards == 1 else '%s (%d of %d)' % (binary.name, shard + 1, shards)
+
+    def expected(self, flags, environment):
+        listing = subprocess.run([str(self.binary), '--gtest_list_tests'] + flags, capture_output=True, text=True,
+                                 env={**os.environ, **environment})
+        return sum(line.startswith('  ') for line in listing.stdout.splitlines())
+
+    def __call__(self, logs):
+        result = Result()
+        stem = logs / re.sub(r'\W+', '_', self.name)
+        xml, log = stem.with_suffix('.xml'), stem.with_suffix('.log')
+        if not self.binary.exists():
+            result.fail('%s was not built' % self.binary.name)
+            return result, None
+        flags = ['--gtest_filter=' + self.pattern] if self.pattern else []
+        environment = {'GTEST_TOTAL_SHARDS': str(self.shards), 'GTEST_SHARD_INDEX': str(self.shard)}
+        status = run([str(self.binary), '--gtest_output=xml:%s' % xml] + flags, log, environment)
+        if xml.exists():
+            count_junit(xml, result)
+            # A failure outside a test case (an environment's tear-down, a sanitizer's report at exit) has no entry.
+            if status != 0 and not result.failed:
+                result.fail('%s exited with status %s' % (self.name, status))
+            return result, log
+        # Crashed or out of time: count what it printed; all that did not finish failed. gtest lists tests regardless of
+        # shards, so the count of this shard is the one it announced when it started.
+        output = log.read_text(errors='replace')
+        result.passed = len(re.findall(r'^\[       OK \]', output, re.M))
+        result.skipped = len(re.findall(r'^\[  SKIPPED \] .*\(\d+ ms\)', output, re.M))
+        announced = re.search(r'Running (\d+) tests? from', output)
+        total = int(announced.group(1)) if announced else max(1, self.expected(flags, environment))
+        why = 'ran out of time' if status is None else 'died with status %d' % status
+        result.fail('%s %s' % (self.name, why), max(1, total - result.passed - result.skipped))
+        return result, log
+
+
+class RostestRunner:
+    def __init__(self, path):
+        self.path = path
+        self.name = path.name
+
+    def __call__(self, logs):
+        result = Result()
+        folder = logs / ('rostest_' + self.path.stem)
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        log = logs / (self.path.name + '.log')
+        # A master, log folder and port of its own: nothing is written outside the checkout.
+        environment = {'ROS_HOME': str(folder / 'ros_home'), 'ROS_LOG_DIR': str(folder / 'log'),
+                       'ROS_HOSTNAME': 'localhost'}
+        status = run(['rostest', '--pkgdir=%s' % CHECKOUT, '--package=deformable_ccd', '--results-filename',
+                      self.path.stem + '.xml', '--results-base-dir', str(folder), str(self.path)], log, environment)
+        # The runner's summary file lists the same tests once more.
+        files = [f for f in folder.rglob('*.xml') if not f.name.startswith('rostest-')]
+        ran = 0
+        for file in files:
+            try:
+                ran += count_junit(file, result)
+            except ElementTree.ParseError:
+                result.fail('%s wrote a broken result file' % self.name)
+        expected = len(re.findall(r'<test\s', re.sub(r'<!--.*?-->', '', self.path.read_text(), flags=re.S)))
+        if len(files) < expected:
+            result.fail('%s: %d of %d tests gave no result' % (self.name, expected - len(files), expected),
+                        expected - len(files))
+        elif status != 0 and not result.failed:
+            result.fail('%s exited with status %s' % (self.name, status))
+        if not ran and not result.failed:
+            result.fail('%s ran no test' % self.name)
+        return result, log
+
+
+class PythonRunner:
+    def __init__(self, path):
+        self.path = path
+        self.name = str(path.relative_to(CHECKOUT))
+
+    def __call__(self, logs):
+        result = Result()
+        log = logs / (self.path.stem + '.py.log')
+        status = run([sys.executable, '-m', 'unittest', '-v', str(self.path)], log,
+                     {'PYTHONDONTWRITEBYTECODE': '1', 'PYTHONPATH': os.pathsep.join(
+                         [str(self.path.parent), os.environ.get('PYTHONPATH', '')])})
+        output = log.read_text(errors='replace')
+        ran = re.search(r'^Ran (\d+) tests? in', output, re.M)
+        if not ran:
+            result.fail('%s did not run' % self.name)
+            return result, log
+        summary = output[ran.end():]
+        counts = {key: int(number) for key, number in re.findall(r'(\w+)=(\d+)', summary)}
+        result.failed = counts.get('failures', 0) + counts.get('errors', 0) + counts.get('successes', 0)
+        result.skipped = counts.get('skipped', 0)
+        result.passed = max(0, int(ran.group(1)) - result.failed - result.skipped)
+        result.notes += ['failed: ' + line for line in re.findall(r'^(?:FAIL|ERROR): (.*)', output, re.M)]
+        result.notes += ['skipped: %s' % line for line in re.findall(r"^(.*skipped '.*)", output, re.M)]
+        if status != 0 and not result.failed:
+            result.fail('%s exited with status %s' % (self.name, status))
+        elif result.passed + result.failed + result.skipped == 0:
+            result.fail('%s holds no test' % self.name)
+        return result, log
+
+
+class LaunchCheckRunner:
+    def __init__(self, path):
+        self.path = path
+        self.name = 'roslaunch-check ' + str(path.relative_to(CHECKOUT))
+
+    def __call__(self, logs):
+        result = Result()
+        log = logs / (re.sub(r'\W+', '_', self.name) + '.log')
+        candidates = [pathlib.Path(prefix) / 'share/roslaunch/scripts/roslaunch-check'
+                      for prefix in os.environ.get('CMAKE_PREFIX_PATH', '').split(':') + ['/usr'] if prefix]
+        check = next((c for c in candidates if c.exists()), None)
+        if check is None:
+            result.fail('roslaunch-check was not found')
+            return result, None
+        status = run([sys.executable, str(check), '-o', str(log.with_suffix('.xml')), str(self.path)], log,
+                     {'ROS_HOME': str(logs / 'ros_home')})
+        if status == 0:
+            result.passed = 1
+        else:
+            result.fail('failed: ' + self.name)
+        return result, log
+
+
+def find_runners(arguments):
+    """All runners, in two lists: those that keep a core busy, and the live ones, which mostly wait."""
+    suites = (arguments.build / 'gtest_suites.txt').read_text().split()
+    busy = []
+    for suite in suites:
+        # Shards let two cores share one long suite.
+        shards = 1 if arguments.filter else max(1, min(4, os.cpu_count() or 1))
+        busy += [GtestRunner(arguments.build / 'gtest' / suite, shard, shards, arguments.filter)
+                 for shard in range(shards)]
+    if arguments.core_only or arguments.filter:
+        return busy, []
+    python = [PythonRunner(p) for p in sorted((CHECKOUT / 'test').rglob('*_test.py'))
+              if 'ros' not in p.relative_to(CHECKOUT / 'test').parts]
+    launch = [LaunchCheckRunner(p) for p in sorted((CHECKOUT / 'launch').rglob('*.launch'))]
+    live = [RostestRunner(p) for p in sorted((CHECKOUT / 'test' / 'ros').glob('*.test'))]
+    return busy + python, launch + live
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument('--build', type=pathlib.Path, required=True, help='build folder of the package')
+    parser.add_argument('--core-only', action='store_true')
+    parser.add_argument('--only', default='')
+    parser.add_argument('--filter', default='')
+    arguments = parser.parse_args()
+    logs = arguments.build / 'test_logs'
+    shutil.rmtree(logs, ignore_errors=True)
+    logs.mkdir(parents=True)
+
+    total = Result()
+    lock = threading.Lock()
+
+    def work(runner):
+        started = time.monotonic()
+        try:
+            result, log = runner(logs)
+        except Exception as error:  # a runner that cannot start is a failed test, not the end of the run
+            result, log = Result(), None
+            result.fail('%s: %s' % (runner.name, error))
+        with lock:
+            print('%-44s %5d passed %3d failed %3d skipped  %6.1f s' % (
+                runner.name, result.passed, result.failed, result.skipped, time.monotonic() - started), flush=True)
+            for note in result.notes:
+                print('    ' + note, flush=True)
+            if result.failed and log:
+                print('    output: %s; its end:' % log)
+                print(''.join('    | ' + line for line in log.read_text(errors='replace').splitlines(True)[-40:]),
+                      flush=True)
+            total.passed += result.passed
+            total.failed += result.failed
+            total.skipped += result.skipped
+
+    busy, live = [[r for r in group if arguments.only in r.name] for group in find_runners(arguments)]
+    # Live tests have deadlines of their own, so only one runs at a time, beside one that computes.
+    with concurrent.futures.ThreadPoolExecutor(1) as live_pool, \
+            concurrent.futures.ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - (1 if live else 0))) as busy_pool:
+        pending = [live_pool.submit(work, r) for r in live] + [busy_pool.submit(work, r) for r in busy]
+        concurrent.futures.wait(pending)
+    if not busy and not live:
+        total.fail('no test was selected')
+        print('no test was selected')
+    print('%d passed, %d failed, %d skipped' % (total.passed, total.failed, total.skipped), flush=True)
+    return 1 if total.failed else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
