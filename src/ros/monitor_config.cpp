@@ -1,0 +1,218 @@
+#include "ros/monitor_config.h"
+
+#include <algorithm>
+
+namespace deformable_ccd {
+
+using XmlRpc::XmlRpcValue;
+
+namespace {
+
+constexpr double LARGE = 1e9;
+constexpr int MANY = 1000000000;
+
+TopologySource topologySource(ParameterReader& section) {
+  const std::string text = section.choice(
+      "source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld"});
+  if (text == "message") return TopologySource::MESSAGE;
+  if (text == "grid") return TopologySource::GRID;
+  if (text == "polyline") return TopologySource::POLYLINE;
+  if (text == "file") return TopologySource::FILE;
+  if (text == "first_frame_weld") return TopologySource::FIRST_FRAME_WELD;
+  return TopologySource::AUTO;
+}
+
+void readTopology(ParameterReader section, BodyConfig& body) {
+  MeshInputConfig& input = body.input;
+  input.source = topologySource(section);
+  input.rows = static_cast<std::size_t>(section.get("rows", 0, 0, 100000));
+  input.cols = static_cast<std::size_t>(section.get("cols", 0, 0, 100000));
+  body.topology_file = section.get("file", std::string());
+  section.finish();
+  if ((input.rows == 0) != (input.cols == 0)) section.fail("rows", "and cols go together: set both or neither");
+  if (input.rows == 1 || input.cols == 1) section.fail("rows", "and cols must be 2 or more; for a rope set source to polyline");
+  if (input.source == TopologySource::AUTO && !body.topology_file.empty()) input.source = TopologySource::FILE;
+  if (input.source == TopologySource::FILE && body.topology_file.empty()) section.fail("file", "is needed for source 'file'");
+  if (input.source == TopologySource::POLYLINE && input.rows) section.fail("rows", "has no meaning for a polyline; remove rows and cols");
+}
+
+void readRigid(ParameterReader section, BodyConfig& body) {
+  body.mesh_file = section.get("mesh", std::string());
+  body.tf_frame = section.get("frame", std::string());
+  body.mesh_scale = section.get("scale", 1.0, 1e-6, 1e6);
+  section.finish();
+  if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY) or a package:// path");
+  if (body.tf_frame.empty()) section.fail("frame", "is needed: the tf frame that carries the mesh");
+  body.body.rigid = true;
+}
+
+BodyConfig readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic) {
+  BodyConfig body;
+  body.body.name = name;
+  body.topic = reader.get("topic", default_topic);
+  std::vector<std::string> types{"auto"};
+  for (const MeshType& type : meshTypes()) types.push_back(type.name);
+  body.input.type = reader.choice("type", "auto", types);
+  body.input.frame_id = reader.get("frame_id", std::string());
+  body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
+  body.input.max_vertices = static_cast<std::size_t>(reader.get("max_vertices", 1000000, 1, MANY));
+  readTopology(reader.section("topology"), body);
+  if (reader.has("marker")) {
+    ParameterReader marker = reader.section("marker");
+    if (marker.has("namespace")) body.input.marker_namespace = marker.get("namespace", std::string());
+    if (marker.has("id")) body.input.marker_id = marker.get("id", 0, -2147483647, 2147483647);
+    marker.finish();
+  }
+  if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
+  body.body.vertex_mask = reader.indices("vertex_mask");
+  if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
+  return body;
+}
+
+void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyConfig& body) {
+  const bool self_asked = reader.has("self_collision");
+  body.body.self_collision = reader.get("self_collision", !body.body.rigid);
+  if (body.body.rigid && self_asked && body.body.self_collision) {
+    reader.fail("self_collision", "is true, but the body is rigid and cannot meet itself; remove it");
+  }
+  body.body.against_bodies = reader.get("against_bodies", true);
+  body.body.against_obstacle = reader.get("against_obstacle", true);
+  body.body.minimum_separation_m = reader.get("minimum_separation_m", config.minimum_separation_m, 0, LARGE);
+}
+
+void readBodies(ParameterReader& reader, MonitorConfig& config) {
+  const std::string clock = reader.get("clock_body", std::string());
+  if (!reader.has("bodies")) {
+    BodyConfig body = readBody(reader, "mesh", "mesh");
+    if (body.isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
+    readBodyEffects(reader, config, body);
+    config.bodies.push_back(std::move(body));
+  } else {
+    ParameterReader section = reader.section("bodies");
+    for (const std::string& name : section.names()) {
+      ParameterReader one = section.section(name);
+      BodyConfig body = readBody(one, name, name);
+      readBodyEffects(one, config, body);
+      one.finish();
+      config.bodies.push_back(std::move(body));
+    }
+    if (config.bodies.empty()) reader.fail("bodies", "is empty");
+  }
+  const auto has_clock = [&](const BodyConfig& body) {
+    return !body.isRigid() && body.body.motion == BodyMotionKind::STREAM && (clock.empty() || clock == body.body.name);
+  };
+  const auto found = std::find_if(config.bodies.begin(), config.bodies.end(), has_clock);
+  if (found == config.bodies.end()) {
+    reader.fail("clock_body", clock.empty() ? "cannot be chosen: no body is a stream of meshes"
+                                            : "is '" + clock + "', which is not a body with a stream of meshes");
+  }
+  config.monitor.clock_body = static_cast<std::size_t>(found - config.bodies.begin());
+}
+
+void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
+  DetectorOptions& detector = config.monitor.detector;
+  const bool chosen = reader.has("accuracy");
+  const std::string rung = reader.choice("accuracy", "exact", {"screen", "fast", "conservative", "exact"});
+  detector.accuracy.rung = accuracyFromString(rung.c_str());
+  detector.accuracy.tolerance_m = reader.get("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
+  detector.accuracy.toc_bits = reader.get("toc_bits", detector.accuracy.toc_bits, 10, 52);
+  detector.accuracy.max_subdivisions = reader.get("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
+  detector.num_threads = reader.get("num_threads", detector.num_threads, 1, 256);
+  detector.step_budget_ms = reader.get("step_budget_ms", 0.0, 0, LARGE);
+  config.minimum_separation_m = reader.get("minimum_separation_m", 0.0, 0, LARGE);
+  if (config.minimum_separation_m > 0 && (rung == "exact" || rung == "fast")) {
+    if (chosen) {
+      reader.fail("accuracy", "is '" + rung + "', which cannot hold a minimum separation; write accuracy: conservative");
+    }
+    detector.accuracy.rung = Accuracy::CONSERVATIVE;
+  }
+}
+
+void readThresholds(ParameterReader& reader, MonitorConfig& config) {
+  MonitorOptions& monitor = config.monitor;
+  monitor.store.max_step_s = reader.get("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
+  monitor.store.max_vertex_step_m = reader.get("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
+  monitor.sync_timeout_s = reader.get("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
+  monitor.max_contacts = static_cast<std::size_t>(reader.get("max_contacts", 10000, 1, MANY));
+  monitor.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
+  for (XmlRpcValue& item : reader.list("exclude_boxes")) {
+    const auto n = reader.numbers(item, "exclude_boxes", 6);
+    const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (box.empty()) reader.fail("exclude_boxes", "holds a box whose min exceeds its max; write [x0, y0, z0, x1, y1, z1]");
+    monitor.exclude_boxes.push_back(box);
+  }
+  monitor.rigid_tolerance_m = reader.get("rigid_tolerance_m", monitor.rigid_tolerance_m, 1e-9, LARGE);
+  monitor.max_substeps = static_cast<std::size_t>(reader.get("max_substeps", 64, 1, 100000));
+  monitor.look_ahead_s = reader.get("look_ahead_s", 0.0, 0, 3600);
+  config.transform_timeout_s = reader.get("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
+  config.queue_size = static_cast<std::size_t>(reader.get("queue_size", 8, 1, 100000));
+  config.queue_policy =
+      reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST : QueuePolicy::OLDEST;
+  config.simd_target = reader.get("simd_target", std::string("auto"));
+  config.record_ring = static_cast<std::size_t>(reader.get("record_ring", 0, 0, 10000));
+  config.record_directory = reader.get("record_directory", std::string());
+}
+
+void readMap(ParameterReader& reader, MonitorConfig& config) {
+  config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
+  config.octomap_file = reader.get("octomap_file", std::string());
+  config.octomap_frame = reader.get("octomap_frame", std::string());
+  config.max_map_bytes = static_cast<std::size_t>(reader.get("max_map_mb", 512, 1, 4096)) << 20;
+  config.monitor.octomap_timeout_s = reader.get("octomap_timeout_s", 0.0, 0, LARGE);
+  const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
+  config.unknown_space = unknown == "free" ? UnknownSpace::FREE
+                         : unknown == "occupied" ? UnknownSpace::OCCUPIED : UnknownSpace::REPORT;
+}
+
+void readEffects(ParameterReader section, MonitorConfig& config) {
+  for (const std::string& name : effectNames()) {
+    const std::string text = section.choice(name, "auto", {"auto", "on", "off"});
+    config.effects[name] = text == "on" ? Setting::ON : text == "off" ? Setting::OFF : Setting::AUTO;
+  }
+  section.finish();
+}
+
+void readMarkers(ParameterReader section, MarkerConfig& markers) {
+  markers.point_size_m = section.get("point_size_m", markers.point_size_m, 1e-6, LARGE);
+  markers.normal_length_m = section.get("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
+  markers.line_width_m = section.get("line_width_m", markers.line_width_m, 1e-6, LARGE);
+  markers.max_contacts = section.get("max_contacts", markers.max_contacts, 1, MANY);
+  markers.mesh = section.get("mesh", markers.mesh);
+  section.finish();
+}
+
+std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every machine
+  std::uint64_t hash = 1469598103934665603ull;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return hash;
+}
+
+}  // namespace
+
+const char* toString(Setting setting) {
+  return setting == Setting::AUTO ? "auto" : setting == Setting::ON ? "on" : "off";
+}
+
+const std::vector<std::string>& effectNames() {
+  static const std::vector<std::string> NAMES = {"self_collision", "body_body",     "octomap",      "start_state",
+                                                 "rigid_bodies",   "unknown_space", "minimum_separation", "look_ahead"};
+  return NAMES;
+}
+
+MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
+  ParameterReader reader(tree, path);
+  MonitorConfig config;
+  config.fixed_frame = reader.get("fixed_frame", std::string());
+  readAccuracy(reader, config);
+  readThresholds(reader, config);
+  readMap(reader, config);
+  readEffects(reader.section("effects"), config);
+  readMarkers(reader.section("markers"), config.markers);
+  readBodies(reader, config);
+  reader.finish();
+  XmlRpcValue copy = tree;
+  config.hash = hashOf(copy.valid() ? copy.toXml() : std::string());
+  return config;
+}
+
+}  // namespace deformable_ccd

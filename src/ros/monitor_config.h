@@ -1,0 +1,71 @@
+// Every parameter of the monitor, read and checked once. The node reads it from the parameter server, analyze_bag from a
+// YAML file; both see the same names, defaults and errors. doc/interface.md is the table for people.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <xmlrpcpp/XmlRpcValue.h>
+
+#include "deformable_ccd/monitor.h"
+#include "ros/mesh_decoder.h"
+#include "ros/parameter_reader.h"
+
+namespace deformable_ccd {
+
+enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
+enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
+/// What a user asks of an effect (effects/NAME).
+enum class Setting : std::uint8_t { AUTO, ON, OFF };
+const char* toString(Setting setting);
+
+/// Names under effects/.
+const std::vector<std::string>& effectNames();
+
+struct BodyConfig {
+  MonitorBody body;
+  std::string topic;  ///< streams and static meshes
+  MeshInputConfig input;
+  std::string topology_file;
+  // Rigid bodies: no topic, but a mesh file that a tf frame carries.
+  std::string mesh_file;
+  std::string tf_frame;
+  double mesh_scale = 1;
+  bool isRigid() const { return body.rigid; }
+};
+
+struct MarkerConfig {
+  double point_size_m = 0.01;
+  double normal_length_m = 0.05;
+  double line_width_m = 0.002;
+  int max_contacts = 2000;
+  bool mesh = false;  ///< republish the bodies as markers
+};
+
+struct MonitorConfig {
+  std::string fixed_frame;  ///< empty: the frame of the clock body's first message
+  std::vector<BodyConfig> bodies;
+  MonitorOptions monitor;
+  std::map<std::string, Setting> effects;
+  double minimum_separation_m = 0;
+  UnknownSpace unknown_space = UnknownSpace::FREE;
+  std::string octomap_topic = "octomap", octomap_file, octomap_frame;
+  std::size_t max_map_bytes = std::size_t{512} << 20;
+  double transform_timeout_s = 0.2;
+  std::size_t queue_size = 8;
+  QueuePolicy queue_policy = QueuePolicy::NEWEST;
+  std::string simd_target = "auto";
+  MarkerConfig markers;
+  std::size_t record_ring = 0;      ///< steps kept for ~record_step; 0: none
+  std::string record_directory;
+  std::uint64_t hash = 0;           ///< of all values in force
+};
+
+/// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
+MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
+
+/// The same tree from a YAML file, typed as rosparam would. Throws ParameterError naming file and line.
+XmlRpc::XmlRpcValue readYaml(const std::string& file);
+
+}  // namespace deformable_ccd

@@ -1,0 +1,33 @@
+// Transforms: what arrives on /tf goes into one buffer; what is asked for comes out at exactly the stamp asked.
+#pragma once
+
+#include <string>
+#include <unordered_map>
+
+#include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "deformable_ccd/mesh_store.h"
+
+namespace deformable_ccd {
+
+/// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of the
+/// end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
+class TransformFeed {
+ public:
+  explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
+  /// Returns true when the buffer was cleared.
+  bool add(const tf2_msgs::TFMessage& message, bool is_static);
+
+ private:
+  tf2::BufferCore& buffer_;
+  std::unordered_map<std::string, StampNs> newest_;  // per child frame
+};
+
+/// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no transform.
+bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source,
+                     StampNs stamp_ns, Eigen::Isometry3d& transform, std::string& reason);
+
+void transform(const Eigen::Isometry3d& target_from_source, Positions& positions);
+
+}  // namespace deformable_ccd
