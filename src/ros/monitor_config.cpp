@@ -25,8 +25,8 @@ TopologySource topologySource(ParameterReader& section) {
 void readTopology(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
   input.source = topologySource(section);
-  input.rows = static_cast<std::size_t>(section.get("rows", 0, 0, 100000));
-  input.cols = static_cast<std::size_t>(section.get("cols", 0, 0, 100000));
+  input.rows = static_cast<std::size_t>(section.integer("rows", 0, 0, 100000));
+  input.cols = static_cast<std::size_t>(section.integer("cols", 0, 0, 100000));
   body.topology_file = section.get("file", std::string());
   section.finish();
   if ((input.rows == 0) != (input.cols == 0)) section.fail("rows", "and cols go together: set both or neither");
@@ -39,7 +39,7 @@ void readTopology(ParameterReader section, BodyConfig& body) {
 void readRigid(ParameterReader section, BodyConfig& body) {
   body.mesh_file = section.get("mesh", std::string());
   body.tf_frame = section.get("frame", std::string());
-  body.mesh_scale = section.get("scale", 1.0, 1e-6, 1e6);
+  body.mesh_scale = section.number("scale", 1.0, 1e-6, 1e6);
   section.finish();
   if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY) or a package:// path");
   if (body.tf_frame.empty()) section.fail("frame", "is needed: the tf frame that carries the mesh");
@@ -55,12 +55,12 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
   body.input.type = reader.choice("type", "auto", types);
   body.input.frame_id = reader.get("frame_id", std::string());
   body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
-  body.input.max_vertices = static_cast<std::size_t>(reader.get("max_vertices", 1000000, 1, MANY));
+  body.input.max_vertices = static_cast<std::size_t>(reader.integer("max_vertices", 1000000, 1, MANY));
   readTopology(reader.section("topology"), body);
   if (reader.has("marker")) {
     ParameterReader marker = reader.section("marker");
     if (marker.has("namespace")) body.input.marker_namespace = marker.get("namespace", std::string());
-    if (marker.has("id")) body.input.marker_id = marker.get("id", 0, -2147483647, 2147483647);
+    if (marker.has("id")) body.input.marker_id = marker.integer("id", 0, -2147483647, 2147483647);
     marker.finish();
   }
   if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
@@ -77,7 +77,7 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   }
   body.body.against_bodies = reader.get("against_bodies", true);
   body.body.against_obstacle = reader.get("against_obstacle", true);
-  body.body.minimum_separation_m = reader.get("minimum_separation_m", config.minimum_separation_m, 0, LARGE);
+  body.body.minimum_separation_m = reader.number("minimum_separation_m", config.minimum_separation_m, 0, LARGE);
 }
 
 void readBodies(ParameterReader& reader, MonitorConfig& config) {
@@ -114,12 +114,12 @@ void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
   const bool chosen = reader.has("accuracy");
   const std::string rung = reader.choice("accuracy", "exact", {"screen", "fast", "conservative", "exact"});
   detector.accuracy.rung = accuracyFromString(rung.c_str());
-  detector.accuracy.tolerance_m = reader.get("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
-  detector.accuracy.toc_bits = reader.get("toc_bits", detector.accuracy.toc_bits, 10, 52);
-  detector.accuracy.max_subdivisions = reader.get("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
-  detector.num_threads = reader.get("num_threads", detector.num_threads, 1, 256);
-  detector.step_budget_ms = reader.get("step_budget_ms", 0.0, 0, LARGE);
-  config.minimum_separation_m = reader.get("minimum_separation_m", 0.0, 0, LARGE);
+  detector.accuracy.tolerance_m = reader.number("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
+  detector.accuracy.toc_bits = reader.integer("toc_bits", detector.accuracy.toc_bits, 10, 52);
+  detector.accuracy.max_subdivisions = reader.integer("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
+  detector.num_threads = reader.integer("num_threads", detector.num_threads, 1, 256);
+  detector.step_budget_ms = reader.number("step_budget_ms", 0.0, 0, LARGE);
+  config.minimum_separation_m = reader.number("minimum_separation_m", 0.0, 0, LARGE);
   if (config.minimum_separation_m > 0 && (rung == "exact" || rung == "fast")) {
     if (chosen) {
       reader.fail("accuracy", "is '" + rung + "', which cannot hold a minimum separation; write accuracy: conservative");
@@ -130,10 +130,10 @@ void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
 
 void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   MonitorOptions& monitor = config.monitor;
-  monitor.store.max_step_s = reader.get("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
-  monitor.store.max_vertex_step_m = reader.get("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
-  monitor.sync_timeout_s = reader.get("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
-  monitor.max_contacts = static_cast<std::size_t>(reader.get("max_contacts", 10000, 1, MANY));
+  monitor.store.max_step_s = reader.number("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
+  monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
+  monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
+  monitor.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
   monitor.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
   for (XmlRpcValue& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);
@@ -141,15 +141,15 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
     if (box.empty()) reader.fail("exclude_boxes", "holds a box whose min exceeds its max; write [x0, y0, z0, x1, y1, z1]");
     monitor.exclude_boxes.push_back(box);
   }
-  monitor.rigid_tolerance_m = reader.get("rigid_tolerance_m", monitor.rigid_tolerance_m, 1e-9, LARGE);
-  monitor.max_substeps = static_cast<std::size_t>(reader.get("max_substeps", 64, 1, 100000));
-  monitor.look_ahead_s = reader.get("look_ahead_s", 0.0, 0, 3600);
-  config.transform_timeout_s = reader.get("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
-  config.queue_size = static_cast<std::size_t>(reader.get("queue_size", 8, 1, 100000));
+  monitor.rigid_tolerance_m = reader.number("rigid_tolerance_m", monitor.rigid_tolerance_m, 1e-9, LARGE);
+  monitor.max_substeps = static_cast<std::size_t>(reader.integer("max_substeps", 64, 1, 100000));
+  monitor.look_ahead_s = reader.number("look_ahead_s", 0.0, 0, 3600);
+  config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
+  config.queue_size = static_cast<std::size_t>(reader.integer("queue_size", 8, 1, 100000));
   config.queue_policy =
       reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST : QueuePolicy::OLDEST;
   config.simd_target = reader.get("simd_target", std::string("auto"));
-  config.record_ring = static_cast<std::size_t>(reader.get("record_ring", 0, 0, 10000));
+  config.record_ring = static_cast<std::size_t>(reader.integer("record_ring", 0, 0, 10000));
   config.record_directory = reader.get("record_directory", std::string());
 }
 
@@ -157,8 +157,8 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
   config.octomap_file = reader.get("octomap_file", std::string());
   config.octomap_frame = reader.get("octomap_frame", std::string());
-  config.max_map_bytes = static_cast<std::size_t>(reader.get("max_map_mb", 512, 1, 4096)) << 20;
-  config.monitor.octomap_timeout_s = reader.get("octomap_timeout_s", 0.0, 0, LARGE);
+  config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 4096)) << 20;
+  config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
   const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
   config.unknown_space = unknown == "free" ? UnknownSpace::FREE
                          : unknown == "occupied" ? UnknownSpace::OCCUPIED : UnknownSpace::REPORT;
@@ -173,10 +173,10 @@ void readEffects(ParameterReader section, MonitorConfig& config) {
 }
 
 void readMarkers(ParameterReader section, MarkerConfig& markers) {
-  markers.point_size_m = section.get("point_size_m", markers.point_size_m, 1e-6, LARGE);
-  markers.normal_length_m = section.get("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
-  markers.line_width_m = section.get("line_width_m", markers.line_width_m, 1e-6, LARGE);
-  markers.max_contacts = section.get("max_contacts", markers.max_contacts, 1, MANY);
+  markers.point_size_m = section.number("point_size_m", markers.point_size_m, 1e-6, LARGE);
+  markers.normal_length_m = section.number("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
+  markers.line_width_m = section.number("line_width_m", markers.line_width_m, 1e-6, LARGE);
+  markers.max_contacts = section.integer("max_contacts", markers.max_contacts, 1, MANY);
   markers.mesh = section.get("mesh", markers.mesh);
   section.finish();
 }

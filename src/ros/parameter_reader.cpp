@@ -38,10 +38,10 @@ const char* typeName(XmlRpcValue& value) {
   }
 }
 
-std::string number(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
+std::string text(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
 }
 
 }  // namespace
@@ -73,11 +73,7 @@ XmlRpcValue ParameterReader::raw(const std::string& name) {
 
 bool ParameterReader::has(const std::string& name) { return raw(name).valid(); }
 
-double ParameterReader::get(const std::string& name, double fallback) {
-  return get(name, fallback, -std::numeric_limits<double>::max(), std::numeric_limits<double>::max());
-}
-
-double ParameterReader::get(const std::string& name, double fallback, double min, double max) {
+double ParameterReader::number(const std::string& name, double fallback, double min, double max) {
   XmlRpcValue value = raw(name);
   if (!value.valid()) return fallback;
   double result = 0;
@@ -91,12 +87,12 @@ double ParameterReader::get(const std::string& name, double fallback, double min
                    (value.getType() == XmlRpcValue::TypeString ? " (in YAML write 1.0e-6, not 1e-6)" : ""));
   }
   if (!(result >= min && result <= max)) {
-    fail(name, "is " + number(result) + ", it must be from " + number(min) + " to " + number(max));
+    fail(name, "is " + text(result) + ", it must be from " + text(min) + " to " + text(max));
   }
   return result;
 }
 
-int ParameterReader::get(const std::string& name, int fallback, int min, int max) {
+int ParameterReader::integer(const std::string& name, int fallback, int min, int max) {
   XmlRpcValue value = raw(name);
   if (!value.valid()) return fallback;
   if (value.getType() != XmlRpcValue::TypeInt) fail(name, std::string("is ") + typeName(value) + ", an integer is needed");

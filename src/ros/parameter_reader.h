@@ -28,10 +28,9 @@ class ParameterReader {
   ParameterReader(XmlRpc::XmlRpcValue tree, std::string path);
 
   bool has(const std::string& name);
-  double get(const std::string& name, double fallback);
   /// Numbers in [min, max].
-  double get(const std::string& name, double fallback, double min, double max);
-  int get(const std::string& name, int fallback, int min, int max);
+  double number(const std::string& name, double fallback, double min, double max);
+  int integer(const std::string& name, int fallback, int min, int max);
   bool get(const std::string& name, bool fallback);
   std::string get(const std::string& name, const std::string& fallback);
   /// One of the choices. YAML's on and off are booleans, so those are taken for the words where these are choices.
