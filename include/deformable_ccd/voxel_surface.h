@@ -26,19 +26,20 @@ inline double voxelPlane(std::int64_t k, double resolution_m) {
 class VoxelSurface {
  public:
   struct Impl;
-  /// Throws std::invalid_argument naming the value when resolution_m is not finite and > 0 or leaves overlap.
+  /// Leaves in any order. Throws std::invalid_argument naming the value when resolution_m is not from 1e-290 to 1e290,
+  /// or a leaf's size is no power of two up to 65536, its key no multiple of its size, or two leaves overlap.
   static std::shared_ptr<const VoxelSurface> build(double resolution_m, std::vector<OccupiedLeaf> leaves);
   explicit VoxelSurface(std::unique_ptr<Impl> impl);
   ~VoxelSurface();
 
   double resolution() const;            ///< [m]
   std::size_t leafCount() const;
-  std::size_t faceCount() const;        ///< exposed faces (pieces)
-  std::size_t edgeCount() const;        ///< convex edges (pieces)
+  std::size_t faceCount() const;        ///< exposed faces, each leaf's own
+  std::size_t edgeCount() const;        ///< convex edges, each leaf's own
   std::size_t cornerCount() const;
   std::size_t memoryBytes() const;
   const Box& bounds() const;            ///< [m], map frame; empty when nothing is occupied
-  /// Leaves, sorted by key.
+  /// Leaves in the order of the surface's index: fixed by the set of leaves, not sorted by key.
   const std::vector<OccupiedLeaf>& leaves() const;
   /// The leaf that contains the point (closed), or null. Ties on shared planes: the smallest key.
   const OccupiedLeaf* leafAt(const Vec3& point_map) const;

@@ -1,0 +1,52 @@
+// What VoxelSurface holds: the tree of leaves and one mask of exposed features for each.
+#pragma once
+
+#include <vector>
+
+#include "deformable_ccd/voxel_surface.h"
+#include "obstacle/voxel_exposure.h"
+#include "obstacle/voxel_tree.h"
+
+namespace deformable_ccd {
+
+struct VoxelSurface::Impl {
+  explicit Impl(double resolution, const std::vector<OccupiedLeaf>& leaves);
+
+  /// Keys of all voxels that a closed range of coordinates [m] may touch, closed voxels: at least these.
+  KeyBox keysOf(const double* lo, const double* hi) const;
+
+  double resolution_m;
+  double inverse_resolution;
+  VoxelTree tree;
+  std::vector<FeatureMask> features;  ///< one per leaf
+  std::size_t face_count = 0, edge_count = 0, corner_count = 0;
+  Box bounds;
+};
+
+/// A leaf as a closed box [m].
+struct LeafBox {
+  double lo[3];
+  double hi[3];
+};
+
+inline LeafBox leafBox(const OccupiedLeaf& leaf, double resolution_m) {
+  LeafBox box;
+  const std::int64_t key[3] = {leaf.min.x, leaf.min.y, leaf.min.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    box.lo[axis] = voxelPlane(key[axis], resolution_m);
+    box.hi[axis] = voxelPlane(key[axis] + leaf.size, resolution_m);
+  }
+  return box;
+}
+
+/// Cell coordinates are rounded outward by this many cells: |x / resolution| <= 2^15 carries an error of a few
+/// 2^-53 relative, so below 2^-35 cells; planes themselves are rounded by as much. Larger only costs candidates.
+constexpr double KEY_MARGIN = 1.0 / 1048576;
+
+/// The key of the voxel below x (side -1) or above it (side +1), rounded outward and clamped to the map's range.
+inline std::int32_t outwardKey(double x, double inverse_resolution, double side) {
+  const double cell = x * inverse_resolution + (32768.0 + side * KEY_MARGIN);
+  return static_cast<std::int32_t>(cell < 0 ? 0.0 : cell > 65535.0 ? 65535.0 : cell);
+}
+
+}  // namespace deformable_ccd

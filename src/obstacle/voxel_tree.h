@@ -1,0 +1,175 @@
+// A sparse tree of 64-way nodes over cubes of voxels. Level 0 nodes have 4 voxels a side, level l nodes 4^(l+1); a leaf
+// is a run of bits of one node, so pruned leaves of any power-of-two size cost what a single voxel costs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "deformable_ccd/voxel_surface.h"
+#include "obstacle/voxel_bits.h"
+
+namespace deformable_ccd {
+
+/// A closed range of voxel keys, each within 0 to 65535.
+struct KeyBox {
+  std::array<std::int32_t, 3> lo{0, 0, 0};
+  std::array<std::int32_t, 3> hi{-1, -1, -1};
+};
+
+class VoxelTree {
+ public:
+  static constexpr int LEVELS = 8;
+  static constexpr std::int32_t KEYS = 65536;
+  static constexpr std::uint32_t NONE = 0xffffffffu;
+
+  struct Node {
+    std::uint64_t full = 0;    ///< cells covered by a leaf of this node
+    std::uint64_t start = 0;   ///< first cell of each of those leaves
+    std::uint64_t child = 0;   ///< cells that are a node of the level below
+    std::uint32_t first_leaf = 0;
+    std::uint32_t first_child = 0;
+    std::uint32_t leafAt(unsigned bit) const {
+      return first_leaf + bitCount(start & ((std::uint64_t{2} << bit) - 1)) - 1;
+    }
+    std::uint32_t childAt(unsigned bit) const { return first_child + rankBelow(child, bit); }
+  };
+
+  enum class Coverage : std::uint8_t { EMPTY, PARTIAL, FULL };
+
+  /// Leaves may come in any order. Throws std::invalid_argument naming the leaf when a size is no power of two up to
+  /// 65536, a key is no multiple of its size, or two leaves overlap.
+  explicit VoxelTree(const std::vector<OccupiedLeaf>& leaves);
+
+  /// In the tree's order: by level, then by Morton code.
+  const std::vector<OccupiedLeaf>& leaves() const { return leaves_; }
+  const std::vector<Node>& nodes(int level) const { return levels_[level].nodes; }
+  /// Node coordinates, in units of the node's own size.
+  const std::array<std::uint16_t, 3>& nodeCell(int level, std::uint32_t node) const {
+    return levels_[level].cells[node];
+  }
+  std::uint32_t firstLeafOfLevel(int level) const { return first_leaf_of_level_[level]; }
+  std::size_t memoryBytes() const;
+
+  /// The node of `level` >= 1 with these node coordinates, or NONE. Out of range coordinates give NONE.
+  std::uint32_t find(int level, std::int32_t x, std::int32_t y, std::int32_t z) const;
+
+  /// How far the aligned cube of `size` (a power of two) voxels with smallest key (x, y, z) is occupied.
+  Coverage coverage(std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t size) const;
+
+  /// Calls visit(leaf index) once for every leaf with a voxel in the box, in an order fixed by the tree.
+  template <class Visit>
+  void visitLeaves(const KeyBox& box, Visit&& visit) const;
+
+ private:
+  struct Level {
+    std::vector<Node> nodes;
+    std::vector<std::array<std::uint16_t, 3>> cells;
+    std::vector<std::uint32_t> table;  ///< open addressing; NONE where free; empty on level 0
+    int table_shift = 0;
+  };
+
+  void sortLeaves(const std::vector<OccupiedLeaf>& leaves, std::vector<std::uint64_t>& codes);
+  void buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes);
+  void buildTable(Level& level);
+
+  template <class Visit>
+  void descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
+               Visit& visit) const;
+  template <class Visit>
+  static void visitBits(const Node& node, std::uint64_t bits, Visit& visit);
+  /// The node's cells that the box reaches, each side clipped.
+  static std::uint64_t boxBits(int level, const std::array<std::int32_t, 3>& origin, const KeyBox& box);
+
+  static std::size_t hash(std::uint64_t packed, int shift) {
+    return static_cast<std::size_t>(packed * 0x9e3779b97f4a7c15u >> shift);
+  }
+  static std::uint64_t pack(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return std::uint64_t{x} << 32 | std::uint64_t{y} << 16 | z;
+  }
+
+  std::array<Level, LEVELS> levels_;
+  std::array<std::uint32_t, LEVELS + 1> first_leaf_of_level_{};
+  std::uint32_t levels_with_leaves_ = 0;  ///< bit l: some leaf belongs to level l
+  std::vector<OccupiedLeaf> leaves_;
+};
+
+inline std::uint32_t VoxelTree::find(int level, std::int32_t x, std::int32_t y, std::int32_t z) const {
+  const Level& l = levels_[level];
+  if (l.table.empty()) return NONE;
+  const std::uint32_t mask = static_cast<std::uint32_t>(l.table.size() - 1);
+  for (std::size_t slot = hash(pack(x, y, z), l.table_shift);; slot = (slot + 1) & mask) {
+    const std::uint32_t node = l.table[slot];
+    if (node == NONE) return NONE;
+    const std::array<std::uint16_t, 3>& cell = l.cells[node];
+    if (cell[0] == x && cell[1] == y && cell[2] == z) return node;
+  }
+}
+
+inline std::uint64_t VoxelTree::boxBits(int level, const std::array<std::int32_t, 3>& origin, const KeyBox& box) {
+  std::uint64_t bits = ~std::uint64_t{0};
+  for (int axis = 0; axis < 3; ++axis) {
+    std::int32_t lo = (box.lo[axis] - origin[axis]) >> (2 * level);
+    std::int32_t hi = (box.hi[axis] - origin[axis]) >> (2 * level);
+    lo = lo < 0 ? 0 : lo;
+    hi = hi > 3 ? 3 : hi;
+    if (lo > hi) return 0;
+    bits &= RANGE_MASKS[axis][lo][hi];
+  }
+  return bits;
+}
+
+template <class Visit>
+void VoxelTree::visitBits(const Node& node, std::uint64_t bits, Visit& visit) {
+  std::uint32_t last = NONE;
+  for (; bits != 0; bits &= bits - 1) {
+    const std::uint32_t leaf = node.leafAt(lowestBit(bits));
+    if (leaf != last) visit(leaf);
+    last = leaf;
+  }
+}
+
+template <class Visit>
+void VoxelTree::descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
+                        Visit& visit) const {
+  const std::uint64_t bits = boxBits(level, origin, box);
+  visitBits(node, node.full & bits, visit);
+  for (std::uint64_t children = node.child & bits; children != 0; children &= children - 1) {
+    const unsigned bit = lowestBit(children);
+    std::array<std::int32_t, 3> child_origin;
+    for (int axis = 0; axis < 3; ++axis) child_origin[axis] = origin[axis] + (CELL_COORDINATES[bit][axis] << (2 * level));
+    descend(level - 1, levels_[level - 1].nodes[node.childAt(bit)], child_origin, box, visit);
+  }
+}
+
+template <class Visit>
+void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
+  // Start where the box spans two nodes an axis at most; above that only the leaves of the nodes themselves matter.
+  int start = 1;
+  const auto spans = [&](int level, int axis) {
+    const int shift = 2 * (level + 1);
+    return (box.hi[axis] >> shift) - (box.lo[axis] >> shift);
+  };
+  while (start < LEVELS - 1 && (spans(start, 0) > 1 || spans(start, 1) > 1 || spans(start, 2) > 1)) ++start;
+  for (int level = start; level < LEVELS; ++level) {
+    if (level > start && !(levels_with_leaves_ >> level & 1)) continue;
+    const int shift = 2 * (level + 1);
+    for (std::int32_t z = box.lo[2] >> shift; z <= box.hi[2] >> shift; ++z) {
+      for (std::int32_t y = box.lo[1] >> shift; y <= box.hi[1] >> shift; ++y) {
+        for (std::int32_t x = box.lo[0] >> shift; x <= box.hi[0] >> shift; ++x) {
+          const std::uint32_t index = find(level, x, y, z);
+          if (index == NONE) continue;
+          const Node& node = levels_[level].nodes[index];
+          const std::array<std::int32_t, 3> origin{x << shift, y << shift, z << shift};
+          if (level == start) {
+            descend(level, node, origin, box, visit);
+          } else {
+            visitBits(node, node.full & boxBits(level, origin, box), visit);
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace deformable_ccd
