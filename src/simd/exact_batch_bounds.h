@@ -24,7 +24,7 @@
 //     the coefficients' errors contribute at most 174/3 = 58 eps U V W.
 //   de Casteljau with f1 = fl(F1 fl(1/3)): 2 more factors on F1, so (12*12 + 6*11)/3 = 70 eps U V W from the
 //     coefficients; three levels fl(fl(p s) + fl(q t)) give 6 factors on each.
-// One bound serves both: 70 eps U V W + 6 eps max(|F0|, |f1|, |f2|, |F3|).
+// One bound, 70 eps U V W + 6 eps max(|F0|, |f1|, |f2|, |F3|), serves both and the coefficients themselves.
 //
 // The inside test evaluates, at one t = m, two-by-two minors q = x_i y_j - x_j y_i of vectors x, y out of {u, v, w}
 // with absolute bounds X, Y, on one coordinate plane:
@@ -33,6 +33,12 @@
 //   over |t - m| <= h: |q(t) - q(m)| <= h max|q'|, |x'| = |x1 - x0| <= 2 X, so |q'| <= 8 X Y.
 //   sums n - B - C of three minors round twice more: at most 2 eps (|n| + |B| + |C|) <= 4 eps (sum of the X Y).
 // So each minor is known to (20 eps + 8 h) X Y, sums of minors to the sum of those.
+//
+// The separation test takes the Bernstein coefficients q0, q1, q2 of the same minors over [a, b], from x(a), x(b):
+//   q0 = x(a)_i y(a)_j - x(a)_j y(a)_i and q2 as above:     16 eps X Y
+//   2 q1 = fl(minor(x(a), y(b)) + minor(x(b), y(a))):        9 factors on 4 products: 36 eps X Y, 18 on q1
+//   sums of three: 2 eps (|n| + |B| + |C|) as above, twice that for 2 q1.
+// So 22 eps X Y for each coefficient, sums of minors to the sum of those.
 //
 // Underflow: the guard demands 2^-150 <= U, V, W <= 2^150, so that U V W >= 2^-450, while each of fewer than 200
 // operations that underflows errs by at most 2^-1075, multiplied later by at most one factor of U, V, W <= 2^150. No
@@ -43,12 +49,11 @@ namespace deformable_ccd {
 namespace simd {
 
 constexpr double BATCH_EPS = 0x1p-53;
-constexpr double BATCH_END_ERROR = 48.5 * BATCH_EPS;       ///< of F0 and F3, times U V W
-constexpr double BATCH_MIDDLE_ERROR = 175.5 * BATCH_EPS;   ///< of F1 and F2, times U V W
-constexpr double BATCH_VALUE_ERROR = 70.5 * BATCH_EPS;     ///< of f(t) and coefficients over [a, b], times U V W
+constexpr double BATCH_VALUE_ERROR = 70.5 * BATCH_EPS;     ///< of f(t) and f's coefficients, times U V W
 constexpr double BATCH_VALUE_ROUNDING = 6.25 * BATCH_EPS;  ///< the same, times max |fi|
 constexpr double BATCH_MINOR_ERROR = 20.5 * BATCH_EPS;     ///< of a minor, times X Y
 constexpr double BATCH_MINOR_SLOPE = 8.125;                ///< of a minor, times h X Y
+constexpr double BATCH_SEPARATION_ERROR = 22.5 * BATCH_EPS; ///< of a minor's coefficient over [a, b], times X Y
 constexpr double BATCH_SMALLEST = 0x1p-150;                ///< guard on U, V, W
 constexpr double BATCH_LARGEST = 0x1p150;
 

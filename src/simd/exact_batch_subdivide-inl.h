@@ -1,0 +1,136 @@
+// Third stage of the batched elementary test: see exact_batch-inl.h, which includes this.
+HWY_BEFORE_NAMESPACE();
+namespace deformable_ccd {
+namespace simd {
+namespace HWY_NAMESPACE {
+
+constexpr int MAX_INTERVALS = 48;            ///< looked at per pair
+constexpr double SMALLEST_INTERVAL = 0x1p-12;
+
+/// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4, where
+/// f would stay uncertain at every level.
+HWY_INLINE V warp(V x) {
+  return onGrid(hn::Add(x, hn::Mul(constant(0.1376), hn::Mul(x, hn::Sub(constant(1), x)))));
+}
+
+/// Adds to `plus` and `minus` the lanes whose quadratic with Bernstein coefficients q0, q1_times_2 / 2, q2 certainly
+/// keeps that sign over the interval.
+HWY_INLINE void keepsSign(V q0, V q1_times_2, V q2, V error, M& plus, M& minus) {
+  const V twice = hn::Add(error, error), against = hn::Neg(error), twice_against = hn::Neg(twice);
+  plus = hn::Or(plus, hn::And(hn::And(hn::Gt(q0, error), hn::Gt(q2, error)), hn::Gt(q1_times_2, twice)));
+  minus = hn::Or(minus,
+                 hn::And(hn::And(hn::Lt(q0, against), hn::Lt(q2, against)), hn::Lt(q1_times_2, twice_against)));
+}
+
+/// Lanes whose features are certainly apart at every t of an interval, whatever f does: in the projection along one
+/// axis, with n, B, C as in insideTest(), a contact makes all of n, B, C, n-B-C (VF), or n, B, C, n-B, n-C (EE),
+/// zero or of one sign; so one that is positive and one that is negative throughout exclude it. Holds for parallel
+/// edges and flat triangles too: B = s n and the like need no division. a, b: the vectors at the interval's ends.
+template <BatchKind KIND>
+HWY_INLINE M apartAlong(V ua1, V ua2, V va1, V va2, V wa1, V wa2, V ub1, V ub2, V vb1, V vb2, V wb1, V wb2, V error_n,
+                        V error_b, V error_c) {
+  constexpr bool VF = KIND == BatchKind::VERTEX_FACE;
+  const V n0 = minor(ua1, va2, ua2, va1), n2 = minor(ub1, vb2, ub2, vb1);
+  const V n1 = hn::Add(minor(ua1, vb2, ua2, vb1), minor(ub1, va2, ub2, va1));
+  const V b0 = minor(wa1, va2, wa2, va1), b2 = minor(wb1, vb2, wb2, vb1);
+  const V b1 = hn::Add(minor(wa1, vb2, wa2, vb1), minor(wb1, va2, wb2, va1));
+  V c0 = minor(wa1, ua2, wa2, ua1), c2 = minor(wb1, ub2, wb2, ub1);
+  V c1 = hn::Add(minor(wa1, ub2, wa2, ub1), minor(wb1, ua2, wb2, ua1));
+  if (VF) c0 = hn::Neg(c0), c1 = hn::Neg(c1), c2 = hn::Neg(c2);
+  M plus = hn::FirstN(Tag(), 0), minus = plus;
+  keepsSign(n0, n1, n2, error_n, plus, minus);
+  keepsSign(b0, b1, b2, error_b, plus, minus);
+  keepsSign(c0, c1, c2, error_c, plus, minus);
+  if (VF) {
+    keepsSign(hn::Sub(hn::Sub(n0, b0), c0), hn::Sub(hn::Sub(n1, b1), c1), hn::Sub(hn::Sub(n2, b2), c2),
+              hn::Add(hn::Add(error_n, error_b), error_c), plus, minus);
+  } else {
+    keepsSign(hn::Sub(n0, b0), hn::Sub(n1, b1), hn::Sub(n2, b2), hn::Add(error_n, error_b), plus, minus);
+    keepsSign(hn::Sub(n0, c0), hn::Sub(n1, c1), hn::Sub(n2, c2), hn::Add(error_n, error_c), plus, minus);
+  }
+  return hn::And(plus, minus);
+}
+
+/// The same along each axis.
+template <BatchKind KIND>
+HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
+  const auto& m = pairs.motion;
+  const V sa = hn::Sub(constant(1), a), sb = hn::Sub(constant(1), b);
+  const V size_u = load(pairs.size[0], i), size_v = load(pairs.size[1], i), size_w = load(pairs.size[2], i);
+  const V relative = constant(BATCH_SEPARATION_ERROR);
+  const V error_n = hn::Mul(hn::Mul(size_u, size_v), relative);
+  const V error_b = hn::Mul(hn::Mul(size_v, size_w), relative);
+  const V error_c = hn::Mul(hn::Mul(size_u, size_w), relative);
+  M result = hn::FirstN(Tag(), 0);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int p = axis == 2 ? 0 : axis + 1, q = axis == 0 ? 2 : axis - 1;
+    const V up0 = load(m[U_T0 + p], i), up1 = load(m[U_T1 + p], i), uq0 = load(m[U_T0 + q], i);
+    const V uq1 = load(m[U_T1 + q], i), vp0 = load(m[V_T0 + p], i), vp1 = load(m[V_T1 + p], i);
+    const V vq0 = load(m[V_T0 + q], i), vq1 = load(m[V_T1 + q], i), wp0 = load(m[W_T0 + p], i);
+    const V wp1 = load(m[W_T1 + p], i), wq0 = load(m[W_T0 + q], i), wq1 = load(m[W_T1 + q], i);
+    const M along = apartAlong<KIND>(lerp(up0, up1, sa, a), lerp(uq0, uq1, sa, a), lerp(vp0, vp1, sa, a),
+                                     lerp(vq0, vq1, sa, a), lerp(wp0, wp1, sa, a), lerp(wq0, wq1, sa, a),
+                                     lerp(up0, up1, sb, b), lerp(uq0, uq1, sb, b), lerp(vp0, vp1, sb, b),
+                                     lerp(vq0, vq1, sb, b), lerp(wp0, wp1, sb, b), lerp(wq0, wq1, sb, b), error_n,
+                                     error_b, error_c);
+    result = hn::Or(result, along);
+  }
+  return result;
+}
+
+/// One vector, intervals from left to right: each is proved free (no root, or the features apart), or holds one root,
+/// which is refined, or is halved. Stops at the first certain contact.
+template <BatchKind KIND>
+HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
+  const Tag d;
+  const V one = constant(1), zero = hn::Zero(d), third = constant(1.0 / 3), half = constant(0.5);
+  const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
+  const V f1 = hn::Mul(load(pairs.coefficient[1], i), third), f2 = hn::Mul(load(pairs.coefficient[2], i), third);
+  V from = zero, width = one, result = constant(ROOT_PENDING), kept_lo = zero, kept_hi = zero;
+  for (int k = 0; k < MAX_INTERVALS; ++k) {
+    const M active = hn::Eq(result, constant(ROOT_PENDING));
+    if (hn::AllFalse(d, active)) break;
+    const V a = warp(from), b = warp(hn::Add(from, width));
+    V c0, c1, c2, c3;
+    overPiece(f0, f1, f2, f3, a, b, c0, c1, c2, c3);
+    const V piece = pieceOf<true, false>(c0, c1, c2, c3, error);
+    M free = hn::Eq(piece, constant(PIECE_FREE));
+    if (!hn::AllTrue(d, hn::Or(free, hn::Not(active)))) free = hn::Or(free, apart<KIND>(pairs, i, a, b));
+    const M has_root = hn::And(active, hn::AndNot(free, hn::Eq(piece, constant(PIECE_ROOT))));
+    if (!hn::AllFalse(d, has_root)) {
+      store(a, pairs.lo, i), store(b, pairs.hi, i), store(c0, pairs.at_lo, i), store(c3, pairs.at_hi, i);
+      store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
+      refine<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
+      const V outcome = load(pairs.outcome, i);
+      const M contact = hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
+      free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
+      result = choose(contact, outcome, result);
+      kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);
+      kept_hi = choose(contact, load(pairs.root_hi, i), kept_hi);
+    }
+    const V next = hn::Add(from, width), wider = hn::Add(width, width);
+    const M ascend = hn::And(hn::Eq(hn::Mul(floorOf(hn::Div(next, wider)), wider), next), hn::Lt(next, one));
+    const M still = hn::Eq(result, constant(ROOT_PENDING));
+    result = choose(hn::And(still, hn::And(free, hn::Ge(next, one))), constant(ROOT_NO_CONTACT), result);
+    from = choose(free, next, from);
+    width = choose(free, choose(ascend, wider, width), hn::Mul(half, width));
+    result = choose(hn::And(hn::Eq(result, constant(ROOT_PENDING)), hn::Lt(width, constant(SMALLEST_INTERVAL))),
+                    constant(ROOT_UNCERTAIN), result);
+  }
+  store(choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result), pairs.outcome, i);
+  store(kept_lo, pairs.root_lo, i);
+  store(kept_hi, pairs.root_hi, i);
+}
+
+template <BatchKind KIND>
+void subdivideAll(RootBlock& hard, double cells, const BatchOutput& out) {
+  for (std::size_t j = hard.count; j % lanes() != 0; ++j) copyPair(hard, hard.count - 1, hard, j);
+  for (std::size_t i = 0; i < hard.count; i += lanes()) subdivideVector<KIND>(hard, i, cells);
+  for (std::size_t j = 0; j < hard.count; ++j) writeOut(hard, j, cells, out);
+  hard.count = 0;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace simd
+}  // namespace deformable_ccd
+HWY_AFTER_NAMESPACE();
