@@ -25,7 +25,8 @@ struct VoxelKey {
 };
 
 // The package's messages generate classes deformable_ccd::Contact and deformable_ccd::StepStats. The core's own
-// live in an inline namespace, so that code without messages need not care and code with them says core::Contact.
+// live in an inline namespace, so that code without messages need not care; code with both includes the generated
+// headers first (they name their classes in full) and says core::Contact.
 inline namespace core {
 
 /// One contact. VF: body[0] owns the vertex, body[1] the face. EE: the edge that sorts first is first

@@ -1,0 +1,221 @@
+#include "ros/output_messages.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace deformable_ccd {
+
+namespace {
+
+using ContactMessage = Contact_<std::allocator<void>>;
+using StatsMessage = StepStats_<std::allocator<void>>;
+
+static_assert(static_cast<int>(StepStatus::OK) == static_cast<int>(ContactArray::OK));
+static_assert(static_cast<int>(StepStatus::GAP) == static_cast<int>(ContactArray::GAP));
+static_assert(static_cast<int>(StepStatus::NO_BODY) == static_cast<int>(ContactArray::NO_BODY));
+static_assert(static_cast<int>(StepStatus::TRUNCATED) == static_cast<int>(ContactArray::TRUNCATED));
+static_assert(static_cast<int>(StepStatus::VERTEX_COUNT) == static_cast<int>(ContactArray::VERTEX_COUNT));
+static_assert(static_cast<int>(StepStatus::INTERNAL_ERROR) == static_cast<int>(ContactArray::INTERNAL_ERROR));
+static_assert(static_cast<int>(StartState::NOT_CHECKED) == static_cast<int>(ContactArray::NOT_CHECKED));
+static_assert(static_cast<int>(PairKind::FACE_VOXEL_CORNER) == static_cast<int>(ContactMessage::FACE_VOXEL_CORNER));
+static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
+
+std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
+  std_msgs::Header out;
+  out.stamp = toRosTime(stamp_ns);
+  out.frame_id = frame;
+  return out;
+}
+
+/// Never after the true time: the sum is rounded down to a nanosecond.
+ros::Time timeOf(const StepOutcome& outcome, double toc) {
+  const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
+  return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
+}
+
+ContactMessage toMessage(const StepOutcome& outcome, const core::Contact& contact) {
+  const ContactGeometry geometry = contactGeometry(outcome, contact);
+  ContactMessage out;
+  out.kind = static_cast<std::uint8_t>(contact.kind);
+  out.certainty = static_cast<std::uint8_t>(contact.certainty);
+  out.initial = contact.initial;
+  out.leaving = contact.leaving;
+  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
+  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
+  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
+  out.voxel_size = contact.voxel_size;
+  out.toc_lower = contact.toc_lower;
+  out.toc_upper = contact.toc_upper;
+  out.time_of_contact = timeOf(outcome, contact.toc_lower);
+  out.point.x = geometry.point.x();
+  out.point.y = geometry.point.y();
+  out.point.z = geometry.point.z();
+  out.normal.x = geometry.normal.x();
+  out.normal.y = geometry.normal.y();
+  out.normal.z = geometry.normal.z();
+  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
+  out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
+  return out;
+}
+
+void fillFrames(const FrameCounters& frames, StatsMessage& out) {
+  out.frames_received = frames.received;
+  out.frames_processed = frames.processed();
+  out.frames_started = frames.started();
+  out.frames_skipped = frames.skipped();
+  out.skipped_duplicate = frames.of(StepStatus::DUPLICATE);
+  out.skipped_vertex_count = frames.of(StepStatus::VERTEX_COUNT);
+  out.skipped_bad_message = frames.of(StepStatus::BAD_MESSAGE);
+  out.skipped_no_transform = frames.of(StepStatus::NO_TRANSFORM);
+  out.skipped_no_body = frames.of(StepStatus::NO_BODY);
+  out.skipped_queue_full = frames.of(StepStatus::QUEUE_FULL);
+  out.skipped_disabled = frames.of(StepStatus::DISABLED);
+  out.skipped_reset = frames.of(StepStatus::RESET);
+  out.skipped_error = frames.of(StepStatus::INTERNAL_ERROR);
+  out.frames_waiting = frames.waiting();
+  out.receipt_stamps = frames.receipt_stamps;
+  out.seams_topology = frames.of(StepStatus::TOPOLOGY_CHANGED);
+  out.seams_gap = frames.of(StepStatus::GAP);
+  out.seams_time_jump = frames.of(StepStatus::TIME_JUMP);
+  out.seams_teleport = frames.of(StepStatus::TELEPORT);
+}
+
+void fillContacts(const StepOutcome& outcome, StatsMessage& out) {
+  out.contacts = static_cast<std::uint32_t>(outcome.total_contacts);
+  for (const core::Contact& contact : outcome.contacts) {
+    ++(contact.certainty == Certainty::CERTAIN ? out.contacts_certain : out.contacts_undecided);
+    ++(contact.body[1] == OBSTACLE_BODY ? out.contacts_obstacle : out.contacts_mesh);
+    out.contacts_initial += contact.initial;
+    out.contacts_leaving += contact.leaving;
+  }
+  out.suppressed = static_cast<std::uint32_t>(outcome.suppressed + outcome.excluded);
+  out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
+  out.earliest_toc = outcome.earliest_toc;
+}
+
+void fillStages(const core::StepStats& stats, StatsMessage& out) {
+  out.total_ms = stats.total_ms;
+  out.unchecked_vertices = static_cast<std::uint32_t>(stats.unchecked_vertices);
+  out.unchecked_faces = static_cast<std::uint32_t>(stats.unchecked_faces);
+  out.vf_candidates = stats.vf_candidates;
+  out.ee_candidates = stats.ee_candidates;
+  out.broad_phase_in = stats[Stage::BROAD_PHASE].in;
+  out.broad_phase_out = stats[Stage::BROAD_PHASE].out;
+  out.planar_in = stats[Stage::PLANAR].in;
+  out.planar_out = stats[Stage::PLANAR].out;
+  out.elementary_in = stats[Stage::ELEMENTARY].in;
+  out.elementary_out = stats[Stage::ELEMENTARY].out;
+  out.record_ms = stats[Stage::RECORD].ms;
+  out.bounds_ms = stats[Stage::BOUNDS].ms;
+  out.broad_phase_ms = stats[Stage::BROAD_PHASE].ms;
+  out.planar_ms = stats[Stage::PLANAR].ms;
+  out.elementary_ms = stats[Stage::ELEMENTARY].ms;
+  out.obstacle_ms = stats[Stage::OBSTACLE].ms;
+  out.start_state_ms = stats[Stage::START_STATE].ms;
+  out.sort_ms = stats[Stage::SORT].ms;
+  out.self_collision_in = stats[Effect::SELF_COLLISION].in;
+  out.self_collision_out = stats[Effect::SELF_COLLISION].out;
+  out.self_collision_ms = stats[Effect::SELF_COLLISION].ms;
+  out.body_body_in = stats[Effect::BODY_BODY].in;
+  out.body_body_out = stats[Effect::BODY_BODY].out;
+  out.body_body_ms = stats[Effect::BODY_BODY].ms;
+  out.obstacle_in = stats[Effect::OBSTACLE].in;
+  out.obstacle_out = stats[Effect::OBSTACLE].out;
+  const auto tier = [&](Tier t) { return stats.tiers.settled[static_cast<std::size_t>(t)]; };
+  out.tier_coincidence = tier(Tier::COINCIDENCE);
+  out.tier_double_batch = tier(Tier::DOUBLE_BATCH);
+  out.tier_bernstein = tier(Tier::BERNSTEIN);
+  out.tier_double_double = tier(Tier::DOUBLE_DOUBLE);
+  out.tier_fixed_integer = tier(Tier::FIXED_INTEGER);
+  out.tier_big_integer = tier(Tier::BIG_INTEGER);
+}
+
+}  // namespace
+
+ros::Time toRosTime(StampNs stamp_ns) {
+  ros::Time time;
+  time.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
+  return time;
+}
+
+ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame) {
+  ContactArray out;
+  out.header = header(outcome.stamp_ns, frame);
+  out.start = toRosTime(outcome.start_ns);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.reason = outcome.reason;
+  out.answered = outcome.answered;
+  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
+  out.complete = outcome.complete;
+  out.unchecked_toc_lower = outcome.unchecked_toc_lower;
+  out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
+  out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed + outcome.excluded);
+  for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
+  out.contacts.reserve(outcome.contacts.size());
+  for (const core::Contact& contact : outcome.contacts) out.contacts.push_back(toMessage(outcome, contact));
+  for (const StartIntersection& crossing : outcome.intersections) {
+    Intersection message;
+    std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
+    std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
+    out.intersections.push_back(message);
+  }
+  return out;
+}
+
+FirstContact toFirstContact(const StepOutcome& outcome, const std::string& frame) {
+  FirstContact out;
+  out.header = header(outcome.stamp_ns, frame);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
+  out.answered = outcome.answered;
+  out.contact = std::isfinite(outcome.earliest_toc);
+  out.toc = outcome.earliest_toc;
+  out.seconds_from_start = outcome.earliest_toc;
+  if (!out.contact) return out;
+  for (const core::Contact& contact : outcome.contacts) {
+    out.certain |= contact.toc_lower == outcome.earliest_toc && contact.certainty == Certainty::CERTAIN;
+  }
+  out.time_of_contact = timeOf(outcome, outcome.earliest_toc);
+  out.seconds_from_start = outcome.earliest_toc * outcome.duration_s();
+  return out;
+}
+
+StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context, const std::string& frame) {
+  StatsMessage out;
+  out.header = header(outcome.stamp_ns, frame);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
+  out.answered = outcome.answered;
+  out.complete = outcome.complete;
+  out.step = outcome.duration_s();
+  out.latency = context.latency_s;
+  out.substeps = static_cast<std::uint32_t>(outcome.substeps);
+  fillFrames(context.frames, out);
+  out.weld_changes = context.weld_changes;
+  fillContacts(outcome, out);
+  fillStages(outcome.stats, out);
+  out.map_present = outcome.obstacle != nullptr;
+  if (outcome.obstacle) {
+    out.map_leaves = outcome.obstacle->leafCount();
+    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9;
+  }
+  out.maps_received = context.maps_received;
+  out.maps_refused = context.maps_refused;
+  out.markers_built = context.markers_built;
+  out.parameter_hash = context.parameter_hash;
+  return out;
+}
+
+TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s, const std::string& frame) {
+  TimeToContact out;
+  out.header = header(prediction.start_ns, frame);
+  out.status = static_cast<std::uint8_t>(prediction.status);
+  out.start_state = static_cast<std::uint8_t>(prediction.start_state);
+  out.answered = prediction.answered;
+  out.horizon = horizon_s;
+  out.contact = std::isfinite(prediction.earliest_toc);
+  out.seconds = prediction.earliest_toc * horizon_s;
+  return out;
+}
+
+}  // namespace deformable_ccd

@@ -1,0 +1,35 @@
+// An outcome as messages. Used by the node and by analyze_bag, so that both write the same.
+#pragma once
+
+// Generated headers before the core's: see contact.h. Whoever includes this header includes it first.
+#include <deformable_ccd/ContactArray.h>
+#include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/StepStats.h>
+#include <deformable_ccd/TimeToContact.h>
+#include <std_msgs/Header.h>
+
+#include "deformable_ccd/monitor.h"
+
+namespace deformable_ccd {
+
+ros::Time toRosTime(StampNs stamp_ns);
+
+/// What the statistics say beyond the outcome itself.
+struct StatsContext {
+  FrameCounters frames;  ///< of all bodies
+  std::uint64_t weld_changes = 0;
+  double latency_s = 0;
+  std::uint64_t maps_received = 0, maps_refused = 0;
+  std::uint64_t markers_built = 0;
+  std::uint64_t parameter_hash = 0;
+};
+
+ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
+FirstContact toFirstContact(const StepOutcome& outcome, const std::string& frame);
+/// The message of the package, not core::StepStats.
+StepStats_<std::allocator<void>> toStepStats(const StepOutcome& outcome, const StatsContext& context,
+                                             const std::string& frame);
+/// From a prediction (Monitor::predict) over horizon_s.
+TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s, const std::string& frame);
+
+}  // namespace deformable_ccd
