@@ -146,6 +146,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   context.scene = &scene;
   context.elementary = elementary.get();
   context.earliest_only = options.earliest_only;
+  if (options.accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options.accuracy.tolerance_m;
   if (options.step_budget_ms > 0) {
     context.deadline = begin + std::chrono::duration_cast<Clock::duration>(
                                    std::chrono::duration<double, std::milli>(options.step_budget_ms));
@@ -327,6 +328,9 @@ void Detector::Impl::runObstacle(const MotionStep& step) {
                            inMap(step, *step.bodies[b].t1, map_t1), active, static_cast<std::uint16_t>(b), result.contacts,
                            total);
   }
+  // Each body's are in order; of several bodies, kinds come first.
+  const auto first = result.contacts.begin() + static_cast<std::ptrdiff_t>(before);
+  if (!std::is_sorted(first, result.contacts.end(), canonicalLess)) std::sort(first, result.contacts.end(), canonicalLess);
   const std::uint64_t in = total.vertex_pairs_in + total.edge_pairs_in + total.corner_pairs_in;
   const std::uint64_t out = result.contacts.size() - before;
   result.stats[Stage::OBSTACLE] = {in, out, msSince(start)};

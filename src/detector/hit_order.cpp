@@ -8,20 +8,11 @@ constexpr int BITS = 11;
 constexpr std::size_t BUCKETS = std::size_t{1} << BITS;
 }  // namespace
 
-const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
-  a_.clear();
-  std::uint64_t all_or = 0, all_and = ~std::uint64_t{0};
-  for (const auto* part : parts) {
-    for (const Hit& h : *part) {
-      a_.push_back({h.key, &h});
-      all_or |= h.key;
-      all_and &= h.key;
-    }
-  }
-  b_.resize(a_.size());
+// Stable, so that sorting by the key first and by the bodies then sorts by both.
+void HitOrder::sortByKey(std::uint64_t differing_bits) {
   for (int shift = 0; shift < 64; shift += BITS) {
     const std::uint64_t digit = (BUCKETS - 1) << shift;
-    if (((all_or ^ all_and) & digit) == 0) continue;  // the digit is the same in all keys
+    if ((differing_bits & digit) == 0) continue;
     std::array<std::size_t, BUCKETS> next{};
     for (const Entry& e : a_) ++next[(e.key >> shift) & (BUCKETS - 1)];
     std::size_t sum = 0;
@@ -32,6 +23,27 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
     }
     for (const Entry& e : a_) b_[next[(e.key >> shift) & (BUCKETS - 1)]++] = e;
     std::swap(a_, b_);
+  }
+}
+
+const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
+  a_.clear();
+  std::uint64_t key_or = 0, key_and = ~std::uint64_t{0}, bodies_or = 0, bodies_and = ~std::uint64_t{0};
+  for (const auto* part : parts) {
+    for (const Hit& h : *part) {
+      a_.push_back({h.key, &h});
+      key_or |= h.key;
+      key_and &= h.key;
+      bodies_or |= h.bodies;
+      bodies_and &= h.bodies;
+    }
+  }
+  b_.resize(a_.size());
+  sortByKey(key_or ^ key_and);
+  // Ranks go through all bodies, so that the first feature's body is in order already; the second's may not be.
+  if (!a_.empty() && bodies_or != bodies_and) {
+    for (Entry& e : a_) e.key = e.hit->bodies;
+    sortByKey(bodies_or ^ bodies_and);
   }
   sorted_.resize(a_.size());
   for (std::size_t i = 0; i < a_.size(); ++i) sorted_[i] = a_[i].hit;

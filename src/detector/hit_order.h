@@ -8,7 +8,7 @@
 
 namespace deformable_ccd {
 
-/// Sorts hits by key (radix sort on the digits in use; keys are unique). Keeps its buffers.
+/// Sorts hits by bodies, then by key (radix sort on the digits in use; no two are equal in both). Keeps its buffers.
 class HitOrder {
  public:
   /// The result is valid until the next call; its elements point into the workers' vectors.
@@ -19,6 +19,7 @@ class HitOrder {
     std::uint64_t key;
     const Hit* hit;
   };
+  void sortByKey(std::uint64_t differing_bits);
   std::vector<Entry> a_, b_;
   std::vector<const Hit*> sorted_;
 };

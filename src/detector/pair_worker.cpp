@@ -147,7 +147,7 @@ void PairWorker::filter() {
   const Clock::time_point start = Clock::now();
   stats_[Stage::PLANAR].in += count_;
   const std::size_t kept = simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_,
-                                             task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ADAPTIVE, kept_.data());
+                                             task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, kept_.data());
   for (std::size_t i = 0; i < kept; ++i) {
     quads_[i] = quads_[kept_[i]];
     keys_[i] = keys_[kept_[i]];
@@ -160,9 +160,12 @@ void PairWorker::filter() {
 void PairWorker::dropLate() {
   const double best = context_->best_toc_upper.load(std::memory_order_relaxed);
   if (best >= 2) return;
+  // With the tolerance, so that nothing is dropped that the elementary test would have called a contact before `best`:
+  // the answer must not depend on which pair was looked at first.
+  const double distance = separation() + context_->tolerance_m;
   std::size_t n = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    if (linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separation()) > best) continue;
+    if (linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance) > best) continue;
     quads_[n] = quads_[i];
     keys_[n++] = keys_[i];
   }
@@ -172,11 +175,12 @@ void PairWorker::dropLate() {
 void PairWorker::keepUndecided() {
   const Clock::time_point start = Clock::now();
   auto& hits = hits_[static_cast<int>(task_->kind)];
+  const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   std::size_t out = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const double bound = linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separation());
     if (bound > 1) continue;
-    hits.push_back({keys_[i], bound, 1, Certainty::UNDECIDED});
+    hits.push_back({keys_[i], bound, 1, bodies, Certainty::UNDECIDED});
     ++out;
   }
   stats_.undecided += out;
@@ -197,12 +201,19 @@ void PairWorker::decide() {
   }
   context_->elementary->run(batch, results_.data(), stats_.tiers);
   auto& hits = hits_[static_cast<int>(task_->kind)];
+  const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   const std::size_t before = hits.size();
   for (std::size_t i = 0; i < count_; ++i) {
-    const ElementaryResult& r = results_[i];
+    ElementaryResult& r = results_[i];
     if (r.verdict == Verdict::NO_CONTACT) continue;
     const bool certain = r.verdict == Verdict::CONTACT;
-    hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, certain ? Certainty::CERTAIN : Certainty::UNDECIDED});
+    if (!certain) {
+      // As tight as the linear filter allows; dropLate() decides by the same bound.
+      const double bound = linearTocBound(task_->kind, batch.vertices, quads_[i], separation() + context_->tolerance_m);
+      r.toc_lower = std::max(r.toc_lower, std::min(bound, 1.0));
+    }
+    hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,
+                    certain ? Certainty::CERTAIN : Certainty::UNDECIDED});
     stats_.undecided += !certain;
     if (certain && context_->earliest_only) {
       double best = context_->best_toc_upper.load(std::memory_order_relaxed);

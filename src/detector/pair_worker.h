@@ -16,10 +16,11 @@ inline double msSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// A contact (certain or undecided) by the ranks of its features; sorts canonically by key within a kind.
+/// A contact (certain or undecided) by the ranks of its features; within a kind it sorts canonically by bodies, then key.
 struct Hit {
   std::uint64_t key;  ///< rank of the first feature << 32 | rank of the second
   double toc_lower, toc_upper;
+  std::uint32_t bodies;  ///< body of the first feature << 16 | body of the second
   Certainty certainty;
 };
 
@@ -38,6 +39,7 @@ struct StepContext {
   Clock::time_point deadline = Clock::time_point::max();
   std::atomic<bool> expired{false};
   bool earliest_only = false;
+  double tolerance_m = 0;  ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   bool timeIsUp() {
     if (expired.load(std::memory_order_relaxed)) return true;

@@ -1,0 +1,86 @@
+// Small steps made to be hard, and their true contacts straight from the definition: what judges the detector as a whole.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "deformable_ccd/detector.h"
+#include "support/oracle.h"
+
+namespace deformable_ccd {
+namespace test {
+
+/// An integer between the two, ends included: from a random source, or from the bytes of a fuzzer.
+using Draw = std::function<int(int low, int high)>;
+Draw drawFrom(std::uint64_t seed);
+
+/// A body with everything that its step needs.
+struct StepBody {
+  Topology topology;
+  Positions t0, t1;
+  bool self_collision = true, against_bodies = true;
+  std::vector<std::uint8_t> vertex_active;  ///< empty: all
+};
+
+struct TestStep {
+  std::vector<StepBody> bodies;
+  std::vector<BodySetup> setups() const;  ///< bodies are called body_0, body_1 ...
+  std::vector<const Positions*> positions() const;
+  MotionStep motion() const;
+  /// The next step: what was t=1 is t=0, and the positions at t=1 are given.
+  TestStep continued(std::vector<Positions> t1) const;
+};
+
+/// How coordinates are made.
+enum class Coordinates : std::uint8_t {
+  SMALL_INTEGERS = 0,  ///< -3 to 3 at both times
+  FEW_BITS,            ///< six-bit multiples of a power of two
+  REAL,                ///< all bits in use
+  LITTLE_MOTION,       ///< all bits in use, motion down to one ulp
+  HUGE_OFFSET,         ///< small integers far from the origin
+  FLAT,                ///< everything in one plane during the whole step
+  AT_REST,             ///< no motion
+  COINCIDENT,          ///< vertices in the same few places
+  SUBNORMAL,           ///< below the smallest normal double
+  EXTREME,             ///< sums of coordinates overflow
+  COUNT
+};
+
+/// One to three bodies of at most `triangles` triangles altogether (or ropes), of any shape: grids, strips, single
+/// triangles, faces on random vertices, non-manifold ones included.
+TestStep randomStep(const Draw& draw, int triangles, Coordinates coordinates);
+TestStep randomStep(const Draw& draw, int triangles);
+/// Positions of one body, of the style given.
+Positions randomPositions(const Draw& draw, std::size_t count, Coordinates coordinates);
+/// t0 moved the way the style moves.
+Positions randomMotion(const Draw& draw, const Positions& t0, Coordinates coordinates);
+/// At most so many triangles, over at most 3 * triangles vertices.
+Topology randomTopology(const Draw& draw, int triangles);
+
+struct TrueContact {
+  core::Contact contact;  ///< toc 0 to 1
+  Root toc;
+};
+/// Every pair that the setups ask for, by the oracle, in canonical order.
+std::vector<TrueContact> trueContacts(const TestStep& step);
+
+/// The motion of a contact's four vertices.
+PairMotion motionOf(const TestStep& step, const core::Contact& contact);
+
+/// Whether the segment and the triangle meet, by the oracle: a vertex on its way from one end to the other.
+bool trulyMeet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c);
+/// Every edge that meets a face at t=0, in the order that the detector lists them.
+std::vector<StartIntersection> trueIntersections(const TestStep& step);
+bool operator==(const StartIntersection& x, const StartIntersection& y);
+
+/// Runs `body` for every SIMD target that this machine has, by its name; the choice is undone afterwards.
+void forEachSimdTarget(const std::function<void(const std::string& target)>& body);
+
+/// What differs, in words; empty where the contacts are the same bit for bit.
+std::string difference(const std::vector<core::Contact>& x, const std::vector<core::Contact>& y);
+std::string describe(const core::Contact& contact);
+
+}  // namespace test
+}  // namespace deformable_ccd
