@@ -147,7 +147,7 @@ void PairWorker::filter() {
   const Clock::time_point start = Clock::now();
   stats_[Stage::PLANAR].in += count_;
   const std::size_t kept = simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_,
-                                             task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, kept_.data());
+                                             task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ADAPTIVE, kept_.data());
   for (std::size_t i = 0; i < kept; ++i) {
     quads_[i] = quads_[kept_[i]];
     keys_[i] = keys_[kept_[i]];

@@ -25,6 +25,9 @@ struct Vec3V {
 HWY_INLINE Vec3V operator+(const Vec3V& a, const Vec3V& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
+HWY_INLINE Vec3V operator-(const Vec3V& a, const Vec3V& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
 HWY_INLINE Vec3V cross(const Vec3V& a, const Vec3V& b) {
   return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
           hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
@@ -74,28 +77,42 @@ HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const
   return hn::And(hn::Gt(o.largest_lo, margin), hn::Lt(o.smallest_hi, hn::Neg(margin)));
 }
 
-// Differences to the origin point, rounded once in double and once to float: out[(time * 3 + point) * 3 + axis][lane].
+// Differences of one pair to its origin point, rounded once in double and once to float:
+// out[time * 3 + point][lane * 4 + axis]; the fourth value is 0.
 template <bool EDGE_EDGE>
 HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
-                       float (*HWY_RESTRICT out)[MAX_LANES]) {
+                       float (*HWY_RESTRICT out)[4 * MAX_LANES]) {
+  const hn::CappedTag<double, 4> dd;
+  const hn::Rebind<float, decltype(dd)> df;
   const double* o = vertices + size_t{quad[EDGE_EDGE ? 3 : 0]} * 8;
-  for (size_t i = 0; i < 3; ++i) {
-    const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
-    for (size_t t = 0; t < 2; ++t) {
-      for (size_t k = 0; k < 3; ++k) out[(t * 3 + i) * 3 + k][lane] = static_cast<float>(v[4 * t + k] - o[4 * t + k]);
+  for (size_t k = 0; k < 8; k += hn::Lanes(dd)) {
+    const auto origin = hn::Load(dd, o + k);
+    for (size_t i = 0; i < 3; ++i) {
+      const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
+      hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, v + k), origin)), df, out[k / 4 * 3 + i] + lane * 4 + k % 4);
     }
   }
 }
 
+// Motion of the first feature's centre relative to the other's, times a constant; a, b, c are relative to the origin.
 template <bool EDGE_EDGE>
-HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[MAX_LANES], FusedPlanes planes) {
+HWY_INLINE Vec3V relativeMotion(const Vec3V* p0, const Vec3V* p1) {
+  const auto centre = [](const Vec3V* p) {
+    const Vec3V ab = p[0] + p[1];
+    return EDGE_EDGE ? ab - p[2] : ab + p[2];
+  };
+  return centre(p1) - centre(p0);
+}
+
+template <bool EDGE_EDGE>
+HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], FusedPlanes planes) {
   const DF d;
   Vec3V p[2][3];
   VF M = hn::Zero(d);
   for (size_t t = 0; t < 2; ++t) {
     for (size_t i = 0; i < 3; ++i) {
-      const size_t row = (t * 3 + i) * 3;
-      p[t][i] = {hn::Load(d, in[row]), hn::Load(d, in[row + 1]), hn::Load(d, in[row + 2])};
+      VF unused;
+      hn::LoadInterleaved4(d, in[t * 3 + i], p[t][i].x, p[t][i].y, p[t][i].z, unused);
       M = hn::Max(M, hn::Max(hn::Max(hn::Abs(p[t][i].x), hn::Abs(p[t][i].y)), hn::Abs(p[t][i].z)));
     }
   }
@@ -122,11 +139,14 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[MAX_LANES], Fuse
   out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.y; }, margin));
   out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.z; }, margin));
   if (planes != FusedPlanes::COORDINATE) {
+    const auto rejects = [&](const Vec3V& n) {
+      const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
+      const VF plane_margin = hn::Add(hn::Mul(margin, size), tiny);
+      return opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return dot(n, v); }, plane_margin);
+    };
     const Quadratic& N = EDGE_EDGE ? bc_ca : T;
-    const Vec3V n = N.A + N.B + N.C;
-    const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
-    const VF adaptive_margin = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 128 * UNIT), M_sq), size), tiny);
-    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return dot(n, v); }, adaptive_margin));
+    out = hn::Or(out, rejects(N.A + N.B + N.C));
+    out = hn::Or(out, rejects(relativeMotion<EDGE_EDGE>(p[0], p[1])));
   }
   if (planes == FusedPlanes::ALL && !hn::AllTrue(d, out)) {
     const VF two = hn::Mul(hn::Set(d, 2.0f), margin), three = hn::Mul(hn::Set(d, 3.0f), margin);
@@ -147,7 +167,7 @@ HWY_INLINE size_t filterAll(const double* HWY_RESTRICT vertices, const uint32_t*
                             FusedPlanes planes, uint32_t* HWY_RESTRICT kept) {
   const DF d;
   const size_t lanes = hn::Lanes(d);
-  HWY_ALIGN_MAX float in[18][MAX_LANES] = {};
+  HWY_ALIGN_MAX float in[6][4 * MAX_LANES] = {};
   size_t out = 0;
   for (size_t first = 0; first < count; first += lanes) {
     const size_t n = count - first < lanes ? count - first : lanes;

@@ -12,9 +12,11 @@
 // and with a smaller rank all are 0. So at the time of contact no two of the four have strictly opposite signs. A pair
 // is rejected when one of the four is strictly positive during the whole step and another strictly negative: the three
 // Bernstein coefficients of each are beyond the rounding margin on their side.
-// Planes: the three coordinate planes cost nothing more; one plane per pair, orthogonal to the mean normal of the face
-// (VF) or to the mean common normal of the edges (EE), sees the features as undistorted as a fixed plane can; then the
-// other five of the paper's eight.
+// Planes: any normal n will do, so each pair gets two of its own. Orthogonal to the mean normal of the face (VF) or to
+// the mean common normal of the edges (EE) the features are seen undistorted. Orthogonal to the motion of one feature
+// relative to the other they hardly move, so that what passes by at any speed stays apart: this plane alone takes the
+// survivors of n-body from 589,000 to 51,000, of which 50,490 meet. The three coordinate planes cost nothing more;
+// then come the other five of the paper's eight.
 //
 // Non-penetration filter (Tang et al. 2010): a.(b x c) is the cubic of coplanarity; no contact when its four Bernstein
 // coefficients have one strict sign.
@@ -39,7 +41,11 @@ namespace deformable_ccd {
 namespace simd {
 
 /// Which certificates to try; ALL_PLANES for the step, the others for measuring what each buys.
-enum class FusedPlanes : std::uint8_t { COORDINATE = 0, ADAPTIVE = 1, ALL = 2 };
+enum class FusedPlanes : std::uint8_t {
+  COORDINATE = 0,  ///< non-penetration and the coordinate planes
+  ADAPTIVE = 1,    ///< and the pair's own two planes
+  ALL = 2          ///< and the paper's other five
+};
 
 /// Tests `count` pairs; vertices: 8 doubles each (x0 y0 z0 0 x1 y1 z1 0); quads: VF v f0 f1 f2, EE ea0 ea1 eb0 eb1.
 /// Writes the positions of the pairs that are kept, ascending, to kept (room for count); returns their number.
