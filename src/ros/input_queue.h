@@ -1,0 +1,56 @@
+// Messages on their way from callbacks to the worker: bounded, counted, and never a reason to block.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <vector>
+
+#include <topic_tools/shape_shifter.h>
+
+#include "ros/monitor_config.h"
+
+namespace deformable_ccd {
+
+/// A message as the callback got it; its bytes are read by the worker.
+struct QueuedMessage {
+  topic_tools::ShapeShifter::ConstPtr message;
+  StampNs receipt_ns = 0;
+  std::int64_t arrival_ns = 0;
+};
+
+/// One queue a body, and commands for the worker. Safe to call from any thread.
+class InputQueue {
+ public:
+  InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy);
+
+  /// A full queue drops its oldest message (newest) or this one (oldest), and counts it.
+  void push(std::size_t body, QueuedMessage message);
+  /// False when the body has none.
+  bool pop(std::size_t body, QueuedMessage& message);
+  /// Drops all messages of all bodies; returns how many of each.
+  std::vector<std::uint64_t> clear();
+  /// Messages dropped since the last call, per body.
+  std::vector<std::uint64_t> takeDropped();
+  std::size_t size(std::size_t body) const;
+
+  /// For the worker to run between steps.
+  void command(std::function<void()> run);
+  /// Waits for a message, a command, a wake-up or the timeout; returns the commands that arrived.
+  std::vector<std::function<void()>> wait(std::chrono::microseconds timeout);
+  void wake();
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::deque<QueuedMessage>> queues_;
+  std::vector<std::uint64_t> dropped_;
+  std::vector<std::function<void()>> commands_;
+  std::size_t capacity_;
+  QueuePolicy policy_;
+  bool woken_ = false;
+};
+
+}  // namespace deformable_ccd

@@ -1,0 +1,148 @@
+#include "ros/markers.h"
+
+#include <algorithm>
+#include <map>
+
+namespace deformable_ccd {
+
+namespace {
+
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+
+std_msgs::ColorRGBA color(double r, double g, double b, double a = 1) {
+  std_msgs::ColorRGBA out;
+  out.r = static_cast<float>(r);
+  out.g = static_cast<float>(g);
+  out.b = static_cast<float>(b);
+  out.a = static_cast<float>(a);
+  return out;
+}
+
+geometry_msgs::Point point(const Vec3& p) {
+  geometry_msgs::Point out;
+  out.x = p.x();
+  out.y = p.y();
+  out.z = p.z();
+  return out;
+}
+
+Marker list(const StepOutcome& outcome, const std::string& frame, const std::string& ns, int type, double scale) {
+  Marker marker;
+  marker.header.frame_id = frame;
+  marker.header.stamp = toRosTime(outcome.stamp_ns);
+  marker.ns = ns;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.pose.orientation.w = 1;
+  marker.scale.x = marker.scale.y = marker.scale.z = scale;
+  marker.color = color(1, 1, 1);
+  return marker;
+}
+
+/// The mesh face that takes part, at the time of contact; nothing for edge pairs.
+void addFace(const StepOutcome& outcome, const core::Contact& contact, Marker& faces) {
+  int first = -1, body = 0;
+  if (contact.kind == PairKind::VERTEX_FACE) first = 1, body = 1;
+  if (contact.kind == PairKind::FACE_VOXEL_CORNER) first = 0;
+  if (first < 0) return;
+  for (int i = first; i < first + 3; ++i) {
+    const Vec3& from = (*outcome.positions_t0)[contact.body[body]][contact.vertex[i]];
+    const Vec3& to = (*outcome.positions_t1)[contact.body[body]][contact.vertex[i]];
+    faces.points.push_back(point(from + contact.toc_lower * (to - from)));
+  }
+}
+
+void addVoxel(const StepOutcome& outcome, const core::Contact& contact, const std::string& frame,
+              std::map<std::uint32_t, Marker>& by_size) {
+  if (contact.body[1] != OBSTACLE_BODY) return;
+  const double resolution = outcome.obstacle->resolution();
+  const double edge = contact.voxel_size * resolution;
+  auto found = by_size.find(contact.voxel_size);
+  if (found == by_size.end()) {
+    Marker marker = list(outcome, frame, "voxels", Marker::CUBE_LIST, edge);
+    marker.id = static_cast<int>(contact.voxel_size);
+    marker.color = color(0.9, 0.4, 0.1, 0.5);
+    const Eigen::Isometry3d pose = outcome.map_from_fixed.inverse();
+    const Eigen::Quaterniond q(pose.linear());
+    marker.pose.position = point(pose.translation());
+    marker.pose.orientation.x = q.x();
+    marker.pose.orientation.y = q.y();
+    marker.pose.orientation.z = q.z();
+    marker.pose.orientation.w = q.w();
+    found = by_size.emplace(contact.voxel_size, std::move(marker)).first;
+  }
+  const Vec3 min(voxelPlane(contact.voxel.x, resolution), voxelPlane(contact.voxel.y, resolution),
+                 voxelPlane(contact.voxel.z, resolution));
+  const geometry_msgs::Point centre = point(min + Vec3::Constant(0.5 * edge));
+  // Contacts come sorted by feature, so one voxel comes many times; once is enough where it is next to itself.
+  auto& points = found->second.points;
+  if (points.empty() || points.back().x != centre.x || points.back().y != centre.y || points.back().z != centre.z) {
+    points.push_back(centre);
+  }
+}
+
+void addMeshes(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& config,
+               const std::string& frame, MarkerArray& out) {
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const Topology& topology = *(*outcome.topologies)[b];
+    const Positions& at = (*outcome.positions_t1)[b];
+    const bool rope = !topology.hasFaces();
+    Marker marker = list(outcome, frame, "mesh/" + bodies[b].name, rope ? Marker::LINE_LIST : Marker::TRIANGLE_LIST,
+                         rope ? config.line_width_m : 1.0);
+    marker.color = color(0.3, 0.5, 0.9, 0.6);
+    const auto add = [&](const auto& feature) {
+      for (const Index v : feature) {
+        if (!at[v].allFinite()) return;
+      }
+      for (const Index v : feature) marker.points.push_back(point(at[v]));
+    };
+    if (rope) std::for_each(topology.edges().begin(), topology.edges().end(), add);
+    else std::for_each(topology.faces().begin(), topology.faces().end(), add);
+    if (!marker.points.empty()) out.markers.push_back(std::move(marker));
+  }
+}
+
+}  // namespace
+
+MarkerArray toMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& config,
+                      const std::string& frame) {
+  MarkerArray out;
+  Marker clear = list(outcome, frame, "", Marker::CUBE, 1);
+  clear.action = Marker::DELETEALL;
+  out.markers.push_back(clear);
+  if (!outcome.answered) return out;
+
+  Marker contacts = list(outcome, frame, "contacts", Marker::SPHERE_LIST, config.point_size_m);
+  Marker initial = list(outcome, frame, "initial", Marker::SPHERE_LIST, config.point_size_m);
+  Marker normals = list(outcome, frame, "normals", Marker::LINE_LIST, config.line_width_m);
+  Marker faces = list(outcome, frame, "faces", Marker::TRIANGLE_LIST, 1);
+  initial.color = color(0.6, 0.2, 0.9);
+  normals.color = color(0.2, 0.9, 0.4);
+  faces.color = color(1, 0.2, 0.2, 0.7);
+  std::map<std::uint32_t, Marker> voxels;
+  const std::size_t shown = std::min(outcome.contacts.size(), static_cast<std::size_t>(config.max_contacts));
+  for (std::size_t i = 0; i < shown; ++i) {
+    const core::Contact& contact = outcome.contacts[i];
+    const ContactGeometry geometry = contactGeometry(outcome, contact);
+    if (!geometry.point.allFinite() || !geometry.normal.allFinite()) continue;
+    addVoxel(outcome, contact, frame, voxels);
+    if (contact.initial) {
+      initial.points.push_back(point(geometry.point));
+      continue;
+    }
+    contacts.points.push_back(point(geometry.point));
+    contacts.colors.push_back(color(1, contact.toc_lower, contact.certainty == Certainty::CERTAIN ? 0 : 0.8));
+    normals.points.push_back(point(geometry.point));
+    normals.points.push_back(point(geometry.point + config.normal_length_m * geometry.normal));
+    addFace(outcome, contact, faces);
+  }
+  if (config.mesh) addMeshes(outcome, bodies, config, frame, out);
+  for (Marker* marker : {&contacts, &initial, &normals, &faces}) {
+    if (!marker->points.empty()) out.markers.push_back(std::move(*marker));
+  }
+  for (auto& voxel : voxels) out.markers.push_back(std::move(voxel.second));
+  return out;
+}
+
+}  // namespace deformable_ccd

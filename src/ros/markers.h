@@ -1,0 +1,17 @@
+// A step as RViz markers. Built only for a subscriber.
+#pragma once
+
+#include <visualization_msgs/MarkerArray.h>
+
+#include "ros/output_messages.h"
+
+#include "ros/monitor_config.h"
+
+namespace deformable_ccd {
+
+/// First a DELETEALL, then a few list markers: contacts (points coloured by TOC, red early to yellow late), normals, faces,
+/// voxels (one list per size of leaf), initial contacts apart, and the meshes if asked for.
+visualization_msgs::MarkerArray toMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                                          const MarkerConfig& config, const std::string& frame);
+
+}  // namespace deformable_ccd

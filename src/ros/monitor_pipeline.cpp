@@ -1,0 +1,172 @@
+#include "ros/monitor_pipeline.h"
+
+#include <utility>
+
+#include "ros/mesh_resource.h"
+#include "ros/transforms.h"
+
+namespace deformable_ccd {
+
+namespace {
+
+std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
+  std::vector<MonitorBody> bodies;
+  for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
+  return bodies;
+}
+
+}  // namespace
+
+MonitorPipeline::MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms)
+    : config_(config), transforms_(transforms), fixed_frame_(config.fixed_frame) {
+  loadFiles();
+  monitor_ = std::make_unique<Monitor>(config_.monitor, monitorBodies(config_));
+  for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
+  waiting_.resize(config_.bodies.size());
+  complaints_.resize(config_.bodies.size());
+}
+
+void MonitorPipeline::loadFiles() {
+  rigid_.resize(config_.bodies.size());
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
+    BodyConfig& body = config_.bodies[b];
+    if (!body.topology_file.empty()) {
+      body.input.file_topology = loadMeshResource(body.topology_file, 1).topology;
+    }
+    if (!body.isRigid()) continue;
+    MeshResource mesh = loadMeshResource(body.mesh_file, body.mesh_scale);
+    rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions)};
+  }
+}
+
+void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
+                           const std::string& reason) {
+  monitor_->skip(body, status, stamp_ns, reason);
+  complaints_[body] = reason;
+  if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
+}
+
+void MonitorPipeline::take(std::size_t body, const RawMessage& message) {
+  finishing_ = false;
+  Waiting waiting;
+  waiting.arrival_ns = message.arrival_ns;
+  try {
+    waiting.mesh = decoders_[body].decode(message.datatype, message.bytes.data(), message.bytes.size());
+  } catch (const MeshError& error) {
+    monitor_->countReceived(body);
+    return skip(body, error.status, message.receipt_ns, message.arrival_ns, error.what());
+  }
+  const bool unstamped = waiting.mesh.stamp_ns == 0;
+  if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
+  monitor_->countReceived(body, 1, unstamped);
+  weld_changes_ += waiting.mesh.weld_changed;
+  if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
+  waiting_[body] = std::move(waiting);
+}
+
+bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
+  std::vector<std::pair<std::size_t, MeshFrame>> frames;
+  for (std::size_t b = 0; b < rigid_.size(); ++b) {
+    if (!rigid_[b]) continue;
+    MeshFrame frame{stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity()};
+    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) return false;
+    transform(frame.pose, frame.positions);
+    frames.emplace_back(b, std::move(frame));
+  }
+  for (auto& frame : frames) {
+    monitor_->countReceived(frame.first);
+    monitor_->push(frame.first, std::move(frame.second), now_ns);
+  }
+  return true;
+}
+
+bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
+  Waiting& waiting = *waiting_[body];
+  const bool timed_out =
+      finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
+  std::string reason = "the fixed frame is not known before the first message of the clock body";
+  Eigen::Isometry3d fixed_from_mesh;
+  const bool is_clock = body == config_.monitor.clock_body;
+  const bool placed = !fixed_frame_.empty() &&
+                      lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id, waiting.mesh.stamp_ns,
+                                      fixed_from_mesh, reason) &&
+                      (!is_clock || placeRigid(waiting.mesh.stamp_ns, now_ns, reason));
+  if (!placed && !timed_out) return false;
+  Waiting done = std::move(waiting);
+  waiting_[body].reset();
+  if (!placed) {
+    skip(body, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns,
+         "no transform from '" + done.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason);
+    return true;
+  }
+  transform(fixed_from_mesh, done.mesh.positions);
+  monitor_->push(body, {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
+                        Eigen::Isometry3d::Identity()}, now_ns);
+  if (is_clock) arrivals_.push_back(done.arrival_ns);
+  return true;
+}
+
+void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
+  unplaced_map_ = std::move(map);
+  unplaced_since_ns_ = now_ns;
+}
+
+void MonitorPipeline::placeMap(std::int64_t now_ns) {
+  if (!unplaced_map_) return;
+  if (!unplaced_map_->surface) {
+    // Refused: what was there before is out of date, and no map is better than a wrong one.
+    monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
+    unplaced_map_.reset();
+    return;
+  }
+  if (fixed_frame_.empty()) return;
+  const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
+  MonitorMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
+  std::string reason;
+  if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
+    monitor_->setMap(std::move(map));
+    unplaced_map_.reset();
+  } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
+    // It is tried again at every call: a map comes rarely, and its transform may come late.
+    if (monitor_->map().problem.empty()) {
+      monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(),
+                        "no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason});
+    }
+  }
+}
+
+bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
+  placeMap(now_ns);
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (waiting_[b]) place(b, now_ns);
+  }
+  if (finishing_) monitor_->finish();
+  if (!monitor_->next(now_ns, outcome)) return false;
+  outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
+  if (!arrivals_.empty()) arrivals_.pop_front();
+  return true;
+}
+
+bool MonitorPipeline::waiting() const {
+  if (unplaced_map_ || monitor_->waiting()) return true;
+  for (const auto& one : waiting_) {
+    if (one) return true;
+  }
+  return false;
+}
+
+void MonitorPipeline::finish() { finishing_ = true; }
+
+void MonitorPipeline::reset(StepStatus status) {
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (waiting_[b]) monitor_->countDropped(b, status);
+    waiting_[b].reset();
+  }
+  monitor_->reset(status);
+  arrivals_.clear();
+  if (config_.fixed_frame.empty()) fixed_frame_.clear();
+}
+
+std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }
+
+}  // namespace deformable_ccd

@@ -1,0 +1,95 @@
+// From messages to outcomes: decoding, waiting for tf, the fixed frame, the map's pose, rigid bodies, and the monitor. The
+// node drives it with a steady clock, analyze_bag with the bag's; there is no other difference between the two.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <tf2/buffer_core.h>
+
+#include "deformable_ccd/monitor.h"
+#include "ros/mesh_decoder.h"
+#include "ros/monitor_config.h"
+
+namespace deformable_ccd {
+
+/// One serialised message as it came.
+struct RawMessage {
+  std::string datatype;
+  std::vector<std::uint8_t> bytes;
+  StampNs receipt_ns = 0;       ///< stamp for messages without one
+  std::int64_t arrival_ns = 0;  ///< on the clock that drives the pipeline
+};
+
+/// A decoded map in its own frame.
+struct LoadedMap {
+  std::shared_ptr<const VoxelSurface> surface;  ///< null: `problem` says why
+  std::string frame_id;                         ///< empty: the fixed frame
+  StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
+  std::string problem;
+};
+
+class MonitorPipeline {
+ public:
+  /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file.
+  MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms);
+
+  /// Whether the body can take a message: none of its frames waits for tf.
+  bool idle(std::size_t body) const { return !waiting_[body]; }
+  /// Counts, decodes and keeps one message of an idle body.
+  void take(std::size_t body, const RawMessage& message);
+  void setMap(LoadedMap map, std::int64_t now_ns);
+  /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
+  bool next(std::int64_t now_ns, StepOutcome& outcome);
+  /// Something waits for tf or for other bodies, so that next() is worth calling again without new input.
+  bool waiting() const;
+  /// End of input: whatever still waits is given up at the next call of next().
+  void finish();
+  void reset(StepStatus status);
+
+  Monitor& monitor() { return *monitor_; }
+  const Monitor& monitor() const { return *monitor_; }
+  const MonitorConfig& config() const { return config_; }
+  const std::string& fixedFrame() const { return fixed_frame_; }
+  std::uint64_t weldChanges() const { return weld_changes_; }
+  /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
+  std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
+  /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none.
+  std::string takeComplaint(std::size_t body);
+
+ private:
+  struct Waiting {
+    DecodedMesh mesh;
+    std::int64_t arrival_ns = 0;
+  };
+  struct RigidMesh {
+    std::shared_ptr<const Topology> topology;
+    Positions rest;
+  };
+  MonitorConfig config_;
+  tf2::BufferCore& transforms_;
+  std::unique_ptr<Monitor> monitor_;
+  std::vector<MeshDecoder> decoders_;
+  std::vector<std::optional<Waiting>> waiting_;
+  std::vector<std::optional<RigidMesh>> rigid_;
+  std::vector<std::string> complaints_;
+  std::optional<LoadedMap> unplaced_map_;
+  std::int64_t unplaced_since_ns_ = 0;
+  std::deque<std::int64_t> arrivals_;  // of the clock body's frames inside the monitor
+  std::int64_t outcome_arrival_ns_ = 0;
+  std::string fixed_frame_;
+  std::uint64_t weld_changes_ = 0;
+  bool finishing_ = false;
+
+  void loadFiles();
+  void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
+  /// False: still waits.
+  bool place(std::size_t body, std::int64_t now_ns);
+  bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
+  void placeMap(std::int64_t now_ns);
+};
+
+}  // namespace deformable_ccd
