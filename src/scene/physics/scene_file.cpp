@@ -1,0 +1,222 @@
+#include "scene/physics/scene_file.h"
+
+#include <fstream>
+#include <numeric>
+#include <sstream>
+
+namespace deformable_ccd::scene {
+namespace {
+
+constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
+
+Shape readSheet(YamlMap map) {
+  Shape shape;
+  shape.kind = Shape::Kind::SHEET;
+  shape.rows = map.integer("rows", 2, 1000);
+  shape.cols = map.integer("cols", 2, 1000);
+  shape.size_m = map.numbers("size_m", 2, 1e-3, 1e3);
+  shape.center_m = map.vector("center_m");
+  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+  map.finish();
+  return shape;
+}
+
+Shape readTube(YamlMap map) {
+  Shape shape;
+  shape.kind = Shape::Kind::TUBE;
+  shape.rows = map.integer("rows", 2, 1000);
+  shape.cols = map.integer("cols", 3, 1000);
+  shape.size_m = Vec3(map.number("radius_m", 1e-3, 1e3), map.number("length_m", 1e-3, 1e3), 0.0);
+  shape.center_m = map.vector("center_m");
+  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+  map.finish();
+  return shape;
+}
+
+Shape readRope(YamlMap map) {
+  Shape shape;
+  shape.kind = Shape::Kind::ROPE;
+  shape.cols = map.integer("points", 2, 10000);
+  shape.size_m = Vec3(map.number("length_m", 1e-3, 1e3), 0.0, 0.0);
+  shape.center_m = map.vector("center_m");
+  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+  map.finish();
+  return shape;
+}
+
+Motion readMotion(YamlMap& parent) {
+  Motion motion;
+  for (YamlMap& map : parent.list("motion")) {
+    MotionKey key;
+    key.time_s = map.number("time_s", 0.0, LARGE);
+    key.offset_m = map.vector("offset_m", Vec3::Zero());
+    key.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+    if (!motion.empty() && key.time_s <= motion.back().time_s) map.fail("time_s", "write a later time than the key before");
+    map.finish();
+    motion.push_back(key);
+  }
+  return motion;
+}
+
+Gripper readGripper(YamlMap map, const Shape& shape) {
+  Gripper gripper;
+  const bool by_row = map.has("row"), by_col = map.has("col"), by_vertex = map.has("vertices");
+  if (by_row + by_col + by_vertex != 1) map.fail("", "write just one of row, col, vertices: what the gripper holds");
+  if (by_row) {
+    const int row = map.integer("row", 0, shape.rows - 1);
+    gripper.vertices.resize(static_cast<std::size_t>(shape.cols));
+    std::iota(gripper.vertices.begin(), gripper.vertices.end(), row * shape.cols);
+  } else if (by_col) {
+    const int col = map.integer("col", 0, shape.cols - 1);
+    for (int row = 0; row < shape.rows; ++row) gripper.vertices.push_back(row * shape.cols + col);
+  } else {
+    gripper.vertices = map.integers("vertices", 0, shape.rows * shape.cols - 1);
+  }
+  gripper.motion = readMotion(map);
+  if (map.has("release_s")) gripper.release_s = map.number("release_s", 0.0, LARGE);
+  map.finish();
+  return gripper;
+}
+
+Body readBody(YamlMap map, const std::string& fixed_frame) {
+  Body body;
+  body.name = map.text("name");
+  body.topic = map.text("topic", "/" + body.name);
+  body.frame = map.text("frame", fixed_frame);
+  body.output = static_cast<MeshOutput>(
+      map.choice("output", {"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}, 0));
+  const bool sheet = map.has("sheet"), tube = map.has("tube"), rope = map.has("rope");
+  if (sheet + tube + rope != 1) map.fail("", "write just one of sheet, tube, rope: the body's shape");
+  body.shape = sheet ? readSheet(map.map("sheet")) : tube ? readTube(map.map("tube")) : readRope(map.map("rope"));
+  if (rope && body.output != MeshOutput::POINT_CLOUD_GRID) map.fail("output", "write point_cloud_grid: a rope has no faces");
+  body.mass_kg = map.number("mass_kg", 1e-6, LARGE);
+  body.thickness_m = map.number("thickness_m", 1e-5, 1.0, body.thickness_m);
+  body.stretch_stiffness = map.number("stretch_stiffness", 0.0, 1.0, body.stretch_stiffness);
+  body.damping = map.number("damping", 0.0, 1.0, 0.0);
+  body.start_noise_m = map.number("start_noise_m", 0.0, 1.0, 0.0);
+  body.tracker_noise_m = map.number("tracker_noise_m", 0.0, 1.0, 0.0);
+  if (auto bending = map.optionalMap("bending")) {
+    body.bending = Bending{bending->number("stiffness", 0.0, 1.0)};
+    bending->finish();
+  }
+  if (auto self_collision = map.optionalMap("self_collision")) {
+    if (rope) map.fail("self_collision", "leave it out: physics' self-collision needs faces, and a rope has none");
+    body.self_collision = SelfCollision{self_collision->integer("clusters", 2, 10000, SelfCollision{}.clusters)};
+    self_collision->finish();
+  }
+  if (map.has("friction")) body.friction = map.number("friction", 0.0, 1.0);
+  for (YamlMap& gripper : map.list("grippers")) body.grippers.push_back(readGripper(gripper, body.shape));
+  map.finish();
+  return body;
+}
+
+Solid readSolid(YamlMap map) {
+  Solid solid;
+  const bool box = map.has("box"), ring = map.has("ring");
+  if (box + ring != 1) map.fail("", "write just one of box, ring");
+  if (box) {
+    YamlMap inner = map.map("box");
+    solid.box.min = inner.vector("min_m");
+    solid.box.max = inner.vector("max_m");
+    if (!(solid.box.min.array() < solid.box.max.array()).all()) inner.fail("max_m", "write corners with min_m below max_m on every axis");
+    inner.finish();
+  } else {
+    solid.kind = Solid::Kind::RING;
+    YamlMap inner = map.map("ring");
+    solid.center_m = inner.vector("center_m");
+    solid.axis = inner.vector("axis", Vec3::UnitZ());
+    if (solid.axis.norm() < 1e-6) inner.fail("axis", "write a direction that is not zero");
+    solid.axis.normalize();
+    solid.radius_m = inner.number("radius_m", 1e-3, 1e3);
+    solid.tube_radius_m = inner.number("tube_radius_m", 1e-4, solid.radius_m);
+    inner.finish();
+  }
+  map.finish();
+  return solid;
+}
+
+Obstacle readObstacle(YamlMap map, const std::string& fixed_frame) {
+  Obstacle obstacle;
+  obstacle.topic = map.text("topic", "/octomap_binary");
+  obstacle.frame = map.text("frame", fixed_frame);
+  obstacle.resolution_m = map.number("resolution_m", 1e-3, 10.0);
+  obstacle.binary = map.boolean("binary", true);
+  obstacle.collides = map.boolean("collides", false);
+  obstacle.inset_m = map.number("inset_m", 0.0, 1.0, 0.0);
+  for (YamlMap& solid : map.list("solids")) obstacle.solids.push_back(readSolid(solid));
+  if (obstacle.solids.empty()) map.fail("solids", "write at least one solid (box or ring), or leave the obstacle out");
+  map.finish();
+  return obstacle;
+}
+
+RigidBody readRigidBody(YamlMap map) {
+  RigidBody body;
+  body.name = map.text("name");
+  body.frame = map.text("frame", body.name);
+  body.size_m = map.numbers("size_m", 3, 1e-4, 1e3);
+  body.start_m = map.vector("start_m");
+  body.motion = readMotion(map);
+  map.finish();
+  return body;
+}
+
+Wind readWind(YamlMap map) {
+  Wind wind;
+  wind.velocity_m_s = map.vector("velocity_m_s");
+  wind.drag = map.number("drag", 0.0, LARGE);
+  wind.lift = map.number("lift", 0.0, LARGE, 0.0);
+  wind.gust = map.number("gust", 0.0, 10.0, 0.0);
+  wind.gust_period_s = map.number("gust_period_s", 0.01, LARGE, wind.gust_period_s);
+  map.finish();
+  return wind;
+}
+
+SceneSpec readScene(const YAML::Node& root, const std::string& name) {
+  YamlMap map(root, name, "");
+  SceneSpec spec;
+  spec.name = map.text("name");
+  spec.description = map.text("description");
+  spec.fixed_frame = map.text("fixed_frame", "world");
+  spec.frame_rate_hz = map.number("frame_rate_hz", 0.1, 1000.0, spec.frame_rate_hz);
+  spec.frames = map.integer("frames", 2, 1000000);
+  YamlMap physics = map.map("physics");
+  spec.substeps = physics.integer("substeps", 1, 1000, spec.substeps);
+  if (physics.has("gravity_m_s2")) spec.gravity_m_s2 = physics.vector("gravity_m_s2");
+  if (auto wind = physics.optionalMap("wind")) spec.wind = readWind(*wind);
+  physics.finish();
+  for (YamlMap& body : map.list("bodies")) {
+    spec.bodies.push_back(readBody(body, spec.fixed_frame));
+    for (std::size_t i = 0; i + 1 < spec.bodies.size(); ++i) {
+      if (spec.bodies[i].topic == spec.bodies.back().topic) body.fail("topic", "write a topic of its own for each body");
+    }
+  }
+  if (spec.bodies.empty()) map.fail("bodies", "write at least one body: what moves in this scene");
+  if (auto obstacle = map.optionalMap("obstacle")) spec.obstacle = readObstacle(*obstacle, spec.fixed_frame);
+  for (YamlMap& body : map.list("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
+  spec.monitor_yaml = map.raw("monitor");
+  spec.expect_yaml = map.raw("expect");
+  map.finish();
+  return spec;
+}
+
+}  // namespace
+
+SceneSpec parseScene(const std::string& text, const std::string& name) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw SceneFileError(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML: " + error.msg);
+  }
+  return readScene(root, name);
+}
+
+SceneSpec readSceneFile(const std::string& path) {
+  std::ifstream stream(path);
+  if (!stream) throw SceneFileError(path + ": cannot be read; name a scene file, such as config/scenes/table_edge.yaml");
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return parseScene(text.str(), path);
+}
+
+}  // namespace deformable_ccd::scene
