@@ -3,10 +3,11 @@ find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 
 # The exact oracle: judges the rungs in the tests and in the tools that report errors. The libraries never link it.
-set(ORACLE_SOURCES test/support/algebraic.cpp test/support/exact_distance.cpp test/support/oracle.cpp)
+set(ORACLE_SOURCES test/support/algebraic.cpp test/support/exact_distance.cpp test/support/oracle.cpp
+  test/support/promises.cpp)
 list(TRANSFORM ORACLE_SOURCES PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
 add_library(deformable_ccd_oracle STATIC ${ORACLE_SOURCES})
-target_include_directories(deformable_ccd_oracle PUBLIC test)
+target_include_directories(deformable_ccd_oracle PUBLIC src test)
 target_link_libraries(deformable_ccd_oracle PUBLIC deformable_ccd ${GMP_LIBRARY})
 
 set(CORE_TOOLS check_step run_queries)

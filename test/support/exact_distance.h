@@ -11,6 +11,9 @@ namespace test {
 /// The features at the time t (any finite double, taken exactly). Kind VERTEX_FACE or EDGE_EDGE.
 Rational squaredDistanceAt(PairKind kind, const PairMotion& pair, double t);
 
+/// The distance in doubles, for searching: wrong by rounding, unlike the others.
+double approximateDistanceAt(PairKind kind, const PairMotion& pair, double t);
+
 /// Whether the features are at most `bound` (a double >= 0, taken exactly) apart at the time t.
 bool isWithin(PairKind kind, const PairMotion& pair, double t, double bound);
 

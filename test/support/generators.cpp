@@ -298,7 +298,7 @@ int significantBits(double value) {
 int costOf(const Query& query) {
   int cost = largestExponent(query) != 0;
   const double* values = &query.motion.x[0][0][0];
-  for (int i = 0; i < 24; ++i) cost += significantBits(values[i]);
+  for (int i = 0; i < 24; ++i) cost += 2 * significantBits(values[i]);  // more than what moves, so that zeros win
   for (int i = 0; i < 12; ++i) cost += values[i] != values[i + 12];
   return cost;
 }

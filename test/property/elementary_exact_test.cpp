@@ -1,0 +1,156 @@
+// The exact rung on hard pairs: the oracle's answers, and the same answers for the same pair said differently.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <memory>
+#include <sstream>
+
+#include "deformable_ccd/elementary.h"
+#include "support/generators.h"
+#include "support/oracle.h"
+#include "support/promises.h"
+#include "support/query_property.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr std::array<int, 3> TOC_BITS = {10, 32, 52};
+
+AccuracyOptions exactOptions(int toc_bits) {
+  AccuracyOptions options;
+  options.rung = Accuracy::EXACT;
+  options.toc_bits = toc_bits;
+  return options;
+}
+
+bool same(const ElementaryResult& a, const ElementaryResult& b) {
+  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
+}
+
+std::string described(const ElementaryResult& result) {
+  std::ostringstream text;
+  text.precision(17);
+  text << "verdict " << int(result.verdict) << " [" << result.toc_lower << ", " << result.toc_upper << "] tier "
+       << toString(result.tier);
+  return text.str();
+}
+
+TEST(ElementaryExact, VerdictAndCellAreTheOracles) {
+  std::vector<std::unique_ptr<ElementaryTest>> tests;
+  for (int bits : TOC_BITS) tests.push_back(makeElementaryTest(exactOptions(bits)));
+  checkHardQueries("exact-oracle", longRun() ? 1000000 : 20000, [&](const Query& query) -> std::string {
+    std::optional<Root> toc = firstContact(query.kind, query.motion);
+    for (std::size_t i = 0; i < tests.size(); ++i) {
+      const ElementaryResult result = testQuery(*tests[i], query);
+      const std::string broken = brokenPromise(exactOptions(TOC_BITS[i]), query, toc, result);
+      if (!broken.empty()) return broken + " at " + std::to_string(TOC_BITS[i]) + " bits: " + described(result);
+    }
+    return {};
+  });
+}
+
+TEST(ElementaryExact, NoOrderAxisOrScaleChangesTheAnswer) {
+  const auto test = makeElementaryTest(exactOptions(32));
+  const auto axes = axisPermutations();
+  checkHardQueries("exact-symmetry", longRun() ? 200000 : 10000, [&](const Query& query) -> std::string {
+    const ElementaryResult expected = testQuery(*test, query);
+    const auto differs = [&](const Query& variant, const char* what) -> std::string {
+      const ElementaryResult result = testQuery(*test, variant);
+      if (same(result, expected)) return {};
+      return std::string(what) + " changes " + described(expected) + " to " + described(result);
+    };
+    for (const auto& order : vertexPermutations(query.kind)) {
+      const std::string wrong = differs(permuted(query, order), "another order of the vertices");
+      if (!wrong.empty()) return wrong;
+    }
+    for (const AxisPermutation& permutation : axes) {
+      const std::string wrong = differs(permuted(query, permutation), "a signed permutation of the axes");
+      if (!wrong.empty()) return wrong;
+    }
+    for (int exponent : {-1000, -600, -300, -1, 1, 300, 600, 1000}) {
+      Query scaled;
+      if (!scaledExactly(query, exponent, scaled)) continue;
+      const std::string wrong = differs(scaled, "a power of two");
+      if (!wrong.empty()) return wrong + ", exponent " + std::to_string(exponent);
+    }
+    return {};
+  });
+}
+
+TEST(ElementaryExact, TimeReversedHasTheSameVerdict) {
+  const auto test = makeElementaryTest(exactOptions(32));
+  checkHardQueries("exact-reversed", longRun() ? 1000000 : 20000, [&](const Query& query) -> std::string {
+    const ElementaryResult forward = testQuery(*test, query), backward = testQuery(*test, timeReversed(query));
+    if (forward.verdict == backward.verdict) return {};
+    return "forward " + described(forward) + ", backward " + described(backward);
+  });
+}
+
+// A coarser cell is the finer one with bits cut off: cells of all widths name one time.
+TEST(ElementaryExact, CellsOfAllWidthsContainEachOther) {
+  std::vector<std::unique_ptr<ElementaryTest>> tests;
+  for (int bits = 10; bits <= 52; ++bits) tests.push_back(makeElementaryTest(exactOptions(bits)));
+  checkHardQueries("exact-nested", longRun() ? 100000 : 2000, [&](const Query& query) -> std::string {
+    ElementaryResult finer = testQuery(*tests.back(), query);
+    for (int bits = 51; bits >= 10; --bits) {
+      const ElementaryResult coarser = testQuery(*tests[static_cast<std::size_t>(bits - 10)], query);
+      const bool nested = coarser.verdict == finer.verdict &&
+                          (finer.verdict == Verdict::NO_CONTACT ||
+                           (coarser.toc_lower <= finer.toc_lower && finer.toc_upper <= coarser.toc_upper));
+      if (!nested) return std::to_string(bits) + " bits: " + described(coarser) + ", finer: " + described(finer);
+      finer = coarser;
+    }
+    return {};
+  });
+}
+
+// Lanes must not disturb each other, whatever stands beside a pair and wherever in the batch it stands.
+TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
+  const auto test = makeElementaryTest(exactOptions(32));
+  RandomSource random(11);
+  const int rounds = longRun() ? 2000 : 60;
+  for (int round = 0; round < rounds; ++round) {
+    const PairKind kind = round % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
+    std::vector<Query> queries;
+    const std::size_t count = 1 + random() % 600;
+    while (queries.size() < count) {
+      const Query query = hardQuery(random);
+      if (query.kind == kind) queries.push_back(query);
+    }
+    std::vector<VertexMotion> vertices;
+    std::vector<Quad> quads;
+    for (const Query& query : queries) {
+      Quad quad;
+      for (int i = 0; i < 4; ++i) {
+        VertexMotion vertex{};
+        std::copy_n(query.motion.x[0][i], 3, vertex.t0);
+        std::copy_n(query.motion.x[1][i], 3, vertex.t1);
+        quad[i] = static_cast<Index>(vertices.size());
+        vertices.push_back(vertex);
+      }
+      quads.push_back(quad);
+    }
+    PairBatch batch;
+    batch.kind = kind;
+    batch.vertices = vertices.data();
+    batch.pairs = quads.data();
+    batch.count = quads.size();
+    std::vector<ElementaryResult> results(count);
+    TierCounters counters;
+    test->run(batch, results.data(), counters);
+    std::uint64_t settled = 0;
+    for (std::uint64_t tier : counters.settled) settled += tier;
+    EXPECT_EQ(settled, count) << "every pair is settled by one tier";
+    for (std::size_t i = 0; i < count; ++i) {
+      const ElementaryResult single = testQuery(*test, queries[i]);
+      ASSERT_TRUE(same(results[i], single) && results[i].tier == single.tier)
+          << "pair " << i << " of " << count << ": " << described(results[i]) << ", alone " << described(single)
+          << "\nreplay: run_queries " << writeReplayFile("exact-batch", queries[i]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
