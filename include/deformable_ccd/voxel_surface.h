@@ -53,6 +53,7 @@ struct ObstacleStats {
   std::uint64_t vertex_pairs_in = 0, edge_pairs_in = 0, corner_pairs_in = 0;  ///< candidates past the bounds
   std::uint64_t vertex_contacts = 0, edge_contacts = 0, corner_contacts = 0;
   std::uint64_t initial = 0, leaving = 0;
+  TierCounters tiers;  ///< of the pairs that reached the elementary test
   double ms = 0;
 };
 

@@ -61,6 +61,9 @@ class VoxelTree {
   template <class Visit>
   void visitLeaves(const KeyBox& box, Visit&& visit) const;
 
+  /// Does any leaf have a voxel in the box?
+  bool anyLeaf(const KeyBox& box) const;
+
  private:
   struct Level {
     std::vector<Node> nodes;
@@ -73,11 +76,12 @@ class VoxelTree {
   void buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);
 
+  /// Calls visit(node, bits) for each node with leaves in the box, bits being their cells there, until it returns true.
   template <class Visit>
-  void descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
+  bool visitNodes(const KeyBox& box, Visit&& visit) const;
+  template <class Visit>
+  bool descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
                Visit& visit) const;
-  template <class Visit>
-  static void visitBits(const Node& node, std::uint64_t bits, Visit& visit);
   /// The node's cells that the box reaches, each side clipped.
   static std::uint64_t boxBits(int level, const std::array<std::int32_t, 3>& origin, const KeyBox& box);
 
@@ -120,33 +124,26 @@ inline std::uint64_t VoxelTree::boxBits(int level, const std::array<std::int32_t
 }
 
 template <class Visit>
-void VoxelTree::visitBits(const Node& node, std::uint64_t bits, Visit& visit) {
-  std::uint32_t last = NONE;
-  for (; bits != 0; bits &= bits - 1) {
-    const std::uint32_t leaf = node.leafAt(lowestBit(bits));
-    if (leaf != last) visit(leaf);
-    last = leaf;
-  }
-}
-
-template <class Visit>
-void VoxelTree::descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
+bool VoxelTree::descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
                         Visit& visit) const {
   const std::uint64_t bits = boxBits(level, origin, box);
-  visitBits(node, node.full & bits, visit);
+  if ((node.full & bits) != 0 && visit(node, node.full & bits)) return true;
   for (std::uint64_t children = node.child & bits; children != 0; children &= children - 1) {
     const unsigned bit = lowestBit(children);
     std::array<std::int32_t, 3> child_origin;
-    for (int axis = 0; axis < 3; ++axis) child_origin[axis] = origin[axis] + (CELL_COORDINATES[bit][axis] << (2 * level));
-    descend(level - 1, levels_[level - 1].nodes[node.childAt(bit)], child_origin, box, visit);
+    for (int axis = 0; axis < 3; ++axis) {
+      child_origin[axis] = origin[axis] + (CELL_COORDINATES[bit][axis] << (2 * level));
+    }
+    if (descend(level - 1, levels_[level - 1].nodes[node.childAt(bit)], child_origin, box, visit)) return true;
   }
+  return false;
 }
 
 template <class Visit>
-void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
+bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
   // Start where the box spans two nodes an axis at most; above that only the leaves of the nodes themselves matter.
   int start = 1;
-  const auto spans = [&](int level, int axis) {
+  const auto spans = [&box](int level, int axis) {
     const int shift = 2 * (level + 1);
     return (box.hi[axis] >> shift) - (box.lo[axis] >> shift);
   };
@@ -162,14 +159,33 @@ void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
           const Node& node = levels_[level].nodes[index];
           const std::array<std::int32_t, 3> origin{x << shift, y << shift, z << shift};
           if (level == start) {
-            descend(level, node, origin, box, visit);
+            if (descend(level, node, origin, box, visit)) return true;
           } else {
-            visitBits(node, node.full & boxBits(level, origin, box), visit);
+            const std::uint64_t bits = node.full & boxBits(level, origin, box);
+            if (bits != 0 && visit(node, bits)) return true;
           }
         }
       }
     }
   }
+  return false;
+}
+
+template <class Visit>
+void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
+  visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
+    std::uint32_t last = NONE;
+    for (; bits != 0; bits &= bits - 1) {
+      const std::uint32_t leaf = node.leafAt(lowestBit(bits));
+      if (leaf != last) visit(leaf);
+      last = leaf;
+    }
+    return false;
+  });
+}
+
+inline bool VoxelTree::anyLeaf(const KeyBox& box) const {
+  return visitNodes(box, [](const Node&, std::uint64_t) { return true; });
 }
 
 }  // namespace deformable_ccd

@@ -1,0 +1,42 @@
+// The voxel keys that each vertex may touch during the step, and unions of them for edges and faces.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "deformable_ccd/types.h"
+#include "obstacle/voxel_surface_impl.h"
+
+namespace deformable_ccd {
+
+/// A key box in eight 16-bit lanes, keys less 32768, upper ends complemented: the union of boxes is the minimum of the
+/// lanes, one instruction on any SIMD target. Lanes 3 and 7 are unused.
+struct alignas(16) KeyLanes {
+  std::int16_t lane[8];
+
+  void include(const KeyLanes& other) {
+    for (int i = 0; i < 8; ++i) lane[i] = other.lane[i] < lane[i] ? other.lane[i] : lane[i];
+  }
+  KeyBox box() const {
+    KeyBox box;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lo[axis] = lane[axis] + 32768;
+      box.hi[axis] = ~lane[4 + axis] + 32768;
+    }
+    return box;
+  }
+};
+
+/// Keys within `reach_m` of the straight path from p0 to p1, rounded outward. Both points must be finite.
+inline KeyLanes sweptKeys(const Vec3& p0, const Vec3& p1, double inverse_resolution, double reach_m) {
+  KeyLanes keys{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double lo = p0[axis] < p1[axis] ? p0[axis] : p1[axis];
+    const double hi = p0[axis] < p1[axis] ? p1[axis] : p0[axis];
+    keys.lane[axis] = static_cast<std::int16_t>(outwardKey(lo - reach_m, inverse_resolution, -1) - 32768);
+    keys.lane[4 + axis] = static_cast<std::int16_t>(~(outwardKey(hi + reach_m, inverse_resolution, +1) - 32768));
+  }
+  return keys;
+}
+
+}  // namespace deformable_ccd

@@ -1,0 +1,59 @@
+// Pairs of a mesh feature and a feature of one leaf on their way through the elementary test, a chunk at a time.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "deformable_ccd/contact.h"
+#include "deformable_ccd/voxel_surface.h"
+#include "obstacle/voxel_surface_impl.h"
+
+namespace deformable_ccd {
+
+/// What a pair becomes when it is in contact: the parts of the contact that do not depend on the test.
+struct ObstaclePair {
+  Contact contact;         ///< all but times and certainty
+  double outward[3];       ///< direction out of the leaf at its feature, any length
+  bool started_inside;     ///< the mesh feature touched the obstacle at t=0
+};
+
+/// Collects pairs of one elementary kind and appends what the rung finds to a vector of contacts. Reuses its memory.
+class ObstacleBatch {
+ public:
+  /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`. toc_limit: null, or
+  /// where to note the upper bound of each contact; pairs that cannot touch by then are left out.
+  ObstacleBatch(PairKind kind, const ElementaryTest* test, double minimum_separation_m, double* toc_limit);
+
+  /// Drops whatever an earlier run left behind.
+  void clear();
+  /// points: as the elementary kind wants them. toc_bound: not after a contact, if any, by cheaper means.
+  void add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound);
+  /// Tests what is left. Contacts are found in the order of add().
+  void flush();
+
+  std::vector<Contact>& contacts() { return contacts_; }
+  const TierCounters& tiers() const { return tiers_; }
+
+ private:
+  void append(std::size_t index, const ElementaryResult& result);
+
+  static constexpr std::size_t CHUNK = 512;
+  PairKind kind_;
+  const ElementaryTest* test_;
+  double separation_m_;
+  double* toc_limit_;
+  std::vector<ObstaclePair> pairs_;
+  std::vector<double> toc_bounds_;
+  std::vector<VertexMotion> points_;
+  std::vector<Quad> quads_;
+  std::vector<double> separations_;
+  std::vector<ElementaryResult> results_;
+  std::vector<Contact> contacts_;
+  TierCounters tiers_;
+};
+
+/// Sorts contacts canonically and joins those of one mesh feature and one leaf into one: the earliest time counts, and
+/// it is certain when any of them is.
+void sortAndJoin(std::vector<Contact>& contacts);
+
+}  // namespace deformable_ccd

@@ -1,0 +1,510 @@
+// One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for each
+// face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "obstacle/mesh_keys.h"
+#include "obstacle/obstacle_batch.h"
+#include "obstacle/start_contact.h"
+#include "obstacle/static_filters.h"
+#include "obstacle/vertex_path.h"
+
+namespace deformable_ccd {
+namespace {
+
+enum VertexState : std::uint8_t { ACTIVE = 1, NEAR = 2, INSIDE = 4 };
+
+/// The smallest box around moving points, at t=0, at t=1 and over the step.
+struct MovingBounds {
+  double min[2][3], max[2][3];
+  double sweptMin(int axis) const { return std::min(min[0][axis], min[1][axis]); }
+  double sweptMax(int axis) const { return std::max(max[0][axis], max[1][axis]); }
+};
+
+MovingBounds boundsOf(const VertexMotion* points, int count) {
+  MovingBounds bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    bounds.min[0][axis] = bounds.max[0][axis] = points[0].t0[axis];
+    bounds.min[1][axis] = bounds.max[1][axis] = points[0].t1[axis];
+    for (int i = 1; i < count; ++i) {
+      bounds.min[0][axis] = std::min(bounds.min[0][axis], points[i].t0[axis]);
+      bounds.max[0][axis] = std::max(bounds.max[0][axis], points[i].t0[axis]);
+      bounds.min[1][axis] = std::min(bounds.min[1][axis], points[i].t1[axis]);
+      bounds.max[1][axis] = std::max(bounds.max[1][axis], points[i].t1[axis]);
+    }
+  }
+  return bounds;
+}
+
+VertexMotion fixedPoint(double x, double y, double z) { return {{x, y, z, 0}, {x, y, z, 0}}; }
+
+double planeOf(const LeafBox& box, int axis, int side) { return side ? box.hi[axis] : box.lo[axis]; }
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::unique_ptr<ElementaryTest> elementaryTestFor(const ObstacleOptions& options) {
+  if (!(options.minimum_separation_m >= 0 && std::isfinite(options.minimum_separation_m))) {
+    throw std::invalid_argument("minimum_separation_m is " + std::to_string(options.minimum_separation_m) +
+                                ", which is not a length from 0 up");
+  }
+  const Accuracy rung = options.accuracy.rung;
+  if (options.minimum_separation_m > 0 && rung != Accuracy::CONSERVATIVE && rung != Accuracy::SCREEN) {
+    throw std::invalid_argument(std::string("minimum_separation_m above 0 cannot be had with accuracy ") +
+                                toString(rung) + "; use conservative");
+  }
+  return rung == Accuracy::SCREEN ? nullptr : makeElementaryTest(options.accuracy);
+}
+
+}  // namespace
+
+struct ObstacleTest::Impl {
+  explicit Impl(const ObstacleOptions& o)
+      : options(o),
+        test(elementaryTestFor(o)),
+        reach_m(o.minimum_separation_m * (1 + 0x1p-40)),
+        vertex_batch(PairKind::VERTEX_FACE, test.get(), o.minimum_separation_m, tocLimit()),
+        edge_batch(PairKind::EDGE_EDGE, test.get(), o.minimum_separation_m, tocLimit()),
+        corner_batch(PairKind::VERTEX_FACE, test.get(), o.minimum_separation_m, tocLimit()) {}
+
+  /// What one run works on.
+  struct Run {
+    const VoxelSurface::Impl* surface;
+    const Topology* topology;
+    const Positions* t0;
+    const Positions* t1;
+    std::uint16_t body;
+    ObstacleStats* stats;
+  };
+
+  bool reachesSurface(const Run& run) const;
+  void prepareVertices(const Run& run, const std::uint8_t* vertex_active);
+  void markNearFaces(const Run& run);
+  void markNearEdges(const Run& run);
+  void runVertices(const Run& run);
+  void runEdges(const Run& run);
+  void runFaces(const Run& run);
+
+  void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
+  void vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
+  void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, std::uint32_t leaf, bool inside);
+  void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, std::uint32_t leaf, bool inside);
+  void collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats);
+
+  void keepEarliest(std::vector<Contact>& contacts, std::size_t first) const;
+
+  /// Earliest-only runs: no contact after this matters.
+  double* tocLimit() { return options.earliest_only ? &toc_limit : nullptr; }
+  Contact contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const;
+  void setInitial(Contact& contact);
+  VertexMotion motionOf(const Run& run, Index vertex) const {
+    const Vec3 &a = (*run.t0)[vertex], &b = (*run.t1)[vertex];
+    return {{a.x(), a.y(), a.z(), 0}, {b.x(), b.y(), b.z(), 0}};
+  }
+  KeyBox edgeKeys(const Edge& edge) const {
+    KeyLanes lanes = keys[edge[0]];
+    lanes.include(keys[edge[1]]);
+    return lanes.box();
+  }
+  KeyBox faceKeys(const Face& face) const {
+    KeyLanes lanes = keys[face[0]];
+    lanes.include(keys[face[1]]);
+    lanes.include(keys[face[2]]);
+    return lanes.box();
+  }
+  /// Fills near_leaves with the leaves that a key box reaches, by key.
+  void findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box);
+
+  ObstacleOptions options;
+  std::unique_ptr<ElementaryTest> test;
+  double reach_m;         ///< the separation, rounded up
+  double toc_limit = 1;   ///< upper bound of the earliest contact so far
+  ObstacleBatch vertex_batch, edge_batch, corner_batch;
+
+  std::vector<KeyLanes> keys;
+  std::vector<std::uint8_t> state;  ///< VertexState bits
+  std::vector<Index> near_faces;
+  std::vector<std::uint32_t> near_leaves, moving_leaves;
+  std::vector<Contact> vertex_contacts, edge_contacts, face_contacts;
+};
+
+Contact ObstacleTest::Impl::contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const {
+  const OccupiedLeaf& occupied = run.surface->tree.leaves()[leaf];
+  Contact contact;
+  contact.kind = kind;
+  contact.body = {run.body, OBSTACLE_BODY};
+  contact.voxel = occupied.min;
+  contact.voxel_size = occupied.size;
+  return contact;
+}
+
+void ObstacleTest::Impl::setInitial(Contact& contact) {
+  contact.initial = true;
+  contact.toc_lower = 0;
+  contact.toc_upper = options.accuracy.rung == Accuracy::EXACT ? std::ldexp(1.0, -options.accuracy.toc_bits) : 0.0;
+  toc_limit = 0;
+}
+
+bool ObstacleTest::Impl::reachesSurface(const Run& run) const {
+  Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  const std::size_t count = run.topology->vertexCount();
+  for (const Positions* positions : {run.t0, run.t1}) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double* p = (*positions)[i].data();
+      for (int axis = 0; axis < 3; ++axis) {  // a NaN fails both comparisons and changes nothing
+        lo[axis] = p[axis] < lo[axis] ? p[axis] : lo[axis];
+        hi[axis] = p[axis] > hi[axis] ? p[axis] : hi[axis];
+      }
+    }
+  }
+  const Box& bounds = run.surface->bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(lo[axis] - reach_m <= bounds.max[axis] && hi[axis] + reach_m >= bounds.min[axis])) return false;
+  }
+  return true;
+}
+
+void ObstacleTest::Impl::prepareVertices(const Run& run, const std::uint8_t* vertex_active) {
+  keys.resize(run.topology->vertexCount());
+  state.assign(run.topology->vertexCount(), 0);
+  for (const Index v : run.topology->usedVertices()) {
+    const Vec3 &p0 = (*run.t0)[v], &p1 = (*run.t1)[v];
+    // x - x is 0 for finite x only.
+    const double finite = (p0 - p0).sum() + (p1 - p1).sum();
+    if ((vertex_active != nullptr && vertex_active[v] == 0) || !(finite == 0)) continue;
+    keys[v] = sweptKeys(p0, p1, run.surface->inverse_resolution, reach_m);
+    state[v] = ACTIVE;
+  }
+}
+
+void ObstacleTest::Impl::markNearFaces(const Run& run) {
+  near_faces.clear();
+  const std::vector<Face>& faces = run.topology->faces();
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    const Face& face = faces[f];
+    const bool active = state[face[0]] & state[face[1]] & state[face[2]] & ACTIVE;
+    if (active) {
+      if (!run.surface->tree.anyLeaf(faceKeys(face))) continue;
+      near_faces.push_back(static_cast<Index>(f));
+    }
+    // The other features of a face with an inactive vertex are looked at themselves.
+    for (const Index v : face) state[v] |= NEAR;
+  }
+}
+
+void ObstacleTest::Impl::markNearEdges(const Run& run) {
+  for (const Edge& edge : run.topology->edges()) {
+    const bool active = state[edge[0]] & state[edge[1]] & ACTIVE;
+    if (active && !run.surface->tree.anyLeaf(edgeKeys(edge))) continue;
+    for (const Index v : edge) state[v] |= NEAR;
+  }
+}
+
+void ObstacleTest::Impl::findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box) {
+  near_leaves.clear();
+  surface.tree.visitLeaves(box, [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
+  if (near_leaves.size() < 2) return;
+  const std::vector<OccupiedLeaf>& leaves = surface.tree.leaves();
+  std::sort(near_leaves.begin(), near_leaves.end(),
+            [&leaves](std::uint32_t a, std::uint32_t b) { return leaves[a].min < leaves[b].min; });
+}
+
+void ObstacleTest::Impl::runVertices(const Run& run) {
+  vertex_contacts.clear();
+  const double resolution = run.surface->resolution_m;
+  for (const Index v : run.topology->usedVertices()) {
+    if ((state[v] & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
+    findLeaves(*run.surface, keys[v].box());
+    if (near_leaves.empty()) continue;
+    const double* p0 = (*run.t0)[v].data();
+    moving_leaves.clear();
+    for (const std::uint32_t leaf : near_leaves) {
+      if (!pointInBox(p0, leafBox(run.surface->tree.leaves()[leaf], resolution))) {
+        if (run.surface->features[leaf] & FACE_MASK) moving_leaves.push_back(leaf);
+        continue;
+      }
+      state[v] |= INSIDE;
+      Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
+      contact.vertex[0] = v;
+      setInitial(contact);
+      vertex_contacts.push_back(contact);
+    }
+    run.stats->vertex_pairs_in += near_leaves.size();
+    for (const std::uint32_t leaf : moving_leaves) {
+      if (options.minimum_separation_m > 0) {
+        vertexSeparation(run, v, leaf, (state[v] & INSIDE) != 0);
+      } else {
+        vertexPath(run, v, leaf, (state[v] & INSIDE) != 0);
+      }
+    }
+  }
+}
+
+void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
+  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+  const FaceHit hit =
+      firstFaceHit((*run.t0)[vertex].data(), (*run.t1)[vertex].data(), box, run.surface->features[leaf] & FACE_MASK);
+  if (!hit.hit) return;
+  Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
+  contact.vertex[0] = vertex;
+  contact.leaving = inside && hit.outward;
+  if (compareToOne(hit.time) == 0) {
+    contact.toc_lower = contact.toc_upper = 1;
+  } else if (options.accuracy.rung == Accuracy::EXACT) {
+    const double cell = std::ldexp(1.0, -options.accuracy.toc_bits);
+    const double k = static_cast<double>(timeCell(hit.time, options.accuracy.toc_bits));
+    contact.toc_lower = k * cell;
+    contact.toc_upper = (k + 1) * cell;
+  } else if (hit.time.certain) {
+    contact.toc_lower = hit.time.approximate * (1 - CROSSING_ERROR);
+    contact.toc_upper = std::min(1.0, hit.time.approximate * (1 + CROSSING_ERROR));
+  } else {
+    const double k = static_cast<double>(timeCell(hit.time, 52));
+    contact.toc_lower = k * 0x1p-52;
+    contact.toc_upper = (k + 1) * 0x1p-52;
+  }
+  if (options.accuracy.rung == Accuracy::SCREEN) {
+    contact.certainty = Certainty::UNDECIDED;
+    contact.toc_upper = 1;
+  }
+  if (contact.certainty == Certainty::CERTAIN) toc_limit = std::min(toc_limit, contact.toc_upper);
+  vertex_contacts.push_back(contact);
+}
+
+void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
+  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+  VertexMotion points[4] = {motionOf(run, vertex), {}, {}, {}};
+  const MovingBounds moving = boundsOf(points, 1);
+  double toc_bound = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double bound =
+        firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, box.lo[axis] - reach_m, box.hi[axis] + reach_m);
+    toc_bound = std::max(toc_bound, bound);
+  }
+  if (toc_bound > 1) return;
+  for (int direction = 0; direction < FACE_DIRECTIONS; ++direction) {
+    if (!(run.surface->features[leaf] >> direction & 1)) continue;
+    const int axis = direction >> 1, side = direction & 1, b = (axis + 1) % 3, c = (axis + 2) % 3;
+    ObstaclePair pair{contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf), {0, 0, 0}, inside};
+    pair.contact.vertex[0] = vertex;
+    pair.outward[axis] = side ? 1 : -1;
+    for (int half = 0; half < 2; ++half) {  // the square as two triangles; joined again afterwards
+      for (int k = 0; k < 3; ++k) {
+        const int corner = half == 0 ? (k == 0 ? 0 : k == 1 ? 1 : 3) : (k == 0 ? 0 : k == 1 ? 3 : 2);
+        double x[3];
+        x[axis] = planeOf(box, axis, side);
+        x[b] = planeOf(box, b, corner & 1);
+        x[c] = planeOf(box, c, corner >> 1);
+        points[k + 1] = fixedPoint(x[0], x[1], x[2]);
+      }
+      vertex_batch.add(pair, points, toc_bound);
+    }
+  }
+}
+
+void ObstacleTest::Impl::runEdges(const Run& run) {
+  edge_contacts.clear();
+  const double resolution = run.surface->resolution_m;
+  for (const Edge& edge : run.topology->edges()) {
+    constexpr std::uint8_t WANTED = ACTIVE | NEAR;
+    if ((state[edge[0]] & state[edge[1]] & WANTED) != WANTED) continue;
+    findLeaves(*run.surface, edgeKeys(edge));
+    if (near_leaves.empty()) continue;
+    run.stats->edge_pairs_in += near_leaves.size();
+    const double *a = (*run.t0)[edge[0]].data(), *b = (*run.t0)[edge[1]].data();
+    bool inside = ((state[edge[0]] | state[edge[1]]) & INSIDE) != 0;
+    moving_leaves.clear();
+    for (const std::uint32_t leaf : near_leaves) {
+      const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], resolution);
+      // What touches at an end is the vertex's initial contact.
+      if (inside && (pointInBox(a, box) || pointInBox(b, box))) continue;
+      if (segmentMeetsBox(a, b, box)) {
+        inside = true;
+        Contact contact = contactOf(run, PairKind::EDGE_VOXEL_EDGE, leaf);
+        contact.vertex[0] = edge[0];
+        contact.vertex[1] = edge[1];
+        setInitial(contact);
+        edge_contacts.push_back(contact);
+      } else if (run.surface->features[leaf] & EDGE_MASK) {
+        moving_leaves.push_back(leaf);
+      }
+    }
+    if (moving_leaves.empty()) continue;
+    const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
+    for (const std::uint32_t leaf : moving_leaves) edgePairs(run, edge, points, leaf, inside);
+  }
+}
+
+void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, std::uint32_t leaf,
+                                   bool inside) {
+  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+  const MovingBounds moving = boundsOf(points, 2);
+  // Per axis: the first meeting with the lower plane, the upper plane and the slab between them.
+  double meet[3][3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto first = [&](double lo, double hi) {
+      return firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, lo - reach_m, hi + reach_m);
+    };
+    meet[axis][2] = first(box.lo[axis], box.hi[axis]);
+    if (meet[axis][2] > 1) return;
+    meet[axis][0] = first(box.lo[axis], box.lo[axis]);
+    meet[axis][1] = first(box.hi[axis], box.hi[axis]);
+  }
+  const FeatureMask features = run.surface->features[leaf];
+  for (int axis = 0; axis < 3; ++axis) {
+    const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    for (int sides = 0; sides < 4; ++sides) {
+      const int side_b = sides & 1, side_c = sides >> 1;
+      if (!(features >> edgeBit(axis, side_b, side_c) & 1)) continue;
+      const double toc_bound = std::max(meet[axis][2], std::max(meet[b][side_b], meet[c][side_c]));
+      if (toc_bound > 1) continue;
+      double low[3], high[3];
+      low[axis] = box.lo[axis];
+      high[axis] = box.hi[axis];
+      low[b] = high[b] = planeOf(box, b, side_b);
+      low[c] = high[c] = planeOf(box, c, side_c);
+      if (reach_m == 0 && edgeMissesLine(points[0], points[1], low, axis)) continue;
+      ObstaclePair pair{contactOf(run, PairKind::EDGE_VOXEL_EDGE, leaf), {0, 0, 0}, inside};
+      pair.contact.vertex[0] = edge[0];
+      pair.contact.vertex[1] = edge[1];
+      pair.outward[b] = side_b ? 1 : -1;
+      pair.outward[c] = side_c ? 1 : -1;
+      const VertexMotion quad[4] = {points[0], points[1], fixedPoint(low[0], low[1], low[2]),
+                                    fixedPoint(high[0], high[1], high[2])};
+      edge_batch.add(pair, quad, toc_bound);
+    }
+  }
+}
+
+void ObstacleTest::Impl::runFaces(const Run& run) {
+  face_contacts.clear();
+  const double resolution = run.surface->resolution_m;
+  for (const Index f : near_faces) {
+    const Face& face = run.topology->faces()[f];
+    findLeaves(*run.surface, faceKeys(face));
+    run.stats->corner_pairs_in += near_leaves.size();
+    const double *p0 = (*run.t0)[face[0]].data(), *p1 = (*run.t0)[face[1]].data(), *p2 = (*run.t0)[face[2]].data();
+    bool inside = ((state[face[0]] | state[face[1]] | state[face[2]]) & INSIDE) != 0;
+    moving_leaves.clear();
+    for (const std::uint32_t leaf : near_leaves) {
+      const TriangleStart start =
+          triangleMeetsBox(p0, p1, p2, leafBox(run.surface->tree.leaves()[leaf], resolution));
+      inside = inside || start != TriangleStart::APART;
+      if (start == TriangleStart::APART && (run.surface->features[leaf] & CORNER_MASK)) moving_leaves.push_back(leaf);
+      if (start != TriangleStart::INTERIOR) continue;  // on the boundary it is an edge's or a vertex's contact
+      Contact contact = contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf);
+      std::copy(face.begin(), face.end(), contact.vertex.begin());
+      setInitial(contact);
+      face_contacts.push_back(contact);
+    }
+    if (moving_leaves.empty()) continue;
+    const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
+    for (const std::uint32_t leaf : moving_leaves) cornerPairs(run, face, points, leaf, inside);
+  }
+}
+
+void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points, std::uint32_t leaf,
+                                     bool inside) {
+  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+  const MovingBounds moving = boundsOf(points, 3);
+  double meet[3][2];
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 2; ++side) {
+      const double plane = planeOf(box, axis, side);
+      meet[axis][side] =
+          firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, plane - reach_m, plane + reach_m);
+    }
+  }
+  const FeatureMask features = run.surface->features[leaf];
+  for (int sides = 0; sides < 8; ++sides) {
+    const int x = sides & 1, y = sides >> 1 & 1, z = sides >> 2;
+    if (!(features >> cornerBit(x, y, z) & 1)) continue;
+    const double toc_bound = std::max(meet[0][x], std::max(meet[1][y], meet[2][z]));
+    if (toc_bound > 1) continue;
+    const double corner[3] = {planeOf(box, 0, x), planeOf(box, 1, y), planeOf(box, 2, z)};
+    if (reach_m == 0 && triangleMissesPoint(points[0], points[1], points[2], corner)) continue;
+    ObstaclePair pair{contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf),
+                      {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
+    std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
+    const VertexMotion quad[4] = {fixedPoint(corner[0], corner[1], corner[2]), points[0], points[1], points[2]};
+    corner_batch.add(pair, quad, toc_bound);
+  }
+}
+
+void ObstacleTest::Impl::collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats) {
+  const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch, std::uint64_t& count) {
+    batch.flush();
+    stats.tiers += batch.tiers();
+    // Settled ones of vertices and edges are in order already; a few tested ones join them.
+    std::vector<Contact>& tested = batch.contacts();
+    sortAndJoin(tested);
+    sortAndJoin(settled);
+    const std::size_t middle = contacts.size();
+    contacts.insert(contacts.end(), settled.begin(), settled.end());
+    contacts.insert(contacts.end(), tested.begin(), tested.end());
+    if (!tested.empty()) {
+      const auto begin = contacts.begin() + static_cast<std::ptrdiff_t>(middle);
+      std::inplace_merge(begin, begin + static_cast<std::ptrdiff_t>(settled.size()), contacts.end(), canonicalLess);
+    }
+    count += contacts.size() - middle;
+    settled.clear();
+  };
+  append(vertex_contacts, vertex_batch, stats.vertex_contacts);
+  append(edge_contacts, edge_batch, stats.edge_contacts);
+  append(face_contacts, corner_batch, stats.corner_contacts);
+  if (options.earliest_only) keepEarliest(contacts, first);
+  for (std::size_t i = first; i < contacts.size(); ++i) {
+    stats.initial += contacts[i].initial;
+    stats.leaving += contacts[i].leaving;
+  }
+}
+
+void ObstacleTest::Impl::keepEarliest(std::vector<Contact>& contacts, std::size_t first) const {
+  double earliest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = first; i < contacts.size(); ++i) {
+    if (contacts[i].certainty == Certainty::CERTAIN) earliest = std::min(earliest, contacts[i].toc_lower);
+  }
+  contacts.erase(std::remove_if(contacts.begin() + static_cast<std::ptrdiff_t>(first), contacts.end(),
+                                [earliest](const Contact& contact) { return contact.toc_lower > earliest; }),
+                 contacts.end());
+}
+
+ObstacleTest::ObstacleTest(const ObstacleOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+ObstacleTest::~ObstacleTest() = default;
+
+void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
+                       const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
+                       std::vector<Contact>& contacts, ObstacleStats& stats) {
+  const auto start = std::chrono::steady_clock::now();
+  if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
+    throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +
+                                std::to_string(map_t1.size()) + " vertices, the topology has " +
+                                std::to_string(topology.vertexCount()));
+  }
+  Impl& impl = *impl_;
+  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats};
+  if (surface.leafCount() > 0 && impl.reachesSurface(run)) {
+    impl.toc_limit = 1;
+    impl.vertex_batch.clear();
+    impl.edge_batch.clear();
+    impl.corner_batch.clear();
+    impl.prepareVertices(run, vertex_active);
+    if (topology.hasFaces()) {
+      impl.markNearFaces(run);
+    } else {
+      impl.near_faces.clear();
+      impl.markNearEdges(run);
+    }
+    impl.runVertices(run);
+    impl.runEdges(run);
+    impl.runFaces(run);
+    impl.collect(contacts, contacts.size(), stats);
+  }
+  stats.ms += millisecondsSince(start);
+}
+
+}  // namespace deformable_ccd
