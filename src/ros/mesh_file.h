@@ -1,0 +1,24 @@
+// Mesh files by PCL's readers: PLY (ASCII, binary of either byte order) and OBJ.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "deformable_ccd/types.h"
+
+namespace deformable_ccd {
+
+struct MeshFileError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct MeshFile {
+  Positions positions;       ///< [m], in the file's frame; float or double coordinates are taken exactly
+  std::vector<Face> faces;   ///< polygons with more than three corners as fans
+};
+
+/// Throws MeshFileError naming the file and what is wrong with it.
+MeshFile loadMeshFile(const std::string& path);
+
+}  // namespace deformable_ccd

@@ -1,0 +1,47 @@
+#include "simd/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "simd/targets.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace deformable_ccd {
+namespace simd {
+namespace HWY_NAMESPACE {
+int64_t Target() { return HWY_TARGET; }
+}  // namespace HWY_NAMESPACE
+}  // namespace simd
+}  // namespace deformable_ccd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace deformable_ccd {
+namespace simd {
+HWY_EXPORT(Target);
+
+std::vector<std::string> usableTargets() {
+  hwy::DisableTargets(0);
+  std::vector<std::string> names;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(hwy::TargetName(target));
+  return names;
+}
+
+std::string activeTarget() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
+
+bool restrictTo(const std::string& name) {
+  hwy::DisableTargets(0);
+  int64_t allowed = name.empty() ? hwy::SupportedTargets() : 0;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    if (name == hwy::TargetName(target)) allowed = target;
+  }
+  if (allowed == 0) return false;
+  // The dispatch tables are read by the targets that are supported now; what is better than `allowed` goes.
+  hwy::DisableTargets(name.empty() ? 0 : (allowed - 1));
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  return true;
+}
+
+}  // namespace simd
+}  // namespace deformable_ccd
+#endif
