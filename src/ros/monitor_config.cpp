@@ -120,7 +120,8 @@ void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
   detector.num_threads = reader.integer("num_threads", detector.num_threads, 1, 256);
   detector.step_budget_ms = reader.number("step_budget_ms", 0.0, 0, LARGE);
   config.minimum_separation_m = reader.number("minimum_separation_m", 0.0, 0, LARGE);
-  if (config.minimum_separation_m > 0 && (rung == "exact" || rung == "fast")) {
+  const bool separates = config.minimum_separation_m > 0;
+  if (separates && (rung == "exact" || rung == "fast")) {
     if (chosen) {
       reader.fail("accuracy", "is '" + rung + "', which cannot hold a minimum separation; write accuracy: conservative");
     }
@@ -167,7 +168,7 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
 void readEffects(ParameterReader section, MonitorConfig& config) {
   for (const std::string& name : effectNames()) {
     const std::string text = section.choice(name, "auto", {"auto", "on", "off"});
-    config.effects[name] = text == "on" ? Setting::ON : text == "off" ? Setting::OFF : Setting::AUTO;
+    config.effects[name] = text == "on" ? EffectSetting::ON : text == "off" ? EffectSetting::OFF : EffectSetting::AUTO;
   }
   section.finish();
 }
@@ -181,6 +182,20 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
   section.finish();
 }
 
+/// What is switched off is off everywhere: no later stage asks again.
+void applyEffects(MonitorConfig& config) {
+  const auto off = [&](const char* name) { return config.effects[name] == EffectSetting::OFF; };
+  for (BodyConfig& body : config.bodies) {
+    if (off("self_collision")) body.body.self_collision = false;
+    if (off("body_body")) body.body.against_bodies = false;
+    if (off("octomap")) body.body.against_obstacle = false;
+    if (off("minimum_separation")) body.body.minimum_separation_m = 0;
+  }
+  if (off("start_state")) config.monitor.detector.check_start_state = false;
+  if (off("look_ahead")) config.monitor.look_ahead_s = 0;
+  if (off("unknown_space")) config.unknown_space = UnknownSpace::FREE;
+}
+
 std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every machine
   std::uint64_t hash = 1469598103934665603ull;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
@@ -188,16 +203,6 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 }
 
 }  // namespace
-
-const char* toString(Setting setting) {
-  return setting == Setting::AUTO ? "auto" : setting == Setting::ON ? "on" : "off";
-}
-
-const std::vector<std::string>& effectNames() {
-  static const std::vector<std::string> NAMES = {"self_collision", "body_body",     "octomap",      "start_state",
-                                                 "rigid_bodies",   "unknown_space", "minimum_separation", "look_ahead"};
-  return NAMES;
-}
 
 MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   ParameterReader reader(tree, path);
@@ -210,6 +215,7 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
   reader.finish();
+  applyEffects(config);
   XmlRpcValue copy = tree;
   config.hash = hashOf(copy.valid() ? copy.toXml() : std::string());
   return config;

@@ -8,6 +8,7 @@
 
 #include <xmlrpcpp/XmlRpcValue.h>
 
+#include "deformable_ccd/effect_plan.h"
 #include "deformable_ccd/monitor.h"
 #include "ros/mesh_decoder.h"
 #include "ros/parameter_reader.h"
@@ -16,13 +17,6 @@ namespace deformable_ccd {
 
 enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
 enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
-/// What a user asks of an effect (effects/NAME).
-enum class Setting : std::uint8_t { AUTO, ON, OFF };
-const char* toString(Setting setting);
-
-/// Names under effects/.
-const std::vector<std::string>& effectNames();
-
 struct BodyConfig {
   MonitorBody body;
   std::string topic;  ///< streams and static meshes
@@ -47,7 +41,7 @@ struct MonitorConfig {
   std::string fixed_frame;  ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;
   MonitorOptions monitor;
-  std::map<std::string, Setting> effects;
+  std::map<std::string, EffectSetting> effects;
   double minimum_separation_m = 0;
   UnknownSpace unknown_space = UnknownSpace::FREE;
   std::string octomap_topic = "octomap", octomap_file, octomap_frame;

@@ -64,6 +64,11 @@ void MonitorPipeline::take(std::size_t body, const RawMessage& message) {
   waiting_[body] = std::move(waiting);
 }
 
+void MonitorPipeline::refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason) {
+  monitor_->countReceived(body);
+  skip(body, StepStatus::BAD_MESSAGE, receipt_ns, arrival_ns, reason);
+}
+
 bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {

@@ -41,6 +41,8 @@ class MonitorPipeline {
   bool idle(std::size_t body) const { return !waiting_[body]; }
   /// Counts, decodes and keeps one message of an idle body.
   void take(std::size_t body, const RawMessage& message);
+  /// Counts a message that is refused unread; the clock body's yield an outcome.
+  void refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason);
   void setMap(LoadedMap map, std::int64_t now_ns);
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
   bool next(std::int64_t now_ns, StepOutcome& outcome);

@@ -1,0 +1,18 @@
+// The node. Exit status 1 when a parameter is wrong, with one line that says which.
+#include <exception>
+
+#include <ros/ros.h>
+
+#include "ros/collision_monitor.h"
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "collision_monitor");
+  try {
+    deformable_ccd::CollisionMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~")};
+    ros::spin();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,342 @@
+#include "ros/outputs.h"
+
+#include "ros/collision_monitor.h"
+
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <thread>
+
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <ros/spinner.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
+#include <topic_tools/shape_shifter.h>
+
+#include "ros/diagnostics.h"
+#include "ros/effects.h"
+#include "ros/input_queue.h"
+#include "ros/known_types.h"
+#include "ros/log_throttle.h"
+#include "ros/map_loader.h"
+#include "ros/monitor_pipeline.h"
+#include "ros/transforms.h"
+
+namespace deformable_ccd {
+
+namespace {
+
+using topic_tools::ShapeShifter;
+using std::chrono::microseconds;
+
+// While something waits for tf or another body the worker looks again this often; else it sleeps until it is woken, and
+// this long at most, for diagnostics.
+constexpr microseconds POLL{2000}, SLEEP{100000};
+constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
+constexpr double SERVICE_TIMEOUT_S = 10;
+
+std::int64_t steadyNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::vector<std::uint8_t> bytesOf(const ShapeShifter& message) {
+  std::vector<std::uint8_t> bytes(message.size());
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  message.write(stream);
+  return bytes;
+}
+
+MonitorConfig configOf(const ros::NodeHandle& private_node) {
+  XmlRpc::XmlRpcValue tree;
+  private_node.getParam(private_node.getNamespace(), tree);
+  return readConfig(tree);
+}
+
+}  // namespace
+
+struct CollisionMonitor::Impl {
+  ros::NodeHandle node, private_node;
+  MonitorConfig config;
+  tf2::BufferCore transforms;
+  TransformFeed feed{transforms};
+  MonitorPipeline pipeline;
+  Outputs outputs;
+  InputQueue queue;
+  Diagnostics diagnostics;
+  LogThrottle log{5};
+  EffectTracker effects;
+  std::unique_ptr<MapLoader> maps;
+
+  ros::CallbackQueue input_callbacks, service_callbacks;
+  ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
+  std::vector<ros::Subscriber> mesh_subscribers;
+  ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
+  std::vector<ros::ServiceServer> services;
+  std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
+  std::thread worker;
+
+  Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
+      : node(n), private_node(p), config(configOf(p)), pipeline(config, transforms),
+        outputs(private_node, config.monitor.look_ahead_s > 0),
+        queue(config.bodies.size(), config.queue_size, config.queue_policy),
+        diagnostics(private_node.getNamespace(), node), effects(config) {}
+
+  void start();
+  void stop();
+
+  // Input thread.
+  void subscribe();
+  void onMesh(std::size_t body, const ShapeShifter::ConstPtr& message);
+  void onMap(const ShapeShifter::ConstPtr& message);
+
+  // Service thread.
+  void advertiseServices();
+  template <typename Result>
+  bool onWorker(std::function<Result()> run, Result& result);
+
+  // Worker.
+  void work();
+  void takeMaps();
+  void takeMessages();
+  void publish(StepOutcome& outcome);
+  void complain(std::size_t body, const std::string& kind, const std::string& text);
+  void accountDropped();
+  void resetNow(StepStatus status);
+  StatsContext statsContext() const;
+};
+
+// --- input thread ----------------------------------------------------------------------------------------------------
+
+void CollisionMonitor::Impl::onMesh(std::size_t body, const ShapeShifter::ConstPtr& message) {
+  const std::int64_t now_ns = steadyNs();
+  if (!enabled) {
+    queue.command([this, body] {
+      pipeline.monitor().countReceived(body);
+      pipeline.monitor().countDropped(body, StepStatus::DISABLED);
+    });
+    return;
+  }
+  queue.push(body, {message, static_cast<StampNs>(ros::Time::now().toNSec()), now_ns});
+}
+
+void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
+  map_publisher_seen = true;
+  const std::string problem = mapTypeProblem(message->getDataType(), message->getMD5Sum());
+  if (!problem.empty()) {
+    queue.command([this, problem] { complain(config.bodies.size(), "map type", problem); });
+    return;
+  }
+  if (message->size() > config.max_map_bytes) {
+    queue.command([this, size = message->size()] {
+      complain(config.bodies.size(), "map size",
+               "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
+      pipeline.setMap({nullptr, {}, 0, "the octomap is larger than max_map_mb"}, steadyNs());
+    });
+    return;
+  }
+  maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
+}
+
+void CollisionMonitor::Impl::subscribe() {
+  ros::NodeHandle input(node);
+  input.setCallbackQueue(&input_callbacks);
+  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (config.bodies[b].isRigid()) {
+      mesh_subscribers.emplace_back();
+      continue;
+    }
+    mesh_subscribers.push_back(input.subscribe<ShapeShifter>(
+        config.bodies[b].topic, SUBSCRIBER_QUEUE, [this, b](const ShapeShifter::ConstPtr& m) { onMesh(b, m); },
+        ros::VoidConstPtr(), hints));
+  }
+  tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
+      "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
+      ros::VoidConstPtr(), hints);
+  tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
+      "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, true); });
+  if (!effects.mayUseMap()) return;
+  maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
+  if (!config.octomap_file.empty()) {
+    maps->submitFile(config.octomap_file);
+  } else {
+    map_subscriber = input.subscribe<ShapeShifter>(config.octomap_topic, 2,
+                                                   [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
+  }
+}
+
+// --- service thread --------------------------------------------------------------------------------------------------
+
+template <typename Result>
+bool CollisionMonitor::Impl::onWorker(std::function<Result()> run, Result& result) {
+  const auto promise = std::make_shared<std::promise<Result>>();
+  std::future<Result> future = promise->get_future();
+  queue.command([promise, run] { promise->set_value(run()); });
+  if (future.wait_for(std::chrono::duration<double>(SERVICE_TIMEOUT_S)) != std::future_status::ready) return false;
+  result = future.get();
+  return true;
+}
+
+void CollisionMonitor::Impl::advertiseServices() {
+  using Trigger = std_srvs::Trigger;
+  using SetBool = std_srvs::SetBool;
+  ros::NodeHandle service(private_node);
+  service.setCallbackQueue(&service_callbacks);
+  services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
+      "reset", [this](Trigger::Request&, Trigger::Response& response) {
+        bool done = false;
+        response.success = onWorker<bool>([this] { resetNow(StepStatus::RESET); return true; }, done) && done;
+        response.message = response.success ? "frames forgotten; the next one is a first frame" : "the worker is busy";
+        return true;
+      }));
+  services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
+      "enable", [this](SetBool::Request& request, SetBool::Response& response) {
+        enabled = request.data;
+        bool done = false;
+        response.success = onWorker<bool>([this] { resetNow(StepStatus::DISABLED); return true; }, done) && done;
+        response.message = request.data ? "enabled" : "disabled; frames are counted and dropped";
+        return true;
+      }));
+  services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
+      "check_now", [this](Trigger::Request&, Trigger::Response& response) {
+        StepOutcome outcome;
+        const bool done = onWorker<StepOutcome>([this] { return pipeline.monitor().checkNow(); }, outcome);
+        response.success = done && outcome.answered;
+        response.message = done ? describe(outcome) : "the worker is busy";
+        return true;
+      }));
+}
+
+// --- worker ----------------------------------------------------------------------------------------------------------
+
+void CollisionMonitor::Impl::complain(std::size_t body, const std::string& kind, const std::string& text) {
+  const std::string topic = body < config.bodies.size() ? node.resolveName(config.bodies[body].topic)
+                                                         : node.resolveName(config.octomap_topic);
+  const std::string line = log.line(topic + " " + kind, topic + ": " + text, steadyNs());
+  if (!line.empty()) ROS_WARN_STREAM(line);
+}
+
+void CollisionMonitor::Impl::resetNow(StepStatus status) {
+  accountDropped();
+  const auto cleared = queue.clear();
+  for (std::size_t b = 0; b < cleared.size(); ++b) {
+    pipeline.monitor().countReceived(b, cleared[b]);
+    pipeline.monitor().countDropped(b, status, cleared[b]);
+  }
+  pipeline.reset(status);
+  outputs.publishNotClear();
+}
+
+void CollisionMonitor::Impl::accountDropped() {
+  const auto dropped = queue.takeDropped();
+  for (std::size_t b = 0; b < dropped.size(); ++b) {
+    if (dropped[b] == 0) continue;
+    pipeline.monitor().countReceived(b, dropped[b]);
+    pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
+    complain(b, "queue", std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come");
+  }
+}
+
+void CollisionMonitor::Impl::takeMaps() {
+  LoadedMap map;
+  if (!maps || !maps->take(map)) return;
+  if (!map.surface) {
+    complain(config.bodies.size(), "map", "refused: " + map.problem);
+    map.problem = "the octomap was refused: " + map.problem;
+  }
+  map_publisher_seen = true;
+  pipeline.setMap(std::move(map), steadyNs());
+}
+
+void CollisionMonitor::Impl::takeMessages() {
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    QueuedMessage queued;
+    if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
+    const ShapeShifter& message = *queued.message;
+    const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
+    if (problem.empty()) {
+      pipeline.take(b, {message.getDataType(), bytesOf(message), queued.receipt_ns, queued.arrival_ns});
+    } else {
+      pipeline.refuse(b, queued.receipt_ns, queued.arrival_ns, problem);
+    }
+    const std::string complaint = pipeline.takeComplaint(b);
+    if (!complaint.empty()) complain(b, "message", "refused: " + complaint);
+  }
+}
+
+StatsContext CollisionMonitor::Impl::statsContext() const {
+  StatsContext context;
+  context.frames = pipeline.monitor().total();
+  context.weld_changes = pipeline.weldChanges();
+  context.latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
+  context.maps_received = maps ? maps->received() : 0;
+  context.maps_refused = maps ? maps->refused() : 0;
+  context.parameter_hash = config.hash;
+  return context;
+}
+
+void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
+  const auto& bodies = pipeline.monitor().bodies();
+  const std::string& frame = pipeline.fixedFrame();
+  if (outcome.status != StepStatus::OK && outcome.status != StepStatus::FIRST_FRAME) {
+    complain(config.monitor.clock_body, toString(outcome.status),
+             std::string(toString(outcome.status)) + (outcome.reason.empty() ? "" : ": " + outcome.reason));
+  }
+  const StatsContext context = statsContext();
+  outputs.publish(outcome, bodies, context, config.markers, frame);
+  diagnostics.add(outcome, context);
+  if (effects.update(outcome)) {
+    outputs.publishEffects(effects.message(toRosTime(outcome.stamp_ns), frame));
+    for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
+  }
+  if (outcome.answered && config.monitor.look_ahead_s > 0 && outputs.wantsPrediction()) {
+    outputs.publishPrediction(pipeline.monitor().predict(), config.monitor.look_ahead_s, bodies, frame);
+  }
+}
+
+void CollisionMonitor::Impl::work() {
+  bool more = false;
+  while (!stopping) {
+    for (auto& command : queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP)) command();
+    if (stopping) return;
+    if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
+    effects.apply(pipeline.monitor(), map_publisher_seen);
+    takeMaps();
+    takeMessages();
+    accountDropped();
+    StepOutcome outcome;
+    while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
+    more = false;
+    for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
+    diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected());
+  }
+}
+
+void CollisionMonitor::Impl::start() {
+  subscribe();
+  advertiseServices();
+  worker = std::thread([this] { work(); });
+  input_spinner.start();
+  service_spinner.start();
+}
+
+void CollisionMonitor::Impl::stop() {
+  stopping = true;
+  input_spinner.stop();
+  service_spinner.stop();
+  queue.wake();
+  if (worker.joinable()) worker.join();
+  maps.reset();
+}
+
+CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
+    : impl_(std::make_unique<Impl>(node, private_node)) {
+  impl_->start();
+}
+
+CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
+
+}  // namespace deformable_ccd

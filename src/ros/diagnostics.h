@@ -1,0 +1,37 @@
+// /diagnostics: one status a second with rates, drops, resets, latency and the map's age.
+#pragma once
+
+#include "ros/output_messages.h"
+
+#include <string>
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+
+namespace deformable_ccd {
+
+class Diagnostics {
+ public:
+  Diagnostics(const std::string& name, ros::NodeHandle& node);
+  void add(const StepOutcome& outcome, const StatsContext& context);
+  void publishWhenDue(std::int64_t now_ns, bool enabled, bool map_expected);
+
+ private:
+  std::string name_;
+  ros::Publisher publisher_;
+  std::int64_t last_ns_ = 0;
+  // Since the last status.
+  std::uint64_t outcomes_ = 0, answers_ = 0, dropped_before_ = 0;
+  double worst_latency_s_ = 0;
+  // Of the newest outcome.
+  StepStatus status_ = StepStatus::FIRST_FRAME;
+  std::string reason_;
+  double map_age_s_ = 0;
+  bool map_present_ = false;
+  StatsContext context_;
+};
+
+/// One sentence for people: status, contacts, earliest time.
+std::string describe(const StepOutcome& outcome);
+
+}  // namespace deformable_ccd

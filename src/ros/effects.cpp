@@ -1,0 +1,73 @@
+#include "ros/effects.h"
+
+#include <algorithm>
+
+namespace deformable_ccd {
+
+EffectTracker::EffectTracker(const MonitorConfig& config) : settings_(config.effects) {
+  for (const BodyConfig& body : config.bodies) {
+    EffectBody one;
+    one.name = body.body.name;
+    one.rigid = body.isRigid();
+    one.self_collision = body.body.self_collision;
+    scene_.bodies.push_back(one);
+    scene_.minimum_separation_m = std::max(scene_.minimum_separation_m, body.body.minimum_separation_m);
+  }
+  scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
+  scene_.map_seen = !config.octomap_file.empty();
+  scene_.look_ahead_s = config.monitor.look_ahead_s;
+  scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
+  plan_ = EffectPlan(scene_, settings_);
+}
+
+bool EffectTracker::mayUseMap() const {
+  const auto setting = settings_.find("octomap");
+  return setting == settings_.end() || setting->second != EffectSetting::OFF;
+}
+
+void EffectTracker::apply(Monitor& monitor, bool map_seen) {
+  if (map_seen && !scene_.map_seen) {
+    scene_.map_seen = true;
+    plan_ = EffectPlan(scene_, settings_);
+  }
+  const bool expected = mapExpected(), start_state = plan_.running("start_state");
+  if (monitor.options().obstacle_expected == expected &&
+      monitor.options().detector.check_start_state == start_state) return;
+  MonitorOptions options = monitor.options();
+  options.obstacle_expected = expected;
+  options.detector.check_start_state = start_state;
+  monitor.setOptions(options);
+}
+
+bool EffectTracker::update(const StepOutcome& outcome) {
+  if (outcome.answered && outcome.topologies) {
+    bool changed = false;
+    for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+      const bool has_faces = (*outcome.topologies)[b]->hasFaces();
+      changed = changed || !scene_.bodies[b].topology_known || scene_.bodies[b].has_faces != has_faces;
+      scene_.bodies[b].topology_known = true;
+      scene_.bodies[b].has_faces = has_faces;
+    }
+    if (changed) plan_ = EffectPlan(scene_, settings_);
+  }
+  if (plan_ == told_) return false;
+  told_ = plan_;
+  return true;
+}
+
+EffectArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
+  EffectArray out;
+  out.header.stamp = stamp;
+  out.header.frame_id = frame;
+  for (const EffectDecision& decision : plan_.decisions()) {
+    EffectState state;
+    state.name = decision.name;
+    state.setting = toString(decision.setting);
+    state.running = decision.running;
+    state.reason = decision.reason;
+    out.effects.push_back(state);
+  }
+  return out;
+}
+
+}  // namespace deformable_ccd

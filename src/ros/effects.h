@@ -1,0 +1,36 @@
+// The effect plan of a running monitor: renewed only when the scene changes, applied between steps.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <deformable_ccd/EffectArray.h>
+
+#include "ros/monitor_config.h"
+
+namespace deformable_ccd {
+
+class EffectTracker {
+ public:
+  /// Throws std::invalid_argument when an effect is asked for that the scene cannot have.
+  explicit EffectTracker(const MonitorConfig& config);
+
+  /// False: the octomap is switched off, nothing is subscribed to for it.
+  bool mayUseMap() const;
+  bool mapExpected() const { return plan_.running("octomap"); }
+  /// Brings the monitor's options in line with the plan.
+  void apply(Monitor& monitor, bool map_seen);
+  /// Learns topologies from the outcome. True when the plan has changed since the last call, or at the first one.
+  bool update(const StepOutcome& outcome);
+
+  const EffectPlan& plan() const { return plan_; }
+  std::vector<std::string> lines() const { return plan_.lines(); }
+  EffectArray message(const ros::Time& stamp, const std::string& frame) const;
+
+ private:
+  EffectScene scene_;
+  std::map<std::string, EffectSetting> settings_;
+  EffectPlan plan_, told_;
+};
+
+}  // namespace deformable_ccd

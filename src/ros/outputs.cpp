@@ -1,0 +1,64 @@
+#include "ros/outputs.h"
+
+#include <std_msgs/Bool.h>
+
+#include "ros/markers.h"
+
+namespace deformable_ccd {
+
+namespace {
+
+// Deep enough for a subscriber that stalls for a second at camera rate; a slower one loses messages, not the node time.
+constexpr std::uint32_t QUEUE = 32;
+
+}  // namespace
+
+Outputs::Outputs(ros::NodeHandle& node, bool look_ahead) {
+  contacts_ = node.advertise<ContactArray>("contacts", QUEUE);
+  first_contact_ = node.advertise<FirstContact>("first_contact", QUEUE);
+  clear_ = node.advertise<std_msgs::Bool>("clear", QUEUE, true);
+  stats_ = node.advertise<StepStats_<std::allocator<void>>>("stats", QUEUE);
+  markers_ = node.advertise<visualization_msgs::MarkerArray>("markers", 2);
+  effects_ = node.advertise<EffectArray>("effects", 1, true);
+  if (look_ahead) {
+    predicted_ = node.advertise<ContactArray>("predicted_contacts", QUEUE);
+    time_to_contact_ = node.advertise<TimeToContact>("time_to_contact", QUEUE);
+  }
+  publishNotClear();
+}
+
+void Outputs::publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, StatsContext context,
+                      const MarkerConfig& markers, const std::string& frame) {
+  std_msgs::Bool clear;
+  clear.data = outcome.clear;
+  clear_.publish(clear);
+  if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, frame));
+  if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
+  if (markers_.getNumSubscribers() > 0 && !frame.empty()) {
+    ++markers_built_;
+    markers_.publish(toMarkers(outcome, bodies, markers, frame));
+  }
+  if (stats_.getNumSubscribers() > 0) {
+    context.markers_built = markers_built_;
+    stats_.publish(toStepStats(outcome, context, frame));
+  }
+}
+
+bool Outputs::wantsPrediction() const {
+  return (predicted_ && predicted_.getNumSubscribers() > 0) ||
+         (time_to_contact_ && time_to_contact_.getNumSubscribers() > 0);
+}
+
+void Outputs::publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
+                                const std::string& frame) {
+  if (predicted_.getNumSubscribers() > 0) predicted_.publish(toContactArray(prediction, bodies, frame));
+  if (time_to_contact_.getNumSubscribers() > 0) {
+    time_to_contact_.publish(toTimeToContact(prediction, horizon_s, frame));
+  }
+}
+
+void Outputs::publishEffects(const EffectArray& effects) { effects_.publish(effects); }
+
+void Outputs::publishNotClear() { clear_.publish(std_msgs::Bool()); }
+
+}  // namespace deformable_ccd

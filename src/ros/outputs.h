@@ -1,0 +1,37 @@
+// The node's topics. A message is built only when somebody listens; latched ones always, since they are for later comers.
+#pragma once
+
+#include "ros/output_messages.h"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <deformable_ccd/EffectArray.h>
+#include <ros/node_handle.h>
+
+#include "ros/monitor_config.h"
+
+namespace deformable_ccd {
+
+class Outputs {
+ public:
+  Outputs(ros::NodeHandle& private_node, bool look_ahead);
+
+  void publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, StatsContext context,
+               const MarkerConfig& markers, const std::string& frame);
+  /// Whether anybody listens to predictions.
+  bool wantsPrediction() const;
+  void publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
+                         const std::string& frame);
+  void publishEffects(const EffectArray& effects);
+  /// Not clear, and nothing shown: after a reset or when disabled.
+  void publishNotClear();
+  std::uint64_t markersBuilt() const { return markers_built_; }
+
+ private:
+  ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, predicted_, time_to_contact_;
+  std::uint64_t markers_built_ = 0;
+};
+
+}  // namespace deformable_ccd
