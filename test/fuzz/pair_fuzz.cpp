@@ -1,0 +1,140 @@
+// Any bytes as a pair: every rung against the oracle, and exact against itself in another order of the vertices.
+//
+// The first byte chooses how the rest is read: a seed of the generators of hard pairs; coordinates of few bits, one or
+// two bytes each, between which coincidences are likely; or doubles as they are. Missing bytes are zeros.
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "fuzz/fuzz_target.h"
+#include "support/generators.h"
+#include "support/promises.h"
+
+namespace {
+
+using namespace deformable_ccd;
+using test::RandomSource;
+
+/// Takes bytes from the front.
+class Bytes {
+ public:
+  Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
+  std::uint8_t byte() {
+    if (size_ == 0) return 0;
+    --size_;
+    return *data_++;
+  }
+  template <typename T>
+  T raw() {
+    std::uint8_t bytes[sizeof(T)];
+    for (std::uint8_t& b : bytes) b = byte();
+    T value;
+    std::memcpy(&value, bytes, sizeof value);
+    return value;
+  }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t size_;
+};
+
+double coordinate(Bytes& bytes, int mode) {
+  switch (mode) {
+    case 0:  // -8 to 7
+      return (bytes.byte() & 15) - 8;
+    case 1:  // seven bits and a scale
+    {
+      const int digits = static_cast<std::int8_t>(bytes.byte());
+      return std::ldexp(digits, bytes.byte() % 64 - 32);
+    }
+    case 2: {  // float
+      const float value = bytes.raw<float>();
+      return std::isfinite(value) ? value : 0;
+    }
+    default: {
+      const double value = bytes.raw<double>();
+      return std::isfinite(value) ? value : 0;
+    }
+  }
+}
+
+Query decode(const std::uint8_t* data, std::size_t size) {
+  Bytes bytes(data, size);
+  const int choice = bytes.byte();
+  const PairKind kind = (choice & 1) != 0 ? PairKind::EDGE_EDGE : PairKind::VERTEX_FACE;
+  const int mode = (choice >> 1) % 5;
+  if (mode == 4) {
+    const auto hardness = static_cast<test::Hardness>(bytes.byte() % static_cast<int>(test::Hardness::COUNT));
+    RandomSource random(bytes.raw<std::uint64_t>());
+    return test::hardQuery(random, kind, hardness);
+  }
+  Query query;
+  query.kind = kind;
+  const int resting = bytes.byte();  // a bit for each point that does not move
+  for (int i = 0; i < 24; ++i) {
+    const int point = i / 3 % 4;
+    const bool rests = i >= 12 && ((resting >> point) & 1) != 0;
+    double* values = &query.motion.x[0][0][0];
+    values[i] = rests ? values[i - 12] : coordinate(bytes, mode);
+  }
+  return query;
+}
+
+struct Rung {
+  AccuracyOptions options;
+  std::unique_ptr<ElementaryTest> test;
+};
+
+const std::vector<Rung>& rungs() {
+  static const std::vector<Rung> all = [] {
+    std::vector<Rung> result;
+    const auto add = [&result](const AccuracyOptions& options) {
+      result.push_back({options, makeElementaryTest(options)});
+    };
+    AccuracyOptions options;
+    for (int bits : {10, 32, 52}) {
+      options.toc_bits = bits;
+      add(options);
+    }
+    options.rung = Accuracy::CONSERVATIVE;
+    add(options);
+    options.rung = Accuracy::FAST;
+    add(options);
+    return result;
+  }();
+  return all;
+}
+
+[[noreturn]] void report(const Query& query, const Rung& rung, const std::string& what) {
+  std::ostringstream text;
+  text << toString(rung.options.rung) << " " << rung.options.toc_bits << " bits: " << what << "\n"
+       << queryFolder(query.kind) << ":\n";
+  writeQueries(text, {query});
+  throw std::logic_error(text.str());
+}
+
+void pair(const std::uint8_t* data, std::size_t size) {
+  const Query query = decode(data, size);
+  std::optional<test::Root> toc = test::firstContact(query.kind, query.motion);
+  for (const Rung& rung : rungs()) {
+    const ElementaryResult result = test::testQuery(*rung.test, query);
+    const std::string broken = test::brokenPromise(rung.options, query, toc, result);
+    if (!broken.empty()) report(query, rung, broken);
+    if (rung.options.rung != Accuracy::EXACT) continue;
+    const auto orders = test::vertexPermutations(query.kind);
+    const Query other = test::permuted(query, orders[size % orders.size()]);
+    const ElementaryResult again = test::testQuery(*rung.test, other);
+    if (again.verdict != result.verdict || again.toc_lower != result.toc_lower) {
+      report(query, rung, "another order of the vertices, another answer");
+    }
+  }
+}
+
+}  // namespace
+
+DEFORMABLE_CCD_FUZZ_TARGET(pair)
