@@ -1,0 +1,35 @@
+// make_scene_bag SCENE.yaml OUT.bag: records a scene's cloth, octomap and transforms from a physics simulation.
+#include <cstdint>
+#include <exception>
+#include <iostream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "apps/make_scene_bag/recorder.h"
+#include "scene/physics/scene_file.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf. The same seed gives the same bag.");
+  std::string scene_path, bag_path;
+  deformable_ccd::RecorderOptions options;
+  app.add_option("scene", scene_path, "Scene file")->required();
+  app.add_option("bag", bag_path, "Bag to write")->required();
+  app.add_option("--frames", options.frames, "Frames to record instead of the scene's own number")
+      ->check(CLI::Range(2, 1000000));
+  app.add_option("--seed", options.seed, "Seed of the start's and the tracker's noise")->capture_default_str();
+  app.add_option("--output", options.output, "Message type of every body, instead of the scene's own")
+      ->check(CLI::IsMember({"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}));
+  app.add_flag("--full", options.full_octomap, "Write the octomap with log-odds instead of binary");
+  app.add_option("--monitor-config", options.monitor_config_path, "Also write the scene's parameters for the monitor here");
+  app.add_flag("--quiet", options.quiet, "No progress bar");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const deformable_ccd::scene::SceneSpec spec = deformable_ccd::scene::readSceneFile(scene_path);
+    std::cout << deformable_ccd::recordScene(spec, bag_path, options);
+  } catch (const std::exception& error) {
+    std::cerr << "make_scene_bag: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,122 @@
+#include "apps/make_scene_bag/messages.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "octomap/map_builder.h"
+#include "scene/physics/shapes.h"
+
+namespace deformable_ccd {
+namespace {
+
+geometry_msgs::Point toPoint(const Vec3& p) {
+  geometry_msgs::Point point;
+  point.x = p[0];
+  point.y = p[1];
+  point.z = p[2];
+  return point;
+}
+
+}  // namespace
+
+MeshStamped toMeshStamped(const std_msgs::Header& header, const Positions& positions, const std::vector<Face>& faces) {
+  MeshStamped message;
+  message.header = header;
+  for (const Vec3& p : positions) message.vertices.push_back(toPoint(p));
+  message.triangles.resize(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    std::copy(faces[f].begin(), faces[f].end(), message.triangles[f].vertex_indices.begin());
+  }
+  return message;
+}
+
+sensor_msgs::PointCloud2 toPointCloud(const std_msgs::Header& header, const Positions& positions) {
+  sensor_msgs::PointCloud2 message;
+  message.header = header;
+  message.height = 1;
+  message.width = static_cast<std::uint32_t>(positions.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    sensor_msgs::PointField field;
+    field.name = std::string(1, static_cast<char>('x' + axis));
+    field.offset = static_cast<std::uint32_t>(axis * sizeof(double));
+    field.datatype = sensor_msgs::PointField::FLOAT64;
+    field.count = 1;
+    message.fields.push_back(field);
+  }
+  message.point_step = 3 * sizeof(double);
+  message.row_step = message.point_step * message.width;
+  message.is_dense = true;
+  message.data.resize(message.row_step);
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    std::memcpy(message.data.data() + i * message.point_step, positions[i].data(), message.point_step);
+  }
+  return message;
+}
+
+pcl_msgs::PolygonMesh toPolygonMesh(const std_msgs::Header& header, const Positions& positions,
+                                    const std::vector<Face>& faces) {
+  pcl_msgs::PolygonMesh message;
+  message.header = header;
+  message.cloud = toPointCloud(header, positions);
+  message.polygons.resize(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) message.polygons[f].vertices.assign(faces[f].begin(), faces[f].end());
+  return message;
+}
+
+visualization_msgs::MarkerArray toMarkers(const std_msgs::Header& header, const Positions& positions,
+                                          const std::vector<Face>& faces) {
+  visualization_msgs::Marker marker;
+  marker.header = header;
+  marker.id = 2;
+  marker.type = visualization_msgs::Marker::TRIANGLE_LIST;
+  marker.action = visualization_msgs::Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
+  marker.color.g = marker.color.b = 0.7f;
+  marker.color.a = 1.0f;
+  marker.points.reserve(3 * faces.size());
+  for (const Face& face : faces) {
+    for (const Index v : face) marker.points.push_back(toPoint(positions[v]));
+  }
+  visualization_msgs::MarkerArray message;
+  message.markers.push_back(marker);
+  return message;
+}
+
+octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, const scene::Obstacle& obstacle, bool binary) {
+  Box bounds;
+  for (const scene::Solid& solid : obstacle.solids) {
+    const Box one = scene::bounds(solid);
+    bounds.min = bounds.min.cwiseMin(one.min);
+    bounds.max = bounds.max.cwiseMax(one.max);
+  }
+  const auto occupied = [&obstacle](const Vec3& center) {
+    return std::any_of(obstacle.solids.begin(), obstacle.solids.end(),
+                       [&center](const scene::Solid& solid) { return scene::contains(solid, center); });
+  };
+  octomap_msgs::Octomap message;
+  message.header = header;
+  message.binary = binary;
+  message.id = "OcTree";
+  message.resolution = obstacle.resolution_m;
+  message.data = buildOctomap(obstacle.resolution_m, bounds, occupied, binary);
+  return message;
+}
+
+geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child,
+                                            const Eigen::Isometry3d& pose) {
+  geometry_msgs::TransformStamped message;
+  message.header = header;
+  message.child_frame_id = child;
+  const Eigen::Quaterniond q(pose.linear());
+  message.transform.translation.x = pose.translation()[0];
+  message.transform.translation.y = pose.translation()[1];
+  message.transform.translation.z = pose.translation()[2];
+  message.transform.rotation.x = q.x();
+  message.transform.rotation.y = q.y();
+  message.transform.rotation.z = q.z();
+  message.transform.rotation.w = q.w();
+  return message;
+}
+
+}  // namespace deformable_ccd

@@ -1,0 +1,29 @@
+// A scene's state as the messages that publishers of meshes, maps and transforms send.
+#pragma once
+
+#include <vector>
+
+#include <deformable_ccd/MeshStamped.h>
+#include <octomap_msgs/Octomap.h>
+#include <pcl_msgs/PolygonMesh.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <tf2_msgs/TFMessage.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "scene/physics/scene_spec.h"
+
+namespace deformable_ccd {
+
+MeshStamped toMeshStamped(const std_msgs::Header& header, const Positions& positions, const std::vector<Face>& faces);
+/// A row-major grid, height 1 like the cloth trackers send it, coordinates in float64 as they are.
+sensor_msgs::PointCloud2 toPointCloud(const std_msgs::Header& header, const Positions& positions);
+pcl_msgs::PolygonMesh toPolygonMesh(const std_msgs::Header& header, const Positions& positions,
+                                    const std::vector<Face>& faces);
+/// A triangle soup: three points per face, in the order of the faces.
+visualization_msgs::MarkerArray toMarkers(const std_msgs::Header& header, const Positions& positions,
+                                          const std::vector<Face>& faces);
+octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, const scene::Obstacle& obstacle, bool binary);
+geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child,
+                                            const Eigen::Isometry3d& pose);
+
+}  // namespace deformable_ccd

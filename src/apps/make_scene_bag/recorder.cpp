@@ -1,0 +1,156 @@
+#include "apps/make_scene_bag/recorder.h"
+
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include <boost/make_shared.hpp>
+#include <rosbag/bag.h>
+
+#include "apps/make_scene_bag/messages.h"
+#include "io/progress_bar.h"
+#include "scene/physics/shapes.h"
+#include "scene/physics/simulation.h"
+
+namespace deformable_ccd {
+namespace {
+
+// Stamps count from here, not from the day of the recording, so that equal seeds give equal bags. Not zero, since a zero
+// stamp means "unset" in ROS.
+constexpr double START_STAMP_S = 1000.0;
+
+/// Writes messages to a bag; latched topics carry the header that makes rosbag play latch them.
+class SceneBag {
+ public:
+  explicit SceneBag(const std::string& path) {
+    bag_.open(path, rosbag::bagmode::Write);
+    bag_.setCompression(rosbag::compression::LZ4);
+  }
+  template <class Message>
+  void write(const std::string& topic, const ros::Time& stamp, const Message& message, bool latched = false) {
+    if (!latched) {
+      bag_.write(topic, stamp, message);
+      return;
+    }
+    auto header = boost::make_shared<ros::M_string>();
+    (*header)["topic"] = topic;
+    (*header)["type"] = ros::message_traits::datatype(message);
+    (*header)["md5sum"] = ros::message_traits::md5sum(message);
+    (*header)["message_definition"] = ros::message_traits::definition(message);
+    (*header)["callerid"] = "/make_scene_bag";
+    (*header)["latching"] = "1";
+    bag_.write(topic, stamp, message, header);
+  }
+  void close() { bag_.close(); }
+
+ private:
+  rosbag::Bag bag_;
+};
+
+std_msgs::Header header(const std::string& frame, const ros::Time& stamp, std::uint32_t seq) {
+  std_msgs::Header result;
+  result.frame_id = frame;
+  result.stamp = stamp;
+  result.seq = seq;
+  return result;
+}
+
+/// Frames that the scene names beside the fixed one rest at its origin; rigid bodies' frames move.
+void writeStaticTransforms(SceneBag& bag, const scene::SceneSpec& spec, const ros::Time& stamp) {
+  std::set<std::string> frames;
+  for (const scene::Body& body : spec.bodies) frames.insert(body.frame);
+  if (spec.obstacle) frames.insert(spec.obstacle->frame);
+  frames.erase(spec.fixed_frame);
+  tf2_msgs::TFMessage message;
+  for (const std::string& frame : frames) {
+    message.transforms.push_back(toTransform(header(spec.fixed_frame, stamp, 0), frame, Eigen::Isometry3d::Identity()));
+  }
+  if (!message.transforms.empty()) bag.write("/tf_static", stamp, message, true);
+}
+
+void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& at, const Positions& positions,
+               const std::vector<Face>& faces) {
+  switch (body.output) {
+    case scene::MeshOutput::MESH_STAMPED:
+      bag.write(body.topic, at.stamp, toMeshStamped(at, positions, faces));
+      return;
+    case scene::MeshOutput::POINT_CLOUD_GRID:
+      bag.write(body.topic, at.stamp, toPointCloud(at, positions));
+      return;
+    case scene::MeshOutput::POLYGON_MESH:
+      bag.write(body.topic, at.stamp, toPolygonMesh(at, positions, faces));
+      return;
+    case scene::MeshOutput::MARKER:
+      bag.write(body.topic, at.stamp, toMarkers(at, positions, faces));
+      return;
+  }
+}
+
+void overrideOutput(scene::SceneSpec& spec, const std::string& output) {
+  if (output.empty()) return;
+  for (scene::Body& body : spec.bodies) {
+    if (output == "mesh_stamped") body.output = scene::MeshOutput::MESH_STAMPED;
+    if (output == "point_cloud_grid") body.output = scene::MeshOutput::POINT_CLOUD_GRID;
+    if (output == "polygon_mesh") body.output = scene::MeshOutput::POLYGON_MESH;
+    if (output == "marker") body.output = scene::MeshOutput::MARKER;
+    if (body.shape.kind == scene::Shape::Kind::ROPE && body.output != scene::MeshOutput::POINT_CLOUD_GRID) {
+      throw std::runtime_error("--output " + output + ": body '" + body.name + "' is a rope and has no faces; use point_cloud_grid");
+    }
+  }
+}
+
+std::string summary(const scene::SceneSpec& spec, const scene::Simulation& simulation, const std::string& bag_path) {
+  std::ostringstream text;
+  text << spec.name << ": " << spec.frames << " frames at " << spec.frame_rate_hz << " Hz in " << bag_path << "\n";
+  for (const scene::Body& body : spec.bodies) {
+    text << "  " << body.topic << ": " << body.shape.rows * body.shape.cols << " vertices\n";
+  }
+  text << "  physics:";
+  for (const std::string& effect : simulation.effects()) text << " " << effect << (&effect == &simulation.effects().back() ? "" : ",");
+  text << "\n";
+  return text.str();
+}
+
+}  // namespace
+
+std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& bag_path, const RecorderOptions& options) {
+  scene::SceneSpec spec = scene_spec;
+  if (options.frames > 0) spec.frames = options.frames;
+  overrideOutput(spec, options.output);
+  scene::Simulation simulation(spec, options.seed);
+  std::vector<std::vector<Face>> faces;
+  for (const scene::Body& body : spec.bodies) faces.push_back(scene::shapeFaces(body.shape));
+
+  SceneBag bag(bag_path);
+  const ros::Time start(START_STAMP_S);
+  writeStaticTransforms(bag, spec, start);
+  if (spec.obstacle) {
+    const bool binary = spec.obstacle->binary && !options.full_octomap;
+    bag.write(spec.obstacle->topic, start, toOctomap(header(spec.obstacle->frame, start, 0), *spec.obstacle, binary), true);
+  }
+  ProgressBar progress(spec.name, static_cast<std::size_t>(spec.frames), !options.quiet);
+  for (int frame = 0; frame < spec.frames; ++frame) {
+    if (frame > 0) simulation.step();
+    const ros::Time stamp(START_STAMP_S + frame / spec.frame_rate_hz);
+    tf2_msgs::TFMessage transforms;
+    for (std::size_t r = 0; r < spec.rigid_bodies.size(); ++r) {
+      transforms.transforms.push_back(
+          toTransform(header(spec.fixed_frame, stamp, frame), spec.rigid_bodies[r].frame, simulation.rigidPose(r)));
+    }
+    if (!transforms.transforms.empty()) bag.write("/tf", stamp, transforms);
+    for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
+      writeBody(bag, spec.bodies[b], header(spec.bodies[b].frame, stamp, frame), simulation.observe(b), faces[b]);
+    }
+    progress.advance();
+  }
+  bag.close();
+  if (!options.monitor_config_path.empty()) {
+    std::ofstream config(options.monitor_config_path);
+    config << "# Parameters of the monitor for the scene " << spec.name << "\n" << spec.monitor_yaml << "\n";
+    if (!config) throw std::runtime_error(options.monitor_config_path + ": cannot be written");
+  }
+  return summary(spec, simulation, bag_path);
+}
+
+}  // namespace deformable_ccd
