@@ -25,6 +25,7 @@ PairMotion gather(const VertexMotion* vertices, const Quad& quad) {
 /// Pairs that the batched double tier left, by the tiers after it.
 ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
   ElementaryResult result = exact::decideByCoincidence(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = exact::decideBySubdivision(kind, pair);
   if (result.verdict == Verdict::UNDECIDED) result = exact::decideByFixedIntegers(kind, pair, toc_bits);
   return result.verdict == Verdict::UNDECIDED ? exact::decideByBigIntegers(kind, pair, toc_bits) : result;
 }

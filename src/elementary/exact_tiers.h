@@ -19,7 +19,15 @@ ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier);
 ElementaryResult noContact(Tier tier);
 ElementaryResult undecided(Tier tier);
 
+/// COINCIDENCE: a vertex of one feature where one of the other is, at t = 0.
 ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int toc_bits);
+/// DOUBLE_BATCH: the batched kernel on one pair; a contact whose cell it cannot tell is undecided.
+ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bits);
+/// BERNSTEIN: only ever says NO_CONTACT.
+ElementaryResult decideBySubdivision(PairKind kind, const PairMotion& pair);
+/// DOUBLE_DOUBLE: contacts that the batched kernel brackets; their cell is found without its help.
+ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int toc_bits);
+/// FIXED_INTEGER: undecided for more than FIXED_INTEGER_MAX_BITS bits. BIG_INTEGER: always decides.
 ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
 ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
 
