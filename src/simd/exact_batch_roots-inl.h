@@ -5,7 +5,8 @@ namespace simd {
 namespace HWY_NAMESPACE {
 
 constexpr int QUICK_STEPS = 4;     ///< Halley steps that settle nearly every root
-constexpr int PATIENT_STEPS = 16;  ///< for the others
+constexpr int SPLIT_STEPS = 5;     ///< where one end is an extremum of f
+constexpr int PATIENT_STEPS = 20;  ///< for the others
 
 /// Two places that split [0,1] into pieces on which the Bernstein coefficients of f are monotone: the extrema of f, or
 /// its inflection point where it has none. Any place is safe; these leave no piece uncertain without need.
@@ -113,7 +114,7 @@ HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& t
 }
 
 /// Approximate root in [lo, hi] by `steps` Halley steps that fall back to bisection, and |f'| there.
-HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, V at_hi, int steps, V& slope, V& curvature) {
+HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int steps, V& slope, V& curvature) {
   const V three = constant(3), half = constant(0.5), sign_bit = hn::SignBit(Tag());
   const V a1 = hn::Sub(f1, hn::Mul(three, f0));
   const V a2 = hn::Add(hn::Sub(hn::Mul(three, f0), hn::Add(f1, f1)), f2);
@@ -121,7 +122,7 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, V at_h
   const V a3_times_3 = hn::Mul(three, a3);
   const V flip = hn::And(at_lo, sign_bit);  // makes f positive at lo
   const V zero = hn::Zero(Tag());
-  V x = hn::Add(lo, hn::Div(hn::Mul(hn::Sub(hi, lo), at_lo), hn::Sub(at_lo, at_hi)));
+  V x = hn::Mul(half, hn::Add(lo, hi));
   V d = zero, c = zero;
   for (int step = 0; step < steps; ++step) {
     const V f = hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Add(hn::Mul(a3, x), a2), x), a1), x), f0);
@@ -140,15 +141,15 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, V at_h
 }
 
 /// One vector: approximates the pending roots, certifies bracket and cell, and tests for contact. WHOLE: the root is
-/// the only one in [0,1], and lo, hi, at_lo, at_hi need not be set.
+/// the only one in [0,1], and lo, hi, at_lo need not be set.
 template <bool CERTIFIED, BatchKind KIND, bool WHOLE, int STEPS>
 HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
   const V f0 = load(roots.coefficient[0], i), f1 = load(roots.coefficient[1], i);
   const V f2 = load(roots.coefficient[2], i), f3 = load(roots.coefficient[3], i);
   const V lo = WHOLE ? hn::Zero(Tag()) : load(roots.lo, i), at_lo = WHOLE ? f0 : load(roots.at_lo, i);
-  const V hi = WHOLE ? constant(1) : load(roots.hi, i), at_hi = WHOLE ? f3 : load(roots.at_hi, i);
+  const V hi = WHOLE ? constant(1) : load(roots.hi, i);
   V slope, curvature;
-  const V x = approximateRoot(f0, f1, f2, f3, lo, hi, at_lo, at_hi, STEPS, slope, curvature);
+  const V x = approximateRoot(f0, f1, f2, f3, lo, hi, at_lo, STEPS, slope, curvature);
   const V count = constant(cells), width = constant(1 / cells), one = constant(1);
   M touches, misses;
   V outcome = constant(ROOT_UNCERTAIN);
@@ -160,7 +161,7 @@ HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
     const V error = load(roots.error, i);
     const V flip = hn::And(at_lo, hn::SignBit(Tag()));
     V reach = hn::Div(hn::Mul(constant(4), error), slope);
-    if (STEPS != QUICK_STEPS) {  // near a double root the curvature bounds the reach better than the slope
+    if (STEPS == PATIENT_STEPS) {  // near a double root the curvature bounds the reach better than the slope
       const V parabola = hn::Sqrt(hn::Div(hn::Mul(constant(16), error), curvature));
       reach = hn::Mul(constant(4), reach);
       reach = choose(hn::Lt(parabola, reach), parabola, reach);
@@ -205,15 +206,14 @@ inline void copyPair(const RootBlock& from, std::size_t i, RootBlock& to, std::s
 
 inline void copySplit(const SplitBlock& from, std::size_t i, SplitBlock& to, std::size_t j) {
   copyPair(from, i, to, j);
-  for (int k = 0; k < 4; ++k) {
-    to.end[k][j] = from.end[k][i];
+  for (int k = 0; k < 4; ++k) to.end[k][j] = from.end[k][i];
+  for (int k = 0; k < 3; ++k) {
     to.value[k][j] = from.value[k][i];
+    to.piece[k][j] = from.piece[k][i];
   }
-  for (int k = 0; k < 3; ++k) to.piece[k][j] = from.piece[k][i];
   to.lo[j] = from.lo[i];
   to.hi[j] = from.hi[i];
   to.at_lo[j] = from.at_lo[i];
-  to.at_hi[j] = from.at_hi[i];
   to.outcome[j] = from.outcome[i];
   to.current[j] = from.current[i];
 }
@@ -235,18 +235,38 @@ HWY_INLINE void leave(const RootBlock& roots, std::size_t j, double cells, RootB
   if (hard.count == BATCH_BLOCK) subdivideAll<KIND>(hard, cells, out);
 }
 
-/// Pairs with certainly one root in the step.
-template <bool CERTIFIED, BatchKind KIND>
-HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+/// Pairs with certainly one root in the step that a few steps did not bracket.
+template <BatchKind KIND>
+HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
   for (std::size_t j = roots.count; j % lanes() != 0; ++j) copyPair(roots, roots.count - 1, roots, j);
-  for (std::size_t i = 0; i < roots.count; i += lanes()) refine<CERTIFIED, KIND, true, QUICK_STEPS>(roots, i, cells);
+  for (std::size_t i = 0; i < roots.count; i += lanes()) refine<true, KIND, true, PATIENT_STEPS>(roots, i, cells);
   for (std::size_t j = 0; j < roots.count; ++j) {
-    if (CERTIFIED && (roots.outcome[j] == ROOT_UNCERTAIN || roots.outcome[j] == ROOT_NOT_BRACKETED)) {
+    if (roots.outcome[j] == ROOT_UNCERTAIN || roots.outcome[j] == ROOT_NOT_BRACKETED) {
       leave<KIND>(roots, j, cells, hard, out);
     } else {
       writeOut(roots, j, cells, out);
     }
   }
+}
+
+/// Pairs with certainly one root in the step: a few Halley steps, and more for those that they did not bring close enough.
+template <bool CERTIFIED, BatchKind KIND>
+HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+  for (std::size_t j = roots.count; j % lanes() != 0; ++j) copyPair(roots, roots.count - 1, roots, j);
+  for (std::size_t i = 0; i < roots.count; i += lanes()) refine<CERTIFIED, KIND, true, QUICK_STEPS>(roots, i, cells);
+  std::size_t again = 0;
+  for (std::size_t j = 0; j < roots.count; ++j) {
+    if (CERTIFIED && roots.outcome[j] == ROOT_NOT_BRACKETED) {
+      if (again != j) copyPair(roots, j, roots, again);
+      ++again;
+    } else if (CERTIFIED && roots.outcome[j] == ROOT_UNCERTAIN) {
+      leave<KIND>(roots, j, cells, hard, out);
+    } else {
+      writeOut(roots, j, cells, out);
+    }
+  }
+  roots.count = again;
+  if (again != 0) solveStubborn<KIND>(roots, cells, hard, out);
   roots.count = 0;
 }
 
@@ -260,7 +280,6 @@ inline void selectPiece(SplitBlock& roots, std::size_t j, int piece) {
   roots.lo[j] = roots.end[piece][j];
   roots.hi[j] = roots.end[piece + 1][j];
   roots.at_lo[j] = roots.value[piece][j];
-  roots.at_hi[j] = roots.value[piece + 1][j];
 }
 
 /// Splits the step of one vector of pairs at the extrema of f, and says what each piece holds.
@@ -277,7 +296,6 @@ HWY_INLINE void split(SplitBlock& roots, std::size_t i) {
   store(t1, roots.end[1], i);
   store(t2, roots.end[2], i);
   store(constant(1), roots.end[3], i);
-  store(f3, roots.value[3], i);
   for (int k = 0; k < 3; ++k) {
     V c0, c1, c2, c3;
     overPiece(f0, f1, f2, f3, load(roots.end[k], i), load(roots.end[k + 1], i), c0, c1, c2, c3);
@@ -308,7 +326,7 @@ HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, RootBlock& hard, c
     }
     roots.count = pending;
     for (std::size_t j = pending; j % lanes() != 0; ++j) copySplit(roots, pending - 1, roots, j);
-    for (std::size_t i = 0; i < pending; i += lanes()) refine<CERTIFIED, KIND, false, QUICK_STEPS>(roots, i, cells);
+    for (std::size_t i = 0; i < pending; i += lanes()) refine<CERTIFIED, KIND, false, SPLIT_STEPS>(roots, i, cells);
   }
 }
 

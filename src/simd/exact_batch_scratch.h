@@ -41,7 +41,7 @@ struct alignas(64) RootBlock {
   BatchPlane coefficient[4];         ///< F0 = f0, F1 = 3 f1, F2 = 3 f2, F3 = f3
   BatchPlane size[3];                ///< U, V, W
   BatchPlane error;                  ///< bound on f's values
-  BatchPlane lo, hi, at_lo, at_hi;   ///< where the root looked for now lies, and f there
+  BatchPlane lo, hi, at_lo;          ///< where the root looked for now lies, and f at lo
   BatchPlane outcome;                ///< ROOT_*
   BatchPlane root_lo, root_hi;       ///< its certified bracket
   std::uint32_t pair[BATCH_STRIDE];  ///< position in the batch
@@ -51,7 +51,7 @@ struct alignas(64) RootBlock {
 /// The same with the step split at the extrema of f.
 struct alignas(64) SplitBlock : RootBlock {
   BatchPlane end[4];                   ///< 0, the two places, 1
-  BatchPlane value[4];                 ///< f there
+  BatchPlane value[3];                 ///< f at the first three
   BatchPlane piece[3];                 ///< PIECE_*
   std::uint8_t current[BATCH_STRIDE];  ///< piece in work; 3: none is left
 };

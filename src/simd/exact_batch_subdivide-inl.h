@@ -98,7 +98,7 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
     if (!hn::AllTrue(d, hn::Or(free, hn::Not(active)))) free = hn::Or(free, apart<KIND>(pairs, i, a, b));
     const M has_root = hn::And(active, hn::AndNot(free, hn::Eq(piece, constant(PIECE_ROOT))));
     if (!hn::AllFalse(d, has_root)) {
-      store(a, pairs.lo, i), store(b, pairs.hi, i), store(c0, pairs.at_lo, i), store(c3, pairs.at_hi, i);
+      store(a, pairs.lo, i), store(b, pairs.hi, i), store(c0, pairs.at_lo, i);
       store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
       refine<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
       const V outcome = load(pairs.outcome, i);
