@@ -1,0 +1,98 @@
+// The rung `conservative`: never misses, never late; false positives only closer than the tolerance. Without a minimum
+// separation the batched certified test (exact tier T1) answers nearly every pair, more sharply than asked; the rest,
+// and every pair with a minimum separation, goes through conservative advancement.
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include "elementary/conservative_advance.h"
+#include "elementary/rungs.h"
+#include "simd/exact_batch.h"
+
+namespace deformable_ccd {
+namespace {
+
+constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched test lie on the stack at once
+constexpr int BATCH_TOC_BITS = 10;  ///< the batch's cells are not used, only its brackets; coarse ones cost least
+
+struct BlockOutput {
+  std::uint8_t verdict[BLOCK];
+  std::uint64_t cell[BLOCK];
+  double lo[BLOCK], hi[BLOCK];
+};
+
+class ConservativeTest : public ElementaryTest {
+ public:
+  explicit ConservativeTest(const AccuracyOptions& options) : options_(options) {}
+  void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const override;
+
+ private:
+  ElementaryResult fromBatch(PairKind kind, const conservative::Corners& corners, const BlockOutput& output,
+                             std::size_t i) const;
+
+  AccuracyOptions options_;
+};
+
+/// What the batched test's answer is worth: NO as it stands, YES when the bracket of the TOC is so narrow that at its
+/// lower end the features are within the tolerance, UNDECIDED otherwise.
+ElementaryResult ConservativeTest::fromBatch(PairKind kind, const conservative::Corners& corners,
+                                             const BlockOutput& output, std::size_t i) const {
+  ElementaryResult result;
+  result.tier = Tier::DOUBLE_BATCH;
+  result.verdict = Verdict::UNDECIDED;
+  if (output.verdict[i] == simd::BATCH_NO) {
+    result.verdict = Verdict::NO_CONTACT;
+    result.toc_lower = 1;
+  }
+  if (output.verdict[i] == simd::BATCH_YES || output.verdict[i] == simd::BATCH_YES_BRACKET) {
+    const double width = output.hi[i] - output.lo[i];  // exact: both are multiples of 2^-52
+    if (conservative::closingSpeed(kind, corners) * width * (1 + 0x1p-50) <= options_.tolerance_m) {
+      result.verdict = Verdict::CONTACT;
+      result.toc_lower = output.lo[i];
+      result.toc_upper = output.hi[i];
+    }
+  }
+  return result;
+}
+
+void ConservativeTest::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
+    throw std::invalid_argument(std::string("conservative test: kind ") + toString(batch.kind) +
+                                " is not vertex-face or edge-edge");
+  }
+  static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
+  BlockOutput output;
+  simd::BatchInput input;
+  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
+  input.toc_bits = BATCH_TOC_BITS;
+  for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
+    const double* separation = batch.minimum_separation_m == nullptr ? nullptr : batch.minimum_separation_m + begin;
+    input.vertices = batch.vertices->t0;
+    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
+    input.count = std::min(BLOCK, batch.count - begin);
+    const bool batched = separation == nullptr || std::find(separation, separation + input.count, 0.0) !=
+                                                      separation + input.count;
+    if (batched) simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
+    for (std::size_t i = 0; i < input.count; ++i) {
+      const Quad& quad = batch.pairs[begin + i];
+      const conservative::Corners corners = {&batch.vertices[quad[0]], &batch.vertices[quad[1]],
+                                             &batch.vertices[quad[2]], &batch.vertices[quad[3]]};
+      ElementaryResult& result = results[begin + i];
+      result = {};
+      const conservative::Limits limits = {options_.tolerance_m, separation == nullptr ? 0 : separation[i],
+                                           options_.max_subdivisions};
+      if (limits.minimum_separation_m == 0) result = fromBatch(batch.kind, corners, output, i);
+      if (result.verdict == Verdict::UNDECIDED) result = conservative::advance(batch.kind, corners, limits);
+      ++counters.settled[static_cast<std::size_t>(result.tier)];
+    }
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<ElementaryTest> makeConservativeTest(const AccuracyOptions& options) {
+  return std::make_unique<ConservativeTest>(options);
+}
+
+}  // namespace deformable_ccd

@@ -1,0 +1,29 @@
+// Conservative advancement with certified rounding: the work of the rung `conservative`.
+#pragma once
+
+#include "deformable_ccd/elementary.h"
+
+namespace deformable_ccd {
+namespace conservative {
+
+/// The four points of a pair over the step, in the order of Quad.
+using Corners = std::array<const VertexMotion*, 4>;
+
+struct Limits {
+  double tolerance_m = 1e-6;         ///< > 0
+  double minimum_separation_m = 0;   ///< >= 0: contact means that the distance is at most this
+  int max_steps = 4096;              ///< then UNDECIDED
+};
+
+/// Advances from t = 0 as long as the features are certainly more than the minimum separation apart.
+/// NO_CONTACT: certain, toc_lower is 1. CONTACT: at toc_lower the features are certainly at most minimum separation plus tolerance
+/// apart, and more than the minimum separation before it. UNDECIDED: the latter only. toc_upper is 1.
+/// Kind VERTEX_FACE or EDGE_EDGE; coordinates finite.
+ElementaryResult advance(PairKind kind, const Corners& corners, const Limits& limits);
+
+/// Upper bound on how fast the distance of the two features changes, in metres per step: the largest relative speed
+/// of a point of the one and a point of the other.
+double closingSpeed(PairKind kind, const Corners& corners);
+
+}  // namespace conservative
+}  // namespace deformable_ccd
