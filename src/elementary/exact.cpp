@@ -26,6 +26,7 @@ PairMotion gather(const VertexMotion* vertices, const Quad& quad) {
 ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
   ElementaryResult result = exact::decideByCoincidence(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = exact::decideBySubdivision(kind, pair);
+  if (result.verdict == Verdict::UNDECIDED) result = exact::decideByDoubleDouble(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = exact::decideByFixedIntegers(kind, pair, toc_bits);
   return result.verdict == Verdict::UNDECIDED ? exact::decideByBigIntegers(kind, pair, toc_bits) : result;
 }
@@ -51,7 +52,8 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
   }
   const PairMotion pair = gather(batch.vertices, batch.pairs[pair_index]);
   if (output.verdict[i] == simd::BATCH_YES_BRACKET) {
-    const std::int64_t cell = exact::cellOfRoot(batch.kind, pair, output.lo[i], output.hi[i], toc_bits);
+    const exact::CoplanarityCubic f(batch.kind, pair);
+    const std::int64_t cell = exact::cellOfRoot(f, output.lo[i], output.hi[i], toc_bits);
     if (cell >= 0) return exact::contactInCell(cell, toc_bits, Tier::DOUBLE_DOUBLE);
   }
   return decideUncertain(batch.kind, pair, toc_bits);

@@ -81,7 +81,8 @@ CoplanarityCubic::CoplanarityCubic(PairKind kind, const PairMotion& pair) {
   double volume = 1;
   bool in_range = true;
   for (int i = 0; i < 3; ++i) {
-    double size = 0;
+    double& size = size_[i];
+    size = 0;
     for (int time = 0; time < 2; ++time) {
       for (int k = 0; k < 3; ++k) {
         const DoubleDouble d = twoSum(pair.x[time][ends[i][1]][k], -pair.x[time][ends[i][0]][k]);
@@ -127,13 +128,12 @@ int CoplanarityCubic::signAt(double t) const {
   return value > error_ ? 1 : value < -error_ ? -1 : 0;
 }
 
-std::int64_t cellOfRoot(PairKind kind, const PairMotion& pair, double lo, double hi, int toc_bits) {
+std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits) {
   constexpr int MOST_STEPS = 16;  // regula falsi on a piece where f is nearly straight needs two or three
   const double cells = std::ldexp(1.0, toc_bits), width = 1 / cells;
   auto low = static_cast<std::int64_t>(lo * cells);  // exact, like all of these
   auto high = static_cast<std::int64_t>(std::ceil(hi * cells));
   if (high - low == 1) return low;
-  const CoplanarityCubic f(kind, pair);
   const int before = f.signAt(lo);
   if (before == 0) return -1;
   double value_lo = 0, value_hi = 0;

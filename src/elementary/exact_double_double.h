@@ -1,6 +1,6 @@
 // Signs of a pair's coplanarity cubic f at single times in double-double arithmetic (about 106 bits), with a proved
-// bound: what certifies the TOC's cell where plain doubles know that there is a contact but not on which side of a grid
-// point its root lies. No fused multiply-add is needed, so every machine computes the same bits.
+// bound: what brackets a root within 2^-52 where plain doubles leave a wide bracket, for the TOC's cell and for a sharp
+// inside test. No fused multiply-add is needed, so every machine computes the same bits.
 #pragma once
 
 #include <cstdint>
@@ -27,17 +27,23 @@ class CoplanarityCubic {
   /// Sign of f at a multiple of 2^-52 in [0,1]; 0 where the arithmetic cannot tell.
   int signAt(double t) const;
 
+  /// Rounded component k of u, v or w (i = 0, 1, 2) at time 0 or 1.
+  double difference(int time, int i, int k) const { return difference_[time][i][k].hi; }
+  /// Largest absolute value of those of u, v or w.
+  double size(int i) const { return size_[i]; }
+
  private:
   double roughValueAt(double t) const;  // in plain double, within rough_error_
 
   DoubleDouble difference_[2][3][3];  // at t = 0 and 1; u, v, w; axis
+  double size_[3];
   double error_;                      // infinite where the differences are too large or too small for the bound
   double rough_error_;
 };
 
-/// The cell k of the 2^-toc_bits grid that holds the only root of the pair's f in the open interval (lo, hi), at whose
+/// The cell k of the 2^-toc_bits grid that holds the only root of f in the open interval (lo, hi), at whose
 /// ends f has opposite signs; lo < hi, both multiples of 2^-52 in [0,1]. -1 where the arithmetic cannot tell.
-std::int64_t cellOfRoot(PairKind kind, const PairMotion& pair, double lo, double hi, int toc_bits);
+std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits);
 
 }  // namespace exact
 }  // namespace deformable_ccd

@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "elementary/exact_double_double.h"
 #include "simd/exact_batch.h"
 
 namespace deformable_ccd {
@@ -42,16 +41,7 @@ ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int 
   return coincident ? contactInCell(0, toc_bits, Tier::COINCIDENCE) : undecided(Tier::COINCIDENCE);
 }
 
-namespace {
-
-/// What the batched tier says of one pair.
-struct SingleOutput {
-  std::uint8_t verdict;
-  std::uint64_t cell;
-  double lo, hi;
-};
-
-SingleOutput runBatchOnOne(PairKind kind, const PairMotion& pair, int toc_bits) {
+ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bits) {
   VertexMotion vertices[4] = {};
   for (int i = 0; i < 4; ++i) {
     std::copy(pair.x[0][i], pair.x[0][i] + 3, vertices[i].t0);
@@ -64,27 +54,13 @@ SingleOutput runBatchOnOne(PairKind kind, const PairMotion& pair, int toc_bits) 
   input.count = 1;
   input.kind = kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
   input.toc_bits = toc_bits;
-  SingleOutput output;
-  simd::exactBatch(input, {&output.verdict, &output.cell, &output.lo, &output.hi});
-  return output;
-}
-
-}  // namespace
-
-ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bits) {
-  const SingleOutput output = runBatchOnOne(kind, pair, toc_bits);
-  if (output.verdict == simd::BATCH_NO) return noContact(Tier::DOUBLE_BATCH);
-  if (output.verdict != simd::BATCH_YES) return undecided(Tier::DOUBLE_BATCH);
-  return contactInCell(static_cast<std::int64_t>(output.cell), toc_bits, Tier::DOUBLE_BATCH);
-}
-
-ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int toc_bits) {
-  const SingleOutput output = runBatchOnOne(kind, pair, toc_bits);
-  if (output.verdict != simd::BATCH_YES && output.verdict != simd::BATCH_YES_BRACKET) {
-    return undecided(Tier::DOUBLE_DOUBLE);
-  }
-  const std::int64_t cell = cellOfRoot(kind, pair, output.lo, output.hi, toc_bits);
-  return cell < 0 ? undecided(Tier::DOUBLE_DOUBLE) : contactInCell(cell, toc_bits, Tier::DOUBLE_DOUBLE);
+  std::uint8_t verdict;
+  std::uint64_t cell;
+  double lo, hi;
+  simd::exactBatch(input, {&verdict, &cell, &lo, &hi});
+  if (verdict == simd::BATCH_NO) return noContact(Tier::DOUBLE_BATCH);
+  if (verdict != simd::BATCH_YES) return undecided(Tier::DOUBLE_BATCH);
+  return contactInCell(static_cast<std::int64_t>(cell), toc_bits, Tier::DOUBLE_BATCH);
 }
 
 ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair, int toc_bits) {

@@ -25,7 +25,8 @@ ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int 
 ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bits);
 /// BERNSTEIN: only ever says NO_CONTACT.
 ElementaryResult decideBySubdivision(PairKind kind, const PairMotion& pair);
-/// DOUBLE_DOUBLE: contacts that the batched kernel brackets; their cell is found without its help.
+/// DOUBLE_DOUBLE: roots bracketed within 2^-52; undecided where f is zero, or nearly, at an end of the step or an
+/// extremum, and where a feature's border is hit exactly.
 ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int toc_bits);
 /// FIXED_INTEGER: undecided for more than FIXED_INTEGER_MAX_BITS bits. BIG_INTEGER: always decides.
 ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
