@@ -19,6 +19,7 @@ namespace deformable_ccd {
 namespace {
 
 constexpr std::size_t TASK_SUPERCLUSTERS = 16;  // supercluster pairs in a unit of work: about a millisecond
+constexpr std::size_t CONTACT_PIECE = 16384;    // contacts in a unit of writing them out
 constexpr std::size_t PIECE = 256;              // groups or vertices x 16 in a unit of refitting
 
 FeatureKind firstKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
@@ -82,6 +83,7 @@ struct Detector::Impl {
   void runPairs(StepContext& context);
   void runObstacle(const MotionStep& step);
   void collect();
+  void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
   const Positions& inMap(const MotionStep& step, const Positions& fixed, Positions& scratch) const;
   template <class Body>
   void parallel(std::size_t n, std::size_t piece, const Body& body);
@@ -119,7 +121,6 @@ void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body
 const StepResult& Detector::Impl::run(const MotionStep& step) {
   const ScopedFloatMode mode;
   const Clock::time_point begin = Clock::now();
-  result.contacts.clear();
   result.intersections.clear();
   result.start_state = StartState::NOT_CHECKED;
   result.complete = true;
@@ -248,6 +249,18 @@ void Detector::Impl::runPairs(StepContext& context) {
   result.complete = !context.expired;
 }
 
+void Detector::Impl::writeContact(PairKind kind, const Hit& hit, core::Contact& c) const {
+  c = core::Contact();
+  c.kind = kind;
+  c.toc_lower = hit.toc_lower;
+  c.toc_upper = hit.toc_upper;
+  c.certainty = hit.certainty;
+  c.body = {static_cast<std::uint16_t>(hit.bodies >> 16), static_cast<std::uint16_t>(hit.bodies)};
+  const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
+  scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
+  scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
+}
+
 void Detector::Impl::collect() {
   const Clock::time_point start = Clock::now();
   core::StepStats& stats = result.stats;
@@ -269,27 +282,16 @@ void Detector::Impl::collect() {
     stats.ee_candidates += w.stats().ee_candidates;
     result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
   }
+  std::size_t base = 0;
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     parts.clear();
     for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
     const std::vector<const Hit*>& sorted = order.sort(parts);
-    const std::size_t base = result.contacts.size();
     result.contacts.resize(base + sorted.size());
-    const std::size_t n_first = kind == PairKind::VERTEX_FACE ? 1 : 2, n_second = kind == PairKind::VERTEX_FACE ? 3 : 2;
-    for (std::size_t i = 0; i < sorted.size(); ++i) {
-      const Hit& hit = *sorted[i];
-      const auto first = scene.ranked(firstKind(kind), static_cast<Index>(hit.key >> 32));
-      const auto second = scene.ranked(secondKind(kind), static_cast<Index>(hit.key));
-      core::Contact& c = result.contacts[base + i];
-      c = core::Contact();
-      c.kind = kind;
-      c.toc_lower = hit.toc_lower;
-      c.toc_upper = hit.toc_upper;
-      c.certainty = hit.certainty;
-      c.body = {first.body, second.body};
-      std::copy_n(first.v, n_first, c.vertex.begin());
-      std::copy_n(second.v, n_second, c.vertex.begin() + n_first);
-    }
+    parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) writeContact(kind, *sorted[i], result.contacts[base + i]);
+    });
+    base += sorted.size();
   }
   stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
 }

@@ -4,7 +4,7 @@
 
 namespace deformable_ccd {
 namespace {
-constexpr int BITS = 11;
+constexpr int BITS = 12;
 constexpr std::size_t BUCKETS = std::size_t{1} << BITS;
 }  // namespace
 
@@ -39,7 +39,12 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
     }
   }
   b_.resize(a_.size());
-  sortByKey(key_or ^ key_and);
+  // The ranks fill few of their 32 bits; side by side they need fewer digits.
+  int low_bits = 0;
+  while (low_bits < 32 && (key_or & 0xffffffffu) >> low_bits) ++low_bits;
+  const auto packed = [low_bits](std::uint64_t key) { return key >> 32 << low_bits | (key & 0xffffffffu); };
+  for (Entry& e : a_) e.key = packed(e.key);
+  sortByKey(packed(key_or) ^ packed(key_and));
   // Ranks go through all bodies, so that the first feature's body is in order already; the second's may not be.
   if (!a_.empty() && bodies_or != bodies_and) {
     for (Entry& e : a_) e.key = e.hit->bodies;

@@ -17,7 +17,7 @@ FeatureKind kindB(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind:
 }  // namespace
 
 PairWorker::PairWorker()
-    : quads_(CAPACITY), keys_(CAPACITY), kept_(CAPACITY), results_(CAPACITY), separations_(CAPACITY) {}
+    : quads_(CAPACITY), slots_(CAPACITY), keys_(CAPACITY), kept_(CAPACITY), results_(CAPACITY), separations_(CAPACITY) {}
 
 void PairWorker::beginStep() {
   for (auto& h : hits_) h.clear();
@@ -96,27 +96,22 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   std::size_t n = count_;
   if (task_->kind == PairKind::EDGE_EDGE) {
     const ClusterTree &ta = a_->tree(FeatureKind::EDGE), &tb = b_->tree(FeatureKind::EDGE);
-    const std::vector<Index>&ra = a_->rank(FeatureKind::EDGE), &rb = b_->rank(FeatureKind::EDGE);
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
       const Index *ea = ta.feature(sa), *eb = tb.feature(sb);
-      const Index rank_a = ra[sa], rank_b = rb[sb];
       const bool shared = (ea[0] == eb[0]) | (ea[0] == eb[1]) | (ea[1] == eb[0]) | (ea[1] == eb[1]);
-      const bool swap = rank_b < rank_a;
-      const Index *first = swap ? eb : ea, *second = swap ? ea : eb;
-      quads_[n] = {first[0], first[1], second[0], second[1]};
-      keys_[n] = swap ? std::uint64_t{rank_b} << 32 | rank_a : std::uint64_t{rank_a} << 32 | rank_b;
+      quads_[n] = {ea[0], ea[1], eb[0], eb[1]};
+      slots_[n] = {sa, sb};
       n += !shared;
     }
   } else {
     const ClusterTree &ta = a_->tree(FeatureKind::VERTEX), &tb = b_->tree(FeatureKind::FACE);
-    const std::vector<Index>&ra = a_->rank(FeatureKind::VERTEX), &rb = b_->rank(FeatureKind::FACE);
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
       const Index v = *ta.feature(sa);
       const Index* f = tb.feature(sb);
       quads_[n] = {v, f[0], f[1], f[2]};
-      keys_[n] = std::uint64_t{ra[sa]} << 32 | rb[sb];
+      slots_[n] = {sa, sb};
       n += !((v == f[0]) | (v == f[1]) | (v == f[2]));
     }
   }
@@ -132,6 +127,7 @@ void PairWorker::flush() {
   if (count_ == 0) return;
   const Clock::time_point start = Clock::now();
   filter();
+  makeCanonical();
   if (context_->earliest_only) dropLate();
   if (!context_->elementary || context_->timeIsUp()) {
     keepUndecided();
@@ -150,11 +146,25 @@ void PairWorker::filter() {
                                              task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ADAPTIVE, kept_.data());
   for (std::size_t i = 0; i < kept; ++i) {
     quads_[i] = quads_[kept_[i]];
-    keys_[i] = keys_[kept_[i]];
+    slots_[i] = slots_[kept_[i]];
   }
   count_ = kept;
   stats_[Stage::PLANAR].out += kept;
   lap(Stage::PLANAR, start);
+}
+
+// Only what the filters kept needs its ranks, and the elementary test wants the features in canonical order.
+void PairWorker::makeCanonical() {
+  const std::vector<Index>&ra = a_->rank(kindA(task_->kind)), &rb = b_->rank(kindB(task_->kind));
+  for (std::size_t i = 0; i < count_; ++i) {
+    std::uint64_t rank_a = ra[slots_[i][0]], rank_b = rb[slots_[i][1]];
+    if (task_->kind == PairKind::EDGE_EDGE && rank_b < rank_a) {
+      std::swap(rank_a, rank_b);
+      Quad& q = quads_[i];
+      q = {q[2], q[3], q[0], q[1]};
+    }
+    keys_[i] = rank_a << 32 | rank_b;
+  }
 }
 
 void PairWorker::dropLate() {
@@ -228,7 +238,7 @@ void PairWorker::decide() {
 }
 
 std::size_t PairWorker::memoryBytes() const {
-  return quads_.capacity() * sizeof(Quad) + keys_.capacity() * 8 + kept_.capacity() * 4 +
+  return quads_.capacity() * sizeof(Quad) + (slots_.capacity() + keys_.capacity()) * 8 + kept_.capacity() * 4 +
          results_.capacity() * sizeof(ElementaryResult) + separations_.capacity() * 8 +
          (hits_[0].capacity() + hits_[1].capacity()) * sizeof(Hit);
 }

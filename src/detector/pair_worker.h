@@ -68,6 +68,7 @@ class PairWorker {
   void take(const std::uint32_t* slots, std::size_t count);
   void flush();
   void filter();
+  void makeCanonical();
   void decide();
   void keepUndecided();
   void dropLate();
@@ -79,6 +80,7 @@ class PairWorker {
   const SceneBody *a_ = nullptr, *b_ = nullptr;
   ClusterPairStream stream_;
   std::vector<Quad> quads_;
+  std::vector<std::array<std::uint32_t, 2>> slots_;
   std::vector<std::uint64_t> keys_;
   std::vector<std::uint32_t> kept_;
   std::vector<ElementaryResult> results_;

@@ -263,31 +263,17 @@ void SceneArrays::overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pa
   }
 }
 
-std::uint16_t SceneArrays::bodyOf(FeatureKind kind, Index rank) const {
-  const auto begin = [kind](const SceneBody& b) {
-    return kind == FeatureKind::VERTEX ? b.vertex_begin : kind == FeatureKind::EDGE ? b.edge_begin : b.face_begin;
-  };
-  std::size_t lo = 0, hi = bodies_.size();
-  while (hi - lo > 1) {
-    const std::size_t mid = (lo + hi) / 2;
-    (begin(bodies_[mid]) <= rank ? lo : hi) = mid;
-  }
-  return static_cast<std::uint16_t>(lo);
-}
-
-SceneArrays::RankedFeature SceneArrays::ranked(FeatureKind kind, Index rank) const {
-  RankedFeature f{bodyOf(kind, rank), {NO_INDEX, NO_INDEX, NO_INDEX}};
-  const SceneBody& body = bodies_[f.body];
+void SceneArrays::featureVertices(FeatureKind kind, std::size_t body_index, Index rank, Index* out) const {
+  const SceneBody& body = bodies_[body_index];
   if (kind == FeatureKind::VERTEX) {
-    f.v[0] = rank - body.vertex_begin;
+    *out = rank - body.vertex_begin;
   } else if (kind == FeatureKind::EDGE) {
     const Edge& e = body.setup.topology->edges()[rank - body.edge_begin];
-    std::copy(e.begin(), e.end(), f.v);
+    std::copy(e.begin(), e.end(), out);
   } else {
     const Face& face = body.setup.topology->faces()[face_order_[rank]];
-    std::copy(face.begin(), face.end(), f.v);
+    std::copy(face.begin(), face.end(), out);
   }
-  return f;
 }
 
 std::size_t SceneArrays::memoryBytes() const {

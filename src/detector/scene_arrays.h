@@ -76,12 +76,8 @@ class SceneArrays {
   std::size_t height() const { return height_; }
   double largestSeparation() const { return largest_separation_; }
 
-  /// Contacts by rank (canonical order) back to local indices.
-  struct RankedFeature {
-    std::uint16_t body;
-    Index v[3];
-  };
-  RankedFeature ranked(FeatureKind kind, Index rank) const;
+  /// The body-local vertices (1, 2 or 3) of the feature with the rank, in the input's order.
+  void featureVertices(FeatureKind kind, std::size_t body, Index rank, Index* out) const;
 
   /// Real width of a record unit per direction and the real value of record 0, for bounds on times.
   const double* unit() const { return unit_; }
@@ -91,7 +87,6 @@ class SceneArrays {
  private:
   void quantize(std::size_t first, std::size_t last);
   void refitBodies();
-  std::uint16_t bodyOf(FeatureKind kind, Index rank) const;
 
   std::vector<SceneBody> bodies_;
   std::vector<Index> face_order_;  // face rank -> face of the input (all bodies)

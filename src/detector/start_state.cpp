@@ -49,9 +49,11 @@ const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& sce
   intersections_.clear();
   for (const EdgeFace& pair : found_) {
     const SceneBody &a = scene.bodies()[pair.edge_body], &b = scene.bodies()[pair.face_body];
-    const auto edge = scene.ranked(FeatureKind::EDGE, a.rank(FeatureKind::EDGE)[pair.edge]);
-    const auto face = scene.ranked(FeatureKind::FACE, b.rank(FeatureKind::FACE)[pair.face]);
-    intersections_.push_back({{edge.body, face.body}, {edge.v[0], edge.v[1], face.v[0], face.v[1], face.v[2]}});
+    StartIntersection found;
+    found.body = {static_cast<std::uint16_t>(pair.edge_body), static_cast<std::uint16_t>(pair.face_body)};
+    scene.featureVertices(FeatureKind::EDGE, pair.edge_body, a.rank(FeatureKind::EDGE)[pair.edge], found.vertex.data());
+    scene.featureVertices(FeatureKind::FACE, pair.face_body, b.rank(FeatureKind::FACE)[pair.face], found.vertex.data() + 2);
+    intersections_.push_back(found);
   }
   stats[Stage::START_STATE].in += tested_;
   stats[Stage::START_STATE].out += found_.size();
