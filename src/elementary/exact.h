@@ -6,8 +6,8 @@
 namespace deformable_ccd {
 
 /// Needs rounding to nearest and denormals. Allocates only for coordinates that span more than
-/// exact::FIXED_INTEGER_MAX_BITS bits. run() throws std::invalid_argument for a kind other than VERTEX_FACE or EDGE_EDGE
-/// and where a minimum separation is asked for (the rung `conservative` has that).
+/// exact::FIXED_INTEGER_MAX_BITS bits. run() throws std::invalid_argument for a kind other than VERTEX_FACE or
+/// EDGE_EDGE and where a minimum separation is asked for (the rung `conservative` has that).
 class ExactTest : public ElementaryTest {
  public:
   /// toc_bits: 10 to 52; a TOC is reported as its cell of the 2^-toc_bits grid.

@@ -3,8 +3,8 @@
 //   A difference D = h + l exactly, |l| <= e |h|. With t and s = 1-t exact, x(t) = s D0 + t D1 is kept as a pair:
 //     s h0 + t h1 exactly into one leading and three trailing terms, which like s l0, t l1 sum to at most 3 e U;
 //     rounding two products and four sums of such terms: at most 8 e^2 U. |x| <= U (1 + 3 e).
-//   A product x y of pairs: leading parts exactly, cross terms rounded, x.lo y.lo dropped: at most 8 e^2 |x||y| (bounds),
-//     its trailing part at most 3 e.
+//   A product of pairs within bounds X, Y: leading parts exactly, cross terms rounded, x.lo y.lo dropped: at most
+//     8 e^2 X Y, its trailing part at most 3 e X Y.
 //   n_k, a difference of two products: 2 * 8 + (6 + 8) for adding the trailing parts, + 2 * 2 * 8 from the errors of
 //     x and y: at most 62 e^2 U V; |n_k| <= 2 U V.
 //   f, a sum of three products: 3 * 16 + (12 + 18 + 10 + 28) for adding, 3 * 62 + 3 * 2 * 8 from the errors of n_k and

@@ -3,10 +3,10 @@
 // allow. Settles nearly parallel edges, slivers and grazing features.
 //
 // Bounds, with e = 2^-53 and U, V, W as in exact_double_double.cpp. In plain double, f = F0 s^3 + F1 s^2 t + F2 s t^2 +
-// F3 t^3 with F0, F3 within 48 e U V W and F1, F2 within 174 e U V W (each product of three differences: 8 to 10 rounding
-// factors, 6 of them in F0 and F3, 18 in F1 and F2). f' = c0 s^2 + 2 c1 s t + c2 t^2, c0 = F1 - 3 F0, c1 = F2 - F1,
-// c2 = 3 F3 - F2: 348 from those, at most 36 U V W in magnitude, so at most 3 * 36 for its own rounding and 6 * 36 for the
-// blossom: 672 e U V W; 1024 is used.
+// F3 t^3 with F0, F3 within 48 e U V W and F1, F2 within 174 e U V W (each product of three differences: 8 to 10
+// rounding factors, 6 of them in F0 and F3, 18 in F1 and F2). f' = c0 s^2 + 2 c1 s t + c2 t^2, c0 = F1 - 3 F0, c1 =
+// F2 - F1, c2 = 3 F3 - F2: 348 from those, at most 36 U V W in magnitude, so at most 3 * 36 for its own rounding and
+// 6 * 36 for the blossom: 672 e U V W; 1024 is used.
 // Minors x_i y_j - x_j y_i at t within h of m: 16 e X Y computed, 8 h X Y for moving by h, 4 e X Y for sums of three;
 // with h = 2^-52 = 2 e: 36 e X Y; 48 is used. Underflow is covered by the range that CoplanarityCubic demands.
 #include <algorithm>
@@ -72,8 +72,8 @@ class RefinedDecision {
     slope_error_ = 0x1p-43 * (f_.size(0) * f_.size(1) * f_.size(2));
   }
 
-  /// Fills in ends[1..4]: a zone around each extremum in the step, outside which f' is certain (its slope at the extrema
-  /// is 2 sqrt(discriminant)) and inside which f hardly moves. Any ends are safe.
+  /// Fills in ends[1..4]: a zone around each extremum in the step, outside which f' is certain (its slope at the
+  /// extrema is 2 sqrt(discriminant)) and inside which f hardly moves. Any ends are safe.
   void setExtrema(double (&ends)[6]) const {
     const double a = slope_[0] - 2 * slope_[1] + slope_[2], b = slope_[1] - slope_[0], c = slope_[0];
     const double discriminant = b * b - a * c;
@@ -110,7 +110,8 @@ class RefinedDecision {
 
   double roughValueAt(double t) const {
     const double s = 1 - t;
-    return ((coefficient_[0] * s + coefficient_[1] * t) * s + coefficient_[2] * t * t) * s + coefficient_[3] * t * t * t;
+    const double low = (coefficient_[0] * s + coefficient_[1] * t) * s + coefficient_[2] * t * t;
+    return low * s + coefficient_[3] * t * t * t;
   }
 
   /// The only root of f in [a, b], f having the certain sign `before` at a and the opposite one at b.
@@ -127,9 +128,10 @@ class RefinedDecision {
     return cell52_ < 0 ? Outcome::UNCERTAIN : insideTest(std::ldexp(static_cast<double>(cell52_), -52));
   }
 
-  /// The features at the root of f within 2^-52 of m. Seen along axis k, with n = u x v, B = w x v and C = u x w (VF) or
-  /// w x u (EE), and n != 0, they touch when n, B, C, n-B-C (VF) or n, B, C, n-B, n-C (EE) have no two opposite signs;
-  /// when two have, they do not touch, n = 0 or not (B = l n, C = m n with barycentric coordinates or edge parameters).
+  /// The features at the root of f within 2^-52 of m. Seen along axis k, with n = u x v, B = w x v and C = u x w (VF)
+  /// or w x u (EE), and n != 0, they touch when n, B, C, n-B-C (VF) or n, B, C, n-B, n-C (EE) have no two opposite
+  /// signs; when two have, they do not touch, n = 0 or not (B = l n, C = m n with barycentric coordinates or edge
+  /// parameters).
   Outcome insideTest(double m) const {
     double x[3][3];
     for (int i = 0; i < 3; ++i) {

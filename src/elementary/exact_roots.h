@@ -1,5 +1,5 @@
-// The distinct real roots in [0,1] of a polynomial of degree up to three, in increasing order, each with its cell of the
-// dyadic grid and the exact sign of any quadratic at it. See exact_algebra.h for the method.
+// The distinct real roots in [0,1] of a polynomial of degree up to three, in increasing order, each with its cell of
+// the dyadic grid and the exact sign of any quadratic at it. See exact_algebra.h for the method.
 #pragma once
 
 #include <cstdint>

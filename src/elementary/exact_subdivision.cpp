@@ -1,9 +1,9 @@
 // Tier BERNSTEIN: the step is halved until the features' projections on some axis stay apart during every piece, or a
-// piece gets too short. It settles what the batched tier cannot: pairs whose polynomials all vanish, or nearly so, at one
-// time although the features are far from each other then (parallel edges one behind the other, say).
+// piece gets too short. It settles what the batched tier cannot: pairs whose polynomials all vanish, or nearly so, at
+// one time although the features are far from each other then (parallel edges one behind the other, say).
 //
-// A linearly moving point's projection is linear, so the Bernstein coefficients over a piece are its values at the ends:
-// strictly apart at both ends with the same order means apart during the piece. Ends are multiples of 2^-DEPTH,
+// A linearly moving point's projection is linear, so the Bernstein coefficients over a piece are its values at the
+// ends: strictly apart at both ends with the same order means apart during the piece. Ends are multiples of 2^-DEPTH,
 // computed as fl(fl(x0 (1-t)) + fl(x1 t)) with 1-t exact: error at most (3 + 2^-50) 2^-53 max(|x0|, |x1|), and
 // 2^-1074 where a product underflows; the margin below is larger than two such errors and its own rounding.
 #include <algorithm>
@@ -38,7 +38,8 @@ Ranges rangesAt(const PairMotion& pair, int first_points, double t) {
 
 class Separation {
  public:
-  Separation(PairKind kind, const PairMotion& pair) : pair_(pair), first_points_(kind == PairKind::VERTEX_FACE ? 1 : 2) {
+  Separation(PairKind kind, const PairMotion& pair)
+      : pair_(pair), first_points_(kind == PairKind::VERTEX_FACE ? 1 : 2) {
     for (int k = 0; k < 3; ++k) {
       double largest = 0;
       for (const auto& time : pair.x) {

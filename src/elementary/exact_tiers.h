@@ -1,5 +1,5 @@
-// The tiers of the exact rung one by one. Each answers CONTACT (with the TOC's cell), NO_CONTACT or UNDECIDED; which one
-// answers first changes nothing in the answer. Rounding must be to nearest, denormals on.
+// The tiers of the exact rung one by one. Each answers CONTACT (with the TOC's cell), NO_CONTACT or UNDECIDED; which
+// one answers first changes nothing in the answer. Rounding must be to nearest, denormals on.
 #pragma once
 
 #include <cstddef>

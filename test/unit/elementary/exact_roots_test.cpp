@@ -66,7 +66,8 @@ TYPED_TEST(ExactRoots, RationalRootsOfEveryMultiplicityAndSign) {
       const Z tiny = Z::shifted(1, 0), scale = Z::shifted(1, 55);
       EXPECT_EQ(found.signAt(index, Quadratic<Z>{{Z(-p) * scale + tiny, Z(q) * scale, Z(0)}}), 1);
       EXPECT_EQ(found.signAt(index, Quadratic<Z>{{Z(-p) * scale - tiny, Z(q) * scale, Z(0)}}), -1);
-      EXPECT_EQ(found.signAt(index, Quadratic<Z>{{Z(p * p) * scale + tiny, Z(-2 * p * q) * scale, Z(q * q) * scale}}), 1);
+      const Quadratic<Z> square = {{Z(p * p) * scale + tiny, Z(-2 * p * q) * scale, Z(q * q) * scale}};
+      EXPECT_EQ(found.signAt(index, square), 1);
     }
     if (this->HasFailure()) return;
   }
