@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+"""What accuracy costs in time: every rung on whole steps and per pair, as CSV, JSON, a table and a plot.
+
+The whole step: check_step on the real scenes; answers are held against the scenes' truth before a time is printed.
+Per pair: accuracy_pairs on hard queries and on what the filters leave of the scenes, FCL's elementary tests in the same run.
+"""
+import argparse
+import csv
+import gzip
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+
+RUNGS = [
+    ("screen", ["--accuracy", "screen"]),
+    ("fast", ["--accuracy", "fast"]),
+    ("conservative 1e-3", ["--accuracy", "conservative", "--tolerance", "1e-3"]),
+    ("conservative 1e-6", ["--accuracy", "conservative", "--tolerance", "1e-6"]),
+    ("conservative 1e-9", ["--accuracy", "conservative", "--tolerance", "1e-9"]),
+    ("exact 2^-10", ["--accuracy", "exact", "--toc-bits", "10"]),
+    ("exact 2^-32", ["--accuracy", "exact", "--toc-bits", "32"]),
+    ("exact 2^-52", ["--accuracy", "exact", "--toc-bits", "52"]),
+]
+STEP_COLUMNS = ["scene", "rung", "reported", "missed", "false", "undecided", "max_toc_error", "best_ms", "median_ms"]
+
+
+def normal(kind, v):
+    """A pair whatever the order of its vertices."""
+    if kind == "VF":
+        return (kind, v[0]) + tuple(sorted(v[1:]))
+    return (kind,) + tuple(sorted((tuple(sorted(v[:2])), tuple(sorted(v[2:])))))
+
+
+def truth(scene_dir):
+    pairs = set()
+    for kind, name in (("VF", "vf.txt.gz"), ("EE", "ee.txt.gz")):
+        with gzip.open(os.path.join(scene_dir, name), "rt") as lines:
+            for line in lines:
+                if line.startswith("#"):
+                    continue
+                row = [int(x) for x in line.split()]
+                if row[4]:
+                    pairs.add(normal(kind, row[:4]))
+    return pairs
+
+
+def contacts(path):
+    with open(path, newline="") as f:
+        return {normal(r["kind"], [int(r["v%d" % i]) for i in range(4)]): r for r in csv.DictReader(f)}
+
+
+def check_step(tools, scene_dir, arguments, repeat, folder):
+    frames = [os.path.join(scene_dir, "frame_%d.ply" % i) for i in (0, 1)]
+    out, stats = os.path.join(folder, "contacts.csv"), os.path.join(folder, "stats.json")
+    subprocess.run([os.path.join(tools, "check_step"), *frames, "--contacts", out, "--stats", stats,
+                    "--repeat", str(repeat), *arguments], check=True, stdout=subprocess.DEVNULL)
+    with open(stats) as f:
+        return contacts(out), json.load(f)
+
+
+def whole_steps(tools, scenes, repeat):
+    rows, stages = [], {}
+    with tempfile.TemporaryDirectory() as folder:
+        for scene in scenes:
+            name, true_pairs = os.path.basename(scene.rstrip("/")), truth(scene)
+            finest, _ = check_step(tools, scene, RUNGS[-1][1], 1, folder)
+            for rung, arguments in RUNGS:
+                found, stats = check_step(tools, scene, arguments, repeat, folder)
+                missed, false = len(true_pairs - found.keys()), 0
+                undecided, error = 0, 0.0
+                for pair, row in found.items():
+                    if row["certainty"] == "undecided":
+                        undecided += 1
+                    elif pair not in true_pairs:
+                        false += 1
+                    if pair in finest:
+                        error = max(error, abs(float(finest[pair]["toc_lower"]) - float(row["toc_lower"])))
+                if rung.startswith("exact") and (missed or false or undecided):
+                    sys.exit("%s on %s: %d missed, %d false, %d undecided; no time is printed for wrong answers"
+                             % (rung, name, missed, false, undecided))
+                rows.append(dict(zip(STEP_COLUMNS, [name, rung, len(found), missed, false, undecided, error,
+                                                    stats["ms"]["total"]["best"], stats["ms"]["total"]["median"]])))
+                stages["%s, %s" % (name, rung)] = {"ms": stats["ms"], "pairs": stats["pairs"], "tiers": stats["tiers"],
+                                                   "simd_target": stats["simd_target"]}
+                print("%-11s %-18s %7d reported %5d missed %6d false %7d undecided  toc error %-9.2g %8.1f ms (median %.1f)"
+                      % (name, rung, len(found), missed, false, undecided, error, rows[-1]["best_ms"], rows[-1]["median_ms"]),
+                      flush=True)
+    return rows, stages
+
+
+def per_pair(tools, queries, scenes, repeat):
+    arguments = [queries] + [a for s in scenes for a in
+                             ("--scene", os.path.basename(s.rstrip("/")), os.path.join(s, "frame_0.ply"), os.path.join(s, "frame_1.ply"))]
+    text = subprocess.run([os.path.join(tools, "accuracy_pairs"), *arguments, "--repeat", str(repeat)], check=True,
+                          stdout=subprocess.PIPE, universal_newlines=True).stdout
+    print(text, end="")
+    return list(csv.DictReader(text.splitlines()))
+
+
+def write_csv(path, rows):
+    with open(path, "w", newline="") as f:
+        writer = csv.DictWriter(f, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def plot(steps, pairs, folder):
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6))
+    floor = 2.0 ** -54  # where an error of 0 is drawn
+    markers = {"cloth-ball": "o", "n-body": "s"}
+    for scene in dict.fromkeys(r["scene"] for r in steps):
+        mine = [r for r in steps if r["scene"] == scene]
+        left.plot([max(r["max_toc_error"], floor) for r in mine], [r["median_ms"] for r in mine], linestyle="none",
+                  marker=markers.get(scene, "^"), label=scene)
+        if scene == next(iter(markers)):
+            for r in mine:
+                left.annotate(r["rung"], (max(r["max_toc_error"], floor), r["median_ms"]), textcoords="offset points",
+                              xytext=(5, 5), fontsize=7)
+    left.set(xscale="log", yscale="log", xlabel="worst error of the TOC [share of the step]", ylabel="whole step, median [ms]",
+             title="One step, one thread")
+    left.invert_xaxis()
+    left.legend()
+    for source in dict.fromkeys(r["source"] for r in pairs):
+        for kind, fill in (("VF", "full"), ("EE", "none")):
+            mine = [r for r in pairs if r["source"] == source and r["kind"] == kind]
+            right.plot([r["rung"] for r in mine], [float(r["median_ns"]) for r in mine], marker="o", fillstyle=fill,
+                       linestyle=":", linewidth=0.8, label="%s, %s" % (source, kind))
+            for r in mine:
+                wrong = int(r["missed"]) + int(r["false_contacts"])
+                if wrong:
+                    right.annotate("%d wrong" % wrong, (r["rung"], float(r["median_ns"])), textcoords="offset points",
+                                   xytext=(3, 5), fontsize=6)
+    right.set(yscale="log", ylabel="per pair, median [ns]", title="The elementary test alone")
+    right.tick_params(axis="x", rotation=35, labelsize=8)
+    right.legend(fontsize=7)
+    for axes in (left, right):
+        axes.grid(True, which="major", linewidth=0.3)
+    figure.tight_layout()
+    for ending in ("svg", "png"):
+        figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=150)
+
+
+def markdown(rows):
+    lines = ["| scene | rung | reported | missed | false | undecided | worst TOC error | ms, best | ms, median |",
+             "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
+    for r in rows:
+        lines.append("| %s | %s | %d | %d | %d | %d | %.1e | %.1f | %.1f |" % tuple(r[c] for c in STEP_COLUMNS))
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--tools", required=True, help="folder of check_step and accuracy_pairs")
+    parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
+    parser.add_argument("--out", required=True, help="folder for the results")
+    parser.add_argument("--repeat", type=int, default=15)
+    a = parser.parse_args()
+    os.makedirs(a.out, exist_ok=True)
+    scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
+    steps, stages = whole_steps(a.tools, scenes, a.repeat)
+    pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
+    write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
+    write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
+    with open(os.path.join(a.out, "accuracy.json"), "w") as f:
+        json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "stages": stages,
+                   "pairs": pairs}, f, indent=1)
+    with open(os.path.join(a.out, "accuracy.md"), "w") as f:
+        f.write(markdown(steps))
+    plot(steps, pairs, a.out)
+    print("results: " + a.out)
+
+
+if __name__ == "__main__":
+    main()
