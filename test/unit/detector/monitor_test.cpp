@@ -1,0 +1,387 @@
+#include "deformable_ccd/monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "detector/step_runner.h"
+
+namespace deformable_ccd {
+namespace {
+
+constexpr StampNs MS = 1000000;
+constexpr std::int64_t NOW = 0, LATER = 10000 * MS;
+
+/// A triangle in the plane z = 0 and one above it that points down with vertex 3.
+std::shared_ptr<const Topology> twoTriangles() {
+  static const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
+  return topology;
+}
+MeshFrame pair(StampNs stamp_ns, double tip_z) {
+  return {stamp_ns, twoTriangles(),
+          {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, tip_z}, {0.5, 0, tip_z + 1}, {-0.5, 0, tip_z + 1}},
+          false, Eigen::Isometry3d::Identity()};
+}
+
+std::shared_ptr<const Topology> oneTriangle() {
+  static const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  return topology;
+}
+MeshFrame floor(StampNs stamp_ns, double z) {
+  return {stamp_ns, oneTriangle(), {{-1, -1, z}, {1, -1, z}, {0, 1, z}}, false, Eigen::Isometry3d::Identity()};
+}
+MeshFrame tip(StampNs stamp_ns, double z) {
+  return {stamp_ns, oneTriangle(), {{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, false, Eigen::Isometry3d::Identity()};
+}
+
+MonitorOptions loose() {
+  MonitorOptions options;
+  options.store.max_vertex_step_m = 0;
+  return options;
+}
+
+MonitorBody named(const std::string& name) {
+  MonitorBody body;
+  body.name = name;
+  return body;
+}
+
+StepOutcome only(Monitor& monitor, std::int64_t now = NOW) {
+  StepOutcome outcome, more;
+  EXPECT_TRUE(monitor.next(now, outcome));
+  EXPECT_FALSE(monitor.next(now, more));
+  return outcome;
+}
+
+void expectAddsUp(const Monitor& monitor) {
+  const FrameCounters all = monitor.total();
+  EXPECT_EQ(all.received, all.processed() + all.started() + all.skipped() + all.waiting());
+}
+
+class OneBody : public ::testing::Test {
+ protected:
+  Monitor monitor{loose(), {named("cloth")}};
+  StepOutcome feed(MeshFrame frame) {
+    monitor.countReceived(0);
+    monitor.push(0, std::move(frame), NOW);
+    return only(monitor);
+  }
+};
+
+TEST_F(OneBody, KnownTimeOfContact) {
+  EXPECT_EQ(feed(pair(100 * MS, 1)).status, StepStatus::FIRST_FRAME);
+  const StepOutcome outcome = feed(pair(200 * MS, -3));
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  ASSERT_TRUE(outcome.answered);
+  EXPECT_EQ(outcome.start_ns, 100 * MS);
+  EXPECT_EQ(outcome.stamp_ns, 200 * MS);
+  EXPECT_LE(outcome.earliest_toc, 0.25);
+  EXPECT_GE(outcome.earliest_toc, 0.25 - std::ldexp(1.0, -31));
+  EXPECT_FALSE(outcome.clear);
+  const ContactGeometry geometry = contactGeometry(outcome, outcome.contacts.front());
+  EXPECT_NEAR(geometry.point.z(), 0, 1e-6);
+  EXPECT_NEAR(std::abs(geometry.normal.z()), 1, 1e-6);
+  EXPECT_NEAR(geometry.approach_speed, 4, 1e-6);
+}
+
+TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
+  EXPECT_FALSE(feed(pair(100 * MS, 1)).clear) << "one frame is no answer";
+  EXPECT_TRUE(feed(pair(200 * MS, 0.9)).clear);
+  MeshFrame lost = pair(300 * MS, 0.8);
+  lost.positions[5].x() = std::numeric_limits<double>::infinity();
+  const StepOutcome partial = feed(std::move(lost));
+  EXPECT_EQ(partial.status, StepStatus::PARTIAL);
+  EXPECT_TRUE(partial.answered);
+  EXPECT_FALSE(partial.clear);
+  EXPECT_EQ(partial.stats.unchecked_vertices, 1u);
+}
+
+TEST_F(OneBody, NeverAcrossASeam) {
+  feed(pair(1000 * MS, 1));
+  EXPECT_EQ(feed(pair(2000 * MS, -1)).status, StepStatus::GAP);
+  EXPECT_EQ(feed(pair(500 * MS, 1)).status, StepStatus::TIME_JUMP);
+  EXPECT_EQ(feed(pair(500 * MS, 1)).status, StepStatus::DUPLICATE);
+  MeshFrame other{600 * MS, oneTriangle(), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, false, Eigen::Isometry3d::Identity()};
+  EXPECT_EQ(feed(other).status, StepStatus::TOPOLOGY_CHANGED);
+  other.stamp_ns = 650 * MS;
+  EXPECT_TRUE(feed(other).clear) << "recovered with the second frame";
+  expectAddsUp(monitor);
+  EXPECT_EQ(monitor.total().started(), 4u);
+  EXPECT_EQ(monitor.total().skipped(), 1u);
+}
+
+TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
+  feed(pair(0, 1));
+  monitor.countReceived(0, 2);
+  monitor.skip(0, StepStatus::BAD_MESSAGE, 10 * MS, "index 7");
+  monitor.push(0, pair(20 * MS, 0.9), NOW);
+  StepOutcome outcome;
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::BAD_MESSAGE);
+  EXPECT_EQ(outcome.reason, "index 7");
+  EXPECT_FALSE(outcome.answered);
+  EXPECT_FALSE(outcome.clear);
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::OK) << "from the frame before the refused one";
+  EXPECT_EQ(outcome.start_ns, 0);
+  expectAddsUp(monitor);
+}
+
+TEST_F(OneBody, ResetForgets) {
+  feed(pair(0, 1));
+  monitor.reset();
+  EXPECT_EQ(feed(pair(10 * MS, -1)).status, StepStatus::FIRST_FRAME);
+}
+
+TEST_F(OneBody, MapIsMissedOnlyWhenExpected) {
+  feed(pair(0, 1));
+  EXPECT_EQ(feed(pair(10 * MS, 0.9)).status, StepStatus::OK);
+  MonitorOptions options = loose();
+  options.obstacle_expected = true;
+  monitor.setOptions(options);
+  const StepOutcome none = feed(pair(20 * MS, 0.8));
+  EXPECT_EQ(none.status, StepStatus::NO_MAP);
+  EXPECT_FALSE(none.clear);
+  monitor.setMap({VoxelSurface::build(0.1, {}), 0, Eigen::Isometry3d::Identity(), {}});
+  EXPECT_EQ(feed(pair(30 * MS, 0.7)).status, StepStatus::OK) << "an empty map is a map";
+}
+
+TEST_F(OneBody, OldMapIsNoMap) {
+  MonitorOptions options = loose();
+  options.obstacle_expected = true;
+  options.octomap_timeout_s = 1;
+  monitor.setOptions(options);
+  monitor.setMap({VoxelSurface::build(0.1, {}), 1000 * MS, Eigen::Isometry3d::Identity(), {}});
+  feed(pair(1900 * MS, 1));
+  EXPECT_EQ(feed(pair(1950 * MS, 1)).status, StepStatus::OK);
+  EXPECT_EQ(feed(pair(2001 * MS, 1)).status, StepStatus::NO_MAP);
+}
+
+TEST_F(OneBody, VoxelContactInTheMapsFrame) {
+  // The map's frame stands 10 m above the fixed frame's: voxel [0, 1]^3 there is [0, 1]^2 x [10, 11] here.
+  MonitorMap map{VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 1}}), 0, Eigen::Isometry3d::Identity(), {}};
+  map.map_from_fixed.translation() = Vec3(0, 0, -10);
+  monitor.setMap(std::move(map));
+  const auto at = [](StampNs stamp_ns, double z) {
+    return MeshFrame{stamp_ns, oneTriangle(), {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}}, false,
+                     Eigen::Isometry3d::Identity()};
+  };
+  feed(at(0, 12));
+  const StepOutcome outcome = feed(at(100 * MS, 10));
+  ASSERT_FALSE(outcome.contacts.empty());
+  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
+  const core::Contact& contact = outcome.contacts.front();
+  EXPECT_EQ(contact.body[1], OBSTACLE_BODY);
+  const ContactGeometry geometry = contactGeometry(outcome, contact);
+  EXPECT_NEAR(geometry.point.z(), 11, 1e-6);
+  EXPECT_NEAR(geometry.normal.z(), 1, 1e-9);
+  EXPECT_NEAR(geometry.approach_speed, 2, 1e-9);
+
+  MonitorOptions options = loose();
+  options.exclude_boxes = {{{0, 0, 10}, {1, 1, 11}}};
+  monitor.setOptions(options);
+  feed(at(200 * MS, 12));
+  const StepOutcome excluded = feed(at(300 * MS, 10));
+  EXPECT_TRUE(excluded.contacts.empty());
+  EXPECT_GT(excluded.excluded, 0u);
+  EXPECT_TRUE(excluded.clear) << "what is excluded is not looked at";
+}
+
+TEST_F(OneBody, TooManyContactsKeepTheEarliest) {
+  MonitorOptions options = loose();
+  options.max_contacts = 1;
+  monitor.setOptions(options);
+  feed(pair(0, 1));
+  const StepOutcome outcome = feed(pair(100 * MS, -3));
+  ASSERT_GT(outcome.total_contacts, 1u);
+  EXPECT_EQ(outcome.status, StepStatus::TRUNCATED);
+  ASSERT_EQ(outcome.contacts.size(), 1u);
+  EXPECT_EQ(outcome.contacts[0].toc_lower, outcome.earliest_toc);
+}
+
+TEST_F(OneBody, MaskedVerticesMeetNothing) {
+  MonitorBody masked = named("cloth");
+  masked.vertex_mask = {3};
+  Monitor other(loose(), {masked});
+  other.push(0, pair(0, 1), NOW);
+  other.push(0, pair(100 * MS, 0.2 - 1), NOW);
+  StepOutcome outcome;
+  other.next(NOW, outcome);
+  ASSERT_TRUE(other.next(NOW, outcome));
+  for (const core::Contact& contact : outcome.contacts) {
+    for (const Index v : contact.vertex) EXPECT_NE(v, 3u);
+  }
+  masked.vertex_mask = {6};
+  Monitor wrong(loose(), {masked});
+  wrong.push(0, pair(0, 1), NOW);
+  wrong.push(0, pair(100 * MS, 0.9), NOW);
+  wrong.next(NOW, outcome);
+  ASSERT_TRUE(wrong.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::INTERNAL_ERROR);
+  EXPECT_NE(outcome.reason.find("vertex_mask"), std::string::npos);
+}
+
+TEST_F(OneBody, PredictionMeetsWhatIsObservedLater) {
+  MonitorOptions options = loose();
+  options.look_ahead_s = 0.4;
+  monitor.setOptions(options);
+  EXPECT_FALSE(monitor.predict().answered);
+  feed(pair(0, 2));
+  ASSERT_TRUE(feed(pair(100 * MS, 1.5)).clear);
+  const StepOutcome ahead = monitor.predict();
+  ASSERT_EQ(ahead.status, StepStatus::OK) << ahead.reason;
+  EXPECT_NEAR(ahead.earliest_toc, 0.75, 1e-9) << "0.3 s of 0.4 s";
+  EXPECT_EQ(ahead.stamp_ns, 500 * MS);
+  const StepOutcome next = feed(pair(200 * MS, 1));
+  EXPECT_TRUE(next.clear) << "a prediction leaves the observed steps alone";
+}
+
+TEST_F(OneBody, CheckNowLooksAtTheNewestFrame) {
+  EXPECT_FALSE(monitor.checkNow().answered);
+  feed(pair(0, 0));
+  const StepOutcome touching = monitor.checkNow();
+  EXPECT_TRUE(touching.answered);
+  EXPECT_FALSE(touching.contacts.empty());
+}
+
+class TwoBodies : public ::testing::Test {
+ protected:
+  Monitor monitor{loose(), {named("floor"), named("tip")}};  // the floor is the clock
+  void feed(std::size_t body, MeshFrame frame, std::int64_t now = NOW) {
+    monitor.countReceived(body);
+    monitor.push(body, std::move(frame), now);
+  }
+};
+
+TEST_F(TwoBodies, OthersAreInterpolatedAtBothEnds) {
+  feed(0, floor(100 * MS, 0));
+  EXPECT_EQ(only(monitor).status, StepStatus::FIRST_FRAME);
+  feed(1, tip(0, 4));
+  feed(0, floor(200 * MS, 0));
+  StepOutcome outcome;
+  EXPECT_FALSE(monitor.next(NOW, outcome)) << "waits for the tip";
+  EXPECT_TRUE(monitor.waiting());
+  feed(1, tip(400 * MS, -4));  // 2 at 100 ms, 0 at 200 ms
+  outcome = only(monitor);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_NEAR((*outcome.positions_t0)[1][0].z(), 2, 1e-12);
+  EXPECT_NEAR(outcome.earliest_toc, 1, 1e-9);
+  EXPECT_EQ(outcome.contacts[0].body, (std::array<std::uint16_t, 2>{1, 0}));
+  expectAddsUp(monitor);
+}
+
+TEST_F(TwoBodies, MissingBodyIsNoAnswerAfterTheTimeout) {
+  feed(0, floor(100 * MS, 0));
+  only(monitor);
+  feed(0, floor(200 * MS, 0));
+  StepOutcome outcome;
+  EXPECT_FALSE(monitor.next(NOW, outcome));
+  outcome = only(monitor, LATER);
+  EXPECT_EQ(outcome.status, StepStatus::NO_BODY);
+  EXPECT_NE(outcome.reason.find("tip"), std::string::npos);
+  EXPECT_FALSE(outcome.clear);
+  expectAddsUp(monitor);
+}
+
+TEST_F(TwoBodies, SeamOfAnotherBodyIsASeamOfTheStep) {
+  feed(0, floor(1000 * MS, 0));
+  feed(1, tip(0, 4));
+  feed(1, tip(1100 * MS, 4));
+  only(monitor);
+  feed(0, floor(1050 * MS, 0));
+  const StepOutcome outcome = only(monitor);
+  EXPECT_EQ(outcome.status, StepStatus::GAP);
+  EXPECT_NE(outcome.reason.find("tip"), std::string::npos);
+}
+
+TEST_F(TwoBodies, TimeJumpDropsWhatWaits) {
+  feed(0, floor(1000 * MS, 0));
+  only(monitor);
+  feed(0, floor(1050 * MS, 0));
+  feed(0, floor(10 * MS, 0));
+  StepOutcome outcome;
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::NO_BODY);
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::TIME_JUMP);
+  expectAddsUp(monitor);
+}
+
+TEST(StaticBody, HoldsAtAllTimes) {
+  MonitorBody table = named("table");
+  table.motion = BodyMotionKind::STATIC;
+  Monitor monitor(loose(), {named("tip"), table});
+  StepOutcome outcome;
+  monitor.push(0, tip(0, 1), NOW);
+  monitor.push(1, floor(5, 0), NOW);
+  monitor.push(0, tip(100 * MS, -1), NOW);
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
+}
+
+TEST(RigidBody, LargeTurnsAreSplit) {
+  // A bar of 1 m turns by 180 degrees about its end; half way its other end passes a vertex that no chord comes near.
+  StepInput input;
+  input.resize(1);
+  input.t0[0] = {{0, 0, 0}, {1, 0, 0}, {1, 0.1, 0}};
+  input.rigid[0] = 1;
+  input.pose_t1[0].linear() = Eigen::AngleAxisd(3.1, Vec3::UnitY()).toRotationMatrix();
+  const std::size_t parts = requiredSubsteps(input, 1e-3);
+  EXPECT_GT(parts, 30u);
+  EXPECT_LT(parts, 40u);
+  EXPECT_LE(1.005 * (1 - std::cos(3.1 / (2.0 * static_cast<double>(parts)))), 1e-3);
+  input.rigid[0] = 0;
+  EXPECT_EQ(requiredSubsteps(input, 1e-3), 1u);
+
+  MonitorOptions options = loose();
+  MonitorBody bar = named("bar");
+  bar.rigid = true;
+  Monitor monitor(options, {named("tip"), bar});
+  const auto at = [&](StampNs stamp_ns, double angle) {
+    MeshFrame frame{stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true, Eigen::Isometry3d::Identity()};
+    frame.pose.linear() = Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix();
+    for (Vec3& p : frame.positions) p = frame.pose * p;
+    return frame;
+  };
+  StepOutcome outcome;
+  // Straight below the pivot, where only the arc passes.
+  monitor.push(0, tip(0, -3), NOW);
+  monitor.push(1, at(0, 0), NOW);
+  monitor.push(1, at(100 * MS, 3.1), NOW);
+  MeshFrame below = tip(100 * MS, -3);
+  monitor.push(0, below, NOW);
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_GT(outcome.substeps, 30u);
+  ASSERT_TRUE(outcome.contacts.empty()) << "the tip is 2 m below";
+  Monitor near(options, {named("tip"), bar});
+  const auto close = [](StampNs stamp_ns) {
+    return MeshFrame{stamp_ns, oneTriangle(), {{0, 0, -0.9}, {0.1, 0, -2}, {-0.1, 0, -2}}, false, Eigen::Isometry3d::Identity()};
+  };
+  near.push(0, close(0), NOW);
+  near.push(1, at(0, 0), NOW);
+  near.push(1, at(100 * MS, 3.1), NOW);
+  near.push(0, close(100 * MS), NOW);
+  ASSERT_TRUE(near.next(NOW, outcome));
+  ASSERT_TRUE(near.next(NOW, outcome));
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_NEAR(outcome.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
+}
+
+TEST(MonitorOptionsTest, OutOfRangeNamesTheOption) {
+  MonitorOptions options;
+  options.sync_timeout_s = -1;
+  EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
+  options = {};
+  options.clock_body = 1;
+  EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
+  options = {};
+  options.exclude_boxes = {Box{}};
+  EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace deformable_ccd
