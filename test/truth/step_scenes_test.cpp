@@ -1,0 +1,244 @@
+// The real scenes through the whole detector, and the filters of the step on every pair with known truth.
+#include <gtest/gtest.h>
+#include <hwy/aligned_allocator.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+#include <tuple>
+
+#include "detector/toc_bound.h"
+#include "io/query_file.h"
+#include "simd/cluster_kernels.h"
+#include "simd/fused_filter.h"
+#include "support/data.h"
+#include "support/scene_data.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+using Pair = std::tuple<PairKind, Index, Index, Index, Index>;
+
+/// Faces by their set of vertices; edges with the smaller index first, the smaller edge first.
+Pair canonical(PairKind kind, std::array<Index, 4> v) {
+  if (kind == PairKind::VERTEX_FACE) {
+    std::sort(v.begin() + 1, v.end());
+  } else {
+    if (v[0] > v[1]) std::swap(v[0], v[1]);
+    if (v[2] > v[3]) std::swap(v[2], v[3]);
+    if (std::tie(v[2], v[3]) < std::tie(v[0], v[1])) std::swap_ranges(v.begin(), v.begin() + 2, v.begin() + 2);
+  }
+  return {kind, v[0], v[1], v[2], v[3]};
+}
+
+struct Scene {
+  SceneData data;
+  Positions t0, t1;
+  std::set<Pair> contacts;
+
+  explicit Scene(const std::string& name) : data(readScene(name)) {
+    for (const VertexMotion& v : data.vertices) {
+      t0.emplace_back(v.t0[0], v.t0[1], v.t0[2]);
+      t1.emplace_back(v.t1[0], v.t1[1], v.t1[2]);
+    }
+    for (const TruthPair& p : data.vertex_face) {
+      if (p.contact) contacts.insert(canonical(PairKind::VERTEX_FACE, p.pair));
+    }
+    for (const TruthPair& p : data.edge_edge) {
+      if (p.contact) contacts.insert(canonical(PairKind::EDGE_EDGE, p.pair));
+    }
+  }
+
+  StepResult run(const DetectorOptions& options) const {
+    Detector detector(options);
+    BodySetup setup;
+    setup.name = "mesh";
+    setup.topology = std::make_shared<Topology>(Topology::fromTriangles(t0.size(), data.faces));
+    detector.setBodies({setup}, {&t0});
+    MotionStep step;
+    step.bodies = {{&t0, &t1}};
+    return detector.run(step);
+  }
+};
+
+class StepScenes : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override { DEFORMABLE_CCD_REQUIRE_DATA(); }
+};
+
+std::set<Pair> pairsOf(const StepResult& result) {
+  std::set<Pair> pairs;
+  for (const core::Contact& c : result.contacts) pairs.insert(canonical(c.kind, c.vertex));
+  EXPECT_EQ(pairs.size(), result.contacts.size()) << "a pair is reported twice";
+  return pairs;
+}
+
+std::size_t missing(const std::set<Pair>& from, const std::set<Pair>& wanted) {
+  return static_cast<std::size_t>(
+      std::count_if(wanted.begin(), wanted.end(), [&](const Pair& p) { return from.count(p) == 0; }));
+}
+
+TEST_P(StepScenes, ExactGivesExactlyTheTruth) {
+  const Scene scene(GetParam());
+  DetectorOptions options;
+  options.num_threads = 2;
+  const StepResult result = scene.run(options);
+  const std::set<Pair> found = pairsOf(result);
+  EXPECT_TRUE(result.complete);
+  EXPECT_EQ(result.stats.undecided, 0u);
+  EXPECT_EQ(missing(found, scene.contacts), 0u);
+  EXPECT_EQ(missing(scene.contacts, found), 0u) << "contacts that are none";
+  EXPECT_TRUE(std::is_sorted(result.contacts.begin(), result.contacts.end(), canonicalLess));
+  std::cout << GetParam() << ": " << found.size() << " contacts, " << scene.contacts.size() << " in truth; "
+            << toString(result.start_state) << " with " << result.intersections.size() << " pairs\n";
+}
+
+TEST_P(StepScenes, ScreenAndConservativeMissNothing) {
+  const Scene scene(GetParam());
+  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::CONSERVATIVE}) {
+    DetectorOptions options;
+    options.accuracy.rung = rung;
+    options.check_start_state = false;
+    const StepResult result = scene.run(options);
+    const std::set<Pair> found = pairsOf(result);
+    EXPECT_EQ(missing(found, scene.contacts), 0u) << toString(rung);
+    std::cout << GetParam() << ", " << toString(rung) << ": " << found.size() << " for " << scene.contacts.size() << '\n';
+  }
+}
+
+// Carried over from step to step, back and forth between the two frames, the start state is that of the full test.
+TEST_P(StepScenes, StartStateIsCarriedOver) {
+  const Scene scene(GetParam());
+  DetectorOptions options;
+  Detector carrying(options), full(options);
+  BodySetup setup;
+  setup.name = "mesh";
+  setup.topology = std::make_shared<Topology>(Topology::fromTriangles(scene.t0.size(), scene.data.faces));
+  for (Detector* d : {&carrying, &full}) d->setBodies({setup}, {&scene.t0});
+  for (int i = 0; i < 3; ++i) {
+    MotionStep step;
+    step.bodies = {i % 2 == 0 ? BodyMotion{&scene.t0, &scene.t1} : BodyMotion{&scene.t1, &scene.t0}};
+    step.continues = i > 0;
+    const auto& carried = carrying.run(step).intersections;
+    step.continues = false;
+    const auto& expected = full.run(step).intersections;
+    EXPECT_TRUE(std::equal(carried.begin(), carried.end(), expected.begin(), expected.end(),
+                           [](const auto& x, const auto& y) { return x == y; }))
+        << carried.size() << " carried over, " << expected.size() << " by the full test";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Truth, StepScenes, testing::Values("cloth-ball", "n-body"), [](const auto& info) {
+  std::string name = info.param;
+  name.erase(std::remove(name.begin(), name.end(), '-'), name.end());
+  return name;
+});
+
+// --- the filters of the step on single pairs --------------------------------------------------------------------------
+
+struct TruePairs {
+  std::vector<VertexMotion> vertices;
+  std::vector<Quad> pairs;
+  void add(const PairMotion& motion) {
+    Quad quad;
+    for (int i = 0; i < 4; ++i) {
+      quad[i] = static_cast<Index>(vertices.size());
+      VertexMotion v{};
+      std::copy_n(motion.x[0][i], 3, v.t0);
+      std::copy_n(motion.x[1][i], 3, v.t1);
+      vertices.push_back(v);
+    }
+    pairs.push_back(quad);
+  }
+};
+
+void expectFusedKeepsAll(const TruePairs& truth, PairKind kind, const std::string& what) {
+  std::vector<std::uint32_t> kept(truth.pairs.size());
+  for (const simd::FusedPlanes planes : {simd::FusedPlanes::COORDINATE, simd::FusedPlanes::ADAPTIVE, simd::FusedPlanes::ALL}) {
+    EXPECT_EQ(simd::fusedFilter(truth.vertices[0].t0, truth.pairs[0].data(), truth.pairs.size(),
+                                kind == PairKind::EDGE_EDGE, planes, kept.data()),
+              truth.pairs.size())
+        << what;
+  }
+}
+
+/// Each pair as two groups of one feature, with records over the range of `vertices`.
+void expectLinearKeepsAll(const TruePairs& truth, PairKind kind, const std::string& what) {
+  double low[8], high[8], scale[8];
+  std::fill_n(low, 8, HUGE_VAL);
+  std::fill_n(high, 8, -HUGE_VAL);
+  simd::projectionBounds(truth.vertices[0].t0, truth.vertices.size(), low, high);
+  for (int d = 0; d < 8; ++d) scale[d] = high[d] > low[d] ? simd::RECORD_RANGE / (high[d] - low[d]) : 0;
+  std::vector<std::int16_t> records(truth.vertices.size() * simd::RECORD);
+  simd::quantize(truth.vertices[0].t0, truth.vertices.size(), low, scale, records.data());
+  auto soa = hwy::AllocateAligned<std::int16_t>(2 * simd::SOA_SIZE);
+  auto aos = hwy::AllocateAligned<std::int16_t>(2 * simd::AOS_SIZE);
+  const std::size_t first = kind == PairKind::VERTEX_FACE ? 1 : 2;
+  for (const Quad& quad : truth.pairs) {
+    for (std::size_t side = 0; side < 2; ++side) {
+      const std::size_t arity = side == 0 ? first : 4 - first;
+      std::vector<std::uint32_t> lanes(simd::GROUP * arity, UINT32_MAX);
+      std::copy_n(quad.begin() + (side == 0 ? 0 : first), arity, lanes.begin());
+      simd::buildLeaves(records.data(), lanes.data(), arity, simd::GROUP, nullptr, soa.get() + side * simd::SOA_SIZE,
+                        aos.get() + side * simd::AOS_SIZE);
+    }
+    const std::uint32_t groups[2] = {0, 1};
+    std::uint32_t out[512];
+    std::size_t consumed = 0;
+    const simd::GroupsView view{soa.get(), aos.get()};
+    ASSERT_EQ(simd::testGroupPairs(view, view, groups, 1, false, simd::Diagonal::ALL, false, out, 256, &consumed), 1u)
+        << what << ": the linear filter culls a true contact";
+  }
+}
+
+void expectBoundsHold(const TruePairs& truth, PairKind kind, const std::string& what) {
+  for (const Quad& quad : truth.pairs) {
+    const double bound = linearTocBound(kind, truth.vertices.data(), quad, 0);
+    ASSERT_GE(bound, 0) << what;
+    ASSERT_LE(bound, 1) << what << ": a true contact is said never to be";
+  }
+}
+
+TEST(StepFilters, CullNoTrueContactOfTheQueries) {
+  DEFORMABLE_CCD_REQUIRE_DATA();
+  std::size_t count = 0;
+  for (const QueryFileEntry& file : findQueryFiles(dataDir() + "/ccd_queries")) {
+    TruePairs truth;
+    for (const Query& query : readQueryFile(file.path, file.kind)) {
+      if (query.contact) truth.add(query.motion);
+    }
+    if (truth.pairs.empty()) continue;
+    count += truth.pairs.size();
+    forEachSimdTarget([&](const std::string& target) {
+      expectFusedKeepsAll(truth, file.kind, target + ", " + file.path);
+      expectLinearKeepsAll(truth, file.kind, target + ", " + file.path);
+    });
+    expectBoundsHold(truth, file.kind, file.path);
+  }
+  std::cout << count << " queries in contact\n";
+  EXPECT_GT(count, 1000u);
+}
+
+TEST(StepFilters, CullNoTrueContactOfTheScenes) {
+  DEFORMABLE_CCD_REQUIRE_DATA();
+  for (const char* name : {"cloth-ball", "n-body"}) {
+    const SceneData scene = readScene(name);
+    for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
+      TruePairs truth;
+      truth.vertices = scene.vertices;
+      for (const TruthPair& p : kind == PairKind::VERTEX_FACE ? scene.vertex_face : scene.edge_edge) {
+        if (p.contact) truth.pairs.push_back(p.pair);
+      }
+      forEachSimdTarget([&](const std::string& target) { expectFusedKeepsAll(truth, kind, target + ", " + name); });
+      expectLinearKeepsAll(truth, kind, name);
+      expectBoundsHold(truth, kind, name);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
