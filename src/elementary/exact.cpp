@@ -1,6 +1,7 @@
 #include "elementary/exact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -40,16 +41,9 @@ struct BlockOutput {
   double lo[BLOCK], hi[BLOCK];
 };
 
+/// A pair for which the batched tier has no complete answer.
 ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const BlockOutput& output, std::size_t i,
                         int toc_bits) {
-  switch (output.verdict[i]) {
-    case simd::BATCH_NO:
-      return exact::noContact(Tier::DOUBLE_BATCH);
-    case simd::BATCH_YES:
-      return exact::contactInCell(static_cast<std::int64_t>(output.cell[i]), toc_bits, Tier::DOUBLE_BATCH);
-    default:
-      break;
-  }
   const PairMotion pair = gather(batch.vertices, batch.pairs[pair_index]);
   if (output.verdict[i] == simd::BATCH_YES_BRACKET) {
     const exact::CoplanarityCubic f(batch.kind, pair);
@@ -72,16 +66,26 @@ void ExactTest::run(const PairBatch& batch, ElementaryResult* results, TierCount
   static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
   BlockOutput output;
   simd::BatchInput input;
-  input.vertices = batch.vertices->t0;
+  input.vertices = reinterpret_cast<const double*>(batch.vertices);
   input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
   input.toc_bits = toc_bits_;
+  const ElementaryResult no_contact = exact::noContact(Tier::DOUBLE_BATCH);
+  const double width = std::ldexp(1.0, -toc_bits_);
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
     input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
     input.count = std::min(BLOCK, batch.count - begin);
     simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
     for (std::size_t i = 0; i < input.count; ++i) {
-      results[begin + i] = finish(batch, begin + i, output, i, toc_bits_);
-      ++counters.settled[static_cast<std::size_t>(results[begin + i].tier)];
+      ElementaryResult& result = results[begin + i];
+      if (output.verdict[i] == simd::BATCH_NO) {
+        result = no_contact;
+      } else if (output.verdict[i] == simd::BATCH_YES) {  // inside the step: its cells are below 2^toc_bits
+        const auto cell = static_cast<double>(static_cast<std::int64_t>(output.cell[i]));
+        result = {cell * width, (cell + 1) * width, Verdict::CONTACT, Tier::DOUBLE_BATCH};
+      } else {
+        result = finish(batch, begin + i, output, i, toc_bits_);
+      }
+      ++counters.settled[static_cast<std::size_t>(result.tier)];
     }
   }
 }

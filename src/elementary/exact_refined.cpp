@@ -3,10 +3,10 @@
 // allow. Settles nearly parallel edges, slivers and grazing features.
 //
 // Bounds, with e = 2^-53 and U, V, W as in exact_double_double.cpp. In plain double, f = F0 s^3 + F1 s^2 t + F2 s t^2 +
-// F3 t^3 with F0, F3 within 48 e U V W and F1, F2 within 174 e U V W (each product of three differences: 8 to 10
-// rounding factors, 6 of them in F0 and F3, 18 in F1 and F2). f' = c0 s^2 + 2 c1 s t + c2 t^2, c0 = F1 - 3 F0, c1 =
-// F2 - F1, c2 = 3 F3 - F2: 348 from those, at most 36 U V W in magnitude, so at most 3 * 36 for its own rounding and
-// 6 * 36 for the blossom: 672 e U V W; 1024 is used.
+// F3 t^3 with F0, F3 within 54 e U V W and F1, F2 within 198 e U V W (6 and 18 products of three differences with at
+// most 9 and 11 rounding factors). f' = c0 s^2 + 2 c1 s t + c2 t^2, c0 = F1 - 3 F0, c1 = F2 - F1, c2 = 3 F3 - F2:
+// 396 from those, at most 36 U V W in magnitude, so at most 3 * 36 for their own rounding and 4 * 36 for the blossom:
+// 648 e U V W; 1024 is used.
 // Minors x_i y_j - x_j y_i at t within h of m: 16 e X Y computed, 8 h X Y for moving by h, 4 e X Y for sums of three;
 // with h = 2^-52 = 2 e: 36 e X Y; 48 is used. Underflow is covered by the range that CoplanarityCubic demands.
 #include <algorithm>
