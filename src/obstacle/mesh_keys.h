@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 
 #include "deformable_ccd/types.h"
 #include "obstacle/voxel_surface_impl.h"
@@ -17,6 +18,7 @@ struct alignas(16) KeyLanes {
   void include(const KeyLanes& other) {
     for (int i = 0; i < 8; ++i) lane[i] = other.lane[i] < lane[i] ? other.lane[i] : lane[i];
   }
+  bool operator==(const KeyLanes& other) const { return std::memcmp(lane, other.lane, sizeof lane) == 0; }
   KeyBox box() const {
     KeyBox box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -27,14 +29,12 @@ struct alignas(16) KeyLanes {
   }
 };
 
-/// Keys within `reach_m` of the straight path from p0 to p1, rounded outward. Both points must be finite.
-inline KeyLanes sweptKeys(const Vec3& p0, const Vec3& p1, double inverse_resolution, double reach_m) {
+/// Keys within `reach_m` of a point, rounded outward. The point must be finite.
+inline KeyLanes pointKeys(const Vec3& p, double inverse_resolution, double reach_m) {
   KeyLanes keys{};
   for (int axis = 0; axis < 3; ++axis) {
-    const double lo = p0[axis] < p1[axis] ? p0[axis] : p1[axis];
-    const double hi = p0[axis] < p1[axis] ? p1[axis] : p0[axis];
-    keys.lane[axis] = static_cast<std::int16_t>(outwardKey(lo - reach_m, inverse_resolution, -1) - 32768);
-    keys.lane[4 + axis] = static_cast<std::int16_t>(~(outwardKey(hi + reach_m, inverse_resolution, +1) - 32768));
+    keys.lane[axis] = static_cast<std::int16_t>(outwardKey(p[axis] - reach_m, inverse_resolution, -1) - 32768);
+    keys.lane[4 + axis] = static_cast<std::int16_t>(~(outwardKey(p[axis] + reach_m, inverse_resolution, +1) - 32768));
   }
   return keys;
 }

@@ -15,7 +15,15 @@
 namespace deformable_ccd {
 namespace {
 
-enum VertexState : std::uint8_t { ACTIVE = 1, NEAR = 2, INSIDE = 4 };
+/// What is known of a vertex. The NEAR bits are set by the faces (of a polyline: edges) at it: of what their keys reach.
+enum VertexState : std::uint8_t {
+  ACTIVE = 1,
+  MOVES = 2,
+  NEAR = 4,        ///< some leaf, during the step
+  NEAR_EDGE = 8,   ///< a convex edge, during the step
+  NEAR_START = 16, ///< some leaf, at t=0
+  INSIDE = 32      ///< it touches a leaf at t=0
+};
 
 /// The smallest box around moving points, at t=0, at t=1 and over the step.
 struct MovingBounds {
@@ -42,6 +50,10 @@ MovingBounds boundsOf(const VertexMotion* points, int count) {
 VertexMotion fixedPoint(double x, double y, double z) { return {{x, y, z, 0}, {x, y, z, 0}}; }
 
 double planeOf(const LeafBox& box, int axis, int side) { return side ? box.hi[axis] : box.lo[axis]; }
+
+bool endInside(const VertexMotion* points, const LeafBox& box) {
+  return pointInBox(points[0].t0, box) || pointInBox(points[1].t0, box);
+}
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -83,12 +95,25 @@ struct ObstacleTest::Impl {
 
   bool reachesSurface(const Run& run) const;
   void prepareVertices(const Run& run, const std::uint8_t* vertex_active);
+  /// What the keys of a face or an edge reach, as NEAR bits for its vertices; corner: also a corner.
+  std::uint8_t nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start, bool& corner) const;
   void markNearFaces(const Run& run);
   void markNearEdges(const Run& run);
   void runVertices(const Run& run);
   void runEdges(const Run& run);
   void runFaces(const Run& run);
 
+  /// These add the initial contacts of a feature none of whose own ends touches anything at t=0.
+  bool edgeStartsInside(const Run& run, const Edge& edge);
+  bool faceStartsInside(const Run& run, const Face& face);
+  template <class Feature>
+  void addInitial(const Run& run, PairKind kind, const Feature& feature, std::uint32_t leaf,
+                  std::vector<Contact>& contacts) {
+    Contact contact = contactOf(run, kind, leaf);
+    std::copy(feature.begin(), feature.end(), contact.vertex.begin());
+    setInitial(contact);
+    contacts.push_back(contact);
+  }
   void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
   void vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
   void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, std::uint32_t leaf, bool inside);
@@ -105,19 +130,15 @@ struct ObstacleTest::Impl {
     const Vec3 &a = (*run.t0)[vertex], &b = (*run.t1)[vertex];
     return {{a.x(), a.y(), a.z(), 0}, {b.x(), b.y(), b.z(), 0}};
   }
-  KeyBox edgeKeys(const Edge& edge) const {
-    KeyLanes lanes = keys[edge[0]];
-    lanes.include(keys[edge[1]]);
-    return lanes.box();
-  }
-  KeyBox faceKeys(const Face& face) const {
-    KeyLanes lanes = keys[face[0]];
-    lanes.include(keys[face[1]]);
-    lanes.include(keys[face[2]]);
-    return lanes.box();
+  template <class Feature>
+  static KeyLanes unite(const std::vector<KeyLanes>& of, const Feature& feature) {
+    KeyLanes lanes = of[feature[0]];
+    for (std::size_t i = 1; i < feature.size(); ++i) lanes.include(of[feature[i]]);
+    return lanes;
   }
   /// Fills near_leaves with the leaves that a key box reaches, by key.
   void findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box);
+  static void sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list);
 
   ObstacleOptions options;
   std::unique_ptr<ElementaryTest> test;
@@ -125,10 +146,15 @@ struct ObstacleTest::Impl {
   double toc_limit = 1;   ///< upper bound of the earliest contact so far
   ObstacleBatch vertex_batch, edge_batch, corner_batch;
 
-  std::vector<KeyLanes> keys;
-  std::vector<std::uint8_t> state;  ///< VertexState bits
-  std::vector<Index> near_faces;
-  std::vector<std::uint32_t> near_leaves, moving_leaves;
+  std::vector<KeyLanes> keys;        ///< over the step, as far as the separation
+  std::vector<KeyLanes> start_keys;  ///< at t=0, touching
+  std::vector<std::uint8_t> state;   ///< VertexState bits
+  struct NearFace {
+    Index face;
+    bool corner, start;  ///< corners within reach; leaves at t=0
+  };
+  std::vector<NearFace> near_faces;
+  std::vector<std::uint32_t> near_leaves;
   std::vector<Contact> vertex_contacts, edge_contacts, face_contacts;
 };
 
@@ -170,15 +196,33 @@ bool ObstacleTest::Impl::reachesSurface(const Run& run) const {
 
 void ObstacleTest::Impl::prepareVertices(const Run& run, const std::uint8_t* vertex_active) {
   keys.resize(run.topology->vertexCount());
+  start_keys.resize(run.topology->vertexCount());
   state.assign(run.topology->vertexCount(), 0);
   for (const Index v : run.topology->usedVertices()) {
     const Vec3 &p0 = (*run.t0)[v], &p1 = (*run.t1)[v];
     // x - x is 0 for finite x only.
     const double finite = (p0 - p0).sum() + (p1 - p1).sum();
     if ((vertex_active != nullptr && vertex_active[v] == 0) || !(finite == 0)) continue;
-    keys[v] = sweptKeys(p0, p1, run.surface->inverse_resolution, reach_m);
+    start_keys[v] = pointKeys(p0, run.surface->inverse_resolution, 0);
+    if (reach_m > 0) {
+      keys[v] = pointKeys(p0, run.surface->inverse_resolution, reach_m);
+    } else {
+      keys[v] = start_keys[v];
+    }
     state[v] = ACTIVE;
+    // With a separation what rests may be too close; without one, what rests can only touch at t=0.
+    if (reach_m > 0 || p0 != p1) state[v] |= MOVES;
+    if (p0 != p1) keys[v].include(pointKeys(p1, run.surface->inverse_resolution, reach_m));
   }
+}
+
+std::uint8_t ObstacleTest::Impl::nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start,
+                                          bool& corner) const {
+  const VoxelTree::Reached reached = run.surface->tree.reached(swept.box());
+  corner = reached.corner;
+  if (!reached.leaf) return 0;
+  const bool at_start = start == swept || run.surface->tree.reached(start.box()).leaf;
+  return NEAR | (reached.edge ? NEAR_EDGE : 0) | (at_start ? NEAR_START : 0);
 }
 
 void ObstacleTest::Impl::markNearFaces(const Run& run) {
@@ -186,30 +230,39 @@ void ObstacleTest::Impl::markNearFaces(const Run& run) {
   const std::vector<Face>& faces = run.topology->faces();
   for (std::size_t f = 0; f < faces.size(); ++f) {
     const Face& face = faces[f];
-    const bool active = state[face[0]] & state[face[1]] & state[face[2]] & ACTIVE;
-    if (active) {
-      if (!run.surface->tree.anyLeaf(faceKeys(face))) continue;
-      near_faces.push_back(static_cast<Index>(f));
-    }
     // The other features of a face with an inactive vertex are looked at themselves.
-    for (const Index v : face) state[v] |= NEAR;
+    std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
+    if (state[face[0]] & state[face[1]] & state[face[2]] & ACTIVE) {
+      bool corner = false;
+      bits = nearBits(run, unite(keys, face), unite(start_keys, face), corner);
+      if (bits == 0) continue;
+      const bool start = (bits & NEAR_START) != 0;
+      if (corner || start) near_faces.push_back({static_cast<Index>(f), corner, start});
+    }
+    for (const Index v : face) state[v] |= bits;
   }
 }
 
 void ObstacleTest::Impl::markNearEdges(const Run& run) {
+  near_faces.clear();
   for (const Edge& edge : run.topology->edges()) {
-    const bool active = state[edge[0]] & state[edge[1]] & ACTIVE;
-    if (active && !run.surface->tree.anyLeaf(edgeKeys(edge))) continue;
-    for (const Index v : edge) state[v] |= NEAR;
+    std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
+    bool corner = false;
+    if (state[edge[0]] & state[edge[1]] & ACTIVE) bits = nearBits(run, unite(keys, edge), unite(start_keys, edge), corner);
+    for (const Index v : edge) state[v] |= bits;
   }
 }
 
 void ObstacleTest::Impl::findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box) {
   near_leaves.clear();
   surface.tree.visitLeaves(box, [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
-  if (near_leaves.size() < 2) return;
+  sortLeaves(surface, near_leaves);
+}
+
+void ObstacleTest::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list) {
+  if (list.size() < 2) return;
   const std::vector<OccupiedLeaf>& leaves = surface.tree.leaves();
-  std::sort(near_leaves.begin(), near_leaves.end(),
+  std::sort(list.begin(), list.end(),
             [&leaves](std::uint32_t a, std::uint32_t b) { return leaves[a].min < leaves[b].min; });
 }
 
@@ -220,25 +273,25 @@ void ObstacleTest::Impl::runVertices(const Run& run) {
     if ((state[v] & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
     findLeaves(*run.surface, keys[v].box());
     if (near_leaves.empty()) continue;
+    run.stats->vertex_pairs_in += near_leaves.size();
     const double* p0 = (*run.t0)[v].data();
-    moving_leaves.clear();
+    std::size_t apart = 0;
     for (const std::uint32_t leaf : near_leaves) {
       if (!pointInBox(p0, leafBox(run.surface->tree.leaves()[leaf], resolution))) {
-        if (run.surface->features[leaf] & FACE_MASK) moving_leaves.push_back(leaf);
+        near_leaves[apart++] = leaf;
         continue;
       }
       state[v] |= INSIDE;
-      Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
-      contact.vertex[0] = v;
-      setInitial(contact);
-      vertex_contacts.push_back(contact);
+      addInitial(run, PairKind::VERTEX_VOXEL_FACE, std::array<Index, 1>{v}, leaf, vertex_contacts);
     }
-    run.stats->vertex_pairs_in += near_leaves.size();
-    for (const std::uint32_t leaf : moving_leaves) {
+    if (!(state[v] & MOVES)) continue;
+    const bool inside = (state[v] & INSIDE) != 0;
+    for (std::size_t i = 0; i < apart; ++i) {
+      if (!(run.surface->features[near_leaves[i]] & FACE_MASK)) continue;
       if (options.minimum_separation_m > 0) {
-        vertexSeparation(run, v, leaf, (state[v] & INSIDE) != 0);
+        vertexSeparation(run, v, near_leaves[i], inside);
       } else {
-        vertexPath(run, v, leaf, (state[v] & INSIDE) != 0);
+        vertexPath(run, v, near_leaves[i], inside);
       }
     }
   }
@@ -308,35 +361,33 @@ void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uin
 
 void ObstacleTest::Impl::runEdges(const Run& run) {
   edge_contacts.clear();
-  const double resolution = run.surface->resolution_m;
   for (const Edge& edge : run.topology->edges()) {
-    constexpr std::uint8_t WANTED = ACTIVE | NEAR;
-    if ((state[edge[0]] & state[edge[1]] & WANTED) != WANTED) continue;
-    findLeaves(*run.surface, edgeKeys(edge));
+    const std::uint8_t both = state[edge[0]] & state[edge[1]], either = state[edge[0]] | state[edge[1]];
+    if ((both & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
+    bool inside = (either & INSIDE) != 0;
+    // What starts inside at an end is known by that end.
+    if (!inside && (both & NEAR_START)) inside = edgeStartsInside(run, edge);
+    if (!(both & NEAR_EDGE) || !(either & MOVES)) continue;
+    near_leaves.clear();
+    run.surface->tree.visitLeavesWithEdges(unite(keys, edge).box(),
+                                           [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
     if (near_leaves.empty()) continue;
     run.stats->edge_pairs_in += near_leaves.size();
-    const double *a = (*run.t0)[edge[0]].data(), *b = (*run.t0)[edge[1]].data();
-    bool inside = ((state[edge[0]] | state[edge[1]]) & INSIDE) != 0;
-    moving_leaves.clear();
-    for (const std::uint32_t leaf : near_leaves) {
-      const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], resolution);
-      // What touches at an end is the vertex's initial contact.
-      if (inside && (pointInBox(a, box) || pointInBox(b, box))) continue;
-      if (segmentMeetsBox(a, b, box)) {
-        inside = true;
-        Contact contact = contactOf(run, PairKind::EDGE_VOXEL_EDGE, leaf);
-        contact.vertex[0] = edge[0];
-        contact.vertex[1] = edge[1];
-        setInitial(contact);
-        edge_contacts.push_back(contact);
-      } else if (run.surface->features[leaf] & EDGE_MASK) {
-        moving_leaves.push_back(leaf);
-      }
-    }
-    if (moving_leaves.empty()) continue;
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
-    for (const std::uint32_t leaf : moving_leaves) edgePairs(run, edge, points, leaf, inside);
+    for (const std::uint32_t leaf : near_leaves) edgePairs(run, edge, points, leaf, inside);
   }
+}
+
+bool ObstacleTest::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
+  findLeaves(*run.surface, unite(start_keys, edge).box());
+  bool inside = false;
+  for (const std::uint32_t leaf : near_leaves) {
+    const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+    if (!segmentMeetsBox((*run.t0)[edge[0]].data(), (*run.t0)[edge[1]].data(), box)) continue;
+    inside = true;
+    addInitial(run, PairKind::EDGE_VOXEL_EDGE, edge, leaf, edge_contacts);
+  }
+  return inside;
 }
 
 void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, std::uint32_t leaf,
@@ -368,6 +419,11 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
       low[b] = high[b] = planeOf(box, b, side_b);
       low[c] = high[c] = planeOf(box, c, side_c);
       if (reach_m == 0 && edgeMissesLine(points[0], points[1], low, axis)) continue;
+      if (segmentMeetsBox(points[0].t0, points[1].t0, box)) {
+        // What touches at an end is the vertex's contact. Pairs that edgeStartsInside() found are joined with it later.
+        if (!endInside(points, box)) addInitial(run, PairKind::EDGE_VOXEL_EDGE, edge, leaf, edge_contacts);
+        return;
+      }
       ObstaclePair pair{contactOf(run, PairKind::EDGE_VOXEL_EDGE, leaf), {0, 0, 0}, inside};
       pair.contact.vertex[0] = edge[0];
       pair.contact.vertex[1] = edge[1];
@@ -382,29 +438,35 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
 
 void ObstacleTest::Impl::runFaces(const Run& run) {
   face_contacts.clear();
-  const double resolution = run.surface->resolution_m;
-  for (const Index f : near_faces) {
-    const Face& face = run.topology->faces()[f];
-    findLeaves(*run.surface, faceKeys(face));
+  for (const NearFace& near : near_faces) {
+    const Face& face = run.topology->faces()[near.face];
+    const std::uint8_t any = state[face[0]] | state[face[1]] | state[face[2]];
+    bool inside = (any & INSIDE) != 0;
+    if (!inside && near.start) inside = faceStartsInside(run, face);
+    if (!near.corner || !(any & MOVES)) continue;
+    near_leaves.clear();
+    run.surface->tree.visitLeavesWithCorners(unite(keys, face).box(),
+                                             [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
     run.stats->corner_pairs_in += near_leaves.size();
-    const double *p0 = (*run.t0)[face[0]].data(), *p1 = (*run.t0)[face[1]].data(), *p2 = (*run.t0)[face[2]].data();
-    bool inside = ((state[face[0]] | state[face[1]] | state[face[2]]) & INSIDE) != 0;
-    moving_leaves.clear();
-    for (const std::uint32_t leaf : near_leaves) {
-      const TriangleStart start =
-          triangleMeetsBox(p0, p1, p2, leafBox(run.surface->tree.leaves()[leaf], resolution));
-      inside = inside || start != TriangleStart::APART;
-      if (start == TriangleStart::APART && (run.surface->features[leaf] & CORNER_MASK)) moving_leaves.push_back(leaf);
-      if (start != TriangleStart::INTERIOR) continue;  // on the boundary it is an edge's or a vertex's contact
-      Contact contact = contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf);
-      std::copy(face.begin(), face.end(), contact.vertex.begin());
-      setInitial(contact);
-      face_contacts.push_back(contact);
-    }
-    if (moving_leaves.empty()) continue;
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
-    for (const std::uint32_t leaf : moving_leaves) cornerPairs(run, face, points, leaf, inside);
+    for (const std::uint32_t leaf : near_leaves) cornerPairs(run, face, points, leaf, inside);
   }
+}
+
+bool ObstacleTest::Impl::faceStartsInside(const Run& run, const Face& face) {
+  findLeaves(*run.surface, unite(start_keys, face).box());
+  const double *p0 = (*run.t0)[face[0]].data(), *p1 = (*run.t0)[face[1]].data(), *p2 = (*run.t0)[face[2]].data();
+  std::size_t pierced = 0;
+  for (const std::uint32_t leaf : near_leaves) {
+    const TriangleStart start =
+        triangleMeetsBox(p0, p1, p2, leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m));
+    if (start == TriangleStart::BOUNDARY) return true;  // known by an edge of the face
+    if (start == TriangleStart::INTERIOR) near_leaves[pierced++] = leaf;
+  }
+  for (std::size_t i = 0; i < pierced; ++i) {
+    addInitial(run, PairKind::FACE_VOXEL_CORNER, face, near_leaves[i], face_contacts);
+  }
+  return pierced > 0;
 }
 
 void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points, std::uint32_t leaf,
@@ -427,6 +489,11 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
     if (toc_bound > 1) continue;
     const double corner[3] = {planeOf(box, 0, x), planeOf(box, 1, y), planeOf(box, 2, z)};
     if (reach_m == 0 && triangleMissesPoint(points[0], points[1], points[2], corner)) continue;
+    if (inside) {
+      const TriangleStart start = triangleMeetsBox(points[0].t0, points[1].t0, points[2].t0, box);
+      if (start == TriangleStart::INTERIOR) addInitial(run, PairKind::FACE_VOXEL_CORNER, face, leaf, face_contacts);
+      if (start != TriangleStart::APART) return;
+    }
     ObstaclePair pair{contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf),
                       {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
     std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
@@ -496,7 +563,6 @@ void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, co
     if (topology.hasFaces()) {
       impl.markNearFaces(run);
     } else {
-      impl.near_faces.clear();
       impl.markNearEdges(run);
     }
     impl.runVertices(run);

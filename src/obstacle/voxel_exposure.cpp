@@ -53,7 +53,7 @@ void blockFeatures(const VoxelTree::Node& node, const std::array<std::uint64_t, 
 }
 
 /// Leaves of one and two voxels, a level 1 node (16 voxels a side) at a time.
-void smallLeaves(const VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>& masks) {
+void smallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>& masks) {
   const VoxelTree::Node& parent = tree.nodes(1)[index];
   if (parent.child == 0) return;
   const std::array<std::uint16_t, 3>& at = tree.nodeCell(1, index);
@@ -81,6 +81,8 @@ void smallLeaves(const VoxelTree& tree, std::uint32_t index, std::vector<Feature
       exposed[d] = node.full & ~neighbourBits(node.full, block, d);
     }
     blockFeatures(node, exposed, masks);
+    const std::uint64_t x = exposed[0] | exposed[1], y = exposed[2] | exposed[3], z = exposed[4] | exposed[5];
+    tree.setFeatureCells(0, parent.childAt(bit), (x & y) | (y & z) | (z & x), x & y & z);
   }
 }
 
@@ -155,15 +157,31 @@ FeatureMask largeLeaf(const VoxelTree& tree, const OccupiedLeaf& leaf) {
   return mask;
 }
 
+/// Cells of leaves of four voxels and more: all of a leaf's cells stand for its edges and corners.
+void markFeatureCells(VoxelTree& tree, int level, std::uint32_t index, const std::vector<FeatureMask>& masks) {
+  const VoxelTree::Node& node = tree.nodes(level)[index];
+  std::uint64_t edges = 0, corners = 0;
+  for (std::uint64_t bits = node.full; bits != 0; bits &= bits - 1) {
+    const FeatureMask mask = masks[node.leafAt(lowestBit(bits))];
+    const std::uint64_t cell = bits & (~bits + 1);
+    if (mask & EDGE_MASK) edges |= cell;
+    if (mask & CORNER_MASK) corners |= cell;
+  }
+  tree.setFeatureCells(level, index, edges, corners);
+}
+
 }  // namespace
 
 FeatureMask featuresOfFaces(unsigned exposed_faces) { return FEATURES_OF_FACES[exposed_faces & 63]; }
 
-std::vector<FeatureMask> exposedFeatures(const VoxelTree& tree) {
+std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
   std::vector<FeatureMask> masks(tree.leaves().size(), 0);
   for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node) smallLeaves(tree, node, masks);
   for (std::size_t leaf = tree.firstLeafOfLevel(1); leaf < masks.size(); ++leaf) {
     masks[leaf] = largeLeaf(tree, tree.leaves()[leaf]);
+  }
+  for (int level = 1; level < VoxelTree::LEVELS; ++level) {
+    for (std::uint32_t index = 0; index < tree.nodes(level).size(); ++index) markFeatureCells(tree, level, index, masks);
   }
   return masks;
 }

@@ -27,6 +27,7 @@ FeatureMask featuresOfFaces(unsigned exposed_faces);
 
 /// One mask for each leaf, in the tree's order. Where the neighbours are smaller than the leaf, a face that is exposed
 /// anywhere counts whole, and so does an edge or a corner that counts somewhere: a superset, never less.
-std::vector<FeatureMask> exposedFeatures(const VoxelTree& tree);
+/// Also tells the tree which cells hold edges and corners.
+std::vector<FeatureMask> exposedFeatures(VoxelTree& tree);
 
 }  // namespace deformable_ccd

@@ -27,6 +27,8 @@ class VoxelTree {
     std::uint64_t full = 0;    ///< cells covered by a leaf of this node
     std::uint64_t start = 0;   ///< first cell of each of those leaves
     std::uint64_t child = 0;   ///< cells that are a node of the level below
+    std::uint64_t edges = 0;   ///< cells at which a convex edge of their leaf may lie
+    std::uint64_t corners = 0; ///< the same of its exposed corners
     std::uint32_t first_leaf = 0;
     std::uint32_t first_child = 0;
     std::uint32_t leafAt(unsigned bit) const {
@@ -44,6 +46,11 @@ class VoxelTree {
   /// In the tree's order: by level, then by Morton code.
   const std::vector<OccupiedLeaf>& leaves() const { return leaves_; }
   const std::vector<Node>& nodes(int level) const { return levels_[level].nodes; }
+  /// Where convex edges and corners lie, for queries that want nothing else. Set once, when they are known.
+  void setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners) {
+    levels_[level].nodes[node].edges |= edges;
+    levels_[level].nodes[node].corners |= corners;
+  }
   /// Node coordinates, in units of the node's own size.
   const std::array<std::uint16_t, 3>& nodeCell(int level, std::uint32_t node) const {
     return levels_[level].cells[node];
@@ -60,9 +67,17 @@ class VoxelTree {
   /// Calls visit(leaf index) once for every leaf with a voxel in the box, in an order fixed by the tree.
   template <class Visit>
   void visitLeaves(const KeyBox& box, Visit&& visit) const;
+  /// Only those with a cell of theirs in the box that may hold a convex edge, or a corner.
+  template <class Visit>
+  void visitLeavesWithEdges(const KeyBox& box, Visit&& visit) const;
+  template <class Visit>
+  void visitLeavesWithCorners(const KeyBox& box, Visit&& visit) const;
 
-  /// Does any leaf have a voxel in the box?
-  bool anyLeaf(const KeyBox& box) const;
+  /// What the box reaches.
+  struct Reached {
+    bool leaf = false, edge = false, corner = false;
+  };
+  Reached reached(const KeyBox& box) const;
 
  private:
   struct Level {
@@ -76,6 +91,8 @@ class VoxelTree {
   void buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);
 
+  template <class Visit>
+  static void visitBits(const Node& node, std::uint64_t bits, Visit& visit);
   /// Calls visit(node, bits) for each node with leaves in the box, bits being their cells there, until it returns true.
   template <class Visit>
   bool visitNodes(const KeyBox& box, Visit&& visit) const;
@@ -141,6 +158,12 @@ bool VoxelTree::descend(int level, const Node& node, const std::array<std::int32
 
 template <class Visit>
 bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
+  const auto within = [&box](int axis) { return box.lo[axis] >> 4 == box.hi[axis] >> 4; };
+  if (levels_with_leaves_ < 4 && within(0) && within(1) && within(2)) {  // the common case: small box, small leaves
+    const std::uint32_t index = find(1, box.lo[0] >> 4, box.lo[1] >> 4, box.lo[2] >> 4);
+    if (index == NONE) return false;
+    return descend(1, levels_[1].nodes[index], {box.lo[0] & ~15, box.lo[1] & ~15, box.lo[2] & ~15}, box, visit);
+  }
   // Start where the box spans two nodes an axis at most; above that only the leaves of the nodes themselves matter.
   int start = 1;
   const auto spans = [&box](int level, int axis) {
@@ -172,20 +195,48 @@ bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
 }
 
 template <class Visit>
+void VoxelTree::visitBits(const Node& node, std::uint64_t bits, Visit& visit) {
+  std::uint32_t last = NONE;
+  for (; bits != 0; bits &= bits - 1) {
+    const std::uint32_t leaf = node.leafAt(lowestBit(bits));
+    if (leaf != last) visit(leaf);
+    last = leaf;
+  }
+}
+
+template <class Visit>
 void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
   visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
-    std::uint32_t last = NONE;
-    for (; bits != 0; bits &= bits - 1) {
-      const std::uint32_t leaf = node.leafAt(lowestBit(bits));
-      if (leaf != last) visit(leaf);
-      last = leaf;
-    }
+    visitBits(node, bits, visit);
     return false;
   });
 }
 
-inline bool VoxelTree::anyLeaf(const KeyBox& box) const {
-  return visitNodes(box, [](const Node&, std::uint64_t) { return true; });
+template <class Visit>
+void VoxelTree::visitLeavesWithEdges(const KeyBox& box, Visit&& visit) const {
+  visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
+    visitBits(node, bits & node.edges, visit);
+    return false;
+  });
+}
+
+template <class Visit>
+void VoxelTree::visitLeavesWithCorners(const KeyBox& box, Visit&& visit) const {
+  visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
+    visitBits(node, bits & node.corners, visit);
+    return false;
+  });
+}
+
+inline VoxelTree::Reached VoxelTree::reached(const KeyBox& box) const {
+  Reached found;
+  visitNodes(box, [&found](const Node& node, std::uint64_t bits) {
+    found.leaf = true;
+    found.edge = found.edge || (bits & node.edges) != 0;
+    found.corner = found.corner || (bits & node.corners) != 0;
+    return found.corner && found.edge;
+  });
+  return found;
 }
 
 }  // namespace deformable_ccd
