@@ -12,8 +12,9 @@
 //   n.w_ij(t), n taken as exact: 3 more factors: error <= 6 eps |n|_1 M             (SEPARATION_ERROR, rounded up)
 //   |n|: sqrt of a sum of three squares, at most 3 eps relative                     (LENGTH_ERROR, rounded up)
 //   The connecting vectors n = w - beta u - gamma v and (w - u) - s (v - u), for exact beta, gamma, s: at most 6 factors
-//   on each of at most four terms: 24 eps M a component; beta + gamma may exceed 1 by eps: 1 eps M more. So the true
-//   vector between those two points is at most |n| (1 + 3 eps) + sqrt(3) 25 eps M long   (POINT_ERROR, rounded up)
+//   on each of at most four terms: 24 eps M a component; a second correction of s, and beta + gamma beyond 1, are worth
+//   a few eps M more. So the true vector between those two points is at most |n| (1 + 3 eps) + sqrt(3) 30 eps M long
+//                                                                                   (POINT_ERROR, rounded up)
 // Underflow: lengths below SMALLEST are not trusted, and far above what underflowing products add.
 #include "elementary/conservative_advance.h"
 
@@ -27,14 +28,17 @@ namespace {
 constexpr double EPS = 0x1p-53;
 constexpr double SEPARATION_ERROR = 6.5 * EPS;
 constexpr double LENGTH_ERROR = 8 * EPS;
-constexpr double POINT_ERROR = 48 * EPS;
+constexpr double POINT_ERROR = 64 * EPS;
 constexpr double SMALLEST = 1e-140;
-constexpr double LARGEST = 1e140;
+constexpr double LARGEST = 1e70;  ///< products of four lengths stay finite
 
 struct Vec {
   double x, y, z;
 };
 Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec cross(const Vec& a, const Vec& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 Vec operator+(const Vec& a, const Vec& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 Vec operator*(double s, const Vec& a) { return {s * a.x, s * a.y, s * a.z}; }
 double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -79,51 +83,63 @@ Differences differencesOf(PairKind kind, const Corners& x) {
   return r;
 }
 
-double clamp01(double s) { return s > 0 ? std::min(s, 1.0) : 0; }  // NaN gives 0
+/// About the shortest vector from the one feature to the other: `vector` connects points of theirs (see POINT_ERROR).
+/// `direction`, of length about 1, is the same, but as nearly perpendicular to what it connects as doubles allow: where
+/// the features are close, the vector itself is mostly rounding error.
+struct Connection {
+  Vec vector, direction;
+  double square;
+};
 
-/// The better of two connecting vectors.
-void keepShorter(Vec& best, double& best_square, const Vec& candidate) {
-  const double square = dot(candidate, candidate);
-  if (square < best_square) {
-    best = candidate;
-    best_square = square;
-  }
+Connection connection(const Vec& vector, const Vec& direction) {
+  const double length_of_direction = length(direction);
+  return {vector, length_of_direction > 0 ? (1 / length_of_direction) * direction : vector, dot(vector, vector)};
 }
 
-/// The shortest vector from segment 0..u to the point w.
-Vec fromSegment(const Vec& w, const Vec& u) { return w - clamp01(dot(u, w) / dot(u, u)) * u; }
-
-/// About the shortest vector from the triangle 0, u, v to the point w; always one that connects the two (see POINT_ERROR).
-Vec fromTriangle(const Vec& u, const Vec& v, const Vec& w) {
-  const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uw = dot(u, w), vw = dot(v, w);
-  const double determinant = uu * vv - uv * uv;
-  const double beta = (vv * uw - uv * vw) / determinant, gamma = (uu * vw - uv * uw) / determinant;
-  const bool inside = beta >= 0 && gamma >= 0 && beta + gamma <= 1;
-  const bool sliver = !(determinant > 1e-10 * uu * vv);
-  if (inside && !sliver) return (w - beta * u) - gamma * v;
-  Vec best = fromSegment(w, u);
-  double square = dot(best, best);
-  keepShorter(best, square, fromSegment(w, v));
-  keepShorter(best, square, fromSegment(w - u, v - u));
-  if (inside) keepShorter(best, square, (w - beta * u) - gamma * v);
-  return best;
+/// From the segment 0..u to the point w.
+Connection fromSegment(const Vec& w, const Vec& u) {
+  const double uu = dot(u, u), s = dot(u, w) / uu;
+  if (!(s > 0)) return connection(w, w);  // also where u = 0
+  if (s >= 1) return connection(w - u, w - u);
+  Vec n = w - s * u;
+  n = n - (dot(n, u) / uu) * u;
+  return connection(n, n);
 }
 
-/// About the shortest vector from segment 0..u to segment w..w+v.
-Vec betweenSegments(const Vec& u, const Vec& v, const Vec& w) {
-  const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uw = dot(u, w), vw = dot(v, w);
-  const double determinant = uu * vv - uv * uv;
-  const double s = (vv * uw - uv * vw) / determinant, r = (uv * uw - uu * vw) / determinant;
-  const bool inside = s >= 0 && s <= 1 && r >= 0 && r <= 1;
-  const bool parallel = !(determinant > 1e-10 * uu * vv);
-  if (inside && !parallel) return (w - s * u) + r * v;
-  Vec best = fromSegment(w, u);
-  double square = dot(best, best);
-  keepShorter(best, square, fromSegment(w + v, u));
-  keepShorter(best, square, w + clamp01(-vw / vv) * v);
-  keepShorter(best, square, (w - u) + clamp01((uv - vw) / vv) * v);
-  if (inside) keepShorter(best, square, (w - s * u) + r * v);
-  return best;
+Connection shorter(const Connection& a, const Connection& b) { return b.square < a.square ? b : a; }
+
+/// Inside both features: perpendicular to u and v, on the side of w.
+Connection inside(const Vec& vector, const Vec& normal, const Vec& w) {
+  return connection(vector, dot(normal, w) < 0 ? -1 * normal : normal);
+}
+
+/// Cross products of vectors at less than this angle squared are mostly rounding error.
+constexpr double PARALLEL = 1e-22;
+
+/// From the triangle 0, u, v to the point w.
+Connection fromTriangle(const Vec& u, const Vec& v, const Vec& w) {
+  const Vec n = cross(u, v);  // not the Gram matrix: its determinant loses twice as many digits
+  const double nn = dot(n, n), beta = dot(cross(w, v), n) / nn, gamma = dot(cross(u, w), n) / nn;
+  const bool is_inside = beta >= 0 && gamma >= 0 && beta + gamma <= 1;
+  const Connection face = inside((w - beta * u) - gamma * v, n, w);
+  if (is_inside && nn > PARALLEL * (dot(u, u) * dot(v, v))) return face;
+  const Connection border = shorter(shorter(fromSegment(w, u), fromSegment(w, v)), fromSegment(w - u, v - u));
+  return is_inside ? shorter(border, face) : border;
+}
+
+Connection reversed(const Connection& c) { return {-1 * c.vector, -1 * c.direction, c.square}; }
+
+/// From the segment 0..u to the segment w..w+v.
+Connection betweenSegments(const Vec& u, const Vec& v, const Vec& w) {
+  const Vec n = cross(u, v);
+  const double nn = dot(n, n), s = dot(cross(w, v), n) / nn, r = dot(cross(w, u), n) / nn;
+  const bool is_inside = s >= 0 && s <= 1 && r >= 0 && r <= 1;
+  const Connection crossing = inside((w - s * u) + r * v, n, w);
+  if (is_inside && nn > PARALLEL * (dot(u, u) * dot(v, v))) return crossing;
+  const Connection border =
+      shorter(shorter(fromSegment(w, u), fromSegment(w + v, u)),
+              reversed(shorter(fromSegment(-1 * w, v), fromSegment(u - w, v))));
+  return is_inside ? shorter(border, crossing) : border;
 }
 
 /// The n.w_ij: at some time and at the end of the step.
@@ -178,12 +194,14 @@ ElementaryResult advance(PairKind kind, const Corners& corners, const Limits& li
   double t = 0;
   for (int step = 0; step < limits.max_steps; ++step) {
     const Vec u = pair.u.at(t), v = pair.v.at(t), w = pair.w[0].at(t);
-    const Vec n = kind == PairKind::VERTEX_FACE ? fromTriangle(u, v, w) : betweenSegments(u, v, w);
-    const double n_length = length(n) * (1 + LENGTH_ERROR);
-    if (n_length + (POINT_ERROR * pair.largest + SMALLEST) <= near * (1 - LENGTH_ERROR)) {
+    const Connection shortest = kind == PairKind::VERTEX_FACE ? fromTriangle(u, v, w) : betweenSegments(u, v, w);
+    const double distance = length(shortest.vector) * (1 + LENGTH_ERROR);
+    if (distance + (POINT_ERROR * pair.largest + SMALLEST) <= near * (1 - LENGTH_ERROR)) {
       return resultOf(Verdict::CONTACT, t);
     }
-    if (!(n_length > SMALLEST)) break;
+    if (!(distance > SMALLEST)) break;
+    const Vec& n = shortest.direction;
+    const double n_length = length(n) * (1 + LENGTH_ERROR);
     // Strictly more than d|n| for certain, at t and at the next time, and so in between.
     const double error = SEPARATION_ERROR * sumOfAbs(n) * pair.largest * (1 + LENGTH_ERROR);
     const double bound = limits.minimum_separation_m * n_length * (1 + LENGTH_ERROR) + error;
