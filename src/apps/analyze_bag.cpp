@@ -1,0 +1,136 @@
+// analyze_bag IN.bag [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a master.
+#include "ros/output_messages.h"
+
+#include <rosbag/bag.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "deformable_ccd/simd_target.h"
+#include "io/report.h"
+#include "ros/bag_replay.h"
+
+namespace {
+
+using namespace deformable_ccd;
+
+struct Arguments {
+  std::string bag, out, report, params, octomap, accuracy, mesh;
+  int threads = 0;
+  bool no_rungs = false, quiet = false;
+};
+
+MonitorConfig configure(const Arguments& a) {
+  XmlRpc::XmlRpcValue tree;
+  if (!a.params.empty()) tree = readYaml(a.params);
+  if (a.params.empty() || !tree.hasMember("bodies")) {
+    const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag) : a.mesh;
+    if (!topic.empty() && !(tree.valid() && tree.hasMember("topic"))) tree["topic"] = topic;
+  }
+  if (!a.accuracy.empty()) tree["accuracy"] = a.accuracy;
+  if (a.threads > 0) tree["num_threads"] = a.threads;
+  return readConfig(tree, a.params.empty() ? "--" : a.params + ": ");
+}
+
+// The input's messages with the results between them, as the node would have published them.
+class ResultBag {
+ public:
+  explicit ResultBag(const std::string& path) : bag_(path, rosbag::bagmode::Write) { bag_.setCompression(rosbag::CompressionType::LZ4); }
+  void copy(const rosbag::MessageInstance& m) { bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader()); }
+  void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
+    const std::string& frame = pipeline.fixedFrame();
+    StatsContext context;
+    context.frames = pipeline.monitor().total();
+    context.weld_changes = pipeline.weldChanges();
+    context.parameter_hash = pipeline.config().hash;
+    bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
+    bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
+    if (outcome.answered) bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, frame));
+  }
+
+ private:
+  rosbag::Bag bag_;
+};
+
+std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config, const BagReplayOptions& options) {
+  std::vector<std::string> names{"screen", "fast", "conservative", "exact"};
+  double separation = config.minimum_separation_m;
+  for (const BodyConfig& b : config.bodies) separation = std::max(separation, b.body.minimum_separation_m);
+  if (separation > 0) names = {"screen", "conservative"};  // the others cannot hold a distance
+  std::vector<ContactLog> logs;
+  for (const std::string& name : names) {
+    MonitorConfig one = config;
+    one.monitor.detector.accuracy.rung = accuracyFromString(name.c_str());
+    one.monitor.detector.step_budget_ms = 0;
+    one.monitor.max_contacts = std::numeric_limits<std::size_t>::max();
+    if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
+    logs.emplace_back();
+    BagReplay(a.bag, one, options).run([&](const StepOutcome& o, MonitorPipeline&, const ros::Time&) { logs.back().add(o); });
+  }
+  std::vector<RungCost> rungs;
+  for (std::size_t i = 0; i < names.size(); ++i) rungs.push_back(logs[i].against(logs.back(), names[i]));
+  return rungs;
+}
+
+int analyze(const Arguments& a) {
+  const MonitorConfig config = configure(a);
+  setSimdTarget(config.simd_target);
+  BagReplayOptions options;
+  options.octomap_file = a.octomap;
+  options.show_progress = !a.quiet;
+  BagReplay replay(a.bag, config, options);
+  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out);
+  Report report(a.report);
+  std::string frame;
+  const BagReplaySummary summary = replay.run(
+      [&](const StepOutcome& outcome, MonitorPipeline& pipeline, const ros::Time& at) {
+        report.add(outcome, pipeline.monitor().bodies());
+        frame = pipeline.fixedFrame();
+        if (out) out->add(outcome, pipeline, at);
+      },
+      [&](const rosbag::MessageInstance& m) { if (out) out->copy(m); });
+  report.setEffects(summary.effects);
+  report.setCounters(summary.frames);
+  std::string topics;
+  for (const std::string& t : summary.mesh_topics) topics += (topics.empty() ? "" : ", ") + (t.empty() ? "(rigid)" : t);
+  std::vector<std::pair<std::string, std::string>> facts{
+      {"bag", a.bag}, {"mesh topics", topics}, {"fixed frame", frame}, {"duration", std::to_string(summary.duration_s) + " s"},
+      {"mesh messages", std::to_string(summary.mesh_messages)}, {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
+      {"accuracy", toString(config.monitor.detector.accuracy.rung)}, {"threads", std::to_string(config.monitor.detector.num_threads)},
+      {"SIMD target", simdTarget()}};
+  for (const std::string& c : summary.complaints) facts.push_back({"refused", c});
+  report.setFacts(std::move(facts));
+  if (!a.no_rungs) report.setRungs(otherRungs(a, config, options));
+  report.finish();
+  std::cout << report.headline() << '\n'
+            << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
+            << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
+            << "report: " << a.report << "/report.html\n";
+  for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: refused: " << c << '\n';
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Contacts of a recorded run, with a report"};
+  Arguments a;
+  app.add_option("BAG", a.bag, "bag to analyse")->required()->check(CLI::ExistingFile);
+  app.add_option("-o,--output", a.out, "write a bag with the input and the results");
+  app.add_option("--report", a.report, "folder for the report")->required();
+  app.add_option("--params", a.params, "YAML file with the node's parameters")->check(CLI::ExistingFile);
+  app.add_option("--mesh", a.mesh, "mesh topic; without parameters the first one of the bag is taken");
+  app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
+  app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact");
+  app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
+  app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
+  app.add_flag("--quiet", a.quiet, "no progress");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return analyze(a);
+  } catch (const std::exception& e) {
+    std::cerr << "analyze_bag: " << e.what() << '\n';
+    return 1;
+  }
+}

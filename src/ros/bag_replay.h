@@ -1,0 +1,56 @@
+// A bag through the monitor without a master: the same pipeline as the node's, driven by the bag's clock, nothing dropped.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <ros/time.h>
+#include <rosbag/bag.h>
+
+#include "ros/map_loader.h"
+#include "ros/monitor_pipeline.h"
+
+namespace deformable_ccd {
+
+struct BagReplayOptions {
+  std::string octomap_file;  ///< instead of the bag's maps; empty: none
+  bool show_progress = false;
+};
+
+/// What a replay met besides outcomes.
+struct BagReplaySummary {
+  std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
+  std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0, transforms = 0;
+  std::vector<std::string> complaints;   ///< refused messages, each kind once
+  FrameCounters frames;
+  EffectPlan effects;                    ///< at the end
+  double duration_s = 0;
+};
+
+class BagReplay {
+ public:
+  /// Called for each outcome, in order; `at` is the bag time of the message that led to it.
+  using Sink = std::function<void(const StepOutcome&, MonitorPipeline&, const ros::Time& at)>;
+  /// Called for each message of the bag, in order, before its outcomes.
+  using MessageSink = std::function<void(const rosbag::MessageInstance&)>;
+
+  /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.
+  BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
+  ~BagReplay();
+
+  /// The first message topic of the bag that carries meshes, for configurations that name none. Empty: none.
+  static std::string firstMeshTopic(const std::string& bag);
+
+  /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds; a map that was
+  /// recorded after the first frame (latched ones are, often) is known from the start.
+  BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr);
+
+ private:
+  struct Run;
+  std::string path_;
+  MonitorConfig config_;
+  BagReplayOptions options_;
+};
+
+}  // namespace deformable_ccd
