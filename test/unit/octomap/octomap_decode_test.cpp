@@ -1,0 +1,256 @@
+// Round trips with liboctomap's own writers, and streams that are cut, flipped or made to hurt.
+#include "deformable_ccd/octomap_decode.h"
+
+#include <gtest/gtest.h>
+#include <octomap/ColorOcTree.h>
+#include <octomap/OcTree.h>
+#include <octomap/OcTreeStamped.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <sstream>
+#include <tuple>
+
+namespace deformable_ccd {
+namespace {
+
+using Leaves = std::vector<std::tuple<int, int, int, std::uint32_t>>;
+
+Leaves sorted(const std::vector<OccupiedLeaf>& leaves) {
+  Leaves list;
+  for (const OccupiedLeaf& leaf : leaves) list.emplace_back(leaf.min.x, leaf.min.y, leaf.min.z, leaf.size);
+  std::sort(list.begin(), list.end());
+  return list;
+}
+
+template <class Tree>
+Leaves leavesOf(const Tree& tree, bool occupied) {
+  Leaves list;
+  if (tree.size() <= 1) return list;
+  for (auto it = tree.begin_leafs(), end = tree.end_leafs(); it != end; ++it) {
+    if (tree.isNodeOccupied(*it) != occupied) continue;
+    const octomap::OcTreeKey key = it.getIndexKey();
+    list.emplace_back(key[0], key[1], key[2], 1u << (16 - it.getDepth()));
+  }
+  std::sort(list.begin(), list.end());
+  return list;
+}
+
+/// A ball on a floor: pruned leaves of several sizes, free and occupied, both signs of coordinates.
+template <class Tree>
+void paint(Tree& tree, int reach) {
+  for (int x = -reach; x < reach; ++x) {
+    for (int y = -reach; y < reach; ++y) {
+      for (int z = -reach; z < reach; ++z) {
+        const bool ball = x * x + y * y + z * z < reach * reach / 2, floor = z < -reach / 2;
+        if ((x + 3 * y + 5 * z) % 11 == 0) continue;  // unknown
+        tree.updateNode(octomap::OcTreeKey(32768 + x, 32768 + y, 32768 + z), ball || floor, true);
+      }
+    }
+  }
+  for (int x = 64; x < 80; ++x) {
+    for (int y = 64; y < 80; ++y) {
+      for (int z = 64; z < 80; ++z) tree.updateNode(octomap::OcTreeKey(32768 + x, 32768 + y, 32768 + z), true, true);
+    }
+  }
+  tree.updateInnerOccupancy();
+  tree.toMaxLikelihood();
+  tree.prune();
+}
+
+struct Stream {
+  std::string id;
+  double resolution;
+  bool binary;
+  std::string data;
+};
+
+DecodedOctomap decode(const Stream& stream, const OctomapLimits& limits = {}) {
+  return decodeOctomap({stream.id, stream.resolution, stream.binary, stream.data.data(), stream.data.size()}, limits);
+}
+
+template <class Tree>
+std::vector<Stream> streamsOf(Tree& tree) {
+  std::vector<Stream> streams;
+  for (const bool binary : {true, false}) {
+    for (const bool header : {true, false}) {
+      std::ostringstream out;
+      if (binary && header) tree.writeBinaryConst(out);
+      if (binary && !header) tree.writeBinaryData(out);
+      if (!binary && header) tree.write(out);
+      if (!binary && !header) tree.writeData(out);
+      streams.push_back({tree.getTreeType(), tree.getResolution(), binary, out.str()});
+    }
+  }
+  return streams;
+}
+
+template <class Tree>
+class OctomapRoundTrip : public testing::Test {};
+using TreeTypes = testing::Types<octomap::OcTree, octomap::ColorOcTree, octomap::OcTreeStamped>;
+TYPED_TEST_SUITE(OctomapRoundTrip, TreeTypes);
+
+TYPED_TEST(OctomapRoundTrip, EveryStreamGivesTheTreesLeaves) {
+  TypeParam tree(0.05);
+  paint(tree, 9);
+  ASSERT_GT(leavesOf(tree, true).size(), 100u);
+  ASSERT_GT(leavesOf(tree, false).size(), 100u);
+  for (const Stream& stream : streamsOf(tree)) {
+    const DecodedOctomap map = decode(stream);
+    EXPECT_EQ(map.id, tree.getTreeType());
+    EXPECT_EQ(map.resolution_m, 0.05);
+    EXPECT_EQ(sorted(map.occupied), leavesOf(tree, true));
+    EXPECT_EQ(sorted(map.free), leavesOf(tree, false));
+    const auto largest = std::max_element(map.occupied.begin(), map.occupied.end(),
+                                          [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return a.size < b.size; });
+    EXPECT_EQ(largest->size, 16u) << "a pruned leaf was expanded";
+    EXPECT_EQ(VoxelSurface::build(map.resolution_m, map.occupied)->leafCount(), map.occupied.size());
+  }
+}
+
+TYPED_TEST(OctomapRoundTrip, AnEmptyTreeIsAValidEmptyMap) {
+  TypeParam tree(0.1);
+  for (const Stream& stream : streamsOf(tree)) {
+    const DecodedOctomap map = decode(stream);
+    EXPECT_TRUE(map.occupied.empty());
+    EXPECT_TRUE(map.free.empty());
+  }
+}
+
+TYPED_TEST(OctomapRoundTrip, CutAtEveryByteItIsRefused) {
+  TypeParam tree(0.1);
+  paint(tree, 3);
+  for (const Stream& stream : streamsOf(tree)) {
+    Stream cut = stream;
+    for (std::size_t size = 1; size < stream.data.size(); ++size) {
+      cut.data = stream.data.substr(0, size);
+      EXPECT_THROW(decode(cut), OctomapError) << size << " of " << stream.data.size() << " bytes";
+    }
+    cut.data = stream.data + '\0';
+    EXPECT_THROW(decode(cut), OctomapError) << "a trailing byte";
+  }
+}
+
+TYPED_TEST(OctomapRoundTrip, FlippedBitsGiveAMapOrAnError) {
+  TypeParam tree(0.1);
+  paint(tree, 4);
+  std::mt19937 random(5);
+  int read = 0, refused = 0;
+  for (const Stream& stream : streamsOf(tree)) {
+    for (int i = 0; i < 2000; ++i) {
+      Stream bad = stream;
+      for (unsigned flips = 1 + random() % 4; flips > 0; --flips) {
+        bad.data[random() % bad.data.size()] ^= static_cast<char>(1u << random() % 8);
+      }
+      try {
+        const DecodedOctomap map = decode(bad);
+        EXPECT_LE(map.occupied.size() + map.free.size(), 4 * bad.data.size());
+        VoxelSurface::build(map.resolution_m, map.occupied);  // whatever was read is a set of leaves
+        ++read;
+      } catch (const OctomapError&) {
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(read, 100);
+  EXPECT_GT(refused, 100);
+}
+
+TEST(OctomapDecode, WhatItReadsOfDamagedStreamsIsWhatLiboctomapReads) {
+  octomap::OcTree tree(0.1);
+  paint(tree, 4);
+  std::mt19937 random(7);
+  int compared = 0;
+  for (const Stream& stream : streamsOf(tree)) {
+    if (stream.data[0] == '#') continue;
+    for (int i = 0; i < 1000; ++i) {
+      Stream bad = stream;
+      bad.data[random() % bad.data.size()] ^= static_cast<char>(1u << random() % 8);
+      DecodedOctomap map;
+      try {
+        map = decode(bad);
+      } catch (const OctomapError&) {
+        continue;
+      }
+      octomap::OcTree other(0.1);
+      std::istringstream in(bad.data);
+      if (bad.binary) {
+        other.readBinaryData(in);
+      } else {
+        other.readData(in);
+      }
+      EXPECT_EQ(sorted(map.occupied), leavesOf(other, true));
+      EXPECT_EQ(sorted(map.free), leavesOf(other, false));
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 100);
+}
+
+std::string errorOf(const Stream& stream, const OctomapLimits& limits = {}) {
+  try {
+    decode(stream, limits);
+  } catch (const OctomapError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(OctomapDecode, ErrorsNameTheFieldAndTheValue) {
+  EXPECT_NE(errorOf({"PointCloud", 0.1, true, ""}).find("PointCloud"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0, true, ""}).find("resolution is 0"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", -0.5, true, ""}).find("-0.5"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", std::numeric_limits<double>::quiet_NaN(), true, ""}).find("nan"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", std::numeric_limits<double>::infinity(), true, ""}).find("inf"), std::string::npos);
+  const std::string header = "# Octomap OcTree binary file\nid OcTree\nsize 3\nres 0.1\ndata\n";
+  EXPECT_NE(errorOf({"OcTree", 0.2, true, header + "ab"}).find("0.1"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0.1, false, header + "ab"}).find(".bt"), std::string::npos);
+  EXPECT_NE(errorOf({"ColorOcTree", 0.1, true, header + "ab"}).find("ColorOcTree"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, "# Octomap OcTree binary file\nid OcTree\n"}).find("data"), std::string::npos);
+}
+
+TEST(OctomapDecode, HostileStreamsAreRefusedSoon) {
+  // Every child inner, for ever: deeper than any map.
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, std::string(1 << 20, '\xff')}).find("16 levels"), std::string::npos);
+  std::string full;
+  for (int i = 0; i < 1000; ++i) full += std::string("\0\0\0\0\x01", 5);
+  EXPECT_NE(errorOf({"OcTree", 0.1, false, full}).find("16 levels"), std::string::npos);
+  // Few bytes cannot claim many leaves; limits are checked before anything is allocated.
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, std::string("\xaa\xaa", 2)}, {1, 100}).find("limit"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, std::string("\xaa\xaa", 2)}, {100, 7}).find("limit"), std::string::npos);
+  EXPECT_EQ(errorOf({"OcTree", 0.1, true, std::string("\xaa\xaa", 2)}, {100, 8}), "");
+  // A log-odds that is not a number.
+  EXPECT_NE(errorOf({"OcTree", 0.1, false, std::string("\xff\xff\xff\xff\0", 5)}).find("log-odds"), std::string::npos);
+}
+
+TEST(OctomapDecode, ARootWithoutChildrenSaysNothing) {
+  EXPECT_TRUE(decode({"OcTree", 0.1, true, std::string(2, '\0')}).occupied.empty());
+  EXPECT_TRUE(decode({"OcTree", 0.1, false, std::string(5, '\0')}).occupied.empty());
+}
+
+TEST(OctomapDecode, FilesAreReadByTheirHeader) {
+  octomap::OcTree tree(0.05);
+  paint(tree, 5);
+  const std::filesystem::path folder = std::filesystem::temp_directory_path();
+  for (const std::string name : {"deformable_ccd_decode.bt", "deformable_ccd_decode.ot"}) {
+    const std::string path = (folder / name).string();
+    ASSERT_TRUE(name.back() == 't' && name[name.size() - 2] == 'b' ? tree.writeBinaryConst(path) : tree.write(path));
+    const DecodedOctomap map = readOctomapFile(path);
+    EXPECT_EQ(map.resolution_m, 0.05);
+    EXPECT_EQ(sorted(map.occupied), leavesOf(tree, true));
+    std::filesystem::remove(path);
+  }
+  try {
+    readOctomapFile((folder / "no_such_map.bt").string());
+    FAIL() << "a missing file was read";
+  } catch (const OctomapError& error) {
+    EXPECT_NE(std::string(error.what()).find("no_such_map.bt"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace deformable_ccd
