@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <limits>
 #include <vector>
 
 #include "broad_phase/cluster_pairs.h"
@@ -88,7 +89,7 @@ class PairWorker {
   std::size_t count_ = 0;
   std::vector<Hit> hits_[2];
   core::StepStats stats_;
-  double unchecked_toc_lower_ = 0;
+  double unchecked_toc_lower_ = std::numeric_limits<double>::infinity();  // workers may be made during a step
 };
 
 }  // namespace deformable_ccd
