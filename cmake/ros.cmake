@@ -21,7 +21,9 @@ if(ROS_SOURCES)
   # The headers that nearly every file of this library reads, compiled once.
   target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> <map> <string> <vector>)
   target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb nlohmann_json::nlohmann_json)
-  # PCL's headers are the slowest to read: only for the files that use them.
+  # PCL's headers are the slowest to read: only for the files that use them. The compiler's own folders must not come
+  # with them, since their order matters to it.
+  list(REMOVE_ITEM PCL_INCLUDE_DIRS ${CMAKE_CXX_IMPLICIT_INCLUDE_DIRECTORIES})
   foreach(source ${ROS_SOURCES})
     file(STRINGS ${source} pcl_includes REGEX "^#include <pcl(_conversions)?/")
     if(pcl_includes)
@@ -51,9 +53,11 @@ foreach(source ${APP_SOURCES})
   add_dependencies(${app} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
   target_include_directories(${app} PRIVATE src)
   target_include_directories(${app} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
-  target_link_libraries(${app} ${ROS_LINK_LIBRARIES} CLI11::CLI11 nlohmann_json::nlohmann_json)
   if(app STREQUAL "make_scene_bag")
-    target_link_libraries(${app} deformable_ccd_physics)
+    # Records, and monitors nothing: it needs neither the node's library nor PCL.
+    target_link_libraries(${app} deformable_ccd_physics deformable_ccd_octomap ${catkin_LIBRARIES} CLI11::CLI11)
+  else()
+    target_link_libraries(${app} ${ROS_LINK_LIBRARIES} CLI11::CLI11 nlohmann_json::nlohmann_json)
   endif()
   list(APPEND TOOL_TARGETS ${app})
 endforeach()

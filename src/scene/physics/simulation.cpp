@@ -1,5 +1,6 @@
 #include "scene/physics/simulation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -19,7 +20,9 @@ static_assert(sizeof(btScalar) == sizeof(double), "scenes are recorded with Bull
 // Iterations of the position solver per physics step: enough that cloth of a thousand vertices does not look like rubber.
 constexpr int POSITION_ITERATIONS = 12;
 // Cell size of Bullet's sampled distance field around rigid shapes, as a multiple of the thickness it must resolve.
-constexpr double SDF_CELL_PER_THICKNESS = 4.0;
+constexpr double SDF_CELL_PER_THICKNESS = 1.0;
+// Bullet rounds a box's corners by its margin, by default 4 cm.
+constexpr double BOX_MARGIN_M = 1e-3;
 // A ring is a wreath of this many capsules: off the true torus by less than 1 % of its radius.
 constexpr int RING_CAPSULES = 24;
 
@@ -29,6 +32,12 @@ Vec3 fromBullet(const btVector3& v) { return Vec3(v[0], v[1], v[2]); }
 btTransform toBullet(const Eigen::Isometry3d& pose) {
   const Eigen::Quaterniond q(pose.linear());
   return btTransform(btQuaternion(q.x(), q.y(), q.z(), q.w()), toBullet(Vec3(pose.translation())));
+}
+
+std::unique_ptr<btCollisionShape> makeBox(const Vec3& half_size_m) {
+  auto box = std::make_unique<btBoxShape>(toBullet(half_size_m));
+  box->setMargin(std::min(BOX_MARGIN_M, 0.5 * half_size_m.minCoeff()));
+  return box;
 }
 
 /// Vertices in the hand of a gripper, driven instead of simulated.
@@ -184,7 +193,7 @@ void Simulation::Impl::addObstacle(const Obstacle& obstacle) {
     }
     const Vec3 half = 0.5 * (solid.box.max - solid.box.min) - Vec3::Constant(obstacle.inset_m);
     const Vec3 center = 0.5 * (solid.box.max + solid.box.min);
-    addRigid(std::make_unique<btBoxShape>(toBullet(half)), btTransform(btQuaternion::getIdentity(), toBullet(center)), false);
+    addRigid(makeBox(half), btTransform(btQuaternion::getIdentity(), toBullet(center)), false);
   }
 }
 
@@ -213,6 +222,7 @@ Simulation::Simulation(const SceneSpec& spec, std::uint64_t seed) : impl_(std::m
   btSoftBodyWorldInfo& info = impl.world.getWorldInfo();
   info.m_sparsesdf.Initialize();
   info.m_sparsesdf.setDefaultVoxelsz(SDF_CELL_PER_THICKNESS * thinnest_m);
+  info.m_sparsesdf.Reset();  // only this takes the cell size over
   const Vec3 gravity = spec.gravity_m_s2.value_or(Vec3::Zero());
   info.m_gravity = toBullet(gravity);
   impl.world.setGravity(toBullet(gravity));
@@ -222,8 +232,8 @@ Simulation::Simulation(const SceneSpec& spec, std::uint64_t seed) : impl_(std::m
   if (spec.obstacle && spec.obstacle->collides) impl.addObstacle(*impl.spec.obstacle);
   for (const RigidBody& body : impl.spec.rigid_bodies) {
     impl.effects.push_back(body.name + ": rigid body");
-    impl.moving.push_back(impl.addRigid(std::make_unique<btBoxShape>(toBullet(Vec3(0.5 * body.size_m))),
-                                        btTransform(btQuaternion::getIdentity(), toBullet(body.start_m)), true));
+    impl.moving.push_back(impl.addRigid(
+        makeBox(0.5 * body.size_m), btTransform(btQuaternion::getIdentity(), toBullet(body.start_m)), true));
   }
   for (const Body& body : impl.spec.bodies) impl.addBody(body);
 }
