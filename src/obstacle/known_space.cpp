@@ -1,0 +1,191 @@
+#include "deformable_ccd/known_space.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "obstacle/voxel_surface_impl.h"
+
+namespace deformable_ccd {
+namespace {
+
+using Coverage = VoxelTree::Coverage;
+
+/// The voxels whose closed boxes meet a closed region, exactly: the outward rounded keys, corrected by the planes.
+/// False where the region lies outside of the map's range.
+bool touchedKeys(const Box& region_m, double resolution_m, KeyBox& keys) {
+  const double inverse = 1.0 / resolution_m;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double lo = region_m.min[axis], hi = region_m.max[axis];
+    if (hi < voxelPlane(0, resolution_m) || lo > voxelPlane(VoxelTree::KEYS, resolution_m)) return false;
+    keys.lo[axis] = outwardKey(lo, inverse, -1);
+    keys.hi[axis] = outwardKey(hi, inverse, +1);
+    while (keys.lo[axis] < keys.hi[axis] && voxelPlane(keys.lo[axis] + 1, resolution_m) < lo) ++keys.lo[axis];
+    while (keys.hi[axis] > keys.lo[axis] && voxelPlane(keys.hi[axis], resolution_m) > hi) --keys.hi[axis];
+  }
+  return true;
+}
+
+struct Cube {
+  std::int32_t min[3];
+  std::int32_t size;
+};
+
+enum class Overlap : std::uint8_t { NONE, PART, INSIDE };
+
+Overlap overlap(const Cube& cube, const KeyBox& keys) {
+  bool inside = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t last = cube.min[axis] + cube.size - 1;
+    if (last < keys.lo[axis] || cube.min[axis] > keys.hi[axis]) return Overlap::NONE;
+    inside = inside && cube.min[axis] >= keys.lo[axis] && last <= keys.hi[axis];
+  }
+  return inside ? Overlap::INSIDE : Overlap::PART;
+}
+
+/// Calls visit(cube) for the largest aligned cubes of unknown voxels in the key box, until it returns false.
+template <class Visit>
+bool visitUnknown(const VoxelTree& tree, const Cube& cube, const KeyBox& keys, Visit& visit) {
+  const Overlap common = overlap(cube, keys);
+  if (common == Overlap::NONE) return true;
+  const Coverage coverage = tree.coverage(cube.min[0], cube.min[1], cube.min[2], cube.size);
+  if (coverage == Coverage::FULL) return true;
+  if (coverage == Coverage::EMPTY && common == Overlap::INSIDE) return visit(cube);
+  const std::int32_t half = cube.size / 2;
+  for (int i = 0; i < 8; ++i) {
+    const Cube child{{cube.min[0] + (i & 1 ? half : 0), cube.min[1] + (i & 2 ? half : 0), cube.min[2] + (i & 4 ? half : 0)},
+                     half};
+    if (!visitUnknown(tree, child, keys, visit)) return false;
+  }
+  return true;
+}
+
+constexpr Cube WHOLE_MAP{{0, 0, 0}, VoxelTree::KEYS};
+
+/// A block of 4^3 voxels and which of them are touched.
+using TouchedBlock = std::pair<std::uint64_t, std::uint64_t>;
+
+std::uint64_t packBlock(std::int32_t x, std::int32_t y, std::int32_t z) {
+  return static_cast<std::uint64_t>(x) << 32 | static_cast<std::uint64_t>(y) << 16 | static_cast<std::uint64_t>(z);
+}
+
+/// Appends the blocks of a key box; false when that makes more than the limit.
+bool addBlocks(const KeyBox& keys, std::size_t limit, std::vector<TouchedBlock>& blocks) {
+  std::size_t count = 1;
+  for (int axis = 0; axis < 3; ++axis) count *= static_cast<std::size_t>((keys.hi[axis] >> 2) - (keys.lo[axis] >> 2) + 1);
+  if (count > limit - blocks.size()) return false;
+  const auto range = [&keys](int axis, std::int32_t block) {
+    const std::int32_t lo = std::max(0, keys.lo[axis] - 4 * block), hi = std::min(3, keys.hi[axis] - 4 * block);
+    return RANGE_MASKS[axis][lo][hi];
+  };
+  for (std::int32_t z = keys.lo[2] >> 2; z <= keys.hi[2] >> 2; ++z) {
+    for (std::int32_t y = keys.lo[1] >> 2; y <= keys.hi[1] >> 2; ++y) {
+      const std::uint64_t yz = range(1, y) & range(2, z);
+      for (std::int32_t x = keys.lo[0] >> 2; x <= keys.hi[0] >> 2; ++x) {
+        blocks.emplace_back(packBlock(x, y, z), range(0, x) & yz);
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+struct KnownSpace::Impl {
+  Impl(double resolution, const std::vector<OccupiedLeaf>& leaves) : resolution_m(resolution), tree(leaves) {}
+
+  /// The known voxels of a block of 4^3.
+  std::uint64_t knownCells(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    const std::uint32_t parent = tree.find(1, x >> 2, y >> 2, z >> 2);
+    if (parent == VoxelTree::NONE) return tree.coverage(4 * x, 4 * y, 4 * z, 4) == Coverage::FULL ? ~std::uint64_t{0} : 0;
+    const VoxelTree::Node& node = tree.nodes(1)[parent];
+    const unsigned bit = cellBit(x, y, z);
+    if (node.child >> bit & 1) return tree.nodes(0)[node.childAt(bit)].full;
+    return node.full >> bit & 1 ? ~std::uint64_t{0} : 0;
+  }
+
+  double resolution_m;
+  VoxelTree tree;
+};
+
+std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m, const std::vector<OccupiedLeaf>& known_leaves) {
+  if (!(resolution_m >= 1e-290 && resolution_m <= 1e290)) {
+    throw std::invalid_argument("resolution_m is " + std::to_string(resolution_m) +
+                                ", which is not a length from 1e-290 to 1e290 m");
+  }
+  return std::shared_ptr<const KnownSpace>(new KnownSpace(std::make_unique<Impl>(resolution_m, known_leaves)));
+}
+
+KnownSpace::KnownSpace(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+KnownSpace::~KnownSpace() = default;
+
+double KnownSpace::resolution() const { return impl_->resolution_m; }
+std::size_t KnownSpace::memoryBytes() const { return sizeof(Impl) + impl_->tree.memoryBytes(); }
+
+bool KnownSpace::isKnown(const Box& region_m) const {
+  if (region_m.empty()) return true;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (region_m.min[axis] < voxelPlane(0, impl_->resolution_m)) return false;
+    if (region_m.max[axis] > voxelPlane(VoxelTree::KEYS, impl_->resolution_m)) return false;
+  }
+  KeyBox keys;
+  if (!touchedKeys(region_m, impl_->resolution_m, keys)) return false;
+  const auto stop = [](const Cube&) { return false; };
+  return visitUnknown(impl_->tree, WHOLE_MAP, keys, stop);
+}
+
+std::vector<OccupiedLeaf> KnownSpace::unknownLeaves(const Box& crop_m, std::size_t max_leaves) const {
+  std::vector<OccupiedLeaf> leaves;
+  if (crop_m.empty()) return leaves;
+  if (!crop_m.min.allFinite() || !crop_m.max.allFinite()) {
+    throw std::invalid_argument("crop_m has corners that are not finite");
+  }
+  KeyBox keys;
+  if (!touchedKeys(crop_m, impl_->resolution_m, keys)) return leaves;
+  const auto keep = [&](const Cube& cube) {
+    if (leaves.size() == max_leaves) return false;
+    leaves.push_back({{static_cast<std::uint16_t>(cube.min[0]), static_cast<std::uint16_t>(cube.min[1]),
+                       static_cast<std::uint16_t>(cube.min[2])},
+                      static_cast<std::uint32_t>(cube.size)});
+    return true;
+  };
+  if (!visitUnknown(impl_->tree, WHOLE_MAP, keys, keep)) {
+    throw std::length_error("the unknown space of the crop box has more leaves than the limit of " +
+                            std::to_string(max_leaves) + "; make the box smaller");
+  }
+  return leaves;
+}
+
+SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map_t0, const Positions& map_t1,
+                                  const std::uint8_t* vertex_active, std::size_t limit) const {
+  SweptSpace swept;
+  std::vector<TouchedBlock> blocks;
+  const auto add = [&](const auto& feature) {
+    Box box;
+    for (const Index v : feature) {
+      if ((vertex_active != nullptr && vertex_active[v] == 0) || !map_t0[v].allFinite() || !map_t1[v].allFinite()) return;
+      box.min = box.min.cwiseMin(map_t0[v]).cwiseMin(map_t1[v]);
+      box.max = box.max.cwiseMax(map_t0[v]).cwiseMax(map_t1[v]);
+    }
+    KeyBox keys;
+    if (touchedKeys(box, impl_->resolution_m, keys) && !addBlocks(keys, limit, blocks)) swept.complete = false;
+  };
+  for (const Face& face : topology.faces()) add(face);
+  if (!topology.hasFaces()) {
+    for (const Edge& edge : topology.edges()) add(edge);
+  }
+  std::sort(blocks.begin(), blocks.end());
+  for (std::size_t i = 0; i < blocks.size();) {
+    const std::uint64_t block = blocks[i].first;
+    std::uint64_t touched = 0;
+    for (; i < blocks.size() && blocks[i].first == block; ++i) touched |= blocks[i].second;
+    const auto at = [block](int shift) { return static_cast<std::int32_t>(block >> shift & 0xffff); };
+    swept.voxels += bitCount(touched);
+    swept.unknown += bitCount(touched & ~impl_->knownCells(at(32), at(16), at(0)));
+  }
+  return swept;
+}
+
+}  // namespace deformable_ccd
