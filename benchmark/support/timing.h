@@ -1,0 +1,32 @@
+// Timing as every benchmark here reports it: all runs kept, medians with their spread, the machine named.
+#pragma once
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace deformable_ccd {
+namespace benchmarks {
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  double milliseconds() const { return 1e3 * seconds(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+/// {"best", "median", "worst", "runs"}; every value 0 for no runs.
+nlohmann::json spread(std::vector<double> values);
+
+/// What a time depends on: processor, SIMD target, compiler, and the time of a fixed arithmetic kernel in this process.
+nlohmann::json machine();
+
+/// Milliseconds of a fixed scalar kernel (a chain of multiplications and additions): tells a slow or busy machine from a
+/// slow program.
+double calibrationMs();
+
+}  // namespace benchmarks
+}  // namespace deformable_ccd
