@@ -13,6 +13,10 @@
 //   The last sum to one double rounds once more, which changes no sign.
 // In plain double with x = fl(fl(s h0) + fl(t h1)): x errs by at most 4 e U; n_k by 2 * (2*4 + 1) + 2 = 20 e U V; f by
 //   3 * (20 + 2*4 + 2) + (4 + 6) = 100 e U V W; 128 is used.
+// Slope: f' = det(u', v, w) + det(u, v', w) + det(u, v, w'), at most 3 * 6 * 2 U V W; three factors with at most 3
+//   roundings each, 2 for products, 5 for sums: at most 16 * 36 = 576 e U V W; 1024 is used.
+// Tangent: |f(x + h) - f(x) - f'(x) h| <= h^2 max|f''| / 2 on [0,1]; f'' is twice a sum of three determinants with two
+//   changes each, at most 2 * 3 * 6 * 4 U V W: 72 h^2 U V W.
 #include "elementary/exact_double_double.h"
 
 #include <algorithm>
@@ -95,6 +99,8 @@ CoplanarityCubic::CoplanarityCubic(PairKind kind, const PairMotion& pair) {
   }
   constexpr double INFINITE = std::numeric_limits<double>::infinity();
   error_ = in_range ? 0x1p-97 * volume : INFINITE;
+  slope_error_ = 0x1p-43 * volume;
+  most_curvature_ = 73 * volume;
   rough_error_ = in_range ? 0x1p-46 * volume : INFINITE;
 }
 
@@ -128,35 +134,78 @@ int CoplanarityCubic::signAt(double t) const {
   return value > error_ ? 1 : value < -error_ ? -1 : 0;
 }
 
+double CoplanarityCubic::slopeAt(double t) const {
+  double x[3][3], change[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      x[i][k] = difference(0, i, k) * (1 - t) + difference(1, i, k) * t;
+      change[i][k] = difference(1, i, k) - difference(0, i, k);
+    }
+  }
+  double slope = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    const double n = x[0][i] * x[1][j] - x[0][j] * x[1][i];
+    const double n_change =
+        (change[0][i] * x[1][j] - change[0][j] * x[1][i]) + (x[0][i] * change[1][j] - x[0][j] * change[1][i]);
+    slope += n_change * x[2][k] + n * change[2][k];
+  }
+  return slope;
+}
+
+namespace {
+
+/// A value and a slope of f at x, and what is known of f's sign elsewhere from them.
+struct Tangent {
+  double x, value, slope;
+
+  /// Whether f has the sign given at t.
+  bool provesSign(const CoplanarityCubic& f, double t, int sign) const {
+    const double h = t - x;  // exact where it matters: both are multiples of 2^-52 in [0,1]
+    const double at_t = value + slope * h;
+    const double change = std::fabs(slope * h);
+    const double error = f.error() + 0x1p-51 * (std::fabs(value) + change) +
+                         std::fabs(h) * (f.slopeError() + f.mostCurvature() * std::fabs(h));
+    return sign * at_t > 1.0625 * error;
+  }
+};
+
+}  // namespace
+
 std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits) {
-  constexpr int MOST_STEPS = 16;  // regula falsi on a piece where f is nearly straight needs two or three
+  constexpr int MOST_STEPS = 16;  // Newton's; from the batched tier's brackets one or two suffice
+  constexpr double GRID = 0x1p-52;
   const double cells = std::ldexp(1.0, toc_bits), width = 1 / cells;
-  auto low = static_cast<std::int64_t>(lo * cells);  // exact, like all of these
+  auto low = static_cast<std::int64_t>(lo * cells);  // exact, like all products with cells and width
   auto high = static_cast<std::int64_t>(std::ceil(hi * cells));
   if (high - low == 1) return low;
   const int before = f.signAt(lo);
   if (before == 0) return -1;
-  double value_lo = 0, value_hi = 0;
-  if (high - low > 2) {
-    value_lo = f.valueAt(lo);
-    value_hi = f.valueAt(hi);
-  }
-  for (int step = 0; high - low > 1 && step < MOST_STEPS; ++step) {
-    std::int64_t k = low + 1;
-    if (high - low > 2) {  // the guessed cell's lower border, then its upper one, then what the new values suggest
-      const double guess = lo + (hi - lo) * (value_lo / (value_lo - value_hi));
-      k = static_cast<std::int64_t>(guess * cells) + (step % 2);
-      k = std::min(std::max(k, low + 1), high - 1);
+  Tangent tangent;
+  tangent.x = high - low == 2 ? static_cast<double>(low + 1) * width : lo + std::floor(0.5 * (hi - lo) / GRID) * GRID;
+  for (int step = 0; step < MOST_STEPS; ++step) {
+    tangent.value = f.valueAt(tangent.x);
+    if (!(std::fabs(tangent.value) > f.error())) return -1;
+    if ((tangent.value > 0) == (before > 0)) {
+      lo = tangent.x;
+      low = std::max(low, static_cast<std::int64_t>(lo * cells));
+    } else {
+      hi = tangent.x;
+      high = std::min(high, static_cast<std::int64_t>(std::ceil(hi * cells)));
     }
-    const double t = static_cast<double>(k) * width;
-    const double value = f.valueAt(t);
-    if (std::fabs(value) <= f.error()) return -1;
-    const bool is_before = (value > 0) == (before > 0);
-    (is_before ? low : high) = k;
-    (is_before ? lo : hi) = t;
-    (is_before ? value_lo : value_hi) = value;
+    if (high - low == 1) return low;
+    tangent.slope = f.slopeAt(tangent.x);
+    double reach = -tangent.value / tangent.slope;  // added to x only in cells: t has no bits to spare
+    if (!(tangent.x + reach >= lo && tangent.x + reach <= hi)) reach = 0.5 * (lo + hi) - tangent.x;
+    const double place = tangent.x * cells, cell_of_x = std::floor(place);
+    const auto offset = static_cast<std::int64_t>(std::floor((place - cell_of_x) + reach * cells));
+    const std::int64_t k = std::min(std::max(static_cast<std::int64_t>(cell_of_x) + offset, low), high - 1);
+    const bool not_before = k == low || tangent.provesSign(f, static_cast<double>(k) * width, before);
+    const bool before_end = k + 1 == high || tangent.provesSign(f, static_cast<double>(k + 1) * width, -before);
+    if (not_before && before_end) return k;
+    tangent.x = std::min(std::max(tangent.x + std::floor(reach / GRID) * GRID, lo + GRID), hi - GRID);
   }
-  return high - low == 1 ? low : -1;
+  return -1;
 }
 
 }  // namespace exact

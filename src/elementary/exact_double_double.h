@@ -27,6 +27,12 @@ class CoplanarityCubic {
   /// Sign of f at a multiple of 2^-52 in [0,1]; 0 where the arithmetic cannot tell.
   int signAt(double t) const;
 
+  /// f'(t) at a multiple of 2^-52 in [0,1] in plain double; exact f' differs by at most slopeError().
+  double slopeAt(double t) const;
+  double slopeError() const { return slope_error_; }
+  /// At least half of max |f''| over [0,1].
+  double mostCurvature() const { return most_curvature_; }
+
   /// Rounded component k of u, v or w (i = 0, 1, 2) at time 0 or 1.
   double difference(int time, int i, int k) const { return difference_[time][i][k].hi; }
   /// Largest absolute value of those of u, v or w.
@@ -39,6 +45,8 @@ class CoplanarityCubic {
   double size_[3];
   double error_;                      // infinite where the differences are too large or too small for the bound
   double rough_error_;
+  double slope_error_;
+  double most_curvature_;
 };
 
 /// The cell k of the 2^-toc_bits grid that holds the only root of f in the open interval (lo, hi), at whose

@@ -6,7 +6,7 @@
 // F3 t^3 with F0, F3 within 54 e U V W and F1, F2 within 198 e U V W (6 and 18 products of three differences with at
 // most 9 and 11 rounding factors). f' = c0 s^2 + 2 c1 s t + c2 t^2, c0 = F1 - 3 F0, c1 = F2 - F1, c2 = 3 F3 - F2:
 // 396 from those, at most 36 U V W in magnitude, so at most 3 * 36 for their own rounding and 4 * 36 for the blossom:
-// 648 e U V W; 1024 is used.
+// 648 e U V W; slopeError() has 1024.
 // Minors x_i y_j - x_j y_i at t within h of m: 16 e X Y computed, 8 h X Y for moving by h, 4 e X Y for sums of three;
 // with h = 2^-52 = 2 e: 36 e X Y; 48 is used. Underflow is covered by the range that CoplanarityCubic demands.
 #include <algorithm>
@@ -69,7 +69,6 @@ class RefinedDecision {
     slope_[0] = coefficient_[1] - 3 * coefficient_[0];
     slope_[1] = coefficient_[2] - coefficient_[1];
     slope_[2] = 3 * coefficient_[3] - coefficient_[2];
-    slope_error_ = 0x1p-43 * (f_.size(0) * f_.size(1) * f_.size(2));
   }
 
   /// Fills in ends[1..4]: a zone around each extremum in the step, outside which f' is certain (its slope at the
@@ -79,7 +78,7 @@ class RefinedDecision {
     const double discriminant = b * b - a * c;
     const double root = std::sqrt(std::max(0.0, discriminant));
     const double q = -(b + std::copysign(root, b));
-    const double zone = LEAST_ZONE + 2 * slope_error_ / root;
+    const double zone = LEAST_ZONE + 2 * f_.slopeError() / root;
     const double places[2] = {q / a, c / q};
     for (int i = 0; i < 2; ++i) {
       const bool inside = discriminant > 0 && places[i] > 0 && places[i] < 1;  // false for NaN, too
@@ -95,13 +94,13 @@ class RefinedDecision {
 
   Outcome decidePiece(double a, double b, int halvings) {
     const auto [least, most] = std::minmax({slopeBlossom(a, a), slopeBlossom(a, b), slopeBlossom(b, b)});
-    if (least > slope_error_ || most < -slope_error_) {
+    if (least > f_.slopeError() || most < -f_.slopeError()) {
       const int before = f_.signAt(a), after = f_.signAt(b);
       if (before == 0 || after == 0) return Outcome::UNCERTAIN;
       return before == after ? Outcome::FREE : decideRoot(a, b, before);
     }
     const double middle = onGrid(0.5 * (a + b));
-    const double most_change = 1.0625 * (std::max(-least, most) + slope_error_) * (b - a);
+    const double most_change = 1.0625 * (std::max(-least, most) + f_.slopeError()) * (b - a);
     if (std::fabs(f_.valueAt(middle)) > 1.0625 * (f_.error() + most_change)) return Outcome::FREE;
     if (halvings == 0 || middle == a || middle == b) return Outcome::UNCERTAIN;
     const Outcome outcome = decidePiece(a, middle, halvings - 1);
@@ -164,7 +163,6 @@ class RefinedDecision {
   CoplanarityCubic f_;
   double coefficient_[4];
   double slope_[3];
-  double slope_error_;
   std::int64_t cell52_ = -1;
 };
 
