@@ -1,5 +1,5 @@
-// How it works. Let w_ij(t) be the differences between a point of the one feature and a point of the other (VF: p-a, p-b,
-// p-c; EE: c-a, c-b, d-a, d-b), linear in t. For any fixed vector n, n.(y-x) with x, y in the features is a convex
+// How it works. Let w_ij(t) be the differences between a point of the one feature and a point of the other (VF: p-a,
+// p-b, p-c; EE: c-a, c-b, d-a, d-b), linear in t. For any fixed vector n, n.(y-x) with x, y in the features is a convex
 // combination of the n.w_ij(t), so the distance is at least min_ij n.w_ij(t) / |n|. Each n.w_ij is linear in t: if it
 // exceeds d|n| at t and at t', it does so in between. From t, with n the shortest vector between the features at t,
 // this allows a step that for translating features ends at the contact itself, and for others converges like Newton's
@@ -8,12 +8,14 @@
 //
 // Rounding. eps = 2^-53, M = the largest absolute component of any difference vector at either end of the step. Times
 // are multiples of 2^-52, so that 1-t is exact.
-//   w_ij(t) = fl(fl(w0 (1-t)) + fl(w1 t)), w0 and w1 rounded differences: 3 factors (1+eps) on each term, error <= 3 eps M
+//   w_ij(t) = fl(fl(w0 (1-t)) + fl(w1 t)), w0 and w1 rounded differences: 3 factors (1+eps) on each term, so the error
+//   is at most 3 eps M
 //   n.w_ij(t), n taken as exact: 3 more factors: error <= 6 eps |n|_1 M             (SEPARATION_ERROR, rounded up)
 //   |n|: sqrt of a sum of three squares, at most 3 eps relative                     (LENGTH_ERROR, rounded up)
-//   The connecting vectors n = w - beta u - gamma v and (w - u) - s (v - u), for exact beta, gamma, s: at most 6 factors
-//   on each of at most four terms: 24 eps M a component; a second correction of s, and beta + gamma beyond 1, are worth
-//   a few eps M more. So the true vector between those two points is at most |n| (1 + 3 eps) + sqrt(3) 30 eps M long
+//   The connecting vectors n = w - beta u - gamma v and (w - u) - s (v - u), for exact beta, gamma, s: at most 6
+//   factors on each of at most four terms: 24 eps M a component; a second correction of s, and beta + gamma beyond 1,
+//   are worth a few eps M more. So the true vector between those two points is at most |n| (1 + 3 eps) +
+//   sqrt(3) 30 eps M long
 //                                                                                   (POINT_ERROR, rounded up)
 // Underflow: lengths below SMALLEST are not trusted, and far above what underflowing products add.
 #include "elementary/conservative_advance.h"

@@ -16,8 +16,8 @@ struct Limits {
 };
 
 /// Advances from t = 0 as long as the features are certainly more than the minimum separation apart.
-/// NO_CONTACT: certain, toc_lower is 1. CONTACT: at toc_lower the features are certainly at most minimum separation plus tolerance
-/// apart, and more than the minimum separation before it. UNDECIDED: the latter only. toc_upper is 1.
+/// NO_CONTACT: certain, toc_lower is 1. CONTACT: at toc_lower the features are certainly at most minimum separation
+/// plus tolerance apart, and more than the minimum separation before it. UNDECIDED: the latter only. toc_upper is 1.
 /// Kind VERTEX_FACE or EDGE_EDGE; coordinates finite.
 ElementaryResult advance(PairKind kind, const Corners& corners, const Limits& limits);
 

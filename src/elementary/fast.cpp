@@ -1,5 +1,5 @@
-// The rung `fast`: the batched kernel of the exact test without its bounds. Floating point all the way: an answer near a
-// tie may be wrong either way, and the TOC is approximate.
+// The rung `fast`: the batched kernel of the exact test without its bounds. Floating point all the way: an answer near
+// a tie may be wrong either way, and the TOC is approximate.
 #include <algorithm>
 #include <stdexcept>
 #include <string>

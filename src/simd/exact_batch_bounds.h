@@ -1,8 +1,8 @@
 // Rounding bounds of the batched elementary test (exact_batch-inl.h), with their derivation.
 //
-// Notation. eps = 2^-53; every operation is correctly rounded: fl(x op y) = (x op y)(1+d), |d| <= eps. "k factors" means
-// a product of at most k such (1+d); (1+eps)^k - 1 <= k eps (1 + 2^-40) for the k <= 12 below. u, v, w are the pair's
-// difference vectors, linear in t; f = det(u, v, w) = (u x v).w.
+// Notation. eps = 2^-53; every operation is correctly rounded: fl(x op y) = (x op y)(1+d), |d| <= eps. "k factors"
+// means a product of at most k such (1+d); (1+eps)^k - 1 <= k eps (1 + 2^-40) for the k <= 12 below. u, v, w are the
+// pair's difference vectors, linear in t; f = det(u, v, w) = (u x v).w.
 //   VF (p; a b c): u = b-a, v = c-a, w = p-a.     EE (a b; c d): u = b-a, v = d-c, w = c-a.
 // U, V, W are the largest absolute values of the *rounded* difference components over both ends of the step. The true
 // ones are at most U(1+2 eps); such second-order terms, the underflow terms and the rounding of the bounds' own

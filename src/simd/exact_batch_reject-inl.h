@@ -65,11 +65,11 @@ HWY_INLINE void coefficients(const BatchPlane* m, std::size_t i, V& f0, V& f1, V
   f3 = dot(nx2, ny2, nz2, wx1, wy1, wz1);
 }
 
-/// Appends the pairs of one vector whose bits are set to `to`; first is the position of lane 0 in the batch. Whole vectors
-/// are written: the planes leave room for it.
+/// Appends the pairs of one vector whose bits are set to `to`; first is the position of lane 0 in the batch. Whole
+/// vectors are written: the planes leave room for it.
 template <bool CERTIFIED>
-HWY_INLINE void appendPairs(const BatchPlane* m, std::size_t i, unsigned bits, std::size_t first, V f0, V f1, V f2, V f3,
-                            V error, RootBlock& to) {
+HWY_INLINE void appendPairs(const BatchPlane* m, std::size_t i, unsigned bits, std::size_t first, V f0, V f1, V f2,
+                            V f3, V error, RootBlock& to) {
   const auto front = hn::SetTableIndices(Tag(), FRONT_TABLE.row[bits]);
   const std::size_t at = to.count;
   const auto append = [&front, at](V v, double* plane) HWY_ATTR {

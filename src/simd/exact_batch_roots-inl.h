@@ -249,7 +249,7 @@ HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard,
   }
 }
 
-/// Pairs with certainly one root in the step: a few Halley steps, and more for those that they did not bring close enough.
+/// Pairs with certainly one root in the step: a few Halley steps, and more for those that these did not bring close.
 template <bool CERTIFIED, BatchKind KIND>
 HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
   for (std::size_t j = roots.count; j % lanes() != 0; ++j) copyPair(roots, roots.count - 1, roots, j);

@@ -7,8 +7,8 @@ namespace HWY_NAMESPACE {
 constexpr int MAX_INTERVALS = 48;            ///< looked at per pair
 constexpr double SMALLEST_INTERVAL = 0x1p-12;
 
-/// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4, where
-/// f would stay uncertain at every level.
+/// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4,
+/// where f would stay uncertain at every level.
 HWY_INLINE V warp(V x) {
   return onGrid(hn::Add(x, hn::Mul(constant(0.1376), hn::Mul(x, hn::Sub(constant(1), x)))));
 }
@@ -102,7 +102,8 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
       store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
       refine<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
       const V outcome = load(pairs.outcome, i);
-      const M contact = hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
+      const M contact =
+          hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
       free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
       result = choose(contact, outcome, result);
       kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);

@@ -237,8 +237,8 @@ void checkScene(const std::string& name, std::size_t most_undecided) {
   EXPECT_LE(without_cell, pairs / 500);
 }
 
-// On cloth-ball nothing is left; on n-body the 3,520 pairs of coincident vertices at rest, which a cheaper tier settles,
-// and at most a few pairs of nearly parallel edges.
+// On cloth-ball nothing is left; on n-body the 3,520 pairs of coincident vertices at rest, which a cheaper tier
+// settles, and at most a few pairs of nearly parallel edges.
 TEST(ExactBatch, NeverContradictsTheTruthOfClothBall) {
   DEFORMABLE_CCD_REQUIRE_DATA();
   checkScene("cloth-ball", 5);
