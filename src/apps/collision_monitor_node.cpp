@@ -7,8 +7,9 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "collision_monitor");
+  const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
-    deformable_ccd::CollisionMonitor monitor{ros::NodeHandle(), ros::NodeHandle("~")};
+    deformable_ccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what());

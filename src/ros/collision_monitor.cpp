@@ -285,7 +285,8 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
     complain(config.monitor.clock_body, toString(outcome.status),
              std::string(toString(outcome.status)) + (outcome.reason.empty() ? "" : ": " + outcome.reason));
   }
-  const StatsContext context = statsContext();
+  StatsContext context = statsContext();
+  context.unknown_fraction = pipeline.unknownFraction(outcome);
   outputs.publish(outcome, bodies, context, config.markers, frame);
   diagnostics.add(outcome, context);
   if (effects.update(outcome)) {

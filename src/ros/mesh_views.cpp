@@ -2,10 +2,6 @@
 
 namespace deformable_ccd {
 
-namespace {
-
-constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
-
 HeaderView readHeader(WireReader& wire) {
   wire.skip(4, "header.seq");
   const auto seconds = wire.read<std::uint32_t>("header.stamp");
@@ -16,6 +12,10 @@ HeaderView readHeader(WireReader& wire) {
   header.frame_id = wire.readString("header.frame_id");
   return header;
 }
+
+namespace {
+
+constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
 
 void readFields(WireReader& wire, CloudView& cloud) {
   bool found[3] = {false, false, false};

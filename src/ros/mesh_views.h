@@ -18,6 +18,9 @@ struct HeaderView {
   std::string_view frame_id;
 };
 
+/// std_msgs/Header. Throws WireError, also for a stamp with too many nanoseconds.
+HeaderView readHeader(WireReader& wire);
+
 /// sensor_msgs/PointCloud2. Fields are located by name and datatype; strides are held against the data.
 struct CloudView {
   HeaderView header;

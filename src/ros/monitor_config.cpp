@@ -163,6 +163,15 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
   config.unknown_space = unknown == "free" ? UnknownSpace::FREE
                          : unknown == "occupied" ? UnknownSpace::OCCUPIED : UnknownSpace::REPORT;
+  XmlRpcValue box = reader.raw("unknown_box");
+  if (box.valid()) {
+    const auto n = reader.numbers(box, "unknown_box", 6);
+    config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+  }
+  if (config.unknown_space == UnknownSpace::OCCUPIED && config.unknown_box.empty()) {
+    reader.fail("unknown_box", "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
+                               "the workspace within which the unknown is an obstacle");
+  }
 }
 
 void readEffects(ParameterReader section, MonitorConfig& config) {

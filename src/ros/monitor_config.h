@@ -44,6 +44,7 @@ struct MonitorConfig {
   std::map<std::string, EffectSetting> effects;
   double minimum_separation_m = 0;
   UnknownSpace unknown_space = UnknownSpace::FREE;
+  Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = "octomap", octomap_file, octomap_frame;
   std::size_t max_map_bytes = std::size_t{512} << 20;
   double transform_timeout_s = 0.2;

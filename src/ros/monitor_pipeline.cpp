@@ -122,6 +122,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
     // Refused: what was there before is out of date, and no map is better than a wrong one.
     monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
     unplaced_map_.reset();
+    known_.reset();
     return;
   }
   if (fixed_frame_.empty()) return;
@@ -130,6 +131,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   std::string reason;
   if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
     monitor_->setMap(std::move(map));
+    known_ = unplaced_map_->known;
     unplaced_map_.reset();
   } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
@@ -170,6 +172,22 @@ void MonitorPipeline::reset(StepStatus status) {
   monitor_->reset(status);
   arrivals_.clear();
   if (config_.fixed_frame.empty()) fixed_frame_.clear();
+}
+
+double MonitorPipeline::unknownFraction(const StepOutcome& outcome) const {
+  if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return 0;
+  SweptSpace sum;
+  Positions map_t0, map_t1;
+  for (std::size_t b = 0; b < outcome.topologies->size(); ++b) {
+    map_t0 = (*outcome.positions_t0)[b];
+    map_t1 = (*outcome.positions_t1)[b];
+    transform(outcome.map_from_fixed, map_t0);
+    transform(outcome.map_from_fixed, map_t1);
+    const SweptSpace one = known_->sweptSpace(*(*outcome.topologies)[b], map_t0, map_t1, nullptr);
+    sum.voxels += one.voxels;
+    sum.unknown += one.unknown;
+  }
+  return sum.unknownFraction();
 }
 
 std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }

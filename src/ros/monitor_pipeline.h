@@ -10,6 +10,7 @@
 
 #include <tf2/buffer_core.h>
 
+#include "deformable_ccd/known_space.h"
 #include "deformable_ccd/monitor.h"
 #include "ros/mesh_decoder.h"
 #include "ros/monitor_config.h"
@@ -27,6 +28,7 @@ struct RawMessage {
 /// A decoded map in its own frame.
 struct LoadedMap {
   std::shared_ptr<const VoxelSurface> surface;  ///< null: `problem` says why
+  std::shared_ptr<const KnownSpace> known;      ///< when unknown_space is not free
   std::string frame_id;                         ///< empty: the fixed frame
   StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
   std::string problem;
@@ -59,6 +61,8 @@ class MonitorPipeline {
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
   std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
+  /// unknown_space: report. Share of the voxels swept in this outcome's step that the map does not know; else 0.
+  double unknownFraction(const StepOutcome& outcome) const;
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none.
   std::string takeComplaint(std::size_t body);
 
@@ -79,6 +83,7 @@ class MonitorPipeline {
   std::vector<std::optional<RigidMesh>> rigid_;
   std::vector<std::string> complaints_;
   std::optional<LoadedMap> unplaced_map_;
+  std::shared_ptr<const KnownSpace> known_;  // of the map in use
   std::int64_t unplaced_since_ns_ = 0;
   std::deque<std::int64_t> arrivals_;  // of the clock body's frames inside the monitor
   std::int64_t outcome_arrival_ns_ = 0;

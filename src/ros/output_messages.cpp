@@ -199,6 +199,7 @@ StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context
     out.map_leaves = outcome.obstacle->leafCount();
     out.map_age = static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9;
   }
+  out.unknown_fraction = context.unknown_fraction;
   out.maps_received = context.maps_received;
   out.maps_refused = context.maps_refused;
   out.markers_built = context.markers_built;

@@ -1,0 +1,490 @@
+// The live node: messages in, contacts or the reason why there are none out.
+#include <deformable_ccd/ContactArray.h>
+#include <deformable_ccd/EffectArray.h>
+#include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/StepStats.h>
+#include <deformable_ccd/TimeToContact.h>
+
+#include <cmath>
+#include <limits>
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <gtest/gtest.h>
+#include <octomap_msgs/Octomap.h>
+#include <ros/ros.h>
+#include <std_msgs/Bool.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "octomap/map_builder.h"
+#include "ros/support/meshes.h"
+#include "ros/support/probe.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+using Stats = StepStats_<std::allocator<void>>;
+
+octomap_msgs::Octomap blockBelowZero(bool binary, double stamp_s = 1) {
+  octomap_msgs::Octomap map;
+  map.header = header(stamp_s);
+  map.binary = binary;
+  map.id = "OcTree";
+  map.resolution = 0.1;
+  map.data = buildOctomap(0.1, Box{{0, 0, -0.2}, {0.5, 0.4, 0}}, [](const Vec3&) { return true; }, binary);
+  return map;
+}
+
+tf2_msgs::TFMessage transformAt(double stamp_s, const std::string& child, const Vec3& at) {
+  geometry_msgs::TransformStamped transform;
+  transform.header = header(stamp_s);
+  transform.child_frame_id = child;
+  transform.transform.translation.x = at.x();
+  transform.transform.translation.y = at.y();
+  transform.transform.translation.z = at.z();
+  transform.transform.rotation.w = 1;
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(transform);
+  return message;
+}
+
+/// One of the launch file's monitors, reset before each case.
+class MonitorTest : public ::testing::Test {
+ protected:
+  explicit MonitorTest(const std::string& name)
+      : name_(name), contacts(node, name + "/contacts"), stats(node, name + "/stats"), clear(node, name + "/clear") {
+    EXPECT_TRUE(ros::service::waitForService(name + "/reset", 10000));
+    EXPECT_TRUE(trigger("reset").success);
+    waitUntil([this] { return clear.count() > 0 && !clear.last().data; });
+  }
+
+  std_srvs::Trigger::Response trigger(const std::string& service) {
+    std_srvs::Trigger call;
+    EXPECT_TRUE(ros::service::call(name_ + "/" + service, call));
+    return call.response;
+  }
+
+  /// Publishes one message and returns the outcome that it leads to.
+  template <typename Message>
+  ContactArray send(const ros::Publisher& publisher, const Message& message) {
+    const std::size_t seen = contacts.count();
+    publisher.publish(message);
+    return contacts.after(seen);
+  }
+
+  void expectAddsUp() {
+    const Stats s = stats.last();
+    EXPECT_EQ(s.frames_received, s.frames_processed + s.frames_started + s.frames_skipped + s.frames_waiting);
+    EXPECT_EQ(s.frames_skipped, s.skipped_duplicate + s.skipped_vertex_count + s.skipped_bad_message +
+                                    s.skipped_no_transform + s.skipped_no_body + s.skipped_queue_full +
+                                    s.skipped_disabled + s.skipped_reset + s.skipped_error);
+  }
+
+  std::string name_;
+  ros::NodeHandle node;
+  Probe<ContactArray> contacts;
+  Probe<Stats> stats;
+  Probe<std_msgs::Bool> clear;
+};
+
+// --- any mesh type ---------------------------------------------------------------------------------------------------
+
+struct Plain : MonitorTest {
+  Plain() : MonitorTest("/plain") {}
+
+  /// From z = 1 to z = -3 in 0.1 s: the tip meets the triangle at a quarter of the step.
+  void expectQuarter(const ContactArray& outcome) {
+    ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+    ASSERT_TRUE(outcome.answered);
+    ASSERT_FALSE(outcome.contacts.empty());
+    double earliest = 1;
+    for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
+    EXPECT_LE(earliest, 0.25);
+    EXPECT_GE(earliest, 0.25 - std::ldexp(1.0, -30));
+    EXPECT_FALSE(clear.last().data);
+  }
+};
+
+TEST_F(Plain, MeshStampedKnownTime) {
+  Probe<FirstContact> first(node, "/plain/first_contact");
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const ContactArray alone = send(publisher, meshStamped(tipAbove(1), 10));
+  EXPECT_EQ(alone.status, ContactArray::FIRST_FRAME);
+  EXPECT_FALSE(alone.answered);
+  EXPECT_EQ(alone.header.frame_id, "world");
+  const ContactArray outcome = send(publisher, meshStamped(tipAbove(-3), 10.1));
+  expectQuarter(outcome);
+  EXPECT_EQ(outcome.start, ros::Time(10));
+  EXPECT_EQ(outcome.header.stamp, ros::Time(10.1));
+  ASSERT_EQ(outcome.bodies.size(), 1u);
+  const auto& contact = outcome.contacts.front();
+  EXPECT_NEAR((contact.time_of_contact - ros::Time(10)).toSec(), 0.025, 1e-6);
+  EXPECT_NEAR(contact.point.z, 0, 1e-6);
+  EXPECT_NEAR(contact.approach_speed, 40, 1e-3) << "m/s, not m per step";
+  ASSERT_TRUE(waitUntil([&] { return first.count() > 0 && first.last().contact; }));
+  EXPECT_NEAR(first.last().seconds_from_start, 0.025, 1e-6);
+  expectAddsUp();
+}
+
+TEST_F(Plain, EveryMessageTypeSaysTheSame) {
+  {
+    const auto publisher = advertiseAndWait<pcl_msgs::PolygonMesh>(node, "/plain/mesh");
+    send(publisher, polygonMesh(tipAbove(1), 10));
+    expectQuarter(send(publisher, polygonMesh(tipAbove(-3), 10.1)));
+  }
+  ros::Duration(0.2).sleep();
+  {
+    const auto publisher = advertiseAndWait<visualization_msgs::MarkerArray>(node, "/plain/mesh");
+    send(publisher, soup(tipAbove(1), 20));
+    expectQuarter(send(publisher, soup(tipAbove(-3), 20.1)));
+  }
+  ros::Duration(0.2).sleep();
+  {
+    const auto publisher = advertiseAndWait<visualization_msgs::Marker>(node, "/plain/mesh");
+    send(publisher, soup(tipAbove(1), 30).markers[0]);
+    expectQuarter(send(publisher, soup(tipAbove(-3), 30.1).markers[0]));
+  }
+  ros::Duration(0.2).sleep();
+  {
+    const auto publisher = advertiseAndWait<shape_msgs::Mesh>(node, "/plain/mesh");
+    const ContactArray outcome = send(publisher, shapeMesh(tipAbove(1)));
+    EXPECT_EQ(outcome.status, ContactArray::BAD_MESSAGE);
+    EXPECT_NE(outcome.reason.find("frame_id"), std::string::npos) << outcome.reason;
+  }
+  ros::Duration(0.2).sleep();
+  const auto publisher = advertiseAndWait<std_msgs::Bool>(node, "/plain/mesh");
+  EXPECT_EQ(send(publisher, std_msgs::Bool()).status, ContactArray::BAD_MESSAGE);
+  expectAddsUp();
+}
+
+TEST_F(Plain, SeamsAreNeverStepped) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  send(publisher, meshStamped(tipAbove(1), 100));
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 100)).status, ContactArray::DUPLICATE);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(-1), 101)).status, ContactArray::GAP);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 50)).status, ContactArray::TIME_JUMP);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 50.1)).status, ContactArray::OK) << "recovered within two";
+  Mesh other = tipAbove(0.8);
+  other.faces.pop_back();
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.2)).status, ContactArray::TOPOLOGY_CHANGED);
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.3)).status, ContactArray::OK);
+  other.positions[0].x() = 50;
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.4)).status, ContactArray::TELEPORT);
+  EXPECT_EQ(stats.last().seams_gap > 0, true);
+  expectAddsUp();
+}
+
+TEST_F(Plain, LoopingReplay) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  for (int loop = 0; loop < 3; ++loop) {
+    const ContactArray start = send(publisher, meshStamped(tipAbove(1), 5));
+    EXPECT_EQ(start.status, loop == 0 ? ContactArray::FIRST_FRAME : ContactArray::TIME_JUMP);
+    expectQuarter(send(publisher, meshStamped(tipAbove(-3), 5.1)));
+  }
+}
+
+TEST_F(Plain, VerticesThatAreNotFinite) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  Mesh lost = tipAbove(0.9);
+  lost.positions[4].y() = std::numeric_limits<double>::quiet_NaN();
+  lost.positions[5].x() = std::numeric_limits<double>::infinity();
+  send(publisher, meshStamped(tipAbove(1), 10));
+  const ContactArray outcome = send(publisher, meshStamped(lost, 10.1));
+  EXPECT_EQ(outcome.status, ContactArray::PARTIAL);
+  EXPECT_TRUE(outcome.answered);
+  EXPECT_FALSE(clear.last().data);
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
+  EXPECT_EQ(stats.last().unchecked_vertices, 2u);
+}
+
+TEST_F(Plain, ClearIsTrueOnlyForACheckedStep) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  send(publisher, meshStamped(tipAbove(1), 10));
+  EXPECT_FALSE(clear.last().data);
+  const ContactArray outcome = send(publisher, meshStamped(tipAbove(0.9), 10.1));
+  EXPECT_EQ(outcome.start_state, ContactArray::CLEAR);
+  EXPECT_TRUE(waitUntil([&] { return clear.last().data; }));
+  EXPECT_TRUE(trigger("reset").success);
+  EXPECT_TRUE(waitUntil([&] { return !clear.last().data; })) << "a reset is not clear";
+}
+
+TEST_F(Plain, ZeroStampsTakeTheReceiptTime) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const std::uint64_t before = stats.last().receipt_stamps;
+  send(publisher, meshStamped(tipAbove(1), 0));
+  EXPECT_GT(contacts.last().header.stamp, ros::Time(1e9));
+  ASSERT_TRUE(waitUntil([&] { return stats.last().receipt_stamps > before; }));
+}
+
+TEST_F(Plain, HostileMessagesAreRefused) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  Mesh far = tipAbove(1);
+  far.faces.push_back({0, 1, 600});
+  const ContactArray outcome = send(publisher, meshStamped(far, 10));
+  EXPECT_EQ(outcome.status, ContactArray::BAD_MESSAGE);
+  EXPECT_NE(outcome.reason.find("600"), std::string::npos) << outcome.reason;
+  EXPECT_EQ(send(publisher, meshStamped({}, 10)).status, ContactArray::BAD_MESSAGE);
+  send(publisher, meshStamped(tipAbove(1), 10));
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 10.1)).status, ContactArray::OK);
+  expectAddsUp();
+}
+
+TEST_F(Plain, MarkersAreBuiltForSubscribersOnly) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  send(publisher, meshStamped(tipAbove(1), 10));
+  send(publisher, meshStamped(tipAbove(-3), 10.1));
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
+  EXPECT_EQ(stats.last().markers_built, 0u);
+  Probe<visualization_msgs::MarkerArray> markers(node, "/plain/markers");
+  send(publisher, meshStamped(tipAbove(1), 5));
+  send(publisher, meshStamped(tipAbove(-3), 5.1));
+  ASSERT_TRUE(waitUntil([&] { return markers.count() >= 2; }));
+  const auto array = markers.last();
+  ASSERT_GE(array.markers.size(), 2u);
+  EXPECT_EQ(array.markers[0].action, visualization_msgs::Marker::DELETEALL);
+  EXPECT_EQ(array.markers[0].header.frame_id, "world");
+  EXPECT_TRUE(array.markers[0].ns.empty());
+  EXPECT_EQ(stats.last().markers_built, 2u);
+}
+
+TEST_F(Plain, FramesWaitForMovingTransforms) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
+  Mesh mesh = tipAbove(1);
+  // The camera goes up while the mesh goes down with it: in the world nothing moves, and nothing touches.
+  tf.publish(transformAt(200, "camera", {0, 0, 0}));
+  send(publisher, meshStamped(mesh, 200, "camera"));
+  const std::size_t seen = contacts.count();
+  for (Vec3& p : mesh.positions) p.z() -= 0.4;
+  publisher.publish(meshStamped(mesh, 200.05, "camera"));
+  ros::Duration(0.05).sleep();
+  EXPECT_EQ(contacts.count(), seen) << "its transform is not there yet";
+  tf.publish(transformAt(200.1, "camera", {0, 0, 0.8}));
+  const ContactArray outcome = contacts.after(seen);
+  EXPECT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  EXPECT_TRUE(outcome.contacts.empty());
+
+  const ContactArray lost = send(publisher, meshStamped(mesh, 200.15, "nowhere"));
+  EXPECT_EQ(lost.status, ContactArray::NO_TRANSFORM);
+  EXPECT_NE(lost.reason.find("nowhere"), std::string::npos) << lost.reason;
+  expectAddsUp();
+}
+
+TEST_F(Plain, LookAheadPredictsWhatComes) {
+  Probe<TimeToContact> ahead(node, "/plain/time_to_contact");
+  Probe<ContactArray> predicted(node, "/plain/predicted_contacts");
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  send(publisher, meshStamped(tipAbove(2), 10));
+  send(publisher, meshStamped(tipAbove(1.5), 10.1));
+  const TimeToContact time = ahead.after(0);
+  ASSERT_TRUE(time.answered);
+  EXPECT_TRUE(time.contact);
+  EXPECT_NEAR(time.seconds, 0.3, 1e-6);
+  EXPECT_EQ(time.header.stamp, ros::Time(10.1));
+  EXPECT_FALSE(predicted.after(0).contacts.empty());
+  EXPECT_TRUE(contacts.last().contacts.empty()) << "predictions are never mixed with what was observed";
+}
+
+TEST_F(Plain, Services) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  EXPECT_FALSE(trigger("check_now").success) << "nothing to check yet";
+  send(publisher, meshStamped(tipAbove(0), 10));
+  const auto now = trigger("check_now");
+  EXPECT_TRUE(now.success) << now.message;
+  EXPECT_NE(now.message.find("contacts"), std::string::npos);
+  std_srvs::SetBool enable;
+  enable.request.data = false;
+  ASSERT_TRUE(ros::service::call("/plain/enable", enable));
+  const std::size_t seen = contacts.count();
+  publisher.publish(meshStamped(tipAbove(1), 10.1));
+  ros::Duration(0.2).sleep();
+  EXPECT_EQ(contacts.count(), seen);
+  enable.request.data = true;
+  ASSERT_TRUE(ros::service::call("/plain/enable", enable));
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 10.2)).status, ContactArray::FIRST_FRAME);
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.2); }));
+  EXPECT_GE(stats.last().skipped_disabled, 1u);
+  expectAddsUp();
+}
+
+TEST_F(Plain, EffectsSayWhy) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  send(publisher, meshStamped(tipAbove(1), 10));
+  send(publisher, meshStamped(tipAbove(0.9), 10.1));
+  Probe<EffectArray> effects(node, "/plain/effects");
+  const EffectArray plan = effects.after(0);
+  ASSERT_FALSE(plan.effects.empty());
+  for (const EffectState& effect : plan.effects) {
+    EXPECT_FALSE(effect.reason.empty()) << effect.name;
+    if (effect.name == "self_collision") EXPECT_TRUE(effect.running);
+    if (effect.name == "octomap") EXPECT_FALSE(effect.running) << effect.reason;
+  }
+}
+
+TEST_F(Plain, Diagnostics) {
+  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
+  ASSERT_TRUE(waitUntil([&] { return diagnostics.count() > 0; }));
+  EXPECT_FALSE(diagnostics.last().status.empty());
+}
+
+// --- a grid over an octomap ------------------------------------------------------------------------------------------
+
+struct Grid : MonitorTest {
+  Grid() : MonitorTest("/grid") {}
+  ros::Publisher mesh = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/grid/mesh");
+  ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/grid/octomap", true);
+
+  void giveMap(const octomap_msgs::Octomap& message) {
+    const Stats before = stats.last();
+    map.publish(message);
+    // Frames that touch nothing, until one has seen the map.
+    double stamp_s = 1;
+    ASSERT_TRUE(waitUntil([&] {
+      send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
+      const Stats now = stats.last();
+      return now.maps_received > before.maps_received && now.map_present;
+    }));
+  }
+};
+
+TEST_F(Grid, AMissingMapIsNoAnswerAboutIt) {
+  // Before any map: the launch file's cases run in order of their names within the fixture.
+  send(mesh, cloud(gridAt(3, 4, 0.3), 10));
+  const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.2), 10.1));
+  if (!stats.last().map_present) EXPECT_EQ(outcome.status, ContactArray::NO_MAP);
+  if (!stats.last().map_present) EXPECT_FALSE(clear.last().data);
+}
+
+TEST_F(Grid, OctomapBinaryAndFull) {
+  for (const bool binary : {true, false}) {
+    giveMap(blockBelowZero(binary));
+    send(mesh, cloud(gridAt(3, 4, 0.3), 100));
+    const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, -0.1), 100.1));
+    ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+    EXPECT_EQ(outcome.start_state, ContactArray::CLEAR);
+    ASSERT_FALSE(outcome.contacts.empty());
+    double earliest = 1;
+    std::size_t vertices = 0;
+    for (const auto& contact : outcome.contacts) {
+      earliest = std::min(earliest, contact.toc_lower);
+      vertices += contact.kind == decltype(outcome.contacts)::value_type::VERTEX_VOXEL_FACE;
+      EXPECT_EQ(contact.body[1], 65535);
+    }
+    EXPECT_NEAR(earliest, 0.75, 1e-6) << "float coordinates";
+    EXPECT_EQ(vertices, 12u) << "each vertex falls on one face";
+    send(mesh, cloud(gridAt(3, 4, 0.3), 100.2));
+  }
+}
+
+TEST_F(Grid, MalformedMapsAreRefused) {
+  giveMap(blockBelowZero(true));
+  const std::uint64_t refused = stats.last().maps_refused;
+  octomap_msgs::Octomap bad = blockBelowZero(true);
+  bad.data.resize(bad.data.size() / 2);
+  bad.resolution = std::numeric_limits<double>::quiet_NaN();
+  map.publish(bad);
+  double stamp_s = 200;
+  ASSERT_TRUE(waitUntil([&] {
+    send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
+    return stats.last().maps_refused > refused;
+  }));
+  const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 5), stamp_s + 0.1));
+  EXPECT_EQ(outcome.status, ContactArray::NO_MAP) << "no map is better than an old one";
+  EXPECT_NE(outcome.reason.find("refused"), std::string::npos) << outcome.reason;
+  giveMap(blockBelowZero(true));
+  EXPECT_EQ(contacts.last().status, ContactArray::OK);
+}
+
+TEST_F(Grid, VertexCountMismatch) {
+  send(mesh, cloud(gridAt(3, 4, 1), 10));
+  const ContactArray outcome = send(mesh, cloud(gridAt(3, 5, 1), 10.1));
+  EXPECT_EQ(outcome.status, ContactArray::VERTEX_COUNT);
+  EXPECT_FALSE(outcome.answered);
+  EXPECT_NE(outcome.reason.find("3 x 4"), std::string::npos) << outcome.reason;
+  EXPECT_TRUE(send(mesh, cloud(gridAt(3, 4, 1), 10.2)).answered);
+  expectAddsUp();
+}
+
+TEST_F(Grid, LyingCloudsAreRefused) {
+  auto lying = cloud(gridAt(3, 4, 1), 10);
+  lying.width = 1u << 31;
+  EXPECT_EQ(send(mesh, lying).status, ContactArray::BAD_MESSAGE);
+  lying = cloud(gridAt(3, 4, 1), 10);
+  lying.fields[2].offset = 1u << 30;
+  EXPECT_EQ(send(mesh, lying).status, ContactArray::BAD_MESSAGE);
+  lying = cloud(gridAt(3, 4, 1), 10);
+  lying.fields[1].datatype = 2;
+  const ContactArray outcome = send(mesh, lying);
+  EXPECT_EQ(outcome.status, ContactArray::BAD_MESSAGE);
+  EXPECT_NE(outcome.reason.find("'y'"), std::string::npos) << outcome.reason;
+  lying = cloud(gridAt(3, 4, 1), 10);
+  lying.point_step = 0;
+  EXPECT_EQ(send(mesh, lying).status, ContactArray::BAD_MESSAGE);
+  expectAddsUp();
+}
+
+// --- several bodies --------------------------------------------------------------------------------------------------
+
+struct Pair : MonitorTest {
+  Pair() : MonitorTest("/pair") {}
+  ros::Publisher cloth = advertiseAndWait<MeshStamped>(node, "/pair/cloth");
+  ros::Publisher gripper = advertiseAndWait<MeshStamped>(node, "/pair/gripper");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
+
+  static Mesh floor(double z) { return {{{-1, -1, z}, {1, -1, z}, {0, 1, z}}, {{0, 1, 2}}}; }
+  static Mesh tip(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}}}; }
+  void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
+};
+
+TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
+  finger(300, -5);
+  finger(300.4, -5);
+  cloth.publish(meshStamped(floor(0), 300));
+  gripper.publish(meshStamped(tip(4), 299.9));
+  ASSERT_TRUE(waitUntil([&] { return contacts.count() > 0; }));
+  const std::size_t seen = contacts.count();
+  cloth.publish(meshStamped(floor(0), 300.1));
+  ros::Duration(0.05).sleep();
+  EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
+  gripper.publish(meshStamped(tip(-4), 300.3));  // 2 at 300, 0 at 300.1
+  const ContactArray outcome = contacts.after(seen);
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  ASSERT_EQ(outcome.bodies.size(), 3u);
+  EXPECT_FALSE(outcome.contacts.empty());
+
+  const ContactArray late = send(cloth, meshStamped(floor(0), 300.35));
+  EXPECT_EQ(late.status, ContactArray::NO_BODY);
+  EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
+  expectAddsUp();
+}
+
+TEST_F(Pair, RigidBodiesMoveByTf) {
+  finger(400, 2);
+  finger(400.2, -2);
+  gripper.publish(meshStamped(tip(50), 400));
+  gripper.publish(meshStamped(tip(50), 400.3));
+  ros::Duration(0.1).sleep();
+  send(cloth, meshStamped(floor(0), 400));
+  const ContactArray outcome = send(cloth, meshStamped(floor(0), 400.2));
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  ASSERT_FALSE(outcome.contacts.empty());
+  double earliest = 1;
+  for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
+  EXPECT_NEAR(earliest, 0.5, 1e-6);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "monitor_test");
+  ros::NodeHandle node;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
