@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "detector/start_state.h"
+#include "support/exact_distance.h"
 
 namespace deformable_ccd {
 namespace test {
@@ -145,6 +146,39 @@ std::optional<double> earliestOfContacts(const std::vector<Contact>& contacts, c
     if (part && (!earliest || contact.toc_lower < *earliest)) earliest = contact.toc_lower;
   }
   return earliest;
+}
+
+double distanceToBoxes(const ObstacleScene& scene, double t) {
+  double distance = 1e308;
+  const auto at = [&](Index v) { return Vec3((1 - t) * scene.t0[v] + t * scene.t1[v]); };
+  const auto measure = [&](PairKind kind, const std::array<Vec3, 4>& points) {
+    PairMotion pair;
+    for (int time = 0; time < 2; ++time) {
+      for (int i = 0; i < 4; ++i) std::memcpy(pair.x[time][i], points[i].data(), sizeof pair.x[time][i]);
+    }
+    distance = std::min(distance, approximateDistanceAt(kind, pair, 0));
+  };
+  for (const OccupiedLeaf& leaf : scene.leaves) {
+    const BoxFeatures box = featuresOf(leaf, scene.resolution_m);
+    for (const Edge& edge : scene.topology.edges()) {
+      if (meetsAtStart(box, {at(edge[0]), at(edge[1])})) return 0;
+      for (const auto& e : box.edges) {
+        measure(PairKind::EDGE_EDGE, {at(edge[0]), at(edge[1]), box.corner[e[0]], box.corner[e[1]]});
+      }
+      for (const Index v : edge) {
+        for (const auto& f : box.triangles) {
+          measure(PairKind::VERTEX_FACE, {at(v), box.corner[f[0]], box.corner[f[1]], box.corner[f[2]]});
+        }
+      }
+    }
+    for (const Face& face : scene.topology.faces()) {
+      if (meetsAtStart(box, {at(face[0]), at(face[1]), at(face[2])})) return 0;
+      for (const Vec3& corner : box.corner) {
+        measure(PairKind::VERTEX_FACE, {corner, at(face[0]), at(face[1]), at(face[2])});
+      }
+    }
+  }
+  return distance;
 }
 
 std::string describe(const ObstacleScene& scene) {

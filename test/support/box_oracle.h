@@ -26,6 +26,9 @@ std::optional<double> earliestAgainstBoxes(const ObstacleScene& scene, const std
 /// The same from an obstacle test's contacts: the earliest of those of the feature's vertices, edges and face.
 std::optional<double> earliestOfContacts(const std::vector<Contact>& contacts, const std::vector<Index>& feature);
 
+/// The distance between the mesh and the boxes as solids at time t, rounded [m].
+double distanceToBoxes(const ObstacleScene& scene, double t);
+
 /// One line a part, for failures.
 std::string describe(const ObstacleScene& scene);
 

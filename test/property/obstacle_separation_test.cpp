@@ -1,0 +1,72 @@
+// With a minimum separation the obstacle test is never late, misses nothing closer than it, and reports nothing farther
+// than it plus the tolerance.
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <random>
+
+#include "support/box_oracle.h"
+#include "support/query_property.h"
+
+namespace deformable_ccd {
+namespace {
+
+using test::ObstacleScene;
+
+constexpr double RESOLUTION = 0.05;
+
+ObstacleScene randomScene(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> place(-0.1, 0.25), step(-0.15, 0.15);
+  ObstacleScene scene;
+  scene.resolution_m = RESOLUTION;
+  scene.leaves = {{{32768, 32768, 32768}, 2}, {{32770, 32768, 32768}, 1}, {{32768, 32770, 32769}, 1}};
+  for (int i = 0; i < 3; ++i) {
+    scene.t0.emplace_back(place(random), place(random), place(random));
+    scene.t1.push_back(scene.t0.back() + Vec3(step(random), step(random), step(random)));
+  }
+  scene.topology = random() % 2 ? Topology::fromTriangles(3, {{0, 1, 2}}) : Topology::polyline(3);
+  return scene;
+}
+
+TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
+  std::mt19937_64 random(11);
+  const int scenes = test::longRun() ? 20000 : 400;
+  int within = 0, apart = 0;
+  ObstacleOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.accuracy.tolerance_m = 1e-6;
+  options.accuracy.max_subdivisions = 1 << 16;
+  for (int i = 0; i < scenes; ++i) {
+    const ObstacleScene scene = randomScene(random);
+    options.minimum_separation_m = (random() % 4 + 1) * 0.004;
+    ObstacleTest test(options);
+    std::vector<Contact> contacts;
+    ObstacleStats stats;
+    test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
+             contacts, stats);
+    double earliest = 2;
+    for (const Contact& contact : contacts) earliest = std::min(earliest, contact.toc_lower);
+    bool close = false;
+    for (int k = 0; k <= 64; ++k) {
+      const double t = k / 64.0;
+      const double distance = test::distanceToBoxes(scene, t);
+      if (distance > options.minimum_separation_m - 1e-9) continue;
+      close = true;
+      ASSERT_LE(earliest, t) << "distance " << distance << " of " << options.minimum_separation_m << "\n"
+                             << test::describe(scene);
+      break;
+    }
+    for (const Contact& contact : contacts) {
+      if (contact.certainty != Certainty::CERTAIN) continue;
+      ASSERT_LE(test::distanceToBoxes(scene, contact.toc_lower), options.minimum_separation_m + 1.1e-6)
+          << test::describe(scene);
+    }
+    ++(close ? within : apart);
+  }
+  std::cout << scenes << " scenes, closer than the separation " << within << ", apart " << apart << "\n";
+  EXPECT_GT(within, scenes / 10);
+  EXPECT_GT(apart, scenes / 10);
+}
+
+}  // namespace
+}  // namespace deformable_ccd
