@@ -1,0 +1,81 @@
+#include "support/step_judge.h"
+
+#include <algorithm>
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+std::string judgeContacts(const std::vector<core::Contact>& found, std::vector<TrueContact>& truth, int toc_bits) {
+  const auto before = [](const core::Contact& a, const core::Contact& b) {
+    return std::tie(a.kind, a.body, a.vertex) < std::tie(b.kind, b.body, b.vertex);
+  };
+  for (std::size_t i = 0; i < std::max(found.size(), truth.size()); ++i) {
+    if (i == truth.size()) return "reported but not true: " + describe(found[i]);
+    if (i == found.size()) return "true but not reported: " + describe(truth[i].contact);
+    if (before(found[i], truth[i].contact)) return "reported but not true (or out of order): " + describe(found[i]);
+    if (before(truth[i].contact, found[i])) return "true but not reported: " + describe(truth[i].contact);
+    ElementaryResult result;
+    result.verdict = found[i].certainty == Certainty::CERTAIN ? Verdict::CONTACT : Verdict::UNDECIDED;
+    result.toc_lower = found[i].toc_lower;
+    result.toc_upper = found[i].toc_upper;
+    if (result.verdict != Verdict::CONTACT) return "undecided: " + describe(found[i]);
+    if (!isCellOf(truth[i].toc, result, toc_bits)) return "the wrong cell of time: " + describe(found[i]);
+  }
+  return "";
+}
+
+std::string judgeStart(const StepResult& result, const std::vector<StartIntersection>& truth) {
+  if (result.start_state != (truth.empty() ? StartState::CLEAR : StartState::INTERSECTING)) {
+    return std::string("start state ") + toString(result.start_state) + " with " + std::to_string(truth.size()) + " pairs in truth";
+  }
+  const bool same = std::equal(result.intersections.begin(), result.intersections.end(), truth.begin(), truth.end(),
+                               [](const auto& x, const auto& y) { return x == y; });
+  return same ? "" : std::to_string(result.intersections.size()) + " intersections listed, " +
+                         std::to_string(truth.size()) + " in truth, or in another order";
+}
+
+}  // namespace
+
+std::string judgeStep(const TestStep& step) {
+  std::vector<TrueContact> contacts = trueContacts(step);
+  const std::vector<StartIntersection> start = trueIntersections(step);
+  for (const BroadPhase broad_phase : {BroadPhase::CLUSTERED, BroadPhase::BRUTE_FORCE}) {
+    DetectorOptions options;
+    options.broad_phase = broad_phase;
+    Detector detector(options);
+    detector.setBodies(step.setups(), step.positions());
+    const StepResult& result = detector.run(step.motion());
+    std::string wrong = judgeContacts(result.contacts, contacts, options.accuracy.toc_bits);
+    if (wrong.empty()) wrong = judgeStart(result, start);
+    if (!wrong.empty()) return (broad_phase == BroadPhase::CLUSTERED ? "clustered: " : "brute force: ") + wrong;
+  }
+  return "";
+}
+
+std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests, int& full_tests) {
+  Detector carrying{DetectorOptions()}, full{DetectorOptions()};
+  for (Detector* d : {&carrying, &full}) d->setBodies(steps[0].setups(), steps[0].positions());
+  bool must_be_clear = false;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    MotionStep motion = steps[i].motion();
+    const StepResult& expected = full.run(motion);
+    motion.continues = i > 0;
+    const StepResult& result = carrying.run(motion);
+    const std::string where = "step " + std::to_string(i) + ": ";
+    if (i > 0) {
+      carried_tests += static_cast<int>(result.stats[Stage::START_STATE].in);
+      full_tests += static_cast<int>(expected.stats[Stage::START_STATE].in);
+    }
+    const std::string wrong = judgeStart(result, expected.intersections);
+    if (!wrong.empty()) return where + "carried over: " + wrong;
+    const std::string other = difference(result.contacts, expected.contacts);
+    if (!other.empty()) return where + other;
+    if (must_be_clear && result.start_state != StartState::CLEAR) return where + "INTERSECTING after CLEAR without contact";
+    must_be_clear = result.start_state == StartState::CLEAR && result.contacts.empty() && result.stats.unchecked_vertices == 0;
+  }
+  return "";
+}
+
+}  // namespace test
+}  // namespace deformable_ccd
