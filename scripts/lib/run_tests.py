@@ -36,11 +36,11 @@ class Result:
         self.notes.append(note)
 
 
-def run(command, log, environment=None):
+def run(command, log, environment=None, folder=None):
     """Runs a command with its output in the file `log`; returns the exit status, or None when out of time."""
     with open(log, 'w') as output:
         process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                                   env={**os.environ, **(environment or {})}, start_new_session=True)
+                                   env={**os.environ, **(environment or {})}, cwd=folder, start_new_session=True)
         try:
             return process.wait(timeout=TIME_LIMIT_S)
         except subprocess.TimeoutExpired:
@@ -155,9 +155,9 @@ class PythonRunner:
     def __call__(self, logs):
         result = Result()
         log = logs / (self.path.stem + '.py.log')
-        status = run([sys.executable, '-m', 'unittest', '-v', str(self.path)], log,
-                     {'PYTHONDONTWRITEBYTECODE': '1', 'PYTHONPATH': os.pathsep.join(
-                         [str(self.path.parent), os.environ.get('PYTHONPATH', '')])})
+        # From its own folder, so that unittest takes the file's name for a module and finds the helpers beside it.
+        status = run([sys.executable, '-m', 'unittest', '-v', self.path.name], log, {'PYTHONDONTWRITEBYTECODE': '1'},
+                     self.path.parent)
         output = log.read_text(errors='replace')
         ran = re.search(r'^Ran (\d+) tests? in', output, re.M)
         if not ran:

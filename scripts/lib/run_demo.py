@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""Plays a recorded scene to the monitor (launch/demo.launch) under a ROS master of its own, and says what it found."""
+import argparse
+import csv
+import json
+import os
+import pathlib
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import threading
+import time
+
+import rosbag
+import rosgraph
+import rospy
+from deformable_ccd.msg import Contact, ContactArray, StepStats
+
+NODE = '/collision_monitor'
+START_STATE = {ContactArray.CLEAR: 'CLEAR', ContactArray.INTERSECTING: 'INTERSECTING',
+               ContactArray.NOT_CHECKED: 'NOT_CHECKED'}
+STATUS_NAMES = ['OK', 'FIRST_FRAME', 'TOPOLOGY_CHANGED', 'GAP', 'TIME_JUMP', 'NO_TRANSFORM', 'NO_MAP', 'NO_BODY', 'PARTIAL',
+                'DEADLINE', 'TRUNCATED', 'DUPLICATE', 'TELEPORT', 'VERTEX_COUNT', 'BAD_MESSAGE', 'QUEUE_FULL', 'DISABLED',
+                'RESET', 'INTERNAL_ERROR']
+MESH_TYPES = {'deformable_ccd/MeshStamped', 'sensor_msgs/PointCloud2', 'pcl_msgs/PolygonMesh',
+              'visualization_msgs/MarkerArray'}
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('localhost', 0))
+        return probe.getsockname()[1]
+
+
+class Listener:
+    """Collects what the node publishes for every step."""
+
+    def __init__(self):
+        self.lock = threading.Lock()
+        self.stats, self.contacts = [], []
+        rospy.Subscriber(NODE + '/stats', StepStats, self.add_stats, queue_size=None)
+        rospy.Subscriber(NODE + '/contacts', ContactArray, self.add_contacts, queue_size=None)
+
+    def add_stats(self, message):
+        with self.lock:
+            self.stats.append(message)
+
+    def add_contacts(self, message):
+        with self.lock:
+            self.contacts.append(message)
+
+
+def start_launch(arguments, environment, extra):
+    log = open(arguments.folder / 'roslaunch.log', 'w')
+    return subprocess.Popen(['roslaunch', '--port', str(arguments.port), 'deformable_ccd', 'demo.launch',
+                             'bag:=%s' % arguments.bag] + extra, env=environment, stdout=log, stderr=subprocess.STDOUT,
+                            stdin=subprocess.DEVNULL, start_new_session=True)
+
+
+def stop(process):
+    """Ends roslaunch as Ctrl-C would, which ends its nodes."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(timeout=20)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def kind_of(contact):
+    return {Contact.VERTEX_FACE: 'cloth vertex - cloth face', Contact.EDGE_EDGE: 'cloth edge - cloth edge',
+            Contact.VERTEX_VOXEL_FACE: 'cloth vertex - octomap face', Contact.EDGE_VOXEL_EDGE: 'cloth edge - octomap edge',
+            Contact.FACE_VOXEL_CORNER: 'cloth face - octomap corner'}[contact.kind]
+
+
+def frames_of(path):
+    info = rosbag.Bag(str(path)).get_type_and_topic_info().topics
+    topic, of_topic = next((name, i) for name, i in info.items() if i.msg_type in MESH_TYPES)
+    start = rosbag.Bag(str(path)).get_start_time()
+    return topic, of_topic.message_count, start
+
+
+def summarize(arguments, listener, start):
+    arrays = sorted(listener.contacts, key=lambda a: a.header.stamp)
+    stats = sorted(listener.stats, key=lambda s: s.header.stamp)
+    kinds, first = {}, {}
+    for array in arrays:
+        for contact in array.contacts:
+            name = kind_of(contact) + (', already there at the start of the step' if contact.initial else '')
+            kinds[name] = kinds.get(name, 0) + 1
+            at = contact.time_of_contact.to_sec() - start
+            if not contact.initial and (name not in first or at < first[name][0]):
+                first[name] = (at, contact)
+    last = stats[-1] if stats else None
+    summary = {
+        'frames_in_bag': arguments.frames, 'contacts': {k: kinds[k] for k in sorted(kinds)},
+        'first_contact_s': {k: first[k][0] for k in sorted(first)},
+        'statuses': {}, 'start_states': {},
+        'latency_ms': {}, 'step_ms': {},
+    }
+    for array in arrays:
+        for key, name in (('statuses', STATUS_NAMES[array.status]), ('start_states', START_STATE[array.start_state])):
+            summary[key][name] = summary[key].get(name, 0) + 1
+    if last:
+        for name in ('frames_received', 'frames_processed', 'frames_started', 'frames_skipped', 'frames_waiting'):
+            summary[name] = getattr(last, name)
+        steps = [s for s in stats if s.answered]
+        for key, values in (('latency_ms', [1e3 * s.latency for s in steps]), ('step_ms', [s.total_ms for s in steps])):
+            if values:
+                summary[key] = {'median': statistics.median(values), 'max': max(values)}
+    return summary, arrays, stats
+
+
+def write_report(folder, summary, arrays, stats, start):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / 'summary.json').write_text(json.dumps(summary, indent=2) + '\n')
+    with open(folder / 'contacts.csv', 'w', newline='') as stream:
+        writer = csv.writer(stream)
+        writer.writerow(['step_end_s', 'contact_s', 'kind', 'initial', 'leaving', 'certain', 'v0', 'v1', 'v2', 'v3',
+                         'x_m', 'y_m', 'z_m'])
+        for array in arrays:
+            for c in array.contacts:
+                writer.writerow(['%.6f' % (array.header.stamp.to_sec() - start),
+                                 '%.9f' % (c.time_of_contact.to_sec() - start), kind_of(c), int(c.initial),
+                                 int(c.leaving), int(c.certainty == Contact.CERTAIN)] +
+                                ['' if v == Contact.NO_VERTEX else v for v in c.vertex] +
+                                ['%.6f' % v for v in (c.point.x, c.point.y, c.point.z)])
+    with open(folder / 'steps.csv', 'w', newline='') as stream:
+        writer = csv.writer(stream)
+        names = [n for n in StepStats.__slots__ if n != 'header']
+        writer.writerow(['stamp_s'] + names)
+        for s in stats:
+            writer.writerow(['%.6f' % (s.header.stamp.to_sec() - start)] + [getattr(s, n) for n in names])
+
+
+def print_summary(summary, folder):
+    print('Frames: %d in the bag, %d received: %d ended a step, %d started anew, %d skipped, %d waiting' % tuple(
+        [summary['frames_in_bag']] + [summary.get('frames_' + n, 0)
+                                      for n in ('received', 'processed', 'started', 'skipped', 'waiting')]))
+    print('Status: ' + ', '.join('%s %d' % item for item in summary['statuses'].items()) +
+          '; start of the step: ' + ', '.join('%s %d' % item for item in summary['start_states'].items()))
+    print('Contacts: %d' % sum(summary['contacts'].values()))
+    for kind, count in summary['contacts'].items():
+        first = summary['first_contact_s'].get(kind)
+        print('  %6d  %s%s' % (count, kind, '' if first is None else ', first at %.4f s' % first))
+    for key, name in (('step_ms', 'Step'), ('latency_ms', 'Frame to answer')):
+        if summary[key]:
+            print('%s: median %.2f ms, longest %.2f ms' % (name, summary[key]['median'], summary[key]['max']))
+    print('Report: %s' % os.path.relpath(folder))
+
+
+def problems(summary):
+    """What must hold of a run, whatever the scene."""
+    found = []
+    total = sum(summary.get('frames_' + n, 0) for n in ('processed', 'started', 'skipped', 'waiting'))
+    if summary.get('frames_received', 0) != summary['frames_in_bag']:
+        found.append('the monitor received %d of %d frames' % (summary.get('frames_received', 0), summary['frames_in_bag']))
+    if total != summary.get('frames_received', 0):
+        found.append('the counters account for %d of %d frames' % (total, summary.get('frames_received', 0)))
+    if not summary['contacts']:
+        found.append('no contact was found')
+    return found
+
+
+def wait_for_node(launch, environment, limit_s=30):
+    master = rosgraph.Master('/run_demo', environment['ROS_MASTER_URI'])
+    deadline = time.monotonic() + limit_s
+    while time.monotonic() < deadline and launch.poll() is None:
+        if master.is_online():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def play(arguments, environment):
+    """Plays the bag once; the listener, or None when the launch failed."""
+    launch = start_launch(arguments, environment, ['loop:=false', 'mesh:=%s' % arguments.topic])
+    try:
+        if not wait_for_node(launch, environment):
+            return None
+        rospy.init_node('run_demo', anonymous=True, disable_signals=True, disable_rosout=True)
+        listener = Listener()
+        # The player ends the launch when the bag is over; the node may still be at the last frames just before that.
+        deadline = time.monotonic() + 60 + arguments.duration_s
+        while launch.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.1)
+        time.sleep(0.5)
+        return listener
+    finally:
+        stop(launch)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument('--bag', type=pathlib.Path, required=True)
+    parser.add_argument('--folder', type=pathlib.Path, required=True)
+    parser.add_argument('--tools', type=pathlib.Path, required=True)
+    parser.add_argument('--rviz', action='store_true')
+    arguments = parser.parse_args()
+    arguments.port = free_port()
+    arguments.topic, arguments.frames, start = frames_of(arguments.bag)
+    arguments.duration_s = rosbag.Bag(str(arguments.bag)).get_end_time() - start
+    environment = dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % arguments.port, ROS_HOSTNAME='localhost',
+                       ROS_HOME=str(arguments.folder / 'ros_home'), ROS_LOG_DIR=str(arguments.folder / 'ros_log'))
+    os.environ.update(environment)
+    if arguments.rviz:
+        return subprocess.call(['roslaunch', '--port', str(arguments.port), 'deformable_ccd', 'demo.launch',
+                                'bag:=%s' % arguments.bag, 'rviz:=true'], env=environment)
+
+    print('Playing %s (%.1f s) to the monitor' % (arguments.bag.name, arguments.duration_s), flush=True)
+    listener = play(arguments, environment)
+    if listener is None or not listener.stats:
+        print((arguments.folder / 'roslaunch.log').read_text()[-4000:], file=sys.stderr)
+        print('demo: the monitor published nothing; see %s' % (arguments.folder / 'roslaunch.log'), file=sys.stderr)
+        return 1
+    summary, arrays, stats = summarize(arguments, listener, start)
+    report = arguments.folder / 'report'
+    write_report(report, summary, arrays, stats, start)
+    analyze = arguments.tools / 'analyze_bag'
+    if analyze.exists():
+        subprocess.run([str(analyze), str(arguments.bag), '--report', str(report)], check=True)
+    print_summary(summary, report)
+    found = problems(summary)
+    for problem in found:
+        print('demo: ' + problem, file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,21 @@
+"""Where the checkout is and what belongs to it; for the tests beside this file."""
+import pathlib
+import subprocess
+
+CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
+CODE_SUFFIXES = {'.h', '.cpp'}
+
+
+def tracked_files():
+    """Files of the checkout: git's where it is a clone, else all that is no build output."""
+    listing = subprocess.run(['git', '-C', str(CHECKOUT), 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
+                             capture_output=True, text=True, check=False)
+    if listing.returncode == 0:
+        files = [CHECKOUT / name for name in listing.stdout.split('\0') if name]
+    else:
+        files = [p for p in CHECKOUT.rglob('*') if p.relative_to(CHECKOUT).parts[0] not in ('build', '.git')]
+    return [p for p in files if p.is_file()]
+
+
+def code_under(folder):
+    return [p for p in sorted((CHECKOUT / folder).rglob('*')) if p.suffix in CODE_SUFFIXES]

@@ -1,0 +1,86 @@
+"""package.xml, the CMake files and scripts/debian-packages.txt say the same."""
+import re
+import shutil
+import subprocess
+import unittest
+import xml.etree.ElementTree as ElementTree
+
+from checkout import CHECKOUT
+
+# In no Debian package: scripts/build links the definitions in dependencies/ where the system has none.
+FROM_OVERLAY = {'octomap_msgs'}
+
+
+def package_keys():
+    root = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+    return {e.text.strip() for e in root if e.tag.endswith('depend')}
+
+
+def debian_list():
+    """Debian package -> set of keys, for every group."""
+    groups, group = {}, None
+    for line in (CHECKOUT / 'scripts/debian-packages.txt').read_text().splitlines():
+        if line.startswith('['):
+            group = groups.setdefault(line.strip('[] '), {})
+        elif line.strip() and not line.startswith('#'):
+            package, *keys = line.split()
+            group[package] = set(keys)
+    return groups
+
+
+class DependenciesTest(unittest.TestCase):
+    def setUp(self):
+        self.groups = debian_list()
+        self.packages = {name: keys for group in self.groups.values() for name, keys in group.items()}
+        self.served = {key for keys in self.packages.values() for key in keys if not key.startswith('tool:')}
+
+    def test_every_key_of_package_xml_has_a_debian_package(self):
+        self.assertEqual(package_keys() - self.served - FROM_OVERLAY, set())
+
+    def test_every_key_of_the_list_is_in_package_xml(self):
+        self.assertEqual(self.served - package_keys(), set())
+
+    def test_every_listed_package_says_what_it_is_for(self):
+        self.assertEqual([name for name, keys in self.packages.items() if not keys], [])
+
+    def test_test_dependencies_are_in_the_test_group(self):
+        root = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+        only_tests = {e.text for e in root.findall('test_depend')}
+        others = {e.text for e in root if e.tag.endswith('depend') and e.tag != 'test_depend'}
+        in_build = {key for keys in self.groups['build'].values() for key in keys}
+        in_rviz = {key for keys in self.groups['rviz'].values() for key in keys}
+        self.assertEqual((only_tests - others) & in_build, set())
+        self.assertEqual(others - in_build - in_rviz - FROM_OVERLAY, set())
+
+    def test_catkin_components_are_declared(self):
+        text = (CHECKOUT / 'CMakeLists.txt').read_text()
+        components = re.search(r'find_package\(catkin REQUIRED COMPONENTS([^)]*)\)', text).group(1).split()
+        self.assertGreater(len(components), 10)
+        self.assertEqual(set(components) - package_keys(), set())
+
+    def test_overlay_is_what_package_xml_asks_for(self):
+        root = ElementTree.parse(CHECKOUT / 'dependencies/octomap_msgs/package.xml').getroot()
+        self.assertEqual({root.find('name').text}, FROM_OVERLAY)
+
+    def test_nothing_is_missing_here(self):
+        if not shutil.which('dpkg-query'):
+            self.skipTest('not a Debian system')
+        listing = subprocess.run([str(CHECKOUT / 'scripts/setup'), '--tests', '--list'], capture_output=True, text=True,
+                                 check=True)
+        self.assertEqual(listing.stdout.split(), [])
+
+    def test_octomap_message_is_the_upstream_one(self):
+        from octomap_msgs.msg import Octomap
+        self.assertEqual(Octomap._md5sum, '9a45536b45c5e409cd49f04bb2d9999f')
+
+    def test_catkin_lint_is_clean(self):
+        if not shutil.which('catkin_lint'):
+            self.skipTest('catkin_lint is not installed')
+        for package in ['.', 'dependencies/octomap_msgs']:
+            result = subprocess.run(['catkin_lint', '--offline', '-W1', str(CHECKOUT / package)], capture_output=True,
+                                    text=True, check=False)
+            self.assertEqual((result.returncode, result.stdout.strip()), (0, ''), package)
+
+
+if __name__ == '__main__':
+    unittest.main()

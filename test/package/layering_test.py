@@ -1,0 +1,128 @@
+"""The layering rules of DESIGN.md, held against the includes of every source file."""
+import re
+import unittest
+
+from checkout import CHECKOUT, code_under, tracked_files
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
+
+# Folder of src/ -> the folders of src/ that it may include. The public headers (deformable_ccd/...) are open to all but
+# simd. A folder may always include itself.
+MAY_INCLUDE = {
+    'simd': set(),
+    'mesh': set(),
+    'projection': {'mesh', 'simd'},
+    'filter': {'simd'},
+    'broad_phase': {'mesh', 'projection', 'filter', 'simd'},
+    'elementary': {'simd'},
+    'obstacle': {'simd'},
+    'detector': {'mesh', 'projection', 'broad_phase', 'filter', 'elementary', 'obstacle', 'simd'},
+    'io': {'mesh'},
+    'octomap': {'obstacle'},
+    'scene': set(),
+    'ros': {'octomap', 'io'},
+    'apps': None,  # everything
+}
+CORE = ['simd', 'mesh', 'projection', 'filter', 'broad_phase', 'elementary', 'obstacle', 'detector', 'io']
+ROS_OR_PCL = re.compile(r'^(ros/|ros\.h|tf2|pcl|rosbag|roslib|nodelet|pluginlib|topic_tools|dynamic_reconfigure|'
+                        r'diagnostic_updater|xmlrpcpp|message_filters|[a-z_]+_msgs/|std_srvs/)')
+OCTOMAP = re.compile(r'^octomap/(?!.*\.hh)')
+INTRINSICS = re.compile(r'\b_mm(?:256|512)?_[a-z]|\b__m(?:128|256|512)|immintrin\.h|arm_neon\.h|hwy/highway\.h|'
+                        r'hwy/foreach_target\.h|HWY_NAMESPACE')
+
+
+def includes(path):
+    return INCLUDE.findall(path.read_text(errors='replace'))
+
+
+def name(path):
+    return str(path.relative_to(CHECKOUT))
+
+
+class LayeringTest(unittest.TestCase):
+    def test_every_folder_of_src_has_a_rule(self):
+        folders = {p.name for p in (CHECKOUT / 'src').iterdir() if p.is_dir() and code_under('src/' + p.name)}
+        self.assertLessEqual(folders, set(MAY_INCLUDE))
+        self.assertGreaterEqual(len(folders), 8, 'the scan found too little to mean anything')
+
+    def test_own_includes_point_right_to_left(self):
+        wrong = []
+        for folder, allowed in MAY_INCLUDE.items():
+            if allowed is None:
+                continue
+            for path in code_under('src/' + folder):
+                for bracket, target in includes(path):
+                    first = target.split('/')[0]
+                    if bracket == '"' and '/' in target and first in MAY_INCLUDE and first != folder and \
+                            first not in allowed:
+                        wrong.append('%s includes %s' % (name(path), target))
+        self.assertEqual(wrong, [])
+
+    def test_simd_includes_nothing_of_the_package(self):
+        wrong = ['%s includes %s' % (name(path), target) for path in code_under('src/simd')
+                 for _, target in includes(path) if target.startswith('deformable_ccd/')]
+        self.assertEqual(wrong, [])
+
+    def test_core_is_free_of_ros_pcl_and_octomap(self):
+        files = code_under('include/deformable_ccd') + [p for folder in CORE for p in code_under('src/' + folder)]
+        wrong = ['%s includes %s' % (name(path), target) for path in files for bracket, target in includes(path)
+                 if ROS_OR_PCL.match(target) or (bracket == '<' and OCTOMAP.match(target))]
+        self.assertEqual(wrong, [])
+        self.assertGreater(len(files), 30)
+
+    def test_ros_and_pcl_only_under_ros_and_apps(self):
+        files = [p for p in code_under('src') if p.relative_to(CHECKOUT).parts[1] not in ('ros', 'apps')]
+        wrong = ['%s includes %s' % (name(path), target) for path in files for _, target in includes(path)
+                 if ROS_OR_PCL.match(target)]
+        self.assertEqual(wrong, [])
+
+    def test_liboctomap_only_under_octomap(self):
+        files = [p for p in code_under('src') + code_under('include')
+                 if p.relative_to(CHECKOUT).parts[:2] != ('src', 'octomap')]
+        wrong = ['%s includes %s' % (name(path), target) for path in files for bracket, target in includes(path)
+                 if bracket == '<' and OCTOMAP.match(target)]
+        self.assertEqual(wrong, [])
+
+    def test_bullet_only_under_scene_physics(self):
+        files = [p for p in code_under('src') if p.relative_to(CHECKOUT).parts[1:3] != ('scene', 'physics')]
+        wrong = [name(p) for p in files if any(re.match(r'(bt[A-Z]|Bullet)', t) for _, t in includes(p))]
+        self.assertEqual(wrong, [])
+
+    def test_intrinsics_only_under_simd(self):
+        files = [p for p in code_under('src') + code_under('include')
+                 if p.relative_to(CHECKOUT).parts[:2] != ('src', 'simd')]
+        self.assertEqual([name(p) for p in files if INTRINSICS.search(p.read_text(errors='replace'))], [])
+
+
+class HygieneTest(unittest.TestCase):
+    """What must not be in any file of the checkout."""
+
+    def find(self, pattern, exclude=()):
+        found = []
+        for path in tracked_files():
+            if name(path).startswith('test/package/') or name(path) in exclude:
+                continue
+            for number, line in enumerate(path.read_text(errors='replace').splitlines(), 1):
+                if re.search(pattern, line):
+                    found.append('%s:%d: %s' % (name(path), number, line.strip()[:100]))
+        return found
+
+    def test_no_paths_of_one_machine(self):
+        self.assertEqual(self.find(r'(?<![\w.])/(work|farm|root|home/[a-z]+)/'), [])
+
+    def test_no_flag_that_breaks_certified_signs(self):
+        # Prose may name the flags in order to forbid them; what builds must not use them.
+        found = [line for line in self.find(r'-march=native|-Ofast|-ffast-math')
+                 if re.match(r'(CMakeLists|cmake/|scripts/|benchmark/.*CMake|dependencies/)', line)]
+        self.assertEqual(found, [])
+
+    def test_no_unfinished_marks(self):
+        self.assertEqual(self.find(r'\b(TO' r'DO|FIX' r'ME|HA' r'CK)\b'), [])
+
+    def test_scripts_can_be_run(self):
+        for script in ['scripts/setup', 'scripts/build', 'scripts/test', 'scripts/demo', '.ci/run']:
+            self.assertTrue((CHECKOUT / script).stat().st_mode & 0o100, script + ' has no run bit')
+
+
+if __name__ == '__main__':
+    unittest.main()

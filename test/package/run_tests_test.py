@@ -1,0 +1,84 @@
+"""The runner that adds the tests up: a test that did not start, crashed or failed must never read as passed."""
+import importlib.util
+import pathlib
+import stat
+import tempfile
+import textwrap
+import unittest
+
+from checkout import CHECKOUT
+
+SPEC = importlib.util.spec_from_file_location('run_tests', CHECKOUT / 'scripts/lib/run_tests.py')
+run_tests = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(run_tests)
+
+
+class RunTestsTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = pathlib.Path(self.folder.name)
+
+    def gtest(self, body):
+        binary = self.path / 'suite_tests'
+        binary.write_text('#!/bin/sh\nfor a in "$@"; do case $a in --gtest_output=xml:*) xml=${a#*xml:};; esac; done\n' +
+                          textwrap.dedent(body))
+        binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
+        result, _ = run_tests.GtestRunner(binary, 0, 1, '')(self.path)
+        return result.passed, result.failed, result.skipped
+
+    def test_counts_what_gtest_reports(self):
+        self.assertEqual(self.gtest('''
+            cat >"$xml" <<END
+            <testsuites><testsuite name="A"><testcase name="a" status="run" result="completed"/>
+            <testcase name="b" status="run"><failure message="x"/></testcase>
+            <testcase name="c" status="run" result="skipped"><skipped message="why"/></testcase>
+            </testsuite></testsuites>
+            END
+            exit 1'''), (1, 1, 1))
+
+    def test_what_a_crash_left_undone_failed(self):
+        self.assertEqual(self.gtest('''
+            echo "[==========] Running 5 tests from 1 test suite."
+            echo "[       OK ] A.a (0 ms)"
+            echo "[       OK ] A.b (0 ms)"
+            kill -SEGV $$'''), (2, 3, 0))
+
+    def test_a_binary_that_says_nothing_failed(self):
+        self.assertEqual(self.gtest('exit 0'), (0, 1, 0))
+
+    def test_a_bad_exit_after_good_tests_failed(self):
+        self.assertEqual(self.gtest('''
+            echo '<testsuites><testcase name="a" status="run"/></testsuites>' >"$xml"
+            exit 66'''), (1, 1, 0))
+
+    def test_a_binary_that_was_not_built_failed(self):
+        result, _ = run_tests.GtestRunner(self.path / 'not_there', 0, 1, '')(self.path)
+        self.assertEqual((result.passed, result.failed), (0, 1))
+
+    def test_python_tests_are_counted(self):
+        test = CHECKOUT / 'build' / 'counted_test.py'
+        test.parent.mkdir(exist_ok=True)
+        test.write_text(textwrap.dedent('''
+            import unittest
+            class T(unittest.TestCase):
+                def test_good(self): pass
+                def test_bad(self): self.fail()
+                def test_skipped(self): self.skipTest('why')
+            '''))
+        self.addCleanup(test.unlink)
+        result, _ = run_tests.PythonRunner(test)(self.path)
+        self.assertEqual((result.passed, result.failed, result.skipped), (1, 1, 1))
+
+    def test_a_python_file_that_cannot_be_imported_failed(self):
+        test = CHECKOUT / 'build' / 'broken_test.py'
+        test.parent.mkdir(exist_ok=True)
+        test.write_text('import there_is_no_such_module\n')
+        self.addCleanup(test.unlink)
+        result, _ = run_tests.PythonRunner(test)(self.path)
+        self.assertGreater(result.failed, 0)
+        self.assertEqual(result.passed, 0)
+
+
+if __name__ == '__main__':
+    unittest.main()
