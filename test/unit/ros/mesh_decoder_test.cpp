@@ -1,0 +1,224 @@
+#include "ros/mesh_decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+namespace deformable_ccd {
+namespace {
+
+/// Serialises as ROS does, with lies where a test wants them.
+struct Bytes {
+  std::vector<std::uint8_t> data;
+  template <typename T>
+  Bytes& put(T value) {
+    const auto* at = reinterpret_cast<const std::uint8_t*>(&value);
+    data.insert(data.end(), at, at + sizeof(T));
+    return *this;
+  }
+  Bytes& text(const std::string& s) {
+    put<std::uint32_t>(static_cast<std::uint32_t>(s.size()));
+    data.insert(data.end(), s.begin(), s.end());
+    return *this;
+  }
+  Bytes& header(const std::string& frame = "world") {
+    return put<std::uint32_t>(0).put<std::uint32_t>(5).put<std::uint32_t>(0).text(frame);
+  }
+  Bytes& points(const Positions& points) {
+    put<std::uint32_t>(static_cast<std::uint32_t>(points.size()));
+    for (const Vec3& p : points) put(p.x()).put(p.y()).put(p.z());
+    return *this;
+  }
+};
+
+Bytes mesh(const Positions& points, const std::vector<Face>& faces) {
+  Bytes out;
+  out.header().points(points).put<std::uint32_t>(static_cast<std::uint32_t>(faces.size()));
+  for (const Face& f : faces) out.put(f);
+  return out;
+}
+
+Bytes marker(const Positions& corners, double x = 0, double qw = 1) {
+  Bytes out;
+  out.header().text("cloth").put<std::int32_t>(2).put(MARKER_TRIANGLE_LIST).put(MARKER_ADD);
+  out.put(x).put(0.0).put(0.0).put(0.0).put(0.0).put(0.0).put(qw).put(1.0).put(1.0).put(1.0);
+  for (int i = 0; i < 4; ++i) out.put(1.0f);
+  out.put<std::uint64_t>(0).put<std::uint8_t>(0).points(corners).put<std::uint32_t>(0).text("").text("").put<std::uint8_t>(0);
+  return out;
+}
+
+struct CloudSpec {
+  std::uint32_t height = 1, width = 4, point_step = 16, row_step = 64;
+  std::uint32_t offsets[3] = {0, 4, 8};
+  std::uint8_t datatype = 7, big = 0;
+  std::uint32_t claimed = 64;
+};
+Bytes cloud(const CloudSpec& spec) {
+  Bytes out;
+  out.header().put(spec.height).put(spec.width).put<std::uint32_t>(3);
+  for (int axis = 0; axis < 3; ++axis) {
+    out.text(std::string(1, static_cast<char>('x' + axis))).put(spec.offsets[axis]).put(spec.datatype).put<std::uint32_t>(1);
+  }
+  out.put(spec.big).put(spec.point_step).put(spec.row_step).put(spec.claimed);
+  for (int i = 0; i < 16; ++i) out.put(static_cast<float>(i));
+  return out.put<std::uint8_t>(1);
+}
+
+DecodedMesh decode(MeshDecoder& decoder, const char* type, const Bytes& bytes) {
+  return decoder.decode(type, bytes.data.data(), bytes.data.size());
+}
+std::string errorOf(MeshInputConfig config, const char* type, const Bytes& bytes) {
+  MeshDecoder decoder(config);
+  try {
+    decode(decoder, type, bytes);
+  } catch (const MeshError& error) {
+    return std::string(toString(error.status)) + ": " + error.what();
+  }
+  return "";
+}
+bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+constexpr const char* MESH = "deformable_ccd/MeshStamped";
+constexpr const char* CLOUD = "sensor_msgs/PointCloud2";
+constexpr const char* MARKER = "visualization_msgs/Marker";
+const Positions SQUARE = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+const std::vector<Face> HALVES = {{0, 1, 2}, {0, 2, 3}};
+
+MeshInputConfig grid(std::size_t rows, std::size_t cols) {
+  MeshInputConfig config;
+  config.source = TopologySource::GRID;
+  config.rows = rows;
+  config.cols = cols;
+  return config;
+}
+
+TEST(MeshDecoder, KeepsOneTopologyWhileItIsTheSame) {
+  MeshDecoder decoder({});
+  const DecodedMesh a = decode(decoder, MESH, mesh(SQUARE, HALVES));
+  EXPECT_EQ(a.stamp_ns, 5000000000);
+  EXPECT_EQ(a.frame_id, "world");
+  EXPECT_EQ(a.topology->edges().size(), 5u);
+  EXPECT_EQ(decode(decoder, MESH, mesh(SQUARE, HALVES)).topology, a.topology);
+  EXPECT_EQ(decode(decoder, MESH, mesh(SQUARE, {})).topology, a.topology) << "triangles sent once hold on";
+  EXPECT_NE(decode(decoder, MESH, mesh(SQUARE, {{0, 1, 2}})).topology, a.topology);
+}
+
+TEST(MeshDecoder, ReadsCloudsByNameTypeAndStride) {
+  MeshDecoder decoder(grid(2, 2));
+  CloudSpec spec;
+  spec.offsets[0] = 8;
+  spec.offsets[2] = 0;
+  const DecodedMesh swapped = decode(decoder, CLOUD, cloud(spec));
+  EXPECT_EQ(swapped.positions[1], Vec3(6, 5, 4));
+  CloudSpec organised;
+  organised.height = 2;
+  organised.width = 2;
+  organised.row_step = 32;
+  MeshDecoder automatic({});
+  EXPECT_EQ(decode(automatic, CLOUD, cloud(organised)).topology->faces().size(), 2u);
+}
+
+TEST(MeshDecoder, RefusesLies) {
+  const auto with = [](const std::function<void(CloudSpec&)>& lie) {
+    CloudSpec spec;
+    lie(spec);
+    return errorOf(grid(2, 2), CLOUD, cloud(spec));
+  };
+  EXPECT_EQ(with([](CloudSpec&) {}), "") << "the honest one";
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.claimed = 4000000000u; }), "data claims 4000000000"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.width = 4294967295u; }), "do not fit"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.height = s.width = 4294967295u; s.row_step = 4294967295u; }), "do not fit"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.point_step = 0; }), "point_step"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.offsets[1] = 4294967294u; }), "offset"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.datatype = 2; }), "datatype 2"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.big = 1; }), "is_bigendian"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.height = 2; s.width = 2; s.row_step = 3; }), "row_step"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.width = 3; }), "VERTEX_COUNT"));
+  EXPECT_TRUE(mentions(errorOf({}, CLOUD, cloud({})), "topology/rows")) << "says what to set";
+  EXPECT_TRUE(mentions(errorOf({}, MESH, mesh(SQUARE, {{0, 1, 9}})), "index 9"));
+  EXPECT_TRUE(mentions(errorOf({}, "std_msgs/String", Bytes()), "std_msgs/String"));
+  MeshInputConfig small;
+  small.max_vertices = 3;
+  EXPECT_TRUE(mentions(errorOf(small, MESH, mesh(SQUARE, HALVES)), "max_vertices"));
+  EXPECT_TRUE(mentions(errorOf({}, MARKER, marker(SQUARE)), "multiple of 3"));
+  EXPECT_TRUE(mentions(errorOf({}, MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]}, std::nan(""))), "pose"));
+}
+
+TEST(MeshDecoder, EveryTruncationIsRefused) {
+  struct Case {
+    const char* type;
+    Bytes bytes;
+    MeshInputConfig config;
+  };
+  const Case cases[] = {{MESH, mesh(SQUARE, HALVES), {}}, {CLOUD, cloud({}), grid(2, 2)},
+                        {MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]}), {}}};
+  for (const Case& one : cases) {
+    EXPECT_EQ(errorOf(one.config, one.type, one.bytes), "");
+    for (std::size_t size = 0; size < one.bytes.data.size(); ++size) {
+      Bytes cut = one.bytes;
+      cut.data.resize(size);
+      EXPECT_TRUE(mentions(errorOf(one.config, one.type, cut), "BAD_MESSAGE")) << one.type << " cut to " << size;
+    }
+  }
+}
+
+TEST(MeshDecoder, RandomBytesNeverDoMoreThanFail) {
+  std::mt19937 random(7);
+  const Bytes honest[] = {mesh(SQUARE, HALVES), cloud({}), marker({SQUARE[0], SQUARE[1], SQUARE[2]})};
+  const char* types[] = {MESH, CLOUD, MARKER, "visualization_msgs/MarkerArray", "pcl_msgs/PolygonMesh", "shape_msgs/Mesh"};
+  std::size_t refused = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Bytes bytes = honest[random() % 3];
+    for (int k = 0; k < 4; ++k) bytes.data[random() % bytes.data.size()] = static_cast<std::uint8_t>(random());
+    const char* type = types[random() % 6];
+    MeshDecoder decoder(grid(2, 2));
+    try {
+      const DecodedMesh out = decode(decoder, type, bytes);
+      EXPECT_EQ(out.positions.size(), out.topology->vertexCount());
+    } catch (const MeshError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 1000u);
+}
+
+TEST(MeshDecoder, WeldsTheFirstFrameAndComesApartForGood) {
+  const Vec3 a(0, 0, 0), b(1, 0, 0), c(0, 1, 0), d(1, 1, 0);
+  MeshDecoder decoder({});
+  const DecodedMesh first = decode(decoder, MARKER, marker({a, b, c, c, b, d}, 10));
+  EXPECT_EQ(first.topology->vertexCount(), 4u);
+  EXPECT_EQ(first.topology->edges().size(), 5u);
+  EXPECT_EQ(first.positions[0], Vec3(10, 0, 0)) << "the marker's pose holds";
+  const Vec3 away(0, 1, 0.5);
+  const DecodedMesh apart = decode(decoder, MARKER, marker({a, b, c, away, b, d}));
+  EXPECT_TRUE(apart.weld_changed);
+  EXPECT_EQ(apart.topology->vertexCount(), 5u);
+  const DecodedMesh again = decode(decoder, MARKER, marker({a, b, c, c, b, d}));
+  EXPECT_FALSE(again.weld_changed);
+  EXPECT_EQ(again.topology, apart.topology) << "what touches again is contact, not mesh";
+  MeshInputConfig off;
+  off.weld = false;
+  MeshDecoder loose(off);
+  EXPECT_EQ(decode(loose, MARKER, marker({a, b, c, c, b, d})).topology->vertexCount(), 6u);
+}
+
+TEST(MeshDecoder, ChoosesTheMarker) {
+  MeshInputConfig config;
+  config.marker_id = 3;
+  EXPECT_TRUE(mentions(errorOf(config, MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]})), "'cloth', 2"));
+}
+
+TEST(MeshDecoder, PolylineFollowsTheOrderOfThePoints) {
+  MeshInputConfig config;
+  config.source = TopologySource::POLYLINE;
+  MeshDecoder decoder(config);
+  const DecodedMesh rope = decode(decoder, CLOUD, cloud({}));
+  EXPECT_EQ(rope.topology->edges().size(), 3u);
+  EXPECT_FALSE(rope.topology->hasFaces());
+}
+
+}  // namespace
+}  // namespace deformable_ccd

@@ -1,0 +1,117 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+
+#include "ros/monitor_config.h"
+
+namespace deformable_ccd {
+namespace {
+
+using XmlRpc::XmlRpcValue;
+
+std::string errorOf(XmlRpcValue tree) {
+  try {
+    readConfig(tree);
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(Parameters, NoneAtAllIsOneBodyWithDefaults) {
+  const MonitorConfig config = readConfig(XmlRpcValue());
+  ASSERT_EQ(config.bodies.size(), 1u);
+  EXPECT_EQ(config.bodies[0].topic, "mesh");
+  EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::EXACT);
+}
+
+TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
+  XmlRpcValue tree;
+  tree["max_stp_s"] = 0.5;
+  EXPECT_TRUE(mentions(errorOf(tree), "~max_stp_s")) << errorOf(tree);
+  EXPECT_TRUE(mentions(errorOf(tree), "~max_step_s")) << errorOf(tree);
+  XmlRpcValue nested;
+  nested["topology"]["rwos"] = 3;
+  EXPECT_TRUE(mentions(errorOf(nested), "~topology/rwos")) << errorOf(nested);
+  EXPECT_TRUE(mentions(errorOf(nested), "~topology/rows")) << errorOf(nested);
+}
+
+TEST(Parameters, WrongTypesAreRefused) {
+  XmlRpcValue text;
+  text["tolerance_m"] = "1e-6";
+  EXPECT_TRUE(mentions(errorOf(text), "~tolerance_m is a string")) << errorOf(text);
+  EXPECT_TRUE(mentions(errorOf(text), "1.0e-6")) << "the usual mistake is named";
+  XmlRpcValue number;
+  number["num_threads"] = 1.5;
+  EXPECT_TRUE(mentions(errorOf(number), "integer")) << errorOf(number);
+  XmlRpcValue section;
+  section["topology"] = "grid";
+  EXPECT_TRUE(mentions(errorOf(section), "section")) << errorOf(section);
+}
+
+TEST(Parameters, ContradictionsSayWhatToWrite) {
+  struct Case {
+    const char* expected;
+    std::function<void(XmlRpcValue&)> set;
+  };
+  const Case cases[] = {
+      {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
+      {"conservative", [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["minimum_separation_m"] = 0.01; }},
+      {"minimum_separation_m", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
+      {"nearest is 'exact'", [](XmlRpcValue& t) { t["accuracy"] = "exakt"; }},
+      {"topology/file", [](XmlRpcValue& t) { t["topology"]["source"] = "file"; }},
+      {"clock_body", [](XmlRpcValue& t) { t["clock_body"] = "sleeve"; }},
+      {"unknown_box", [](XmlRpcValue& t) { t["unknown_space"] = "occupied"; }},
+      {"rigid and cannot meet itself",
+       [](XmlRpcValue& t) {
+         t["bodies"]["cloth"]["topic"] = "cloth";
+         t["bodies"]["finger"]["rigid"]["mesh"] = "finger.stl";
+         t["bodies"]["finger"]["rigid"]["frame"] = "finger";
+         t["bodies"]["finger"]["self_collision"] = true;
+       }},
+  };
+  for (const Case& one : cases) {
+    XmlRpcValue tree;
+    one.set(tree);
+    EXPECT_TRUE(mentions(errorOf(tree), one.expected)) << one.expected << ": " << errorOf(tree);
+  }
+}
+
+TEST(Parameters, OnAndOffAreWordsThoughYamlTakesThemForBooleans) {
+  XmlRpcValue tree;
+  tree["weld"] = false;
+  tree["effects"]["octomap"] = true;
+  const MonitorConfig config = readConfig(tree);
+  EXPECT_FALSE(config.bodies[0].input.weld);
+  EXPECT_EQ(config.effects.at("octomap"), EffectSetting::ON);
+}
+
+TEST(Parameters, TheHashTellsConfigurationsApart) {
+  XmlRpcValue tree;
+  tree["max_step_s"] = 0.25;
+  EXPECT_NE(readConfig(tree).hash, readConfig(XmlRpcValue()).hash);
+  EXPECT_EQ(readConfig(tree).hash, readConfig(tree).hash);
+}
+
+TEST(Parameters, YamlReadsAsTheParameterServerWould) {
+  const std::string file = ::testing::TempDir() + "monitor_parameters.yaml";
+  std::ofstream(file) << "fixed_frame: world\nmax_step_s: 1\nweld: off\ntopology: {source: grid, rows: 3, cols: 4}\n"
+                         "exclude_boxes: [[0, 0, 0, 1, 1.5, 1]]\n";
+  const MonitorConfig config = readConfig(readYaml(file), file + ": ");
+  EXPECT_EQ(config.fixed_frame, "world");
+  EXPECT_EQ(config.monitor.store.max_step_s, 1);
+  EXPECT_FALSE(config.bodies[0].input.weld);
+  EXPECT_EQ(config.bodies[0].input.cols, 4u);
+  EXPECT_EQ(config.monitor.exclude_boxes.at(0).max.y(), 1.5);
+  std::ofstream(file) << "max_step_s: [1\n";
+  EXPECT_THROW(readYaml(file), ParameterError);
+  std::remove(file.c_str());
+  EXPECT_THROW(readYaml(file), ParameterError);
+}
+
+}  // namespace
+}  // namespace deformable_ccd
