@@ -133,7 +133,9 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
     queue.command([this, size = message->size()] {
       complain(config.bodies.size(), "map size",
                "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
-      pipeline.setMap({nullptr, {}, 0, "the octomap is larger than max_map_mb"}, steadyNs());
+      LoadedMap refused;
+      refused.problem = "the octomap is larger than max_map_mb";
+      pipeline.setMap(std::move(refused), steadyNs());
     });
     return;
   }
