@@ -34,6 +34,7 @@ class VoxelSurface {
 
   double resolution() const;            ///< [m]
   std::size_t leafCount() const;
+  // These three are counted at each call.
   std::size_t faceCount() const;        ///< exposed faces, each leaf's own
   std::size_t edgeCount() const;        ///< convex edges, each leaf's own
   std::size_t cornerCount() const;

@@ -42,7 +42,7 @@ constexpr double TINY = 0x1p-300, LARGE = 0x1p300;
 /// 2^-53, the largest relative error of one rounded operation.
 constexpr double HALF_ULP = 0x1p-53;
 
-/// a - b without error, where its rounding error is zero; a and b of moderate size.
+/// Whether the rounded difference a - b has no error; a and b of moderate size.
 bool differenceIsExact(double a, double b, double difference) {
   // Knuth's two-sum: the error of a rounded difference, exact.
   const double b_part = a - difference;
@@ -149,6 +149,20 @@ std::int64_t timeCell(const CrossingTime& time, int bits) {
   } else {
     // Differences that may overflow, or a tiny quotient: quarters cannot overflow, and lose nothing that matters here.
     cell = static_cast<std::int64_t>((time.plane / 4 - time.from / 4) / (time.to / 4 - time.from / 4) * scale);
+  }
+  // A guess is a few cells off at most. Where the differences are exact, so is this comparison of numerator * 2^bits with
+  // k * denominator; that settles times on the grid, such as one half.
+  const double n = time.plane - time.from, d = time.to - time.from;
+  if (time.certain && std::abs(n) > TINY && std::abs(d) < 0x1p140 && differenceIsExact(time.plane, time.from, n) &&
+      differenceIsExact(time.to, time.from, d)) {
+    const double target = std::abs(n) * scale, unit = std::abs(d);
+    const auto reached = [target, unit](std::int64_t k) {
+      const double product = static_cast<double>(k) * unit;
+      return product != target ? product < target : productError(static_cast<double>(k), unit, product) <= 0;
+    };
+    while (!reached(cell)) --cell;
+    while (reached(cell + 1)) ++cell;
+    return cell;
   }
   // cell <= time * 2^bits  <=>  numerator * 2^bits - cell * denominator >= 0 for a positive denominator.
   const Rational denominator = Rational(time.to) - Rational(time.from);

@@ -44,11 +44,14 @@ void blockFeatures(const VoxelTree::Node& node, const std::array<std::uint64_t, 
                    std::vector<FeatureMask>& masks) {
   std::uint64_t any = 0;
   for (const std::uint64_t bits : exposed) any |= bits;
-  for (any &= node.full; any != 0; any &= any - 1) {
-    const unsigned bit = lowestBit(any);
+  if (any == 0) return;
+  std::uint32_t next_leaf = node.first_leaf;
+  for (std::uint64_t cells = node.full; cells != 0; cells &= cells - 1) {
+    const unsigned bit = lowestBit(cells);
+    next_leaf += static_cast<std::uint32_t>(node.start >> bit & 1);
     unsigned faces = 0;
     for (int d = 0; d < FACE_DIRECTIONS; ++d) faces |= static_cast<unsigned>(exposed[d] >> bit & 1) << d;
-    masks[node.leafAt(bit)] |= FEATURES_OF_FACES[faces];
+    masks[next_leaf - 1] |= FEATURES_OF_FACES[faces];
   }
 }
 

@@ -30,9 +30,6 @@ VoxelSurface::Impl::Impl(double resolution, const std::vector<OccupiedLeaf>& lea
   std::int64_t lo[3] = {VoxelTree::KEYS, VoxelTree::KEYS, VoxelTree::KEYS};
   std::int64_t hi[3] = {0, 0, 0};
   for (std::size_t i = 0; i < features.size(); ++i) {
-    face_count += bitCount(features[i] & FACE_MASK);
-    edge_count += bitCount(features[i] & EDGE_MASK);
-    corner_count += bitCount(features[i] & CORNER_MASK);
     const OccupiedLeaf& leaf = tree.leaves()[i];
     const std::int64_t key[3] = {leaf.min.x, leaf.min.y, leaf.min.z};
     for (int axis = 0; axis < 3; ++axis) {
@@ -45,6 +42,12 @@ VoxelSurface::Impl::Impl(double resolution, const std::vector<OccupiedLeaf>& lea
     bounds.min[axis] = voxelPlane(lo[axis], resolution_m);
     bounds.max[axis] = voxelPlane(hi[axis], resolution_m);
   }
+}
+
+std::size_t VoxelSurface::Impl::countFeatures(FeatureMask kind) const {
+  std::size_t count = 0;
+  for (const FeatureMask mask : features) count += bitCount(mask & kind);
+  return count;
 }
 
 KeyBox VoxelSurface::Impl::keysOf(const double* lo, const double* hi) const {
@@ -65,9 +68,9 @@ VoxelSurface::~VoxelSurface() = default;
 
 double VoxelSurface::resolution() const { return impl_->resolution_m; }
 std::size_t VoxelSurface::leafCount() const { return impl_->features.size(); }
-std::size_t VoxelSurface::faceCount() const { return impl_->face_count; }
-std::size_t VoxelSurface::edgeCount() const { return impl_->edge_count; }
-std::size_t VoxelSurface::cornerCount() const { return impl_->corner_count; }
+std::size_t VoxelSurface::faceCount() const { return impl_->countFeatures(FACE_MASK); }
+std::size_t VoxelSurface::edgeCount() const { return impl_->countFeatures(EDGE_MASK); }
+std::size_t VoxelSurface::cornerCount() const { return impl_->countFeatures(CORNER_MASK); }
 std::size_t VoxelSurface::memoryBytes() const {
   return sizeof(Impl) + impl_->tree.memoryBytes() + impl_->features.capacity() * sizeof(FeatureMask);
 }

@@ -150,7 +150,9 @@ VoxelTree::Coverage VoxelTree::coverage(std::int32_t x, std::int32_t y, std::int
   if (x < 0 || y < 0 || z < 0 || x >= KEYS || y >= KEYS || z >= KEYS) return Coverage::EMPTY;
   // From the first level whose cells are at least the cube up to the first node that exists there.
   const int own = levelOfSize(static_cast<std::uint32_t>(size));
-  for (int level = std::max(own, 1); level < LEVELS; ++level) {
+  const int first = std::max(own, 1);
+  for (int level = first; level < LEVELS; ++level) {
+    if (level > first && !(levels_with_leaves_ >> level & 1)) continue;  // nothing there can cover the cube
     const int shift = 2 * (level + 1);
     const std::uint32_t index = find(level, x >> shift, y >> shift, z >> shift);
     if (index == NONE) continue;
