@@ -1,0 +1,196 @@
+// A cloth against an occupied map: far away, hovering, resting on it; and the small meshes that trackers send. The same
+// surface as triangles is the rival. Both are exact, so their earliest contacts are compared before a time is written.
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "deformable_ccd/detector.h"
+#include "deformable_ccd/voxel_surface.h"
+#include "support/timing.h"
+
+namespace deformable_ccd {
+namespace benchmarks {
+namespace {
+
+constexpr double VOXEL_M = 0.02;
+constexpr int SIDE = 112, LAYERS = 4;  // 50,176 voxels: a table top
+constexpr int FIRST = 32768 - SIDE / 2;
+constexpr int TOP = 32768 + LAYERS;
+
+/// A cloth of rows x cols points over the table, and what it must not take longer than.
+struct Case {
+  std::string name;
+  Topology topology;
+  Positions t0, t1;
+  double required_ms = 0;
+  bool triangulated = false;  ///< also measured against the triangulated surface
+};
+
+/// Points over the middle of the table, `height_voxels` above it, moving down by up to `fall_voxels`.
+Case makeCase(const std::string& name, std::size_t rows, std::size_t cols, double side_m, double height_voxels,
+              double fall_voxels, double required_ms, bool triangulated) {
+  Case c;
+  c.name = name;
+  c.topology = rows > 1 ? Topology::grid(rows, cols) : Topology::polyline(cols);
+  c.required_ms = required_ms;
+  c.triangulated = triangulated;
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> unit(0, 1), sideways(-0.2, 0.2);
+  const double top_m = voxelPlane(TOP, VOXEL_M);
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t k = 0; k < cols; ++k) {
+      const double x = (static_cast<double>(k) / static_cast<double>(cols - 1) - 0.5) * side_m;
+      const double y = rows > 1 ? (static_cast<double>(r) / static_cast<double>(rows - 1) - 0.5) * side_m : 0.0;
+      const Vec3 p(x, y, top_m + VOXEL_M * (height_voxels + 0.1 * unit(random)));
+      c.t0.push_back(p);
+      c.t1.push_back(p + VOXEL_M * Vec3(sideways(random), sideways(random), -fall_voxels * unit(random)));
+    }
+  }
+  return c;
+}
+
+std::vector<OccupiedLeaf> tableTop() {
+  std::vector<OccupiedLeaf> leaves;
+  for (int x = 0; x < SIDE; ++x) {
+    for (int y = 0; y < SIDE; ++y) {
+      for (int z = 0; z < LAYERS; ++z) {
+        OccupiedLeaf leaf;
+        leaf.min = {static_cast<std::uint16_t>(FIRST + x), static_cast<std::uint16_t>(FIRST + y),
+                    static_cast<std::uint16_t>(TOP - 1 - z)};
+        leaves.push_back(leaf);
+      }
+    }
+  }
+  return leaves;
+}
+
+/// The exposed voxel faces of the table top, two triangles each, vertices shared.
+void triangulate(Positions& vertices, std::vector<Face>& faces) {
+  std::map<std::array<int, 3>, Index> number;
+  const auto vertex = [&](const std::array<int, 3>& plane) {
+    const auto [it, is_new] = number.try_emplace(plane, static_cast<Index>(vertices.size()));
+    if (is_new) {
+      vertices.emplace_back(voxelPlane(plane[0], VOXEL_M), voxelPlane(plane[1], VOXEL_M),
+                            voxelPlane(plane[2], VOXEL_M));
+    }
+    return it->second;
+  };
+  const std::array<int, 3> lo{FIRST, FIRST, TOP - LAYERS}, hi{FIRST + SIDE, FIRST + SIDE, TOP};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (const int plane : {lo[axis], hi[axis]}) {
+      for (int i = lo[u]; i < hi[u]; ++i) {
+        for (int j = lo[v]; j < hi[v]; ++j) {
+          const auto at = [&](int di, int dj) {
+            std::array<int, 3> p{};
+            p[axis] = plane;
+            p[u] = i + di;
+            p[v] = j + dj;
+            return vertex(p);
+          };
+          const Index a = at(0, 0), b = at(1, 0), c = at(1, 1), d = at(0, 1);
+          faces.push_back({a, b, c});
+          faces.push_back({a, c, d});
+        }
+      }
+    }
+  }
+}
+
+double earliest(const std::vector<Contact>& contacts) {
+  double toc = 2;
+  for (const Contact& c : contacts) toc = std::min(toc, c.toc_lower);
+  return toc;
+}
+
+/// The case through the detector, with the map as obstacle or as a second body of triangles.
+nlohmann::json timeSteps(const Case& c, const std::shared_ptr<const VoxelSurface>& surface, const Positions* triangles,
+                         const std::shared_ptr<const Topology>& triangle_topology, int repeat,
+                         std::vector<Contact>& contacts) {
+  DetectorOptions options;
+  options.check_start_state = false;
+  Detector detector(options);
+  BodySetup cloth;
+  cloth.name = "cloth";
+  cloth.topology = std::make_shared<const Topology>(c.topology);
+  cloth.self_collision = false;  // what is measured is the map
+  std::vector<BodySetup> bodies{cloth};
+  std::vector<const Positions*> rest{&c.t0};
+  MotionStep step;
+  step.bodies.push_back({&c.t0, &c.t1});
+  if (triangles) {
+    BodySetup table = cloth;
+    table.name = "table";
+    table.topology = triangle_topology;
+    bodies.push_back(table);
+    rest.push_back(triangles);
+    step.bodies.push_back({triangles, triangles});
+  } else {
+    step.obstacle = surface;
+  }
+  detector.setBodies(bodies, rest);
+  std::vector<double> times;
+  for (int r = 0; r < repeat; ++r) {
+    const Stopwatch watch;
+    const StepResult& result = detector.run(step);
+    times.push_back(watch.milliseconds());
+    contacts = result.contacts;
+  }
+  return spread(times);
+}
+
+nlohmann::json measure(int repeat) {
+  std::vector<Case> cases;
+  cases.push_back(makeCase("20,000 triangles, far away", 101, 101, 2.0, 50, 1, 1.5, true));
+  cases.push_back(makeCase("20,000 triangles, hovering half a voxel above", 101, 101, 2.0, 0.5, 0.4, 2.5, true));
+  cases.push_back(makeCase("20,000 triangles, resting", 101, 101, 2.0, 0.01, 0.15, 5, true));
+  cases.push_back(makeCase("cloth of 400 vertices, resting", 20, 20, 0.5, 0.01, 0.15, 0.2, false));
+  cases.push_back(makeCase("rope of 50 points, resting", 1, 50, 1.0, 0.01, 0.15, 0.2, false));
+  const auto surface = VoxelSurface::build(VOXEL_M, tableTop());
+  Positions vertices;
+  std::vector<Face> faces;
+  triangulate(vertices, faces);
+  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(vertices.size(), faces));
+  nlohmann::json out{{"machine", machine()}, {"resolution_m", VOXEL_M}, {"map_triangles", faces.size()}};
+  for (const Case& c : cases) {
+    std::vector<Contact> contacts, of_triangles;
+    nlohmann::json run{{"case", c.name},
+                       {"triangles", c.topology.faces().size()},
+                       {"voxels", surface->leafCount()},
+                       {"required_ms", c.required_ms}};
+    run["ms"] = timeSteps(c, surface, nullptr, topology, repeat, contacts);
+    run["contacts"] = contacts.size();
+    if (c.triangulated) {
+      run["triangulated_ms"] = timeSteps(c, nullptr, &vertices, topology, std::max(1, repeat / 5), of_triangles);
+      if (contacts.empty() != of_triangles.empty() || earliest(contacts) != earliest(of_triangles)) {
+        throw std::runtime_error(c.name + ": the earliest contact with the voxels is not that with their triangles");
+      }
+    }
+    std::cerr << run.dump() << '\n';
+    out["runs"].push_back(run);
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace benchmarks
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  std::string out;
+  int repeat = 25;
+  CLI::App app("Times meshes against an occupied map.");
+  app.add_option("--out", out, "JSON file to write")->required();
+  app.add_option("--repeat", repeat, "runs of each case")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    std::ofstream(out) << deformable_ccd::benchmarks::measure(repeat).dump(1) << '\n';
+  } catch (const std::exception& e) {
+    std::cerr << "octomap_benchmark: " << e.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

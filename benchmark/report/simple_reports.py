@@ -1,0 +1,136 @@
+"""Pages, tables and plots of the benchmarks that are not the paper's."""
+
+import csv
+import os
+
+from .paper_report import table
+
+
+def pair_name(kind, v):
+    """One name for a pair, whatever the order of its vertices."""
+    if kind in ("vf", "vertex_face"):
+        return ("vf", v[0]) + tuple(sorted(v[1:]))
+    return ("ee",) + tuple(sorted([tuple(sorted(v[:2])), tuple(sorted(v[2:]))]))
+
+
+def write_rows(path, header, rows):
+    with open(path, "w", newline="") as out:
+        writer = csv.writer(out)
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def save(folder, name, text):
+    with open(os.path.join(folder, name + ".md"), "w") as out:
+        out.write(text)
+    return text
+
+
+def pyplot():
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    return plt
+
+
+def write_kernels(folder, result):
+    medians = {}
+    for b in result["benchmarks"]:
+        name = b["run_name"]
+        medians.setdefault(name, {})[b.get("aggregate_name", "median")] = b
+    rows = []
+    for name, by_aggregate in medians.items():
+        b = by_aggregate["median"]
+        unit = "pair" if "ns_per_pair" in b else "vertex"
+        deviation = by_aggregate.get("stddev", {}).get("real_time", 0.0) / max(1e-12, b["real_time"])
+        rows.append([name, "%.2f ns a %s" % (1e9 * b["ns_per_" + unit], unit), "%.1f %%" % (100 * deviation),
+                     "%.1f" % b["culled_percent"] if "culled_percent" in b else ""])
+    header = ["kernel / order / kind", "median", "spread", "culled %"]
+    write_rows(os.path.join(folder, "kernels.csv"), header, rows)
+    plt = pyplot()
+    figure, axis = plt.subplots(figsize=(9, 0.3 * len(rows) + 1))
+    axis.barh([r[0] for r in rows], [float(r[1].split()[0]) for r in rows], color="#3182bd")
+    axis.invert_yaxis()
+    axis.set_xlabel("ns a pair (records: a vertex)")
+    figure.tight_layout()
+    figure.savefig(os.path.join(folder, "kernels.png"), dpi=120)
+    plt.close(figure)
+    return save(folder, "kernels", "# Kernels\n\n" + table(header, rows))
+
+
+def write_step(folder, rows):
+    stages = [s for s in rows[0]["ms"] if s != "total"]
+    header = ["scene", "target", "threads", "contacts", "total best", "total median"] + stages
+    lines = []
+    for r in rows:
+        lines.append([r["scene"], str(r["simd_target"]), str(r["threads"]), str(r["contacts"]),
+                      "%.1f" % r["ms"]["total"]["best"], "%.1f" % r["ms"]["total"]["median"]] +
+                     ["%.1f" % r["ms"][s]["median"] for s in stages])
+    write_rows(os.path.join(folder, "step.csv"), header, lines)
+    plt = pyplot()
+    figure, axis = plt.subplots(figsize=(9, 0.5 * len(rows) + 1.5))
+    left = [0.0] * len(rows)
+    labels = ["%s, %s, %s thread(s)" % (r["scene"], r["simd_target"], r["threads"]) for r in rows]
+    for s in stages:
+        values = [r["ms"][s]["median"] for r in rows]
+        axis.barh(labels, values, left=left, label=s)
+        left = [a + b for a, b in zip(left, values)]
+    axis.invert_yaxis()
+    axis.set_xlabel("ms, summed over the workers")
+    axis.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(os.path.join(folder, "step.png"), dpi=120)
+    plt.close(figure)
+    return save(folder, "step", "# The whole step, exact\n\nAll true contacts found, none false. Milliseconds; stages "
+                "are summed over the workers.\n\n" + table(header, lines))
+
+
+def write_scaling(folder, result):
+    header = ["triangles", "threads", "candidates a triangle", "contacts a triangle", "best ms", "median ms",
+              "median ns a triangle"]
+    rows, series = [], {}
+    for r in result["runs"]:
+        n = r["triangles"]
+        per_triangle = 1e6 * r["ms"]["median"] / n
+        rows.append(["%d" % n, str(r["threads"]), "%.1f" % (r["candidates"] / n), "%.2f" % (r["contacts"] / n),
+                     "%.1f" % r["ms"]["best"], "%.1f" % r["ms"]["median"], "%.0f" % per_triangle])
+        series.setdefault(r["threads"], []).append((n, per_triangle))
+    write_rows(os.path.join(folder, "scaling.csv"), header, rows)
+    plt = pyplot()
+    figure, axis = plt.subplots(figsize=(6, 4))
+    for threads, points in series.items():
+        axis.plot([p[0] for p in points], [p[1] for p in points], "o-", label="%d thread(s)" % threads)
+    axis.set_xscale("log")
+    axis.set_ylim(bottom=0)
+    axis.set_xlabel("triangles")
+    axis.set_ylabel("ns a triangle")
+    axis.legend()
+    figure.tight_layout()
+    figure.savefig(os.path.join(folder, "scaling.png"), dpi=120)
+    plt.close(figure)
+    return save(folder, "scaling", "# Growth with the number of triangles\n\nGenerated scene: %s. Candidates are those "
+                "out of the linear filter. Contacts are the same for every number of threads.\n\n" % result["scene"] +
+                table(header, rows))
+
+
+def write_octomap(folder, result):
+    header = ["case", "triangles", "voxels", "contacts", "best ms", "median ms", "required ms", "triangulated median ms",
+              "ratio"]
+    rows = []
+    for r in result["runs"]:
+        t = r.get("triangulated_ms")
+        rows.append([r["case"], str(r["triangles"]), str(r["voxels"]), str(r["contacts"]), "%.3f" % r["ms"]["best"],
+                     "%.3f" % r["ms"]["median"], "%g" % r["required_ms"], "%.2f" % t["median"] if t else "",
+                     "%.1f" % (t["median"] / r["ms"]["median"]) if t else ""])
+    write_rows(os.path.join(folder, "octomap.csv"), header, rows)
+    plt = pyplot()
+    figure, axis = plt.subplots(figsize=(8, 0.45 * len(rows) + 1.2))
+    axis.barh([r[0] for r in rows], [r["ms"]["median"] for r in result["runs"]], color="#3182bd", label="median")
+    axis.plot([r["required_ms"] for r in result["runs"]], [r[0] for r in rows], "k|", markersize=14, label="required")
+    axis.invert_yaxis()
+    axis.set_xlabel("ms")
+    axis.legend()
+    figure.tight_layout()
+    figure.savefig(os.path.join(folder, "octomap.png"), dpi=120)
+    plt.close(figure)
+    return save(folder, "octomap", "# Mesh against octomap\n\n" + table(header, rows))
