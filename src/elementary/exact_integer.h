@@ -162,7 +162,7 @@ class StackInteger {
   }
 
   int size_ = 0;  ///< limbs in use, negative for a negative number
-  mp_limb_t limbs_[LIMBS];
+  mp_limb_t limbs_[LIMBS + 1];  ///< a product's limbs as multiplied: the highest may be zero
 };
 
 /// The same interface over GMP's allocating integers, for lengths that the stack should not carry.

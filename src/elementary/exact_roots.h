@@ -112,18 +112,14 @@ class PolynomialRoots {
   std::int64_t locate(RootLabel label) const {
     const std::int64_t end = std::int64_t{1} << grid_bits_;
     const auto notAfterRoot = [&](std::int64_t k) { return k <= end && compare(label, k, grid_bits_) <= 0; };
-    std::int64_t low = guess(label), high = low + 1, step = 1;
-    while (!notAfterRoot(low)) {  // ends at 0, which is not after the root
+    std::int64_t low = guess(label), high = low + 1;
+    for (std::int64_t step = 1; !notAfterRoot(low); step *= 2) {  // ends at 0, which is not after the root
       high = low;
       low = std::max<std::int64_t>(0, low - step);
-      step *= 2;
     }
-    step = 1;
-    while (high - low == step && notAfterRoot(high)) {
+    for (std::int64_t step = 1; notAfterRoot(high); step *= 2) {
       low = high;
-      step *= 2;
-      high = std::min(low + step, end + 1);
-      if (high == end + 1) break;
+      high = std::min(high + step, end + 1);
     }
     while (high - low > 1) {
       const std::int64_t middle = low + (high - low) / 2;

@@ -82,6 +82,22 @@ TEST(ExactInteger, SmallFactorsShiftsAndNegation) {
   }
 }
 
+TEST(ExactInteger, ProductsFillTheCapacity) {
+  // 2^x * 2^y with x + y + 1 = CAPACITY_BITS bits, cut everywhere: the factors together have one limb more than that.
+  struct Guarded {
+    Fixed product;
+    std::uint64_t guard = 0x0123456789abcdef;
+  };
+  for (int x = 0; x < Fixed::CAPACITY_BITS; ++x) {
+    const int y = Fixed::CAPACITY_BITS - 1 - x;
+    Guarded guarded{Fixed::shifted(1, x) * Fixed::shifted(-1, y)};
+    EXPECT_EQ(guarded.guard, 0x0123456789abcdefu);
+    EXPECT_EQ(guarded.product.sign(), -1);
+    EXPECT_EQ(guarded.product.approximate().exponent, Fixed::CAPACITY_BITS);
+    EXPECT_EQ((guarded.product + Fixed::shifted(1, Fixed::CAPACITY_BITS - 1)).sign(), 0);
+  }
+}
+
 TEST(ExactInteger, ExtremesOfInt64) {
   for (const std::int64_t value : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max(),
                                    std::int64_t{0}, std::int64_t{-1}}) {
