@@ -55,6 +55,25 @@ bool endInside(const VertexMotion* points, const LeafBox& box) {
   return pointInBox(points[0].t0, box) || pointInBox(points[1].t0, box);
 }
 
+/// The axis along which all points move alike from the same height while their other coordinates rest; -1 if none.
+int fallAxis(const VertexMotion* points, std::size_t count) {
+  int axis = -1;
+  for (int a = 0; a < 3; ++a) {
+    if (points[0].t0[a] == points[0].t1[a]) continue;
+    if (axis >= 0) return -1;
+    axis = a;
+  }
+  if (axis < 0) return -1;
+  for (std::size_t i = 1; i < count; ++i) {
+    for (int a = 0; a < 3; ++a) {
+      const bool alike = a == axis ? points[i].t0[a] == points[0].t0[a] && points[i].t1[a] == points[0].t1[a]
+                                   : points[i].t0[a] == points[i].t1[a];
+      if (!alike) return -1;
+    }
+  }
+  return axis;
+}
+
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -126,6 +145,10 @@ struct ObstacleTest::Impl {
   double* tocLimit() { return options.earliest_only ? &toc_limit : nullptr; }
   Contact contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const;
   void setInitial(Contact& contact);
+  void setTime(Contact& contact, const CrossingTime& time);
+  template <class Feature>
+  bool settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points, std::uint32_t leaf,
+                  const LeafBox& target, const double* outward, bool inside, std::vector<Contact>& contacts);
   VertexMotion motionOf(const Run& run, Index vertex) const {
     const Vec3 &a = (*run.t0)[vertex], &b = (*run.t1)[vertex];
     return {{a.x(), a.y(), a.z(), 0}, {b.x(), b.y(), b.z(), 0}};
@@ -297,26 +320,19 @@ void ObstacleTest::Impl::runVertices(const Run& run) {
   }
 }
 
-void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
-  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
-  const FaceHit hit =
-      firstFaceHit((*run.t0)[vertex].data(), (*run.t1)[vertex].data(), box, run.surface->features[leaf] & FACE_MASK);
-  if (!hit.hit) return;
-  Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
-  contact.vertex[0] = vertex;
-  contact.leaving = inside && hit.outward;
-  if (compareToOne(hit.time) == 0) {
+void ObstacleTest::Impl::setTime(Contact& contact, const CrossingTime& time) {
+  if (compareToOne(time) == 0) {
     contact.toc_lower = contact.toc_upper = 1;
   } else if (options.accuracy.rung == Accuracy::EXACT) {
     const double cell = std::ldexp(1.0, -options.accuracy.toc_bits);
-    const double k = static_cast<double>(timeCell(hit.time, options.accuracy.toc_bits));
+    const double k = static_cast<double>(timeCell(time, options.accuracy.toc_bits));
     contact.toc_lower = k * cell;
     contact.toc_upper = (k + 1) * cell;
-  } else if (hit.time.certain) {
-    contact.toc_lower = hit.time.approximate * (1 - CROSSING_ERROR);
-    contact.toc_upper = std::min(1.0, hit.time.approximate * (1 + CROSSING_ERROR));
+  } else if (time.certain) {
+    contact.toc_lower = time.approximate * (1 - CROSSING_ERROR);
+    contact.toc_upper = std::min(1.0, time.approximate * (1 + CROSSING_ERROR));
   } else {
-    const double k = static_cast<double>(timeCell(hit.time, 52));
+    const double k = static_cast<double>(timeCell(time, 52));
     contact.toc_lower = k * 0x1p-52;
     contact.toc_upper = (k + 1) * 0x1p-52;
   }
@@ -325,6 +341,17 @@ void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t 
     contact.toc_upper = 1;
   }
   if (contact.certainty == Certainty::CERTAIN) toc_limit = std::min(toc_limit, contact.toc_upper);
+}
+
+void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
+  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+  const FaceHit hit =
+      firstFaceHit((*run.t0)[vertex].data(), (*run.t1)[vertex].data(), box, run.surface->features[leaf] & FACE_MASK);
+  if (!hit.hit) return;
+  Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
+  contact.vertex[0] = vertex;
+  contact.leaving = inside && hit.outward;
+  setTime(contact, hit.time);
   vertex_contacts.push_back(contact);
 }
 
@@ -429,6 +456,10 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
       pair.contact.vertex[1] = edge[1];
       pair.outward[b] = side_b ? 1 : -1;
       pair.outward[c] = side_c ? 1 : -1;
+      const LeafBox target{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+      if (settleFall(run, PairKind::EDGE_VOXEL_EDGE, edge, points, leaf, target, pair.outward, inside, edge_contacts)) {
+        continue;
+      }
       const VertexMotion quad[4] = {points[0], points[1], fixedPoint(low[0], low[1], low[2]),
                                     fixedPoint(high[0], high[1], high[2])};
       edge_batch.add(pair, quad, toc_bound);
@@ -497,28 +528,59 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
     ObstaclePair pair{contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf),
                       {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
     std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
+    const LeafBox target{{corner[0], corner[1], corner[2]}, {corner[0], corner[1], corner[2]}};
+    if (settleFall(run, PairKind::FACE_VOXEL_CORNER, face, points, leaf, target, pair.outward, inside, face_contacts)) {
+      continue;
+    }
     const VertexMotion quad[4] = {fixedPoint(corner[0], corner[1], corner[2]), points[0], points[1], points[2]};
     corner_batch.add(pair, quad, toc_bound);
   }
+}
+
+/// A feature that lies in an axis plane and moves along that axis alone (level cloth that is let fall, a level plate that
+/// is lowered): it meets the target, a leaf's edge or corner as a flat box, where it meets the target's shadow, at the
+/// first time at which it is at the target's height. Settled exactly here, since such scenes are full of contacts on borders, which
+/// are slow to decide in general. False where the feature moves otherwise.
+template <class Feature>
+bool ObstacleTest::Impl::settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points,
+                                    std::uint32_t leaf, const LeafBox& target, const double* outward, bool inside,
+                                    std::vector<Contact>& contacts) {
+  const int axis = reach_m > 0 ? -1 : fallAxis(points, feature.size());
+  if (axis < 0) return false;
+  const double from = points[0].t0[axis], to = points[0].t1[axis];
+  if (std::max(from, to) < target.lo[axis] || std::min(from, to) > target.hi[axis]) return true;
+  if (from >= target.lo[axis] && from <= target.hi[axis]) return false;  // beside the target at the start
+  const double plane = from < target.lo[axis] ? target.lo[axis] : target.hi[axis];
+  LeafBox shadow = target;
+  shadow.lo[axis] = shadow.hi[axis] = from;
+  const bool meets = feature.size() == 2
+                         ? segmentMeetsBox(points[0].t0, points[1].t0, shadow)
+                         : triangleMeetsBox(points[0].t0, points[1].t0, points[2].t0, shadow) != TriangleStart::APART;
+  if (!meets) return true;
+  Contact contact = contactOf(run, kind, leaf);
+  std::copy(feature.begin(), feature.end(), contact.vertex.begin());
+  contact.leaving = inside && (to - from) * outward[axis] > 0;
+  setTime(contact, CrossingTime(plane, from, to));
+  contacts.push_back(contact);
+  return true;
 }
 
 void ObstacleTest::Impl::collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats) {
   const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch, std::uint64_t& count) {
     batch.flush();
     stats.tiers += batch.tiers();
-    // Settled ones of vertices and edges are in order already; a few tested ones join them.
+    // Settled ones are mostly in order already, and the tested ones few.
     std::vector<Contact>& tested = batch.contacts();
     sortAndJoin(tested);
     sortAndJoin(settled);
-    const std::size_t middle = contacts.size();
-    contacts.insert(contacts.end(), settled.begin(), settled.end());
-    contacts.insert(contacts.end(), tested.begin(), tested.end());
     if (!tested.empty()) {
-      const auto begin = contacts.begin() + static_cast<std::ptrdiff_t>(middle);
-      std::inplace_merge(begin, begin + static_cast<std::ptrdiff_t>(settled.size()), contacts.end(), canonicalLess);
+      const auto middle = static_cast<std::ptrdiff_t>(settled.size());
+      settled.insert(settled.end(), tested.begin(), tested.end());
+      std::inplace_merge(settled.begin(), settled.begin() + middle, settled.end(), canonicalLess);
+      sortAndJoin(settled);
     }
-    count += contacts.size() - middle;
-    settled.clear();
+    contacts.insert(contacts.end(), settled.begin(), settled.end());
+    count += settled.size();
   };
   append(vertex_contacts, vertex_batch, stats.vertex_contacts);
   append(edge_contacts, edge_batch, stats.edge_contacts);

@@ -35,8 +35,12 @@ bool boundsMeet(const double* p0, const double* p1, const LeafBox& box) {
   return true;
 }
 
-/// Does the triangle's plane pass through the closed box? A degenerate triangle's does everywhere.
+/// Does the triangle's plane pass through the closed box, which its bounds overlap? A degenerate one's does everywhere.
 bool planeMeetsBox(const double* p0, const double* p1, const double* p2, const LeafBox& box) {
+  for (int axis = 0; axis < 3; ++axis) {
+    // A triangle that is level in an axis: its bounds, which overlap the box, are its plane.
+    if (p0[axis] == p1[axis] && p0[axis] == p2[axis]) return true;
+  }
   bool below = false, above = false;
   for (int corner = 0; corner < 8; ++corner) {
     const double q[3] = {corner & 1 ? box.hi[0] : box.lo[0], corner & 2 ? box.hi[1] : box.lo[1],

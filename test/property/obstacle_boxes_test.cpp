@@ -97,12 +97,15 @@ ObstacleScene drawScene(bool polyline) {
   scene.resolution_m = *rc::gen::elementOf(RESOLUTIONS);
   scene.leaves = drawLeaves();
   const int vertices = polyline ? *rc::gen::inRange(2, 5) : *rc::gen::inRange(3, 6);
-  // One common displacement for all vertices now and then: faces that slide, fall flat and graze.
-  const bool rigid = *rc::gen::inRange(0, 3) == 0;
+  // One common displacement for all vertices now and then, sometimes of a level mesh: it slides, falls flat and grazes.
+  const bool rigid = *rc::gen::inRange(0, 3) == 0, level = *rc::gen::inRange(0, 2) == 0;
+  const int level_axis = *rc::gen::inRange(0, 3);
+  const double height = drawCoordinate(scene.resolution_m);
   Vec3 shift = Vec3::Zero();
-  if (rigid) shift[*rc::gen::inRange(0, 3)] = scene.resolution_m * *rc::gen::inRange(-6, 7);
+  if (rigid) shift[level ? level_axis : *rc::gen::inRange(0, 3)] = scene.resolution_m * *rc::gen::inRange(-6, 7);
   for (int i = 0; i < vertices; ++i) {
     scene.t0.push_back(drawPoint(scene.resolution_m));
+    if (rigid && level) scene.t0.back()[level_axis] = height;
     scene.t1.push_back(rigid ? Vec3(scene.t0.back() + shift) : drawEnd(scene.t0.back(), scene.resolution_m));
   }
   if (polyline) {
@@ -144,6 +147,10 @@ void checkScene(const ObstacleScene& scene, int toc_bits, Tally& tally) {
   options.accuracy.toc_bits = toc_bits;
   const std::vector<Contact> contacts = contactsOf(scene, options);
   RC_ASSERT(std::is_sorted(contacts.begin(), contacts.end(), canonicalLess));
+  for (std::size_t i = 1; i < contacts.size(); ++i) {
+    const Contact &a = contacts[i - 1], &b = contacts[i];
+    RC_ASSERT(a.kind != b.kind || a.vertex != b.vertex || !(a.voxel == b.voxel));  // one contact a feature and leaf
+  }
   for (const Contact& contact : contacts) {
     RC_ASSERT(contact.certainty == Certainty::CERTAIN);
     RC_ASSERT(contact.body[0] == 3 && contact.body[1] == OBSTACLE_BODY);
