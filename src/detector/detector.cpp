@@ -79,6 +79,8 @@ struct Detector::Impl {
 
   const StepResult& run(const MotionStep& step);
   void findPairs(const StepContext& context);
+  bool staysApart(std::size_t body) const;
+  void rememberApart(bool certain);
   void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
   void runPairs(StepContext& context);
   void runObstacle(const MotionStep& step);
@@ -98,6 +100,8 @@ struct Detector::Impl {
   std::vector<std::uint32_t> body_pairs;
   HitOrder order;
   StartStateTest start_state;
+  std::vector<std::uint8_t> apart;  // per body: at the end of the last step it certainly did not touch itself
+  bool continues = false;
   std::vector<std::unique_ptr<ObstacleTest>> obstacle_tests;
   Positions map_t0, map_t1;
   std::vector<std::uint8_t> obstacle_active;
@@ -153,10 +157,12 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
                                    std::chrono::duration<double, std::milli>(options.step_budget_ms));
   }
   for (PairWorker& w : workers) w.beginStep();
+  continues = step.continues;
   findPairs(context);
   runPairs(context);
   collect();
   if (step.obstacle) runObstacle(step);
+  rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only && !result.contacts.empty()) {
     double best = 2;
     for (const core::Contact& c : result.contacts) {
@@ -211,13 +217,30 @@ void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, c
   }
 }
 
+// A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
+// stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
+bool Detector::Impl::staysApart(std::size_t body) const {
+  return continues && body < apart.size() && apart[body] && scene.bodies()[body].translates;
+}
+
+void Detector::Impl::rememberApart(bool certain) {
+  apart.resize(scene.bodies().size(), 0);
+  for (std::size_t b = 0; b < apart.size(); ++b) {
+    const bool tested = scene.bodies()[b].setup.self_collision;
+    apart[b] = certain && tested && !scene.bodies()[b].masked;
+  }
+  for (const core::Contact& c : result.contacts) {
+    if (c.body[0] == c.body[1]) apart[c.body[0]] = 0;
+  }
+}
+
 void Detector::Impl::findPairs(const StepContext& context) {
   const Clock::time_point start = Clock::now();
   tasks.clear();
   group_pairs.clear();
   const std::size_t n = scene.bodies().size();
   for (std::size_t b = 0; b < n; ++b) {
-    if (!scene.bodies()[b].setup.self_collision) continue;
+    if (!scene.bodies()[b].setup.self_collision || staysApart(b)) continue;
     const std::uint16_t i = static_cast<std::uint16_t>(b);
     addTasks(PairKind::VERTEX_FACE, i, i, context);
     addTasks(PairKind::EDGE_EDGE, i, i, context);
@@ -365,6 +388,7 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
   Impl::checkSeparation(impl_->options, separation);
   impl_->scene.setBodies(std::move(bodies), rest_positions);
   impl_->start_state.forget();
+  impl_->apart.clear();
   impl_->obstacle_tests.clear();
 }
 

@@ -33,6 +33,28 @@ void buildTree(SceneBody& body, FeatureKind kind, const std::vector<Index>& loca
   body.ranks[static_cast<int>(kind)] = std::move(ranks);
 }
 
+// a - b as an unevaluated sum without error (Knuth's two-sum); not finite when it overflows.
+struct ExactDifference {
+  double high, low;
+  friend bool operator==(const ExactDifference& x, const ExactDifference& y) { return x.high == y.high && x.low == y.low; }
+};
+ExactDifference exactDifference(double a, double b) {
+  const double high = a - b, virtual_b = a - high, virtual_a = high + virtual_b;
+  return {high, (a - virtual_a) + (virtual_b - b)};
+}
+
+bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
+  for (std::size_t i = 1; i < n; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(exactDifference(vertices[i].t1[axis], vertices[i].t0[axis]) ==
+            exactDifference(vertices[0].t1[axis], vertices[0].t0[axis]))) {
+        return false;
+      }
+    }
+  }
+  return n > 0;
+}
+
 std::vector<Index> consecutive(std::size_t n, Index first) {
   std::vector<Index> v(n);
   std::iota(v.begin(), v.end(), first);
@@ -185,6 +207,7 @@ void SceneArrays::record(const MotionStep& step, core::StepStats& stats) {
         if (!body.active[i]) out[i] = first_active < body.usedCount() ? out[first_active] : VertexMotion{};
       }
     }
+    body.translates = !masked && sameDisplacement(out, body.usedCount());
     stats.unchecked_vertices += unchecked;
     if (changed || masked != body.masked) {
       // The mask is indexed by internal vertex number.

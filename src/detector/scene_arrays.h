@@ -25,6 +25,7 @@ struct SceneBody {
   std::vector<Index> ranks[3];       ///< slot -> rank: vertex_begin + local vertex, edge rank, face rank
   std::vector<std::uint8_t> active;  ///< per used vertex; what the trees are masked with
   bool masked = false;
+  bool translates = false;  ///< all vertices have exactly the same displacement in this step (at rest included)
 
   const ClusterTree& tree(FeatureKind k) const { return trees[static_cast<int>(k)]; }
   const std::vector<Index>& rank(FeatureKind k) const { return ranks[static_cast<int>(k)]; }
