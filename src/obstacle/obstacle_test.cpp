@@ -25,26 +25,42 @@ enum VertexState : std::uint8_t {
   INSIDE = 32      ///< it touches a leaf at t=0
 };
 
-/// The smallest box around moving points, at t=0, at t=1 and over the step.
+/// The smallest box around moving points at t=0 and t=1, and over the step (swept), the last inflated by the reach.
 struct MovingBounds {
   double min[2][3], max[2][3];
-  double sweptMin(int axis) const { return std::min(min[0][axis], min[1][axis]); }
-  double sweptMax(int axis) const { return std::max(max[0][axis], max[1][axis]); }
+  double swept_min[3], swept_max[3];
+
+  bool reaches(int axis, double lo, double hi) const { return swept_min[axis] <= hi && swept_max[axis] >= lo; }
 };
 
-MovingBounds boundsOf(const VertexMotion* points, int count) {
+MovingBounds boundsOf(const VertexMotion* points, int count, double reach_m) {
   MovingBounds bounds;
   for (int axis = 0; axis < 3; ++axis) {
-    bounds.min[0][axis] = bounds.max[0][axis] = points[0].t0[axis];
-    bounds.min[1][axis] = bounds.max[1][axis] = points[0].t1[axis];
+    double lo0 = points[0].t0[axis], hi0 = lo0, lo1 = points[0].t1[axis], hi1 = lo1;
     for (int i = 1; i < count; ++i) {
-      bounds.min[0][axis] = std::min(bounds.min[0][axis], points[i].t0[axis]);
-      bounds.max[0][axis] = std::max(bounds.max[0][axis], points[i].t0[axis]);
-      bounds.min[1][axis] = std::min(bounds.min[1][axis], points[i].t1[axis]);
-      bounds.max[1][axis] = std::max(bounds.max[1][axis], points[i].t1[axis]);
+      lo0 = std::min(lo0, points[i].t0[axis]);
+      hi0 = std::max(hi0, points[i].t0[axis]);
+      lo1 = std::min(lo1, points[i].t1[axis]);
+      hi1 = std::max(hi1, points[i].t1[axis]);
     }
+    bounds.min[0][axis] = lo0;
+    bounds.max[0][axis] = hi0;
+    bounds.min[1][axis] = lo1;
+    bounds.max[1][axis] = hi1;
+    bounds.swept_min[axis] = std::min(lo0, lo1) - reach_m;
+    bounds.swept_max[axis] = std::max(hi0, hi1) + reach_m;
   }
   return bounds;
+}
+
+/// Not after the time at which the points first come within reach of a box; above 1 when they never do.
+double tocBound(const MovingBounds& moving, const LeafBox& box, double reach_m) {
+  double bound = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    bound = std::max(bound, firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, box.lo[axis] - reach_m,
+                                         box.hi[axis] + reach_m));
+  }
+  return bound;
 }
 
 VertexMotion fixedPoint(double x, double y, double z) { return {{x, y, z, 0}, {x, y, z, 0}}; }
@@ -135,8 +151,10 @@ struct ObstacleTest::Impl {
   }
   void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
   void vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
-  void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, std::uint32_t leaf, bool inside);
-  void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, std::uint32_t leaf, bool inside);
+  void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, const MovingBounds& moving,
+                 std::uint32_t leaf, bool inside);
+  void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, const MovingBounds& moving,
+                 std::uint32_t leaf, bool inside);
   void collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats);
 
   void keepEarliest(std::vector<Contact>& contacts, std::size_t first) const;
@@ -358,13 +376,7 @@ void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t 
 void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   VertexMotion points[4] = {motionOf(run, vertex), {}, {}, {}};
-  const MovingBounds moving = boundsOf(points, 1);
-  double toc_bound = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double bound =
-        firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, box.lo[axis] - reach_m, box.hi[axis] + reach_m);
-    toc_bound = std::max(toc_bound, bound);
-  }
+  const double toc_bound = tocBound(boundsOf(points, 1, reach_m), box, reach_m);
   if (toc_bound > 1) return;
   for (int direction = 0; direction < FACE_DIRECTIONS; ++direction) {
     if (!(run.surface->features[leaf] >> direction & 1)) continue;
@@ -401,7 +413,8 @@ void ObstacleTest::Impl::runEdges(const Run& run) {
     if (near_leaves.empty()) continue;
     run.stats->edge_pairs_in += near_leaves.size();
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
-    for (const std::uint32_t leaf : near_leaves) edgePairs(run, edge, points, leaf, inside);
+    const MovingBounds moving = boundsOf(points, 2, reach_m);
+    for (const std::uint32_t leaf : near_leaves) edgePairs(run, edge, points, moving, leaf, inside);
   }
 }
 
@@ -417,29 +430,21 @@ bool ObstacleTest::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
   return inside;
 }
 
-void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, std::uint32_t leaf,
-                                   bool inside) {
+void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points,
+                                   const MovingBounds& moving, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
-  const MovingBounds moving = boundsOf(points, 2);
-  // Per axis: the first meeting with the lower plane, the upper plane and the slab between them.
-  double meet[3][3];
+  bool near[3][2];
   for (int axis = 0; axis < 3; ++axis) {
-    const auto first = [&](double lo, double hi) {
-      return firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, lo - reach_m, hi + reach_m);
-    };
-    meet[axis][2] = first(box.lo[axis], box.hi[axis]);
-    if (meet[axis][2] > 1) return;
-    meet[axis][0] = first(box.lo[axis], box.lo[axis]);
-    meet[axis][1] = first(box.hi[axis], box.hi[axis]);
+    if (!moving.reaches(axis, box.lo[axis], box.hi[axis])) return;
+    near[axis][0] = moving.reaches(axis, box.lo[axis], box.lo[axis]);
+    near[axis][1] = moving.reaches(axis, box.hi[axis], box.hi[axis]);
   }
   const FeatureMask features = run.surface->features[leaf];
   for (int axis = 0; axis < 3; ++axis) {
     const int b = (axis + 1) % 3, c = (axis + 2) % 3;
     for (int sides = 0; sides < 4; ++sides) {
       const int side_b = sides & 1, side_c = sides >> 1;
-      if (!(features >> edgeBit(axis, side_b, side_c) & 1)) continue;
-      const double toc_bound = std::max(meet[axis][2], std::max(meet[b][side_b], meet[c][side_c]));
-      if (toc_bound > 1) continue;
+      if (!near[b][side_b] || !near[c][side_c] || !(features >> edgeBit(axis, side_b, side_c) & 1)) continue;
       double low[3], high[3];
       low[axis] = box.lo[axis];
       high[axis] = box.hi[axis];
@@ -462,7 +467,7 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
       }
       const VertexMotion quad[4] = {points[0], points[1], fixedPoint(low[0], low[1], low[2]),
                                     fixedPoint(high[0], high[1], high[2])};
-      edge_batch.add(pair, quad, toc_bound);
+      edge_batch.add(pair, quad, tocBound(moving, target, reach_m));
     }
   }
 }
@@ -479,8 +484,10 @@ void ObstacleTest::Impl::runFaces(const Run& run) {
     run.surface->tree.visitLeavesWithCorners(unite(keys, face).box(),
                                              [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
     run.stats->corner_pairs_in += near_leaves.size();
+    if (near_leaves.empty()) continue;
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
-    for (const std::uint32_t leaf : near_leaves) cornerPairs(run, face, points, leaf, inside);
+    const MovingBounds moving = boundsOf(points, 3, reach_m);
+    for (const std::uint32_t leaf : near_leaves) cornerPairs(run, face, points, moving, leaf, inside);
   }
 }
 
@@ -500,24 +507,18 @@ bool ObstacleTest::Impl::faceStartsInside(const Run& run, const Face& face) {
   return pierced > 0;
 }
 
-void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points, std::uint32_t leaf,
-                                     bool inside) {
+void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points,
+                                     const MovingBounds& moving, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
-  const MovingBounds moving = boundsOf(points, 3);
-  double meet[3][2];
+  bool near[3][2];
   for (int axis = 0; axis < 3; ++axis) {
-    for (int side = 0; side < 2; ++side) {
-      const double plane = planeOf(box, axis, side);
-      meet[axis][side] =
-          firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, plane - reach_m, plane + reach_m);
-    }
+    near[axis][0] = moving.reaches(axis, box.lo[axis], box.lo[axis]);
+    near[axis][1] = moving.reaches(axis, box.hi[axis], box.hi[axis]);
   }
   const FeatureMask features = run.surface->features[leaf];
   for (int sides = 0; sides < 8; ++sides) {
     const int x = sides & 1, y = sides >> 1 & 1, z = sides >> 2;
-    if (!(features >> cornerBit(x, y, z) & 1)) continue;
-    const double toc_bound = std::max(meet[0][x], std::max(meet[1][y], meet[2][z]));
-    if (toc_bound > 1) continue;
+    if (!near[0][x] || !near[1][y] || !near[2][z] || !(features >> cornerBit(x, y, z) & 1)) continue;
     const double corner[3] = {planeOf(box, 0, x), planeOf(box, 1, y), planeOf(box, 2, z)};
     if (reach_m == 0 && triangleMissesPoint(points[0], points[1], points[2], corner)) continue;
     if (inside) {
@@ -533,7 +534,7 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
       continue;
     }
     const VertexMotion quad[4] = {fixedPoint(corner[0], corner[1], corner[2]), points[0], points[1], points[2]};
-    corner_batch.add(pair, quad, toc_bound);
+    corner_batch.add(pair, quad, tocBound(moving, target, reach_m));
   }
 }
 
