@@ -1,0 +1,108 @@
+// Scene files: what is read, and what is refused with file, line, key and what to write instead.
+#include "scene/physics/scene_file.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace deformable_ccd::scene {
+namespace {
+
+const char* const GOOD = R"(name: drop
+description: A sheet falls
+frames: 5
+physics:
+  gravity_m_s2: [0, 0, -9.81]
+bodies:
+  - name: sheet
+    mass_kg: 0.1
+    sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}
+)";
+
+std::string errorOf(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+  try {
+    parseScene(text, "s.yaml");
+  } catch (const SceneFileError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(SceneFile, ReadsWhatItSays) {
+  const SceneSpec spec = parseScene(GOOD, "s.yaml");
+  EXPECT_EQ(spec.name, "drop");
+  EXPECT_EQ(spec.frames, 5);
+  ASSERT_EQ(spec.bodies.size(), 1u);
+  EXPECT_EQ(spec.bodies[0].topic, "/sheet");
+  EXPECT_EQ(spec.bodies[0].shape.rows, 3);
+  EXPECT_EQ(spec.bodies[0].shape.cols, 4);
+  EXPECT_TRUE(spec.gravity_m_s2.has_value());
+  EXPECT_FALSE(spec.wind.has_value());
+  EXPECT_FALSE(spec.obstacle.has_value());
+  EXPECT_FALSE(spec.bodies[0].bending.has_value());
+  EXPECT_FALSE(spec.bodies[0].self_collision.has_value());
+  EXPECT_FALSE(spec.bodies[0].friction.has_value());
+}
+
+TEST(SceneFile, AnUnknownKeyIsNamedWithItsLineAndTheKnownOnes) {
+  const std::string error = errorOf(GOOD, "mass_kg", "mas_kg");
+  EXPECT_NE(error.find("s.yaml:"), std::string::npos) << error;
+  EXPECT_NE(error.find("mass_kg: is missing"), std::string::npos) << error;
+  const std::string extra = errorOf(GOOD, "    mass_kg: 0.1\n", "    mass_kg: 0.1\n    colour: red\n");
+  EXPECT_NE(extra.find("s.yaml:9: bodies[0].colour"), std::string::npos) << extra;
+  EXPECT_NE(extra.find("mass_kg"), std::string::npos) << extra;
+}
+
+TEST(SceneFile, ValuesOutOfRangeOrOfTheWrongTypeAreRefused) {
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: -1").find("s.yaml:8: bodies[0].mass_kg: write a number from"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: .nan").find("write a number"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: heavy").find("not 'heavy'"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: 2.5").find("write a whole number"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "rows: 3", "rows: 1").find("rows"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "[0, -9.81]").find("a list of 3 numbers"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "9.81").find("a list of 3 numbers"), std::string::npos);
+}
+
+TEST(SceneFile, ContradictionsAreRefused) {
+  EXPECT_NE(errorOf(GOOD, "sheet: {rows: 3", "grippers: [{vertices: [12]}]\n    sheet: {rows: 3").find("from 0 to 11"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "sheet: {rows: 3", "grippers: [{row: 0, col: 0}]\n    sheet: {rows: 3").find("just one of"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "    sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}",
+                    "    rope: {points: 9, length_m: 1, center_m: [0, 0, 1]}")
+                .find("a rope has no faces"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "bodies:",
+                    "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 1], max_m: [1, 1, 1]}}]}\nbodies:")
+                .find("min_m below max_m"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"), std::string::npos);
+}
+
+TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
+  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
+  EXPECT_THROW(readSceneFile("no/such/scene.yaml"), SceneFileError);
+  EXPECT_THROW(parseScene("", "s.yaml"), SceneFileError);
+  EXPECT_THROW(parseScene("- a\n- b\n", "s.yaml"), SceneFileError);
+}
+
+TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
+  int scenes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const SceneSpec spec = readSceneFile(entry.path().string());
+    EXPECT_EQ(spec.name, entry.path().stem().string());
+    EXPECT_FALSE(spec.monitor_yaml.empty()) << spec.name;
+    EXPECT_FALSE(spec.expect_yaml.empty()) << spec.name;
+    ++scenes;
+  }
+  EXPECT_GE(scenes, 6);
+}
+
+}  // namespace
+}  // namespace deformable_ccd::scene
