@@ -24,7 +24,7 @@ void check(const MeshStoreOptions& options) {
 bool teleports(const Positions& a, const Positions& b, double limit_m) {
   const double limit_sq = limit_m * limit_m;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    if ((b[i] - a[i]).squaredNorm() > limit_sq) return true;
+    if ((b[i] - a[i]).squaredNorm() > limit_sq && a[i].allFinite() && b[i].allFinite()) return true;
   }
   return false;
 }

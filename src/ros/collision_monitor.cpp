@@ -23,6 +23,7 @@
 #include "ros/log_throttle.h"
 #include "ros/map_loader.h"
 #include "ros/monitor_pipeline.h"
+#include "ros/reconfigure.h"
 #include "ros/transforms.h"
 
 namespace deformable_ccd {
@@ -73,8 +74,10 @@ struct CollisionMonitor::Impl {
   ros::CallbackQueue input_callbacks, service_callbacks;
   ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
   std::vector<ros::Subscriber> mesh_subscribers;
+  std::vector<std::uint8_t> had_publisher;
   ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
   std::vector<ros::ServiceServer> services;
+  std::unique_ptr<Reconfigure> reconfigure;
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
   std::thread worker;
 
@@ -89,16 +92,19 @@ struct CollisionMonitor::Impl {
 
   // Input thread.
   void subscribe();
+  void subscribeMesh(std::size_t body);
   void onMesh(std::size_t body, const ShapeShifter::ConstPtr& message);
   void onMap(const ShapeShifter::ConstPtr& message);
 
   // Service thread.
   void advertiseServices();
+  void reconfigureNow(MonitorOptions options, const MarkerConfig& markers);
   template <typename Result>
   bool onWorker(std::function<Result()> run, Result& result);
 
   // Worker.
   void work();
+  void renewSubscriptions();
   void takeMaps();
   void takeMessages();
   void publish(StepOutcome& outcome);
@@ -142,18 +148,22 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
 }
 
+void CollisionMonitor::Impl::subscribeMesh(std::size_t body) {
+  ros::NodeHandle input(node);
+  input.setCallbackQueue(&input_callbacks);
+  mesh_subscribers[body] = input.subscribe<ShapeShifter>(
+      config.bodies[body].topic, SUBSCRIBER_QUEUE, [this, body](const ShapeShifter::ConstPtr& m) { onMesh(body, m); },
+      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+}
+
 void CollisionMonitor::Impl::subscribe() {
   ros::NodeHandle input(node);
   input.setCallbackQueue(&input_callbacks);
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  mesh_subscribers.resize(config.bodies.size());
+  had_publisher.resize(config.bodies.size(), 0);
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    if (config.bodies[b].isRigid()) {
-      mesh_subscribers.emplace_back();
-      continue;
-    }
-    mesh_subscribers.push_back(input.subscribe<ShapeShifter>(
-        config.bodies[b].topic, SUBSCRIBER_QUEUE, [this, b](const ShapeShifter::ConstPtr& m) { onMesh(b, m); },
-        ros::VoidConstPtr(), hints));
+    if (!config.bodies[b].isRigid()) subscribeMesh(b);
   }
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
@@ -210,6 +220,10 @@ void CollisionMonitor::Impl::advertiseServices() {
         response.message = done ? describe(outcome) : "the worker is busy";
         return true;
       }));
+  reconfigure = std::make_unique<Reconfigure>(
+      service, config, [this](const MonitorOptions& options, const MarkerConfig& markers) {
+        queue.command([this, options, markers] { reconfigureNow(options, markers); });
+      });
 }
 
 // --- worker ----------------------------------------------------------------------------------------------------------
@@ -219,6 +233,18 @@ void CollisionMonitor::Impl::complain(std::size_t body, const std::string& kind,
                                                          : node.resolveName(config.octomap_topic);
   const std::string line = log.line(topic + " " + kind, topic + ": " + text, steadyNs());
   if (!line.empty()) ROS_WARN_STREAM(line);
+}
+
+void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const MarkerConfig& markers) {
+  config.markers = markers;
+  // What the effect plan decides stays with it.
+  options.obstacle_expected = pipeline.monitor().options().obstacle_expected;
+  options.detector.check_start_state = pipeline.monitor().options().detector.check_start_state;
+  try {
+    pipeline.monitor().setOptions(options);
+  } catch (const std::invalid_argument& error) {
+    ROS_WARN_STREAM("reconfiguration refused: " << error.what());
+  }
 }
 
 void CollisionMonitor::Impl::resetNow(StepStatus status) {
@@ -239,6 +265,20 @@ void CollisionMonitor::Impl::accountDropped() {
     pipeline.monitor().countReceived(b, dropped[b]);
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
     complain(b, "queue", std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come");
+  }
+}
+
+/// A subscription to any type takes on the type of its first publisher for good. When the last publisher is gone, a new
+/// subscription is open to any type again.
+void CollisionMonitor::Impl::renewSubscriptions() {
+  for (std::size_t b = 0; b < mesh_subscribers.size(); ++b) {
+    if (!mesh_subscribers[b]) continue;
+    const bool has_publisher = mesh_subscribers[b].getNumPublishers() > 0;
+    if (had_publisher[b] && !has_publisher) {
+      mesh_subscribers[b].shutdown();
+      subscribeMesh(b);
+    }
+    had_publisher[b] = has_publisher;
   }
 }
 
@@ -307,6 +347,7 @@ void CollisionMonitor::Impl::work() {
     if (stopping) return;
     if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
     effects.apply(pipeline.monitor(), map_publisher_seen);
+    renewSubscriptions();
     takeMaps();
     takeMessages();
     accountDropped();
@@ -330,6 +371,7 @@ void CollisionMonitor::Impl::stop() {
   stopping = true;
   input_spinner.stop();
   service_spinner.stop();
+  reconfigure.reset();
   queue.wake();
   if (worker.joinable()) worker.join();
   maps.reset();

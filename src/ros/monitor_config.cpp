@@ -223,6 +223,7 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   readEffects(reader.section("effects"), config);
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
+  reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
   applyEffects(config);
   XmlRpcValue copy = tree;

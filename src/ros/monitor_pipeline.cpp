@@ -89,7 +89,7 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
   const bool timed_out =
       finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
-  std::string reason = "the fixed frame is not known before the first message of the clock body";
+  std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   Eigen::Isometry3d fixed_from_mesh;
   const bool is_clock = body == config_.monitor.clock_body;
   const bool placed = !fixed_frame_.empty() &&

@@ -57,9 +57,10 @@ class Probe {
 };
 
 template <typename Message>
-ros::Publisher advertiseAndWait(ros::NodeHandle& node, const std::string& topic, bool latch = false) {
+ros::Publisher advertiseAndWait(ros::NodeHandle& node, const std::string& topic, bool latch = false,
+                                std::size_t subscribers = 1) {
   ros::Publisher publisher = node.advertise<Message>(topic, 1000, latch);
-  waitUntil([&] { return publisher.getNumSubscribers() > 0; });
+  waitUntil([&] { return publisher.getNumSubscribers() >= subscribers; });
   return publisher;
 }
 

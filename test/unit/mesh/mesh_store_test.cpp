@@ -58,6 +58,7 @@ TEST_F(MeshStoreTest, VerticesThatAreNotFiniteAreNoTeleport) {
   store.push(frame(0));
   MeshFrame lost = frame(10 * MS);
   lost.positions[1].setConstant(std::numeric_limits<double>::quiet_NaN());
+  lost.positions[2].setConstant(std::numeric_limits<double>::infinity());
   EXPECT_EQ(store.push(lost), StepStatus::OK);
   EXPECT_EQ(store.push(frame(20 * MS)), StepStatus::OK);
 }
