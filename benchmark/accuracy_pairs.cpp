@@ -19,8 +19,8 @@
 #include "deformable_ccd/elementary.h"
 #include "detector/scene_arrays.h"
 #include "io/query_file.h"
-#include "ros/mesh_file.h"
 #include "simd/fused_filter.h"
+#include "support/scene_data.h"
 
 namespace deformable_ccd {
 namespace {
@@ -202,14 +202,14 @@ int run(int argc, char** argv) {
   for (const std::string& dir : dirs) addQueries(dir, sets);
   std::vector<std::unique_ptr<SceneArrays>> scenes;
   for (std::size_t i = 0; i + 2 < frames.size(); i += 3) {
-    const MeshFile m0 = loadMeshFile(frames[i + 1]), m1 = loadMeshFile(frames[i + 2]);
+    const test::PlyMesh m0 = test::readPly(frames[i + 1]), m1 = test::readPly(frames[i + 2]);
     BodySetup body;
     body.name = frames[i];
-    body.topology = std::make_shared<const Topology>(Topology::fromTriangles(m0.positions.size(), m0.faces));
+    body.topology = std::make_shared<const Topology>(Topology::fromTriangles(m0.vertices.size(), m0.faces));
     scenes.push_back(std::make_unique<SceneArrays>());
-    scenes.back()->setBodies({body}, {&m0.positions});
+    scenes.back()->setBodies({body}, {&m0.vertices});
     MotionStep step;
-    step.bodies = {{&m0.positions, &m1.positions}};
+    step.bodies = {{&m0.vertices, &m1.vertices}};
     core::StepStats stats;
     scenes.back()->record(step, stats);
     scenes.back()->refit([](std::size_t n, const auto& f) { f(0, n); });

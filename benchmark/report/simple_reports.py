@@ -43,7 +43,7 @@ def write_kernels(folder, result):
         b = by_aggregate["median"]
         unit = "pair" if "ns_per_pair" in b else "vertex"
         deviation = by_aggregate.get("stddev", {}).get("real_time", 0.0) / max(1e-12, b["real_time"])
-        rows.append([name, "%.2f ns a %s" % (1e9 * b["ns_per_" + unit], unit), "%.1f %%" % (100 * deviation),
+        rows.append([name, "%.2f ns a %s" % (b["ns_per_" + unit], unit), "%.1f %%" % (100 * deviation),
                      "%.1f" % b["culled_percent"] if "culled_percent" in b else ""])
     header = ["kernel / order / kind", "median", "spread", "culled %"]
     write_rows(os.path.join(folder, "kernels.csv"), header, rows)
