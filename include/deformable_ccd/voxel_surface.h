@@ -64,7 +64,17 @@ struct ObstacleOptions {
   bool earliest_only = false;
 };
 
-/// One body's step against the surface, in the map's frame. Reusable scratch inside: after warm-up a run
+/// Mesh vertices against exposed voxel faces, mesh edges against convex voxel edges, voxel corners against mesh faces, over
+/// one body's step in the map's frame. For each face (of a polyline: edge) the earliest TOC over its own, its edges' and
+/// its vertices' contacts is that of its first touch of the occupied voxels as closed, solid boxes.
+/// At most one contact for each mesh feature, leaf and kind, the earliest.
+/// - `initial` (TOC 0): the feature touches the leaf at t=0, interior leaves included. A vertex has one for each leaf it
+///   touches; an edge none of whose ends is inside any leaf, one for each leaf that it pierces or touches; a face none of
+///   whose sides touches a leaf, one for each leaf that pierces it. What an end or a side settles is not said again.
+/// - `leaving`: a feature that touched some leaf at t=0 meets another one's face, edge or corner from within.
+/// Rungs: vertices are always decided exactly (the path of a point through a box is linear); edges and corners by the
+/// elementary test. `screen` calls all but initial contacts undecided.
+/// Reusable scratch inside: after warm-up a run
 /// allocates nothing that grows with the number of steps. Not thread-safe; one per thread or body.
 class ObstacleTest {
  public:

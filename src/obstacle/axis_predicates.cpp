@@ -150,8 +150,8 @@ std::int64_t timeCell(const CrossingTime& time, int bits) {
     // Differences that may overflow, or a tiny quotient: quarters cannot overflow, and lose nothing that matters here.
     cell = static_cast<std::int64_t>((time.plane / 4 - time.from / 4) / (time.to / 4 - time.from / 4) * scale);
   }
-  // A guess is a few cells off at most. Where the differences are exact, so is this comparison of numerator * 2^bits with
-  // k * denominator; that settles times on the grid, such as one half.
+  // A guess is a few cells off at most. Where the differences are exact, so is this comparison of numerator * 2^bits
+  // with k * denominator; that settles times on the grid, such as one half.
   const double n = time.plane - time.from, d = time.to - time.from;
   if (time.certain && std::abs(n) > TINY && std::abs(d) < 0x1p140 && differenceIsExact(time.plane, time.from, n) &&
       differenceIsExact(time.to, time.from, d)) {

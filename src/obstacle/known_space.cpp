@@ -55,8 +55,8 @@ bool visitUnknown(const VoxelTree& tree, const Cube& cube, const KeyBox& keys, V
   if (coverage == Coverage::EMPTY && common == Overlap::INSIDE) return visit(cube);
   const std::int32_t half = cube.size / 2;
   for (int i = 0; i < 8; ++i) {
-    const Cube child{{cube.min[0] + (i & 1 ? half : 0), cube.min[1] + (i & 2 ? half : 0), cube.min[2] + (i & 4 ? half : 0)},
-                     half};
+    Cube child{{}, half};
+    for (int axis = 0; axis < 3; ++axis) child.min[axis] = cube.min[axis] + (i >> axis & 1 ? half : 0);
     if (!visitUnknown(tree, child, keys, visit)) return false;
   }
   return true;
@@ -74,7 +74,9 @@ std::uint64_t packBlock(std::int32_t x, std::int32_t y, std::int32_t z) {
 /// Appends the blocks of a key box; false when that makes more than the limit.
 bool addBlocks(const KeyBox& keys, std::size_t limit, std::vector<TouchedBlock>& blocks) {
   std::size_t count = 1;
-  for (int axis = 0; axis < 3; ++axis) count *= static_cast<std::size_t>((keys.hi[axis] >> 2) - (keys.lo[axis] >> 2) + 1);
+  for (int axis = 0; axis < 3; ++axis) {
+    count *= static_cast<std::size_t>((keys.hi[axis] >> 2) - (keys.lo[axis] >> 2) + 1);
+  }
   if (count > limit - blocks.size()) return false;
   const auto range = [&keys](int axis, std::int32_t block) {
     const std::int32_t lo = std::max(0, keys.lo[axis] - 4 * block), hi = std::min(3, keys.hi[axis] - 4 * block);
@@ -99,7 +101,9 @@ struct KnownSpace::Impl {
   /// The known voxels of a block of 4^3.
   std::uint64_t knownCells(std::int32_t x, std::int32_t y, std::int32_t z) const {
     const std::uint32_t parent = tree.find(1, x >> 2, y >> 2, z >> 2);
-    if (parent == VoxelTree::NONE) return tree.coverage(4 * x, 4 * y, 4 * z, 4) == Coverage::FULL ? ~std::uint64_t{0} : 0;
+    if (parent == VoxelTree::NONE) {
+      return tree.coverage(4 * x, 4 * y, 4 * z, 4) == Coverage::FULL ? ~std::uint64_t{0} : 0;
+    }
     const VoxelTree::Node& node = tree.nodes(1)[parent];
     const unsigned bit = cellBit(x, y, z);
     if (node.child >> bit & 1) return tree.nodes(0)[node.childAt(bit)].full;
@@ -165,7 +169,8 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   const auto add = [&](const auto& feature) {
     Box box;
     for (const Index v : feature) {
-      if ((vertex_active != nullptr && vertex_active[v] == 0) || !map_t0[v].allFinite() || !map_t1[v].allFinite()) return;
+      if (vertex_active != nullptr && vertex_active[v] == 0) return;
+      if (!map_t0[v].allFinite() || !map_t1[v].allFinite()) return;
       box.min = box.min.cwiseMin(map_t0[v]).cwiseMin(map_t1[v]);
       box.max = box.max.cwiseMax(map_t0[v]).cwiseMax(map_t1[v]);
     }

@@ -29,8 +29,9 @@ Vec3 faceVelocity(const VertexMotion* points, double t) {
   const double area = normal.squaredNorm();
   Vec3 weights = Vec3::Constant(1.0 / 3);
   if (area > 0) {
-    weights = Vec3((b - p).cross(c - p).dot(normal), (c - p).cross(a - p).dot(normal), (a - p).cross(b - p).dot(normal));
-    weights /= area;
+    weights[0] = (b - p).cross(c - p).dot(normal) / area;
+    weights[1] = (c - p).cross(a - p).dot(normal) / area;
+    weights[2] = (a - p).cross(b - p).dot(normal) / area;
   }
   return velocity(points[0]) + weights[0] * velocity(points[1]) + weights[1] * velocity(points[2]) +
          weights[2] * velocity(points[3]);

@@ -184,7 +184,9 @@ std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
     masks[leaf] = largeLeaf(tree, tree.leaves()[leaf]);
   }
   for (int level = 1; level < VoxelTree::LEVELS; ++level) {
-    for (std::uint32_t index = 0; index < tree.nodes(level).size(); ++index) markFeatureCells(tree, level, index, masks);
+    for (std::uint32_t index = 0; index < tree.nodes(level).size(); ++index) {
+      markFeatureCells(tree, level, index, masks);
+    }
   }
   return masks;
 }

@@ -122,7 +122,8 @@ void VoxelTree::buildLevel(int level, const std::vector<std::uint64_t>& codes, s
       node.child |= std::uint64_t{1} << (prefixes[child] & 63);
     }
     l.nodes.push_back(node);
-    l.cells.push_back({static_cast<std::uint16_t>(gatherBits(prefix)), static_cast<std::uint16_t>(gatherBits(prefix >> 1)),
+    l.cells.push_back({static_cast<std::uint16_t>(gatherBits(prefix)),
+                       static_cast<std::uint16_t>(gatherBits(prefix >> 1)),
                        static_cast<std::uint16_t>(gatherBits(prefix >> 2))});
     own.push_back(prefix);
   }

@@ -102,7 +102,9 @@ void walkFull(Bytes& bytes, const Cube& cube, std::size_t extra, Leaf& leaf) {
   const unsigned char* node = bytes.take(sizeof(float) + extra + 1);
   float log_odds;
   std::memcpy(&log_odds, node, sizeof log_odds);
-  if (std::isnan(log_odds)) throw OctomapError("octomap data hold a log-odds that is not a number at byte " + text(begin));
+  if (std::isnan(log_odds)) {
+    throw OctomapError("octomap data hold a log-odds that is not a number at byte " + text(begin));
+  }
   const unsigned children = node[sizeof(float) + extra];
   if (children == 0) {
     if (cube.depth > 0) leaf(cube, log_odds >= 0);
