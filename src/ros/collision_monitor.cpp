@@ -16,6 +16,7 @@
 #include <tf2_msgs/TFMessage.h>
 #include <topic_tools/shape_shifter.h>
 
+#include "deformable_ccd/simd_target.h"
 #include "ros/diagnostics.h"
 #include "ros/effects.h"
 #include "ros/input_queue.h"
@@ -53,7 +54,9 @@ std::vector<std::uint8_t> bytesOf(const ShapeShifter& message) {
 MonitorConfig configOf(const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
   private_node.getParam(private_node.getNamespace(), tree);
-  return readConfig(tree);
+  MonitorConfig config = readConfig(tree);
+  setSimdTarget(config.simd_target);
+  return config;
 }
 
 }  // namespace
