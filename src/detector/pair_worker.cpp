@@ -17,7 +17,12 @@ FeatureKind kindB(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind:
 }  // namespace
 
 PairWorker::PairWorker()
-    : quads_(CAPACITY), slots_(CAPACITY), keys_(CAPACITY), kept_(CAPACITY), results_(CAPACITY), separations_(CAPACITY) {}
+    : quads_(CAPACITY),
+      slots_(CAPACITY),
+      keys_(CAPACITY),
+      kept_(CAPACITY),
+      results_(CAPACITY),
+      separations_(CAPACITY) {}
 
 void PairWorker::beginStep() {
   for (auto& h : hits_) h.clear();
@@ -68,14 +73,15 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
 void PairWorker::run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs,
                      std::size_t first, std::size_t last) {
   begin(context, task);
-  const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)), task.self && task.kind == PairKind::EDGE_EDGE,
-                       false};
+  const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
+                       task.self && task.kind == PairKind::EDGE_EDGE, false};
   Clock::time_point start = Clock::now();
   for (std::size_t p = first; p < last; ++p) {
     if (context.timeIsUp()) {
       // Nothing of these was looked at: all that is known is when their groups can meet.
       for (; p < last; ++p) {
-        unchecked_toc_lower_ = std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
+        unchecked_toc_lower_ =
+            std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
       }
       break;
     }
@@ -142,8 +148,9 @@ void PairWorker::filter() {
   if (separation() > 0) return;  // the planar filter proves "never touch", not "never closer than d"
   const Clock::time_point start = Clock::now();
   stats_[Stage::PLANAR].in += count_;
-  const std::size_t kept = simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_,
-                                             task_->kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ADAPTIVE, kept_.data());
+  const std::size_t kept =
+      simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_, task_->kind == PairKind::EDGE_EDGE,
+                        simd::FusedPlanes::ADAPTIVE, kept_.data());
   for (std::size_t i = 0; i < kept; ++i) {
     quads_[i] = quads_[kept_[i]];
     slots_[i] = slots_[kept_[i]];

@@ -17,7 +17,8 @@ inline double msSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// A contact (certain or undecided) by the ranks of its features; within a kind it sorts canonically by bodies, then key.
+/// A contact (certain or undecided) by the ranks of its features; within a kind it sorts canonically by bodies, then
+/// key.
 struct Hit {
   std::uint64_t key;  ///< rank of the first feature << 32 | rank of the second
   double toc_lower, toc_upper;

@@ -11,16 +11,17 @@ namespace {
 
 enum class Answer : std::uint8_t { APART, MEET, UNKNOWN };
 
-// --- Floating-point filter --------------------------------------------------------------------------------------------
+// --- Floating-point filter -------------------------------------------------------------------------------------------
 // With p as the origin, let a, b, c, q be differences to it. Their cross products bc = b x c, ca, ab give every sign:
 //   the face's plane has p on the side of -a.bc and q on that of q.(bc + ca + ab) - a.bc (up to one common sign);
-//   where the line pq meets the face at u a + v b + w c (u + v + w = 1, none negative), (q.bc, q.ca, q.ab) = K (u, v, w)
-//   for some K. So two of these with opposite strict signs show the line to miss the face, degenerate or not.
+//   where the line pq meets the face at u a + v b + w c (u + v + w = 1, none negative), with some K
+//   (q.bc, q.ca, q.ab) = K (u, v, w), so two of these with opposite strict signs show the line to miss the face,
+//   degenerate or not.
 // Rounding, u = 2^-53, M = largest |difference|, differences rounded once: a component of a cross product errs by
 // 2 * 3u M^2 + 2u M^2 = 8u M^2 and is at most 2 M^2; a dot product with one by 3 (8 + 2 + 2)u M^3 + (4 + 6)u M^3 =
 // 46u M^3 and is at most 6 M^3; the sum of three of these and a fourth by 4 * 46u M^3 + (12 + 18 + 24)u M^3 = 238u M^3.
-// The margins 64u M^3 and 256u M^3 cover the terms in u^2 and their own rounding. Underflow: fewer than 100 operations lose
-// at most 2^-1075 each, times factors of at most M^2 <= 2^60: below 2^-1000.
+// The margins 64u M^3 and 256u M^3 cover the terms in u^2 and their own rounding. Underflow: fewer than 100 operations
+// lose at most 2^-1075 each, times factors of at most M^2 <= 2^60: below 2^-1000.
 constexpr double UNIT = 0x1p-53;
 constexpr double UNDERFLOW_MARGIN = 0x1p-1000;
 constexpr double LARGEST_M = 0x1p30;
@@ -34,9 +35,9 @@ inline V cross(const V& a, const V& b) { return {a.y * b.z - a.z * b.y, a.z * b.
 inline double dot(const V& a, const V& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline double largest(const V& a) { return std::max(std::max(std::abs(a.x), std::abs(a.y)), std::abs(a.z)); }
 
-// In the projection onto a coordinate plane: is the triangle strictly on one side of the line pq, or the segment strictly
-// beyond the line of one of the triangle's edges? The 2D cross products are components of the 3D ones. The longest sums
-// have three terms, such as (b - q) x (c - q) = bc + (qb - qc), and err by at most (3 * 8 + 4 + 6)u M^2.
+// In the projection onto a coordinate plane: is the triangle strictly on one side of the line pq, or the segment
+// strictly beyond the line of one of the triangle's edges? The 2D cross products are components of the 3D ones. The
+// longest sums have three terms, such as (b - q) x (c - q) = bc + (qb - qc), and err by at most (3 * 8 + 4 + 6)u M^2.
 inline bool apartInPlane(double bc, double ca, double ab, double qa, double qb, double qc, double margin) {
   const auto beyond = [margin](double x) { return x > margin; };
   if (beyond(std::min(std::min(qa, qb), qc)) || beyond(-std::max(std::max(qa, qb), qc))) return true;
@@ -84,7 +85,7 @@ Answer filter(const double* p, const double* q, const double* a, const double* b
   return apart ? Answer::APART : Answer::UNKNOWN;
 }
 
-// --- Exact decision ---------------------------------------------------------------------------------------------------
+// --- Exact decision --------------------------------------------------------------------------------------------------
 
 template <class Z>
 struct Exact {
@@ -133,7 +134,8 @@ struct Exact {
     const Point normal = cross(minus(b, a), minus(c, a));
     if (isZero(normal)) return false;
     const int axis = axisOf(normal), turn = normal[axis].sign();
-    return orientation(a, b, p, axis) == turn && orientation(b, c, p, axis) == turn && orientation(c, a, p, axis) == turn;
+    return orientation(a, b, p, axis) == turn && orientation(b, c, p, axis) == turn &&
+           orientation(c, a, p, axis) == turn;
   }
 };
 
@@ -195,8 +197,8 @@ bool segmentMeetsTriangle(const double* p, const double* q, const double* a, con
     if (same(p, x) || same(q, x)) return true;
   }
   const Scaled scaled = scale({p, q, a, b, c});
-  // A difference has a bit more than a coordinate, a determinant is a sum of six products of three; a product is formed in
-  // whole limbs of both factors.
+  // A difference has a bit more than a coordinate, a determinant is a sum of six products of three; a product is formed
+  // in whole limbs of both factors.
   using Short = StackInteger<10>;
   return 3 * (scaled.bits + 2) + 3 * 64 <= Short::CAPACITY_BITS ? decide<Short>(scaled) : decide<BigInteger>(scaled);
 }

@@ -52,7 +52,8 @@ const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& sce
     StartIntersection found;
     found.body = {static_cast<std::uint16_t>(pair.edge_body), static_cast<std::uint16_t>(pair.face_body)};
     scene.featureVertices(FeatureKind::EDGE, pair.edge_body, a.rank(FeatureKind::EDGE)[pair.edge], found.vertex.data());
-    scene.featureVertices(FeatureKind::FACE, pair.face_body, b.rank(FeatureKind::FACE)[pair.face], found.vertex.data() + 2);
+    scene.featureVertices(FeatureKind::FACE, pair.face_body, b.rank(FeatureKind::FACE)[pair.face],
+                          found.vertex.data() + 2);
     intersections_.push_back(found);
   }
   stats[Stage::START_STATE].in += tested_;
@@ -149,11 +150,11 @@ void StartStateTest::addCandidates(const SceneArrays& scene, const core::Contact
   const SceneBody &body = scene.bodies()[a], &face_body = scene.bodies()[b];
   const SlotsAtVertex &edges = neighbourhoods_[a].edges, &faces = neighbourhoods_[b].faces;
   const Index at = v[0] - body.internal_begin, corner = v[1] - face_body.internal_begin;
-  const std::uint32_t* face = std::find_if(&faces.slots[faces.begin[corner]], faces.slots.data() + faces.begin[corner + 1],
-                                           [&](std::uint32_t slot) {
-    const Index* f = face_body.tree(FeatureKind::FACE).feature(slot);
-    return contains(f, v[2]) && contains(f, v[3]);
-  });
+  const std::uint32_t* face = std::find_if(&faces.slots[faces.begin[corner]],
+                                           faces.slots.data() + faces.begin[corner + 1], [&](std::uint32_t slot) {
+                                             const Index* f = face_body.tree(FeatureKind::FACE).feature(slot);
+                                             return contains(f, v[2]) && contains(f, v[3]);
+                                           });
   for (std::uint32_t i = edges.begin[at]; i < edges.begin[at + 1]; ++i) {
     const Index* e = body.tree(FeatureKind::EDGE).feature(edges.slots[i]);
     if (!shareVertex(e, v + 1)) candidates_.push_back({a, edges.slots[i], b, *face});

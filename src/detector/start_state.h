@@ -15,24 +15,26 @@ namespace deformable_ccd {
 /// Each argument: x, y, z.
 bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c);
 
-/// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those of
-/// the bodies' setups: within bodies with self_collision, between bodies with against_bodies.
+/// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those
+/// of the bodies' setups: within bodies with self_collision, between bodies with against_bodies.
 ///
-/// What is known at the start of one step is carried over to the next, so that only the first frame, frames after a reset
-/// and the surroundings of contacts are tested. Why that is complete: let edge e and face f, which share no vertex, be
-/// apart at t=0 and meet during the step, first at t* > 0. Suppose that at t* neither end of e is on f and e meets no edge
-/// of f. Then the common point is inside of f, so f has an area (a face without area is the union of its edges), and inside
-/// of e. Were e in the plane of f, it would leave f across an edge of f or end on f; so it crosses the plane there, and
-/// still does so inside of f a little earlier: not the first time. Hence whatever starts to meet during a step shows a
-/// contact of an end of e with f (VF) or of e with an edge of f (EE), and neither pair shares a vertex, since e and f do
-/// not. So after a step in which every pair was decided, or kept where it was not, the next start needs to look at:
+/// What is known at the start of one step is carried over to the next, so that only the first frame, frames after a
+/// reset and the surroundings of contacts are tested. Why that is complete: let edge e and face f, which share no
+/// vertex, be apart at t=0 and meet during the step, first at t* > 0. Suppose that at t* neither end of e is on f and e
+/// meets no edge of f. Then the common point is inside of f, so f has an area (a face without area is the union of its
+/// edges), and inside of e. Were e in the plane of f, it would leave f across an edge of f or end on f; so it crosses
+/// the plane there, and still does so inside of f a little earlier: not the first time. Hence whatever starts to meet
+/// during a step shows a contact of an end of e with f (VF) or of e with an edge of f (EE), and neither pair shares a
+/// vertex, since e and f do not. So after a step in which every pair was decided, or kept where it was not, the next
+/// start needs to look at:
 ///   EE contact (e, e'): e against the faces at e', e' against the faces at e;
 ///   VF contact (v, f): the edges at v against f;
 ///   and the pairs that met already at the step's start.
 class StartStateTest {
  public:
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
-  /// Sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and effect START_STATE.
+  /// Sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and effect
+  /// START_STATE.
   const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, core::StepStats& stats);
 
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.

@@ -1,5 +1,5 @@
-// A step of at most twelve triangles made from the bytes, through the clustered detector and by brute force, judged by the
-// oracle; then the step after it, with the start state carried over.
+// A step of at most twelve triangles made from the bytes, through the clustered detector and by brute force, judged by
+// the oracle; then the step after it, with the start state carried over.
 #include <stdexcept>
 #include <string>
 

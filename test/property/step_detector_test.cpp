@@ -64,8 +64,8 @@ std::string nameOf(const testing::TestParamInfo<int>& info) {
 
 INSTANTIATE_TEST_SUITE_P(Coordinates, StepProperty, testing::Range(0, static_cast<int>(Coordinates::COUNT)), nameOf);
 
-// Bodies that start clear and come near each other a little at a time: most steps end clear, and some do not. A step that
-// starts CLEAR and has no contact must end CLEAR, which the full test of the next one shows.
+// Bodies that start clear and come near each other a little at a time: most steps end clear, and some do not. A step
+// that starts CLEAR and has no contact must end CLEAR, which the full test of the next one shows.
 TEST(StepSequence, ClearWithoutContactEndsClear) {
   int carried = 0, full = 0, clear_steps = 0, steps_with_contact = 0;
   const int sequences = longRun() ? 3000 : 60;

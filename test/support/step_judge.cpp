@@ -27,7 +27,8 @@ std::string judgeContacts(const std::vector<core::Contact>& found, std::vector<T
 
 std::string judgeStart(const StepResult& result, const std::vector<StartIntersection>& truth) {
   if (result.start_state != (truth.empty() ? StartState::CLEAR : StartState::INTERSECTING)) {
-    return std::string("start state ") + toString(result.start_state) + " with " + std::to_string(truth.size()) + " pairs in truth";
+    return std::string("start state ") + toString(result.start_state) + " with " + std::to_string(truth.size()) +
+           " pairs in truth";
   }
   const bool same = std::equal(result.intersections.begin(), result.intersections.end(), truth.begin(), truth.end(),
                                [](const auto& x, const auto& y) { return x == y; });
@@ -71,8 +72,10 @@ std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests
     if (!wrong.empty()) return where + "carried over: " + wrong;
     const std::string other = difference(result.contacts, expected.contacts);
     if (!other.empty()) return where + other;
-    if (must_be_clear && result.start_state != StartState::CLEAR) return where + "INTERSECTING after CLEAR without contact";
-    must_be_clear = result.start_state == StartState::CLEAR && result.contacts.empty() && result.stats.unchecked_vertices == 0;
+    if (must_be_clear && result.start_state != StartState::CLEAR)
+      return where + "INTERSECTING after CLEAR without contact";
+    must_be_clear =
+        result.start_state == StartState::CLEAR && result.contacts.empty() && result.stats.unchecked_vertices == 0;
   }
   return "";
 }

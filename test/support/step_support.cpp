@@ -283,7 +283,8 @@ std::vector<StartIntersection> trueIntersections(const TestStep& step) {
                          face_body.t0[f[2]])) {
             continue;
           }
-          found.push_back({{static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)}, {e[0], e[1], f[0], f[1], f[2]}});
+          found.push_back(
+              {{static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)}, {e[0], e[1], f[0], f[1], f[2]}});
         }
       }
     }
@@ -293,6 +294,40 @@ std::vector<StartIntersection> trueIntersections(const TestStep& step) {
 
 bool operator==(const StartIntersection& x, const StartIntersection& y) {
   return x.body == y.body && x.vertex == y.vertex;
+}
+
+StepResult runOnce(const TestStep& step, const DetectorOptions& options) {
+  Detector detector(options);
+  detector.setBodies(step.setups(), step.positions());
+  return detector.run(step.motion());
+}
+
+TestStep crumpled(std::uint64_t seed, int bodies, std::size_t size) {
+  const Draw draw = drawFrom(seed);
+  TestStep step;
+  for (int b = 0; b < bodies; ++b) {
+    StepBody body;
+    body.topology = Topology::grid(size, size);
+    for (std::size_t i = 0; i < size * size; ++i) {
+      const double x = static_cast<double>(i % size), y = static_cast<double>(i / size);
+      body.t0.push_back(Vec3(x + draw(-9, 9) / 30.0, y + 0.4 * b, 1.5 * std::sin(x + b) * std::cos(y) + 0.8 * b));
+      body.t1.push_back(body.t0.back() + Vec3(draw(-9, 9), draw(-9, 9), draw(-9, 9)) / 12.0);
+    }
+    step.bodies.push_back(body);
+  }
+  return step;
+}
+
+TestStep crossing() {
+  TestStep step;
+  StepBody a, b;
+  a.topology = b.topology = Topology::fromTriangles(3, {{0, 1, 2}});
+  a.t0 = a.t1 = {Vec3(0, 0, 0), Vec3(4, 0, 0), Vec3(0, 4, 0)};
+  b.t0 = {Vec3(1, 1, 1), Vec3(2, 1, 3), Vec3(1, 2, 3)};
+  b.t1 = b.t0;
+  for (Vec3& x : b.t1) x[2] -= 2;
+  step.bodies = {a, b};
+  return step;
 }
 
 void forEachSimdTarget(const std::function<void(const std::string& target)>& body) {

@@ -1,4 +1,5 @@
-// Small steps made to be hard, and their true contacts straight from the definition: what judges the detector as a whole.
+// Small steps made to be hard, and their true contacts straight from the definition: what judges the detector as a
+// whole.
 #pragma once
 
 #include <cstdint>
@@ -74,6 +75,13 @@ bool trulyMeet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const
 /// Every edge that meets a face at t=0, in the order that the detector lists them.
 std::vector<StartIntersection> trueIntersections(const TestStep& step);
 bool operator==(const StartIntersection& x, const StartIntersection& y);
+
+/// One step with a detector of its own, as a first step.
+StepResult runOnce(const TestStep& step, const DetectorOptions& options);
+/// Crumpled cloths of size x size vertices that move through each other and through themselves: thousands of contacts.
+TestStep crumpled(std::uint64_t seed, int bodies, std::size_t size);
+/// Two triangles, one above the inside of the other at t=0; its lowest corner arrives at t=0.5 and passes through.
+TestStep crossing();
 
 /// Runs `body` for every SIMD target that this machine has, by its name; the choice is undone afterwards.
 void forEachSimdTarget(const std::function<void(const std::string& target)>& body);

@@ -105,7 +105,8 @@ TEST_P(StepScenes, ScreenAndConservativeMissNothing) {
     const StepResult result = scene.run(options);
     const std::set<Pair> found = pairsOf(result);
     EXPECT_EQ(missing(found, scene.contacts), 0u) << toString(rung);
-    std::cout << GetParam() << ", " << toString(rung) << ": " << found.size() << " for " << scene.contacts.size() << '\n';
+    std::cout << GetParam() << ", " << toString(rung) << ": " << found.size() << " for " << scene.contacts.size()
+              << '\n';
   }
 }
 
@@ -142,7 +143,7 @@ INSTANTIATE_TEST_SUITE_P(Truth, StepScenes, testing::Values("cloth-ball", "n-bod
   return name;
 });
 
-// --- the filters of the step on single pairs --------------------------------------------------------------------------
+// --- the filters of the step on single pairs -------------------------------------------------------------------------
 
 struct TruePairs {
   std::vector<VertexMotion> vertices;
@@ -162,7 +163,8 @@ struct TruePairs {
 
 void expectFusedKeepsAll(const TruePairs& truth, PairKind kind, const std::string& what) {
   std::vector<std::uint32_t> kept(truth.pairs.size());
-  for (const simd::FusedPlanes planes : {simd::FusedPlanes::COORDINATE, simd::FusedPlanes::ADAPTIVE, simd::FusedPlanes::ALL}) {
+  for (const simd::FusedPlanes planes :
+       {simd::FusedPlanes::COORDINATE, simd::FusedPlanes::ADAPTIVE, simd::FusedPlanes::ALL}) {
     EXPECT_EQ(simd::fusedFilter(truth.vertices[0].t0, truth.pairs[0].data(), truth.pairs.size(),
                                 kind == PairKind::EDGE_EDGE, planes, kept.data()),
               truth.pairs.size())

@@ -39,8 +39,8 @@ std::vector<SlotPair> streamed(const TreePair& trees) {
   return pairs;
 }
 
-/// Sign of (a + s b) - (c + s d), exact: the rounding errors of the sums are doubles, too (Knuth's TwoSum), and the sums'
-/// order decides unless they are equal.
+/// Sign of (a + s b) - (c + s d), exact: the rounding errors of the sums are doubles, too (Knuth's TwoSum), and the
+/// sums' order decides unless they are equal.
 int compareSums(double a, double b, double c, double d) {
   const auto twoSum = [](double x, double y, double& error) {
     const double sum = x + y, part = sum - x;
@@ -60,8 +60,8 @@ int compareProjections(const double* x, const double* y, int d) {
   return compareSums(x[FIRST[d]], s * x[SECOND[d]], y[FIRST[d]], s * y[SECOND[d]]);
 }
 
-/// Exactly: in some direction and on one side at both ends (or at t0 alone), so that the features never meet. Coordinates
-/// must be such that sums do not overflow.
+/// Exactly: in some direction and on one side at both ends (or at t0 alone), so that the features never meet.
+/// Coordinates must be such that sums do not overflow.
 bool provedApart(const VertexMotion* x, const Index* a, std::size_t na, const Index* b, std::size_t nb, bool t0_only) {
   for (int d = 0; d < 8; ++d) {
     bool above = true, below = true;
@@ -191,7 +191,8 @@ TEST(ClusterPairs, BoundsOfGroupsAreNeverLate) {
     const Scene scene(step);
     for (const TrueContact& truth : trueContacts(step)) {
       const bool vf = truth.contact.kind == PairKind::VERTEX_FACE;
-      const SceneBody &a = scene.arrays.bodies()[truth.contact.body[0]], &b = scene.arrays.bodies()[truth.contact.body[1]];
+      const SceneBody &a = scene.arrays.bodies()[truth.contact.body[0]],
+                      &b = scene.arrays.bodies()[truth.contact.body[1]];
       TreePair trees;
       trees.a = &a.tree(vf ? FeatureKind::VERTEX : FeatureKind::EDGE);
       trees.b = &b.tree(vf ? FeatureKind::FACE : FeatureKind::EDGE);

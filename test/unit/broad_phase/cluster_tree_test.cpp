@@ -59,7 +59,8 @@ TEST(ClusterTree, SpatialOrderMakesRunsCompact) {
 TEST(ClusterTree, HasLevelsForItsFeatures) {
   const struct {
     std::size_t features, height, leaf_groups;
-  } CASES[] = {{0, 1, 1}, {1, 1, 1}, {16, 1, 1}, {17, 2, 2}, {256, 2, 16}, {257, 3, 17}, {4096, 3, 256}, {4097, 4, 257}};
+  } CASES[] = {{0, 1, 1},    {1, 1, 1},    {16, 1, 1},     {17, 2, 2},
+               {256, 2, 16}, {257, 3, 17}, {4096, 3, 256}, {4097, 4, 257}};
   for (const auto& c : CASES) {
     ClusterTree tree;
     std::vector<Index> features(2 * c.features, 0);

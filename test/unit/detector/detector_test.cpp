@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "support/step_support.h"
 
@@ -15,42 +16,6 @@ namespace test {
 namespace {
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-
-StepResult runOnce(const TestStep& step, const DetectorOptions& options) {
-  Detector detector(options);
-  detector.setBodies(step.setups(), step.positions());
-  return detector.run(step.motion());
-}
-
-/// Crumpled cloths that move through each other and through themselves: thousands of contacts.
-TestStep crumpled(std::uint64_t seed, int bodies, std::size_t size) {
-  const Draw draw = drawFrom(seed);
-  TestStep step;
-  for (int b = 0; b < bodies; ++b) {
-    StepBody body;
-    body.topology = Topology::grid(size, size);
-    for (std::size_t i = 0; i < size * size; ++i) {
-      const double x = static_cast<double>(i % size), y = static_cast<double>(i / size);
-      body.t0.push_back(Vec3(x + draw(-9, 9) / 30.0, y + 0.4 * b, 1.5 * std::sin(x + b) * std::cos(y) + 0.8 * b));
-      body.t1.push_back(body.t0.back() + Vec3(draw(-9, 9), draw(-9, 9), draw(-9, 9)) / 12.0);
-    }
-    step.bodies.push_back(body);
-  }
-  return step;
-}
-
-/// Two triangles, one above the other at t=0 and below it at t=1, far to the side of each other but for one corner.
-TestStep crossing() {
-  TestStep step;
-  StepBody a, b;
-  a.topology = b.topology = Topology::fromTriangles(3, {{0, 1, 2}});
-  a.t0 = a.t1 = {Vec3(0, 0, 0), Vec3(4, 0, 0), Vec3(0, 4, 0)};
-  b.t0 = {Vec3(1, 1, 1), Vec3(2, 1, 3), Vec3(1, 2, 3)};
-  b.t1 = b.t0;
-  for (Vec3& x : b.t1) x[2] -= 2;
-  step.bodies = {a, b};
-  return step;
-}
 
 std::string differenceOfResults(const StepResult& x, const StepResult& y) {
   std::string text = difference(x.contacts, y.contacts);
@@ -256,7 +221,8 @@ std::string refusal(const Call& call) {
 }
 
 void expectContains(const std::string& text, const std::vector<std::string>& parts) {
-  for (const std::string& part : parts) EXPECT_NE(text.find(part), std::string::npos) << text << " does not say " << part;
+  for (const std::string& part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << text << " does not say " << part;
 }
 
 TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
@@ -298,102 +264,6 @@ TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
   EXPECT_EQ(difference(detector.run(step.motion()).contacts, runOnce(step, {}).contacts), "");
 }
 
-TEST(Detector, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
-  const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
-  for (const Accuracy rung : {Accuracy::EXACT, Accuracy::CONSERVATIVE}) {
-    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-      // Start apart, so that the first contact is not at 0.
-      TestStep step = crumpled(seed, 2, 9);
-      for (StepBody& body : step.bodies) body.self_collision = false;
-      for (Vec3& x : step.bodies[1].t0) x[2] += 6;
-      DetectorOptions options;
-      options.accuracy.rung = rung;
-      if (rung == Accuracy::CONSERVATIVE) options.accuracy.tolerance_m = 0.02;
-      const StepResult full = runOnce(step, options);
-      ASSERT_GT(full.contacts.size(), 10u);
-      ASSERT_GT(full.earliestToc(), 0.01);
-      options.earliest_only = true;
-      const StepResult first = runOnce(step, options);
-      ASSERT_FALSE(first.contacts.empty());
-      EXPECT_LT(first.contacts.size(), full.contacts.size());
-      EXPECT_EQ(first.earliestToc(), full.earliestToc()) << toString(rung) << ", seed " << seed;
-      EXPECT_LT(first.stats[Stage::ELEMENTARY].in, full.stats[Stage::ELEMENTARY].in) << "nothing is pruned";
-      for (const core::Contact& c : first.contacts) {
-        const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
-        ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
-      }
-      for (const int threads : {2, 3}) {
-        options.num_threads = threads;
-        EXPECT_EQ(difference(runOnce(step, options).contacts, first.contacts), "") << toString(rung) << ", seed " << seed;
-      }
-    }
-  }
-}
-
-// Nothing that the budget leaves over may touch before its bound.
-TEST(Detector, BudgetKeepsItsWord) {
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    TestStep step = crumpled(seed, 2, 12);
-    for (Vec3& x : step.bodies[1].t0) x[2] += seed % 2 ? 0 : 8;
-    if (seed % 2 == 0) {
-      for (StepBody& body : step.bodies) body.self_collision = false;
-    }
-    DetectorOptions options;
-    const StepResult full = runOnce(step, options);
-    ASSERT_GT(full.contacts.size(), 10u);
-    for (const double budget : {1e-6, 0.5, 2.0}) {
-      options.step_budget_ms = budget;
-      const StepResult part = runOnce(step, options);
-      if (budget < 0.01) {
-        EXPECT_FALSE(part.complete);
-        EXPECT_TRUE(std::isfinite(part.unchecked_toc_lower));
-      }
-      EXPECT_EQ(part.complete, !std::isfinite(part.unchecked_toc_lower) && part.stats.undecided == 0);
-      EXPECT_LE(part.earliestToc(), full.earliestToc());
-      for (const core::Contact& truth : full.contacts) {
-        const auto same = std::lower_bound(part.contacts.begin(), part.contacts.end(), truth,
-                                           [](const core::Contact& a, const core::Contact& b) {
-                                             return std::tie(a.kind, a.body, a.vertex) < std::tie(b.kind, b.body, b.vertex);
-                                           });
-        const bool listed = same != part.contacts.end() && same->kind == truth.kind && same->body == truth.body &&
-                            same->vertex == truth.vertex;
-        if (!listed) {
-          EXPECT_LE(part.unchecked_toc_lower, truth.toc_upper) << describe(truth);
-        } else if (same->certainty == Certainty::UNDECIDED) {
-          EXPECT_LE(same->toc_lower, truth.toc_upper) << describe(truth);
-          EXPECT_EQ(same->toc_upper, 1);
-        } else {
-          EXPECT_EQ(difference({*same}, {truth}), "");
-        }
-      }
-    }
-    // The bound is as tight as the filter allows: bodies that start apart do not touch at 0.
-    if (seed % 2 == 0) {
-      options.step_budget_ms = 1e-6;
-      EXPECT_GT(runOnce(step, options).earliestToc(), 0.1);
-    }
-  }
-}
-
-TEST(Detector, ScreenReportsBoundsOfItsPairs) {
-  const TestStep step = crossing();
-  DetectorOptions options;
-  const StepResult exact = runOnce(step, options);
-  options.accuracy.rung = Accuracy::SCREEN;
-  const StepResult screen = runOnce(step, options);
-  ASSERT_FALSE(exact.contacts.empty());
-  for (const core::Contact& c : exact.contacts) {
-    const auto same = std::find_if(screen.contacts.begin(), screen.contacts.end(), [&](const core::Contact& s) {
-      return s.kind == c.kind && s.body == c.body && s.vertex == c.vertex;
-    });
-    ASSERT_NE(same, screen.contacts.end());
-    EXPECT_EQ(same->certainty, Certainty::UNDECIDED);
-    EXPECT_LE(same->toc_lower, c.toc_lower);
-    EXPECT_GT(same->toc_lower, 0);
-  }
-  EXPECT_EQ(screen.stats.undecided, screen.contacts.size());
-}
-
 TEST(Detector, KnownTimesOfContact) {
   const StepResult result = runOnce(crossing(), {});
   // The corner (1,1,1) moves down by 2 and meets the plane z = 0 half way.
@@ -408,6 +278,31 @@ TEST(Detector, KnownTimesOfContact) {
   EXPECT_EQ(result.start_state, StartState::CLEAR);
   EXPECT_EQ(result.earliestToc(), 0.5);
   EXPECT_EQ(result.unchecked_toc_lower, std::numeric_limits<double>::infinity());
+}
+
+// Several bodies and a map: the canonical order puts kinds before bodies.
+TEST(Detector, ContactsWithAMapAreInOrder) {
+  TestStep step = crossing();
+  for (StepBody& body : step.bodies) body.against_bodies = false;
+  MotionStep motion = step.motion();
+  std::vector<OccupiedLeaf> leaves;
+  for (std::uint16_t x = 0; x < 4; ++x)
+    leaves.push_back({VoxelKey{static_cast<std::uint16_t>(32768 + x), 32768, 32768}, 1});
+  motion.obstacle = VoxelSurface::build(1.0, leaves);
+  Detector detector{DetectorOptions()};
+  detector.setBodies(step.setups(), step.positions());
+  const StepResult& result = detector.run(motion);
+  std::set<std::uint16_t> bodies;
+  std::set<PairKind> kinds;
+  for (const core::Contact& c : result.contacts) {
+    EXPECT_EQ(c.body[1], OBSTACLE_BODY);
+    bodies.insert(c.body[0]);
+    kinds.insert(c.kind);
+  }
+  EXPECT_EQ(bodies.size(), 2u);
+  EXPECT_GT(kinds.size(), 1u);
+  EXPECT_TRUE(std::is_sorted(result.contacts.begin(), result.contacts.end(), canonicalLess));
+  EXPECT_EQ(result.stats[Effect::OBSTACLE].out, result.contacts.size());
 }
 
 TEST(Detector, NothingToDo) {

@@ -18,7 +18,8 @@ TEST(HitOrder, SortsByBodiesThenKeyAndKeepsEveryHit) {
       for (int i = 0; i < 3000; ++i) {
         Hit hit{};
         hit.key = bits == 64 ? random() : random() & ((std::uint64_t{1} << bits) - 1);
-        hit.bodies = static_cast<std::uint32_t>(random() % bodies) << 16 | static_cast<std::uint32_t>(random() % bodies);
+        hit.bodies =
+            static_cast<std::uint32_t>(random() % bodies) << 16 | static_cast<std::uint32_t>(random() % bodies);
         hit.toc_lower = static_cast<double>(i);
         parts[random() % 3].push_back(hit);  // the last part stays empty
         ++count;

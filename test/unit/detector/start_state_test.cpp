@@ -51,8 +51,10 @@ TEST(SegmentTriangle, OneUlp) {
   EXPECT_TRUE(meet({0.5, 0.5, -1}, {0.5, 0.5, 1}, a, b, c));
   EXPECT_FALSE(meet({0.5, std::nextafter(0.5, 1), -1}, {0.5, 0.5, -tiny}, a, b, c));
   EXPECT_FALSE(meet({0.5, std::nextafter(0.5, 1), -1}, {0.5, std::nextafter(0.5, 1), 1}, a, b, c));
-  EXPECT_TRUE(meet({1e308, 1e308, -1e308}, {1e308, 1e308, 1e308}, {-1.7e308, 0, 0}, {1.7e308, 0, 0}, {1.7e308, 1.7e308, 0}));
-  EXPECT_FALSE(meet({1e308, 1e308, tiny}, {1e308, 1e308, 1e308}, {-1.7e308, 0, 0}, {1.7e308, 0, 0}, {1.7e308, 1.7e308, 0}));
+  EXPECT_TRUE(
+      meet({1e308, 1e308, -1e308}, {1e308, 1e308, 1e308}, {-1.7e308, 0, 0}, {1.7e308, 0, 0}, {1.7e308, 1.7e308, 0}));
+  EXPECT_FALSE(
+      meet({1e308, 1e308, tiny}, {1e308, 1e308, 1e308}, {-1.7e308, 0, 0}, {1.7e308, 0, 0}, {1.7e308, 1.7e308, 0}));
 }
 
 TEST(SegmentTriangle, AgreesWithTheOracle) {
@@ -101,7 +103,7 @@ TEST(SegmentTriangle, AgreesWithTheOracleWhereItIsClose) {
   EXPECT_LT(meeting, std::size_t{all} - std::size_t{all} / 10);
 }
 
-// --- the whole test ---------------------------------------------------------------------------------------------------
+// --- the whole test --------------------------------------------------------------------------------------------------
 
 struct Scene {
   SceneArrays arrays;
@@ -153,7 +155,8 @@ TEST(StartState, FullTestIsTheSameOnEveryTarget) {
   });
   for (const auto& list : lists) {
     ASSERT_EQ(list.size(), lists[0].size());
-    EXPECT_TRUE(std::equal(list.begin(), list.end(), lists[0].begin(), [](const auto& x, const auto& y) { return x == y; }));
+    EXPECT_TRUE(
+        std::equal(list.begin(), list.end(), lists[0].begin(), [](const auto& x, const auto& y) { return x == y; }));
   }
 }
 
@@ -191,7 +194,8 @@ TEST_F(FallingCloth, CarriesOver) {
   core::StepStats carried, full;
   const auto listed = test.run(scene.arrays, true, carried);
   ASSERT_EQ(listed.size(), expected.size());
-  EXPECT_TRUE(std::equal(listed.begin(), listed.end(), expected.begin(), [](const auto& x, const auto& y) { return x == y; }));
+  EXPECT_TRUE(
+      std::equal(listed.begin(), listed.end(), expected.begin(), [](const auto& x, const auto& y) { return x == y; }));
   EXPECT_EQ(test.run(scene.arrays, false, full).size(), expected.size());
   EXPECT_LE(carried[Stage::START_STATE].in, full[Stage::START_STATE].in);
 }

@@ -46,7 +46,8 @@ struct PairList {
   }
   std::vector<std::uint32_t> kept(FusedPlanes planes) const {
     std::vector<std::uint32_t> result(size());
-    result.resize(simd::fusedFilter(vertices[0].t0, quads.data(), size(), kind == PairKind::EDGE_EDGE, planes, result.data()));
+    result.resize(
+        simd::fusedFilter(vertices[0].t0, quads.data(), size(), kind == PairKind::EDGE_EDGE, planes, result.data()));
     return result;
   }
 };
@@ -57,7 +58,7 @@ std::vector<bool> asMask(const std::vector<std::uint32_t>& kept, std::size_t n) 
   return mask;
 }
 
-// --- the reference ----------------------------------------------------------------------------------------------------
+// --- the reference ---------------------------------------------------------------------------------------------------
 
 struct L3 {
   long double x, y, z;
@@ -104,7 +105,8 @@ class Reference {
     long double largest_lo = -HUGE_VALL, smallest_hi = HUGE_VALL;
     for (int i = 0; i < 4; ++i) {
       const long double s = edge_edge_ && i == 2 ? -1 : 1;
-      const auto [lo, hi] = std::minmax({s * dot(n, quantities[i]->A), s * dot(n, quantities[i]->B), s * dot(n, quantities[i]->C)});
+      const auto [lo, hi] =
+          std::minmax({s * dot(n, quantities[i]->A), s * dot(n, quantities[i]->B), s * dot(n, quantities[i]->C)});
       largest_lo = std::max(largest_lo, lo);
       smallest_hi = std::min(smallest_hi, hi);
     }
@@ -210,13 +212,14 @@ TEST(FusedFilter, EveryTargetKeepsTheSame) {
       for (const FusedPlanes planes : {FusedPlanes::COORDINATE, FusedPlanes::ADAPTIVE, FusedPlanes::ALL}) {
         const auto expected = list.kept(planes);
         ASSERT_TRUE(std::is_sorted(expected.begin(), expected.end()));
-        forEachSimdTarget([&](const std::string& target) { ASSERT_EQ(list.kept(planes), expected) << target << count; });
+        forEachSimdTarget(
+            [&](const std::string& target) { ASSERT_EQ(list.kept(planes), expected) << target << count; });
       }
     }
   }
 }
 
-// --- truth ------------------------------------------------------------------------------------------------------------
+// --- truth -----------------------------------------------------------------------------------------------------------
 
 /// A pair that touches on a corner, on a border or inside, made of few bits and then turned and moved with rounding:
 /// whether it still touches only exact arithmetic can tell, and certificates are near their margins.
@@ -282,7 +285,8 @@ std::size_t expectNoContactLost(const PairList& list, const std::string& what) {
     const bool contact = truth[i].verdict == Verdict::CONTACT;
     contacts += contact;
     if (!contact || kept[i]) continue;
-    EXPECT_FALSE(firstContact(list.kind, list.motion(i)).has_value()) << what << ": a true contact is culled, pair " << i;
+    EXPECT_FALSE(firstContact(list.kind, list.motion(i)).has_value())
+        << what << ": a true contact is culled, pair " << i;
   }
   return contacts;
 }
@@ -307,7 +311,7 @@ TEST(FusedFilter, LosesNoHardContact) {
   }
 }
 
-// --- margins ----------------------------------------------------------------------------------------------------------
+// --- margins ---------------------------------------------------------------------------------------------------------
 
 bool isKept(PairKind kind, const double (&origin)[3], const double (&a)[3], const double (&b)[3], const double (&c)[3],
             FusedPlanes planes) {
@@ -325,11 +329,12 @@ bool isKept(PairKind kind, const double (&origin)[3], const double (&a)[3], cons
   return !list.kept(planes).empty();
 }
 
-// Features at rest in a coordinate plane, a = b = (1,0,0), c = (0,x,0) from the origin: n.bc = x, n.ca = -x, all else 0,
-// everything exact in float. M = 1, so the margin is 128 u = 2^-17 to the last bit.
+// Features at rest in a coordinate plane, a = b = (1,0,0), c = (0,x,0) from the origin: n.bc = x, n.ca = -x, all else
+// 0, everything exact in float. M = 1, so the margin is 128 u = 2^-17 to the last bit.
 TEST(FusedFilter, PlaneMarginToTheLastBit) {
   const double margin = 0x1p-17;
-  const double above = std::nextafter(static_cast<float>(margin), 1.0f), below = std::nextafter(static_cast<float>(margin), 0.0f);
+  const double above = std::nextafter(static_cast<float>(margin), 1.0f),
+               below = std::nextafter(static_cast<float>(margin), 0.0f);
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     for (int axis = 0; axis < 3; ++axis) {
       for (const double sign : {1.0, -1.0}) {
@@ -370,7 +375,8 @@ TEST(FusedFilter, KeepsWhatIsOutOfRange) {
       return isKept(kind, o, a, b, c, FusedPlanes::ALL);
     };
     const auto keptReversed = [&](double size) {
-      const double o[3] = {size, size, size}, a[3] = {-size, 0, 0}, b[3] = {-size, size / 2, 0}, c[3] = {-size, 0, size / 2};
+      const double o[3] = {size, size, size}, a[3] = {-size, 0, 0}, b[3] = {-size, size / 2, 0},
+                   c[3] = {-size, 0, size / 2};
       return isKept(kind, o, a, b, c, FusedPlanes::ALL);
     };
     if (kind == PairKind::VERTEX_FACE) {

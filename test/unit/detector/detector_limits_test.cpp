@@ -1,0 +1,114 @@
+// Answers that are cut short: earliest only, a budget of time, filters alone.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "deformable_ccd/detector.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
+  const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
+  for (const Accuracy rung : {Accuracy::EXACT, Accuracy::CONSERVATIVE}) {
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      // Start apart, so that the first contact is not at 0.
+      TestStep step = crumpled(seed, 2, 9);
+      for (StepBody& body : step.bodies) body.self_collision = false;
+      for (Vec3& x : step.bodies[1].t0) x[2] += 6;
+      DetectorOptions options;
+      options.accuracy.rung = rung;
+      if (rung == Accuracy::CONSERVATIVE) options.accuracy.tolerance_m = 0.02;
+      const StepResult full = runOnce(step, options);
+      ASSERT_GT(full.contacts.size(), 10u);
+      ASSERT_GT(full.earliestToc(), 0.01);
+      options.earliest_only = true;
+      const StepResult first = runOnce(step, options);
+      ASSERT_FALSE(first.contacts.empty());
+      EXPECT_LT(first.contacts.size(), full.contacts.size());
+      EXPECT_EQ(first.earliestToc(), full.earliestToc()) << toString(rung) << ", seed " << seed;
+      EXPECT_LT(first.stats[Stage::ELEMENTARY].in, full.stats[Stage::ELEMENTARY].in) << "nothing is pruned";
+      for (const core::Contact& c : first.contacts) {
+        const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
+        ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
+      }
+      for (const int threads : {2, 3}) {
+        options.num_threads = threads;
+        EXPECT_EQ(difference(runOnce(step, options).contacts, first.contacts), "")
+            << toString(rung) << ", seed " << seed;
+      }
+    }
+  }
+}
+
+// Nothing that the budget leaves over may touch before its bound.
+TEST(DetectorLimits, BudgetKeepsItsWord) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    TestStep step = crumpled(seed, 2, 12);
+    for (Vec3& x : step.bodies[1].t0) x[2] += seed % 2 ? 0 : 8;
+    if (seed % 2 == 0) {
+      for (StepBody& body : step.bodies) body.self_collision = false;
+    }
+    DetectorOptions options;
+    const StepResult full = runOnce(step, options);
+    ASSERT_GT(full.contacts.size(), 10u);
+    for (const double budget : {1e-6, 0.5, 2.0}) {
+      options.step_budget_ms = budget;
+      const StepResult part = runOnce(step, options);
+      if (budget < 0.01) {
+        EXPECT_FALSE(part.complete);
+        EXPECT_TRUE(std::isfinite(part.unchecked_toc_lower));
+      }
+      EXPECT_EQ(part.complete, !std::isfinite(part.unchecked_toc_lower) && part.stats.undecided == 0);
+      EXPECT_LE(part.earliestToc(), full.earliestToc());
+      for (const core::Contact& truth : full.contacts) {
+        const auto same = std::lower_bound(
+            part.contacts.begin(), part.contacts.end(), truth, [](const core::Contact& a, const core::Contact& b) {
+              return std::tie(a.kind, a.body, a.vertex) < std::tie(b.kind, b.body, b.vertex);
+            });
+        const bool listed = same != part.contacts.end() && same->kind == truth.kind && same->body == truth.body &&
+                            same->vertex == truth.vertex;
+        if (!listed) {
+          EXPECT_LE(part.unchecked_toc_lower, truth.toc_upper) << describe(truth);
+        } else if (same->certainty == Certainty::UNDECIDED) {
+          EXPECT_LE(same->toc_lower, truth.toc_upper) << describe(truth);
+          EXPECT_EQ(same->toc_upper, 1);
+        } else {
+          EXPECT_EQ(difference({*same}, {truth}), "");
+        }
+      }
+    }
+    // The bound is as tight as the filter allows: bodies that start apart do not touch at 0.
+    if (seed % 2 == 0) {
+      options.step_budget_ms = 1e-6;
+      EXPECT_GT(runOnce(step, options).earliestToc(), 0.1);
+    }
+  }
+}
+
+TEST(DetectorLimits, ScreenReportsBoundsOfItsPairs) {
+  const TestStep step = crossing();
+  DetectorOptions options;
+  const StepResult exact = runOnce(step, options);
+  options.accuracy.rung = Accuracy::SCREEN;
+  const StepResult screen = runOnce(step, options);
+  ASSERT_FALSE(exact.contacts.empty());
+  for (const core::Contact& c : exact.contacts) {
+    const auto same = std::find_if(screen.contacts.begin(), screen.contacts.end(), [&](const core::Contact& s) {
+      return s.kind == c.kind && s.body == c.body && s.vertex == c.vertex;
+    });
+    ASSERT_NE(same, screen.contacts.end());
+    EXPECT_EQ(same->certainty, Certainty::UNDECIDED);
+    EXPECT_LE(same->toc_lower, c.toc_lower);
+    EXPECT_GT(same->toc_lower, 0);
+  }
+  EXPECT_EQ(screen.stats.undecided, screen.contacts.size());
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd

@@ -1,0 +1,153 @@
+// The records of the clustered broad phase: monotone in the exact projection, on every target that runs.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "simd/cluster_kernels.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+using simd::RECORD;
+
+struct Records {
+  double low[8], scale[8];
+  std::vector<std::int16_t> values;
+};
+
+/// As the scene does it: bounds, scale, records.
+Records quantized(const std::vector<VertexMotion>& vertices) {
+  Records r;
+  double high[8];
+  std::fill_n(r.low, 8, HUGE_VAL);
+  std::fill_n(high, 8, -HUGE_VAL);
+  simd::projectionBounds(vertices[0].t0, vertices.size(), r.low, high);
+  for (int d = 0; d < 8; ++d) {
+    const double range = high[d] / 2 - r.low[d] / 2;
+    const bool usable = range > 0 && std::isfinite(r.low[d]) && std::isfinite(high[d]) && std::isfinite(2 * range);
+    if (!usable) r.low[d] = 0;
+    r.scale[d] = usable ? std::min(simd::RECORD_RANGE / 2 / range, 1e300) : 0;
+  }
+  r.values.resize(vertices.size() * RECORD);
+  simd::quantize(vertices[0].t0, vertices.size(), r.low, r.scale, r.values.data());
+  return r;
+}
+
+std::vector<VertexMotion> randomVertices(const Draw& draw, std::size_t n, Coordinates coordinates) {
+  const Positions t0 = randomPositions(draw, n, coordinates), t1 = randomMotion(draw, t0, coordinates);
+  std::vector<VertexMotion> vertices(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    vertices[i] = {};
+    std::copy_n(t0[i].data(), 3, vertices[i].t0);
+    std::copy_n(t1[i].data(), 3, vertices[i].t1);
+  }
+  return vertices;
+}
+
+/// Sign of the exact difference of two projections: every coordinate is a multiple of a power of two.
+int compareExactly(const double* a, const double* b, int d) {
+  static const int TERMS[8][2] = {{0, -1}, {1, -1}, {2, -1}, {0, 1}, {0, 2}, {1, 2}, {0, 1}, {1, 2}};
+  const auto projection = [&](const double* x) {
+    Rational p(x[TERMS[d][0]]);
+    if (TERMS[d][1] >= 0) p += (d < 6 ? 1 : -1) * Rational(x[TERMS[d][1]]);
+    return p;
+  };
+  const Rational pa = projection(a), pb = projection(b);
+  return pa > pb ? 1 : pa < pb ? -1 : 0;
+}
+
+void expectMonotone(const std::vector<VertexMotion>& vertices, const std::string& what) {
+  const Records r = quantized(vertices);
+  const auto point = [&](std::size_t i) { return i % 2 ? vertices[i / 2].t1 : vertices[i / 2].t0; };
+  for (std::size_t i = 0; i < 2 * vertices.size(); ++i) {
+    for (std::size_t k = 0; k < 8; ++k) {
+      const std::int16_t q = r.values[8 * i + k];
+      ASSERT_GE(q, -32764) << what;
+      ASSERT_LE(q, 32764) << what;
+      for (std::size_t j = 0; j < i; ++j) {
+        const std::int16_t other = r.values[8 * j + k];
+        const int order = compareExactly(point(i), point(j), static_cast<int>(k));
+        ASSERT_FALSE((q > other && order <= 0) || (q < other && order >= 0))
+            << what << ": record values " << q << " and " << other << " of projections in another order (" << order
+            << ')';
+      }
+    }
+  }
+}
+
+TEST(ClusterRecords, RecordsAreMonotoneInTheExactProjection) {
+  forEachSimdTarget([](const std::string& target) {
+    for (int style = 0; style < static_cast<int>(Coordinates::COUNT); ++style) {
+      for (std::uint64_t seed = 0; seed < 4; ++seed) {
+        const auto coordinates = static_cast<Coordinates>(style);
+        expectMonotone(randomVertices(drawFrom(100 * seed + static_cast<std::uint64_t>(style)), 12, coordinates),
+                       target + ", style " + std::to_string(style));
+      }
+    }
+  });
+}
+
+// Neighbouring doubles across a step of the grid, near one and far from the origin.
+TEST(ClusterRecords, RecordsAreMonotoneForAdjacentDoubles) {
+  forEachSimdTarget([](const std::string& target) {
+    for (const double offset : {0.0, 1.0, 1e15, -1e15}) {
+      for (const double size : {1.0, 65528.0, 1e-9}) {
+        std::vector<VertexMotion> vertices;
+        VertexMotion v{};
+        v.t1[0] = size;
+        for (int i = 0; i < 3; ++i) v.t0[i] = offset;
+        for (int i = 0; i < 3; ++i) v.t1[i] = offset + size;
+        vertices.push_back(v);
+        for (int step = 1; step < 6; ++step) {
+          double x = offset + size * step / simd::RECORD_RANGE * 1024;
+          for (int k = 0; k < 4; ++k) x = std::nextafter(x, -HUGE_VAL);
+          for (int k = 0; k < 6; k += 2) {
+            VertexMotion w{};
+            for (int i = 0; i < 3; ++i) w.t0[i] = x;
+            x = std::nextafter(x, HUGE_VAL);
+            for (int i = 0; i < 3; ++i) w.t1[i] = x;
+            x = std::nextafter(x, HUGE_VAL);
+            vertices.push_back(w);
+          }
+        }
+        expectMonotone(vertices, target);
+      }
+    }
+  });
+}
+
+TEST(ClusterRecords, RecordsUseTheirRange) {
+  std::vector<VertexMotion> vertices = randomVertices(drawFrom(3), 100, Coordinates::REAL);
+  forEachSimdTarget([&](const std::string& target) {
+    const Records r = quantized(vertices);
+    for (std::size_t k = 0; k < 8; ++k) {
+      int lo = 32767, hi = -32767;
+      for (std::size_t i = k; i < r.values.size(); i += 8) {
+        lo = std::min<int>(lo, r.values[i]);
+        hi = std::max<int>(hi, r.values[i]);
+      }
+      EXPECT_EQ(lo, -32764) << target;
+      EXPECT_GE(hi, 32763) << target;
+    }
+  });
+}
+
+TEST(ClusterRecords, RecordsAndBoundsAreTheSameOnEveryTarget) {
+  for (int style = 0; style < static_cast<int>(Coordinates::COUNT); ++style) {
+    const auto vertices = randomVertices(drawFrom(5), 33, static_cast<Coordinates>(style));
+    const Records expected = quantized(vertices);
+    forEachSimdTarget([&](const std::string& target) {
+      const Records r = quantized(vertices);
+      EXPECT_EQ(r.values, expected.values) << target << ", style " << style;
+      EXPECT_TRUE(std::equal(r.low, r.low + 8, expected.low)) << target;
+    });
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
