@@ -239,9 +239,9 @@ def plot_figure_13(path, results):
     handles = [plt.Rectangle((0, 0), 1, 1, color=c) for c in ("#9ecae1", "#3182bd", "#fdae6b", "#e6550d", "#a63603",
                                                               "#bdbdbd")]
     figure.legend(handles, ["primitive BV", "non-penetration", "linear", "planar", "fused (ours)", "elementary test"],
-                  loc="lower right", ncol=2)
+                  loc="lower center", ncol=6)
     figure.suptitle("Time of the last stage per combination of filters (the paper's Figure 13)")
-    figure.tight_layout(rect=(0, 0.03, 1, 1))
+    figure.tight_layout(rect=(0, 0.05, 1, 1))
     figure.savefig(path + ".png", dpi=120)
     figure.savefig(path + ".svg")
     plt.close(figure)
