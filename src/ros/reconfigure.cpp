@@ -1,5 +1,7 @@
 #include "ros/reconfigure.h"
 
+#include <boost/thread/recursive_mutex.hpp>
+
 #include <deformable_ccd/CollisionMonitorConfig.h>
 #include <dynamic_reconfigure/server.h>
 
@@ -28,10 +30,11 @@ struct Reconfigure::Impl {
   MarkerConfig markers;
   bool separates = false;
   Changed changed;
+  boost::recursive_mutex mutex;  // shared with the server, which asks for it so that updateConfig cannot deadlock
   dynamic_reconfigure::Server<CollisionMonitorConfig> server;
 
   Impl(const ros::NodeHandle& node, const MonitorConfig& config, Changed call)
-      : options(config.monitor), markers(config.markers), changed(std::move(call)), server(node) {
+      : options(config.monitor), markers(config.markers), changed(std::move(call)), server(mutex, node) {
     for (const BodyConfig& body : config.bodies) separates = separates || body.body.minimum_separation_m > 0;
     server.updateConfig(toLive(config));
     bool first = true;  // setCallback calls at once, with what is in force already
