@@ -58,7 +58,8 @@ struct StartIntersection {
   std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};
 };
 
-enum class BroadPhase : std::uint8_t { CLUSTERED = 0, BRUTE_FORCE = 1, PAPER = 2 };
+/// The paper's own hierarchy is not among them: it lives in broad_phase/triangle_candidates.h, for benchmarks and tests.
+enum class BroadPhase : std::uint8_t { CLUSTERED = 0, BRUTE_FORCE = 1 };
 
 struct DetectorOptions {
   AccuracyOptions accuracy;

@@ -164,11 +164,17 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   if (step.obstacle) runObstacle(step);
   rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only && !result.contacts.empty()) {
-    double best = 2;
+    double lower = 2, upper = 2;
     for (const core::Contact& c : result.contacts) {
-      if (c.certainty == Certainty::CERTAIN) best = std::min(best, c.toc_upper);
+      if (c.certainty != Certainty::CERTAIN) continue;
+      lower = std::min(lower, c.toc_lower);
+      upper = std::min(upper, c.toc_upper);
     }
-    auto late = [&](const core::Contact& c) { return c.toc_lower > best || (c.certainty == Certainty::CERTAIN && c.toc_upper > best); };
+    // The cell [1, 1] ends where the one before it does, and is later all the same.
+    const auto late = [&](const core::Contact& c) {
+      if (c.certainty != Certainty::CERTAIN) return c.toc_lower > upper;
+      return c.toc_upper > upper || (c.toc_lower > lower && c.toc_lower >= upper);
+    };
     result.contacts.erase(std::remove_if(result.contacts.begin(), result.contacts.end(), late), result.contacts.end());
   }
   if (options.check_start_state) {
