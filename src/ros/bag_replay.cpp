@@ -23,6 +23,12 @@ const ros::Duration TF_KEPT(60.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
+LoadedMap refusedMap(const std::string& problem) {
+  LoadedMap map;
+  map.problem = problem;
+  return map;
+}
+
 std::vector<std::uint8_t> bytesOf(const rosbag::MessageInstance& message) {
   std::vector<std::uint8_t> bytes(message.size());
   ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
@@ -159,7 +165,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
     const rosbag::MessageInstance& first = *maps.begin();
     first_map = first.getTime();
     const std::string problem = mapTypeProblem(first.getDataType(), first.getMD5Sum());
-    run.setMap(problem.empty() ? decodeMapMessage(bytesOf(first), config_) : LoadedMap{nullptr, {}, 0, problem},
+    run.setMap(problem.empty() ? decodeMapMessage(bytesOf(first), config_) : refusedMap(problem),
                static_cast<std::int64_t>(all.getBeginTime().toNSec()));
   }
   run.effects.apply(run.pipeline.monitor(), run.summary.maps > 0);
@@ -185,7 +191,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
       run.mesh(body->second, m, sink);
     } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
       const std::string problem = mapTypeProblem(m.getDataType(), m.getMD5Sum());
-      run.setMap(problem.empty() ? decodeMapMessage(bytesOf(m), config_) : LoadedMap{nullptr, {}, 0, problem},
+      run.setMap(problem.empty() ? decodeMapMessage(bytesOf(m), config_) : refusedMap(problem),
                  static_cast<std::int64_t>(at.toNSec()));
     }
     progress.step(++done);
