@@ -150,8 +150,6 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.queue_policy =
       reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST : QueuePolicy::OLDEST;
   config.simd_target = reader.get("simd_target", std::string("auto"));
-  config.record_ring = static_cast<std::size_t>(reader.integer("record_ring", 0, 0, 10000));
-  config.record_directory = reader.get("record_directory", std::string());
 }
 
 void readMap(ParameterReader& reader, MonitorConfig& config) {

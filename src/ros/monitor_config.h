@@ -52,8 +52,6 @@ struct MonitorConfig {
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
   std::string simd_target = "auto";
   MarkerConfig markers;
-  std::size_t record_ring = 0;      ///< steps kept for ~record_step; 0: none
-  std::string record_directory;
   std::uint64_t hash = 0;           ///< of all values in force
 };
 
