@@ -221,7 +221,8 @@ def main():
     write_report(report, summary, arrays, stats, start)
     analyze = arguments.tools / 'analyze_bag'
     if analyze.exists():
-        subprocess.run([str(analyze), str(arguments.bag), '--report', str(report)], check=True)
+        subprocess.run([str(analyze), str(arguments.bag), '--report', str(report), '--params',
+                        str(arguments.folder / 'monitor.yaml'), '--quiet'], check=True)
     print_summary(summary, report)
     found = problems(summary)
     for problem in found:
