@@ -218,7 +218,7 @@ def main():
         return 1
     summary, arrays, stats = summarize(arguments, listener, start)
     report = arguments.folder / 'report'
-    write_report(report, summary, arrays, stats, start)
+    write_report(report / 'live', summary, arrays, stats, start)
     analyze = arguments.tools / 'analyze_bag'
     if analyze.exists():
         subprocess.run([str(analyze), str(arguments.bag), '--report', str(report), '--params',

@@ -162,7 +162,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
   rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
   ros::Time first_map;
   if (bag_maps && maps.size() > 0) {
-    const rosbag::MessageInstance& first = *maps.begin();
+    const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
+    const rosbag::MessageInstance& first = *at_first;
     first_map = first.getTime();
     const std::string problem = mapTypeProblem(first.getDataType(), first.getMD5Sum());
     run.setMap(problem.empty() ? decodeMapMessage(bytesOf(first), config_) : refusedMap(problem),
