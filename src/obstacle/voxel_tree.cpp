@@ -168,6 +168,8 @@ VoxelTree::Coverage VoxelTree::coverage(std::int32_t x, std::int32_t y, std::int
     const std::int32_t side = size >> (2 * at);
     const std::uint64_t cells = (side <= 1 ? 1u : side == 2 ? 0xffu : ~std::uint64_t{0}) << bit;
     if ((node->full & cells) == cells) return Coverage::FULL;
+    // No node of the cube's own level: a child here leads to other places, for this one it is as good as empty.
+    if (level > first) return Coverage::EMPTY;
     return ((node->full | node->child) & cells) == 0 ? Coverage::EMPTY : Coverage::PARTIAL;
   }
   return Coverage::EMPTY;

@@ -135,6 +135,15 @@ TEST(VoxelSurface, CoverageOfCubes) {
   EXPECT_EQ(tree.coverage(32768, 0, 0, 32768), Coverage::EMPTY);
 }
 
+// A level without leaves of its own between two with some: its nodes are skipped, and their parents' children with them.
+TEST(VoxelSurface, CoverageBesideALargeLeafWithSmallOnesFurtherOn) {
+  const VoxelTree tree({{{0, 0, 0}, 64}, {{96, 0, 0}, 1}});
+  EXPECT_EQ(tree.coverage(80, 16, 16, 1), VoxelTree::Coverage::EMPTY);
+  EXPECT_EQ(tree.coverage(64, 32, 32, 8), VoxelTree::Coverage::EMPTY);
+  EXPECT_EQ(tree.coverage(63, 16, 16, 1), VoxelTree::Coverage::FULL);
+  EXPECT_EQ(tree.coverage(64, 0, 0, 64), VoxelTree::Coverage::PARTIAL);
+}
+
 TEST(VoxelSurface, HugeLeavesCostWhatSmallOnesDo) {
   const auto whole = VoxelSurface::build(0.05, {leafAt(0, 0, 0, 65536)});
   EXPECT_EQ(whole->faceCount(), 6u);
