@@ -100,6 +100,24 @@ def per_pair(tools, queries, scenes, repeat):
     return list(csv.DictReader(text.splitlines()))
 
 
+def recordings(tools, bags):
+    """Every rung over whole recordings (mesh against itself and an octomap), by analyze_bag's own table."""
+    rows = []
+    for bag in bags:
+        name = os.path.splitext(os.path.basename(bag))[0]
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([os.path.join(tools, "analyze_bag"), bag, "--report", folder, "--quiet"], check=True,
+                           stdout=subprocess.DEVNULL)
+            with open(os.path.join(folder, "report.json")) as f:
+                report = json.load(f)
+        for r in report["rungs"]:
+            rows.append({"recording": name, **r})
+            print("%-14s %-13s %5d steps %7d reported %5d missed %6d false %7d undecided  toc error %-9.2g %7.2f ms (95 %%: %.2f)"
+                  % (name, r["rung"], r["steps"], r["contacts"], r["missed"], r["false"], r["undecided"], r["max_toc_error"],
+                     r["median_ms"], r["p95_ms"]), flush=True)
+    return rows
+
+
 def write_csv(path, rows):
     with open(path, "w", newline="") as f:
         writer = csv.DictWriter(f, fieldnames=list(rows[0]))
@@ -158,18 +176,22 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tools", required=True, help="folder of check_step and accuracy_pairs")
     parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
+    parser.add_argument("--bag", action="append", default=[], help="a recording, repeatable; needs analyze_bag among the tools")
     parser.add_argument("--out", required=True, help="folder for the results")
     parser.add_argument("--repeat", type=int, default=15)
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
     scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
     steps, stages = whole_steps(a.tools, scenes, a.repeat)
+    bags = recordings(a.tools, a.bag)
     pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
     write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
     write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
+    if bags:
+        write_csv(os.path.join(a.out, "accuracy_recordings.csv"), bags)
     with open(os.path.join(a.out, "accuracy.json"), "w") as f:
         json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "stages": stages,
-                   "pairs": pairs}, f, indent=1)
+                   "recordings": bags, "pairs": pairs}, f, indent=1)
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
         f.write(markdown(steps))
     plot(steps, pairs, a.out)
