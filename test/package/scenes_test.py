@@ -1,0 +1,117 @@
+"""Every scene of config/scenes, recorded and analysed by the tools: the facts that the scene states must come out."""
+import csv
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import yaml
+
+from checkout import CHECKOUT
+
+TOOLS = CHECKOUT / 'build/devel/lib/deformable_ccd'
+OBSTACLE = 'octomap'
+
+
+def run(*command):
+    return subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+
+
+def analyse(scene, folder):
+    """Records and analyses a scene; the rows of contacts.csv."""
+    bag, config = folder / (scene.stem + '.bag'), folder / (scene.stem + '.yaml')
+    recorded = run(TOOLS / 'make_scene_bag', scene, bag, '--monitor-config', config, '--quiet')
+    assert recorded.returncode == 0, recorded.stderr
+    report = folder / scene.stem
+    analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet', '--no-accuracy-table')
+    assert analysed.returncode == 0, analysed.stderr
+    with open(report / 'contacts.csv', newline='') as stream:
+        return list(csv.DictReader(stream))
+
+
+def first_s(rows, belongs):
+    times = [float(r['time_s']) for r in rows if r['initial'] == '0' and belongs(r['body_0'], r['body_1'])]
+    return min(times) if times else None
+
+
+class SceneFactsTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(dir=CHECKOUT / 'build'))
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def check(self, scene, rows, what, expected):
+        belongs = {
+            'octomap': lambda a, b: OBSTACLE in (a, b),
+            'self': lambda a, b: a == b,
+            'body': lambda a, b: expected != 'none' and {a, b} == set(expected['names']),
+        }[what]
+        first = first_s(rows, belongs)
+        if expected == 'none':
+            self.assertIsNone(first, '%s: %s' % (scene.stem, what))
+            return
+        low, high = expected['first_contact_s']
+        self.assertIsNotNone(first, '%s: no contact (%s)' % (scene.stem, what))
+        self.assertTrue(low <= first <= high, '%s: first contact (%s) at %g s, expected from %g to %g' % (
+            scene.stem, what, first, low, high))
+
+    def test_the_facts_that_each_scene_states(self):
+        scenes = sorted((CHECKOUT / 'config/scenes').glob('*.yaml'))
+        self.assertGreaterEqual(len(scenes), 6)
+        for scene in scenes:
+            with self.subTest(scene=scene.stem):
+                rows = analyse(scene, self.folder)
+                expect = yaml.safe_load(scene.read_text())['expect']
+                self.assertTrue(expect)
+                for what, expected in expect.items():
+                    self.check(scene, rows, what, expected)
+
+
+class MakeSceneBagTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(dir=CHECKOUT / 'build'))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.scene = CHECKOUT / 'config/scenes/table_edge.yaml'
+
+    def record(self, name, *options):
+        result = run(TOOLS / 'make_scene_bag', self.scene, self.folder / name, '--frames', '6', '--quiet', *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return (self.folder / name).read_bytes()
+
+    def test_the_same_seed_gives_the_same_bag(self):
+        self.assertEqual(self.record('a.bag'), self.record('b.bag'))
+        self.assertNotEqual(self.record('a.bag'), self.record('c.bag', '--seed', '2'))
+
+    def test_every_output_type_and_map_encoding(self):
+        import rosbag
+        types = {'mesh_stamped': 'deformable_ccd/MeshStamped', 'point_cloud_grid': 'sensor_msgs/PointCloud2',
+                 'polygon_mesh': 'pcl_msgs/PolygonMesh', 'marker': 'visualization_msgs/MarkerArray'}
+        for option, expected in types.items():
+            self.record('d.bag', '--output', option, '--full')
+            with rosbag.Bag(str(self.folder / 'd.bag')) as bag:
+                topics = bag.get_type_and_topic_info().topics
+                self.assertEqual((topics['/cloth'].msg_type, topics['/cloth'].message_count), (expected, 6))
+                maps = [m for _, m, _ in bag.read_messages(topics=['/octomap_binary'])]
+                self.assertEqual([(m.binary, m.id, m.resolution) for m in maps], [(False, 'OcTree', 0.02)])
+
+    def test_bad_scenes_are_refused_with_file_line_and_key(self):
+        bad = self.folder / 'bad.yaml'
+        bad.write_text(self.scene.read_text().replace('mass_kg: 0.15', 'mass_kg: heavy'))
+        result = run(TOOLS / 'make_scene_bag', bad, self.folder / 'e.bag')
+        self.assertEqual(result.returncode, 1)
+        line = 1 + bad.read_text().split('mass_kg')[0].count('\n')
+        self.assertIn('bad.yaml:%d: bodies[0].mass_kg: write a number' % line, result.stderr)
+        result = run(TOOLS / 'make_scene_bag', self.folder / 'no.yaml', self.folder / 'e.bag')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('cannot be read', result.stderr)
+
+    def test_a_bag_that_cannot_be_written_is_an_error(self):
+        result = run(TOOLS / 'make_scene_bag', self.scene, self.folder / 'no' / 'such' / 'f.bag', '--frames', '2')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('f.bag', result.stderr)
+
+
+if __name__ == '__main__':
+    os.environ.setdefault('ROS_PACKAGE_PATH', str(CHECKOUT))
+    unittest.main()
