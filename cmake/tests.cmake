@@ -10,9 +10,7 @@ file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS test/support/*.cpp)
 list(REMOVE_ITEM SUPPORT_SOURCES ${ORACLE_SOURCES})
 add_library(deformable_ccd_test_support STATIC EXCLUDE_FROM_ALL ${SUPPORT_SOURCES})
 target_include_directories(deformable_ccd_test_support PUBLIC src test)
-# The true path, not that of a workspace's link: the truth data lie beside the checkout.
-get_filename_component(TRUE_LIST_FILE ${CMAKE_CURRENT_SOURCE_DIR}/CMakeLists.txt REALPATH)
-get_filename_component(TRUE_SOURCE_DIR ${TRUE_LIST_FILE} DIRECTORY)
+# The truth data lie beside the checkout, not beside a workspace's links.
 target_compile_definitions(deformable_ccd_test_support PUBLIC DEFORMABLE_CCD_SOURCE_DIR="${TRUE_SOURCE_DIR}")
 target_link_libraries(deformable_ccd_test_support PUBLIC
   deformable_ccd_oracle deformable_ccd GTest::gtest ZLIB::ZLIB TBB::tbb nlohmann_json::nlohmann_json ${HWY_LIBRARY}
