@@ -129,6 +129,7 @@ def plot(steps, pairs, folder):
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    import matplotlib.ticker
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6))
     floor = 2.0 ** -54  # where an error of 0 is drawn
     markers = {"cloth-ball": "o", "n-body": "s"}
@@ -158,6 +159,9 @@ def plot(steps, pairs, folder):
     right.tick_params(axis="x", rotation=35, labelsize=8)
     right.legend(fontsize=7)
     for axes in (left, right):
+        for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            ticks(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
+        axes.tick_params(axis="y", which="minor", labelsize=7)
         axes.grid(True, which="major", linewidth=0.3)
     figure.tight_layout()
     for ending in ("svg", "png"):

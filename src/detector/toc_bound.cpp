@@ -45,14 +45,17 @@ double bound(const double (*p0)[8], const double (*p1)[8], int first_count, doub
     const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * UP : 0;
     // Every vertex of one feature against every vertex of the other; the features' projections meet when the first pair
     // of opposite ends does.
-    double above = 3, below = 3;
-    for (int i = 0; i < first_count; ++i) {
-      for (int j = first_count; j < 4; ++j) {
-        above = std::min(above, meets(p0[i][d], p1[i][d], p0[j][d], p1[j][d], margin));
-        below = std::min(below, meets(p0[j][d], p1[j][d], p0[i][d], p1[i][d], margin));
+    // opposite ends does. What is not later than the best so far needs no further look.
+    for (const bool first_above : {true, false}) {
+      double meeting = 3;
+      for (int i = 0; i < first_count && meeting > latest; ++i) {
+        for (int j = first_count; j < 4 && meeting > latest; ++j) {
+          const int u = first_above ? i : j, l = first_above ? j : i;
+          meeting = std::min(meeting, meets(p0[u][d], p1[u][d], p0[l][d], p1[l][d], margin));
+        }
       }
+      latest = std::max(latest, meeting);
     }
-    latest = std::max(latest, std::max(above, below));
   }
   return latest;
 }
