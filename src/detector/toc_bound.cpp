@@ -44,8 +44,7 @@ double bound(const double (*p0)[8], const double (*p1)[8], int first_count, doub
   for (int d = 0; d < 8; ++d) {
     const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * UP : 0;
     // Every vertex of one feature against every vertex of the other; the features' projections meet when the first pair
-    // of opposite ends does.
-    // opposite ends does. What is not later than the best so far needs no further look.
+    // of opposite ends does. What is not later than the best so far needs no further look.
     for (const bool first_above : {true, false}) {
       double meeting = 3;
       for (int i = 0; i < first_count && meeting > latest; ++i) {
