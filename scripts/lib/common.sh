@@ -1,6 +1,7 @@
 # Sourced by the scripts beside this folder: where the checkout is, and which Python belongs to ROS.
 CHECKOUT=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd -P)
-BUILD=$CHECKOUT/build
+# The workspace; scripts/test builds others below build/ with other flags.
+BUILD=${DEFORMABLE_CCD_WORKSPACE:-$CHECKOUT/build}
 TOOLS=$BUILD/devel/lib/deformable_ccd
 
 fail() {
