@@ -10,7 +10,7 @@ add_library(deformable_ccd_oracle STATIC ${ORACLE_SOURCES})
 target_include_directories(deformable_ccd_oracle PUBLIC src test)
 target_link_libraries(deformable_ccd_oracle PUBLIC deformable_ccd ${GMP_LIBRARY})
 
-set(CORE_TOOLS run_queries)
+set(CORE_TOOLS run_queries replay_step)
 foreach(tool ${CORE_TOOLS})
   if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/src/apps/${tool}.cpp)
     add_executable(${tool} src/apps/${tool}.cpp)

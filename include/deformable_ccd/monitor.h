@@ -107,6 +107,27 @@ struct StepOutcome {
 /// Point, normal, weights and approach speed [m per step] of one of the outcome's contacts, any kind, in the fixed frame.
 ContactGeometry contactGeometry(const StepOutcome& outcome, const core::Contact& contact);
 
+/// All that a step's answer follows from, before it is computed. One entry a body; valid until the step ends.
+struct StepSource {
+  StampNs start_ns = 0, stamp_ns = 0;
+  std::uint64_t sequence = 0;  ///< as in StepOutcome
+  const std::vector<MonitorBody>* bodies = nullptr;
+  const MonitorOptions* options = nullptr;
+  const std::vector<std::shared_ptr<const Topology>>* topologies = nullptr;
+  const std::vector<Positions>*t0 = nullptr, *t1 = nullptr;  ///< [m] fixed frame
+  const std::vector<std::uint8_t>* rigid = nullptr;          ///< moves from pose_t0 to pose_t1 along the rotation
+  const std::vector<Eigen::Isometry3d>*pose_t0 = nullptr, *pose_t1 = nullptr;
+  const MonitorMap* map = nullptr;  ///< as used: null surface where the map was too old
+};
+
+/// Told of every step that is computed, on the thread that calls next().
+class StepListener {
+ public:
+  virtual ~StepListener() = default;
+  virtual void onStep(const StepSource& source) = 0;
+  virtual void onOutcome(const StepOutcome& outcome) = 0;  ///< of the step before; INTERNAL_ERROR when it failed
+};
+
 /// Not thread-safe: one thread at a time, in the node its worker. `now_ns` is any clock that only goes forward (the
 /// node: steady clock; offline: the bag's); it decides about sync_timeout_s and nothing else.
 class Monitor {
@@ -149,6 +170,9 @@ class Monitor {
 
   const FrameCounters& counters(std::size_t body) const;
   FrameCounters total() const;
+
+  /// Null: none. Must outlive the monitor or be taken away. Steps of checkNow() and predict() are not told.
+  void setListener(StepListener* listener);
 
  private:
   struct Impl;

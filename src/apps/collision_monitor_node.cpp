@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
     deformable_ccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
+    monitor.installCrashHandler();
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what());

@@ -81,6 +81,7 @@ struct Monitor::Impl {
   StampNs last_end_ns = 0;
   double last_duration_s = 0;
   bool has_last = false, map_changed = true, finishing = false;
+  StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
 
   Impl(const MonitorOptions& o, std::vector<MonitorBody> b)
@@ -138,6 +139,8 @@ void Monitor::countReceived(std::size_t body, std::uint64_t count, std::uint64_t
 void Monitor::countDropped(std::size_t body, StepStatus status, std::uint64_t count) {
   impl_->counters.at(body).by_status.at(static_cast<std::size_t>(status)) += count;
 }
+
+void Monitor::setListener(StepListener* listener) { impl_->listener = listener; }
 
 FrameCounters Monitor::total() const {
   FrameCounters sum;
@@ -311,6 +314,10 @@ void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
   const bool continues = has_last && !map_changed && last_end_ns == outcome.start_ns && last_runs == runs;
   has_last = false;
+  if (listener) {
+    listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
+                      &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &used});
+  }
   runner.run(input, bodies, options, used, continues, outcome);
   finishOutcome(outcome, used);
   has_last = true;
@@ -344,6 +351,7 @@ bool Monitor::next(std::int64_t now_ns, StepOutcome& outcome) {
       outcome.sequence = step.sequence;
       outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
     }
+    if (m.listener) m.listener->onOutcome(outcome);
   } else {
     m.has_last = m.has_last && !isSeam(step.status);
   }

@@ -147,13 +147,26 @@ std::size_t requiredSubsteps(const StepInput& input, double tolerance_m) {
   return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
 }
 
+void placeAt(const StepInput& input, std::size_t part, std::size_t parts, std::vector<Positions>& out) {
+  const double u = static_cast<double>(part) / static_cast<double>(parts);
+  out.resize(input.t0.size());
+  for (std::size_t b = 0; b < input.t0.size(); ++b) {
+    if (!input.rigid[b] || part == 0 || part == parts) {
+      interpolate(input.t0[b], input.t1[b], u, out[b]);
+      continue;
+    }
+    const Eigen::Isometry3d moved = interpolate(input.pose_t0[b], input.pose_t1[b], u) * input.pose_t0[b].inverse();
+    out[b].resize(input.t0[b].size());
+    for (std::size_t v = 0; v < out[b].size(); ++v) out[b][v] = moved * input.t0[b][v];
+  }
+}
+
 StepRunner::StepRunner(const DetectorOptions& options) : detector_(options) {}
 
 void StepRunner::setOptions(const DetectorOptions& options) { detector_.setOptions(options); }
 
-void StepRunner::setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies) {
+std::vector<BodySetup> bodySetups(const StepInput& input, const std::vector<MonitorBody>& bodies) {
   std::vector<BodySetup> setups;
-  std::vector<const Positions*> rest;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const MonitorBody& body = bodies[b];
     BodySetup setup{body.name, input.topologies[b], body.self_collision && !body.rigid, body.against_bodies,
@@ -167,9 +180,14 @@ void StepRunner::setBodies(const StepInput& input, const std::vector<MonitorBody
       setup.vertex_active[v] = 0;
     }
     setups.push_back(std::move(setup));
-    rest.push_back(&input.t0[b]);
   }
-  detector_.setBodies(std::move(setups), rest);
+  return setups;
+}
+
+void StepRunner::setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies) {
+  std::vector<const Positions*> rest;
+  for (const Positions& positions : input.t0) rest.push_back(&positions);
+  detector_.setBodies(bodySetups(input, bodies), rest);
   set_topologies_ = input.topologies;
 }
 
@@ -206,17 +224,7 @@ void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
   part_.t1 = input.t0;
   for (std::size_t i = 0; i < parts; ++i) {
     part_.t0.swap(part_.t1);
-    const double u = static_cast<double>(i + 1) / static_cast<double>(parts);
-    for (std::size_t b = 0; b < input.t0.size(); ++b) {
-      if (!input.rigid[b] || i + 1 == parts) {
-        interpolate(input.t0[b], input.t1[b], u, part_.t1[b]);
-        continue;
-      }
-      const Eigen::Isometry3d moved =
-          interpolate(input.pose_t0[b], input.pose_t1[b], u) * input.pose_t0[b].inverse();
-      part_.t1[b].resize(input.t0[b].size());
-      for (std::size_t v = 0; v < part_.t1[b].size(); ++v) part_.t1[b][v] = moved * input.t0[b][v];
-    }
+    placeAt(input, i + 1, parts, part_.t1);
     runPart(part_.t0, part_.t1, i > 0 || continues, i, parts, outcome);
   }
   auto& contacts = outcome.contacts;

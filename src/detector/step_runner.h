@@ -24,6 +24,12 @@ struct StepInput {
 /// arc [m]: 1 where nothing turns. Not limited.
 std::size_t requiredSubsteps(const StepInput& input, double tolerance_m);
 
+/// All bodies at the end of the first `part` of `parts` equal parts of the step; rigid ones along their rotation.
+void placeAt(const StepInput& input, std::size_t part, std::size_t parts, std::vector<Positions>& out);
+
+/// The bodies as the detector takes them. Throws std::invalid_argument when a vertex_mask does not fit its topology.
+std::vector<BodySetup> bodySetups(const StepInput& input, const std::vector<MonitorBody>& bodies);
+
 class StepRunner {
  public:
   explicit StepRunner(const DetectorOptions& options);

@@ -25,6 +25,7 @@
 #include "ros/map_loader.h"
 #include "ros/monitor_pipeline.h"
 #include "ros/reconfigure.h"
+#include "ros/step_recorder.h"
 #include "ros/transforms.h"
 
 namespace deformable_ccd {
@@ -67,6 +68,7 @@ struct CollisionMonitor::Impl {
   tf2::BufferCore transforms;
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
+  StepRecorder recorder;
   Outputs outputs;
   InputQueue queue;
   Diagnostics diagnostics;
@@ -86,7 +88,7 @@ struct CollisionMonitor::Impl {
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
       : node(n), private_node(p), config(configOf(p)), pipeline(config, transforms),
-        outputs(private_node, config.monitor.look_ahead_s > 0),
+        recorder(config, pipeline.monitor()), outputs(private_node, config.monitor.look_ahead_s > 0),
         queue(config.bodies.size(), config.queue_size, config.queue_policy),
         diagnostics(private_node.getNamespace(), node), effects(config) {}
 
@@ -103,7 +105,7 @@ struct CollisionMonitor::Impl {
   void advertiseServices();
   void reconfigureNow(MonitorOptions options, const MarkerConfig& markers);
   template <typename Result>
-  bool onWorker(std::function<Result()> run, Result& result);
+  bool onWorker(const std::function<Result()>& run, Result& result);
 
   // Worker.
   void work();
@@ -186,7 +188,7 @@ void CollisionMonitor::Impl::subscribe() {
 // --- service thread --------------------------------------------------------------------------------------------------
 
 template <typename Result>
-bool CollisionMonitor::Impl::onWorker(std::function<Result()> run, Result& result) {
+bool CollisionMonitor::Impl::onWorker(const std::function<Result()>& run, Result& result) {
   const auto promise = std::make_shared<std::promise<Result>>();
   std::future<Result> future = promise->get_future();
   queue.command([promise, run] { promise->set_value(run()); });
@@ -198,29 +200,38 @@ bool CollisionMonitor::Impl::onWorker(std::function<Result()> run, Result& resul
 void CollisionMonitor::Impl::advertiseServices() {
   using Trigger = std_srvs::Trigger;
   using SetBool = std_srvs::SetBool;
+  using Reply = std::pair<bool, std::string>;
   ros::NodeHandle service(private_node);
   service.setCallbackQueue(&service_callbacks);
-  services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
-      "reset", [this](Trigger::Request&, Trigger::Response& response) {
-        bool done = false;
-        response.success = onWorker<bool>([this] { resetNow(StepStatus::RESET); return true; }, done) && done;
-        response.message = response.success ? "frames forgotten; the next one is a first frame" : "the worker is busy";
-        return true;
-      }));
+  const auto advertise = [&](const char* name, const std::function<Reply()>& run) {
+    services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
+        name, [this, run](Trigger::Request&, Trigger::Response& response) {
+          Reply reply;
+          if (!onWorker(run, reply)) reply = {false, "the worker is busy"};
+          response.success = reply.first;
+          response.message = reply.second;
+          return true;
+        }));
+  };
+  advertise("reset", [this] {
+    resetNow(StepStatus::RESET);
+    return Reply(true, "frames forgotten; the next one is a first frame");
+  });
+  advertise("check_now", [this] {
+    const StepOutcome outcome = pipeline.monitor().checkNow();
+    return Reply(outcome.answered, describe(outcome));
+  });
+  advertise("record_step", [this] {
+    Reply reply;
+    reply.first = recorder.record(reply.second);
+    return reply;
+  });
   services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
       "enable", [this](SetBool::Request& request, SetBool::Response& response) {
         enabled = request.data;
         bool done = false;
         response.success = onWorker<bool>([this] { resetNow(StepStatus::DISABLED); return true; }, done) && done;
         response.message = request.data ? "enabled" : "disabled; frames are counted and dropped";
-        return true;
-      }));
-  services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
-      "check_now", [this](Trigger::Request&, Trigger::Response& response) {
-        StepOutcome outcome;
-        const bool done = onWorker<StepOutcome>([this] { return pipeline.monitor().checkNow(); }, outcome);
-        response.success = done && outcome.answered;
-        response.message = done ? describe(outcome) : "the worker is busy";
         return true;
       }));
   reconfigure = std::make_unique<Reconfigure>(
@@ -356,6 +367,8 @@ void CollisionMonitor::Impl::work() {
     accountDropped();
     StepOutcome outcome;
     while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
+    const std::string surprise = recorder.takeSurprise();
+    if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
     more = false;
     for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
     diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected());
@@ -386,5 +399,13 @@ CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeH
 }
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
+
+void CollisionMonitor::installCrashHandler() {
+  try {
+    impl_->recorder.installCrashHandler();
+  } catch (const std::runtime_error& error) {
+    ROS_WARN_STREAM("a crash will not be recorded: " << error.what());
+  }
+}
 
 }  // namespace deformable_ccd

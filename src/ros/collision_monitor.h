@@ -17,6 +17,9 @@ class CollisionMonitor {
   CollisionMonitor(const CollisionMonitor&) = delete;
   CollisionMonitor& operator=(const CollisionMonitor&) = delete;
 
+  /// For the program that owns its process: a crash writes the last step (doc/troubleshooting.md).
+  void installCrashHandler();
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

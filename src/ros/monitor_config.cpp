@@ -150,6 +150,8 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.queue_policy =
       reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST : QueuePolicy::OLDEST;
   config.simd_target = reader.get("simd_target", std::string("auto"));
+  config.record_steps = static_cast<std::size_t>(reader.integer("record_steps", 1, 0, 10000));
+  config.record_folder = reader.get("record_folder", std::string());
 }
 
 void readMap(ParameterReader& reader, MonitorConfig& config) {

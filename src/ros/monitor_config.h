@@ -51,6 +51,8 @@ struct MonitorConfig {
   std::size_t queue_size = 8;
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
   std::string simd_target = "auto";
+  std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
+  std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
   std::uint64_t hash = 0;           ///< of all values in force
 };

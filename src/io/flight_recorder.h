@@ -1,0 +1,54 @@
+// The last steps of a monitor, kept so that they can be written when somebody asks, when an answer contradicts what was
+// promised, or when the program crashes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/step_recording.h"
+
+namespace deformable_ccd {
+
+/// What of an outcome contradicts the promises of its options; empty: nothing. The step failed, `exact` left a pair
+/// undecided though no deadline expired, or a time lies outside of the step.
+std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options);
+
+/// Memory: `steps` times the positions and contacts of a step; buffers are kept. Not thread-safe: one thread, the monitor's.
+class FlightRecorder : public StepListener {
+ public:
+  static constexpr std::size_t MAX_SURPRISES = 16;  ///< files of surprises per recorder, so that no disk is filled
+
+  /// steps >= 1. The folder is created when a file is written.
+  FlightRecorder(std::size_t steps, std::string folder);
+  ~FlightRecorder() override;
+  FlightRecorder(const FlightRecorder&) = delete;
+  FlightRecorder& operator=(const FlightRecorder&) = delete;
+
+  void onStep(const StepSource& source) override;
+  void onOutcome(const StepOutcome& outcome) override;
+
+  /// Steps that are kept.
+  std::size_t size() const { return count_; }
+  /// Writes all steps that are kept, oldest first; returns the files. Throws std::runtime_error naming the file and why it
+  /// cannot be written.
+  std::vector<std::string> writeAll(const std::string& note);
+  /// One sentence about a surprise since the last call, with the file that it is in; empty: none.
+  std::string takeSurprise();
+
+ private:
+  StepRecording& newest() { return ring_[(next_ + ring_.size() - 1) % ring_.size()]; }
+  std::string write(StepRecording& recording, const std::string& kind, const std::string& note);
+
+  std::vector<StepRecording> ring_;
+  std::size_t next_ = 0, count_ = 0, surprises_ = 0;
+  std::string folder_, surprise_;
+  RecordingImage image_;  // of the newest step without its answer, for the crash handler
+};
+
+/// From now on a crash (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT) of this process writes the step that a FlightRecorder had
+/// last into FOLDER/crash_PID.step, then goes on to what the signal did before. For programs that own their process.
+/// Nothing but async-signal-safe calls on memory that was made ready before. A path of more than 4000 bytes is refused by
+/// std::invalid_argument.
+void installCrashHandler(const std::string& folder);
+
+}  // namespace deformable_ccd

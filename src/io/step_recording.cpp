@@ -1,0 +1,456 @@
+#include "io/step_recording.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <type_traits>
+
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "recordings are written as they lie in memory, which must be little-endian"
+#endif
+
+namespace deformable_ccd {
+
+namespace {
+
+constexpr char MAGIC[8] = {'D', 'C', 'C', 'D', 'S', 'T', 'E', 'P'};
+constexpr std::size_t MAX_TEXT = 1 << 16;
+// What hostile options could cost: parts of a step, and buffers for so many workers.
+constexpr std::size_t MAX_SUBSTEPS = 100000;
+constexpr std::size_t MAX_BODIES = 65534;
+static_assert(sizeof(Vec3) == 24 && sizeof(Face) == 12 && sizeof(Index) == 4, "arrays are written as they are");
+static_assert(sizeof(Box) == 48, "arrays are written as they are");
+
+enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1 };
+
+}  // namespace
+
+/// Appends fields to an image: small ones are copied, arrays are pointed at.
+class RecordingWriter {
+ public:
+  static constexpr bool READS = false;
+  explicit RecordingWriter(RecordingImage& image) : image_(image) {}
+
+  template <typename T>
+  void number(const T& value) {
+    static_assert(std::is_arithmetic_v<T>);
+    copy(&value, sizeof value);
+  }
+  void size(std::size_t value) { number(static_cast<std::uint64_t>(value)); }
+  void flag(bool value) { number(static_cast<std::uint8_t>(value)); }
+  template <typename Enum>
+  void choice(Enum value, Enum) { number(static_cast<std::uint8_t>(value)); }
+  void text(const std::string& value) {
+    const std::uint32_t size = static_cast<std::uint32_t>(std::min(value.size(), MAX_TEXT));
+    number(size);
+    copy(value.data(), size);
+  }
+  template <typename T>
+  void array(const std::vector<T>& values) {
+    number(static_cast<std::uint64_t>(values.size()));
+    if (!values.empty()) image_.pieces_.push_back({values.data(), 0, values.size() * sizeof(T)});
+  }
+  /// The count of a list whose items are visited one by one.
+  template <typename T>
+  void count(const std::vector<T>& values, std::size_t, std::size_t) { number(static_cast<std::uint64_t>(values.size())); }
+
+  void map(const std::shared_ptr<const VoxelSurface>& surface) {
+    number(surface->resolution());
+    if (image_.surface_ != surface) {
+      image_.leaves_.clear();
+      for (const OccupiedLeaf& leaf : surface->leaves()) {
+        image_.leaves_.push_back({leaf.min.x, leaf.min.y, leaf.min.z, 0, leaf.size});
+      }
+      image_.surface_ = surface;
+    }
+    array(image_.leaves_);
+  }
+
+ private:
+  void copy(const void* data, std::size_t size) {
+    if (size == 0) return;
+    const std::size_t offset = image_.heads_.size();
+    const std::uint8_t* bytes = static_cast<const std::uint8_t*>(data);
+    image_.heads_.insert(image_.heads_.end(), bytes, bytes + size);
+    if (!image_.pieces_.empty() && !image_.pieces_.back().data) {
+      image_.pieces_.back().size += size;
+    } else {
+      image_.pieces_.push_back({nullptr, offset, size});
+    }
+  }
+  RecordingImage& image_;
+};
+
+/// Takes fields from bytes that anybody may have written.
+class RecordingReader {
+ public:
+  static constexpr bool READS = true;
+  RecordingReader(const void* data, std::size_t size, const std::string& name)
+      : begin_(static_cast<const std::uint8_t*>(data)), at_(begin_), end_(begin_ + size), name_(name) {}
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw RecordingError(name_ + ": byte " + std::to_string(at_ - begin_) + ": " + what);
+  }
+  std::size_t left() const { return static_cast<std::size_t>(end_ - at_); }
+
+  void bytes(void* out, std::size_t size) {
+    if (size > left()) fail("the file ends here; " + std::to_string(size) + " more bytes were expected");
+    if (size > 0) std::memcpy(out, at_, size);
+    at_ += size;
+  }
+  template <typename T>
+  void number(T& value) {
+    static_assert(std::is_arithmetic_v<T> && !std::is_same_v<T, bool>);
+    bytes(&value, sizeof value);
+  }
+  void size(std::size_t& value) {
+    std::uint64_t wide = 0;
+    number(wide);
+    value = static_cast<std::size_t>(std::min<std::uint64_t>(wide, std::numeric_limits<std::size_t>::max()));
+  }
+  void flag(bool& value) {
+    std::uint8_t byte = 0;
+    number(byte);
+    if (byte > 1) fail("a flag is " + std::to_string(byte));
+    value = byte != 0;
+  }
+  template <typename Enum>
+  void choice(Enum& value, Enum last) {
+    std::uint8_t byte = 0;
+    number(byte);
+    if (byte > static_cast<std::uint8_t>(last)) fail("a choice is " + std::to_string(byte));
+    value = static_cast<Enum>(byte);
+  }
+  void text(std::string& value) {
+    std::uint32_t size = 0;
+    number(size);
+    if (size > MAX_TEXT) fail("a text has " + std::to_string(size) + " bytes");
+    if (size > left()) fail("a text of " + std::to_string(size) + " bytes is longer than the file");
+    value.resize(size);
+    bytes(value.data(), size);
+  }
+  template <typename T>
+  void array(std::vector<T>& values) {
+    count(values, sizeof(T), std::numeric_limits<std::size_t>::max());
+    bytes(static_cast<void*>(values.data()), values.size() * sizeof(T));
+  }
+  void map(std::shared_ptr<const VoxelSurface>& surface) {
+    double resolution_m = 0;
+    std::vector<RecordingImage::PackedLeaf> packed;
+    number(resolution_m);
+    array(packed);
+    std::vector<OccupiedLeaf> leaves;
+    for (const auto& leaf : packed) {
+      if (leaf.zero != 0) fail("a voxel's reserved field is " + std::to_string(leaf.zero));
+      leaves.push_back({{leaf.x, leaf.y, leaf.z}, leaf.size});
+    }
+    try {
+      surface = VoxelSurface::build(resolution_m, std::move(leaves));
+    } catch (const std::invalid_argument& error) {
+      fail(std::string("map: ") + error.what());
+    }
+  }
+  template <typename T>
+  void count(std::vector<T>& values, std::size_t item_bytes, std::size_t most) {
+    std::uint64_t n = 0;
+    number(n);
+    if (n > left() / item_bytes) fail("a list of " + std::to_string(n) + " items is longer than the file");
+    if (n > most) fail("a list has " + std::to_string(n) + " items; " + std::to_string(most) + " are possible");
+    values.clear();
+    values.resize(static_cast<std::size_t>(n));
+  }
+
+ private:
+  const std::uint8_t *begin_, *at_, *end_;
+  const std::string& name_;
+};
+
+namespace {
+
+// The least bytes that one item of a list takes.
+constexpr std::size_t BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24;
+
+template <typename Archive, typename Pose>
+void visitPose(Archive& a, Pose& pose) {
+  for (int i = 0; i < 16; ++i) {
+    a.number(pose.matrix().data()[i]);
+    if constexpr (Archive::READS) {
+      if (!std::isfinite(pose.matrix().data()[i])) a.fail("a pose is not finite");
+    }
+  }
+}
+
+template <typename Archive, typename Options>
+void visitOptions(Archive& a, Options& o) {
+  a.choice(o.detector.accuracy.rung, Accuracy::EXACT);
+  a.number(o.detector.accuracy.tolerance_m);
+  a.number(o.detector.accuracy.toc_bits);
+  a.number(o.detector.accuracy.max_subdivisions);
+  a.choice(o.detector.broad_phase, BroadPhase::BRUTE_FORCE);
+  a.number(o.detector.num_threads);
+  a.number(o.detector.step_budget_ms);
+  a.flag(o.detector.earliest_only);
+  a.flag(o.detector.check_start_state);
+  a.size(o.max_contacts);
+  a.flag(o.suppress_initial);
+  a.array(o.exclude_boxes);
+  a.flag(o.obstacle_expected);
+  a.number(o.rigid_tolerance_m);
+  a.size(o.max_substeps);
+  a.size(o.clock_body);
+  if constexpr (Archive::READS) {
+    if (o.max_substeps > MAX_SUBSTEPS) a.fail("max_substeps is " + std::to_string(o.max_substeps));
+  }
+}
+
+template <typename Archive, typename Body>
+void visitBody(Archive& a, Body& body) {
+  a.text(body.setup.name);
+  a.choice(body.setup.motion, BodyMotionKind::STATIC);
+  a.flag(body.setup.rigid);
+  a.flag(body.setup.self_collision);
+  a.flag(body.setup.against_bodies);
+  a.flag(body.setup.against_obstacle);
+  a.number(body.setup.minimum_separation_m);
+  a.array(body.setup.vertex_mask);
+  a.array(body.t0);
+  a.array(body.t1);
+  a.flag(body.rigid);
+  visitPose(a, body.pose_t0);
+  visitPose(a, body.pose_t1);
+}
+
+void visitTopology(RecordingWriter& a, const RecordedBody& body) {
+  static const std::vector<Face> NONE;
+  const bool line = body.topology && !body.topology->hasFaces() && !body.topology->edges().empty();
+  a.choice(line ? Connectivity::POLYLINE : Connectivity::TRIANGLES, Connectivity::POLYLINE);
+  a.array(body.topology ? body.topology->faces() : NONE);
+}
+
+void visitTopology(RecordingReader& a, RecordedBody& body) {
+  if (body.t0.size() != body.t1.size()) {
+    a.fail("body '" + body.setup.name + "' has " + std::to_string(body.t0.size()) + " vertices at t=0 and " +
+           std::to_string(body.t1.size()) + " at t=1");
+  }
+  Connectivity kind = Connectivity::TRIANGLES;
+  std::vector<Face> faces;
+  a.choice(kind, Connectivity::POLYLINE);
+  a.array(faces);
+  try {
+    body.topology = std::make_shared<const Topology>(kind == Connectivity::POLYLINE
+                                                         ? Topology::polyline(body.t0.size())
+                                                         : Topology::fromTriangles(body.t0.size(), faces));
+  } catch (const TopologyError& error) {
+    a.fail("body '" + body.setup.name + "': " + error.what());
+  }
+}
+
+void visitMap(RecordingWriter& a, const MonitorMap& map) {
+  a.flag(map.surface != nullptr);
+  if (map.surface) a.map(map.surface);
+}
+
+void visitMap(RecordingReader& a, MonitorMap& map) {
+  bool present = false;
+  a.flag(present);
+  if (present) a.map(map.surface);
+}
+
+template <typename Archive, typename Contact>
+void visitContact(Archive& a, Contact& c) {
+  a.choice(c.kind, PairKind::FACE_VOXEL_CORNER);
+  a.number(c.toc_lower);
+  a.number(c.toc_upper);
+  for (auto& vertex : c.vertex) a.number(vertex);
+  for (auto& body : c.body) a.number(body);
+  a.number(c.voxel.x);
+  a.number(c.voxel.y);
+  a.number(c.voxel.z);
+  a.number(c.voxel_size);
+  a.choice(c.certainty, Certainty::UNDECIDED);
+  a.flag(c.initial);
+  a.flag(c.leaving);
+}
+
+template <typename Archive, typename Answer>
+void visitAnswer(Archive& a, Answer& answer) {
+  a.flag(answer.present);
+  a.choice(answer.status, StepStatus::INTERNAL_ERROR);
+  a.text(answer.reason);
+  a.flag(answer.answered);
+  a.flag(answer.complete);
+  a.flag(answer.clear);
+  a.choice(answer.start_state, StartState::NOT_CHECKED);
+  a.number(answer.total_contacts);
+  a.number(answer.suppressed);
+  a.number(answer.excluded);
+  a.number(answer.substeps);
+  a.number(answer.unchecked_toc_lower);
+  a.number(answer.earliest_toc);
+  a.count(answer.contacts, CONTACT_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& contact : answer.contacts) visitContact(a, contact);
+  a.count(answer.intersections, INTERSECTION_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& crossing : answer.intersections) {
+    for (auto& body : crossing.body) a.number(body);
+    for (auto& vertex : crossing.vertex) a.number(vertex);
+  }
+}
+
+/// The file's fields in their order, for both directions.
+template <typename Archive, typename Recording>
+void visit(Archive& a, Recording& r) {
+  a.text(r.note);
+  a.number(r.sequence);
+  a.number(r.start_ns);
+  a.number(r.stamp_ns);
+  if constexpr (Archive::READS) {
+    if (r.start_ns < 0 || r.stamp_ns <= r.start_ns) {
+      a.fail("the step lasts from " + std::to_string(r.start_ns) + " ns to " + std::to_string(r.stamp_ns) + " ns");
+    }
+  }
+  visitOptions(a, r.options);
+  a.count(r.bodies, BODY_BYTES, MAX_BODIES);
+  for (auto& body : r.bodies) {
+    visitBody(a, body);
+    visitTopology(a, body);
+  }
+  visitMap(a, r.map);
+  a.number(r.map.stamp_ns);
+  visitPose(a, r.map.map_from_fixed);
+  a.text(r.map.problem);
+  visitAnswer(a, r.answer);
+}
+
+std::string systemText(const std::string& path) { return path + ": cannot be written: " + std::strerror(errno); }
+
+}  // namespace
+
+void setSource(const StepSource& source, StepRecording& recording) {
+  recording.sequence = source.sequence;
+  recording.start_ns = source.start_ns;
+  recording.stamp_ns = source.stamp_ns;
+  recording.options = *source.options;
+  recording.bodies.resize(source.bodies->size());
+  for (std::size_t b = 0; b < recording.bodies.size(); ++b) {
+    RecordedBody& body = recording.bodies[b];
+    body.setup = (*source.bodies)[b];
+    body.topology = (*source.topologies)[b];
+    body.t0.assign((*source.t0)[b].begin(), (*source.t0)[b].end());
+    body.t1.assign((*source.t1)[b].begin(), (*source.t1)[b].end());
+    body.rigid = (*source.rigid)[b] != 0;
+    body.pose_t0 = (*source.pose_t0)[b];
+    body.pose_t1 = (*source.pose_t1)[b];
+  }
+  recording.map = *source.map;
+  RecordedAnswer& answer = recording.answer;
+  answer.present = false;
+  answer.contacts.clear();
+  answer.intersections.clear();
+}
+
+void setAnswer(const StepOutcome& outcome, StepRecording& recording) {
+  RecordedAnswer& answer = recording.answer;
+  answer.present = true;
+  answer.status = outcome.status;
+  answer.reason = outcome.reason;
+  answer.answered = outcome.answered;
+  answer.complete = outcome.complete;
+  answer.clear = outcome.clear;
+  answer.start_state = outcome.start_state;
+  answer.total_contacts = outcome.total_contacts;
+  answer.suppressed = outcome.suppressed;
+  answer.excluded = outcome.excluded;
+  answer.substeps = outcome.substeps;
+  answer.unchecked_toc_lower = outcome.unchecked_toc_lower;
+  answer.earliest_toc = outcome.earliest_toc;
+  answer.contacts.assign(outcome.contacts.begin(), outcome.contacts.end());
+  answer.intersections.assign(outcome.intersections.begin(), outcome.intersections.end());
+}
+
+void RecordingImage::build(const StepRecording& recording) {
+  heads_.clear();
+  pieces_.clear();
+  RecordingWriter writer(*this);
+  for (const char c : MAGIC) writer.number(c);
+  writer.number(RECORDING_VERSION);
+  visit(writer, recording);
+}
+
+bool RecordingImage::write(int descriptor) const noexcept {
+  for (const Piece& piece : pieces_) {
+    const char* data = static_cast<const char*>(piece.data ? piece.data : heads_.data() + piece.offset);
+    std::size_t left = piece.size;
+    while (left > 0) {
+      const ssize_t written = ::write(descriptor, data, left);
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) return false;
+      data += written;
+      left -= static_cast<std::size_t>(written);
+    }
+  }
+  return true;
+}
+
+std::size_t RecordingImage::bytes() const {
+  std::size_t sum = 0;
+  for (const Piece& piece : pieces_) sum += piece.size;
+  return sum;
+}
+
+void writeRecording(const std::string& path, const StepRecording& recording) {
+  RecordingImage image;
+  image.build(recording);
+  const std::string part = path + ".part";
+  const int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (descriptor < 0) throw std::runtime_error(systemText(path));
+  bool good = image.write(descriptor);
+  int why = errno;
+  // A full disk may show up only here.
+  if (::close(descriptor) != 0 && good) {
+    good = false;
+    why = errno;
+  }
+  if (good && std::rename(part.c_str(), path.c_str()) != 0) {
+    good = false;
+    why = errno;
+  }
+  if (good) return;
+  ::unlink(part.c_str());
+  errno = why;
+  throw std::runtime_error(systemText(path));
+}
+
+StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {
+  RecordingReader reader(data, size, name);
+  char magic[sizeof MAGIC] = {};
+  if (size < sizeof magic) reader.fail("too short for a recording of a step");
+  reader.bytes(magic, sizeof magic);
+  if (std::memcmp(magic, MAGIC, sizeof magic) != 0) reader.fail("not a recording of a step");
+  std::uint32_t version = 0;
+  reader.number(version);
+  if (version != RECORDING_VERSION) {
+    reader.fail("version " + std::to_string(version) + " of the format; this program reads version " +
+                std::to_string(RECORDING_VERSION));
+  }
+  StepRecording recording;
+  visit(reader, recording);
+  if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
+  return recording;
+}
+
+StepRecording readRecordingFile(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw RecordingError(path + ": cannot be read");
+  const std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return readRecording(bytes.data(), bytes.size(), path);
+}
+
+}  // namespace deformable_ccd

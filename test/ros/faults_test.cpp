@@ -1,0 +1,160 @@
+// What real systems do to a monitor: the right status within one step, recovery within two, counters that add up.
+#include "ros/support/monitor_fixture.h"
+
+#include <filesystem>
+#include <sstream>
+
+#include "io/step_replay.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr std::size_t MONITORS = 3;  // in faults.test; each listens to /tf
+
+struct Recording : MonitorTest {
+  Recording() : MonitorTest("/recording") {}
+};
+
+TEST_F(Recording, RecordStepWritesWhatReplaysToTheSameBits) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  send(publisher, meshStamped(tipAbove(1), 10));
+  send(publisher, meshStamped(tipAbove(0.5), 10.1));
+  const ContactArray outcome = send(publisher, meshStamped(tipAbove(-3), 10.2));
+  ASSERT_FALSE(outcome.contacts.empty());
+  const auto written = trigger("record_step");
+  ASSERT_TRUE(written.success) << written.message;
+  std::istringstream lines(written.message);
+  std::vector<StepRecording> steps;
+  for (std::string file; std::getline(lines, file);) steps.push_back(readRecordingFile(file));
+  ASSERT_EQ(steps.size(), 2u) << "record_steps is 2";
+  EXPECT_EQ(steps[1].start_ns, 10100000000);
+  EXPECT_EQ(steps[1].answer.contacts.size(), outcome.contacts.size());
+  for (const StepRecording& step : steps) {
+    const StepReplay replay = replayStep(step);
+    EXPECT_TRUE(replay.differences.empty()) << replay.differences.front();
+  }
+  const auto& message = outcome.contacts.front();
+  const core::Contact& contact = steps[1].answer.contacts.front();
+  EXPECT_EQ(message.toc_lower, contact.toc_lower);
+  EXPECT_EQ(message.toc_upper, contact.toc_upper);
+}
+
+struct Unwritable : MonitorTest {
+  Unwritable() : MonitorTest("/unwritable") {}
+};
+
+TEST_F(Unwritable, ARecordingThatCannotBeWrittenIsAnAnswerNotAnEnd) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/unwritable/mesh");
+  const auto early = trigger("record_step");
+  EXPECT_FALSE(early.success);
+  EXPECT_NE(early.message.find("no step"), std::string::npos) << early.message;
+  send(publisher, meshStamped(tipAbove(1), 10));
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.5), 10.1)).status, ContactArray::OK);
+  const auto answer = trigger("record_step");
+  EXPECT_FALSE(answer.success);
+  EXPECT_NE(answer.message.find("cannot be written"), std::string::npos) << answer.message;
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.4), 10.2)).status, ContactArray::OK) << "and goes on";
+  expectAddsUp();
+}
+
+TEST_F(Recording, AnotherPublisherWithAnotherTopology) {
+  {
+    const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+    send(publisher, meshStamped(tipAbove(1), 10));
+    EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 10.1)).status, ContactArray::OK);
+  }
+  Mesh other = tipAbove(0.8);
+  other.positions.push_back({5, 5, 5});
+  other.faces.push_back({3, 4, 6});
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  const ContactArray changed = send(publisher, meshStamped(other, 10.2));
+  EXPECT_EQ(changed.status, ContactArray::TOPOLOGY_CHANGED);
+  EXPECT_FALSE(changed.answered);
+  EXPECT_FALSE(clear.last().data);
+  EXPECT_EQ(send(publisher, meshStamped(other, 10.3)).status, ContactArray::OK);
+  expectAddsUp();
+}
+
+TEST_F(Recording, TfThatStopsAndComesBack) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
+  const Mesh mesh = tipAbove(1);
+  tf.publish(transformAt(100, "camera", {0, 0, 0}));
+  tf.publish(transformAt(100.1, "camera", {0, 0, 0}));
+  send(publisher, meshStamped(mesh, 100, "camera"));
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.1, "camera")).status, ContactArray::OK);
+  for (const double stamp_s : {100.2, 100.3}) {
+    const ContactArray lost = send(publisher, meshStamped(mesh, stamp_s, "camera"));
+    EXPECT_EQ(lost.status, ContactArray::NO_TRANSFORM);
+    EXPECT_FALSE(lost.answered);
+  }
+  EXPECT_TRUE(waitUntil([&] { return !clear.last().data; }));
+  tf.publish(transformAt(100.6, "camera", {0, 0, 0}));
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.4, "camera")).status, ContactArray::OK) << "from the last good frame on";
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.5, "camera")).status, ContactArray::OK);
+  expectAddsUp();
+}
+
+TEST_F(Recording, ClockThatJumpsBothWays) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  double stamp_s = 1000;
+  send(publisher, meshStamped(tipAbove(1), stamp_s));
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, ContactArray::OK);
+  for (const double jump_s : {-500.0, 3600.0, -0.05, 1e6}) {
+    stamp_s += 0.1 + jump_s;
+    const ContactArray jumped = send(publisher, meshStamped(tipAbove(1), stamp_s));
+    EXPECT_EQ(jumped.status, jump_s < 0 && jump_s + 0.1 <= 0.05 ? ContactArray::TIME_JUMP : ContactArray::GAP) << jump_s;
+    EXPECT_FALSE(jumped.answered);
+    EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, ContactArray::OK) << jump_s;
+  }
+  expectAddsUp();
+}
+
+struct Mapped : MonitorTest {
+  Mapped() : MonitorTest("/mapped") {}
+};
+
+TEST_F(Mapped, AMapThatStopsAndComesBack) {
+  const auto mesh = advertiseAndWait<MeshStamped>(node, "/mapped/mesh");
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/mapped/octomap", true);
+  const auto answerAt = [&](double stamp_s) { return send(mesh, meshStamped(tipAbove(3), stamp_s)); };
+  map.publish(blockBelowZero(true, 50));
+  double stamp_s = 50;
+  answerAt(stamp_s);
+  ASSERT_TRUE(waitUntil([&] {
+    stamp_s += 0.01;
+    return answerAt(stamp_s).status == ContactArray::OK;
+  }));
+  stamp_s = 51.2;
+  answerAt(stamp_s);  // a gap
+  const ContactArray stale = answerAt(stamp_s += 0.1);
+  EXPECT_EQ(stale.status, ContactArray::NO_MAP);
+  EXPECT_NE(stale.reason.find("octomap_timeout_s"), std::string::npos) << stale.reason;
+  EXPECT_FALSE(clear.last().data);
+  const std::uint64_t maps = stats.last().maps_received;
+  map.publish(blockBelowZero(true, 51.3));
+  ASSERT_TRUE(waitUntil([&] {
+    stamp_s += 0.001;
+    return answerAt(stamp_s).status == ContactArray::OK;
+  }));
+  EXPECT_EQ(stats.last().maps_received, maps + 1);
+  EXPECT_EQ(answerAt(stamp_s + 0.1).status, ContactArray::OK);
+  const auto refused = trigger("record_step");
+  EXPECT_FALSE(refused.success);
+  EXPECT_NE(refused.message.find("record_steps is 0"), std::string::npos) << refused.message;
+  expectAddsUp();
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "faults_test");
+  ros::NodeHandle node;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,117 @@
+#include "support/recordings.h"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <stdexcept>
+
+namespace deformable_ccd {
+namespace test {
+
+namespace {
+
+constexpr StampNs STEP_NS = 100000000;
+
+std::vector<MonitorBody> bodies() {
+  std::vector<MonitorBody> all(3);
+  all[0].name = "cloth";
+  all[0].vertex_mask = {0};
+  all[1].name = "finger";
+  all[1].rigid = true;
+  all[1].self_collision = false;
+  all[2].name = "rope";
+  all[2].motion = BodyMotionKind::STATIC;
+  return all;
+}
+
+MonitorOptions withDefaults(MonitorOptions options) {
+  options.store.max_vertex_step_m = 0;
+  options.clock_body = 0;
+  options.rigid_tolerance_m = 0.01;
+  options.exclude_boxes = {Box{{9, 9, 9}, {10, 10, 10}}};
+  return options;
+}
+
+/// Hands on what a step is made of; the answer is set by its owner.
+class Capture : public StepListener {
+ public:
+  explicit Capture(StepRecording& recording) : recording_(recording) {}
+  void onStep(const StepSource& source) override { setSource(source, recording_); }
+  void onOutcome(const StepOutcome& outcome) override { setAnswer(outcome, recording_); }
+
+ private:
+  StepRecording& recording_;
+};
+
+}  // namespace
+
+RecordedScene::RecordedScene(const MonitorOptions& options, bool with_map)
+    : monitor_(withDefaults(options), bodies()),
+      grid_(std::make_shared<const Topology>(Topology::grid(4, 5))),
+      finger_(std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 1, 2}, {0, 3, 1}}))),
+      rope_(std::make_shared<const Topology>(Topology::polyline(4))) {
+  if (with_map) {
+    MonitorMap map;
+    map.surface = VoxelSurface::build(0.1, {{{32768, 32768, 32764}, 1}, {{32770, 32768, 32764}, 2}});
+    map.stamp_ns = 1;
+    monitor_.setMap(map);
+  }
+  push();
+  StepOutcome first;
+  monitor_.next(0, first);
+}
+
+void RecordedScene::push() {
+  const StampNs stamp_ns = STEP_NS * ++frame_;
+  const double fall = 0.16 * frame_;
+  monitor_.push(2, {stamp_ns, rope_, {{0, 0, -0.02}, {0.1, 0.3, -0.03}, {0.2, 0, -0.02}, {0.5, 0.1, -0.3}}, false,
+                    Eigen::Isometry3d::Identity()}, 0);
+  const Positions at_rest{{-0.4, 0, 0}, {0.4, 0, 0}, {0, 0.3, 0.1}, {0, -0.3, 0.1}};
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Vec3(0.2, 0.15, -0.1);
+  pose.rotate(Eigen::AngleAxisd(0.5 * frame_, Vec3::UnitZ()));
+  Positions finger;
+  for (const Vec3& p : at_rest) finger.push_back(pose * p);
+  monitor_.push(1, {stamp_ns, finger_, finger, true, pose}, 0);
+  Positions grid;
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 5; ++c) grid.emplace_back(0.1 * c + 0.013, 0.1 * r + 0.017, 0.3 - fall + 0.01 * ((r * c) % 3));
+  }
+  monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity()}, 0);
+}
+
+StepOutcome RecordedScene::nextFrames() {
+  push();
+  StepOutcome outcome;
+  if (!monitor_.next(0, outcome)) throw std::logic_error("the scene's frames make no step");
+  return outcome;
+}
+
+StepRecording recordScene(const MonitorOptions& options, bool with_map) {
+  RecordedScene scene(options, with_map);
+  scene.nextFrames();
+  StepRecording recording;
+  Capture capture(recording);
+  scene.monitor().setListener(&capture);
+  scene.nextFrames();
+  scene.monitor().setListener(nullptr);
+  recording.note = "test";
+  return recording;
+}
+
+std::vector<std::uint8_t> recordingBytes(const StepRecording& recording) {
+  RecordingImage image;
+  image.build(recording);
+  std::vector<std::uint8_t> bytes(image.bytes());
+  std::FILE* file = std::tmpfile();
+  if (!file) throw std::runtime_error("no temporary file");
+  const bool written = image.write(fileno(file));
+  std::rewind(file);
+  const std::size_t read = std::fread(bytes.data(), 1, bytes.size(), file);
+  std::fclose(file);
+  if (!written || read != bytes.size()) throw std::runtime_error("a temporary file took not all of a recording");
+  return bytes;
+}
+
+}  // namespace test
+}  // namespace deformable_ccd

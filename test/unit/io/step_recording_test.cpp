@@ -1,0 +1,296 @@
+#include "io/step_recording.h"
+
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "deformable_ccd/simd_target.h"
+#include "detector/pair_trace.h"
+#include "io/step_replay.h"
+#include "support/recordings.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string errorOf(const std::vector<std::uint8_t>& bytes) {
+  try {
+    readRecording(bytes.data(), bytes.size(), "FILE");
+  } catch (const RecordingError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+MonitorOptions with(Accuracy rung) {
+  MonitorOptions options;
+  options.detector.accuracy.rung = rung;
+  options.obstacle_expected = true;
+  return options;
+}
+
+TEST(StepRecording, TheSceneCallsForEverything) {
+  const StepRecording r = recordScene();
+  EXPECT_EQ(r.bodies.size(), 3u);
+  EXPECT_GT(r.answer.substeps, 1u) << "the finger turns";
+  bool self_or_body = false, obstacle = false;
+  for (const core::Contact& c : r.answer.contacts) (c.body[1] == OBSTACLE_BODY ? obstacle : self_or_body) = true;
+  EXPECT_TRUE(self_or_body);
+  EXPECT_TRUE(obstacle);
+}
+
+TEST(StepRecording, WhatIsReadIsWhatWasWritten) {
+  const StepRecording r = recordScene();
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
+  const StepRecording again = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(recordingBytes(again), bytes);
+  EXPECT_EQ(again.bodies[2].setup.motion, BodyMotionKind::STATIC);
+  EXPECT_FALSE(again.bodies[2].topology->hasFaces()) << "the rope is a polyline";
+  EXPECT_EQ(again.bodies[2].topology->edges().size(), 3u);
+  ASSERT_TRUE(again.map.surface);
+  EXPECT_EQ(again.map.surface->leafCount(), 2u);
+  EXPECT_TRUE(compareAnswers(r.answer, again.answer).empty());
+}
+
+TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
+  const std::string before = simdTarget();
+  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+    const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(with(rung)));
+    const StepRecording r = readRecording(bytes.data(), bytes.size(), "FILE");
+    ASSERT_FALSE(r.answer.contacts.empty()) << toString(rung);
+    for (const std::string& target : simdTargets()) {
+      setSimdTarget(target);
+      for (const int threads : {1, 3}) {
+        const StepReplay replay = replayStep(r, threads);
+        EXPECT_TRUE(replay.differences.empty()) << toString(rung) << ' ' << target << ": " << replay.differences.front();
+        EXPECT_EQ(replay.answer.contacts.size(), r.answer.contacts.size());
+      }
+    }
+  }
+  setSimdTarget(before);
+}
+
+TEST(StepReplay, WithoutAMapTheStatusIsTheSame) {
+  const StepRecording r = recordScene(with(Accuracy::EXACT), false);
+  EXPECT_EQ(r.answer.status, StepStatus::NO_MAP);
+  const StepReplay replay = replayStep(r);
+  EXPECT_EQ(replay.answer.status, StepStatus::NO_MAP);
+  EXPECT_TRUE(replay.differences.empty());
+}
+
+TEST(StepReplay, OneBitIsADifference) {
+  StepRecording r = recordScene();
+  ASSERT_FALSE(r.answer.contacts.empty());
+  r.answer.contacts.back().toc_lower = std::nextafter(r.answer.contacts.back().toc_lower, 2);
+  EXPECT_EQ(replayStep(r).differences.size(), 1u);
+  r.answer.contacts.pop_back();
+  EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
+  StepRecording r = recordScene();
+  r.answer.complete = false;
+  r.answer.status = StepStatus::DEADLINE;
+  r.answer.contacts.resize(1);
+  EXPECT_TRUE(replayStep(r).differences.empty()) << "the rest was left out, which is no contradiction";
+  r.answer.contacts[0].vertex[0] += 1;
+  EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+TEST(StepReplay, AStepWithoutAnAnswerIsComputed) {
+  StepRecording r = recordScene();
+  const std::size_t contacts = r.answer.contacts.size();
+  r.answer = RecordedAnswer();
+  const StepReplay replay = replayStep(r);
+  EXPECT_TRUE(replay.differences.empty());
+  EXPECT_EQ(replay.answer.contacts.size(), contacts);
+}
+
+TEST(StepRecording, EveryTruncationIsRefused) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  for (std::size_t n = 0; n < bytes.size(); n += n < 600 ? 1 : 37) {
+    const std::vector<std::uint8_t> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n));
+    EXPECT_EQ(errorOf(cut).rfind("FILE: byte ", 0), 0u) << n;
+  }
+  std::vector<std::uint8_t> more = bytes;
+  more.push_back(0);
+  EXPECT_NE(errorOf(more).find("1 bytes are left over"), std::string::npos) << errorOf(more);
+}
+
+TEST(StepRecording, AnyByteMayLie) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  std::size_t refused = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    for (const std::uint8_t value : {0xff, 0x80, 0x01}) {
+      std::vector<std::uint8_t> bad = bytes;
+      bad[i] ^= value;
+      refused += !errorOf(bad).empty();
+    }
+  }
+  EXPECT_GT(refused, 100u);
+}
+
+TEST(StepRecording, LiesAreNamed) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  std::vector<std::uint8_t> bad = bytes;
+  bad[0] = 'X';
+  EXPECT_NE(errorOf(bad).find("not a recording"), std::string::npos);
+  bad = bytes;
+  bad[8] = 9;
+  EXPECT_NE(errorOf(bad).find("version 9"), std::string::npos);
+  StepRecording r = recordScene();
+  r.stamp_ns = r.start_ns;
+  EXPECT_NE(errorOf(recordingBytes(r)).find("the step lasts"), std::string::npos);
+  r = recordScene();
+  r.bodies[0].t1.pop_back();
+  EXPECT_NE(errorOf(recordingBytes(r)).find("20 vertices at t=0 and 19 at t=1"), std::string::npos);
+  r = recordScene();
+  r.bodies[0].t0.resize(3);
+  r.bodies[0].t1.resize(3);
+  EXPECT_NE(errorOf(recordingBytes(r)).find("body 'cloth'"), std::string::npos) << "faces name vertices that are not there";
+  r = recordScene();
+  r.bodies[1].pose_t0.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(errorOf(recordingBytes(r)).find("pose"), std::string::npos);
+}
+
+TEST(StepReplay, ImpossibleOptionsAreRefused) {
+  StepRecording r = recordScene();
+  r.options.clock_body = 7;
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  r = recordScene();
+  r.bodies.clear();
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  r = recordScene();
+  r.options.detector.accuracy.toc_bits = 99;
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+}
+
+// --- the disk --------------------------------------------------------------------------------------------------------
+
+class RecordingFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "recording_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+TEST_F(RecordingFile, IsReadAsItWasWritten) {
+  const StepRecording r = recordScene();
+  const std::string path = folder_ / "a.step";
+  writeRecording(path, r);
+  EXPECT_EQ(recordingBytes(readRecordingFile(path)), recordingBytes(r));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(RecordingFile, AFullDiskIsNamedAndNothingIsLeftBehind) {
+  // A limit on the size of files stands for the full disk: write(2) fails in the middle of the file either way.
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit little = before;
+  little.rlim_cur = 200;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &little);
+  std::string error;
+  try {
+    writeRecording(folder_ / "a.step", recordScene());
+  } catch (const std::runtime_error& e) {
+    error = e.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_NE(error.find("a.step: cannot be written: "), std::string::npos) << error;
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(RecordingFile, AFolderThatIsNotThereIsNamed) {
+  EXPECT_THROW(writeRecording(folder_ / "none" / "a.step", recordScene()), std::runtime_error);
+  EXPECT_THROW(readRecordingFile(folder_ / "none.step"), RecordingError);
+}
+
+// --- one pair's way --------------------------------------------------------------------------------------------------
+
+StepInput inputOf(const StepRecording& r, std::vector<MonitorBody>& bodies) {
+  StepInput input;
+  input.resize(r.bodies.size());
+  for (std::size_t b = 0; b < r.bodies.size(); ++b) {
+    bodies.push_back(r.bodies[b].setup);
+    input.t0[b] = r.bodies[b].t0;
+    input.t1[b] = r.bodies[b].t1;
+    input.topologies[b] = r.bodies[b].topology;
+    input.rigid[b] = r.bodies[b].rigid;
+    input.pose_t0[b] = r.bodies[b].pose_t0;
+    input.pose_t1[b] = r.bodies[b].pose_t1;
+  }
+  return input;
+}
+
+TEST(PairTrace, ContactsPassEveryStageAndAreTheRecordedOnes) {
+  const StepRecording r = recordScene();
+  std::vector<MonitorBody> bodies;
+  const StepInput input = inputOf(r, bodies);
+  std::size_t traced = 0;
+  for (const core::Contact& c : r.answer.contacts) {
+    if (c.body[1] == OBSTACLE_BODY) continue;
+    bool met = false;
+    std::vector<TraceLine> part;
+    const auto judge = [&] {
+      const bool contact = !part.empty() && part.back().says == TraceLine::Says::CONTACT;
+      met |= contact;
+      for (const TraceLine& line : part) {
+        const bool may_err = line.stage == "fast";  // it promises nothing
+        EXPECT_FALSE(contact && !may_err && line.says == TraceLine::Says::REJECTED) << line.stage << ": " << line.text;
+      }
+      part.clear();
+    };
+    for (const TraceLine& line : tracePair(input, bodies, r.options, {c.kind, c.body, c.vertex})) {
+      if (!part.empty() && line.part != part.back().part) judge();
+      part.push_back(line);
+    }
+    judge();
+    EXPECT_TRUE(met) << describeContact(c, r.bodies);
+    ++traced;
+  }
+  EXPECT_GT(traced, 0u);
+}
+
+TEST(PairTrace, SaysWhyAPairIsRejected) {
+  const StepRecording r = recordScene();
+  std::vector<MonitorBody> bodies;
+  const StepInput input = inputOf(r, bodies);
+  const auto first = [&](const PairQuestion& q) { return tracePair(input, bodies, r.options, q).front(); };
+  // Grid faces: (0, 1, 5) or (0, 1, 6), with its diagonals; a vertex of its own face, then a masked one.
+  const Face face = r.bodies[0].topology->faces()[10];
+  EXPECT_NE(first({PairKind::VERTEX_FACE, {0, 0}, {face[1], face[0], face[1], face[2]}}).text.find("share vertex"),
+            std::string::npos);
+  EXPECT_NE(first({PairKind::VERTEX_FACE, {0, 0}, {0, face[0], face[1], face[2]}}).text.find("masked"), std::string::npos);
+  EXPECT_NE(first({PairKind::EDGE_EDGE, {1, 1}, {0, 2, 1, 3}}).text.find("self-collision"), std::string::npos);
+  const std::vector<TraceLine> far = tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {19, 1, 2, 6}});
+  EXPECT_EQ(far[1].stage, "linear");
+  EXPECT_EQ(far[1].says, TraceLine::Says::REJECTED);
+  EXPECT_EQ(far.back().says, TraceLine::Says::REJECTED);
+}
+
+TEST(PairTrace, WhatDoesNotExistIsNamed) {
+  const StepRecording r = recordScene();
+  std::vector<MonitorBody> bodies;
+  const StepInput input = inputOf(r, bodies);
+  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {9, 0}, {0, 1, 2, 3}}), std::invalid_argument);
+  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 300}}), std::invalid_argument);
+  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 19}}), std::invalid_argument)
+      << "no such face";
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
