@@ -1,15 +1,50 @@
-# test/fuzz/NAME_fuzz.cpp: in the ordinary build all of them are one gtest binary, fuzz_tests, that replays
-# test/fuzz/corpus/NAME; with DEFORMABLE_CCD_FUZZ (Clang) each is a libFuzzer executable NAME_fuzz:
+# test/fuzz/NAME_fuzz.cpp (the core) and test/fuzz/decoders/NAME_fuzz.cpp (messages and files): in the ordinary build all of
+# them are one gtest binary, fuzz_tests, that replays test/fuzz/corpus/NAME; with DEFORMABLE_CCD_FUZZ (Clang, a core-only
+# tree) each is a libFuzzer executable NAME_fuzz:
 #   NAME_fuzz -max_total_time=600 WORK_FOLDER test/fuzz/corpus/NAME
 file(GLOB FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/*_fuzz.cpp)
+file(GLOB DECODER_FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/decoders/*_fuzz.cpp)
+
 if(NOT DEFORMABLE_CCD_FUZZ)
-  add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES})
+  if(DEFORMABLE_CCD_CORE_ONLY)
+    add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES})
+  else()
+    if(NOT TARGET deformable_ccd_physics)
+      list(FILTER DECODER_FUZZ_SOURCES EXCLUDE REGEX "scene_file")
+    endif()
+    add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES}
+      LIBRARIES deformable_ccd_ros $<TARGET_NAME_IF_EXISTS:deformable_ccd_physics>)
+  endif()
   return()
 endif()
-foreach(source ${FUZZ_SOURCES})
+
+# The decoders are free of ROS but for a header or two, so the files themselves are built here, with the fuzzer's eyes.
+#catkin_lint: ignore_once duplicate_find
+find_package(PCL REQUIRED COMPONENTS common)
+find_library(PCL_IO_LIBRARY pcl_io REQUIRED HINTS ${PCL_LIBRARY_DIRS})
+find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
+#catkin_lint: ignore_once duplicate_find
+find_package(yaml-cpp REQUIRED)
+add_library(deformable_ccd_decoders STATIC
+  src/ros/mesh_decoder.cpp src/ros/mesh_views.cpp src/ros/map_decode.cpp src/ros/mesh_file.cpp src/ros/stl_file.cpp
+  src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
+  src/scene/physics/scene_file.cpp src/scene/physics/yaml_map.cpp)
+target_include_directories(deformable_ccd_decoders PUBLIC src)
+target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
+target_link_libraries(deformable_ccd_decoders PUBLIC
+  deformable_ccd yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY})
+
+file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
+add_custom_target(fuzzers)
+foreach(source ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES})
   get_filename_component(name ${source} NAME_WE)
   add_executable(${name} ${source})
   target_compile_definitions(${name} PRIVATE DEFORMABLE_CCD_FUZZER)
   target_link_libraries(${name} PRIVATE deformable_ccd_test_support)
+  if(source IN_LIST DECODER_FUZZ_SOURCES)
+    target_link_libraries(${name} PRIVATE deformable_ccd_decoders)
+  endif()
   target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  add_dependencies(fuzzers ${name})
+  file(APPEND ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "${name}\n")
 endforeach()

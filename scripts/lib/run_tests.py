@@ -2,6 +2,7 @@
 """Runs every test that the build made and adds the results up.
 
 Runners: gtest binaries (listed by CMake in gtest_suites.txt, so that one that was not built counts as failed),
+libFuzzer targets where they were built (--fuzzers),
 Python unittest files (test/**/*_test.py), roslaunch-check on every launch file, rostest on test/ros/*.test.
 A runner that starts fewer tests than it has, crashes or runs out of time adds failures. The last line printed is
 `N passed, N failed, N skipped`.
@@ -177,6 +178,54 @@ class PythonRunner:
         return result, log
 
 
+class FuzzRunner:
+    """A libFuzzer target: in rounds, until a round brings no new coverage, and for a least number of runs."""
+    ROUND_S = int(os.environ.get('DEFORMABLE_CCD_FUZZ_SECONDS') or 600)
+    LEAST_RUNS = {'pair_fuzz': 10**7, 'mesh_step_fuzz': 10**5}
+    DECODER_RUNS = 10**6
+    MAX_ROUNDS = 18
+
+    def __init__(self, binary):
+        self.binary = binary
+        self.name = 'fuzz ' + binary.name
+
+    def __call__(self, logs):
+        result = Result()
+        log = logs / (self.binary.name + '.log')
+        if not self.binary.exists():
+            result.fail('%s was not built' % self.binary.name)
+            return result, None
+        target = self.binary.name[:-len('_fuzz')]
+        # Inputs found before are kept beside the build; findings lie there, too, to become seeds.
+        work, findings = (self.binary.parent / folder / target for folder in ('work', 'findings'))
+        for folder in (work, findings):
+            folder.mkdir(parents=True, exist_ok=True)
+        # A short try of a few seconds is one round, and says so.
+        short = self.ROUND_S < 600
+        least = 0 if short else self.LEAST_RUNS.get(self.binary.name, self.DECODER_RUNS)
+        runs = coverage = 0
+        for _ in range(1 if short else self.MAX_ROUNDS):
+            status = run([str(self.binary), '-max_total_time=%d' % self.ROUND_S, '-rss_limit_mb=4096', '-timeout=30',
+                          '-print_final_stats=1', '-artifact_prefix=%s/' % findings, str(work),
+                          str(CHECKOUT / 'test/fuzz/corpus' / target)], log)
+            output = log.read_text(errors='replace')
+            done = re.search(r'number_of_executed_units: (\d+)', output)
+            covered = re.findall(r' cov: (\d+)', output)
+            if status != 0 or not done or not covered:
+                result.fail('%s ended with status %s; the input is in %s' % (self.name, status, findings))
+                return result, log
+            runs += int(done.group(1))
+            before, coverage = coverage, int(covered[-1])
+            if runs >= least and coverage == before:
+                break
+        result.notes.append('%d runs, coverage %d, no finding%s' % (runs, coverage, ' (one short round)' if short else ''))
+        if runs < least:
+            result.fail('%s reached %d of %d runs' % (self.name, runs, least))
+        else:
+            result.passed = 1
+        return result, log
+
+
 class LaunchCheckRunner:
     def __init__(self, path):
         self.path = path
@@ -211,6 +260,9 @@ def find_runners(arguments):
                  for shard in range(shards)]
     if arguments.filter:
         return busy, []
+    if arguments.fuzzers:
+        busy += [FuzzRunner(arguments.fuzzers / name)
+                 for name in (arguments.fuzzers / 'fuzz_targets.txt').read_text().split()]
     python = [PythonRunner(p) for p in sorted((CHECKOUT / 'test').rglob('*_test.py'))
               if 'ros' not in p.relative_to(CHECKOUT / 'test').parts]
     launch = [LaunchCheckRunner(p) for p in sorted((CHECKOUT / 'launch').rglob('*.launch'))]
@@ -221,6 +273,7 @@ def find_runners(arguments):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument('--build', type=pathlib.Path, required=True, help='build folder of the package')
+    parser.add_argument('--fuzzers', type=pathlib.Path, help='build folder of the libFuzzer targets')
     parser.add_argument('--only', default='')
     parser.add_argument('--filter', default='')
     arguments = parser.parse_args()

@@ -1,4 +1,6 @@
-// The node. Exit status 1 when a parameter is wrong, with one line that says which.
+// The node. Exit status 1 when a parameter is wrong, with one line that says which; 0 after SIGINT and SIGTERM, when the
+// step that runs is finished.
+#include <csignal>
 #include <exception>
 
 #include <ros/ros.h>
@@ -7,6 +9,8 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "collision_monitor");
+  // roscpp handles SIGINT alone; containers and service managers send SIGTERM.
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
     deformable_ccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};

@@ -9,6 +9,7 @@
 #include <cctype>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 
 namespace deformable_ccd {
 namespace {
@@ -57,6 +58,22 @@ Positions positionsOf(const pcl::PCLPointCloud2& cloud, const std::string& path)
   return positions;
 }
 
+/// PCL allocates what a PLY header claims before it reads on. An element takes a byte at least.
+void checkClaims(const std::string& path) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const std::uint64_t bytes = static_cast<std::uint64_t>(file.tellg());
+  file.seekg(0);
+  for (std::string line; std::getline(file, line) && line.compare(0, 10, "end_header") != 0;) {
+    std::istringstream words(line);
+    std::string word, name;
+    std::uint64_t count = 0;
+    if (!(words >> word) || word != "element") continue;
+    if (!(words >> name >> count) || count > bytes) {
+      throw MeshFileError(path + ": '" + line.substr(0, 80) + "' claims more than the file holds");
+    }
+  }
+}
+
 }  // namespace
 
 MeshFile loadMeshFile(const std::string& path) {
@@ -65,12 +82,14 @@ MeshFile loadMeshFile(const std::string& path) {
   pcl::PolygonMesh mesh;
   const std::string type = extension(path);
   int result = -1;
-  if (type == "ply") {
-    result = pcl::io::loadPLYFile(path, mesh);
-  } else if (type == "obj") {
-    result = pcl::io::loadOBJFile(path, mesh);
-  } else {
+  if (type != "ply" && type != "obj") {
     throw MeshFileError(path + ": unknown mesh format '" + type + "'; .ply and .obj can be read");
+  }
+  if (type == "ply") checkClaims(path);
+  try {
+    result = type == "ply" ? pcl::io::loadPLYFile(path, mesh) : pcl::io::loadOBJFile(path, mesh);
+  } catch (const std::exception& error) {
+    throw MeshFileError(path + ": not a readable ." + type + " mesh: " + error.what());
   }
   if (result < 0) throw MeshFileError(path + ": not a readable ." + type + " mesh");
   MeshFile file;
