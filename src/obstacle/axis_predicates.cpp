@@ -59,6 +59,9 @@ double productError(double a, double b, double product) {
   return ((ah * bh - product) + ah * bl + al * bh) + al * bl;
 }
 
+/// Products of two such differences neither overflow nor lose bits to underflow, nor do their errors.
+bool isModerate(double difference) { return std::abs(difference) > 0x1p-140 && std::abs(difference) < 0x1p140; }
+
 int signOf(double value) { return (value > 0) - (value < 0); }
 
 int exactOrientation2d(double p0x, double p0y, double p1x, double p1y, double qx, double qy) {
@@ -132,6 +135,19 @@ int compare(const CrossingTime& a, const CrossingTime& b) {
   if (a.certain && b.certain) {
     const double difference = a.approximate - b.approximate;
     if (std::abs(difference) > CROSSING_ERROR * std::max(a.approximate, b.approximate)) return signOf(difference);
+  }
+  // Ties are common where a mesh and a map share a grid: settled in double where nothing was rounded.
+  const double na_rounded = a.plane - a.from, da_rounded = a.to - a.from;
+  const double nb_rounded = b.plane - b.from, db_rounded = b.to - b.from;
+  if (na_rounded == 0 && nb_rounded == 0) return 0;
+  if (a.certain && b.certain && isModerate(na_rounded) && isModerate(nb_rounded) && isModerate(da_rounded) &&
+      isModerate(db_rounded) && differenceIsExact(a.plane, a.from, na_rounded) &&
+      differenceIsExact(a.to, a.from, da_rounded) && differenceIsExact(b.plane, b.from, nb_rounded) &&
+      differenceIsExact(b.to, b.from, db_rounded)) {
+    const double left = std::abs(na_rounded * db_rounded), right = std::abs(nb_rounded * da_rounded);
+    if (left != right) return left > right ? 1 : -1;
+    return signOf(productError(std::abs(na_rounded), std::abs(db_rounded), left) -
+                  productError(std::abs(nb_rounded), std::abs(da_rounded), right));
   }
   const Rational na = Rational(a.plane) - Rational(a.from), da = Rational(a.to) - Rational(a.from);
   const Rational nb = Rational(b.plane) - Rational(b.from), db = Rational(b.to) - Rational(b.from);
