@@ -76,7 +76,7 @@ std::uint8_t ObstacleTest::Impl::nearBits(const Run& run, const KeyLanes& swept,
   const VoxelTree::Reached reached = run.surface->tree.reached(swept.box());
   corner = reached.corner;
   if (!reached.leaf) return 0;
-  const bool at_start = start == swept || run.surface->tree.reached(start.box()).leaf;
+  const bool at_start = start == swept || run.surface->tree.reachesLeaf(start.box());
   return NEAR | (reached.edge ? NEAR_EDGE : 0) | (at_start ? NEAR_START : 0);
 }
 

@@ -1,5 +1,7 @@
 #include "obstacle/vertex_path.h"
 
+#include <algorithm>
+
 namespace deformable_ccd {
 namespace {
 
@@ -33,10 +35,22 @@ bool clipToSlab(double from, double to, double lo, double hi, int axis, SlabPath
   return true;
 }
 
+/// The faces whose planes the path touches: no others can be hit.
+FeatureMask touchedPlanes(const double* p0, const double* p1, const LeafBox& box) {
+  FeatureMask touched = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = std::min(p0[axis], p1[axis]), high = std::max(p0[axis], p1[axis]);
+    const bool lo = low <= box.lo[axis] && box.lo[axis] <= high, hi = low <= box.hi[axis] && box.hi[axis] <= high;
+    touched |= static_cast<FeatureMask>(lo | hi << 1) << (2 * axis);
+  }
+  return touched;
+}
+
 }  // namespace
 
 FaceHit firstFaceHit(const double* p0, const double* p1, const LeafBox& box, FeatureMask faces) {
   FaceHit hit;
+  if (!(touchedPlanes(p0, p1, box) & faces)) return hit;
   SlabPath paths[3];
   for (int axis = 0; axis < 3; ++axis) {
     if (!clipToSlab(p0[axis], p1[axis], box.lo[axis], box.hi[axis], axis, paths[axis])) return hit;

@@ -184,4 +184,20 @@ std::size_t VoxelTree::memoryBytes() const {
   return bytes;
 }
 
+void VoxelTree::setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners) {
+  // A node's cell in the node above holds what any of its cells does, and so on up.
+  while (edges != 0 || corners != 0) {
+    Node& at = levels_[level].nodes[node];
+    const bool new_edges = edges != 0 && at.edges == 0, new_corners = corners != 0 && at.corners == 0;
+    at.edges |= edges;
+    at.corners |= corners;
+    if (++level == LEVELS || !(new_edges || new_corners)) return;
+    const std::array<std::uint16_t, 3>& cell = levels_[level - 1].cells[node];
+    const std::uint64_t bit = std::uint64_t{1} << cellBit(cell[0], cell[1], cell[2]);
+    node = find(level, cell[0] >> 2, cell[1] >> 2, cell[2] >> 2);
+    edges = new_edges ? bit : 0;
+    corners = new_corners ? bit : 0;
+  }
+}
+
 }  // namespace deformable_ccd

@@ -2,6 +2,7 @@
 // is a run of bits of one node, so pruned leaves of any power-of-two size cost what a single voxel costs.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -27,7 +28,7 @@ class VoxelTree {
     std::uint64_t full = 0;    ///< cells covered by a leaf of this node
     std::uint64_t start = 0;   ///< first cell of each of those leaves
     std::uint64_t child = 0;   ///< cells that are a node of the level below
-    std::uint64_t edges = 0;   ///< cells at which a convex edge of their leaf may lie
+    std::uint64_t edges = 0;   ///< cells at which, or in whose node, a convex edge of their leaf may lie
     std::uint64_t corners = 0; ///< the same of its exposed corners
     std::uint32_t first_leaf = 0;
     std::uint32_t first_child = 0;
@@ -47,10 +48,7 @@ class VoxelTree {
   const std::vector<OccupiedLeaf>& leaves() const { return leaves_; }
   const std::vector<Node>& nodes(int level) const { return levels_[level].nodes; }
   /// Where convex edges and corners lie, for queries that want nothing else. Set once, when they are known.
-  void setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners) {
-    levels_[level].nodes[node].edges |= edges;
-    levels_[level].nodes[node].corners |= corners;
-  }
+  void setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners);
   /// Node coordinates, in units of the node's own size.
   const std::array<std::uint16_t, 3>& nodeCell(int level, std::uint32_t node) const {
     return levels_[level].cells[node];
@@ -78,6 +76,7 @@ class VoxelTree {
     bool leaf = false, edge = false, corner = false;
   };
   Reached reached(const KeyBox& box) const;
+  bool reachesLeaf(const KeyBox& box) const;
 
  private:
   struct Level {
@@ -91,14 +90,19 @@ class VoxelTree {
   void buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);
 
-  template <class Visit>
-  static void visitBits(const Node& node, std::uint64_t bits, Visit& visit);
+  /// Calls visit(leaf) for each leaf whose cells are in the box and in `wanted` of their node.
+  template <class Wanted, class Visit>
+  void visitWanted(const KeyBox& box, Wanted wanted, Visit& visit) const;
   /// Calls visit(node, bits) for each node with leaves in the box, bits being their cells there, until it returns true.
+  /// Of each node it looks only at the cells in visit.wanted(node).
   template <class Visit>
   bool visitNodes(const KeyBox& box, Visit&& visit) const;
   template <class Visit>
   bool descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
                Visit& visit) const;
+  /// The same of a node of level 1, which the box must reach, without recursion.
+  template <class Visit>
+  bool visitSmall(const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box, Visit& visit) const;
   /// The node's cells that the box reaches, each side clipped.
   static std::uint64_t boxBits(int level, const std::array<std::int32_t, 3>& origin, const KeyBox& box);
 
@@ -143,7 +147,7 @@ inline std::uint64_t VoxelTree::boxBits(int level, const std::array<std::int32_t
 template <class Visit>
 bool VoxelTree::descend(int level, const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
                         Visit& visit) const {
-  const std::uint64_t bits = boxBits(level, origin, box);
+  const std::uint64_t bits = boxBits(level, origin, box) & visit.wanted(node);
   if ((node.full & bits) != 0 && visit(node, node.full & bits)) return true;
   for (std::uint64_t children = node.child & bits; children != 0; children &= children - 1) {
     const unsigned bit = lowestBit(children);
@@ -157,12 +161,42 @@ bool VoxelTree::descend(int level, const Node& node, const std::array<std::int32
 }
 
 template <class Visit>
+bool VoxelTree::visitSmall(const Node& node, const std::array<std::int32_t, 3>& origin, const KeyBox& box,
+                           Visit& visit) const {
+  std::int32_t lo[3], hi[3];
+  std::uint64_t bits = visit.wanted(node);
+  for (int axis = 0; axis < 3; ++axis) {
+    lo[axis] = std::max(box.lo[axis] - origin[axis], 0);
+    hi[axis] = std::min(box.hi[axis] - origin[axis], 15);
+    bits &= RANGE_MASKS[axis][lo[axis] >> 2][hi[axis] >> 2];
+  }
+  if ((node.full & bits) != 0 && visit(node, node.full & bits)) return true;
+  for (std::uint64_t children = node.child & bits; children != 0; children &= visit.wanted(node) & (children - 1)) {
+    const unsigned bit = lowestBit(children);
+    const Node& child = levels_[0].nodes[node.childAt(bit)];
+    std::uint64_t cells = child.full & visit.wanted(child);
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int32_t first = 4 * CELL_COORDINATES[bit][axis];
+      cells &= RANGE_MASKS[axis][std::max(lo[axis] - first, 0)][std::min(hi[axis] - first, 3)];
+    }
+    if (cells != 0 && visit(child, cells)) return true;
+  }
+  return false;
+}
+
+template <class Visit>
 bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
-  const auto within = [&box](int axis) { return box.lo[axis] >> 4 == box.hi[axis] >> 4; };
-  if (levels_with_leaves_ < 4 && within(0) && within(1) && within(2)) {  // the common case: small box, small leaves
-    const std::uint32_t index = find(1, box.lo[0] >> 4, box.lo[1] >> 4, box.lo[2] >> 4);
-    if (index == NONE) return false;
-    return descend(1, levels_[1].nodes[index], {box.lo[0] & ~15, box.lo[1] & ~15, box.lo[2] & ~15}, box, visit);
+  if (levels_with_leaves_ < 4 && box.hi[0] - box.lo[0] < 16 && box.hi[1] - box.lo[1] < 16 &&
+      box.hi[2] - box.lo[2] < 16) {  // the common case: small box, small leaves
+    for (std::int32_t z = box.lo[2] >> 4; z <= box.hi[2] >> 4; ++z) {
+      for (std::int32_t y = box.lo[1] >> 4; y <= box.hi[1] >> 4; ++y) {
+        for (std::int32_t x = box.lo[0] >> 4; x <= box.hi[0] >> 4; ++x) {
+          const std::uint32_t index = find(1, x, y, z);
+          if (index != NONE && visitSmall(levels_[1].nodes[index], {x << 4, y << 4, z << 4}, box, visit)) return true;
+        }
+      }
+    }
+    return false;
   }
   // Start where the box spans two nodes an axis at most; above that only the leaves of the nodes themselves matter.
   int start = 1;
@@ -184,7 +218,7 @@ bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
           if (level == start) {
             if (descend(level, node, origin, box, visit)) return true;
           } else {
-            const std::uint64_t bits = node.full & boxBits(level, origin, box);
+            const std::uint64_t bits = node.full & boxBits(level, origin, box) & visit.wanted(node);
             if (bits != 0 && visit(node, bits)) return true;
           }
         }
@@ -194,49 +228,64 @@ bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
   return false;
 }
 
-template <class Visit>
-void VoxelTree::visitBits(const Node& node, std::uint64_t bits, Visit& visit) {
-  std::uint32_t last = NONE;
-  for (; bits != 0; bits &= bits - 1) {
-    const std::uint32_t leaf = node.leafAt(lowestBit(bits));
-    if (leaf != last) visit(leaf);
-    last = leaf;
-  }
+template <class Wanted, class Visit>
+void VoxelTree::visitWanted(const KeyBox& box, Wanted wanted, Visit& visit) const {
+  struct Leaves {
+    Wanted wanted;
+    Visit& visit;
+    bool operator()(const Node& node, std::uint64_t bits) {
+      std::uint32_t last = NONE;
+      for (; bits != 0; bits &= bits - 1) {
+        const std::uint32_t leaf = node.leafAt(lowestBit(bits));
+        if (leaf != last) visit(leaf);
+        last = leaf;
+      }
+      return false;
+    }
+  };
+  visitNodes(box, Leaves{wanted, visit});
 }
 
 template <class Visit>
 void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
-  visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
-    visitBits(node, bits, visit);
-    return false;
-  });
+  visitWanted(box, [](const Node&) { return ~std::uint64_t{0}; }, visit);
 }
 
 template <class Visit>
 void VoxelTree::visitLeavesWithEdges(const KeyBox& box, Visit&& visit) const {
-  visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
-    visitBits(node, bits & node.edges, visit);
-    return false;
-  });
+  visitWanted(box, [](const Node& node) { return node.edges; }, visit);
 }
 
 template <class Visit>
 void VoxelTree::visitLeavesWithCorners(const KeyBox& box, Visit&& visit) const {
-  visitNodes(box, [&visit](const Node& node, std::uint64_t bits) {
-    visitBits(node, bits & node.corners, visit);
-    return false;
-  });
+  visitWanted(box, [](const Node& node) { return node.corners; }, visit);
 }
 
 inline VoxelTree::Reached VoxelTree::reached(const KeyBox& box) const {
-  Reached found;
-  visitNodes(box, [&found](const Node& node, std::uint64_t bits) {
-    found.leaf = true;
-    found.edge = found.edge || (bits & node.edges) != 0;
-    found.corner = found.corner || (bits & node.corners) != 0;
-    return found.corner && found.edge;
-  });
-  return found;
+  struct Kinds {
+    Reached found;
+    /// Whatever has something that was not found yet.
+    std::uint64_t wanted(const Node& node) const {
+      return (found.leaf ? 0 : ~std::uint64_t{0}) | (found.edge ? 0 : node.edges) | (found.corner ? 0 : node.corners);
+    }
+    bool operator()(const Node& node, std::uint64_t bits) {
+      found.leaf = true;
+      found.edge = found.edge || (bits & node.edges) != 0;
+      found.corner = found.corner || (bits & node.corners) != 0;
+      return found.corner && found.edge;
+    }
+  };
+  Kinds kinds;
+  visitNodes(box, kinds);
+  return kinds.found;
+}
+
+inline bool VoxelTree::reachesLeaf(const KeyBox& box) const {
+  struct Any {
+    std::uint64_t wanted(const Node&) const { return ~std::uint64_t{0}; }
+    bool operator()(const Node&, std::uint64_t) const { return true; }
+  };
+  return visitNodes(box, Any());
 }
 
 }  // namespace deformable_ccd
