@@ -40,9 +40,19 @@ double meets(double u0, double u1, double l0, double l1, double margin) {
 }
 
 double bound(const double (*p0)[8], const double (*p1)[8], int first_count, double separation) {
+  // At t=0, per direction: what meets there has no say. That leaves few directions, and few divisions.
+  double low_a[8], high_a[8], low_b[8], high_b[8];
+  for (int d = 0; d < 8; ++d) {
+    const bool edges = first_count == 2;
+    low_a[d] = std::min(p0[0][d], p0[edges ? 1 : 0][d]);
+    high_a[d] = std::max(p0[0][d], p0[edges ? 1 : 0][d]);
+    low_b[d] = std::min(std::min(p0[edges ? 2 : 1][d], p0[2][d]), p0[3][d]);
+    high_b[d] = std::max(std::max(p0[edges ? 2 : 1][d], p0[2][d]), p0[3][d]);
+  }
   double latest = 0;
   for (int d = 0; d < 8; ++d) {
     const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * UP : 0;
+    if (!(low_a[d] - margin > high_b[d]) && !(low_b[d] - margin > high_a[d])) continue;
     // Every vertex of one feature against every vertex of the other; the features' projections meet when the first pair
     // of opposite ends does. What is not later than the best so far needs no further look.
     for (const bool first_above : {true, false}) {
