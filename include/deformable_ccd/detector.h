@@ -39,6 +39,7 @@ struct StepStats {
   std::uint64_t vf_candidates = 0, ee_candidates = 0;  ///< out of the linear filter
   std::uint64_t undecided = 0, initial = 0, leaving = 0;
   std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
+  std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
   const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
   StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
   const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
@@ -68,6 +69,7 @@ struct DetectorOptions {
   double step_budget_ms = 0;      ///< 0: none
   bool earliest_only = false;     ///< only the contacts with the earliest TOC cell are returned
   bool check_start_state = true;  ///< run the static tests when the step needs them
+  bool unfolded_test = true;      ///< leave out the self-collision of surfaces that certainly do not fold (no answer changes)
 };
 
 /// A body as the detector sees it; fixed until setBodies is called again.

@@ -14,6 +14,7 @@
 #include "detector/pair_worker.h"
 #include "detector/scene_arrays.h"
 #include "detector/start_state.h"
+#include "detector/unfolded.h"
 
 namespace deformable_ccd {
 namespace {
@@ -80,6 +81,7 @@ struct Detector::Impl {
   const StepResult& run(const MotionStep& step);
   void findPairs(const StepContext& context);
   bool staysApart(std::size_t body) const;
+  bool isUnfolded(std::size_t body);
   void rememberApart(bool certain);
   void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
   void runPairs(StepContext& context);
@@ -100,6 +102,7 @@ struct Detector::Impl {
   std::vector<std::uint32_t> body_pairs;
   HitOrder order;
   StartStateTest start_state;
+  std::vector<UnfoldedTest> unfolded;
   std::vector<std::uint8_t> apart;  // per body: at the end of the last step it certainly did not touch itself
   bool continues = false;
   std::vector<std::unique_ptr<ObstacleTest>> obstacle_tests;
@@ -229,6 +232,13 @@ bool Detector::Impl::staysApart(std::size_t body) const {
   return continues && body < apart.size() && apart[body] && scene.bodies()[body].translates;
 }
 
+bool Detector::Impl::isUnfolded(std::size_t body) {
+  const SceneBody& b = scene.bodies()[body];
+  // With a separation, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
+  if (!options.unfolded_test || options.broad_phase == BroadPhase::BRUTE_FORCE) return false;
+  return b.setup.minimum_separation_m == 0 && !b.masked && unfolded[body].run(b, scene.vertices());
+}
+
 void Detector::Impl::rememberApart(bool certain) {
   apart.resize(scene.bodies().size(), 0);
   for (std::size_t b = 0; b < apart.size(); ++b) {
@@ -247,6 +257,10 @@ void Detector::Impl::findPairs(const StepContext& context) {
   const std::size_t n = scene.bodies().size();
   for (std::size_t b = 0; b < n; ++b) {
     if (!scene.bodies()[b].setup.self_collision || staysApart(b)) continue;
+    if (isUnfolded(b)) {
+      ++result.stats.unfolded_bodies;
+      continue;
+    }
     const std::uint16_t i = static_cast<std::uint16_t>(b);
     addTasks(PairKind::VERTEX_FACE, i, i, context);
     addTasks(PairKind::EDGE_EDGE, i, i, context);
@@ -397,6 +411,8 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
   for (const BodySetup& b : bodies) separation = std::max(separation, b.minimum_separation_m);
   Impl::checkSeparation(impl_->options, separation);
   impl_->scene.setBodies(std::move(bodies), rest_positions);
+  impl_->unfolded.clear();
+  for (const SceneBody& body : impl_->scene.bodies()) impl_->unfolded.emplace_back(body);
   impl_->start_state.forget();
   impl_->apart.clear();
   impl_->obstacle_tests.clear();

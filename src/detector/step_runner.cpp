@@ -31,6 +31,7 @@ void add(const core::StepStats& part, core::StepStats& sum) {
   sum.undecided += part.undecided;
   sum.initial += part.initial;
   sum.leaving += part.leaving;
+  sum.unfolded_bodies += part.unfolded_bodies;
   // The same vertices in every part.
   sum.unchecked_vertices = std::max(sum.unchecked_vertices, part.unchecked_vertices);
   sum.unchecked_faces = std::max(sum.unchecked_faces, part.unchecked_faces);
