@@ -17,6 +17,12 @@ nlohmann::json spread(std::vector<double> values) {
   return {{"best", n ? values.front() : 0.0}, {"median", median}, {"worst", n ? values.back() : 0.0}, {"runs", n}};
 }
 
+nlohmann::json quartiles(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) { return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))]; };
+  return {{"median", at(0.5)}, {"quartile_1", at(0.25)}, {"quartile_3", at(0.75)}, {"runs", values.size()}};
+}
+
 double calibrationMs() {
   double best = 1e9;
   for (int run = 0; run < 5; ++run) {

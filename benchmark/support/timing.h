@@ -21,6 +21,9 @@ class Stopwatch {
 /// {"best", "median", "worst", "runs"}; every value 0 for no runs.
 nlohmann::json spread(std::vector<double> values);
 
+/// {"median", "quartile_1", "quartile_3", "runs"} of ratios taken run by run; of at least one value.
+nlohmann::json quartiles(std::vector<double> values);
+
 /// What a time depends on: processor, SIMD target, compiler, and the time of a fixed arithmetic kernel in this process.
 nlohmann::json machine();
 

@@ -1,0 +1,108 @@
+// What the normal cone and contour test buys: the whole step with and without it, runs in turn, on a cloth that hardly
+// folds and on one that folds everywhere. Contacts are compared before a time is written.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "deformable_ccd/detector.h"
+#include "support/data.h"
+#include "support/scene_data.h"
+#include "support/timing.h"
+
+namespace deformable_ccd {
+namespace benchmarks {
+namespace {
+
+struct Case {
+  std::string name;
+  std::shared_ptr<const Topology> topology;
+  Positions t0, t1;
+};
+
+/// A cloth in the wind: side x side points, waves a third as high as they are long, moving on by a twelfth.
+Case wavingCloth(std::size_t side) {
+  Case c;
+  c.name = "waving cloth";
+  c.topology = std::make_shared<const Topology>(Topology::grid(side, side));
+  for (std::size_t r = 0; r < side; ++r) {
+    for (std::size_t k = 0; k < side; ++k) {
+      const double x = static_cast<double>(k) / static_cast<double>(side), y = static_cast<double>(r) / static_cast<double>(side);
+      const double phase = 2 * M_PI * (2 * x + y);
+      c.t0.emplace_back(x, y, 0.05 * std::sin(phase));
+      c.t1.emplace_back(x + 0.002, y, 0.05 * std::sin(phase + M_PI / 6));
+    }
+  }
+  return c;
+}
+
+nlohmann::json measure(const Case& c, int repeat) {
+  BodySetup body;
+  body.name = "cloth";
+  body.topology = c.topology;
+  MotionStep step;
+  step.bodies = {{&c.t0, &c.t1}};
+  std::deque<Detector> detectors;
+  for (const bool with : {false, true}) {
+    DetectorOptions options;
+    options.check_start_state = false;
+    options.unfolded_test = with;
+    detectors.emplace_back(options);
+    detectors.back().setBodies({body}, {&c.t0});
+  }
+  std::vector<double> times[2], ratios;
+  std::size_t contacts = 0;
+  bool certified = false;
+  for (int r = 0; r < repeat; ++r) {
+    for (std::size_t with = 0; with < 2; ++with) {
+      const Stopwatch watch;
+      const StepResult& result = detectors[with].run(step);
+      times[with].push_back(watch.milliseconds());
+      if (with == 0) contacts = result.contacts.size();
+      if (result.contacts.size() != contacts) throw std::runtime_error(c.name + ": the test changes the contacts");
+      certified = result.stats.unfolded_bodies == 1;
+    }
+    ratios.push_back(times[0].back() / times[1].back());
+  }
+  return {{"case", c.name},          {"triangles", c.topology->faces().size()}, {"contacts", contacts},
+          {"certified", certified},  {"without_ms", spread(times[0])},          {"with_ms", spread(times[1])},
+          {"ratio", quartiles(ratios)}};
+}
+
+}  // namespace
+}  // namespace benchmarks
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  using namespace deformable_ccd;
+  using namespace deformable_ccd::benchmarks;
+  std::string out;
+  int repeat = 25;
+  CLI::App app("Times the step with and without the culling of surfaces that do not fold.");
+  app.add_option("--out", out, "JSON file to write")->required();
+  app.add_option("--repeat", repeat, "runs of each case")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    std::vector<Case> cases{wavingCloth(101), wavingCloth(216)};
+    if (!test::dataDir().empty()) {
+      const std::string folder = test::dataDir() + "/scenes/cloth-ball/";
+      const test::PlyMesh first = test::readPly(folder + "frame_0.ply"), second = test::readPly(folder + "frame_1.ply");
+      cases.push_back({"cloth-ball",
+                       std::make_shared<const Topology>(Topology::fromTriangles(first.vertices.size(), first.faces)),
+                       first.vertices, second.vertices});
+    }
+    nlohmann::json result{{"machine", machine()}};
+    for (const Case& c : cases) {
+      result["runs"].push_back(measure(c, repeat));
+      std::cerr << result["runs"].back().dump() << '\n';
+    }
+    std::ofstream(out) << result.dump(1) << '\n';
+  } catch (const std::exception& e) {
+    std::cerr << "culling_benchmark: " << e.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
