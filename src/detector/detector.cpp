@@ -82,6 +82,8 @@ struct Detector::Impl {
   void findPairs(const StepContext& context);
   bool staysApart(std::size_t body) const;
   bool isUnfolded(std::size_t body);
+  void chooseSelfTests(const MotionStep& step);
+  bool needsTrees(const MotionStep& step) const;
   void rememberApart(bool certain);
   void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
   void runPairs(StepContext& context);
@@ -104,7 +106,7 @@ struct Detector::Impl {
   StartStateTest start_state;
   std::vector<UnfoldedTest> unfolded;
   std::vector<std::uint8_t> apart;  // per body: at the end of the last step it certainly did not touch itself
-  bool continues = false;
+  std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at in this step
   std::vector<std::unique_ptr<ObstacleTest>> obstacle_tests;
   Positions map_t0, map_t1;
   std::vector<std::uint8_t> obstacle_active;
@@ -140,7 +142,11 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
 
   start = Clock::now();
-  scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); });
+  chooseSelfTests(step);
+  stats[Stage::BROAD_PHASE].ms += msSince(start);
+
+  start = Clock::now();
+  if (needsTrees(step)) scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); });
   stats[Stage::BOUNDS].ms = msSince(start);
 
   if (options.check_start_state) {
@@ -160,7 +166,6 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
                                    std::chrono::duration<double, std::milli>(options.step_budget_ms));
   }
   for (PairWorker& w : workers) w.beginStep();
-  continues = step.continues;
   findPairs(context);
   runPairs(context);
   collect();
@@ -229,7 +234,23 @@ void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, c
 // A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
 // stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
 bool Detector::Impl::staysApart(std::size_t body) const {
-  return continues && body < apart.size() && apart[body] && scene.bodies()[body].translates;
+  return body < apart.size() && apart[body] && scene.bodies()[body].translates;
+}
+
+void Detector::Impl::chooseSelfTests(const MotionStep& step) {
+  self_tested.assign(scene.bodies().size(), 0);
+  for (std::size_t b = 0; b < self_tested.size(); ++b) {
+    if (!scene.bodies()[b].setup.self_collision || (step.continues && staysApart(b))) continue;
+    const bool unfolded = isUnfolded(b);
+    result.stats.unfolded_bodies += unfolded;
+    self_tested[b] = !unfolded;
+  }
+}
+
+// A single body that cannot meet itself is tested against the obstacle alone, which has bounds of its own.
+bool Detector::Impl::needsTrees(const MotionStep& step) const {
+  return self_tested.size() > 1 || std::count(self_tested.begin(), self_tested.end(), 1) > 0 ||
+         (options.check_start_state && start_state.needsTrees(step.continues));
 }
 
 bool Detector::Impl::isUnfolded(std::size_t body) {
@@ -256,11 +277,7 @@ void Detector::Impl::findPairs(const StepContext& context) {
   group_pairs.clear();
   const std::size_t n = scene.bodies().size();
   for (std::size_t b = 0; b < n; ++b) {
-    if (!scene.bodies()[b].setup.self_collision || staysApart(b)) continue;
-    if (isUnfolded(b)) {
-      ++result.stats.unfolded_bodies;
-      continue;
-    }
+    if (!self_tested[b]) continue;
     const std::uint16_t i = static_cast<std::uint16_t>(b);
     addTasks(PairKind::VERTEX_FACE, i, i, context);
     addTasks(PairKind::EDGE_EDGE, i, i, context);

@@ -37,6 +37,9 @@ class StartStateTest {
   /// START_STATE.
   const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, core::StepStats& stats);
 
+  /// Whether run() would search the bodies' trees.
+  bool needsTrees(bool continues) const { return !(continues && known_); }
+
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete);
 
