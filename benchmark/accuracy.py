@@ -125,47 +125,60 @@ def write_csv(path, rows):
         writer.writerows(rows)
 
 
+def plot_steps(axes, steps):
+    """A line a rung and scene: from the best run to the median one; what is wrong stands beside it."""
+    rungs = list(dict.fromkeys(r["rung"] for r in steps))
+    scenes = list(dict.fromkeys(r["scene"] for r in steps))
+    for k, scene in enumerate(scenes):
+        for r in (r for r in steps if r["scene"] == scene):
+            y = rungs.index(r["rung"]) + 0.28 * (k - 0.5 * (len(scenes) - 1))
+            first = r["rung"] == rungs[0]
+            axes.plot([r["best_ms"], r["median_ms"]], [y, y], color="C%d" % k, marker="|", linewidth=4, solid_capstyle="butt",
+                      label=scene if first else None)
+            wrong = ["%d missed" % r["missed"]] * (r["missed"] > 0) + ["%d false" % r["false"]] * (r["false"] > 0)
+            wrong += ["all undecided"] * (r["undecided"] == r["reported"] > 0)
+            axes.annotate(", ".join(wrong + ["TOC to %.0e" % max(r["max_toc_error"], 2.0 ** -52)]), (r["median_ms"], y), xytext=(6, -3),
+                          textcoords="offset points", fontsize=7, color="firebrick" if wrong else "dimgray")
+    axes.set_yticks(range(len(rungs)), rungs)
+    axes.invert_yaxis()
+    low, high = min(r["best_ms"] for r in steps), max(r["median_ms"] for r in steps)
+    axes.set(xscale="log", xlim=(0.85 * low, 2.1 * high), xlabel="whole step, one thread: best to median [ms]",
+             title="A step with 92,230 and one with 146,480 triangles")
+    axes.legend(fontsize=8, loc="lower right")
+
+
+def plot_pairs(axes, pairs):
+    rungs = list(dict.fromkeys(r["rung"] for r in pairs))
+    for k, source in enumerate(dict.fromkeys(r["source"] for r in pairs)):
+        for kind, marker in (("VF", "^"), ("EE", "o")):
+            mine = [r for r in pairs if r["source"] == source and r["kind"] == kind]
+            wrong = [int(r["missed"]) + int(r["false_contacts"]) for r in mine]
+            x, y = [float(r["median_ns"]) for r in mine], [rungs.index(r["rung"]) for r in mine]
+            axes.plot(x, y, color="C%d" % k, marker=marker, linestyle="none", fillstyle="none", label="%s, %s" % (source, kind))
+            axes.plot([v for v, n in zip(x, wrong) if n], [v for v, n in zip(y, wrong) if n], color="C%d" % k, marker=marker,
+                      linestyle="none")
+    axes.set_yticks(range(len(rungs)), rungs)
+    axes.invert_yaxis()
+    axes.set(xscale="log", xlabel="elementary test, median of a pair [ns]", title="Filled: some answers are wrong")
+    axes.legend(fontsize=7, loc="upper right")
+
+
 def plot(steps, pairs, folder):
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6))
-    floor = 2.0 ** -54  # where an error of 0 is drawn
-    markers = {"cloth-ball": "o", "n-body": "s"}
-    for scene in dict.fromkeys(r["scene"] for r in steps):
-        mine = [r for r in steps if r["scene"] == scene]
-        left.plot([max(r["max_toc_error"], floor) for r in mine], [r["median_ms"] for r in mine], linestyle="none",
-                  marker=markers.get(scene, "^"), label=scene)
-        if scene == next(iter(markers)):
-            for r in mine:
-                left.annotate(r["rung"], (max(r["max_toc_error"], floor), r["median_ms"]), textcoords="offset points",
-                              xytext=(5, 5), fontsize=7)
-    left.set(xscale="log", yscale="log", xlabel="worst error of the TOC [share of the step]", ylabel="whole step, median [ms]",
-             title="One step, one thread")
-    left.invert_xaxis()
-    left.legend()
-    for source in dict.fromkeys(r["source"] for r in pairs):
-        for kind, fill in (("VF", "full"), ("EE", "none")):
-            mine = [r for r in pairs if r["source"] == source and r["kind"] == kind]
-            right.plot([r["rung"] for r in mine], [float(r["median_ns"]) for r in mine], marker="o", fillstyle=fill,
-                       linestyle=":", linewidth=0.8, label="%s, %s" % (source, kind))
-            for r in mine:
-                wrong = int(r["missed"]) + int(r["false_contacts"])
-                if wrong:
-                    right.annotate("%d wrong" % wrong, (r["rung"], float(r["median_ns"])), textcoords="offset points",
-                                   xytext=(3, 5), fontsize=6)
-    right.set(yscale="log", ylabel="per pair, median [ns]", title="The elementary test alone")
-    right.tick_params(axis="x", rotation=35, labelsize=8)
-    right.legend(fontsize=7)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.8))
+    plot_steps(left, steps)
+    plot_pairs(right, pairs)
     for axes in (left, right):
-        for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-            ticks(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
-        axes.tick_params(axis="y", which="minor", labelsize=7)
-        axes.grid(True, which="major", linewidth=0.3)
+        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+        axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
+        axes.grid(True, axis="x", linewidth=0.3)
     figure.tight_layout()
     for ending in ("svg", "png"):
-        figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=150)
+        figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=130)
 
 
 def markdown(rows):
