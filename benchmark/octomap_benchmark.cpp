@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <set>
 
 #include "deformable_ccd/detector.h"
 #include "deformable_ccd/voxel_surface.h"
@@ -142,6 +143,45 @@ nlohmann::json timeSteps(const Case& c, const std::shared_ptr<const VoxelSurface
   return spread(times);
 }
 
+/// Building the surface of a room: floor, walls and what stands about, 200,000 voxels and more.
+nlohmann::json measureBuild(int repeat) {
+  std::mt19937 random(8);
+  std::uniform_int_distribution<int> anywhere(0, 299);
+  std::set<std::array<int, 3>> keys;
+  for (int i = 0; i < 300; ++i) {
+    for (int j = 0; j < 300; ++j) {
+      keys.insert({i, j, 0});
+      if (j >= 120) continue;
+      keys.insert({i, 0, j});
+      keys.insert({0, i, j});
+    }
+  }
+  while (keys.size() < 200000) {
+    const int x = anywhere(random), y = anywhere(random), height = 1 + anywhere(random) / 6;
+    for (int dx = 0; dx < 6; ++dx) {
+      for (int dy = 0; dy < 6; ++dy) {
+        for (int z = 1; z <= height; ++z) keys.insert({x + dx, y + dy, z});
+      }
+    }
+  }
+  std::vector<OccupiedLeaf> leaves;
+  for (const auto& key : keys) {
+    OccupiedLeaf leaf;
+    leaf.min = {static_cast<std::uint16_t>(32600 + key[0]), static_cast<std::uint16_t>(32600 + key[1]),
+                static_cast<std::uint16_t>(32768 + key[2])};
+    leaves.push_back(leaf);
+  }
+  std::vector<double> times;
+  for (int r = 0; r < repeat; ++r) {
+    const Stopwatch watch;
+    const auto surface = VoxelSurface::build(VOXEL_M, leaves);
+    times.push_back(watch.milliseconds());
+    if (surface->leafCount() != leaves.size()) throw std::runtime_error("the surface lost leaves");
+  }
+  return {{"case", "surface of a map, built on its own thread"}, {"triangles", 0},   {"voxels", leaves.size()},
+          {"contacts", 0},                                       {"required_ms", 20.0}, {"ms", spread(times)}};
+}
+
 nlohmann::json measure(int repeat) {
   std::vector<Case> cases;
   cases.push_back(makeCase("20,000 triangles, far away", 101, 101, 2.0, 50, 1, 1.5, true));
@@ -172,6 +212,8 @@ nlohmann::json measure(int repeat) {
     std::cerr << run.dump() << '\n';
     out["runs"].push_back(run);
   }
+  out["runs"].push_back(measureBuild(repeat));
+  std::cerr << out["runs"].back().dump() << '\n';
   return out;
 }
 

@@ -64,6 +64,7 @@ nlohmann::json measure(const Frames& frames, int threads, int repeat, std::vecto
     rest.push_back(&frames.t0[b]);
     step.bodies.push_back({&frames.t0[b], &frames.t1[b]});
   }
+  const std::size_t memory_before = residentBytes();
   detector.setBodies(setups, rest);
   std::vector<double> times;
   nlohmann::json out;
@@ -80,6 +81,8 @@ nlohmann::json measure(const Frames& frames, int threads, int repeat, std::vecto
            {"contacts", result.contacts.size()}};
   }
   out["ms"] = spread(times);
+  out["bytes_a_triangle"] =
+      static_cast<double>(residentBytes() - memory_before) / static_cast<double>(frames.triangles);
   return out;
 }
 

@@ -87,13 +87,14 @@ def write_step(folder, rows):
 
 def write_scaling(folder, result):
     header = ["triangles", "threads", "candidates a triangle", "contacts a triangle", "best ms", "median ms",
-              "median ns a triangle"]
+              "median ns a triangle", "bytes a triangle"]
     rows, series = [], {}
     for r in result["runs"]:
         n = r["triangles"]
         per_triangle = 1e6 * r["ms"]["median"] / n
         rows.append(["%d" % n, str(r["threads"]), "%.1f" % (r["candidates"] / n), "%.2f" % (r["contacts"] / n),
-                     "%.1f" % r["ms"]["best"], "%.1f" % r["ms"]["median"], "%.0f" % per_triangle])
+                     "%.1f" % r["ms"]["best"], "%.1f" % r["ms"]["median"], "%.0f" % per_triangle,
+                     "%.0f" % r["bytes_a_triangle"]])
         series.setdefault(r["threads"], []).append((n, per_triangle))
     write_rows(os.path.join(folder, "scaling.csv"), header, rows)
     plt = pyplot()
@@ -109,7 +110,8 @@ def write_scaling(folder, result):
     figure.savefig(os.path.join(folder, "scaling.png"), dpi=120)
     plt.close(figure)
     return save(folder, "scaling", "# Growth with the number of triangles\n\nGenerated scene: %s. Candidates are those "
-                "out of the linear filter. Contacts are the same for every number of threads.\n\n" % result["scene"] +
+                "out of the linear filter. Contacts are the same for every number of threads. Memory is what the detector "
+                "holds after its runs, contacts included.\n\n" % result["scene"] +
                 table(header, rows))
 
 

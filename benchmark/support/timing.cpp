@@ -1,6 +1,8 @@
 #include "support/timing.h"
 
 #include <hwy/targets.h>
+#include <malloc.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -21,6 +23,14 @@ nlohmann::json quartiles(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const auto at = [&](double share) { return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))]; };
   return {{"median", at(0.5)}, {"quartile_1", at(0.25)}, {"quartile_3", at(0.75)}, {"runs", values.size()}};
+}
+
+std::size_t residentBytes() {
+  malloc_trim(0);  // what was freed before is not in use
+  std::ifstream pages("/proc/self/statm");
+  std::size_t total = 0, resident = 0;
+  pages >> total >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
 double calibrationMs() {

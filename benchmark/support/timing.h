@@ -24,6 +24,9 @@ nlohmann::json spread(std::vector<double> values);
 /// {"median", "quartile_1", "quartile_3", "runs"} of ratios taken run by run; of at least one value.
 nlohmann::json quartiles(std::vector<double> values);
 
+/// Memory of this process that is in use [bytes].
+std::size_t residentBytes();
+
 /// What a time depends on: processor, SIMD target, compiler, and the time of a fixed arithmetic kernel in this process.
 nlohmann::json machine();
 
