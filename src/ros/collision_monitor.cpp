@@ -40,6 +40,7 @@ using std::chrono::microseconds;
 constexpr microseconds POLL{2000}, SLEEP{100000};
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
+const ros::WallDuration RENEWAL(0.05);
 
 std::int64_t steadyNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -78,12 +79,13 @@ struct CollisionMonitor::Impl {
 
   ros::CallbackQueue input_callbacks, service_callbacks;
   ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
-  std::vector<ros::Subscriber> mesh_subscribers;
-  std::vector<std::uint8_t> had_publisher;
+  std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
+  ros::SteadyTimer renewal;
   ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
   std::vector<ros::ServiceServer> services;
   std::unique_ptr<Reconfigure> reconfigure;
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
+  std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
@@ -97,8 +99,7 @@ struct CollisionMonitor::Impl {
 
   // Input thread.
   void subscribe();
-  void subscribeMesh(std::size_t body);
-  void onMesh(std::size_t body, const ShapeShifter::ConstPtr& message);
+  void onMesh(std::size_t body, MeshMessage message);
   void onMap(const ShapeShifter::ConstPtr& message);
 
   // Service thread.
@@ -109,8 +110,8 @@ struct CollisionMonitor::Impl {
 
   // Worker.
   void work();
-  void renewSubscriptions();
   void takeMaps();
+  void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
   void publish(StepOutcome& outcome);
   void complain(std::size_t body, const std::string& kind, const std::string& text);
@@ -121,8 +122,9 @@ struct CollisionMonitor::Impl {
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
-void CollisionMonitor::Impl::onMesh(std::size_t body, const ShapeShifter::ConstPtr& message) {
+void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
+  frames_handed_over += std::holds_alternative<TypedMesh>(message);
   if (!enabled) {
     queue.command([this, body] {
       pipeline.monitor().countReceived(body);
@@ -130,7 +132,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, const ShapeShifter::ConstP
     });
     return;
   }
-  queue.push(body, {message, static_cast<StampNs>(ros::Time::now().toNSec()), now_ns});
+  queue.push(body, {std::move(message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns});
 }
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
@@ -153,23 +155,21 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
 }
 
-void CollisionMonitor::Impl::subscribeMesh(std::size_t body) {
-  ros::NodeHandle input(node);
-  input.setCallbackQueue(&input_callbacks);
-  mesh_subscribers[body] = input.subscribe<ShapeShifter>(
-      config.bodies[body].topic, SUBSCRIBER_QUEUE, [this, body](const ShapeShifter::ConstPtr& m) { onMesh(body, m); },
-      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
-}
-
 void CollisionMonitor::Impl::subscribe() {
   ros::NodeHandle input(node);
   input.setCallbackQueue(&input_callbacks);
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
-  mesh_subscribers.resize(config.bodies.size());
-  had_publisher.resize(config.bodies.size(), 0);
+  mesh_subscriptions.resize(config.bodies.size());
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    if (!config.bodies[b].isRigid()) subscribeMesh(b);
+    if (config.bodies[b].isRigid()) continue;
+    mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
+        input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
+  renewal = input.createSteadyTimer(RENEWAL, [this](const ros::SteadyTimerEvent&) {
+    for (const auto& subscription : mesh_subscriptions) {
+      if (subscription) subscription->renew();
+    }
+  });
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
       ros::VoidConstPtr(), hints);
@@ -282,20 +282,6 @@ void CollisionMonitor::Impl::accountDropped() {
   }
 }
 
-/// A subscription to any type takes on the type of its first publisher for good. When the last publisher is gone, a new
-/// subscription is open to any type again.
-void CollisionMonitor::Impl::renewSubscriptions() {
-  for (std::size_t b = 0; b < mesh_subscribers.size(); ++b) {
-    if (!mesh_subscribers[b]) continue;
-    const bool has_publisher = mesh_subscribers[b].getNumPublishers() > 0;
-    if (had_publisher[b] && !has_publisher) {
-      mesh_subscribers[b].shutdown();
-      subscribeMesh(b);
-    }
-    had_publisher[b] = has_publisher;
-  }
-}
-
 void CollisionMonitor::Impl::takeMaps() {
   LoadedMap map;
   if (!maps || !maps->take(map)) return;
@@ -307,17 +293,24 @@ void CollisionMonitor::Impl::takeMaps() {
   pipeline.setMap(std::move(map), steadyNs());
 }
 
+void CollisionMonitor::Impl::takeMessage(std::size_t body, const QueuedMessage& queued) {
+  if (const auto* typed = std::get_if<TypedMesh>(&queued.message)) {
+    return pipeline.take(body, *typed, queued.receipt_ns, queued.arrival_ns);
+  }
+  const ShapeShifter& message = *std::get<ShapeShifter::ConstPtr>(queued.message);
+  const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
+  if (problem.empty()) {
+    pipeline.take(body, {message.getDataType(), bytesOf(message), queued.receipt_ns, queued.arrival_ns});
+  } else {
+    pipeline.refuse(body, queued.receipt_ns, queued.arrival_ns, problem);
+  }
+}
+
 void CollisionMonitor::Impl::takeMessages() {
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     QueuedMessage queued;
     if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
-    const ShapeShifter& message = *queued.message;
-    const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
-    if (problem.empty()) {
-      pipeline.take(b, {message.getDataType(), bytesOf(message), queued.receipt_ns, queued.arrival_ns});
-    } else {
-      pipeline.refuse(b, queued.receipt_ns, queued.arrival_ns, problem);
-    }
+    takeMessage(b, queued);
     const std::string complaint = pipeline.takeComplaint(b);
     if (!complaint.empty()) complain(b, "message", "refused: " + complaint);
   }
@@ -329,6 +322,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.weld_changes = pipeline.weldChanges();
   context.latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
   context.maps_received = maps ? maps->received() : 0;
+  context.frames_handed_over = frames_handed_over;
   context.maps_refused = maps ? maps->refused() : 0;
   context.parameter_hash = config.hash;
   return context;
@@ -361,7 +355,6 @@ void CollisionMonitor::Impl::work() {
     if (stopping) return;
     if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
     effects.apply(pipeline.monitor(), map_publisher_seen);
-    renewSubscriptions();
     takeMaps();
     takeMessages();
     accountDropped();
@@ -385,6 +378,7 @@ void CollisionMonitor::Impl::start() {
 
 void CollisionMonitor::Impl::stop() {
   stopping = true;
+  renewal.stop();
   input_spinner.stop();
   service_spinner.stop();
   reconfigure.reset();

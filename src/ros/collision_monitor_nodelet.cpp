@@ -1,4 +1,5 @@
 // The node's class as a nodelet: deformable_ccd/CollisionMonitor.
+#include <exception>
 #include <memory>
 
 #include <nodelet/nodelet.h>
@@ -10,8 +11,14 @@ namespace deformable_ccd {
 
 class CollisionMonitorNodelet : public nodelet::Nodelet {
  private:
-  // What it throws about a parameter reaches the manager, which refuses to load and logs the sentence.
-  void onInit() override { monitor_ = std::make_unique<CollisionMonitor>(getNodeHandle(), getPrivateNodeHandle()); }
+  void onInit() override {
+    try {
+      monitor_ = std::make_unique<CollisionMonitor>(getNodeHandle(), getPrivateNodeHandle());
+    } catch (const std::exception& error) {
+      NODELET_FATAL_STREAM("collision_monitor cannot start: " << error.what());
+      throw;  // the manager then refuses to load, but says nothing about why
+    }
+  }
   std::unique_ptr<CollisionMonitor> monitor_;
 };
 

@@ -8,15 +8,14 @@
 #include <mutex>
 #include <vector>
 
-#include <topic_tools/shape_shifter.h>
-
+#include "ros/mesh_subscription.h"
 #include "ros/monitor_config.h"
 
 namespace deformable_ccd {
 
-/// A message as the callback got it; its bytes are read by the worker.
+/// A message as the callback got it; it is read by the worker.
 struct QueuedMessage {
-  topic_tools::ShapeShifter::ConstPtr message;
+  MeshMessage message;
   StampNs receipt_ns = 0;
   std::int64_t arrival_ns = 0;
 };

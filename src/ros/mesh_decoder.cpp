@@ -89,29 +89,42 @@ void MeshDecoder::reset() {
   representative_.clear();
 }
 
-DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
+template <typename Read>
+DecodedMesh MeshDecoder::guarded(const std::string& datatype, Read read) {
   const auto& types = meshTypes();
   const auto type = std::find_if(types.begin(), types.end(), [&](const MeshType& t) { return datatype == t.datatype; });
   if (type == types.end()) {
-    refuse("type " + datatype + " is not a mesh; accepted are MeshStamped, PointCloud2, PolygonMesh, Marker, MarkerArray, shape_msgs/Mesh");
+    refuse("type " + datatype + " is not a mesh; accepted are MeshStamped, PointCloud2, PolygonMesh, Marker, MarkerArray, "
+           "shape_msgs/Mesh");
   }
   if (config_.type != "auto" && config_.type != type->name) {
     refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
   }
-  WireReader wire(data, size);
   try {
-    const std::string name = type->name;
+    return read(std::string(type->name));
+  } catch (const WireError& error) {
+    refuse(datatype + ": " + error.what());
+  } catch (const TopologyError& error) {
+    refuse(datatype + ": " + error.what());
+  }
+}
+
+DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
+  WireReader wire(data, size);
+  return guarded(datatype, [&](const std::string& name) {
     if (name == "mesh_stamped") return decodeIndexed(readMeshStamped(wire));
     if (name == "point_cloud2") return decodeCloud(readCloud(wire));
     if (name == "polygon_mesh") return decodeIndexed(readPolygonMesh(wire));
     if (name == "shape_mesh") return decodeIndexed(readShapeMesh(wire));
     if (name == "marker") return decodeMarkers({readMarker(wire)});
     return decodeMarkers(readMarkerArray(wire));
-  } catch (const WireError& error) {
-    refuse(datatype + ": " + error.what());
-  } catch (const TopologyError& error) {
-    refuse(datatype + ": " + error.what());
-  }
+  });
+}
+
+DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
+  return guarded(datatypeOf(message), [&](const std::string&) {
+    return std::visit([this](const auto& typed) { return decodeView(viewOf(*typed)); }, message);
+  });
 }
 
 void MeshDecoder::checkCount(std::size_t count) const {

@@ -10,6 +10,7 @@
 
 #include "deformable_ccd/mesh_store.h"
 #include "ros/mesh_views.h"
+#include "ros/typed_mesh.h"
 
 namespace deformable_ccd {
 
@@ -58,6 +59,8 @@ class MeshDecoder {
   /// `datatype` as in the connection header, for example "sensor_msgs/PointCloud2". Throws MeshError; after one the
   /// decoder is as before.
   DecodedMesh decode(const std::string& datatype, const std::uint8_t* data, std::size_t size);
+  /// The same of a message that was never serialised.
+  DecodedMesh decode(const TypedMesh& message);
 
   /// Forgets topology and weld, as after a restart of the publisher.
   void reset();
@@ -69,6 +72,12 @@ class MeshDecoder {
   std::vector<Index> weld_;                        // soup corner to vertex
   std::vector<Index> representative_;              // vertex to one of its corners
 
+  template <typename Read>
+  DecodedMesh guarded(const std::string& datatype, Read read);
+  DecodedMesh decodeView(const CloudView& cloud) { return decodeCloud(cloud); }
+  DecodedMesh decodeView(const IndexedView& mesh) { return decodeIndexed(mesh); }
+  DecodedMesh decodeView(const MarkerView& marker) { return decodeMarkers({marker}); }
+  DecodedMesh decodeView(const std::vector<MarkerView>& markers) { return decodeMarkers(markers); }
   DecodedMesh decodeCloud(const CloudView& cloud);
   DecodedMesh decodeIndexed(const IndexedView& mesh);
   DecodedMesh decodeMarkers(const std::vector<MarkerView>& markers);

@@ -18,23 +18,34 @@ namespace {
 constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
 
 void readFields(WireReader& wire, CloudView& cloud) {
-  bool found[3] = {false, false, false};
+  CloudFieldFinder finder;
   const std::size_t count = wire.readCount("fields", 4 + 4 + 1 + 4);
   for (std::size_t i = 0; i < count; ++i) {
     const std::string_view name = wire.readString("fields.name");
     const std::size_t offset = wire.read<std::uint32_t>("fields.offset");
     const auto datatype = wire.read<std::uint8_t>("fields.datatype");
     wire.skip(4, "fields.count");
-    if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') continue;
-    if (datatype != FLOAT32 && datatype != FLOAT64) {
-      throw WireError("field '" + std::string(name) + "' has datatype " + std::to_string(datatype) +
-                      "; FLOAT32 (7) or FLOAT64 (8) is needed");
-    }
-    cloud.xyz[static_cast<std::size_t>(name[0] - 'x')] = {offset, datatype == FLOAT64};
-    found[name[0] - 'x'] = true;
+    finder.add(name, offset, datatype, cloud);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!found[axis]) throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'");
+  finder.finish();
+}
+
+}  // namespace
+
+void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud) {
+  if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') return;
+  if (datatype != FLOAT32 && datatype != FLOAT64) {
+    throw WireError("field '" + std::string(name) + "' has datatype " + std::to_string(datatype) +
+                    "; FLOAT32 (7) or FLOAT64 (8) is needed");
+  }
+  const auto axis = static_cast<std::size_t>(name[0] - 'x');
+  cloud.xyz[axis] = {offset, datatype == FLOAT64};
+  found_[axis] = true;
+}
+
+void CloudFieldFinder::finish() const {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!found_[axis]) throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'");
   }
 }
 
@@ -58,8 +69,6 @@ void checkStrides(const CloudView& cloud, std::size_t bytes) {
                     std::to_string(cloud.point_step) + " bytes do not fit into data of " + std::to_string(bytes));
   }
 }
-
-}  // namespace
 
 Vec3 CloudView::point(std::size_t i) const {
   const std::uint8_t* at = data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step;
@@ -107,12 +116,16 @@ IndexedView readShapeMesh(WireReader& wire) {
   return mesh;
 }
 
+void fillHeader(IndexedView& mesh) {
+  if (mesh.header->stamp_ns == 0) mesh.header->stamp_ns = mesh.cloud->header.stamp_ns;
+  if (mesh.header->frame_id.empty()) mesh.header->frame_id = mesh.cloud->header.frame_id;
+}
+
 IndexedView readPolygonMesh(WireReader& wire) {
   IndexedView mesh;
   mesh.header = readHeader(wire);
   mesh.cloud = readCloud(wire);
-  if (mesh.header->stamp_ns == 0) mesh.header->stamp_ns = mesh.cloud->header.stamp_ns;
-  if (mesh.header->frame_id.empty()) mesh.header->frame_id = mesh.cloud->header.frame_id;
+  fillHeader(mesh);
   const std::size_t count = wire.readCount("polygons", 4);
   mesh.polygons.reserve(count);
   for (std::size_t i = 0; i < count; ++i) mesh.polygons.push_back(wire.readArray<std::uint32_t>("polygons.vertices"));

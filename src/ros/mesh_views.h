@@ -36,6 +36,19 @@ struct CloudView {
 };
 CloudView readCloud(WireReader& wire);
 
+/// Looks for the fields x, y and z of a cloud, one after the other. Throws WireError for a type that is no coordinate.
+class CloudFieldFinder {
+ public:
+  void add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud);
+  /// Throws WireError naming the field that is not there.
+  void finish() const;
+
+ private:
+  std::array<bool, 3> found_{};
+};
+/// Throws WireError unless every coordinate of every point lies within `bytes` of data.
+void checkStrides(const CloudView& cloud, std::size_t bytes);
+
 /// Triangles by index: MeshStamped, shape_msgs/Mesh, pcl_msgs/PolygonMesh.
 struct IndexedView {
   std::optional<HeaderView> header;
@@ -48,6 +61,8 @@ struct IndexedView {
 IndexedView readMeshStamped(WireReader& wire);
 IndexedView readShapeMesh(WireReader& wire);
 IndexedView readPolygonMesh(WireReader& wire);
+/// PolygonMesh: where the mesh's own header says nothing, its cloud's counts.
+void fillHeader(IndexedView& mesh);
 
 /// One visualization_msgs/Marker.
 struct MarkerView {

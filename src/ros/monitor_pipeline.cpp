@@ -46,22 +46,33 @@ void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns
   if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
 }
 
-void MonitorPipeline::take(std::size_t body, const RawMessage& message) {
+template <typename Decode>
+void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode) {
   finishing_ = false;
   Waiting waiting;
-  waiting.arrival_ns = message.arrival_ns;
+  waiting.arrival_ns = arrival_ns;
   try {
-    waiting.mesh = decoders_[body].decode(message.datatype, message.bytes.data(), message.bytes.size());
+    waiting.mesh = decode(decoders_[body]);
   } catch (const MeshError& error) {
     monitor_->countReceived(body);
-    return skip(body, error.status, message.receipt_ns, message.arrival_ns, error.what());
+    return skip(body, error.status, receipt_ns, arrival_ns, error.what());
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;
-  if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
+  if (unstamped) waiting.mesh.stamp_ns = receipt_ns;
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changed;
   if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
   waiting_[body] = std::move(waiting);
+}
+
+void MonitorPipeline::take(std::size_t body, const RawMessage& message) {
+  takeDecoded(body, message.receipt_ns, message.arrival_ns, [&](MeshDecoder& decoder) {
+    return decoder.decode(message.datatype, message.bytes.data(), message.bytes.size());
+  });
+}
+
+void MonitorPipeline::take(std::size_t body, const TypedMesh& message, StampNs receipt_ns, std::int64_t arrival_ns) {
+  takeDecoded(body, receipt_ns, arrival_ns, [&](MeshDecoder& decoder) { return decoder.decode(message); });
 }
 
 void MonitorPipeline::refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason) {

@@ -43,6 +43,8 @@ class MonitorPipeline {
   bool idle(std::size_t body) const { return !waiting_[body]; }
   /// Counts, decodes and keeps one message of an idle body.
   void take(std::size_t body, const RawMessage& message);
+  /// The same of a message that a publisher in this process handed over.
+  void take(std::size_t body, const TypedMesh& message, StampNs receipt_ns, std::int64_t arrival_ns);
   /// Counts a message that is refused unread; the clock body's yield an outcome.
   void refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason);
   void setMap(LoadedMap map, std::int64_t now_ns);
@@ -92,6 +94,8 @@ class MonitorPipeline {
   bool finishing_ = false;
 
   void loadFiles();
+  template <typename Decode>
+  void takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// False: still waits.
   bool place(std::size_t body, std::int64_t now_ns);

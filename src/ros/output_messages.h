@@ -20,6 +20,7 @@ struct StatsContext {
   std::uint64_t weld_changes = 0;
   double latency_s = 0;
   std::uint64_t maps_received = 0, maps_refused = 0;
+  std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
   double unknown_fraction = 0;
   std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;

@@ -1,0 +1,163 @@
+// The monitor beside a publisher in the same process: what that publishes is neither serialised nor copied.
+#include <boost/make_shared.hpp>
+#include <deformable_ccd/ContactArray.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <gtest/gtest.h>
+#include <nodelet/loader.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+
+#include "ros/mesh_subscription.h"
+#include "ros/support/meshes.h"
+#include "ros/support/probe.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+using topic_tools::ShapeShifter;
+
+boost::shared_ptr<const MeshStamped> shared(const Mesh& mesh, double stamp_s) {
+  return boost::make_shared<const MeshStamped>(meshStamped(mesh, stamp_s));
+}
+
+/// A subscription on a callback queue that the test serves itself.
+struct Subscription : ::testing::Test {
+  ros::NodeHandle node;
+  ros::CallbackQueue callbacks;
+  std::vector<MeshMessage> received;
+
+  std::unique_ptr<MeshSubscription> subscribe(const std::string& topic) {
+    ros::NodeHandle handle(node);
+    handle.setCallbackQueue(&callbacks);
+    return std::make_unique<MeshSubscription>(handle, topic,
+                                              [this](MeshMessage m) { received.push_back(std::move(m)); });
+  }
+  bool serveUntil(std::size_t count) {
+    return waitUntil([&] {
+      callbacks.callAvailable(ros::WallDuration(0.01));
+      return received.size() >= count;
+    });
+  }
+  const MeshStamped* address(std::size_t i) const {
+    const auto* typed = std::get_if<TypedMesh>(&received[i]);
+    return typed ? std::get<MeshStamped::ConstPtr>(*typed).get() : nullptr;
+  }
+};
+
+TEST_F(Subscription, TheObjectItselfArrivesFromTheSameProcess) {
+  const auto subscription = subscribe("/near/mesh");
+  const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/near/mesh");
+  std::vector<boost::shared_ptr<const MeshStamped>> sent;
+  for (int i = 0; i < 5; ++i) {
+    sent.push_back(shared(tipAbove(1), 10 + i));
+    publisher.publish(sent.back());
+    ASSERT_TRUE(serveUntil(sent.size()));
+  }
+  ASSERT_EQ(received.size(), sent.size());
+  EXPECT_EQ(address(0), nullptr) << "the first one shows the type, and came as bytes";
+  for (std::size_t i = 1; i < sent.size(); ++i) EXPECT_EQ(address(i), sent[i].get()) << "message " << i;
+}
+
+TEST_F(Subscription, NoneIsLostOrDoubledAtTheChange) {
+  const auto subscription = subscribe("/burst/mesh");
+  const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/burst/mesh");
+  constexpr int COUNT = 100;
+  // Some wait already when the first is served, some come while the subscription is being changed.
+  for (int i = 0; i < 10; ++i) publisher.publish(shared(tipAbove(1), 10 + i));
+  std::thread more([&] {
+    for (int i = 10; i < COUNT; ++i) {
+      publisher.publish(shared(tipAbove(1), 10 + i));
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+  });
+  EXPECT_TRUE(serveUntil(COUNT));
+  more.join();
+  callbacks.callAvailable(ros::WallDuration(0.05));
+  ASSERT_EQ(received.size(), static_cast<std::size_t>(COUNT));
+  for (int i = 0; i < COUNT; ++i) {
+    const auto* typed = std::get_if<TypedMesh>(&received[static_cast<std::size_t>(i)]);
+    const MeshStamped::ConstPtr mesh = typed ? std::get<MeshStamped::ConstPtr>(*typed)
+                                             : std::get<ShapeShifter::ConstPtr>(received[i])->instantiate<MeshStamped>();
+    ASSERT_TRUE(mesh);
+    EXPECT_EQ(mesh->header.stamp, ros::Time(10 + i)) << "in order";
+  }
+  EXPECT_NE(address(COUNT - 1), nullptr);
+}
+
+TEST_F(Subscription, OpensToAnotherTypeWhenThePublisherIsGone) {
+  const auto subscription = subscribe("/change/mesh");
+  {
+    const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/change/mesh");
+    for (std::size_t i = 1; i <= 3; ++i) {
+      publisher.publish(shared(tipAbove(1), 10.0 * static_cast<double>(i)));
+      ASSERT_TRUE(serveUntil(i));
+    }
+    subscription->renew();
+  }
+  ASSERT_TRUE(waitUntil([&] {
+    subscription->renew();
+    return subscription->getNumPublishers() == 0;
+  }));
+  subscription->renew();
+  const ros::Publisher publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/change/mesh");
+  publisher.publish(boost::make_shared<const sensor_msgs::PointCloud2>(cloud(gridAt(2, 2, 0), 50)));
+  ASSERT_TRUE(serveUntil(4));
+  const auto last = boost::make_shared<const sensor_msgs::PointCloud2>(cloud(gridAt(2, 2, 0), 51));
+  publisher.publish(last);
+  ASSERT_TRUE(serveUntil(5));
+  EXPECT_EQ(std::get<sensor_msgs::PointCloud2::ConstPtr>(std::get<TypedMesh>(received[4])), last);
+}
+
+TEST(Nodelet, FindsTheSameContactsWithoutSerialising) {
+  nodelet::Loader loader;
+  nodelet::M_string remappings{{"/mesh", "/nodelet/mesh"}, {"/octomap", "/nodelet/octomap"}};
+  ros::param::set("/inside/fixed_frame", "world");
+  ros::param::set("/inside/max_vertex_step_m", 10.0);
+  ASSERT_TRUE(loader.load("/inside", "deformable_ccd/CollisionMonitor", remappings, {}));
+
+  ros::NodeHandle node;
+  Probe<ContactArray> contacts(node, "/inside/contacts");
+  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
+  const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/nodelet/mesh");
+  constexpr int FRAMES = 10;
+  for (int i = 0; i < FRAMES; ++i) {
+    const std::size_t seen = contacts.count();
+    publisher.publish(shared(tipAbove(i % 2 ? -3 : 1), 10 + 0.1 * i));
+    const ContactArray outcome = contacts.after(seen);
+    EXPECT_EQ(outcome.status, i == 0 ? ContactArray::FIRST_FRAME : ContactArray::OK) << outcome.reason;
+    if (i % 2 == 1) {
+      EXPECT_FALSE(outcome.contacts.empty()) << "down through the triangle";
+    }
+  }
+  const auto handedOver = [&]() -> std::string {
+    const auto array = diagnostics.last();
+    for (const auto& status : array.status) {
+      for (const auto& pair : status.values) {
+        if (pair.key == "frames handed over in process") return pair.value;
+      }
+    }
+    return "";
+  };
+  EXPECT_TRUE(waitUntil([&] { return handedOver() == std::to_string(FRAMES - 1); }, 5)) << handedOver();
+}
+
+TEST(Nodelet, AWrongParameterIsRefusedByName) {
+  nodelet::Loader loader;
+  ros::param::set("/wrong/acuracy", "exact");
+  EXPECT_FALSE(loader.load("/wrong", "deformable_ccd/CollisionMonitor", {}, {}));
+  ros::param::del("/wrong");
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "nodelet_test");
+  ros::NodeHandle node;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
