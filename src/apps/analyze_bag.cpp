@@ -99,7 +99,7 @@ int analyze(const Arguments& a) {
       {"mesh messages", std::to_string(summary.mesh_messages)}, {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
       {"accuracy", toString(config.monitor.detector.accuracy.rung)}, {"threads", std::to_string(config.monitor.detector.num_threads)},
       {"SIMD target", simdTarget()}};
-  for (const std::string& c : summary.complaints) facts.push_back({"refused", c});
+  for (const std::string& c : summary.complaints) facts.push_back({"complaint", c});
   report.setFacts(std::move(facts));
   if (!a.no_rungs) report.setRungs(otherRungs(a, config, options));
   report.finish();
@@ -107,7 +107,7 @@ int analyze(const Arguments& a) {
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
             << "report: " << a.report << "/report.html\n";
-  for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: refused: " << c << '\n';
+  for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: " << c << '\n';
   return 0;
 }
 

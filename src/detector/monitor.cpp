@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "detector/step_runner.h"
+#include "mesh/seam_reason.h"
 
 namespace deformable_ccd {
 
@@ -97,7 +98,7 @@ struct Monitor::Impl {
     step.status = status;
     step.reason = reason;
   }
-  void onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns);
+  void onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, std::string reason);
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   void place(const Pending& step);
@@ -165,18 +166,21 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
     m.has_last = false;
     return status;
   }
-  const StepStatus status = m.stores.at(body).push(std::move(frame));
+  MeshStore& store = m.stores.at(body);
+  const std::shared_ptr<const MeshFrame> before = store.empty() ? nullptr : store.newestShared();
+  const StepStatus status = store.push(std::move(frame));
   if (body == m.options.clock_body) {
-    m.onClockFrame(status, stamp_ns, now_ns);
+    const std::string reason = before ? seamReason(status, *before, store.newest(), m.options.store) : "";
+    m.onClockFrame(status, stamp_ns, now_ns, reason);
   } else {
     m.counters[body].count(status);
   }
   return status;
 }
 
-void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns) {
+void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, std::string reason) {
   const MeshStore& store = stores[options.clock_body];
-  Pending step{status, nullptr, nullptr, stamp_ns, now_ns, ++sequence, {}};
+  Pending step{status, nullptr, nullptr, stamp_ns, now_ns, ++sequence, std::move(reason)};
   if (status == StepStatus::OK) {
     step.from = store.previous();
     step.to = store.newestShared();

@@ -113,7 +113,8 @@ struct BagReplay::Run {
       pipeline.take(body, {message.getDataType(), bytesOf(message), now_ns, now_ns});
     }
     const std::string complaint = pipeline.takeComplaint(body);
-    if (!complaint.empty()) complain(summary.mesh_topics[body] + ": " + complaint);
+    if (!complaint.empty()) complain(summary.mesh_topics[body] + ": refused: " + complaint);
+    if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(sink, at);
   }
 };

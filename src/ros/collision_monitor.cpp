@@ -17,12 +17,13 @@
 #include <topic_tools/shape_shifter.h>
 
 #include "deformable_ccd/simd_target.h"
+#include "ros/advice.h"
 #include "ros/diagnostics.h"
 #include "ros/effects.h"
 #include "ros/input_queue.h"
 #include "ros/known_types.h"
-#include "ros/log_throttle.h"
 #include "ros/map_loader.h"
+#include "ros/monitor_log.h"
 #include "ros/monitor_pipeline.h"
 #include "ros/reconfigure.h"
 #include "ros/step_recorder.h"
@@ -73,7 +74,7 @@ struct CollisionMonitor::Impl {
   Outputs outputs;
   InputQueue queue;
   Diagnostics diagnostics;
-  LogThrottle log{5};
+  MonitorLog log;
   EffectTracker effects;
   std::unique_ptr<MapLoader> maps;
 
@@ -92,7 +93,7 @@ struct CollisionMonitor::Impl {
       : node(n), private_node(p), config(configOf(p)), pipeline(config, transforms),
         recorder(config, pipeline.monitor()), outputs(private_node, config.monitor.look_ahead_s > 0),
         queue(config.bodies.size(), config.queue_size, config.queue_policy),
-        diagnostics(private_node.getNamespace(), node), effects(config) {}
+        diagnostics(private_node.getNamespace(), node), log(node, private_node.getNamespace(), config), effects(config) {}
 
   void start();
   void stop();
@@ -114,8 +115,8 @@ struct CollisionMonitor::Impl {
   void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
   void publish(StepOutcome& outcome);
-  void complain(std::size_t body, const std::string& kind, const std::string& text);
   void accountDropped();
+  void lookIntoSilence();
   void resetNow(StepStatus status);
   StatsContext statsContext() const;
 };
@@ -139,12 +140,12 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
   const std::string problem = mapTypeProblem(message->getDataType(), message->getMD5Sum());
   if (!problem.empty()) {
-    queue.command([this, problem] { complain(config.bodies.size(), "map type", problem); });
+    queue.command([this, problem] { log.complain(config.bodies.size(), "map type", problem); });
     return;
   }
   if (message->size() > config.max_map_bytes) {
     queue.command([this, size = message->size()] {
-      complain(config.bodies.size(), "map size",
+      log.complain(config.bodies.size(), "map size",
                "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
       LoadedMap refused;
       refused.problem = "the octomap is larger than max_map_mb";
@@ -242,13 +243,6 @@ void CollisionMonitor::Impl::advertiseServices() {
 
 // --- worker ----------------------------------------------------------------------------------------------------------
 
-void CollisionMonitor::Impl::complain(std::size_t body, const std::string& kind, const std::string& text) {
-  const std::string topic = body < config.bodies.size() ? node.resolveName(config.bodies[body].topic)
-                                                         : node.resolveName(config.octomap_topic);
-  const std::string line = log.line(topic + " " + kind, topic + ": " + text, steadyNs());
-  if (!line.empty()) ROS_WARN_STREAM(line);
-}
-
 void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const MarkerConfig& markers) {
   config.markers = markers;
   // What the effect plan decides stays with it.
@@ -278,7 +272,8 @@ void CollisionMonitor::Impl::accountDropped() {
     if (dropped[b] == 0) continue;
     pipeline.monitor().countReceived(b, dropped[b]);
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
-    complain(b, "queue", std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come");
+    log.complain(b, "queue", std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
+                             adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
   }
 }
 
@@ -286,7 +281,7 @@ void CollisionMonitor::Impl::takeMaps() {
   LoadedMap map;
   if (!maps || !maps->take(map)) return;
   if (!map.surface) {
-    complain(config.bodies.size(), "map", "refused: " + map.problem);
+    log.complain(config.bodies.size(), "map", "refused: " + map.problem);
     map.problem = "the octomap was refused: " + map.problem;
   }
   map_publisher_seen = true;
@@ -312,8 +307,19 @@ void CollisionMonitor::Impl::takeMessages() {
     if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
     takeMessage(b, queued);
     const std::string complaint = pipeline.takeComplaint(b);
-    if (!complaint.empty()) complain(b, "message", "refused: " + complaint);
+    // The clock body's come as outcomes, which are logged when they are published.
+    if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", "refused: " + complaint);
   }
+}
+
+void CollisionMonitor::Impl::lookIntoSilence() {
+  if (!log.isSilenceDue(steadyNs())) return;
+  std::vector<AwaitedTopic> silent;
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
+    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
+  }
+  log.hintAt(silent, pipeline);
 }
 
 StatsContext CollisionMonitor::Impl::statsContext() const {
@@ -331,10 +337,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
 void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  if (outcome.status != StepStatus::OK && outcome.status != StepStatus::FIRST_FRAME) {
-    complain(config.monitor.clock_body, toString(outcome.status),
-             std::string(toString(outcome.status)) + (outcome.reason.empty() ? "" : ": " + outcome.reason));
-  }
+  log.tell(outcome);
   StatsContext context = statsContext();
   context.unknown_fraction = pipeline.unknownFraction(outcome);
   outputs.publish(outcome, bodies, context, config.markers, frame);
@@ -364,7 +367,8 @@ void CollisionMonitor::Impl::work() {
     if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
     more = false;
     for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
-    diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected());
+    lookIntoSilence();
+    diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected() ? log.mapSource() : "", log.hint());
   }
 }
 

@@ -8,6 +8,8 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/time.h>
 
+#include "ros/advice.h"
+
 namespace deformable_ccd {
 
 namespace {
@@ -42,7 +44,33 @@ void Diagnostics::add(const StepOutcome& outcome, const StatsContext& context) {
   context_ = context;
 }
 
-void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, bool map_expected) {
+void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::string& map_topic,
+                        const std::string& hint) const {
+  const auto raise = [&](decltype(status.level) level, const std::string& text) {
+    if (level <= status.level) return;
+    status.level = level;
+    status.message = text;
+  };
+  const auto because = [&](const std::string& what) {
+    const std::string advice = adviceFor(status_, reason_, map_topic);
+    return what + toString(status_) + (reason_.empty() ? "" : ": " + reason_) + (advice.empty() ? "" : "; " + advice);
+  };
+  if (!enabled) raise(DiagnosticStatus::WARN, "disabled");
+  if (outcomes_ > 0 && answers_ == 0) raise(DiagnosticStatus::ERROR, because("no answer: "));
+  if (!map_topic.empty() && outcomes_ > 0 && !map_present_) {
+    raise(DiagnosticStatus::ERROR, status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + reason_);
+  }
+  if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
+  if (context_.frames.of(StepStatus::QUEUE_FULL) > dropped_before_) {
+    raise(DiagnosticStatus::WARN, "frames are dropped, steps take longer than frames come; " +
+                                      adviceFor(StepStatus::QUEUE_FULL, {}, map_topic));
+  }
+  if (status_ != StepStatus::OK && isAnswered(status_)) raise(DiagnosticStatus::WARN, because(""));
+  if (!hint.empty()) raise(DiagnosticStatus::WARN, hint);
+}
+
+void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic,
+                                 const std::string& hint) {
   if (now_ns - last_ns_ < PERIOD_NS) return;
   const double seconds = last_ns_ == 0 ? 1 : static_cast<double>(now_ns - last_ns_) * 1e-9;
   last_ns_ = now_ns;
@@ -50,18 +78,8 @@ void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, bool map_exp
   status.name = name_ + ": steps";
   status.level = DiagnosticStatus::OK;
   status.message = toString(status_);
+  judge(status, enabled, map_topic, hint);
   const std::uint64_t dropped = context_.frames.of(StepStatus::QUEUE_FULL);
-  const auto raise = [&](decltype(status.level) level, const std::string& text) {
-    if (level <= status.level) return;
-    status.level = level;
-    status.message = text;
-  };
-  if (!enabled) raise(DiagnosticStatus::WARN, "disabled");
-  if (outcomes_ > 0 && answers_ == 0) raise(DiagnosticStatus::ERROR, std::string("no answer: ") + toString(status_) + " " + reason_);
-  if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive");
-  if (dropped > dropped_before_) raise(DiagnosticStatus::WARN, "frames are dropped: steps take longer than frames come");
-  if (map_expected && outcomes_ > 0 && !map_present_) raise(DiagnosticStatus::ERROR, "no octomap: " + reason_);
-  if (status_ != StepStatus::OK && isAnswered(status_)) raise(DiagnosticStatus::WARN, std::string(toString(status_)) + ": " + reason_);
   dropped_before_ = dropped;
   put(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
   put(status, "answers [Hz]", static_cast<double>(answers_) / seconds);

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 
@@ -14,9 +15,14 @@ class Diagnostics {
  public:
   Diagnostics(const std::string& name, ros::NodeHandle& node);
   void add(const StepOutcome& outcome, const StatsContext& context);
-  void publishWhenDue(std::int64_t now_ns, bool enabled, bool map_expected);
+  /// At most once a second. `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty when
+  /// none is expected.
+  void publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic, const std::string& hint);
 
  private:
+  void judge(diagnostic_msgs::DiagnosticStatus& status, bool enabled, const std::string& map_topic,
+             const std::string& hint) const;
+
   std::string name_;
   ros::Publisher publisher_;
   std::int64_t last_ns_ = 0;

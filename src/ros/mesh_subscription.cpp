@@ -105,9 +105,9 @@ void MeshSubscription::narrow(const std::string& datatype) {
 
 void MeshSubscription::renew() {
   if (any_ && !held_.empty() && ros::SteadyTime::now() - narrowed_at_ > MAX_OVERLAP) closeAny();
-  const bool has_publisher = getNumPublishers() > 0;
-  if (had_publisher_ && !has_publisher) openToAnyType();
-  had_publisher_ = has_publisher;
+  const std::uint32_t publishers = any_ ? any_.getNumPublishers() : typed_.getNumPublishers();
+  if (publishers_ > 0 && publishers == 0) openToAnyType();
+  publishers_ = publishers;
 }
 
 }  // namespace deformable_ccd

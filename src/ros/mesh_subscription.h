@@ -1,6 +1,8 @@
 // One body's topic, of whatever type its publisher has.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <variant>
@@ -33,14 +35,15 @@ class MeshSubscription {
   /// A subscription takes on the type of its first publisher for good. When the last publisher is gone, this one opens to
   /// any type again. To be called now and then.
   void renew();
-  std::uint32_t getNumPublishers() const { return any_ ? any_.getNumPublishers() : typed_.getNumPublishers(); }
+  /// As of the last renew(). From any thread.
+  std::uint32_t getNumPublishers() const { return publishers_; }
 
  private:
   ros::NodeHandle node_;
   std::string topic_;
   Callback callback_;
   ros::Subscriber any_, typed_;
-  bool had_publisher_ = false;
+  std::atomic<std::uint32_t> publishers_{0};
   // While both subscriptions are open (see onTyped).
   topic_tools::ShapeShifter::ConstPtr last_bytes_;
   std::vector<TypedMesh> held_;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "ros/advice.h"
 #include "ros/mesh_resource.h"
 #include "ros/transforms.h"
 
@@ -24,6 +25,8 @@ MonitorPipeline::MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& t
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
+  hints_.resize(config_.bodies.size());
+  hinted_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::loadFiles() {
@@ -56,6 +59,10 @@ void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int
   } catch (const MeshError& error) {
     monitor_->countReceived(body);
     return skip(body, error.status, receipt_ns, arrival_ns, error.what());
+  }
+  if (hinted_[body] != waiting.mesh.topology) {
+    hinted_[body] = waiting.mesh.topology;
+    hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = receipt_ns;

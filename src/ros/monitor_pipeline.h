@@ -67,6 +67,8 @@ class MonitorPipeline {
   double unknownFraction(const StepOutcome& outcome) const;
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none.
   std::string takeComplaint(std::size_t body);
+  /// What looks like a mistake in the body's messages, though they are valid (advice.h); empty: nothing does.
+  const std::string& hint(std::size_t body) const { return hints_[body]; }
 
  private:
   struct Waiting {
@@ -83,7 +85,8 @@ class MonitorPipeline {
   std::vector<MeshDecoder> decoders_;
   std::vector<std::optional<Waiting>> waiting_;
   std::vector<std::optional<RigidMesh>> rigid_;
-  std::vector<std::string> complaints_;
+  std::vector<std::string> complaints_, hints_;
+  std::vector<std::shared_ptr<const Topology>> hinted_;  // the topology that the hint is about
   std::optional<LoadedMap> unplaced_map_;
   std::shared_ptr<const KnownSpace> known_;  // of the map in use
   std::int64_t unplaced_since_ns_ = 0;

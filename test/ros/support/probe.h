@@ -45,6 +45,10 @@ class Probe {
     const std::lock_guard<std::mutex> lock(mutex_);
     return messages_.size() > seen ? messages_[seen] : Message();
   }
+  std::vector<Message> all() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return messages_;
+  }
   Message last() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return messages_.empty() ? Message() : messages_.back();

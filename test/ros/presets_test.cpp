@@ -1,0 +1,252 @@
+// The presets of launch/presets against emulated publishers: type, topic, stamps and frames as the real ones have them.
+#include <deformable_ccd/ContactArray.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <gtest/gtest.h>
+#include <octomap_msgs/Octomap.h>
+#include <ros/ros.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "octomap/map_builder.h"
+#include "ros/support/meshes.h"
+#include "ros/support/probe.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr double RATE_HZ = 30;
+constexpr double TABLE_M = 0;  // height of the table's top in the map
+constexpr std::size_t MONITORS = 4;
+
+/// A table of 2 m x 2 m below z = 0 and, where `more` says so, other voxels; as octomap_server sends it: latched, binary, in
+/// the frame map, stamped when the sensor saw it.
+octomap_msgs::Octomap tableMap(const std::function<bool(const Vec3&)>& more = [](const Vec3&) { return false; }) {
+  octomap_msgs::Octomap map;
+  map.header.stamp = ros::Time::now();
+  map.header.frame_id = "map";
+  map.binary = true;
+  map.id = "OcTree";
+  map.resolution = 0.05;
+  map.data = buildOctomap(0.05, Box{{-1, -1, -0.2}, {1, 1, 1}},
+                          [&](const Vec3& c) { return c.z() < TABLE_M || more(c); }, true);
+  return map;
+}
+
+Positions grid(std::size_t rows, std::size_t cols, double spacing_m, double z) {
+  Positions positions;
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < cols; ++c) {
+      positions.emplace_back(spacing_m * (static_cast<double>(c) - 0.5 * static_cast<double>(cols - 1)),
+                             spacing_m * (static_cast<double>(r) - 0.5 * static_cast<double>(rows - 1)), z);
+    }
+  }
+  return positions;
+}
+
+/// A camera that looks straight down from a metre above the table; its optical frame has z ahead and y down in the image.
+void toOpticalFrame(Positions& positions) {
+  for (Vec3& p : positions) p = Vec3(p.x(), -p.y(), 1 - p.z());
+}
+
+geometry_msgs::TransformStamped cameraPose(const std::string& frame) {
+  geometry_msgs::TransformStamped pose;
+  pose.header.stamp = ros::Time::now();
+  pose.header.frame_id = "map";
+  pose.child_frame_id = frame;
+  pose.transform.translation.z = 1;
+  pose.transform.rotation.x = 1;  // half a turn about x
+  return pose;
+}
+
+/// A cloud as pcl_ros publishes it: points of 32 bytes with a colour behind the coordinates, stamps in whole microseconds.
+sensor_msgs::PointCloud2 pclCloud(const Positions& positions, const std::string& frame) {
+  sensor_msgs::PointCloud2 out = cloud(positions, 0, frame);
+  out.header.stamp.fromNSec(ros::Time::now().toNSec() / 1000 * 1000);
+  sensor_msgs::PointField colour;
+  colour.name = "rgb";
+  colour.offset = 16;
+  colour.datatype = sensor_msgs::PointField::FLOAT32;
+  colour.count = 1;
+  out.fields.push_back(colour);
+  out.point_step = 32;
+  out.row_step = 32 * out.width;
+  std::vector<std::uint8_t> wide(out.row_step);
+  for (std::size_t i = 0; i < positions.size(); ++i) std::memcpy(&wide[32 * i], &out.data[16 * i], 16);
+  out.data = wide;
+  out.is_dense = true;
+  return out;
+}
+
+class Preset : public ::testing::Test {
+ protected:
+  explicit Preset(const std::string& name) : contacts(node, "/" + name + "/collision_monitor/contacts") {
+    EXPECT_TRUE(ros::service::waitForService("/" + name + "/collision_monitor/reset", 20000));
+  }
+
+  /// Frames at rest until the monitor has the map and says OK; then frames sink by `speed` for 10 frames. Returns the last
+  /// outcome at rest and those of the fall.
+  ContactArray rest;
+  std::vector<ContactArray> fall;
+  void drop(double from_z, double to_z, const std::function<void(double z)>& publish) {
+    ros::WallRate rate(RATE_HZ);
+    ASSERT_TRUE(waitUntil(
+        [&] {
+          publish(from_z);
+          rate.sleep();
+          rest = contacts.last();
+          return rest.status == ContactArray::OK && rest.answered && ++steady_ > 3;
+        },
+        15))
+        << static_cast<int>(rest.status) << " " << rest.reason;
+    const std::size_t seen = contacts.count();
+    constexpr int FRAMES = 10;
+    for (int i = 1; i <= FRAMES; ++i) {
+      publish(from_z + (to_z - from_z) * i / FRAMES);
+      rate.sleep();
+    }
+    ASSERT_TRUE(waitUntil([&] { return contacts.count() >= seen + FRAMES; }));
+    const auto all = contacts.all();
+    fall.assign(all.end() - FRAMES, all.end());
+    for (const auto& outcome : fall) EXPECT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  }
+  /// Above the table in the first frame of the fall, and in contact with it in a later one.
+  void expectTouched() {
+    EXPECT_GT(touching(), 0u) << "it fell through the table's top";
+    EXPECT_TRUE(fall.front().contacts.empty()) << "still above the table";
+  }
+  /// Steps of the fall that meet the map anew.
+  std::size_t touching() const {
+    return static_cast<std::size_t>(std::count_if(fall.begin(), fall.end(), [](const ContactArray& outcome) {
+      return std::any_of(outcome.contacts.begin(), outcome.contacts.end(),
+                         [](const auto& c) { return c.body[1] == 65535 && !c.initial && !c.leaving; });
+    }));
+  }
+
+  ros::NodeHandle node;
+  Probe<ContactArray> contacts;
+
+ private:
+  int steady_ = 0;
+};
+
+struct Cdcpd : Preset {
+  Cdcpd() : Preset("cdcpd") {}
+};
+
+TEST_F(Cdcpd, ClothInTheCamerasOpticalFrame) {
+  const std::string frame = "kinect2_rgb_optical_frame";
+  const auto tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf_static", true, MONITORS);
+  tf2_msgs::TFMessage poses;
+  poses.transforms.push_back(cameraPose(frame));
+  tf.publish(poses);
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/cdcpd/octomap_binary", true);
+  map.publish(tableMap());
+  const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/cdcpd/output");
+  drop(0.1, -0.02, [&](double z) {
+    Positions positions = grid(20, 20, 0.02, z);
+    toOpticalFrame(positions);
+    publisher.publish(pclCloud(positions, frame));
+  });
+  EXPECT_EQ(rest.header.frame_id, frame) << "without fixed_frame the mesh's own";
+  EXPECT_TRUE(rest.contacts.empty());
+  expectTouched();
+}
+
+struct Trackdlo : Preset {
+  Trackdlo() : Preset("trackdlo") {}
+};
+
+TEST_F(Trackdlo, RopeOf45Points) {
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/trackdlo/octomap_binary", true);
+  octomap_msgs::Octomap table = tableMap();
+  table.header.frame_id = "camera_color_optical_frame";
+  map.publish(table);
+  const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/trackdlo/results_pc");
+  drop(0.1, -0.02, [&](double z) {
+    publisher.publish(pclCloud(grid(1, 45, 0.01, z), "camera_color_optical_frame"));
+  });
+  EXPECT_TRUE(rest.contacts.empty());
+  expectTouched();
+}
+
+struct FabricSimulator : Preset {
+  FabricSimulator() : Preset("fabric_simulator") {}
+
+  /// 16 x 23 = 368 vertices: spheres for the vertices, lines for the edges, and a soup of triangles, all in one array, without
+  /// namespaces, in the frame map.
+  static visualization_msgs::MarkerArray markers(double z) {
+    Mesh mesh{grid(16, 23, 1.0 / 15, z), {}};
+    for (Index r = 0; r + 1 < 16; ++r) {
+      for (Index c = 0; c + 1 < 23; ++c) {
+        const Index a = r * 23 + c;
+        mesh.faces.push_back({a, a + 1, a + 23});
+        mesh.faces.push_back({a + 1, a + 24, a + 23});
+      }
+    }
+    visualization_msgs::MarkerArray triangles = soup(mesh, 0), out;
+    triangles.markers[0].header.frame_id = "map";
+    triangles.markers[0].header.stamp = ros::Time::now();
+    visualization_msgs::Marker points = triangles.markers[0], lines = triangles.markers[0];
+    points.id = 0;
+    points.type = visualization_msgs::Marker::POINTS;
+    lines.id = 1;
+    lines.type = visualization_msgs::Marker::LINE_LIST;
+    out.markers = {points, lines, triangles.markers[0]};
+    return out;
+  }
+};
+
+TEST_F(FabricSimulator, TriangleSoupAmongOtherMarkers) {
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/fabric_simulator/octomap_binary", true);
+  map.publish(tableMap());
+  const auto publisher = advertiseAndWait<visualization_msgs::MarkerArray>(node, "/fabric_markers");
+  drop(0.1, -0.02, [&](double z) { publisher.publish(markers(z)); });
+  EXPECT_TRUE(rest.contacts.empty());
+  EXPECT_EQ(rest.header.frame_id, "map");
+  expectTouched();
+}
+
+struct OctomapServer : Preset {
+  OctomapServer() : Preset("octomap_server") {}
+};
+
+TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/octomap_binary", true);
+  // The sensor saw the left half of the cloth at rest, at z = 0.31.
+  map.publish(tableMap([](const Vec3& c) { return std::abs(c.z() - 0.325) < 0.03 && c.x() > -0.2 && c.x() < 0; }));
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/octomap_server/mesh");
+  const auto frame = [&](double z) {
+    const Positions positions = grid(5, 9, 0.05, z);
+    Mesh mesh{positions, {}};
+    for (Index r = 0; r + 1 < 5; ++r) {
+      for (Index c = 0; c + 1 < 9; ++c) {
+        const Index a = r * 9 + c;
+        mesh.faces.push_back({a, a + 1, a + 9});
+        mesh.faces.push_back({a + 1, a + 10, a + 9});
+      }
+    }
+    MeshStamped message = meshStamped(mesh, 0, "map");
+    message.header.stamp = ros::Time::now();
+    publisher.publish(message);
+  };
+  drop(0.31, -0.02, frame);
+  EXPECT_TRUE(rest.contacts.empty()) << "its own voxels are not listed";
+  EXPECT_GT(rest.suppressed_contacts, 0u) << "but counted";
+  EXPECT_GT(touching(), 0u) << "the table is no part of the cloth";
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "presets_test");
+  ros::NodeHandle node;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
