@@ -28,6 +28,11 @@ MonitorConfig configure(const Arguments& a) {
     const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag) : a.mesh;
     if (!topic.empty() && !(tree.valid() && tree.hasMember("topic"))) tree["topic"] = topic;
   }
+  // The bag knows where its maps are; one that is named stays.
+  if (!(tree.valid() && tree.hasMember("octomap_topic"))) {
+    const std::string topic = BagReplay::firstMapTopic(a.bag);
+    if (!topic.empty()) tree["octomap_topic"] = topic;
+  }
   if (!a.accuracy.empty()) tree["accuracy"] = a.accuracy;
   if (a.threads > 0) tree["num_threads"] = a.threads;
   return readConfig(tree, a.params.empty() ? "--" : a.params + ": ");

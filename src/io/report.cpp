@@ -1,12 +1,13 @@
 #include "io/report.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iomanip>
 #include <limits>
 #include <sstream>
+
+#include "io/flat_layout.h"
 
 namespace deformable_ccd {
 namespace {
@@ -150,10 +151,12 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   any_ = true;
   const core::StepStats& s = o.stats;
   std::size_t undecided = 0, initial = 0, leaving = 0;
+  double earliest_new = std::numeric_limits<double>::infinity();
   for (const core::Contact& c : o.contacts) {
     undecided += c.certainty == Certainty::UNDECIDED;
     initial += c.initial;
     leaving += c.leaving;
+    if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
   }
   steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ',' << csvField(o.reason) << ','
          << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ',' << o.complete << ',' << o.total_contacts << ','
@@ -166,7 +169,8 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   rows_.push_back({{"step", o.sequence}, {"t", time_s}, {"status", toString(o.status)}, {"reason", o.reason},
                    {"answered", o.answered}, {"start_state", toString(o.start_state)}, {"clear", o.clear},
                    {"contacts", o.total_contacts}, {"undecided", undecided}, {"initial", initial},
-                   {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()}, {"ms", s.total_ms}});
+                   {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
+                   {"toc_new", finiteOrNull(earliest_new)}, {"ms", s.total_ms}});
   if (!o.answered) {
     ++not_answered_;
     return;
@@ -181,7 +185,7 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
     first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
     std::ostringstream text;
     text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " (" << KINDS[static_cast<int>(first->kind)]
-         << ", vertices";
+         << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
     for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
     text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided") << (first->initial ? ", initial" : "") << ")";
     first_contact_ = text.str();
@@ -214,7 +218,7 @@ std::string Report::headline() const {
   } else {
     text << "No answer: no step could be checked";
   }
-  if (not_answered_ > 0) text << "; " << not_answered_ << " frames without an answer";
+  if (not_answered_ > 0) text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";
   text << '.';
   return text.str();
 }
@@ -223,27 +227,7 @@ nlohmann::json Report::heatJson() const {
   nlohmann::json bodies = nlohmann::json::array();
   for (const BodyHeat& h : heat_) {
     if (!h.topology) continue;
-    // The layout's own plane: the two directions in which it is largest.
-    Vec3 mean = Vec3::Zero();
-    std::size_t n = 0;
-    for (const Vec3& p : h.layout) {
-      if (!p.allFinite()) continue;
-      mean += p;
-      ++n;
-    }
-    mean /= std::max<double>(1, static_cast<double>(n));
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    for (const Vec3& p : h.layout) {
-      if (p.allFinite()) covariance += (p - mean) * (p - mean).transpose();
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
-    const Vec3 u = axes.eigenvectors().col(2), v = axes.eigenvectors().col(1);
-    nlohmann::json body = {{"name", h.name}, {"xy", nlohmann::json::array()}, {"first", nlohmann::json::array()}};
-    const auto rounded = [](double x) { return std::round(x * 1e6) / 1e6; };
-    for (const Vec3& p : h.layout) {
-      const Vec3 q = p.allFinite() ? Vec3(p - mean) : Vec3::Zero();
-      body["xy"].push_back(nlohmann::json::array({rounded(u.dot(q)), rounded(v.dot(q))}));
-    }
+    nlohmann::json body = {{"name", h.name}, {"xy", flatLayout(h.layout)}, {"first", nlohmann::json::array()}};
     body["count"] = h.contacts;
     for (double f : h.first_s) body["first"].push_back(finiteOrNull(f));
     body["faces"] = h.topology->faces();

@@ -11,96 +11,172 @@ const char* const HEAD = R"PAGE(<!doctype html>
 body { font: 15px/1.45 system-ui, sans-serif; color: #1c2430; margin: 2rem auto; max-width: 1080px; padding: 0 1rem; }
 h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.1rem; margin: 2rem 0 .4rem; }
 p.lead { font-size: 1.1rem; background: #eef3f8; border-left: 4px solid #2a6fb0; padding: .6rem .9rem; }
-table { border-collapse: collapse; font-size: .9rem; } td, th { padding: .2rem .7rem; border-bottom: 1px solid #dde3ea; text-align: right; }
-td:first-child, th:first-child, td.text, th.text { text-align: left; } th { color: #556; font-weight: 600; }
-svg { display: block; background: #fff; border: 1px solid #dde3ea; max-width: 100%; } .note { color: #556; font-size: .88rem; }
-canvas { border: 1px solid #dde3ea; max-width: 100%; } .bad { color: #b3261e; }
+table { border-collapse: collapse; font-size: .9rem; }
+td, th { padding: .2rem .7rem; border-bottom: 1px solid #dde3ea; text-align: right; }
+td.text, th.text { text-align: left; } th { color: #556; font-weight: 600; }
+td.bar { width: 120px; } td.bar div { background: #2a6fb0; height: .7rem; }
+svg { display: block; background: #fff; border: 1px solid #dde3ea; max-width: 100%; }
+.note { color: #556; font-size: .88rem; } .maps { display: flex; flex-wrap: wrap; gap: 1rem; }
+.maps figure { margin: 0; } figcaption { font-size: .88rem; color: #556; }
+canvas { border: 1px solid #dde3ea; max-width: 100%; display: block; }
+.scale { display: inline-block; width: 160px; height: .7rem; margin: 0 .4rem; vertical-align: middle; }
+i { display: inline-block; width: .8rem; height: .8rem; margin: 0 .3rem 0 .8rem; vertical-align: middle; }
 </style></head><body>
 <h1>Contacts of a recorded run</h1><p class="lead" id="headline"></p><table id="facts"></table>
 <h2>Contacts over time</h2><div id="contacts"></div>
-<p class="note">Each bar is a step: contacts, of them undecided (orange) and initial (grey). Red bands: frames without an answer; "no
-answer" is never "no contact".</p>
+<p class="note"><i style="background:#2a6fb0"></i>contacts of a step <i style="background:#f0a030"></i>of them undecided
+<i style="background:#9aa4b0"></i>of them initial, there when the step began <i style="background:#f6c9c5"></i>no answer, which
+is never "no contact"</p>
 <h2>Earliest time of contact within each step</h2><div id="toc"></div>
-<p class="note">0 is the beginning of the step, 1 its end.</p>
+<p class="note"><i style="background:#2a6fb0"></i>earliest new contact <i style="background:#9aa4b0"></i>earliest of all,
+initial ones included. 0 is the beginning of the step, 1 its end.</p>
 <h2>Where on the bodies</h2><div id="heat"></div>
-<p class="note">Contacts per vertex on the body's own layout in the first answered frame; grey means never.</p>
-<h2>Frames without an answer, seams</h2><table id="seams"></table>
-<h2>Where the time goes</h2><table id="stages"></table><h3 style="font-size:1rem">Milliseconds per step</h3><div id="latency"></div>
+<p class="note">On the body's own layout in the first answered frame, laid flat; grey: never in contact.</p>
+<h2>Gaps, resets and other frames that are not OK</h2><table id="seams"></table>
+<h2>Where the time goes</h2><table id="stages"></table>
+<h2>Milliseconds per step</h2><div id="latency"></div><p class="note" id="latency_note"></p>
 <h2>Effects</h2><table id="effects"></table>
 <h2>What accuracy costs on this recording</h2><table id="rungs"></table>
+<p class="note">Missed and false are against the run with exact; undecided ones are reported as such.</p>
 <h2>Tiers of the exact test</h2><table id="tiers"></table>
 <script>const R = )PAGE";
 
-const char* const TAIL = R"PAGE(;
-const NS = 'http://www.w3.org/2000/svg';
-const el = (n, a, parent, text) => { const e = document.createElementNS(NS, n); for (const k in a) e.setAttribute(k, a[k]);
-  if (text !== undefined) e.textContent = text; if (parent) parent.appendChild(e); return e; };
-const number = x => x === null || x === undefined ? '–' : Number.isInteger(x) ? x.toLocaleString('en') : Math.abs(x) >= 1e-3 || x === 0 ? x.toFixed(3) : x.toExponential(1);
+// Two literals: compilers need not take one as long as both.
+const char* const PLOTS = R"PAGE(;
+const NS = 'http://www.w3.org/2000/svg', W = 1040, LEFT = 62, RIGHT = 14, BOTTOM = 34, TOP = 10;
+const el = (name, attributes, parent, text) => {
+  const e = document.createElementNS(NS, name);
+  for (const k in attributes) e.setAttribute(k, attributes[k]);
+  if (text !== undefined) e.textContent = text;
+  if (parent) parent.appendChild(e);
+  return e;
+};
+const number = x => x === null || x === undefined ? '–' : Number.isInteger(x) ? x.toLocaleString('en') :
+  Math.abs(x) >= 1e-3 ? x.toFixed(3) : x.toExponential(1);
+const bar = share => ({ share });
 function table(id, head, rows) {
   const t = document.getElementById(id);
   if (!rows.length) { t.outerHTML = '<p class="note">None.</p>'; return; }
-  const add = (cells, tag) => { const tr = t.insertRow(); cells.forEach(c => { const d = document.createElement(tag);
-    d.textContent = typeof c === 'string' ? c : number(c); if (typeof c === 'string') d.className = 'text'; tr.appendChild(d); }); };
+  const text = rows[0].map((_, k) => rows.every(r => typeof r[k] === 'string'));
+  const add = (cells, tag) => {
+    const row = t.insertRow();
+    cells.forEach((cell, k) => {
+      const d = row.appendChild(document.createElement(tag));
+      if (cell !== null && typeof cell === 'object') {
+        d.className = 'bar';
+        d.appendChild(document.createElement('div')).style.width = 100 * cell.share + '%';
+      } else {
+        d.textContent = typeof cell === 'string' ? cell : number(cell);
+        if (text[k]) d.className = 'text';
+      }
+    });
+  };
   if (head) add(head, 'th');
   rows.forEach(r => add(r, 'td'));
 }
-function axes(id, height, ymax, ylabel) {
-  const W = 1040, L = 62, B = 34, T = 10, steps = R.steps, t0 = steps.length ? steps[0].t : 0;
-  const t1 = steps.length > 1 ? steps[steps.length - 1].t : t0 + 1, span = Math.max(t1 - t0, 1e-9);
+// Round steps, so that a reader can tell the values between.
+function ticks(max, whole) {
+  const raw = max / 5, power = 10 ** Math.floor(Math.log10(raw)), lead = raw / power;
+  let step = (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10) * power;
+  if (whole) step = Math.max(1, Math.round(step));
+  const out = [];
+  for (let v = 0; v <= max * (1 + 1e-9); v += step) out.push(+v.toPrecision(10));
+  return out;
+}
+function axes(id, height, ymax, ylabel, whole) {
+  const steps = R.steps, t0 = steps.length ? steps[0].t : 0;
+  const span = Math.max((steps.length > 1 ? steps[steps.length - 1].t : t0 + 1) - t0, 1e-9);
   const svg = el('svg', { viewBox: `0 0 ${W} ${height}`, width: W, height }, document.getElementById(id));
-  const x = t => L + (W - L - 12) * (t - t0) / span, y = v => height - B - (height - B - T) * v / ymax;
-  steps.forEach((s, i) => { if (s.answered) return; const w = Math.max(2, (W - L - 12) / steps.length);
-    el('rect', { x: x(s.t) - w / 2, y: T, width: w, height: height - B - T, fill: '#f6c9c5' }, svg).appendChild(el('title', {}, null, s.status + ': ' + s.reason)); });
-  for (let i = 0; i <= 4; ++i) { const v = ymax * i / 4;
-    el('line', { x1: L, x2: W - 12, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
-    el('text', { x: L - 6, y: y(v) + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, number(+v.toPrecision(3)));
-    const t = t0 + span * i / 4;
-    el('text', { x: x(t), y: height - B + 18, 'text-anchor': i == 4 ? 'end' : i ? 'middle' : 'start', 'font-size': 12, fill: '#556' }, svg, number(+t.toFixed(3)) + ' s'); }
-  el('text', { x: 14, y: height / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${height / 2})`, 'text-anchor': 'middle' }, svg, ylabel);
-  return { svg, x, y, bar: Math.max(1.5, 0.8 * (W - L - 12) / Math.max(steps.length, 1)) };
+  const slot = (W - LEFT - RIGHT) / Math.max(steps.length, 1), inner = W - LEFT - RIGHT - slot;
+  const x = t => LEFT + slot / 2 + inner * (t - t0) / span, y = v => height - BOTTOM - (height - BOTTOM - TOP) * v / ymax;
+  steps.forEach(s => { if (s.answered) return;
+    const w = Math.max(2, slot);
+    el('title', {}, el('rect', { x: x(s.t) - w / 2, y: TOP, width: w, height: height - BOTTOM - TOP, fill: '#f6c9c5' }, svg),
+      s.status + (s.reason ? ': ' + s.reason : '')); });
+  ticks(ymax, whole).forEach(v => {
+    el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
+    el('text', { x: LEFT - 6, y: y(v) + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
+  ticks(span).forEach(t => el('text', { x: x(t0 + t), y: height - BOTTOM + 18, 'text-anchor': 'middle', 'font-size': 12,
+    fill: '#556' }, svg, +(t0 + t).toPrecision(6) + ' s'));
+  el('text', { x: 14, y: height / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${height / 2})`,
+    'text-anchor': 'middle' }, svg, ylabel);
+  return { svg, x, y, bar: Math.max(1.5, 0.8 * slot) };
 }
 document.getElementById('headline').textContent = R.headline;
 table('facts', null, R.facts);
-{ const most = Math.max(1, ...R.steps.map(s => s.contacts)), a = axes('contacts', 240, most, 'contacts');
-  R.steps.forEach(s => { if (!s.contacts) return;
-    [[s.contacts, '#2a6fb0'], [s.undecided + s.initial, '#f0a030'], [s.initial, '#9aa4b0']].forEach(([n, fill]) => { if (n)
-      el('rect', { x: a.x(s.t) - a.bar / 2, y: a.y(Math.min(n, s.contacts)), width: a.bar, height: a.y(0) - a.y(Math.min(n, s.contacts)), fill }, a.svg)
-        .appendChild(el('title', {}, null, `step ${s.step}: ${s.contacts} contacts, ${s.undecided} undecided, ${s.initial} initial`)); }); }); }
+{ const a = axes('contacts', 240, Math.max(1, ...R.steps.map(s => s.contacts)), 'contacts', true);
+  R.steps.forEach(s => [[s.contacts, '#2a6fb0'], [s.undecided + s.initial, '#f0a030'], [s.initial, '#9aa4b0']].forEach(([n, fill]) => {
+    const top = a.y(Math.min(n, s.contacts));
+    if (n && s.contacts) el('title', {}, el('rect', { x: a.x(s.t) - a.bar / 2, y: top, width: a.bar, height: a.y(0) - top, fill }, a.svg),
+      `step ${s.step}: ${s.contacts} contacts, ${s.undecided} undecided, ${s.initial} initial`); })); }
 { const a = axes('toc', 180, 1, 'earliest TOC');
-  R.steps.forEach(s => { if (s.toc === null || s.toc > 1) return;
-    el('circle', { cx: a.x(s.t), cy: a.y(s.toc), r: 2.6, fill: '#2a6fb0' }, a.svg).appendChild(el('title', {}, null, `step ${s.step}: ${s.toc}`)); }); }
+  R.steps.forEach(s => [[s.toc, '#9aa4b0'], [s.toc_new, '#2a6fb0']].forEach(([toc, fill]) => {
+    if (toc === null || toc > 1) return;
+    el('title', {}, el('circle', { cx: a.x(s.t), cy: a.y(toc), r: 2.8, fill }, a.svg), `step ${s.step}: ${toc}`); })); }
 { const a = axes('latency', 180, Math.max(1e-3, ...R.steps.map(s => s.ms)), 'ms');
-  el('polyline', { points: R.steps.filter(s => s.answered).map(s => `${a.x(s.t)},${a.y(s.ms)}`).join(' '), fill: 'none', stroke: '#2a6fb0', 'stroke-width': 1.3 }, a.svg); }
-const colour = f => { const stops = [[255, 236, 179], [251, 140, 60], [183, 28, 28]], i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
-  return 'rgb(' + stops[i].map((c, k) => Math.round(c + w * (stops[i + 1][k] - c))).join(',') + ')'; };
-R.bodies.forEach(b => {
-  const box = document.getElementById('heat'), most = Math.max(0, ...b.count), title = document.createElement('p');
-  title.textContent = `${b.name}: ${b.xy.length} vertices, ${b.count.filter(c => c).length} of them in contact at some time, at most ${most} times`;
-  box.appendChild(title);
+  el('polyline', { points: R.steps.filter(s => s.answered).map(s => `${a.x(s.t)},${a.y(s.ms)}`).join(' '), fill: 'none',
+    stroke: '#2a6fb0', 'stroke-width': 1.3 }, a.svg);
+  el('line', { x1: LEFT, x2: W - RIGHT, y1: a.y(R.total.median_ms), y2: a.y(R.total.median_ms), stroke: '#f0a030' }, a.svg);
+  document.getElementById('latency_note').textContent = `Median ${number(R.total.median_ms)} ms (orange line), 95 % below ` +
+    `${number(R.total.p95_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
+)PAGE";
+
+const char* const MAPS_AND_TABLES = R"PAGE(
+const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
+const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
+  return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
+const GRADIENT = 'linear-gradient(to right,' + STOPS.map(s => `rgb(${s.join(',')})`).join(',') + ')';
+// values: per vertex 0 to 1, or null for never.
+function map(parent, b, values, caption, low, high) {
   const xs = b.xy.map(p => p[0]), ys = b.xy.map(p => p[1]);
-  let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
-  xs.forEach(v => { x0 = Math.min(x0, v); x1 = Math.max(x1, v); }); ys.forEach(v => { y0 = Math.min(y0, v); y1 = Math.max(y1, v); });
-  const W = 640, s = (W - 20) / Math.max(x1 - x0, 1e-9), H = Math.min(640, Math.max(24, s * (y1 - y0) + 20));
-  const c = document.createElement('canvas'); c.width = W; c.height = H; box.appendChild(c);
-  const g = c.getContext('2d'), px = i => 10 + s * (xs[i] - x0), py = i => H - 10 - s * (ys[i] - y0);
-  const shade = n => n > 0 ? colour(Math.log(1 + n) / Math.log(1 + most)) : '#e4e8ec';
+  const range = v => v.reduce((r, x) => [Math.min(r[0], x), Math.max(r[1], x)], [Infinity, -Infinity]);
+  const [x0, x1] = range(xs), [y0, y1] = range(ys), width = 510, s = Math.min((width - 20) / Math.max(x1 - x0, 1e-9), 490 / Math.max(y1 - y0, 1e-9));
+  const figure = parent.appendChild(document.createElement('figure')), c = figure.appendChild(document.createElement('canvas'));
+  const H = Math.max(30, s * (y1 - y0) + 20), scale = Math.max(2, window.devicePixelRatio || 1);
+  c.width = width * scale; c.height = H * scale; c.style.width = width + 'px'; c.style.height = H + 'px';
+  const g = c.getContext('2d'); g.scale(scale, scale);
+  const px = i => width / 2 + s * (xs[i] - (x0 + x1) / 2), py = i => H / 2 - s * (ys[i] - (y0 + y1) / 2);
+  const shade = vertices => { const known = vertices.map(v => values[v]).filter(v => v !== null);
+    return known.length ? colour(known.reduce((a, v) => a + v, 0) / known.length) : '#e4e8ec'; };
   b.faces.forEach(f => { g.beginPath(); f.forEach((v, k) => k ? g.lineTo(px(v), py(v)) : g.moveTo(px(v), py(v))); g.closePath();
-    g.fillStyle = shade((b.count[f[0]] + b.count[f[1]] + b.count[f[2]]) / 3); g.fill(); g.strokeStyle = 'rgba(90,100,110,.25)'; g.lineWidth = .5; g.stroke(); });
+    g.fillStyle = shade(f); g.fill(); g.strokeStyle = 'rgba(90,100,110,.25)'; g.lineWidth = .5; g.stroke(); });
   (b.edges || []).forEach(e => { g.beginPath(); g.moveTo(px(e[0]), py(e[0])); g.lineTo(px(e[1]), py(e[1]));
-    g.strokeStyle = shade(Math.max(b.count[e[0]], b.count[e[1]])); g.lineWidth = 3; g.stroke(); });
+    g.strokeStyle = shade(e); g.lineWidth = 4; g.stroke(); });
+  const text = figure.appendChild(document.createElement('figcaption')), bar = document.createElement('span');
+  bar.className = 'scale'; bar.style.background = GRADIENT;
+  text.append(caption + ': ' + low, bar, high);
+}
+R.bodies.forEach(b => {
+  const box = document.getElementById('heat'), most = Math.max(0, ...b.count), times = b.first.filter(t => t !== null);
+  box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.xy.length} vertices, ` +
+    `${b.count.filter(c => c).length} of them in contact at some time`;
+  const row = box.appendChild(document.createElement('div')); row.className = 'maps';
+  map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), 'contacts of a vertex (logarithmic)', '1', String(most));
+  if (!times.length) return;
+  const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
+  map(row, b, b.first.map(t => t === null ? null : 1 - (t - t0) / Math.max(t1 - t0, 1e-9)), 'first contact', number(t1) + ' s', number(t0) + ' s');
 });
-table('seams', ['time [s]', 'step', 'status', 'reason'], R.steps.filter(s => s.status !== 'OK').slice(0, 500).map(s => [number(s.t), String(s.step), s.status, s.reason]));
-table('stages', ['stage', 'pairs in', 'pairs out', 'median ms', '95 % ms'],
-  R.stages.map(s => [s.name, s.in, s.out, s.median_ms, s.p95_ms]).concat([['whole step', '', '', R.total.median_ms, R.total.p95_ms]]));
-table('effects', ['effect', 'runs', 'why', 'pairs in', 'pairs out', 'ms'], R.effects.map(e => [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms]));
-table('rungs', ['rung', 'steps', 'contacts reported', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '95 % ms'],
-  R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, r.p95_ms]));
-table('tiers', ['tier', 'pairs settled'], Object.entries(R.tiers));
+const NOT_OK = R.steps.filter(s => s.status !== 'OK'), SHOWN = 500;
+table('seams', ['time [s]', 'step', 'status', 'reason'], NOT_OK.slice(0, SHOWN).map(s => [number(s.t), String(s.step), s.status, s.reason])
+  .concat(NOT_OK.length > SHOWN ? [['', '', '…', `${NOT_OK.length - SHOWN} more in steps.csv`]] : []));
+const longest = list => Math.max(1e-12, ...list);
+{ const most = longest(R.stages.map(s => s.median_ms));
+  table('stages', ['stage', 'pairs in', 'pairs out', 'median ms', '', '95 % ms'], R.stages.map(s =>
+    [s.name, s.in, s.out, s.median_ms, bar(s.median_ms / most), s.p95_ms]).concat(
+    [['whole step', '', '', R.total.median_ms, '', R.total.p95_ms]])); }
+{ const most = longest(R.effects.map(e => e.ms || 0));
+  table('effects', ['effect', 'runs', 'why', 'pairs in', 'pairs out', 'ms in all', ''], R.effects.map(e =>
+    [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)])); }
+{ const most = longest(R.rungs.map(r => r.median_ms));
+  table('rungs', ['rung', 'steps', 'contacts', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '', '95 % ms'],
+    R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, bar(r.median_ms / most), r.p95_ms])); }
+{ const tiers = Object.entries(R.tiers), most = longest(tiers.map(t => t[1]));
+  table('tiers', ['tier', 'pairs settled', ''], tiers.map(([name, n]) => [name, n, bar(n / most)])); }
 </script></body></html>
 )PAGE";
 
 }  // namespace
 
-std::string reportPage(const std::string& data) { return HEAD + data + TAIL; }
+std::string reportPage(const std::string& data) { return HEAD + data + PLOTS + MAPS_AND_TABLES; }
 
 }  // namespace deformable_ccd

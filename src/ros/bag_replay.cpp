@@ -150,6 +150,15 @@ std::string BagReplay::firstMeshTopic(const std::string& bag) {
   return "";
 }
 
+std::string BagReplay::firstMapTopic(const std::string& bag) {
+  rosbag::Bag file(bag);
+  rosbag::View view(file);
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) {
+    if (mapTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
+  }
+  return "";
+}
+
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
   Run run(*this);
   const std::string map_topic = absolute(config_.octomap_topic);

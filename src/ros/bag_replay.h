@@ -41,6 +41,8 @@ class BagReplay {
 
   /// The first message topic of the bag that carries meshes, for configurations that name none. Empty: none.
   static std::string firstMeshTopic(const std::string& bag);
+  /// The first topic of the bag that carries octomaps. Empty: none.
+  static std::string firstMapTopic(const std::string& bag);
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds; a map that was
   /// recorded after the first frame (latched ones are, often) is known from the start.

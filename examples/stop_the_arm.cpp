@@ -1,0 +1,77 @@
+// A client of the monitor in a page: says when an arm must stop. It publishes ~stop (std_msgs/Bool) twenty times a second;
+// connect it to whatever stops your arm, and let that stop, too, when ~stop itself falls silent.
+//
+// Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~clear is false, and when either
+// is old: what is not known to be clear is not clear. This is no safety function; see doc/guarantees.md.
+#include <algorithm>
+#include <string>
+
+#include <deformable_ccd/TimeToContact.h>
+#include <ros/ros.h>
+#include <std_msgs/Bool.h>
+
+class StopTheArm {
+ public:
+  StopTheArm() : node_("~") {
+    // From the moment at which the tracker's camera looked to the arm standing still: latency of all that lies between,
+    // and braking. The monitor's look_ahead_s must be longer.
+    stopping_time_s_ = node_.param("stopping_time_s", 0.3);
+    max_age_s_ = node_.param("max_age_s", 0.2);
+    const std::string monitor = node_.param<std::string>("monitor", "/collision_monitor");
+    stop_ = node_.advertise<std_msgs::Bool>("stop", 1, true);
+    clear_ = node_.subscribe(monitor + "/clear", 1, &StopTheArm::onClear, this);
+    prediction_ = node_.subscribe(monitor + "/time_to_contact", 1, &StopTheArm::onPrediction, this);
+    timer_ = node_.createSteadyTimer(ros::WallDuration(0.05), [this](const ros::SteadyTimerEvent&) { decide(); });
+  }
+
+ private:
+  void onClear(const std_msgs::Bool& message) {
+    is_clear_ = message.data;
+    clear_at_ = ros::SteadyTime::now();
+  }
+
+  void onPrediction(const deformable_ccd::TimeToContact& message) {
+    answered_ = message.answered;
+    // Beyond the horizon nothing is known: it counts as the time of a contact.
+    contact_in_s_ = message.contact ? std::min(message.seconds, message.horizon) : message.horizon;
+    predicted_at_ = ros::SteadyTime::now();
+  }
+
+  /// Empty: the arm may move.
+  std::string reasonToStop() const {
+    const ros::SteadyTime now = ros::SteadyTime::now();
+    const double clear_age_s = (now - clear_at_).toSec(), prediction_age_s = (now - predicted_at_).toSec();
+    if (clear_at_.isZero() || clear_age_s > max_age_s_) return "no news from the monitor";
+    if (!is_clear_) return "not clear";
+    if (predicted_at_.isZero() || prediction_age_s > max_age_s_) return "no prediction; is look_ahead_s set?";
+    if (!answered_) return "a prediction without an answer";
+    if (contact_in_s_ - prediction_age_s <= stopping_time_s_) return "contact within the stopping time";
+    return "";
+  }
+
+  void decide() {
+    const std::string reason = reasonToStop();
+    if (reason != told_) ROS_INFO_STREAM((reason.empty() ? "go" : "stop: ") << reason);
+    told_ = reason;
+    std_msgs::Bool stop;
+    stop.data = !reason.empty();
+    stop_.publish(stop);
+  }
+
+  ros::NodeHandle node_;
+  double stopping_time_s_ = 0, max_age_s_ = 0;
+  ros::Publisher stop_;
+  ros::Subscriber clear_, prediction_;
+  ros::SteadyTimer timer_;
+  bool is_clear_ = false, answered_ = false;
+  double contact_in_s_ = 0;
+  ros::SteadyTime clear_at_, predicted_at_;  // the steady clock: no replay and no clock change can make old news fresh
+  std::string told_ = "?";
+};
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "stop_the_arm");
+  StopTheArm client;
+  ros::spin();
+  return 0;
+}

@@ -1,0 +1,136 @@
+// examples/stop_the_arm in C++ and Python: it says stop in time, and whenever it cannot know.
+#include <deformable_ccd/TimeToContact.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <std_msgs/Bool.h>
+
+#include <limits>
+
+#include "ros/support/meshes.h"
+#include "ros/support/probe.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+/// A monitor whose words the test chooses.
+class PlayedMonitor {
+ public:
+  explicit PlayedMonitor(ros::NodeHandle& node)
+      : clear_(advertiseAndWait<std_msgs::Bool>(node, "/played/clear", true, 2)),
+        prediction_(advertiseAndWait<TimeToContact>(node, "/played/time_to_contact", false, 2)) {}
+
+  bool silent = false, clear = true, answered = true;
+  double contact_in_s = std::numeric_limits<double>::infinity(), horizon_s = 1;
+  bool predicts = true;
+
+  void speak() const {
+    if (silent) return;
+    std_msgs::Bool is_clear;
+    is_clear.data = clear;
+    clear_.publish(is_clear);
+    if (!predicts) return;
+    TimeToContact time;
+    time.answered = answered;
+    time.contact = contact_in_s < horizon_s;
+    time.seconds = contact_in_s;
+    time.horizon = horizon_s;
+    prediction_.publish(time);
+  }
+
+ private:
+  ros::Publisher clear_, prediction_;
+};
+
+class StopTheArm : public ::testing::TestWithParam<const char*> {
+ protected:
+  StopTheArm() : stop(node, "/" + std::string(GetParam()) + "/stop"), monitor(node) {}
+
+  /// The monitor goes on until the client says so steadily.
+  void expectStop(bool wanted, const std::string& why) {
+    int steady = 0;
+    std::size_t seen = stop.count();
+    EXPECT_TRUE(waitUntil([&] {
+      monitor.speak();
+      ros::WallDuration(1.0 / 30).sleep();
+      for (; seen < stop.count(); ++seen) steady = static_cast<bool>(stop.all()[seen].data) == wanted ? steady + 1 : 0;
+      return steady >= 5;
+    })) << why;
+  }
+
+  ros::NodeHandle node;
+  Probe<std_msgs::Bool> stop;
+  PlayedMonitor monitor;
+};
+
+TEST_P(StopTheArm, WheneverItCannotKnow) {
+  monitor.silent = true;
+  expectStop(true, "nothing has been heard");
+  monitor.silent = false;
+  expectStop(false, "clear, and nothing in sight");
+  monitor.silent = true;
+  expectStop(true, "the monitor fell silent, its last ~clear was true and is latched");
+  monitor.silent = false;
+  expectStop(false, "it is back");
+  monitor.predicts = false;
+  expectStop(true, "clear now, but nobody looks ahead");
+}
+
+TEST_P(StopTheArm, InTime) {
+  monitor.contact_in_s = 0.9;
+  expectStop(false, "0.9 s are enough to stop in 0.3 s");
+  monitor.contact_in_s = 0.29;
+  expectStop(true, "0.29 s are not");
+  monitor.contact_in_s = std::numeric_limits<double>::infinity();
+  expectStop(false, "the way is free again");
+  monitor.horizon_s = 0.2;
+  expectStop(true, "who looks only 0.2 s ahead does not see what cannot be avoided any more");
+  monitor.horizon_s = 1;
+  monitor.clear = false;
+  expectStop(true, "not clear");
+  monitor.clear = true;
+  monitor.answered = false;
+  expectStop(true, "no answer is not \"no contact\"");
+}
+
+INSTANTIATE_TEST_SUITE_P(Clients, StopTheArm, ::testing::Values("cpp", "python"),
+                         [](const auto& info) { return std::string(info.param); });
+
+class WithTheMonitor : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(WithTheMonitor, StopsBeforeTheTipArrives) {
+  ros::NodeHandle node;
+  Probe<std_msgs::Bool> stop(node, "/" + std::string(GetParam()) + "/stop");
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/mesh");
+  // A tip sinks towards a triangle at 0.5 m/s: it goes on while it is far, and stops before it has arrived.
+  const ros::SteadyTime start = ros::SteadyTime::now();
+  bool went = false;
+  double height = 1, stopped_at = -1;
+  while (height > 0 && stopped_at < 0) {
+    height = 1 - 0.5 * (ros::SteadyTime::now() - start).toSec();
+    publisher.publish(meshStamped(tipAbove(height), 1000 - 2 * height));
+    ros::WallDuration(1.0 / 30).sleep();
+    const bool says_stop = stop.count() == 0 || stop.last().data;
+    went = went || !says_stop;
+    if (went && says_stop) stopped_at = height;
+  }
+  EXPECT_TRUE(went) << "it never let the arm move";
+  EXPECT_GT(stopped_at, 0) << "it stopped after the contact, or never";
+  EXPECT_LT(stopped_at, 0.5) << "a second of look-ahead at 0.5 m/s";
+}
+
+INSTANTIATE_TEST_SUITE_P(Clients, WithTheMonitor, ::testing::Values("live_cpp", "live_python"),
+                         [](const auto& info) { return std::string(info.param); });
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "stop_the_arm_test");
+  ros::NodeHandle node;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
