@@ -13,6 +13,7 @@ import dataclasses
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -76,12 +77,13 @@ def count_junit(path, result):
 class GtestRunner:
     """One shard of a gtest binary."""
 
-    def __init__(self, binary, shard, shards, pattern):
+    def __init__(self, binary, shard, shards, pattern, emulator=''):
         self.binary, self.shard, self.shards, self.pattern = binary, shard, shards, pattern
+        self.command = shlex.split(emulator) + [str(binary)]
         self.name = binary.name if shards == 1 else '%s (%d of %d)' % (binary.name, shard + 1, shards)
 
     def expected(self, flags, environment):
-        listing = subprocess.run([str(self.binary), '--gtest_list_tests'] + flags, capture_output=True, text=True,
+        listing = subprocess.run(self.command + ['--gtest_list_tests'] + flags, capture_output=True, text=True,
                                  env={**os.environ, **environment})
         return sum(line.startswith('  ') for line in listing.stdout.splitlines())
 
@@ -94,7 +96,7 @@ class GtestRunner:
             return result, None
         flags = ['--gtest_filter=' + self.pattern] if self.pattern else []
         environment = {'GTEST_TOTAL_SHARDS': str(self.shards), 'GTEST_SHARD_INDEX': str(self.shard)}
-        status = run([str(self.binary), '--gtest_output=xml:%s' % xml] + flags, log, environment)
+        status = run(self.command + ['--gtest_output=xml:%s' % xml] + flags, log, environment)
         if xml.exists():
             count_junit(xml, result)
             # A failure outside a test case (an environment's tear-down, a sanitizer's report at exit) has no entry.
@@ -256,9 +258,9 @@ def find_runners(arguments):
     for suite in suites:
         # Shards let two cores share one long suite.
         shards = 1 if arguments.filter else max(1, min(4, os.cpu_count() or 1))
-        busy += [GtestRunner(arguments.build / 'gtest' / suite, shard, shards, arguments.filter)
+        busy += [GtestRunner(arguments.build / 'gtest' / suite, shard, shards, arguments.filter, arguments.emulator)
                  for shard in range(shards)]
-    if arguments.filter:
+    if arguments.filter or arguments.emulator:
         return busy, []
     if arguments.fuzzers:
         busy += [FuzzRunner(arguments.fuzzers / name)
@@ -274,6 +276,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument('--build', type=pathlib.Path, required=True, help='build folder of the package')
     parser.add_argument('--fuzzers', type=pathlib.Path, help='build folder of the libFuzzer targets')
+    parser.add_argument('--emulator', default='', help='command that runs the gtest binaries; no others are run then')
     parser.add_argument('--only', default='')
     parser.add_argument('--filter', default='')
     arguments = parser.parse_args()

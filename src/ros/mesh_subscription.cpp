@@ -48,6 +48,7 @@ MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topi
 void MeshSubscription::openToAnyType() {
   closeAny();
   typed_.shutdown();
+  has_type_ = false;
   ros::SubscribeOptions options;
   options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
       topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onAny(event); });
@@ -57,6 +58,7 @@ void MeshSubscription::openToAnyType() {
 
 void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event) {
   const ShapeShifter::ConstPtr message = event.getConstMessage();
+  has_type_ = true;  // the publisher may come and go between two calls of renew()
   if (typed_) {
     if (!held_.empty() && isSame(*message, held_.front())) return closeAny();
     last_bytes_ = message;
@@ -106,7 +108,8 @@ void MeshSubscription::narrow(const std::string& datatype) {
 void MeshSubscription::renew() {
   if (any_ && !held_.empty() && ros::SteadyTime::now() - narrowed_at_ > MAX_OVERLAP) closeAny();
   const std::uint32_t publishers = any_ ? any_.getNumPublishers() : typed_.getNumPublishers();
-  if (publishers_ > 0 && publishers == 0) openToAnyType();
+  has_type_ = has_type_ || publishers > 0;
+  if (has_type_ && publishers == 0) openToAnyType();
   publishers_ = publishers;
 }
 

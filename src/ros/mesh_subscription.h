@@ -44,6 +44,7 @@ class MeshSubscription {
   Callback callback_;
   ros::Subscriber any_, typed_;
   std::atomic<std::uint32_t> publishers_{0};
+  bool has_type_ = false;  // a publisher was there since the topic was opened to any type
   // While both subscriptions are open (see onTyped).
   topic_tools::ShapeShifter::ConstPtr last_bytes_;
   std::vector<TypedMesh> held_;
