@@ -8,9 +8,13 @@ if(SCENE_SOURCES)
 endif()
 
 file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)
-if(NOT DEFORMABLE_CCD_CORE_ONLY AND PHYSICS_SOURCES)
+if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURCES)
   # Two builds of Bullet can be installed side by side; single precision would make the recorded cloth jitter.
   find_package(PkgConfig REQUIRED)
+  if(DEFORMABLE_CCD_CORE_ONLY)
+    #catkin_lint: ignore_once duplicate_find
+    find_package(yaml-cpp REQUIRED)
+  endif()
   pkg_check_modules(BULLET_DOUBLE QUIET IMPORTED_TARGET bullet-float64)
   if(NOT BULLET_DOUBLE_FOUND)
     pkg_check_modules(BULLET_DOUBLE QUIET IMPORTED_TARGET bullet)

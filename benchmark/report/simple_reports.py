@@ -149,3 +149,23 @@ def write_culling(folder, result):
     write_rows(os.path.join(folder, "culling.csv"), header, rows)
     return save(folder, "culling", "# Surfaces that do not fold\n\nThe step with and without the normal cone and contour "
                 "test, runs in turn.\n\n" + table(header, rows))
+
+
+def write_effects(folder, result):
+    flag, rope = result["flag"], result["rope"]
+    ratio = flag["ratio"]
+    header = ["what", "measured", "interval or spread", "to reach"]
+    rows = [["flag in the wind, every effect auto / only self-collision", "%.4f" % ratio["median"],
+             "%.4f to %.4f (95 %%, %d rounds)" % (ratio["low"], ratio["high"], ratio["rounds"]),
+             "%g" % flag["required_ratio"]],
+            ["the same, ms a step with every effect auto", "%.4f" % flag["auto_ms"]["median"],
+             "%.4f to %.4f" % (flag["auto_ms"]["best"], flag["auto_ms"]["worst"]), ""],
+            ["the same, ms a step with only self-collision", "%.4f" % flag["self_only_ms"]["median"],
+             "%.4f to %.4f" % (flag["self_only_ms"]["best"], flag["self_only_ms"]["worst"]), ""],
+            ["rope of %d points, %d voxels, ms a step" % (rope["points"], rope["voxels"]), "%.4f" % rope["ms"]["median"],
+             "%.4f to %.4f" % (rope["ms"]["best"], rope["ms"]["worst"]), "%g" % rope["required_ms"]]]
+    write_rows(os.path.join(folder, "effects.csv"), header, rows)
+    return save(folder, "effects", "# What effects cost\n\nBoth flag runs take turns in one process; the ratio is the median over "
+                "rounds of the whole recording. The rope had %.1f pairs with itself, %.1f with the map and %.1f contacts a "
+                "step.\n\n" % (rope["self_pairs_a_step"], rope["map_pairs_a_step"], rope["contacts_a_step"]) +
+                table(header, rows))

@@ -18,7 +18,18 @@ namespace deformable_ccd {
 /// The stages of the flow, in order. Names by toString().
 enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
 /// What a scene can call for (DESIGN.md, Effects). Names by toString().
-enum class Effect : std::uint8_t { SELF_COLLISION, BODY_BODY, OBSTACLE, START_STATE, COUNT };
+enum class Effect : std::uint8_t {
+  SELF_COLLISION,
+  BODY_BODY,
+  OBSTACLE,
+  START_STATE,
+  RIGID_BODIES,        ///< those of BODY_BODY with a rigid body; ms: also the split of the step
+  UNKNOWN_SPACE,       ///< in: voxels that the step sweeps, out: those that the map does not know
+  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test
+  TRACKER_NOISE,       ///< pairs whose vertices bring an uncertainty radius
+  LOOK_AHEAD,          ///< the last prediction: pairs past the filters, contacts
+  COUNT
+};
 const char* toString(Stage stage);
 const char* toString(Effect effect);
 
@@ -27,6 +38,12 @@ struct StageStats {
   std::uint64_t in = 0;
   std::uint64_t out = 0;
   double ms = 0;
+  StageStats& operator+=(const StageStats& other) {
+    in += other.in;
+    out += other.out;
+    ms += other.ms;
+    return *this;
+  }
 };
 
 inline namespace core {  // see contact.h
@@ -40,6 +57,10 @@ struct StepStats {
   std::uint64_t undecided = 0, initial = 0, leaving = 0;
   std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
+  std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
+  std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
+  std::uint64_t left_out_listed = 0;  ///< pairs closer than the separation in the reference frame
+  std::uint64_t left_out_met = 0;     ///< of those, the ones that came to the elementary test, without a separation
   const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
   StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
   const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
@@ -72,6 +93,27 @@ struct DetectorOptions {
   bool unfolded_test = true;      ///< leave out the self-collision of surfaces that certainly do not fold (no answer changes)
 };
 
+/// Where a body was when it was known to be fit: its features that are closer there than the minimum separation are
+/// neighbours, not layers.
+struct ReferenceFrame {
+  Positions positions;           ///< [m]
+  std::vector<double> radius_m;  ///< the largest uncertainty per vertex that the list is to be made for; empty: none
+};
+
+/// A minimum separation [m] from one other body (or itself, or OBSTACLE_BODY) instead of the larger of the two bodies'.
+struct SeparationFrom {
+  std::uint16_t body = 0;
+  double separation_m = 0;
+};
+
+/// A pair of features of one body from which the separation is left out, because it is closer in the reference frame (with
+/// uncertainty radii: while it is closer there than its present separation). It is still tested for contact without one.
+struct LeftOutPair {
+  PairKind kind = PairKind::VERTEX_FACE;
+  std::uint16_t body = 0;
+  std::array<Index, 4> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< as in Contact
+};
+
 /// A body as the detector sees it; fixed until setBodies is called again.
 struct BodySetup {
   std::string name;
@@ -81,12 +123,18 @@ struct BodySetup {
   bool against_obstacle = true;
   double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
   std::vector<std::uint8_t> vertex_active;  ///< empty: all; 0: the vertex and every feature on it is left out
+  std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
+  std::shared_ptr<const ReferenceFrame> reference;  ///< null: no pair is left out
+  bool rigid = false;                               ///< for the statistics
 };
 
 /// One body's positions at both ends of the step, in the fixed frame [m]. Non-finite ones are unchecked.
 struct BodyMotion {
   const Positions* t0 = nullptr;
   const Positions* t1 = nullptr;
+  /// Uncertainty radius per vertex during the whole step [m], finite and 0 or more; null: none. A pair's separation grows
+  /// by the largest radius of each of its two features. Needs accuracy conservative or screen.
+  const std::vector<double>* radius_m = nullptr;
 };
 
 /// One step of all bodies, in the order of setBodies.
@@ -95,6 +143,7 @@ struct MotionStep {
   std::shared_ptr<const VoxelSurface> obstacle;                         ///< null: none
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();     ///< held for the whole step
   bool continues = false;  ///< t0 is the t1 of the previous run(), so the start state can be carried over
+  double spent_ms = 0;     ///< of step_budget_ms, by earlier parts of the same step
 };
 
 struct StepResult {
@@ -122,6 +171,8 @@ class Detector {
   /// Positions of the first frame guide the order of features in memory; any will do.
   void setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions);
   const StepResult& run(const MotionStep& step);
+  /// Known after setBodies; in the order of the bodies, kinds, features.
+  const std::vector<LeftOutPair>& leftOut() const;
 
  private:
   struct Impl;

@@ -21,6 +21,7 @@ struct EffectBody {
   bool self_collision = true;  ///< as the body's own parameter says
   bool topology_known = false;
   bool has_faces = true;       ///< once the topology is known
+  std::string noise;           ///< where its uncertainty radii come from, in words; empty: it has none
 };
 
 /// What the plan is derived from.
@@ -28,7 +29,8 @@ struct EffectScene {
   std::vector<EffectBody> bodies;
   std::string map_source;      ///< a topic or file, for the sentence
   bool map_seen = false;       ///< a file is named, somebody publishes the topic, or a map has come
-  double minimum_separation_m = 0;  ///< the largest of the bodies'
+  double minimum_separation_m = 0;  ///< the largest that is named
+  std::uint64_t left_out_pairs = 0;  ///< closer than that in the reference frame
   double look_ahead_s = 0;
   bool unknown_space_counts = false;  ///< unknown_space is not `free`
 };

@@ -50,6 +50,7 @@ struct MeshFrame {
   /// Rigid bodies: fixed_from_body at the stamp. Between two frames they then move along the rotation, not the chord.
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<double> radius_m;  ///< uncertainty per vertex, finite and 0 or more; empty: none
 };
 
 struct MeshStoreOptions {
@@ -96,6 +97,10 @@ class MeshStore {
   void positionsAt(StampNs stamp_ns, Positions& out) const;
   /// Rigid bodies: the pose at a stamp for which lookup is READY.
   Eigen::Isometry3d poseAt(StampNs stamp_ns) const;
+
+  /// The largest uncertainty radius of each vertex over the frames that stamps in [from, to] (lookup READY) lie between;
+  /// empty when none of them has any.
+  void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
 
   /// Forgets what is not needed for stamps at or after this one.
   void forgetBefore(StampNs stamp_ns);

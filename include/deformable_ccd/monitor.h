@@ -30,6 +30,7 @@ struct MonitorBody {
   bool against_obstacle = true;
   double minimum_separation_m = 0;
   std::vector<Index> vertex_mask;  ///< vertices that are left out, with every feature on them (grasped ones)
+  std::vector<SeparationFrom> separations;  ///< see BodySetup
 };
 
 struct MonitorOptions {
@@ -89,6 +90,7 @@ struct StepOutcome {
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
   core::StepStats stats;
+  double unknown_fraction = 0;  ///< [1] of the swept voxels, those that the map does not know; filled by whoever has the map
   std::size_t substeps = 0;
   bool clear = false;  ///< INTERFACE.md, ~clear
 
@@ -117,6 +119,8 @@ struct StepSource {
   const std::vector<Positions>*t0 = nullptr, *t1 = nullptr;  ///< [m] fixed frame
   const std::vector<std::uint8_t>* rigid = nullptr;          ///< moves from pose_t0 to pose_t1 along the rotation
   const std::vector<Eigen::Isometry3d>*pose_t0 = nullptr, *pose_t1 = nullptr;
+  const std::vector<std::vector<double>>* radius_m = nullptr;  ///< uncertainty per vertex; empty: none
+  const std::vector<std::shared_ptr<const ReferenceFrame>>* references = nullptr;  ///< null: nothing is left out
   const MonitorMap* map = nullptr;  ///< as used: null surface where the map was too old
 };
 
@@ -159,7 +163,8 @@ class Monitor {
   /// End of input: steps that still wait are not waited for any longer.
   void finish();
 
-  /// Forgets all frames. Waiting frames are counted under `status`.
+  /// Forgets all frames. Waiting frames are counted under `status`. After RESET the next frames are new references for
+  /// what the minimum separation leaves out; else references stay as long as the topology does.
   void reset(StepStatus status = StepStatus::RESET);
 
   /// The newest frames as a step without motion: is anything in contact now? Status NO_BODY when a body has none yet.
@@ -167,6 +172,12 @@ class Monitor {
   /// From the newest frames to their extrapolation over look_ahead_s; toc is a fraction of that horizon. NO_BODY when
   /// a body has no two frames without a seam between them. Valid after an outcome with a result.
   StepOutcome predict();
+
+  /// The reference frame of a body for as long as it has this topology, instead of its first frame. For replays.
+  void setReference(std::size_t body, std::shared_ptr<const Topology> topology,
+                    std::shared_ptr<const ReferenceFrame> reference);
+  /// Pairs from which the minimum separation is left out (see LeftOutPair); changes with the reference frames only.
+  const std::vector<LeftOutPair>& leftOut() const;
 
   const FrameCounters& counters(std::size_t body) const;
   FrameCounters total() const;

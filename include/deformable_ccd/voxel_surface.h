@@ -82,9 +82,11 @@ class ObstacleTest {
   ~ObstacleTest();
   /// Appends contacts (body index in Contact::body[0], OBSTACLE_BODY in [1]) in canonical order.
   /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
+  /// vertex_radius_m: uncertainty per vertex, 0 or more; null means none. A feature's largest one adds to the separation,
+  /// so that rungs other than conservative and screen cannot hold it.
   void run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
            const std::uint8_t* vertex_active, std::uint16_t body, std::vector<core::Contact>& contacts,
-           ObstacleStats& stats);
+           ObstacleStats& stats, const double* vertex_radius_m = nullptr);
 
  private:
   struct Impl;

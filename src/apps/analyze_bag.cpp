@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
+#include <sstream>
 
 #include "deformable_ccd/simd_target.h"
 #include "io/report.h"
@@ -17,6 +18,7 @@ using namespace deformable_ccd;
 
 struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh;
+  double look_ahead_s = 0;
   int threads = 0;
   bool no_rungs = false, quiet = false;
 };
@@ -34,6 +36,7 @@ MonitorConfig configure(const Arguments& a) {
     if (!topic.empty()) tree["octomap_topic"] = topic;
   }
   if (!a.accuracy.empty()) tree["accuracy"] = a.accuracy;
+  if (a.look_ahead_s > 0) tree["look_ahead_s"] = a.look_ahead_s;
   if (a.threads > 0) tree["num_threads"] = a.threads;
   return readConfig(tree, a.params.empty() ? "--" : a.params + ": ");
 }
@@ -60,14 +63,13 @@ class ResultBag {
 
 std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config, const BagReplayOptions& options) {
   std::vector<std::string> names{"screen", "fast", "conservative", "exact"};
-  double separation = config.minimum_separation_m;
-  for (const BodyConfig& b : config.bodies) separation = std::max(separation, b.body.minimum_separation_m);
-  if (separation > 0) names = {"screen", "conservative"};  // the others cannot hold a distance
+  if (config.holdsDistance()) names = {"screen", "conservative"};  // the others cannot hold a distance
   std::vector<ContactLog> logs;
   for (const std::string& name : names) {
     MonitorConfig one = config;
     one.monitor.detector.accuracy.rung = accuracyFromString(name.c_str());
     one.monitor.detector.step_budget_ms = 0;
+    one.monitor.look_ahead_s = 0;
     one.monitor.max_contacts = std::numeric_limits<std::size_t>::max();
     if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
     logs.emplace_back();
@@ -76,6 +78,21 @@ std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config
   std::vector<RungCost> rungs;
   for (std::size_t i = 0; i < names.size(); ++i) rungs.push_back(logs[i].against(logs.back(), names[i]));
   return rungs;
+}
+
+std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
+  std::vector<MonitorBody> bodies;
+  for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
+  return bodies;
+}
+
+std::string lookAheadLine(const BagReplaySummary& summary) {
+  if (!summary.look_ahead) return "";
+  const LookAheadSummary& s = *summary.look_ahead;
+  std::ostringstream text;
+  text << "look-ahead: " << s.compared << " predictions came true, median error " << s.median_error_s << " s, 95 % "
+       << s.p95_error_s << " s; " << s.not_observed << " not observed, " << s.not_predicted << " contacts not predicted\n";
+  return text.str();
 }
 
 int analyze(const Arguments& a) {
@@ -96,6 +113,8 @@ int analyze(const Arguments& a) {
       },
       [&](const rosbag::MessageInstance& m) { if (out) out->copy(m); });
   report.setEffects(summary.effects);
+  report.setLeftOut(summary.left_out, monitorBodies(config));
+  if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
   report.setCounters(summary.frames);
   std::string topics;
   for (const std::string& t : summary.mesh_topics) topics += (topics.empty() ? "" : ", ") + (t.empty() ? "(rigid)" : t);
@@ -111,7 +130,7 @@ int analyze(const Arguments& a) {
   std::cout << report.headline() << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
-            << "report: " << a.report << "/report.html\n";
+            << lookAheadLine(summary) << "report: " << a.report << "/report.html\n";
   for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: " << c << '\n';
   return 0;
 }
@@ -129,6 +148,7 @@ int main(int argc, char** argv) {
   app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
   app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact");
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
+  app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")->check(CLI::PositiveNumber);
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
   app.add_flag("--quiet", a.quiet, "no progress");
   CLI11_PARSE(app, argc, argv);

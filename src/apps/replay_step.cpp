@@ -71,6 +71,8 @@ void trace(const Arguments& a, const StepRecording& recording) {
     input.rigid[b] = body.rigid;
     input.pose_t0[b] = body.pose_t0;
     input.pose_t1[b] = body.pose_t1;
+    input.radius_m[b] = body.radius_m;
+    input.references[b] = body.reference;
   }
   for (const std::string& text : a.pairs) {
     std::cout << '\n' << text << "  (* the rung of the recording)\n";

@@ -1,30 +1,20 @@
 #include "deformable_ccd/detector.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 
-#include "detector/float_mode.h"
-#include "detector/hit_order.h"
-#include "detector/pair_worker.h"
-#include "detector/scene_arrays.h"
-#include "detector/start_state.h"
-#include "detector/unfolded.h"
+#include "detector/detector_impl.h"
 
 namespace deformable_ccd {
 namespace {
 
-constexpr std::size_t TASK_SUPERCLUSTERS = 16;  // supercluster pairs in a unit of work: about a millisecond
 constexpr std::size_t CONTACT_PIECE = 16384;    // contacts in a unit of writing them out
 constexpr std::size_t PIECE = 256;              // groups or vertices x 16 in a unit of refitting
 
-FeatureKind firstKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
-FeatureKind secondKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
+std::uint64_t pairsIn(const ObstacleStats& stats) {
+  return stats.vertex_pairs_in + stats.edge_pairs_in + stats.corner_pairs_in;
+}
 
 void check(const DetectorOptions& o) {
   const auto refuse = [](const std::string& text) { throw std::invalid_argument(text); };
@@ -43,7 +33,8 @@ const char* toString(Stage stage) {
   return NAMES[static_cast<std::size_t>(stage)];
 }
 const char* toString(Effect effect) {
-  static const char* const NAMES[] = {"self_collision", "body_body", "obstacle", "start_state"};
+  static const char* const NAMES[] = {"self_collision", "body_body",          "obstacle",      "start_state", "rigid_bodies",
+                                      "unknown_space",  "minimum_separation", "tracker_noise", "look_ahead"};
   return NAMES[static_cast<std::size_t>(effect)];
 }
 const char* toString(StartState state) {
@@ -57,74 +48,25 @@ double StepResult::earliestToc() const {
   return earliest;
 }
 
-struct Detector::Impl {
-  explicit Impl(const DetectorOptions& o) { setOptions(o); }
+void Detector::Impl::setOptions(const DetectorOptions& o) {
+  check(o);
+  std::unique_ptr<ElementaryTest> test;
+  if (o.accuracy.rung != Accuracy::SCREEN) test = makeElementaryTest(o.accuracy);
+  checkSeparation(o, scene.largestSeparation());
+  if (!arena || o.num_threads != options.num_threads) arena.emplace(o.num_threads);
+  elementary = std::move(test);
+  options = o;
+  obstacle_tests.clear();
+}
 
-  void setOptions(const DetectorOptions& o) {
-    check(o);
-    std::unique_ptr<ElementaryTest> test;
-    if (o.accuracy.rung != Accuracy::SCREEN) test = makeElementaryTest(o.accuracy);
-    checkSeparation(o, scene.largestSeparation());
-    if (!arena || o.num_threads != options.num_threads) arena.emplace(o.num_threads);
-    elementary = std::move(test);
-    options = o;
-    obstacle_tests.clear();
-  }
+void Detector::Impl::checkHoldsDistance(const DetectorOptions& o, const std::string& what) {
+  if (o.accuracy.rung == Accuracy::CONSERVATIVE || o.accuracy.rung == Accuracy::SCREEN) return;
+  throw std::invalid_argument(std::string("accuracy = ") + toString(o.accuracy.rung) + " with " + what +
+                              "; a distance above 0 needs accuracy = conservative");
+}
 
-  static void checkSeparation(const DetectorOptions& o, double separation) {
-    if (separation > 0 && o.accuracy.rung != Accuracy::CONSERVATIVE && o.accuracy.rung != Accuracy::SCREEN) {
-      throw std::invalid_argument(std::string("accuracy = ") + toString(o.accuracy.rung) + " with minimum_separation_m = " +
-                                  std::to_string(separation) + "; a separation above 0 needs accuracy = conservative");
-    }
-  }
-
-  const StepResult& run(const MotionStep& step);
-  void findPairs(const StepContext& context);
-  bool staysApart(std::size_t body) const;
-  bool isUnfolded(std::size_t body);
-  void chooseSelfTests(const MotionStep& step);
-  bool needsTrees(const MotionStep& step) const;
-  void rememberApart(bool certain);
-  void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
-  void runPairs(StepContext& context);
-  void runObstacle(const MotionStep& step);
-  void collect();
-  void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
-  const Positions& inMap(const MotionStep& step, const Positions& fixed, Positions& scratch) const;
-  template <class Body>
-  void parallel(std::size_t n, std::size_t piece, const Body& body);
-
-  DetectorOptions options;
-  std::unique_ptr<ElementaryTest> elementary;
-  std::optional<tbb::task_arena> arena;
-  SceneArrays scene;
-  tbb::enumerable_thread_specific<PairWorker> workers;
-  std::vector<PairTask> tasks;
-  std::vector<std::uint32_t> group_pairs, found_groups, scratch;
-  std::vector<std::uint32_t> body_pairs;
-  HitOrder order;
-  StartStateTest start_state;
-  std::vector<UnfoldedTest> unfolded;
-  std::vector<std::uint8_t> apart;  // per body: at the end of the last step it certainly did not touch itself
-  std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at in this step
-  std::vector<std::unique_ptr<ObstacleTest>> obstacle_tests;
-  Positions map_t0, map_t1;
-  std::vector<std::uint8_t> obstacle_active;
-  StepResult result;
-};
-
-template <class Body>
-void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body) {
-  if (options.num_threads == 1 || n <= piece) {
-    body(0, n);
-    return;
-  }
-  arena->execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece), [&](const tbb::blocked_range<std::size_t>& r) {
-      const ScopedFloatMode mode;
-      body(r.begin(), r.end());
-    }, tbb::simple_partitioner());
-  });
+void Detector::Impl::checkSeparation(const DetectorOptions& o, double separation_m) {
+  if (separation_m > 0) checkHoldsDistance(o, "minimum_separation_m = " + std::to_string(separation_m));
 }
 
 const StepResult& Detector::Impl::run(const MotionStep& step) {
@@ -139,6 +81,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
 
   Clock::time_point start = Clock::now();
   scene.record(step, stats);
+  if (scene.uncertain()) checkHoldsDistance(options, "an uncertainty radius");
   stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
 
   start = Clock::now();
@@ -146,7 +89,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   stats[Stage::BROAD_PHASE].ms += msSince(start);
 
   start = Clock::now();
-  if (needsTrees(step)) scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); });
+  if (needsTrees(step)) scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); }, stats);
   stats[Stage::BOUNDS].ms = msSince(start);
 
   if (options.check_start_state) {
@@ -160,16 +103,19 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   context.scene = &scene;
   context.elementary = elementary.get();
   context.earliest_only = options.earliest_only;
+  context.left_out = &left_out;
+  stats.left_out_listed = left_out_list.size();
   if (options.accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options.accuracy.tolerance_m;
   if (options.step_budget_ms > 0) {
+    const double left_ms = std::max(0.0, options.step_budget_ms - step.spent_ms);
     context.deadline = begin + std::chrono::duration_cast<Clock::duration>(
-                                   std::chrono::duration<double, std::milli>(options.step_budget_ms));
+                                   std::chrono::duration<double, std::milli>(left_ms));
   }
   for (PairWorker& w : workers) w.beginStep();
   findPairs(context);
   runPairs(context);
   collect();
-  if (step.obstacle) runObstacle(step);
+  if (step.obstacle && scene.meetsObstacle()) runObstacle(step);
   rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only && !result.contacts.empty()) {
     double lower = 2, upper = 2;
@@ -201,114 +147,6 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   return result;
 }
 
-void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context) {
-  const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
-  if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
-  const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
-  PairTask task{kind, a, b, a == b, 0, 0};
-  if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
-    tasks.push_back(task);
-    return;
-  }
-  const TreePair trees{&ta, &tb, same_tree, false};
-  superclusterPairs(trees, found_groups, scratch);
-  if (context.deadline != Clock::time_point::max()) {
-    // What the deadline leaves over should be what can touch last.
-    std::vector<std::array<std::uint32_t, 2>> pairs(found_groups.size() / 2);
-    for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i] = {found_groups[2 * i], found_groups[2 * i + 1]};
-    std::stable_sort(pairs.begin(), pairs.end(), [&](const auto& x, const auto& y) {
-      return superclusterTocBound(trees, x[0], x[1]) < superclusterTocBound(trees, y[0], y[1]);
-    });
-    for (std::size_t i = 0; i < pairs.size(); ++i) std::copy(pairs[i].begin(), pairs[i].end(), &found_groups[2 * i]);
-  }
-  const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
-  const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);
-  group_pairs.insert(group_pairs.end(), found_groups.begin(), found_groups.end());
-  for (std::uint32_t first = 0; first < count; first += TASK_SUPERCLUSTERS) {
-    task.first = base + first;
-    task.last = base + std::min<std::uint32_t>(count, first + TASK_SUPERCLUSTERS);
-    tasks.push_back(task);
-  }
-}
-
-// A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
-// stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
-bool Detector::Impl::staysApart(std::size_t body) const {
-  return body < apart.size() && apart[body] && scene.bodies()[body].translates;
-}
-
-void Detector::Impl::chooseSelfTests(const MotionStep& step) {
-  self_tested.assign(scene.bodies().size(), 0);
-  for (std::size_t b = 0; b < self_tested.size(); ++b) {
-    if (!scene.bodies()[b].setup.self_collision || (step.continues && staysApart(b))) continue;
-    const bool unfolded = isUnfolded(b);
-    result.stats.unfolded_bodies += unfolded;
-    self_tested[b] = !unfolded;
-  }
-}
-
-// A single body that cannot meet itself is tested against the obstacle alone, which has bounds of its own.
-bool Detector::Impl::needsTrees(const MotionStep& step) const {
-  return self_tested.size() > 1 || std::count(self_tested.begin(), self_tested.end(), 1) > 0 ||
-         (options.check_start_state && start_state.needsTrees(step.continues));
-}
-
-bool Detector::Impl::isUnfolded(std::size_t body) {
-  const SceneBody& b = scene.bodies()[body];
-  // With a separation, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
-  if (!options.unfolded_test || options.broad_phase == BroadPhase::BRUTE_FORCE) return false;
-  return b.setup.minimum_separation_m == 0 && !b.masked && unfolded[body].run(b, scene.vertices());
-}
-
-void Detector::Impl::rememberApart(bool certain) {
-  apart.resize(scene.bodies().size(), 0);
-  for (std::size_t b = 0; b < apart.size(); ++b) {
-    const bool tested = scene.bodies()[b].setup.self_collision;
-    apart[b] = certain && tested && !scene.bodies()[b].masked;
-  }
-  for (const core::Contact& c : result.contacts) {
-    if (c.body[0] == c.body[1]) apart[c.body[0]] = 0;
-  }
-}
-
-void Detector::Impl::findPairs(const StepContext& context) {
-  const Clock::time_point start = Clock::now();
-  tasks.clear();
-  group_pairs.clear();
-  const std::size_t n = scene.bodies().size();
-  for (std::size_t b = 0; b < n; ++b) {
-    if (!self_tested[b]) continue;
-    const std::uint16_t i = static_cast<std::uint16_t>(b);
-    addTasks(PairKind::VERTEX_FACE, i, i, context);
-    addTasks(PairKind::EDGE_EDGE, i, i, context);
-  }
-  if (n > 1) {
-    scene.overlappingBodies(false, body_pairs, scratch);
-    for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
-      const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]), b = static_cast<std::uint16_t>(body_pairs[p + 1]);
-      if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
-      addTasks(PairKind::VERTEX_FACE, a, b, context);
-      addTasks(PairKind::VERTEX_FACE, b, a, context);
-      addTasks(PairKind::EDGE_EDGE, a, b, context);
-    }
-  }
-  result.stats[Stage::BROAD_PHASE].ms += msSince(start);
-}
-
-void Detector::Impl::runPairs(StepContext& context) {
-  parallel(tasks.size(), 1, [&](std::size_t first, std::size_t last) {
-    PairWorker& worker = workers.local();
-    for (std::size_t t = first; t < last; ++t) {
-      if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
-        worker.runBruteForce(context, tasks[t]);
-      } else {
-        worker.run(context, tasks[t], group_pairs, tasks[t].first, tasks[t].last);
-      }
-    }
-  });
-  result.complete = !context.expired;
-}
-
 void Detector::Impl::writeContact(PairKind kind, const Hit& hit, core::Contact& c) const {
   c = core::Contact();
   c.kind = kind;
@@ -326,18 +164,11 @@ void Detector::Impl::collect() {
   core::StepStats& stats = result.stats;
   std::vector<const std::vector<Hit>*> parts;
   for (const PairWorker& w : workers) {
-    for (std::size_t s = 0; s < stats.stages.size(); ++s) {
-      stats.stages[s].in += w.stats().stages[s].in;
-      stats.stages[s].out += w.stats().stages[s].out;
-      stats.stages[s].ms += w.stats().stages[s].ms;
-    }
-    for (std::size_t e = 0; e < stats.effects.size(); ++e) {
-      stats.effects[e].in += w.stats().effects[e].in;
-      stats.effects[e].out += w.stats().effects[e].out;
-      stats.effects[e].ms += w.stats().effects[e].ms;
-    }
+    for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s] += w.stats().stages[s];
+    for (std::size_t e = 0; e < stats.effects.size(); ++e) stats.effects[e] += w.stats().effects[e];
     stats.tiers += w.stats().tiers;
     stats.undecided += w.stats().undecided;
+    stats.left_out_met += w.stats().left_out_met;
     stats.vf_candidates += w.stats().vf_candidates;
     stats.ee_candidates += w.stats().ee_candidates;
     result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
@@ -381,7 +212,7 @@ void Detector::Impl::runObstacle(const MotionStep& step) {
     if (!obstacle_tests[b]) {
       ObstacleOptions o;
       o.accuracy = options.accuracy;
-      o.minimum_separation_m = body.setup.minimum_separation_m;
+      o.minimum_separation_m = scene.separation(b, OBSTACLE_BODY);
       obstacle_tests[b] = std::make_unique<ObstacleTest>(o);
     }
     const std::uint8_t* active = nullptr;
@@ -390,16 +221,19 @@ void Detector::Impl::runObstacle(const MotionStep& step) {
       for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];
       active = obstacle_active.data();
     }
+    const Clock::time_point body_start = Clock::now();
+    const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
     obstacle_tests[b]->run(*step.obstacle, *body.setup.topology, inMap(step, *step.bodies[b].t0, map_t0),
                            inMap(step, *step.bodies[b].t1, map_t1), active, static_cast<std::uint16_t>(b), result.contacts,
-                           total);
+                           total, body.uncertain ? step.bodies[b].radius_m->data() : nullptr);
+    const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(body_start)};
+    if (scene.separation(b, OBSTACLE_BODY) > 0) result.stats[Effect::MINIMUM_SEPARATION] += of_body;
+    if (body.uncertain) result.stats[Effect::TRACKER_NOISE] += of_body;
   }
   // Each body's are in order; of several bodies, kinds come first.
   const auto first = result.contacts.begin() + static_cast<std::ptrdiff_t>(before);
   if (!std::is_sorted(first, result.contacts.end(), canonicalLess)) std::sort(first, result.contacts.end(), canonicalLess);
-  const std::uint64_t in = total.vertex_pairs_in + total.edge_pairs_in + total.corner_pairs_in;
-  const std::uint64_t out = result.contacts.size() - before;
-  result.stats[Stage::OBSTACLE] = {in, out, msSince(start)};
+  result.stats[Stage::OBSTACLE] = {pairsIn(total), result.contacts.size() - before, msSince(start)};
   result.stats[Effect::OBSTACLE] = result.stats[Stage::OBSTACLE];
   for (std::size_t i = before; i < result.contacts.size(); ++i) {
     const core::Contact& c = result.contacts[i];
@@ -425,7 +259,10 @@ void Detector::setOptions(const DetectorOptions& options) { impl_->setOptions(op
 
 void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions) {
   double separation = 0;
-  for (const BodySetup& b : bodies) separation = std::max(separation, b.minimum_separation_m);
+  for (const BodySetup& b : bodies) {
+    separation = std::max(separation, b.minimum_separation_m);
+    for (const SeparationFrom& from : b.separations) separation = std::max(separation, from.separation_m);
+  }
   Impl::checkSeparation(impl_->options, separation);
   impl_->scene.setBodies(std::move(bodies), rest_positions);
   impl_->unfolded.clear();
@@ -433,7 +270,10 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
   impl_->start_state.forget();
   impl_->apart.clear();
   impl_->obstacle_tests.clear();
+  impl_->findLeftOut(rest_positions);
 }
+
+const std::vector<LeftOutPair>& Detector::leftOut() const { return impl_->left_out_list; }
 
 const StepResult& Detector::run(const MotionStep& step) { return impl_->run(step); }
 

@@ -71,7 +71,21 @@ Finding unknownSpace(const EffectScene& scene) {
 
 Finding minimumSeparation(const EffectScene& scene) {
   if (!(scene.minimum_separation_m > 0)) return {false, false, "minimum_separation_m is 0; set it above"};
-  return {true, true, "contacts are reported from " + metres(scene.minimum_separation_m) + " m"};
+  std::string reason = "contacts are reported from " + metres(scene.minimum_separation_m) + " m";
+  if (scene.left_out_pairs > 0) {
+    reason += "; " + std::to_string(scene.left_out_pairs) +
+              " pairs of a body's own features are closer in its reference frame and left out of it";
+  }
+  return {true, true, reason};
+}
+
+Finding trackerNoise(const EffectScene& scene) {
+  std::string all;
+  for (const EffectBody& body : scene.bodies) {
+    if (!body.noise.empty()) all += (all.empty() ? "" : "; ") + body.name + ": " + body.noise;
+  }
+  if (all.empty()) return {false, false, "no body has an uncertainty; give one under uncertainty"};
+  return {true, true, "vertices are only known to a radius (" + all + ")"};
 }
 
 Finding lookAhead(const EffectScene& scene) {
@@ -87,6 +101,7 @@ Finding find(const std::string& name, const EffectScene& scene) {
   if (name == "rigid_bodies") return rigidBodies(scene);
   if (name == "unknown_space") return unknownSpace(scene);
   if (name == "minimum_separation") return minimumSeparation(scene);
+  if (name == "tracker_noise") return trackerNoise(scene);
   return lookAhead(scene);
 }
 
@@ -109,8 +124,9 @@ const char* toString(EffectSetting setting) {
 }
 
 const std::vector<std::string>& effectNames() {
-  static const std::vector<std::string> NAMES = {"self_collision", "body_body",     "octomap",            "start_state",
-                                                 "rigid_bodies",   "unknown_space", "minimum_separation", "look_ahead"};
+  static const std::vector<std::string> NAMES = {"self_collision", "body_body",     "octomap",
+                                                 "start_state",    "rigid_bodies",  "unknown_space",
+                                                 "minimum_separation", "tracker_noise", "look_ahead"};
   return NAMES;
 }
 

@@ -28,6 +28,17 @@ void check(const MonitorOptions& options, std::size_t bodies) {
   for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
 }
 
+std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  std::vector<double> larger(a.size());
+  for (std::size_t v = 0; v < a.size(); ++v) larger[v] = std::max(a[v], b[v]);
+  return larger;
+}
+
+double largest(const std::vector<double>& values) {
+  return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
+}
+
 double seconds(StampNs from, StampNs to) { return static_cast<double>(to - from) * 1e-9; }
 
 }  // namespace
@@ -78,6 +89,8 @@ struct Monitor::Impl {
   StepRunner runner;
   std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
   StepInput input, side_input;
+  std::vector<std::shared_ptr<const ReferenceFrame>> references;
+  std::vector<std::shared_ptr<const Topology>> reference_topologies;
   std::vector<std::uint64_t> runs, last_runs;
   StampNs last_end_ns = 0;
   double last_duration_s = 0;
@@ -91,6 +104,7 @@ struct Monitor::Impl {
     counters.resize(bodies.size());
     input.resize(bodies.size());
     runs.resize(bodies.size());
+    forgetReferences();
   }
 
   bool isStream(std::size_t body) const { return bodies[body].motion == BodyMotionKind::STREAM; }
@@ -102,6 +116,9 @@ struct Monitor::Impl {
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   void place(const Pending& step);
+  void keepReferences(StepInput& at);
+  void forgetReferences();
+  bool separates(std::size_t body, const std::vector<double>& radius_m) const;
   MonitorMap usableMap(StampNs stamp_ns) const;
   void runStep(const Pending& step, StepOutcome& outcome);
   void finishOutcome(StepOutcome& outcome, const MonitorMap& used) const;
@@ -121,6 +138,7 @@ Monitor::~Monitor() = default;
 const MonitorOptions& Monitor::options() const { return impl_->options; }
 const std::vector<MonitorBody>& Monitor::bodies() const { return impl_->bodies; }
 const MonitorMap& Monitor::map() const { return impl_->map; }
+const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->runner.leftOut(); }
 const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
 
 void Monitor::setOptions(const MonitorOptions& options) {
@@ -139,6 +157,12 @@ void Monitor::countReceived(std::size_t body, std::uint64_t count, std::uint64_t
 
 void Monitor::countDropped(std::size_t body, StepStatus status, std::uint64_t count) {
   impl_->counters.at(body).by_status.at(static_cast<std::size_t>(status)) += count;
+}
+
+void Monitor::setReference(std::size_t body, std::shared_ptr<const Topology> topology,
+                           std::shared_ptr<const ReferenceFrame> reference) {
+  impl_->reference_topologies.at(body) = std::move(topology);
+  impl_->references.at(body) = std::move(reference);
 }
 
 void Monitor::setListener(StepListener* listener) { impl_->listener = listener; }
@@ -225,6 +249,7 @@ void Monitor::reset(StepStatus status) {
   for (std::size_t b = 0; b < m.stores.size(); ++b) {
     if (m.isStream(b)) m.stores[b].clear();
   }
+  if (status == StepStatus::RESET) m.forgetReferences();
   m.has_last = false;
 }
 
@@ -273,12 +298,14 @@ void Monitor::Impl::place(const Pending& step) {
       input.rigid[b] = step.to->rigid;
       input.pose_t0[b] = step.from->pose;
       input.pose_t1[b] = step.to->pose;
+      input.radius_m[b] = largerRadii(step.from->radius_m, step.to->radius_m);
       continue;
     }
     input.topologies[b] = store.newest().topology;
     input.rigid[b] = isStream(b) && store.newest().rigid;
     if (!isStream(b)) {
       input.t0[b] = input.t1[b] = store.newest().positions;
+      input.radius_m[b] = store.newest().radius_m;
       continue;
     }
     store.positionsAt(step.from->stamp_ns, input.t0[b]);
@@ -287,8 +314,42 @@ void Monitor::Impl::place(const Pending& step) {
       input.pose_t0[b] = store.poseAt(step.from->stamp_ns);
       input.pose_t1[b] = store.poseAt(step.to->stamp_ns);
     }
+    store.radiiOver(step.from->stamp_ns, step.to->stamp_ns, input.radius_m[b]);
     store.forgetBefore(step.to->stamp_ns);
   }
+  keepReferences(input);
+}
+
+void Monitor::Impl::forgetReferences() {
+  references.assign(bodies.size(), nullptr);
+  reference_topologies.assign(bodies.size(), nullptr);
+}
+
+/// The first frame of each topology is what a minimum separation measures neighbours in. Radii that grow past those of
+/// the reference make a new list; twice as large, so that it happens seldom.
+void Monitor::Impl::keepReferences(StepInput& at) {
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const bool same = reference_topologies[b] && (reference_topologies[b] == at.topologies[b] ||
+                                                  *reference_topologies[b] == *at.topologies[b]);
+    if (!same) {
+      reference_topologies[b] = at.topologies[b];
+      const bool needed = bodies[b].self_collision && !bodies[b].rigid && separates(b, at.radius_m[b]);
+      references[b] = needed ? std::make_shared<const ReferenceFrame>(ReferenceFrame{at.t0[b], {}}) : nullptr;
+    }
+    const double now_m = largest(at.radius_m[b]), listed_m = references[b] ? largest(references[b]->radius_m) : now_m;
+    if (now_m > listed_m) {
+      std::vector<double> radius_m(at.t0[b].size(), std::max(now_m, 2 * listed_m));
+      references[b] =
+          std::make_shared<const ReferenceFrame>(ReferenceFrame{references[b]->positions, std::move(radius_m)});
+    }
+    at.references[b] = references[b];
+  }
+}
+
+bool Monitor::Impl::separates(std::size_t body, const std::vector<double>& radius_m) const {
+  const auto named = [](const SeparationFrom& from) { return from.separation_m > 0; };
+  return bodies[body].minimum_separation_m > 0 || !radius_m.empty() ||
+         std::any_of(bodies[body].separations.begin(), bodies[body].separations.end(), named);
 }
 
 MonitorMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
@@ -320,7 +381,7 @@ void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
   has_last = false;
   if (listener) {
     listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
-                      &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &used});
+                      &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &input.radius_m, &input.references, &used});
   }
   runner.run(input, bodies, options, used, continues, outcome);
   finishOutcome(outcome, used);
@@ -383,7 +444,9 @@ StepOutcome Monitor::checkNow() {
     m.side_input.t0[b] = m.side_input.t1[b] = frame.positions;
     m.side_input.topologies[b] = frame.topology;
     m.side_input.rigid[b] = 0;
+    m.side_input.radius_m[b] = frame.radius_m;
   }
+  m.keepReferences(m.side_input);
   outcome.start_ns = outcome.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   const MonitorMap used = m.usableMap(outcome.stamp_ns);
   m.side().run(m.side_input, m.bodies, m.options, used, false, outcome);
@@ -402,6 +465,8 @@ StepOutcome Monitor::predict() {
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     m.side_input.topologies[b] = m.input.topologies[b];
     m.side_input.rigid[b] = m.input.rigid[b];
+    m.side_input.radius_m[b] = m.input.radius_m[b];
+    m.side_input.references[b] = m.input.references[b];
     m.side_input.t0[b] = m.input.t1[b];
     Positions& to = m.side_input.t1[b];
     to.resize(m.input.t1[b].size());

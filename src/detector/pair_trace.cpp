@@ -81,14 +81,17 @@ class Tracer {
     MotionStep step;
     for (std::size_t b = 0; b < t0.size(); ++b) {
       rest.push_back(&input.t0[b]);
-      step.bodies.push_back({&t0[b], &t1[b]});
+      step.bodies.push_back({&t0[b], &t1[b], input.radius_m[b].empty() ? nullptr : &input.radius_m[b]});
     }
     scene.setBodies(bodySetups(input, bodies_), rest);
+    Detector detector(options_.detector);  // knows what is left out
+    detector.setBodies(bodySetups(input, bodies_), rest);
     core::StepStats stats;
     scene.record(step, stats);
-    scene.refit([](std::size_t n, const auto& f) { f(0, n); });
+    scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
     for (Feature& f : features_) findSlot(scene, f);
     if (!traceRules(scene)) return;
+    setSeparation(scene, detector.leftOut());
     traceLinear(t0, t1);
     traceBroadPhase(scene);
     tracePlanar(scene);
@@ -143,9 +146,48 @@ class Tracer {
     return pair;
   }
 
-  double separation() const {
-    return std::max(bodies_[features_[0].body].minimum_separation_m, bodies_[features_[1].body].minimum_separation_m);
+  /// What the pair carries into the elementary test; see PairWorker::setSeparations.
+  void setSeparation(const SceneArrays& scene, const std::vector<LeftOutPair>& left_out) {
+    const Feature &a = features_[0], &b = features_[1];
+    separation_ = scene.separation(a.body, b.body);
+    const double own = separation_;
+    if (scene.uncertain()) {
+      for (const Feature& f : features_) {
+        const Index* internal = scene.bodies()[f.body].tree(f.kind).feature(f.slot);
+        double radius = 0;
+        for (std::size_t i = 0; i < f.size; ++i) radius = std::max(radius, scene.radii()[internal[i]]);
+        separation_ += radius;
+      }
+    }
+    const bool listed = std::any_of(left_out.begin(), left_out.end(), [&](const LeftOutPair& pair) {
+      return pair.kind == question_.kind && pair.body == a.body && a.body == b.body && sameFeatures(pair.vertex);
+    });
+    if (listed) {
+      say("separation", Says::KEPT, "closer than the separation in the reference frame: left out of it");
+      separation_ = 0;
+    } else if (separation_ > 0) {
+      std::ostringstream text;
+      text << "contact from " << separation_ << " m, " << separation_ - own << " m of it tracker noise";
+      say("separation", Says::KEPT, text.str());
+    }
   }
+
+  /// The same vertices in each feature, in any order; for two edges, in any order of the edges.
+  bool sameFeatures(const std::array<Index, 4>& vertex) const {
+    const auto sorted = [&](const std::array<Index, 4>& v, std::size_t first, std::size_t size) {
+      std::vector<Index> part(v.begin() + first, v.begin() + first + size);
+      std::sort(part.begin(), part.end());
+      return part;
+    };
+    std::array<Index, 4> asked{};
+    std::copy(question_.vertex.begin(), question_.vertex.end(), asked.begin());
+    const std::size_t size = features_[0].size;
+    const auto a = sorted(asked, 0, size), b = sorted(asked, size, 4 - size);
+    const auto c = sorted(vertex, 0, size), d = sorted(vertex, size, 4 - size);
+    return (a == c && b == d) || (size == 2 && a == d && b == c);
+  }
+
+  double separation() const { return separation_; }
 
   void traceLinear(const std::vector<Positions>& t0, const std::vector<Positions>& t1) {
     const double bound = linearTocBound(question_.kind, motion(t0, t1), separation());
@@ -250,6 +292,7 @@ class Tracer {
   const PairQuestion& question_;
   std::array<Feature, 2> features_;
   std::size_t part_ = 0;
+  double separation_ = 0;
   std::vector<TraceLine> lines_;
 };
 

@@ -11,6 +11,8 @@ namespace {
 constexpr std::size_t CHUNK = 2048;                              // pairs that stay in the first-level cache's reach
 constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
 
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
 FeatureKind kindA(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
 FeatureKind kindB(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
 
@@ -30,8 +32,9 @@ void PairWorker::beginStep() {
   unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
 }
 
-double PairWorker::separation() const {
-  return std::max(a_->setup.minimum_separation_m, b_->setup.minimum_separation_m);
+void PairWorker::addMs(double ms) {
+  stats_[effect()].ms += ms;
+  if (rigid()) stats_[Effect::RIGID_BODIES].ms += ms;
 }
 
 Clock::time_point PairWorker::lap(Stage stage, Clock::time_point start) {
@@ -45,11 +48,18 @@ void PairWorker::begin(StepContext& context, const PairTask& task) {
   task_ = &task;
   a_ = &context.scene->bodies()[task.body_a];
   b_ = &context.scene->bodies()[task.body_b];
+  separation_ = context.scene->separation(task.body_a, task.body_b);
+  uncertain_ = a_->uncertain || b_->uncertain;
+  separated_ = separation_ > 0 || uncertain_;
+  left_out_ = task.self && separated_ && context.left_out && !(*context.left_out)[task.body_a].empty()
+                  ? &(*context.left_out)[task.body_a]
+                  : nullptr;
   count_ = 0;
 }
 
 void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
   begin(context, task);
+  const Clock::time_point whole = Clock::now();
   const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
   const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(kindA(task.kind)).featureCount());
   const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(kindB(task.kind)).featureCount());
@@ -68,6 +78,7 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
   }
   take(slots, n);
   flush();
+  addMs(msSince(whole));
 }
 
 void PairWorker::run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs,
@@ -75,7 +86,8 @@ void PairWorker::run(StepContext& context, const PairTask& task, const std::vect
   begin(context, task);
   const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
                        task.self && task.kind == PairKind::EDGE_EDGE, false};
-  Clock::time_point start = Clock::now();
+  const Clock::time_point whole = Clock::now();
+  Clock::time_point start = whole;
   for (std::size_t p = first; p < last; ++p) {
     if (context.timeIsUp()) {
       // Nothing of these was looked at: all that is known is when their groups can meet.
@@ -93,6 +105,7 @@ void PairWorker::run(StepContext& context, const PairTask& task, const std::vect
   }
   lap(Stage::BROAD_PHASE, start);
   flush();
+  addMs(msSince(whole));
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
 }
@@ -123,7 +136,8 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   }
   (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
   stats_[Stage::BROAD_PHASE].out += n - count_;
-  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].in += n - count_;
+  stats_[effect()].in += n - count_;
+  if (rigid()) stats_[Effect::RIGID_BODIES].in += n - count_;
   count_ = n;
   lap(Stage::BROAD_PHASE, start);
   if (count_ >= CHUNK) flush();
@@ -134,18 +148,21 @@ void PairWorker::flush() {
   const Clock::time_point start = Clock::now();
   filter();
   makeCanonical();
+  if (separated_) setSeparations();
   if (context_->earliest_only) dropLate();
   if (!context_->elementary || context_->timeIsUp()) {
     keepUndecided();
   } else {
     decide();
   }
-  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].ms += msSince(start);
+  const double ms = msSince(start);
+  if (separation_ > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
+  if (uncertain_) stats_[Effect::TRACKER_NOISE].ms += ms;
   count_ = 0;
 }
 
 void PairWorker::filter() {
-  if (separation() > 0) return;  // the planar filter proves "never touch", not "never closer than d"
+  if (separated_) return;  // the planar filter proves "never touch", not "never closer than d"
   const Clock::time_point start = Clock::now();
   stats_[Stage::PLANAR].in += count_;
   const std::size_t kept =
@@ -174,16 +191,48 @@ void PairWorker::makeCanonical() {
   }
 }
 
+// By how much the vertices' uncertainty widens the pair: a point of a feature is a convex combination of its vertices, so
+// that it is off by the largest of their radii at most.
+double PairWorker::radius(const Quad& pair) const {
+  const double* r = context_->scene->radii();
+  if (task_->kind == PairKind::EDGE_EDGE) return std::max(r[pair[0]], r[pair[1]]) + std::max(r[pair[2]], r[pair[3]]);
+  return r[pair[0]] + std::max({r[pair[1]], r[pair[2]], r[pair[3]]});
+}
+
+void PairWorker::setSeparations() {
+  for (std::size_t i = 0; i < count_; ++i) {
+    double noise = uncertain_ ? radius(quads_[i]) : 0;
+    // Rounded up, so that a contact at exactly the sum is none too far.
+    separations_[i] = noise > 0 ? (separation_ + noise) * (1 + 0x1p-50) : separation_;
+    // The list is made for the largest radii so far; what counts is what the vertices are known to now.
+    const double apart_m = left_out_ ? left_out_->distance(task_->kind, keys_[i]) : INFINITE;
+    const bool left_out = apart_m < INFINITE && (!uncertain_ || apart_m <= separations_[i] + context_->tolerance_m);
+    if (left_out) separations_[i] = noise = 0;
+    stats_.left_out_met += left_out;
+    stats_[Effect::MINIMUM_SEPARATION].in += separation_ > 0 && !left_out;
+    stats_[Effect::TRACKER_NOISE].in += noise > 0;
+  }
+}
+
+void PairWorker::countOut(std::size_t i) {
+  ++stats_[effect()].out;
+  if (rigid()) ++stats_[Effect::RIGID_BODIES].out;
+  if (!separated_) return;
+  stats_[Effect::MINIMUM_SEPARATION].out += separation_ > 0 && separations_[i] > 0;
+  stats_[Effect::TRACKER_NOISE].out += separations_[i] > separation_;
+}
+
 void PairWorker::dropLate() {
   const double best = context_->best_toc_upper.load(std::memory_order_relaxed);
   if (best >= 2) return;
   // With the tolerance, so that nothing is dropped that the elementary test would have called a contact before `best`:
   // the answer must not depend on which pair was looked at first.
-  const double distance = separation() + context_->tolerance_m;
   std::size_t n = 0;
   for (std::size_t i = 0; i < count_; ++i) {
+    const double distance = separationOf(i) + context_->tolerance_m;
     if (linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance) > best) continue;
     quads_[n] = quads_[i];
+    separations_[n] = separations_[i];
     keys_[n++] = keys_[i];
   }
   count_ = n;
@@ -195,13 +244,13 @@ void PairWorker::keepUndecided() {
   const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   std::size_t out = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    const double bound = linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separation());
+    const double bound = linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separationOf(i));
     if (bound > 1) continue;
+    countOut(i);
     hits.push_back({keys_[i], bound, 1, bodies, Certainty::UNDECIDED});
     ++out;
   }
   stats_.undecided += out;
-  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].out += out;
   lap(Stage::ELEMENTARY, start);
 }
 
@@ -212,10 +261,7 @@ void PairWorker::decide() {
   batch.vertices = context_->scene->vertices();
   batch.pairs = quads_.data();
   batch.count = count_;
-  if (separation() > 0) {
-    std::fill_n(separations_.begin(), count_, separation());
-    batch.minimum_separation_m = separations_.data();
-  }
+  if (separated_) batch.minimum_separation_m = separations_.data();
   context_->elementary->run(batch, results_.data(), stats_.tiers);
   auto& hits = hits_[static_cast<int>(task_->kind)];
   const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
@@ -223,10 +269,11 @@ void PairWorker::decide() {
   for (std::size_t i = 0; i < count_; ++i) {
     ElementaryResult& r = results_[i];
     if (r.verdict == Verdict::NO_CONTACT) continue;
+    countOut(i);
     const bool certain = r.verdict == Verdict::CONTACT;
     if (!certain) {
       // As tight as the linear filter allows; dropLate() decides by the same bound.
-      const double bound = linearTocBound(task_->kind, batch.vertices, quads_[i], separation() + context_->tolerance_m);
+      const double bound = linearTocBound(task_->kind, batch.vertices, quads_[i], separationOf(i) + context_->tolerance_m);
       r.toc_lower = std::max(r.toc_lower, std::min(bound, 1.0));
     }
     hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,
@@ -240,7 +287,6 @@ void PairWorker::decide() {
   }
   stats_[Stage::ELEMENTARY].in += count_;
   stats_[Stage::ELEMENTARY].out += hits.size() - before;
-  stats_[task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY].out += hits.size() - before;
   lap(Stage::ELEMENTARY, start);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "broad_phase/cluster_pairs.h"
+#include "detector/left_out.h"
 #include "detector/scene_arrays.h"
 
 namespace deformable_ccd {
@@ -41,6 +42,7 @@ struct StepContext {
   Clock::time_point deadline = Clock::time_point::max();
   std::atomic<bool> expired{false};
   bool earliest_only = false;
+  const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
   double tolerance_m = 0;  ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   bool timeIsUp() {
@@ -74,7 +76,13 @@ class PairWorker {
   void decide();
   void keepUndecided();
   void dropLate();
-  double separation() const;
+  Effect effect() const { return task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY; }
+  bool rigid() const { return !task_->self && (a_->setup.rigid || b_->setup.rigid); }
+  void setSeparations();
+  double radius(const Quad& pair) const;
+  double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
+  void countOut(std::size_t i);
+  void addMs(double ms);
   Clock::time_point lap(Stage stage, Clock::time_point start);
 
   StepContext* context_ = nullptr;
@@ -87,6 +95,10 @@ class PairWorker {
   std::vector<std::uint32_t> kept_;
   std::vector<ElementaryResult> results_;
   std::vector<double> separations_;
+  double separation_ = 0;   // of the task's bodies
+  bool uncertain_ = false;  // some vertex of theirs has a radius
+  bool separated_ = false;  // either of the two: separations_ holds a value for each pair
+  const LeftOutOfBody* left_out_ = nullptr;
   std::size_t count_ = 0;
   std::vector<Hit> hits_[2];
   core::StepStats stats_;

@@ -33,28 +33,6 @@ void buildTree(SceneBody& body, FeatureKind kind, const std::vector<Index>& loca
   body.ranks[static_cast<int>(kind)] = std::move(ranks);
 }
 
-// a - b as an unevaluated sum without error (Knuth's two-sum); not finite when it overflows.
-struct ExactDifference {
-  double high, low;
-  friend bool operator==(const ExactDifference& x, const ExactDifference& y) { return x.high == y.high && x.low == y.low; }
-};
-ExactDifference exactDifference(double a, double b) {
-  const double high = a - b, virtual_b = a - high, virtual_a = high + virtual_b;
-  return {high, (a - virtual_a) + (virtual_b - b)};
-}
-
-bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
-  for (std::size_t i = 1; i < n; ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(exactDifference(vertices[i].t1[axis], vertices[i].t0[axis]) ==
-            exactDifference(vertices[0].t1[axis], vertices[0].t0[axis]))) {
-        return false;
-      }
-    }
-  }
-  return n > 0;
-}
-
 std::vector<Index> consecutive(std::size_t n, Index first) {
   std::vector<Index> v(n);
   std::iota(v.begin(), v.end(), first);
@@ -82,9 +60,22 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
       throw std::invalid_argument("setBodies: body '" + s.name + "' has " + std::to_string(s.vertex_active.size()) +
                                   " activity flags for " + std::to_string(n) + " vertices");
     }
-    if (!(s.minimum_separation_m >= 0) || !std::isfinite(s.minimum_separation_m)) {
+    const auto check_separation = [&](double separation_m) {
+      if (separation_m >= 0 && std::isfinite(separation_m)) return;
       throw std::invalid_argument("setBodies: body '" + s.name + "' has minimum_separation_m = " +
-                                  std::to_string(s.minimum_separation_m) + "; it must be finite and not negative");
+                                  std::to_string(separation_m) + "; it must be finite and not negative");
+    };
+    check_separation(s.minimum_separation_m);
+    for (const SeparationFrom& from : s.separations) {
+      check_separation(from.separation_m);
+      if (from.body < setups.size() || from.body == OBSTACLE_BODY) continue;
+      throw std::invalid_argument("setBodies: body '" + s.name + "' has a separation from body " +
+                                  std::to_string(from.body) + "; there are " + std::to_string(setups.size()));
+    }
+    if (s.reference && (s.reference->positions.size() != n ||
+                        (!s.reference->radius_m.empty() && s.reference->radius_m.size() != n))) {
+      throw std::invalid_argument("setBodies: body '" + s.name + "' needs " + std::to_string(n) +
+                                  " positions and no or as many radii in its reference frame");
     }
   }
   bodies_.clear();
@@ -103,8 +94,6 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
     body.edge_begin = edge_begin;
     body.face_begin = face_begin;
     body.internal_begin = static_cast<Index>(vertex_count_);
-    largest_separation_ = std::max(largest_separation_, body.setup.minimum_separation_m);
-
     const std::vector<Index>& used = t.usedVertices();
     std::vector<Vec3> centres(used.size());
     for (std::size_t i = 0; i < used.size(); ++i) centres[i] = rest[used[i]];
@@ -143,6 +132,9 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
   for (SceneBody& body : bodies_) {
     for (ClusterTree& tree : body.trees) tree.raise(height_);
   }
+  range_padded_ = uncertain_ = bounds_valid_ = false;
+  radii_.clear();
+  setReaches();
   if (vertex_count_ > vertex_capacity_) {
     vertices_ = hwy::AllocateAligned<VertexMotion>(vertex_count_);
     if (!vertices_) throw std::bad_alloc();
@@ -163,88 +155,28 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
   } while (groups > 1);
 }
 
-void SceneArrays::record(const MotionStep& step, core::StepStats& stats) {
-  if (step.bodies.size() != bodies_.size()) {
-    throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the detector " +
-                                std::to_string(bodies_.size()));
-  }
-  const double inf = std::numeric_limits<double>::infinity();
-  double low[8], high[8];
-  std::fill_n(low, 8, inf);
-  std::fill_n(high, 8, -inf);
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    SceneBody& body = bodies_[b];
-    const BodyMotion& motion = step.bodies[b];
-    const std::size_t n = body.setup.topology->vertexCount();
-    if (!motion.t0 || !motion.t1 || motion.t0->size() != n || motion.t1->size() != n) {
-      throw std::invalid_argument("body '" + body.setup.name + "' needs " + std::to_string(n) +
-                                  " positions at t0 and t1, got " + std::to_string(motion.t0 ? motion.t0->size() : 0) +
-                                  " and " + std::to_string(motion.t1 ? motion.t1->size() : 0));
-    }
-    const Vec3* x0 = motion.t0->data();
-    const Vec3* x1 = motion.t1->data();
-    bool changed = false, masked = false;
-    std::uint64_t unchecked = 0;
-    VertexMotion* out = vertices_.get() + body.internal_begin;
-    std::size_t first_active = body.usedCount();
-    for (std::size_t i = 0; i < body.usedCount(); ++i) {
-      const Index v = body.slot_vertex[i];
-      const Vec3 &p = x0[v], &q = x1[v];
-      out[i] = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
-      // A sum of finite terms times zero is zero; anything else is not (and is looked at more closely).
-      const double probe = (p[0] * 0 + p[1] * 0 + p[2] * 0) + (q[0] * 0 + q[1] * 0 + q[2] * 0);
-      const bool finite = probe == 0;
-      unchecked += !finite;
-      const bool active = finite && (body.setup.vertex_active.empty() || body.setup.vertex_active[v]);
-      changed |= body.active[i] != static_cast<std::uint8_t>(active);
-      body.active[i] = active;
-      masked |= !active;
-      if (active && first_active == body.usedCount()) first_active = i;
-    }
-    if (masked) {
-      // What is left out must not widen the range of the records: it takes an active vertex's place.
-      for (std::size_t i = 0; i < body.usedCount(); ++i) {
-        if (!body.active[i]) out[i] = first_active < body.usedCount() ? out[first_active] : VertexMotion{};
-      }
-    }
-    body.translates = !masked && sameDisplacement(out, body.usedCount());
-    stats.unchecked_vertices += unchecked;
-    if (changed || masked != body.masked) {
-      // The mask is indexed by internal vertex number.
-      const std::uint8_t* flags = masked ? body.active.data() - body.internal_begin : nullptr;
-      for (ClusterTree& tree : body.trees) tree.mask(flags);
-      body.masked = masked;
-    }
-    if (unchecked) {
-      for (const Face& f : body.setup.topology->faces()) {
-        const auto bad = [&](Index v) { return !x0[v].allFinite() || !x1[v].allFinite(); };
-        stats.unchecked_faces += bad(f[0]) || bad(f[1]) || bad(f[2]);
-      }
-    }
-    if (first_active < body.usedCount()) simd::projectionBounds(out->t0, body.usedCount(), low, high);
-  }
-  for (int d = 0; d < 8; ++d) {
-    // Half ranges: a difference of finite doubles can overflow. Scale and unit only have to be positive and finite.
-    const double range = high[d] / 2 - low[d] / 2;
-    const bool usable = range > 0 && std::isfinite(low[d]) && std::isfinite(high[d]) && std::isfinite(2 * range);
-    low_[d] = usable ? low[d] : 0;
-    scale_[d] = usable ? std::min(simd::RECORD_RANGE / 2 / range, 1e300) : 0;
-    unit_[d] = usable ? 2 * range / simd::RECORD_RANGE : inf;
-  }
-  if (largest_separation_ > 0) {
-    for (int k = 0; k < 16; ++k) {
-      const int d = k % 8;
-      const double length = d < 3 ? 1.0 : 1.4142135623730952;  // rounded up
-      // Half of the separation on either side, a unit for the truncation of both values, and the rounding of both sums.
-      const double rounding = std::ldexp(std::max(std::abs(low[d]), std::abs(high[d])), -52) * scale_[d];
-      const double units = std::ceil(0.5000001 * largest_separation_ * length * scale_[d] + rounding) + 1;
-      margin_[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min(units, 32766.0) : 0);
+void SceneArrays::setReaches() {
+  double between_meshes = 0, from_map = 0;
+  for (const SceneBody& body : bodies_) {
+    between_meshes = std::max(between_meshes, body.setup.minimum_separation_m);
+    for (const SeparationFrom& from : body.setup.separations) {
+      double& largest = from.body == OBSTACLE_BODY ? from_map : between_meshes;
+      largest = std::max(largest, from.separation_m);
     }
   }
+  for (SceneBody& body : bodies_) body.reach_m = 0.5 * between_meshes;
+  largest_separation_ = std::max(between_meshes, from_map);
 }
 
-void SceneArrays::quantize(std::size_t first, std::size_t last) {
-  simd::quantize(vertices_[first].t0, last - first, low_, scale_, records_.data() + first * simd::RECORD);
+double SceneArrays::separation(std::size_t a, std::size_t b) const {
+  for (const SeparationFrom& from : bodies_[a].setup.separations) {
+    if (from.body == b) return from.separation_m;
+  }
+  if (b == OBSTACLE_BODY) return bodies_[a].setup.minimum_separation_m;
+  for (const SeparationFrom& from : bodies_[b].setup.separations) {
+    if (from.body == a) return from.separation_m;
+  }
+  return std::max(bodies_[a].setup.minimum_separation_m, bodies_[b].setup.minimum_separation_m);
 }
 
 void SceneArrays::refitBodies() {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "detector/pair_worker.h"
+
 namespace deformable_ccd {
 
 namespace {
@@ -14,16 +16,8 @@ double rotationAngle(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
 }
 
 void add(const core::StepStats& part, core::StepStats& sum) {
-  for (std::size_t i = 0; i < sum.stages.size(); ++i) {
-    sum.stages[i].in += part.stages[i].in;
-    sum.stages[i].out += part.stages[i].out;
-    sum.stages[i].ms += part.stages[i].ms;
-  }
-  for (std::size_t i = 0; i < sum.effects.size(); ++i) {
-    sum.effects[i].in += part.effects[i].in;
-    sum.effects[i].out += part.effects[i].out;
-    sum.effects[i].ms += part.effects[i].ms;
-  }
+  for (std::size_t i = 0; i < sum.stages.size(); ++i) sum.stages[i] += part.stages[i];
+  for (std::size_t i = 0; i < sum.effects.size(); ++i) sum.effects[i] += part.effects[i];
   sum.tiers += part.tiers;
   sum.total_ms += part.total_ms;
   sum.vf_candidates += part.vf_candidates;
@@ -32,7 +26,12 @@ void add(const core::StepStats& part, core::StepStats& sum) {
   sum.initial += part.initial;
   sum.leaving += part.leaving;
   sum.unfolded_bodies += part.unfolded_bodies;
-  // The same vertices in every part.
+  sum.bodies_refitted += part.bodies_refitted;
+  sum.bodies_kept += part.bodies_kept;
+  sum.body_pairs += part.body_pairs;
+  sum.left_out_met += part.left_out_met;
+  // The same in every part.
+  sum.left_out_listed = std::max(sum.left_out_listed, part.left_out_listed);
   sum.unchecked_vertices = std::max(sum.unchecked_vertices, part.unchecked_vertices);
   sum.unchecked_faces = std::max(sum.unchecked_faces, part.unchecked_faces);
 }
@@ -132,6 +131,8 @@ void StepInput::resize(std::size_t bodies) {
   rigid.resize(bodies, 0);
   pose_t0.resize(bodies, Eigen::Isometry3d::Identity());
   pose_t1.resize(bodies, Eigen::Isometry3d::Identity());
+  radius_m.resize(bodies);
+  references.resize(bodies);
 }
 
 std::size_t requiredSubsteps(const StepInput& input, double tolerance_m) {
@@ -171,7 +172,8 @@ std::vector<BodySetup> bodySetups(const StepInput& input, const std::vector<Moni
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const MonitorBody& body = bodies[b];
     BodySetup setup{body.name, input.topologies[b], body.self_collision && !body.rigid, body.against_bodies,
-                    body.against_obstacle, body.minimum_separation_m, {}};
+                    body.against_obstacle, body.minimum_separation_m, {}, body.separations, input.references[b],
+                    body.rigid};
     if (!body.vertex_mask.empty()) setup.vertex_active.assign(input.topologies[b]->vertexCount(), 1);
     for (const Index v : body.vertex_mask) {
       if (v >= setup.vertex_active.size()) {
@@ -190,13 +192,17 @@ void StepRunner::setBodies(const StepInput& input, const std::vector<MonitorBody
   for (const Positions& positions : input.t0) rest.push_back(&positions);
   detector_.setBodies(bodySetups(input, bodies), rest);
   set_topologies_ = input.topologies;
+  set_references_ = input.references;
 }
 
-void StepRunner::runPart(const std::vector<Positions>& t0, const std::vector<Positions>& t1, bool continues,
-                         std::size_t part, std::size_t parts, StepOutcome& outcome) {
-  step_.bodies.resize(t0.size());
-  for (std::size_t b = 0; b < t0.size(); ++b) step_.bodies[b] = {&t0[b], &t1[b]};
+void StepRunner::runPart(const StepInput& at, bool continues, std::size_t part, std::size_t parts,
+                         StepOutcome& outcome) {
+  step_.bodies.resize(at.t0.size());
+  for (std::size_t b = 0; b < at.t0.size(); ++b) {
+    step_.bodies[b] = {&at.t0[b], &at.t1[b], at.radius_m[b].empty() ? nullptr : &at.radius_m[b]};
+  }
   step_.continues = continues;
+  step_.spent_ms = outcome.stats.total_ms;  // the budget is one for the whole step
   const StepResult& result = detector_.run(step_);
   if (part == 0) {
     outcome.start_state = result.start_state;
@@ -216,17 +222,33 @@ void StepRunner::runPart(const std::vector<Positions>& t0, const std::vector<Pos
   add(result.stats, outcome.stats);
 }
 
+bool StepRunner::budgetIsSpent(const StepOutcome& outcome) const {
+  const double budget_ms = detector_.options().step_budget_ms;
+  return budget_ms > 0 && outcome.stats.total_ms >= budget_ms;
+}
+
 void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts,
                           StepOutcome& outcome) {
   step_.obstacle = map.surface;
   step_.map_from_fixed = map.map_from_fixed;
-  if (parts == 1) return runPart(input.t0, input.t1, continues, 0, 1, outcome);
+  if (parts == 1) return runPart(input, continues, 0, 1, outcome);
   part_.resize(input.t0.size());
   part_.t1 = input.t0;
+  part_.radius_m = input.radius_m;
   for (std::size_t i = 0; i < parts; ++i) {
+    if (i > 0 && budgetIsSpent(outcome)) {
+      // Of the rest all that is known is that it has not begun yet.
+      outcome.complete = false;
+      outcome.unchecked_toc_lower = std::min(outcome.unchecked_toc_lower, scaleDown(0, i, parts));
+      break;
+    }
+    const Clock::time_point start = Clock::now();
     part_.t0.swap(part_.t1);
     placeAt(input, i + 1, parts, part_.t1);
-    runPart(part_.t0, part_.t1, i > 0 || continues, i, parts, outcome);
+    const double place_ms = msSince(start);
+    outcome.stats[Effect::RIGID_BODIES].ms += place_ms;
+    outcome.stats.total_ms += place_ms;
+    runPart(part_, i > 0 || continues, i, parts, outcome);
   }
   auto& contacts = outcome.contacts;
   std::sort(contacts.begin(), contacts.end(), canonicalLess);
@@ -235,7 +257,7 @@ void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
 
 void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
                      const MonitorMap& map, bool continues, StepOutcome& outcome) {
-  if (set_topologies_ != input.topologies) {
+  if (set_topologies_ != input.topologies || set_references_ != input.references) {
     setBodies(input, bodies);
     continues = false;
   }

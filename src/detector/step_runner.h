@@ -16,6 +16,8 @@ struct StepInput {
   std::vector<std::shared_ptr<const Topology>> topologies;
   std::vector<std::uint8_t> rigid;  ///< one a body: moves from pose_t0 to pose_t1 along the rotation
   std::vector<Eigen::Isometry3d> pose_t0, pose_t1;
+  std::vector<std::vector<double>> radius_m;  ///< one a body: uncertainty per vertex over the step; empty: none
+  std::vector<std::shared_ptr<const ReferenceFrame>> references;  ///< one a body; null: nothing is left out
 
   void resize(std::size_t bodies);
 };
@@ -35,6 +37,7 @@ class StepRunner {
   explicit StepRunner(const DetectorOptions& options);
 
   void setOptions(const DetectorOptions& options);
+  const std::vector<LeftOutPair>& leftOut() const { return detector_.leftOut(); }
 
   /// Fills the outcome's result from the step. `continues`: t0 is the t1 of the last run here, nothing else changed.
   /// Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
@@ -44,13 +47,14 @@ class StepRunner {
  private:
   Detector detector_;
   std::vector<std::shared_ptr<const Topology>> set_topologies_;
+  std::vector<std::shared_ptr<const ReferenceFrame>> set_references_;
   StepInput part_;
   MotionStep step_;
 
   void setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies);
   void runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts, StepOutcome& outcome);
-  void runPart(const std::vector<Positions>& t0, const std::vector<Positions>& t1, bool continues, std::size_t part,
-               std::size_t parts, StepOutcome& outcome);
+  void runPart(const StepInput& at, bool continues, std::size_t part, std::size_t parts, StepOutcome& outcome);
+  bool budgetIsSpent(const StepOutcome& outcome) const;
 };
 
 }  // namespace deformable_ccd

@@ -198,12 +198,12 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
     stage_sum_[i].out += s.stages[i].out;
   }
   timing_ << '\n';
-  for (std::size_t i = 0; i < effect_sum_.size(); ++i) {
-    effect_sum_[i].in += s.effects[i].in;
-    effect_sum_[i].out += s.effects[i].out;
-    effect_sum_[i].ms += s.effects[i].ms;
-  }
+  for (std::size_t i = 0; i < effect_sum_.size(); ++i) effect_sum_[i] += s.effects[i];
   tiers_ += s.tiers;
+  bodies_refitted_ += s.bodies_refitted;
+  bodies_kept_ += s.bodies_kept;
+  left_out_met_ += s.left_out_met;
+  unknown_fraction_.push_back(o.unknown_fraction);
   total_ms_.push_back(s.total_ms);
 }
 
@@ -237,6 +237,52 @@ nlohmann::json Report::heatJson() const {
   return bodies;
 }
 
+nlohmann::json Report::effectsJson() const {
+  nlohmann::json effects = nlohmann::json::array();
+  for (const EffectDecision& d : plan_.decisions()) {
+    nlohmann::json e = {{"name", d.name}, {"running", d.running}, {"reason", d.reason}};
+    for (std::size_t i = 0; i < effect_sum_.size(); ++i) {
+      const std::string name = toString(static_cast<Effect>(i));
+      if (name != d.name && !(name == "obstacle" && d.name == "octomap")) continue;
+      e["in"] = effect_sum_[i].in;
+      e["out"] = effect_sum_[i].out;
+      e["ms"] = effect_sum_[i].ms;
+    }
+    effects.push_back(std::move(e));
+  }
+  return effects;
+}
+
+nlohmann::json Report::lookAheadJson() const {
+  if (!look_ahead_) return {};
+  return {{"horizon_s", horizon_s_},
+          {"compared", look_ahead_->compared},
+          {"not_observed", look_ahead_->not_observed},
+          {"not_predicted", look_ahead_->not_predicted},
+          {"median_error_s", look_ahead_->median_error_s},
+          {"p95_error_s", look_ahead_->p95_error_s},
+          {"median_signed_error_s", look_ahead_->median_signed_error_s}};
+}
+
+void Report::setLookAhead(const LookAheadSummary& summary, double horizon_s) {
+  look_ahead_ = summary;
+  horizon_s_ = horizon_s;
+}
+
+void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies) {
+  left_out_ = pairs.size();
+  if (pairs.empty()) return;
+  std::ofstream file(folder_ + "/left_out.csv");
+  file << "kind,body,v0,v1,v2,v3\n";
+  for (const LeftOutPair& pair : pairs) {
+    file << KINDS[static_cast<int>(pair.kind)] << ',' << csvField(bodyName(pair.body, bodies));
+    for (const Index v : pair.vertex) file << ',' << v;
+    file << '\n';
+  }
+  file.close();
+  if (!file) throw std::runtime_error(folder_ + "/left_out.csv: cannot be written");
+}
+
 nlohmann::json Report::json() const {
   nlohmann::json j;
   j["headline"] = headline();
@@ -254,18 +300,11 @@ nlohmann::json Report::json() const {
                            {"median_ms", quantile(stage_ms_[s], 0.5)}, {"p95_ms", quantile(stage_ms_[s], 0.95)}});
   }
   j["total"] = {{"median_ms", quantile(total_ms_, 0.5)}, {"p95_ms", quantile(total_ms_, 0.95)}, {"max_ms", quantile(total_ms_, 1)}};
-  j["effects"] = nlohmann::json::array();
-  for (const EffectDecision& d : plan_.decisions()) {
-    nlohmann::json e = {{"name", d.name}, {"running", d.running}, {"reason", d.reason}};
-    for (std::size_t i = 0; i < effect_sum_.size(); ++i) {
-      const std::string name = toString(static_cast<Effect>(i));
-      if (name != d.name && !(name == "obstacle" && d.name == "octomap")) continue;
-      e["in"] = effect_sum_[i].in;
-      e["out"] = effect_sum_[i].out;
-      e["ms"] = effect_sum_[i].ms;
-    }
-    j["effects"].push_back(std::move(e));
-  }
+  j["effects"] = effectsJson();
+  j["bounds"] = {{"bodies_refitted", bodies_refitted_}, {"bodies_kept", bodies_kept_}};
+  j["left_out"] = {{"pairs", left_out_}, {"met", left_out_met_}};
+  j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
+  j["look_ahead"] = lookAheadJson();
   for (std::size_t t = 0; t < tiers_.settled.size(); ++t) j["tiers"][toString(static_cast<Tier>(t))] = tiers_.settled[t];
   j["rungs"] = nlohmann::json::array();
   for (const RungCost& r : rungs_) {

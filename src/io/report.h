@@ -4,12 +4,14 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "deformable_ccd/effect_plan.h"
+#include "deformable_ccd/look_ahead_score.h"
 #include "deformable_ccd/monitor.h"
 
 namespace deformable_ccd {
@@ -38,8 +40,8 @@ class ContactLog {
   std::vector<double> ms_;
 };
 
-/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv, report.json and
-/// report.html. Outcomes are added in order; nothing but their summaries is kept.
+/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv, left_out.csv (pairs
+/// that the minimum separation leaves out, where there are any), report.json and report.html. Outcomes are added in order; nothing but their summaries is kept.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
@@ -47,6 +49,9 @@ class Report {
 
   void add(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
   void setEffects(const EffectPlan& plan) { plan_ = plan; }
+  /// Writes left_out.csv. Throws std::runtime_error naming the file.
+  void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies);
+  void setLookAhead(const LookAheadSummary& summary, double horizon_s);
   void setRungs(const std::vector<RungCost>& rungs) { rungs_ = rungs; }
   /// Facts for the head of the page: name -> value, in the order given.
   void setFacts(std::vector<std::pair<std::string, std::string>> facts) { facts_ = std::move(facts); }
@@ -68,6 +73,8 @@ class Report {
   void addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
   void writeContacts(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
   nlohmann::json heatJson() const;
+  nlohmann::json effectsJson() const;
+  nlohmann::json lookAheadJson() const;
   nlohmann::json json() const;
 
   std::string folder_;
@@ -84,6 +91,11 @@ class Report {
   std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effect_sum_{};
   TierCounters tiers_;
   std::vector<double> total_ms_;
+  std::vector<double> unknown_fraction_;
+  std::uint64_t bodies_refitted_ = 0, bodies_kept_ = 0, left_out_met_ = 0;
+  std::size_t left_out_ = 0;
+  std::optional<LookAheadSummary> look_ahead_;
+  double horizon_s_ = 0;
   EffectPlan plan_;
   std::vector<RungCost> rungs_;
   std::vector<std::pair<std::string, std::string>> facts_;

@@ -35,7 +35,10 @@ initial ones included. 0 is the beginning of the step, 1 its end.</p>
 <h2>Gaps, resets and other frames that are not OK</h2><table id="seams"></table>
 <h2>Where the time goes</h2><table id="stages"></table>
 <h2>Milliseconds per step</h2><div id="latency"></div><p class="note" id="latency_note"></p>
-<h2>Effects</h2><table id="effects"></table>
+<h2>Effects</h2><table id="effects"></table><p class="note" id="effects_note"></p>
+<h2>Look-ahead: predicted against later observed</h2><table id="look_ahead"></table>
+<p class="note">Times at which vertices first touch another body, their own, or the map. The error is that of each prediction which came
+true within its horizon, early ones included.</p>
 <h2>What accuracy costs on this recording</h2><table id="rungs"></table>
 <p class="note">Missed and false are against the run with exact; undecided ones are reported as such.</p>
 <h2>Tiers of the exact test</h2><table id="tiers"></table>
@@ -167,6 +170,14 @@ const longest = list => Math.max(1e-12, ...list);
 { const most = longest(R.effects.map(e => e.ms || 0));
   table('effects', ['effect', 'runs', 'why', 'pairs in', 'pairs out', 'ms in all', ''], R.effects.map(e =>
     [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)])); }
+document.getElementById('effects_note').textContent =
+  `Bounds of bodies: ${R.bounds.bodies_refitted} times computed, ${R.bounds.bodies_kept} times kept from the step before.` +
+  (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +
+    `they came up ${R.left_out.met} times.` : '') +
+  (R.unknown_fraction.max ? ` Of the swept space the map does not know ${number(100 * R.unknown_fraction.median)} % (median), at most ${number(100 * R.unknown_fraction.max)} %.` : '');
+{ const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
+  [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);
+  else document.getElementById('look_ahead').textContent = 'Off: look_ahead_s is 0.'; }
 { const most = longest(R.rungs.map(r => r.median_ms));
   table('rungs', ['rung', 'steps', 'contacts', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '', '95 % ms'],
     R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, bar(r.median_ms / most), r.p95_ms])); }

@@ -176,7 +176,7 @@ class RecordingReader {
 namespace {
 
 // The least bytes that one item of a list takes.
-constexpr std::size_t BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24;
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24;
 
 template <typename Archive, typename Pose>
 void visitPose(Archive& a, Pose& pose) {
@@ -304,6 +304,48 @@ void visitAnswer(Archive& a, Answer& answer) {
   }
 }
 
+template <typename Archive, typename Body>
+void visitSeparations(Archive& a, Body& body) {
+  a.count(body.setup.separations, SEPARATION_BYTES, MAX_BODIES);
+  for (auto& from : body.setup.separations) {
+    a.number(from.body);
+    a.number(from.separation_m);
+  }
+  a.array(body.radius_m);
+}
+
+void visitReference(RecordingWriter& a, const RecordedBody& body) {
+  a.flag(body.reference != nullptr);
+  if (!body.reference) return;
+  a.array(body.reference->positions);
+  a.array(body.reference->radius_m);
+}
+
+void visitReference(RecordingReader& a, RecordedBody& body) {
+  const auto fits = [&](const std::vector<double>& radius) { return radius.empty() || radius.size() == body.t0.size(); };
+  if (!fits(body.radius_m)) a.fail("body '" + body.setup.name + "' has " + std::to_string(body.radius_m.size()) + " radii");
+  bool present = false;
+  a.flag(present);
+  if (!present) return;
+  ReferenceFrame reference;
+  a.array(reference.positions);
+  a.array(reference.radius_m);
+  if (reference.positions.size() != body.t0.size() || !fits(reference.radius_m)) {
+    a.fail("the reference frame of body '" + body.setup.name + "' has " + std::to_string(reference.positions.size()) +
+           " vertices and " + std::to_string(reference.radius_m.size()) + " radii");
+  }
+  body.reference = std::make_shared<const ReferenceFrame>(std::move(reference));
+}
+
+/// What version 2 added.
+template <typename Archive, typename Recording>
+void visitDistances(Archive& a, Recording& r) {
+  for (auto& body : r.bodies) {
+    visitSeparations(a, body);
+    visitReference(a, body);
+  }
+}
+
 /// The file's fields in their order, for both directions.
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
@@ -348,6 +390,8 @@ void setSource(const StepSource& source, StepRecording& recording) {
     body.rigid = (*source.rigid)[b] != 0;
     body.pose_t0 = (*source.pose_t0)[b];
     body.pose_t1 = (*source.pose_t1)[b];
+    body.radius_m.assign((*source.radius_m)[b].begin(), (*source.radius_m)[b].end());
+    body.reference = (*source.references)[b];
   }
   recording.map = *source.map;
   RecordedAnswer& answer = recording.answer;
@@ -382,6 +426,7 @@ void RecordingImage::build(const StepRecording& recording) {
   for (const char c : MAGIC) writer.number(c);
   writer.number(RECORDING_VERSION);
   visit(writer, recording);
+  visitDistances(writer, recording);
 }
 
 bool RecordingImage::write(int descriptor) const noexcept {
@@ -436,12 +481,13 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   if (std::memcmp(magic, MAGIC, sizeof magic) != 0) reader.fail("not a recording of a step");
   std::uint32_t version = 0;
   reader.number(version);
-  if (version != RECORDING_VERSION) {
-    reader.fail("version " + std::to_string(version) + " of the format; this program reads version " +
+  if (version < 1 || version > RECORDING_VERSION) {
+    reader.fail("version " + std::to_string(version) + " of the format; this program reads versions 1 to " +
                 std::to_string(RECORDING_VERSION));
   }
   StepRecording recording;
   visit(reader, recording);
+  if (version >= 2) visitDistances(reader, recording);
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;
 }

@@ -15,7 +15,7 @@
 
 namespace deformable_ccd {
 
-constexpr std::uint32_t RECORDING_VERSION = 1;
+constexpr std::uint32_t RECORDING_VERSION = 2;  ///< 1, without distances beyond the bodies' own, can be read, too
 
 /// A recording that cannot be read; the text names the input, the byte and the value.
 struct RecordingError : std::runtime_error {
@@ -28,6 +28,8 @@ struct RecordedBody {
   std::shared_ptr<const Topology> topology;
   bool rigid = false;
   Eigen::Isometry3d pose_t0 = Eigen::Isometry3d::Identity(), pose_t1 = Eigen::Isometry3d::Identity();
+  std::vector<double> radius_m;                     ///< uncertainty per vertex; empty: none
+  std::shared_ptr<const ReferenceFrame> reference;  ///< null: nothing is left out of the separation
 };
 
 /// The parts of StepOutcome that do not depend on the machine.

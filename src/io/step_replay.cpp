@@ -124,13 +124,16 @@ StepReplay replayStep(const StepRecording& recording, int threads) {
   for (const RecordedBody& body : recording.bodies) bodies.push_back(body.setup);
   Monitor monitor(replayOptions(recording, threads), bodies);
   monitor.setMap(recording.map);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    monitor.setReference(b, recording.bodies[b].topology, recording.bodies[b].reference);
+  }
   const auto push = [&](bool end) {
     // The clock body last, so that its step finds all others.
     for (std::size_t i = 1; i <= bodies.size(); ++i) {
       const std::size_t b = (recording.options.clock_body + i) % bodies.size();
       const RecordedBody& body = recording.bodies[b];
       monitor.push(b, {end ? recording.stamp_ns : recording.start_ns, body.topology, end ? body.t1 : body.t0, body.rigid,
-                       end ? body.pose_t1 : body.pose_t0}, 0);
+                       end ? body.pose_t1 : body.pose_t0, body.radius_m}, 0);
     }
   };
   push(false);

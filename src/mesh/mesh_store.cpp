@@ -85,6 +85,7 @@ void MeshStore::clear() { frames_.clear(); }
 
 StepStatus MeshStore::classify(const MeshFrame& frame) const {
   if (!frame.topology || frame.positions.size() != frame.topology->vertexCount()) return StepStatus::VERTEX_COUNT;
+  if (!frame.radius_m.empty() && frame.radius_m.size() != frame.positions.size()) return StepStatus::VERTEX_COUNT;
   if (frames_.empty()) return StepStatus::FIRST_FRAME;
   const MeshFrame& last = newest();
   if (frame.stamp_ns == last.stamp_ns) return StepStatus::DUPLICATE;
@@ -156,6 +157,21 @@ Eigen::Isometry3d MeshStore::poseAt(StampNs stamp_ns) const {
   if (b.stamp_ns == stamp_ns) return b.pose;
   const MeshFrame& a = *frames_[i - 1].frame;
   return interpolate(a.pose, b.pose, fraction(a.stamp_ns, b.stamp_ns, stamp_ns));
+}
+
+void MeshStore::radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const {
+  out.clear();
+  std::size_t first = firstAtOrAfter(from_ns);
+  if (first > 0 && frames_[first].frame->stamp_ns != from_ns) --first;
+  const std::size_t last = std::min(firstAtOrAfter(to_ns), frames_.size() - 1);
+  for (std::size_t i = first; i <= last; ++i) {
+    const std::vector<double>& radius = frames_[i].frame->radius_m;
+    if (out.empty()) {
+      out.assign(radius.begin(), radius.end());
+    } else {
+      for (std::size_t v = 0; v < radius.size(); ++v) out[v] = std::max(out[v], radius[v]);
+    }
+  }
 }
 
 void MeshStore::forgetBefore(StampNs stamp_ns) {

@@ -61,13 +61,13 @@ void join(Contact& into, const Contact& other) {
 
 }  // namespace
 
-ObstacleBatch::ObstacleBatch(PairKind kind, const ElementaryTest* test, double minimum_separation_m, double* toc_limit)
-    : kind_(kind), test_(test), separation_m_(minimum_separation_m), toc_limit_(toc_limit) {
+ObstacleBatch::ObstacleBatch(PairKind kind, const ElementaryTest* test, double* toc_limit)
+    : kind_(kind), test_(test), toc_limit_(toc_limit) {
   quads_.resize(CHUNK);
   for (std::size_t i = 0; i < CHUNK; ++i) {
     for (std::size_t k = 0; k < 4; ++k) quads_[i][k] = static_cast<Index>(4 * i + k);
   }
-  separations_.assign(CHUNK, minimum_separation_m);
+  separations_.reserve(CHUNK);
   results_.resize(CHUNK);
   pairs_.reserve(CHUNK);
   toc_bounds_.reserve(CHUNK);
@@ -78,15 +78,19 @@ void ObstacleBatch::clear() {
   pairs_.clear();
   toc_bounds_.clear();
   points_.clear();
+  separations_.clear();
+  any_separation_ = false;
   contacts_.clear();
   tiers_ = TierCounters();
 }
 
-void ObstacleBatch::add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound) {
+void ObstacleBatch::add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m) {
   if (toc_limit_ != nullptr && toc_bound > *toc_limit_) return;
   pairs_.push_back(pair);
   toc_bounds_.push_back(toc_bound);
   points_.insert(points_.end(), points, points + 4);
+  separations_.push_back(separation_m);
+  any_separation_ |= separation_m > 0;
   if (pairs_.size() == CHUNK) flush();
 }
 
@@ -99,7 +103,7 @@ void ObstacleBatch::flush() {
     batch.vertices = points_.data();
     batch.pairs = quads_.data();
     batch.count = count;
-    if (separation_m_ > 0) batch.minimum_separation_m = separations_.data();
+    if (any_separation_) batch.minimum_separation_m = separations_.data();
     test_->run(batch, results_.data(), tiers_);
     for (std::size_t i = 0; i < count; ++i) {
       if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);
@@ -110,6 +114,8 @@ void ObstacleBatch::flush() {
   pairs_.clear();
   toc_bounds_.clear();
   points_.clear();
+  separations_.clear();
+  any_separation_ = false;
 }
 
 void ObstacleBatch::append(std::size_t index, const ElementaryResult& result) {
@@ -120,7 +126,7 @@ void ObstacleBatch::append(std::size_t index, const ElementaryResult& result) {
   contact.toc_lower = certain ? result.toc_lower : std::max(result.toc_lower, toc_bounds_[index]);
   contact.toc_upper = result.toc_upper;
   // With a separation, closer than it at t=0 is initial; without one that was settled before.
-  contact.initial = certain && separation_m_ > 0 && result.toc_lower <= 0;
+  contact.initial = certain && separations_[index] > 0 && result.toc_lower <= 0;
   contact.leaving = !contact.initial && pair.started_inside &&
                     movesOutward(kind_, &points_[4 * index], pair.outward, contact.toc_lower);
   if (certain && toc_limit_ != nullptr) *toc_limit_ = std::min(*toc_limit_, contact.toc_upper);

@@ -22,12 +22,12 @@ class ObstacleBatch {
  public:
   /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`. toc_limit: null, or
   /// where to note the upper bound of each contact; pairs that cannot touch by then are left out.
-  ObstacleBatch(PairKind kind, const ElementaryTest* test, double minimum_separation_m, double* toc_limit);
+  ObstacleBatch(PairKind kind, const ElementaryTest* test, double* toc_limit);
 
   /// Drops whatever an earlier run left behind.
   void clear();
   /// points: as the elementary kind wants them. toc_bound: not after a contact, if any, by cheaper means.
-  void add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound);
+  void add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m);
   /// Tests what is left. Contacts are found in the order of add().
   void flush();
 
@@ -40,8 +40,8 @@ class ObstacleBatch {
   static constexpr std::size_t CHUNK = 512;
   PairKind kind_;
   const ElementaryTest* test_;
-  double separation_m_;
   double* toc_limit_;
+  bool any_separation_ = false;  // of the pairs that wait
   std::vector<ObstaclePair> pairs_;
   std::vector<double> toc_bounds_;
   std::vector<VertexMotion> points_;

@@ -137,9 +137,9 @@ void ObstacleTest::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vect
 /// borders, which are slow to decide in general. False where the feature moves otherwise.
 template <class Feature>
 bool ObstacleTest::Impl::settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points,
-                                    std::uint32_t leaf, const LeafBox& target, const double* outward, bool inside,
-                                    std::vector<Contact>& contacts) {
-  const int axis = reach_m > 0 ? -1 : fallAxis(points, feature.size());
+                                    std::uint32_t leaf, const LeafBox& target, const double* outward,
+                                    double separation_m, bool inside, std::vector<Contact>& contacts) {
+  const int axis = separation_m > 0 ? -1 : fallAxis(points, feature.size());
   if (axis < 0) return false;
   const double from = points[0].t0[axis], to = points[0].t1[axis];
   if (std::max(from, to) < target.lo[axis] || std::min(from, to) > target.hi[axis]) return true;
@@ -181,9 +181,9 @@ void ObstacleTest::Impl::runVertices(const Run& run) {
     const bool inside = (state[v] & INSIDE) != 0;
     for (std::size_t i = 0; i < apart; ++i) {
       if (!(run.surface->features[near_leaves[i]] & FACE_MASK)) continue;
-      if (options.minimum_separation_m > 0) {
+      if (separationOf(run, std::array<Index, 1>{v}) > 0) {
         vertexSeparation(run, v, near_leaves[i], inside);
-      } else {
+      } else if ((*run.t0)[v] != (*run.t1)[v]) {
         vertexPath(run, v, near_leaves[i], inside);
       }
     }
@@ -205,7 +205,8 @@ void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t 
 void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   VertexMotion points[4] = {motionOf(run, vertex), {}, {}, {}};
-  const double toc_bound = tocBound(boundsOf(points, 1, reach_m), box, reach_m);
+  const double separation_m = separationOf(run, std::array<Index, 1>{vertex}), reach = reachOf(separation_m);
+  const double toc_bound = tocBound(boundsOf(points, 1, reach), box, reach);
   if (toc_bound > 1) return;
   for (int direction = 0; direction < FACE_DIRECTIONS; ++direction) {
     if (!(run.surface->features[leaf] >> direction & 1)) continue;
@@ -222,7 +223,7 @@ void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uin
         x[c] = planeOf(box, c, corner >> 1);
         points[k + 1] = fixedPoint(x[0], x[1], x[2]);
       }
-      vertex_batch.add(pair, points, toc_bound);
+      vertex_batch.add(pair, points, toc_bound, separation_m);
     }
   }
 }
@@ -242,8 +243,9 @@ void ObstacleTest::Impl::runEdges(const Run& run) {
     if (near_leaves.empty()) continue;
     run.stats->edge_pairs_in += near_leaves.size();
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
-    const MovingBounds moving = boundsOf(points, 2, reach_m);
-    for (const std::uint32_t leaf : near_leaves) edgePairs(run, edge, points, moving, leaf, inside);
+    const double separation_m = separationOf(run, edge);
+    const MovingBounds moving = boundsOf(points, 2, reachOf(separation_m));
+    for (const std::uint32_t leaf : near_leaves) edgePairs(run, edge, points, moving, separation_m, leaf, inside);
   }
 }
 
@@ -260,7 +262,7 @@ bool ObstacleTest::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
 }
 
 void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points,
-                                   const MovingBounds& moving, std::uint32_t leaf, bool inside) {
+                                   const MovingBounds& moving, double separation_m, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   bool near[3][2];
   for (int axis = 0; axis < 3; ++axis) {
@@ -279,7 +281,7 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
       high[axis] = box.hi[axis];
       low[b] = high[b] = planeOf(box, b, side_b);
       low[c] = high[c] = planeOf(box, c, side_c);
-      if (reach_m == 0 && edgeMissesLine(points[0], points[1], low, axis)) continue;
+      if (separation_m == 0 && edgeMissesLine(points[0], points[1], low, axis)) continue;
       if (segmentMeetsBox(points[0].t0, points[1].t0, box)) {
         // What touches at an end is the vertex's contact. Pairs that edgeStartsInside() found are joined with it later.
         if (!endInside(points, box)) addInitial(run, PairKind::EDGE_VOXEL_EDGE, edge, leaf, edge_contacts);
@@ -291,12 +293,13 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
       pair.outward[b] = side_b ? 1 : -1;
       pair.outward[c] = side_c ? 1 : -1;
       const LeafBox target{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
-      if (settleFall(run, PairKind::EDGE_VOXEL_EDGE, edge, points, leaf, target, pair.outward, inside, edge_contacts)) {
+      if (settleFall(run, PairKind::EDGE_VOXEL_EDGE, edge, points, leaf, target, pair.outward, separation_m, inside,
+                     edge_contacts)) {
         continue;
       }
       const VertexMotion quad[4] = {points[0], points[1], fixedPoint(low[0], low[1], low[2]),
                                     fixedPoint(high[0], high[1], high[2])};
-      edge_batch.add(pair, quad, tocBound(moving, target, reach_m));
+      edge_batch.add(pair, quad, tocBound(moving, target, reachOf(separation_m)), separation_m);
     }
   }
 }
@@ -315,8 +318,9 @@ void ObstacleTest::Impl::runFaces(const Run& run) {
     run.stats->corner_pairs_in += near_leaves.size();
     if (near_leaves.empty()) continue;
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
-    const MovingBounds moving = boundsOf(points, 3, reach_m);
-    for (const std::uint32_t leaf : near_leaves) cornerPairs(run, face, points, moving, leaf, inside);
+    const double separation_m = separationOf(run, face);
+    const MovingBounds moving = boundsOf(points, 3, reachOf(separation_m));
+    for (const std::uint32_t leaf : near_leaves) cornerPairs(run, face, points, moving, separation_m, leaf, inside);
   }
 }
 
@@ -337,7 +341,7 @@ bool ObstacleTest::Impl::faceStartsInside(const Run& run, const Face& face) {
 }
 
 void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points,
-                                     const MovingBounds& moving, std::uint32_t leaf, bool inside) {
+                                     const MovingBounds& moving, double separation_m, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   bool near[3][2];
   for (int axis = 0; axis < 3; ++axis) {
@@ -349,7 +353,7 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
     const int x = sides & 1, y = sides >> 1 & 1, z = sides >> 2;
     if (!near[0][x] || !near[1][y] || !near[2][z] || !(features >> cornerBit(x, y, z) & 1)) continue;
     const double corner[3] = {planeOf(box, 0, x), planeOf(box, 1, y), planeOf(box, 2, z)};
-    if (reach_m == 0 && triangleMissesPoint(points[0], points[1], points[2], corner)) continue;
+    if (separation_m == 0 && triangleMissesPoint(points[0], points[1], points[2], corner)) continue;
     if (inside) {
       const TriangleStart start = triangleMeetsBox(points[0].t0, points[1].t0, points[2].t0, box);
       if (start == TriangleStart::INTERIOR) addInitial(run, PairKind::FACE_VOXEL_CORNER, face, leaf, face_contacts);
@@ -359,11 +363,12 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
                       {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
     std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
     const LeafBox target{{corner[0], corner[1], corner[2]}, {corner[0], corner[1], corner[2]}};
-    if (settleFall(run, PairKind::FACE_VOXEL_CORNER, face, points, leaf, target, pair.outward, inside, face_contacts)) {
+    if (settleFall(run, PairKind::FACE_VOXEL_CORNER, face, points, leaf, target, pair.outward, separation_m, inside,
+                   face_contacts)) {
       continue;
     }
     const VertexMotion quad[4] = {fixedPoint(corner[0], corner[1], corner[2]), points[0], points[1], points[2]};
-    corner_batch.add(pair, quad, tocBound(moving, target, reach_m));
+    corner_batch.add(pair, quad, tocBound(moving, target, reachOf(separation_m)), separation_m);
   }
 }
 

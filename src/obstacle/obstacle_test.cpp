@@ -43,10 +43,23 @@ bool ObstacleTest::Impl::reachesSurface(const Run& run) const {
     }
   }
   const Box& bounds = run.surface->bounds;
+  const double reach = *std::max_element(reaches.begin(), reaches.end());
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(lo[axis] - reach_m <= bounds.max[axis] && hi[axis] + reach_m >= bounds.min[axis])) return false;
+    if (!(lo[axis] - reach <= bounds.max[axis] && hi[axis] + reach >= bounds.min[axis])) return false;
   }
   return true;
+}
+
+/// A face reaches as far as its most uncertain vertex asks for, and is found by the keys of all its vertices: each takes
+/// the reach of its features.
+void ObstacleTest::Impl::prepareReaches(const Run& run) {
+  reaches.assign(run.radius_m ? std::max<std::size_t>(run.topology->vertexCount(), 1) : 1,
+                 reachOf(options.minimum_separation_m));
+  if (!run.radius_m) return;
+  for (const Edge& edge : run.topology->edges()) {
+    const double reach = reachOf(separationOf(run, edge));
+    for (const Index v : edge) reaches[v] = std::max(reaches[v], reach);
+  }
 }
 
 void ObstacleTest::Impl::prepareVertices(const Run& run, const std::uint8_t* vertex_active) {
@@ -59,15 +72,16 @@ void ObstacleTest::Impl::prepareVertices(const Run& run, const std::uint8_t* ver
     const double finite = (p0 - p0).sum() + (p1 - p1).sum();
     if ((vertex_active != nullptr && vertex_active[v] == 0) || !(finite == 0)) continue;
     start_keys[v] = pointKeys(p0, run.surface->inverse_resolution, 0);
-    if (reach_m > 0) {
-      keys[v] = pointKeys(p0, run.surface->inverse_resolution, reach_m);
+    const double reach = reaches[run.radius_m ? v : 0];
+    if (reach > 0) {
+      keys[v] = pointKeys(p0, run.surface->inverse_resolution, reach);
     } else {
       keys[v] = start_keys[v];
     }
     state[v] = ACTIVE;
     // With a separation what rests may be too close; without one, what rests can only touch at t=0.
-    if (reach_m > 0 || p0 != p1) state[v] |= MOVES;
-    if (p0 != p1) keys[v].include(pointKeys(p1, run.surface->inverse_resolution, reach_m));
+    if (reach > 0 || p0 != p1) state[v] |= MOVES;
+    if (p0 != p1) keys[v].include(pointKeys(p1, run.surface->inverse_resolution, reach));
   }
 }
 
@@ -152,7 +166,7 @@ ObstacleTest::~ObstacleTest() = default;
 
 void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
                        const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
-                       std::vector<Contact>& contacts, ObstacleStats& stats) {
+                       std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m) {
   const auto start = std::chrono::steady_clock::now();
   if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
     throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +
@@ -160,7 +174,8 @@ void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, co
                                 std::to_string(topology.vertexCount()));
   }
   Impl& impl = *impl_;
-  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats};
+  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats, vertex_radius_m};
+  impl.prepareReaches(run);
   if (surface.leafCount() > 0 && impl.reachesSurface(run)) {
     impl.toc_limit = 1;
     impl.vertex_batch.clear();

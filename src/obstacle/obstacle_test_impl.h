@@ -31,10 +31,9 @@ struct ObstacleTest::Impl {
   explicit Impl(const ObstacleOptions& o)
       : options(o),
         test(elementaryTestFor(o)),
-        reach_m(o.minimum_separation_m * (1 + 0x1p-40)),
-        vertex_batch(PairKind::VERTEX_FACE, test.get(), o.minimum_separation_m, tocLimit()),
-        edge_batch(PairKind::EDGE_EDGE, test.get(), o.minimum_separation_m, tocLimit()),
-        corner_batch(PairKind::VERTEX_FACE, test.get(), o.minimum_separation_m, tocLimit()) {}
+        vertex_batch(PairKind::VERTEX_FACE, test.get(), tocLimit()),
+        edge_batch(PairKind::EDGE_EDGE, test.get(), tocLimit()),
+        corner_batch(PairKind::VERTEX_FACE, test.get(), tocLimit()) {}
 
   /// What one run works on.
   struct Run {
@@ -44,9 +43,24 @@ struct ObstacleTest::Impl {
     const Positions* t1;
     std::uint16_t body;
     ObstacleStats* stats;
+    const double* radius_m = nullptr;  ///< uncertainty per vertex; null: none
   };
 
+  /// Distance from which on a feature of these vertices is in contact.
+  template <class Feature>
+  double separationOf(const Run& run, const Feature& feature) const {
+    double radius = 0;
+    if (run.radius_m) {
+      for (const Index v : feature) radius = std::max(radius, run.radius_m[v]);
+    }
+    // Rounded up, so that a contact at exactly the sum is none too far.
+    return radius > 0 ? (options.minimum_separation_m + radius) * (1 + 0x1p-50) : options.minimum_separation_m;
+  }
+  /// The same, as far as bounds must reach.
+  static double reachOf(double separation_m) { return separation_m * (1 + 0x1p-40); }
+
   bool reachesSurface(const Run& run) const;
+  void prepareReaches(const Run& run);
   void prepareVertices(const Run& run, const std::uint8_t* vertex_active);
   /// What the keys of a face or an edge reach, as NEAR bits for its vertices; corner: also a corner.
   std::uint8_t nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start, bool& corner) const;
@@ -70,9 +84,9 @@ struct ObstacleTest::Impl {
   void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
   void vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
   void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, const MovingBounds& moving,
-                 std::uint32_t leaf, bool inside);
+                 double separation_m, std::uint32_t leaf, bool inside);
   void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, const MovingBounds& moving,
-                 std::uint32_t leaf, bool inside);
+                   double separation_m, std::uint32_t leaf, bool inside);
   void collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats);
 
   void keepEarliest(std::vector<Contact>& contacts, std::size_t first) const;
@@ -84,7 +98,8 @@ struct ObstacleTest::Impl {
   void setTime(Contact& contact, const CrossingTime& time);
   template <class Feature>
   bool settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points, std::uint32_t leaf,
-                  const LeafBox& target, const double* outward, bool inside, std::vector<Contact>& contacts);
+                  const LeafBox& target, const double* outward, double separation_m, bool inside,
+                  std::vector<Contact>& contacts);
   VertexMotion motionOf(const Run& run, Index vertex) const {
     const Vec3 &a = (*run.t0)[vertex], &b = (*run.t1)[vertex];
     return {{a.x(), a.y(), a.z(), 0}, {b.x(), b.y(), b.z(), 0}};
@@ -101,11 +116,11 @@ struct ObstacleTest::Impl {
 
   ObstacleOptions options;
   std::unique_ptr<ElementaryTest> test;
-  double reach_m;         ///< the separation, rounded up
   double toc_limit = 1;   ///< upper bound of the earliest contact so far
   ObstacleBatch vertex_batch, edge_batch, corner_batch;
 
-  std::vector<KeyLanes> keys;        ///< over the step, as far as the separation
+  std::vector<double> reaches;       ///< per vertex: the largest separation of a feature at it, rounded up; [0] for all
+  std::vector<KeyLanes> keys;        ///< over the step, as far as the reaches
   std::vector<KeyLanes> start_keys;  ///< at t=0, touching
   std::vector<std::uint8_t> state;   ///< VertexState bits
   struct NearFace {

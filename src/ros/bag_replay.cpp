@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
+#include <optional>
 #include <set>
 
 #include <rosbag/view.h>
@@ -62,17 +63,27 @@ struct BagReplay::Run {
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
   EffectTracker effects;
+  std::optional<LookAheadScore> look_ahead;
   std::map<std::string, std::size_t> body_of_topic;
   BagReplaySummary summary;
   std::set<std::string> complained;
 
   explicit Run(const BagReplay& r)
       : replay(r), bag(r.path_), pipeline(r.config_, transforms), effects(r.config_) {
+    if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
       const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
       summary.mesh_topics.push_back(topic);
       if (!topic.empty()) body_of_topic[topic] = b;
     }
+  }
+
+  void predict(StepOutcome& outcome) {
+    look_ahead->observe(outcome);
+    if (!outcome.answered) return;
+    const StepOutcome prediction = pipeline.monitor().predict();
+    look_ahead->predict(prediction);
+    outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
   }
 
   void complain(const std::string& text) {
@@ -92,7 +103,8 @@ struct BagReplay::Run {
   void drain(const Sink& sink, const ros::Time& at) {
     StepOutcome outcome;
     while (pipeline.next(static_cast<std::int64_t>(at.toNSec()), outcome)) {
-      effects.update(outcome);
+      effects.update(outcome, pipeline.monitor());
+      if (look_ahead) predict(outcome);
       sink(outcome, pipeline, at);
       effects.apply(pipeline.monitor(), summary.maps > 0);
     }
@@ -211,6 +223,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
   run.drain(sink, at);
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.effects = run.effects.plan();
+  run.summary.left_out = run.pipeline.monitor().leftOut();
+  if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();
   return run.summary;
 }
 

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <ros/time.h>
 #include <rosbag/bag.h>
 
+#include "deformable_ccd/look_ahead_score.h"
 #include "ros/map_loader.h"
 #include "ros/monitor_pipeline.h"
 
@@ -25,6 +27,8 @@ struct BagReplaySummary {
   std::vector<std::string> complaints;   ///< refused messages, each kind once
   FrameCounters frames;
   EffectPlan effects;                    ///< at the end
+  std::vector<LeftOutPair> left_out;     ///< at the end
+  std::optional<LookAheadSummary> look_ahead;  ///< where look_ahead_s is above 0
   double duration_s = 0;
 };
 

@@ -42,6 +42,7 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
 const ros::WallDuration RENEWAL(0.05);
+constexpr std::size_t LOOK_AHEAD_SAMPLES = 1000;  // newest comparisons that the statistics summarise
 
 std::int64_t steadyNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -76,6 +77,7 @@ struct CollisionMonitor::Impl {
   Diagnostics diagnostics;
   MonitorLog log;
   EffectTracker effects;
+  LookAheadScore look_ahead;
   std::unique_ptr<MapLoader> maps;
 
   ros::CallbackQueue input_callbacks, service_callbacks;
@@ -91,9 +93,11 @@ struct CollisionMonitor::Impl {
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
       : node(n), private_node(p), config(configOf(p)), pipeline(config, transforms),
-        recorder(config, pipeline.monitor()), outputs(private_node, config.monitor.look_ahead_s > 0),
+        recorder(config, pipeline.monitor()),
+        outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
         queue(config.bodies.size(), config.queue_size, config.queue_policy),
-        diagnostics(private_node.getNamespace(), node), log(node, private_node.getNamespace(), config), effects(config) {}
+        diagnostics(private_node.getNamespace(), node), log(node, private_node.getNamespace(), config), effects(config),
+        look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
 
   void start();
   void stop();
@@ -115,6 +119,8 @@ struct CollisionMonitor::Impl {
   void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
   void publish(StepOutcome& outcome);
+  void predict(StepOutcome& outcome);
+  void publishEffects(const StepOutcome& outcome);
   void accountDropped();
   void lookIntoSilence();
   void resetNow(StepStatus status);
@@ -326,7 +332,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   StatsContext context;
   context.frames = pipeline.monitor().total();
   context.weld_changes = pipeline.weldChanges();
-  context.latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
+  if (config.monitor.look_ahead_s > 0) context.look_ahead = look_ahead.summary();
   context.maps_received = maps ? maps->received() : 0;
   context.frames_handed_over = frames_handed_over;
   context.maps_refused = maps ? maps->refused() : 0;
@@ -338,17 +344,33 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
+  const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
+  outputs.publish(outcome, bodies, config.markers, frame);
+  publishEffects(outcome);
+  predict(outcome);
   StatsContext context = statsContext();
-  context.unknown_fraction = pipeline.unknownFraction(outcome);
-  outputs.publish(outcome, bodies, context, config.markers, frame);
+  context.latency_s = latency_s;
+  outputs.publishStats(outcome, context, frame);
   diagnostics.add(outcome, context);
-  if (effects.update(outcome)) {
-    outputs.publishEffects(effects.message(toRosTime(outcome.stamp_ns), frame));
-    for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
-  }
-  if (outcome.answered && config.monitor.look_ahead_s > 0 && outputs.wantsPrediction()) {
-    outputs.publishPrediction(pipeline.monitor().predict(), config.monitor.look_ahead_s, bodies, frame);
-  }
+}
+
+void CollisionMonitor::Impl::publishEffects(const StepOutcome& outcome) {
+  const std::string& frame = pipeline.fixedFrame();
+  const Monitor& monitor = pipeline.monitor();
+  if (!effects.update(outcome, monitor)) return;
+  outputs.publishEffects(effects.message(toRosTime(outcome.stamp_ns), frame));
+  outputs.publishLeftOut(toLeftOutPairs(monitor.leftOut(), monitor.bodies(), outcome.stamp_ns, frame));
+  for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
+}
+
+void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
+  if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
+  look_ahead.observe(outcome);
+  if (!outcome.answered) return;
+  const StepOutcome prediction = pipeline.monitor().predict();
+  look_ahead.predict(prediction);
+  outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
+  outputs.publishPrediction(prediction, config.monitor.look_ahead_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
 }
 
 void CollisionMonitor::Impl::work() {

@@ -1,8 +1,22 @@
 #include "ros/effects.h"
 
 #include <algorithm>
+#include <sstream>
 
 namespace deformable_ccd {
+
+namespace {
+
+std::string noiseOf(const MeshInputConfig& input) {
+  std::ostringstream text;
+  if (input.noise_radius_m > 0) text << input.noise_radius_m << " m";
+  if (!input.noise_field.empty()) {
+    text << (input.noise_radius_m > 0 ? " + " : "") << input.noise_scale << " x point field '" << input.noise_field << "'";
+  }
+  return text.str();
+}
+
+}  // namespace
 
 EffectTracker::EffectTracker(const MonitorConfig& config) : settings_(config.effects) {
   for (const BodyConfig& body : config.bodies) {
@@ -10,9 +24,10 @@ EffectTracker::EffectTracker(const MonitorConfig& config) : settings_(config.eff
     one.name = body.body.name;
     one.rigid = body.isRigid();
     one.self_collision = body.body.self_collision;
+    if (body.isUncertain()) one.noise = noiseOf(body.input);
     scene_.bodies.push_back(one);
-    scene_.minimum_separation_m = std::max(scene_.minimum_separation_m, body.body.minimum_separation_m);
   }
+  scene_.minimum_separation_m = config.largestSeparation();
   scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
   scene_.map_seen = !config.octomap_file.empty();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
@@ -39,9 +54,10 @@ void EffectTracker::apply(Monitor& monitor, bool map_seen) {
   monitor.setOptions(options);
 }
 
-bool EffectTracker::update(const StepOutcome& outcome) {
+bool EffectTracker::update(const StepOutcome& outcome, const Monitor& monitor) {
   if (outcome.answered && outcome.topologies) {
-    bool changed = false;
+    bool changed = scene_.left_out_pairs != monitor.leftOut().size();
+    scene_.left_out_pairs = monitor.leftOut().size();
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
       const bool has_faces = (*outcome.topologies)[b]->hasFaces();
       changed = changed || !scene_.bodies[b].topology_known || scene_.bodies[b].has_faces != has_faces;

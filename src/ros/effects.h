@@ -20,8 +20,8 @@ class EffectTracker {
   bool mapExpected() const { return plan_.running("octomap"); }
   /// Brings the monitor's options in line with the plan.
   void apply(Monitor& monitor, bool map_seen);
-  /// Learns topologies from the outcome. True when the plan has changed since the last call, or at the first one.
-  bool update(const StepOutcome& outcome);
+  /// Learns topologies and what is left out from the outcome. True when the plan has changed since the last call, or at the first one.
+  bool update(const StepOutcome& outcome, const Monitor& monitor);
 
   const EffectPlan& plan() const { return plan_; }
   std::vector<std::string> lines() const { return plan_.lines(); }

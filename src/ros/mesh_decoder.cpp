@@ -113,8 +113,8 @@ DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t*
   WireReader wire(data, size);
   return guarded(datatype, [&](const std::string& name) {
     if (name == "mesh_stamped") return decodeIndexed(readMeshStamped(wire));
-    if (name == "point_cloud2") return decodeCloud(readCloud(wire));
-    if (name == "polygon_mesh") return decodeIndexed(readPolygonMesh(wire));
+    if (name == "point_cloud2") return decodeCloud(readCloud(wire, config_.noise_field));
+    if (name == "polygon_mesh") return decodeIndexed(readPolygonMesh(wire, config_.noise_field));
     if (name == "shape_mesh") return decodeIndexed(readShapeMesh(wire));
     if (name == "marker") return decodeMarkers({readMarker(wire)});
     return decodeMarkers(readMarkerArray(wire));
@@ -123,8 +123,35 @@ DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t*
 
 DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
   return guarded(datatypeOf(message), [&](const std::string&) {
-    return std::visit([this](const auto& typed) { return decodeView(viewOf(*typed)); }, message);
+    return std::visit([this](const auto& typed) {
+      using Message = std::remove_const_t<std::remove_reference_t<decltype(*typed)>>;
+      if constexpr (std::is_same_v<Message, sensor_msgs::PointCloud2> || std::is_same_v<Message, pcl_msgs::PolygonMesh>) {
+        return decodeView(viewOf(*typed, config_.noise_field));
+      } else {
+        return decodeView(viewOf(*typed));
+      }
+    }, message);
   });
+}
+
+void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh) const {
+  const bool from_field = !config_.noise_field.empty();
+  if (from_field && !cloud) {
+    refuse("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
+           "'; send a PointCloud2, or write uncertainty/radius_m");
+  }
+  if (!from_field && !(config_.noise_radius_m > 0)) return;
+  mesh.radius_m.assign(mesh.positions.size(), config_.noise_radius_m);
+  if (!from_field) return;
+  for (std::size_t i = 0; i < mesh.radius_m.size(); ++i) {
+    if (!mesh.positions[i].allFinite()) continue;  // unchecked anyway, and trackers leave everything of it open
+    const double value = cloud->extraValue(i);
+    if (!(value >= 0) || !std::isfinite(config_.noise_scale * value)) {
+      refuse("field '" + config_.noise_field + "' of point " + std::to_string(i) + " is " + std::to_string(value) +
+             "; an uncertainty is finite and not negative");
+    }
+    mesh.radius_m[i] += config_.noise_scale * value;
+  }
 }
 
 void MeshDecoder::checkCount(std::size_t count) const {
@@ -193,6 +220,7 @@ DecodedMesh MeshDecoder::decodeCloud(const CloudView& cloud) {
   mesh.topology = fixedTopology(cloud.size(), cloud.height, cloud.width);
   mesh.positions.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
+  addRadii(&cloud, mesh);
   return mesh;
 }
 
@@ -228,6 +256,7 @@ DecodedMesh MeshDecoder::decodeIndexed(const IndexedView& view) {
       mesh.positions[i] = Vec3(p[0], p[1], p[2]);
     }
   }
+  addRadii(view.cloud ? &*view.cloud : nullptr, mesh);
   return mesh;
 }
 
@@ -303,6 +332,7 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   }
   mesh.positions.resize(representative_.size());
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.positions[v] = transform * corners[representative_[v]];
+  addRadii(nullptr, mesh);
   return mesh;
 }
 

@@ -27,6 +27,9 @@ struct MeshInputConfig {
   std::optional<std::string> marker_namespace;
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
+  /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is named.
+  std::string noise_field;
+  double noise_scale = 1, noise_radius_m = 0;
 };
 
 /// Why a message is refused; BAD_MESSAGE or VERTEX_COUNT. The text names the field and the value.
@@ -40,6 +43,7 @@ struct DecodedMesh {
   std::string frame_id;
   std::shared_ptr<const Topology> topology;
   Positions positions;
+  std::vector<double> radius_m;  ///< uncertainty per vertex; empty: none
   bool weld_changed = false;  ///< welded corners came apart
 };
 
@@ -84,6 +88,7 @@ class MeshDecoder {
   DecodedMesh decodeSoup(const MarkerView& marker);
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;
+  void addRadii(const CloudView* cloud, DecodedMesh& mesh) const;
   std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
   std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
   bool weldHolds(const Positions& corners) const;

@@ -17,8 +17,16 @@ namespace {
 
 constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
 
-void readFields(WireReader& wire, CloudView& cloud) {
-  CloudFieldFinder finder;
+CloudView::Coordinate fieldOf(std::string_view name, std::size_t offset, std::uint8_t datatype) {
+  if (datatype != FLOAT32 && datatype != FLOAT64) {
+    throw WireError("field '" + std::string(name) + "' has datatype " + std::to_string(datatype) +
+                    "; FLOAT32 (7) or FLOAT64 (8) is needed");
+  }
+  return {offset, datatype == FLOAT64};
+}
+
+void readFields(WireReader& wire, const std::string& extra_field, CloudView& cloud) {
+  CloudFieldFinder finder(extra_field);
   const std::size_t count = wire.readCount("fields", 4 + 4 + 1 + 4);
   for (std::size_t i = 0; i < count; ++i) {
     const std::string_view name = wire.readString("fields.name");
@@ -27,30 +35,31 @@ void readFields(WireReader& wire, CloudView& cloud) {
     wire.skip(4, "fields.count");
     finder.add(name, offset, datatype, cloud);
   }
-  finder.finish();
+  finder.finish(cloud);
 }
 
 }  // namespace
 
 void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud) {
+  if (!extra_field_.empty() && name == extra_field_) cloud.extra = fieldOf(name, offset, datatype);
   if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') return;
-  if (datatype != FLOAT32 && datatype != FLOAT64) {
-    throw WireError("field '" + std::string(name) + "' has datatype " + std::to_string(datatype) +
-                    "; FLOAT32 (7) or FLOAT64 (8) is needed");
-  }
   const auto axis = static_cast<std::size_t>(name[0] - 'x');
-  cloud.xyz[axis] = {offset, datatype == FLOAT64};
+  cloud.xyz[axis] = fieldOf(name, offset, datatype);
   found_[axis] = true;
 }
 
-void CloudFieldFinder::finish() const {
+void CloudFieldFinder::finish(const CloudView& cloud) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!found_[axis]) throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'");
+  }
+  if (!extra_field_.empty() && !cloud.extra) {
+    throw WireError("there is no field '" + extra_field_ + "', which parameter uncertainty/field names");
   }
 }
 
 void checkStrides(const CloudView& cloud, std::size_t bytes) {
-  for (const auto& coordinate : cloud.xyz) {
+  for (const CloudView::Coordinate& coordinate :
+       {cloud.xyz[0], cloud.xyz[1], cloud.xyz[2], cloud.extra.value_or(cloud.xyz[0])}) {
     if (coordinate.offset + (coordinate.is_double ? 8 : 4) > cloud.point_step) {
       throw WireError("a coordinate's offset " + std::to_string(coordinate.offset) + " reaches past point_step " +
                       std::to_string(cloud.point_step));
@@ -70,27 +79,27 @@ void checkStrides(const CloudView& cloud, std::size_t bytes) {
   }
 }
 
-Vec3 CloudView::point(std::size_t i) const {
-  const std::uint8_t* at = data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step;
-  Vec3 p;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (xyz[axis].is_double) {
-      std::memcpy(&p[axis], at + xyz[axis].offset, 8);
-    } else {
-      float value;
-      std::memcpy(&value, at + xyz[axis].offset, 4);
-      p[axis] = static_cast<double>(value);
-    }
+double CloudView::value(std::size_t i, const Coordinate& field) const {
+  const std::uint8_t* at =
+      data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step + field.offset;
+  if (field.is_double) {
+    double value;
+    std::memcpy(&value, at, 8);
+    return value;
   }
-  return p;
+  float value;
+  std::memcpy(&value, at, 4);
+  return static_cast<double>(value);
 }
 
-CloudView readCloud(WireReader& wire) {
+Vec3 CloudView::point(std::size_t i) const { return {value(i, xyz[0]), value(i, xyz[1]), value(i, xyz[2])}; }
+
+CloudView readCloud(WireReader& wire, const std::string& extra_field) {
   CloudView cloud;
   cloud.header = readHeader(wire);
   cloud.height = wire.read<std::uint32_t>("height");
   cloud.width = wire.read<std::uint32_t>("width");
-  readFields(wire, cloud);
+  readFields(wire, extra_field, cloud);
   if (wire.read<std::uint8_t>("is_bigendian")) throw WireError("is_bigendian is set; send little-endian clouds");
   cloud.point_step = wire.read<std::uint32_t>("point_step");
   cloud.row_step = wire.read<std::uint32_t>("row_step");
@@ -121,10 +130,10 @@ void fillHeader(IndexedView& mesh) {
   if (mesh.header->frame_id.empty()) mesh.header->frame_id = mesh.cloud->header.frame_id;
 }
 
-IndexedView readPolygonMesh(WireReader& wire) {
+IndexedView readPolygonMesh(WireReader& wire, const std::string& extra_field) {
   IndexedView mesh;
   mesh.header = readHeader(wire);
-  mesh.cloud = readCloud(wire);
+  mesh.cloud = readCloud(wire, extra_field);
   fillHeader(mesh);
   const std::size_t count = wire.readCount("polygons", 4);
   mesh.polygons.reserve(count);

@@ -31,19 +31,26 @@ struct CloudView {
     bool is_double = false;
   };
   std::array<Coordinate, 3> xyz;
+  std::optional<Coordinate> extra;  ///< the further field that was asked for
   std::size_t size() const { return height * width; }
   Vec3 point(std::size_t i) const;
+  /// Value of the further field; only where there is one.
+  double extraValue(std::size_t i) const { return value(i, *extra); }
+  double value(std::size_t i, const Coordinate& field) const;
 };
-CloudView readCloud(WireReader& wire);
+/// extra_field: name of a further FLOAT32 or FLOAT64 field that the cloud must have; empty: none.
+CloudView readCloud(WireReader& wire, const std::string& extra_field = {});
 
-/// Looks for the fields x, y and z of a cloud, one after the other. Throws WireError for a type that is no coordinate.
+/// Looks for the fields x, y and z of a cloud, and a further one if it is named, one after the other. Throws WireError for a type that is no coordinate.
 class CloudFieldFinder {
  public:
+  explicit CloudFieldFinder(const std::string& extra_field) : extra_field_(extra_field) {}
   void add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud);
   /// Throws WireError naming the field that is not there.
-  void finish() const;
+  void finish(const CloudView& cloud) const;
 
  private:
+  const std::string& extra_field_;
   std::array<bool, 3> found_{};
 };
 /// Throws WireError unless every coordinate of every point lies within `bytes` of data.
@@ -60,7 +67,7 @@ struct IndexedView {
 };
 IndexedView readMeshStamped(WireReader& wire);
 IndexedView readShapeMesh(WireReader& wire);
-IndexedView readPolygonMesh(WireReader& wire);
+IndexedView readPolygonMesh(WireReader& wire, const std::string& extra_field = {});
 /// PolygonMesh: where the mesh's own header says nothing, its cloud's counts.
 void fillHeader(IndexedView& mesh);
 

@@ -46,6 +46,23 @@ void readRigid(ParameterReader section, BodyConfig& body) {
   body.body.rigid = true;
 }
 
+double separationOf(ParameterReader& reader, double fallback) {
+  return reader.number("minimum_separation_m", fallback, 0, LARGE);
+}
+
+void readUncertainty(ParameterReader section, BodyConfig& body) {
+  MeshInputConfig& input = body.input;
+  input.noise_radius_m = section.number("radius_m", 0.0, 0, LARGE);
+  input.noise_field = section.get("field", std::string());
+  const bool scaled = section.has("scale");
+  input.noise_scale = section.number("scale", 1.0, 0, 1e6);
+  section.finish();
+  if (scaled && input.noise_field.empty()) section.fail("scale", "has no meaning without field; write radius_m instead");
+  if (!input.noise_field.empty() && body.isRigid()) {
+    section.fail("field", "has no meaning for a rigid body, which sends no points; write radius_m instead");
+  }
+}
+
 BodyConfig readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic) {
   BodyConfig body;
   body.body.name = name;
@@ -66,6 +83,7 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
   if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
   body.body.vertex_mask = reader.indices("vertex_mask");
   if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
+  readUncertainty(reader.section("uncertainty"), body);
   return body;
 }
 
@@ -77,7 +95,38 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   }
   body.body.against_bodies = reader.get("against_bodies", true);
   body.body.against_obstacle = reader.get("against_obstacle", true);
-  body.body.minimum_separation_m = reader.number("minimum_separation_m", config.minimum_separation_m, 0, LARGE);
+  body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
+}
+
+/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
+void readSeparationPair(ParameterReader entry, MonitorConfig& config) {
+  const std::string octomap = "octomap";
+  std::vector<std::string> known{octomap};
+  for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
+  std::vector<std::uint16_t> pair;
+  for (XmlRpcValue& name : entry.list("between")) {
+    const std::string text = name.getType() == XmlRpcValue::TypeString ? static_cast<std::string>(name) : std::string();
+    const auto at = std::find(known.begin(), known.end(), text);
+    if (at == known.end()) {
+      entry.fail("between", "names '" + text + "', which is no body and not octomap; nearest is '" +
+                                nearestName(text, known) + "'");
+    }
+    pair.push_back(at == known.begin() ? OBSTACLE_BODY : static_cast<std::uint16_t>(at - known.begin() - 1));
+  }
+  if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
+  if (pair[0] == OBSTACLE_BODY) std::swap(pair[0], pair[1]);
+  if (pair[0] == OBSTACLE_BODY) entry.fail("between", "names octomap twice; name a body and octomap");
+  if (!entry.has("separation_m")) entry.fail("separation_m", "is needed");
+  const double separation_m = entry.number("separation_m", 0.0, 0, LARGE);
+  entry.finish();
+  config.bodies[pair[0]].body.separations.push_back({pair[1], separation_m});
+}
+
+void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
+  std::size_t i = 0;
+  for (XmlRpcValue& entry : reader.list("minimum_separation_pairs")) {
+    readSeparationPair({entry, reader.path() + "minimum_separation_pairs[" + std::to_string(i++) + "]/"}, config);
+  }
 }
 
 void readBodies(ParameterReader& reader, MonitorConfig& config) {
@@ -111,7 +160,6 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
 
 void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
   DetectorOptions& detector = config.monitor.detector;
-  const bool chosen = reader.has("accuracy");
   const std::string rung = reader.choice("accuracy", "exact", {"screen", "fast", "conservative", "exact"});
   detector.accuracy.rung = accuracyFromString(rung.c_str());
   detector.accuracy.tolerance_m = reader.number("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
@@ -119,14 +167,35 @@ void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
   detector.accuracy.max_subdivisions = reader.integer("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
   detector.num_threads = reader.integer("num_threads", detector.num_threads, 1, 256);
   detector.step_budget_ms = reader.number("step_budget_ms", 0.0, 0, LARGE);
-  config.minimum_separation_m = reader.number("minimum_separation_m", 0.0, 0, LARGE);
-  const bool separates = config.minimum_separation_m > 0;
-  if (separates && (rung == "exact" || rung == "fast")) {
-    if (chosen) {
-      reader.fail("accuracy", "is '" + rung + "', which cannot hold a minimum separation; write accuracy: conservative");
+  config.minimum_separation_m = separationOf(reader, 0.0);
+}
+
+/// Which parameter asks for a distance, and how to do without; empty when none does.
+std::string distanceAskedBy(const std::string& path, const MonitorConfig& config, bool listed) {
+  const auto distance = [](const std::string& name, const std::string& what) {
+    return "parameter " + name + " asks for " + what + ": write accuracy: conservative, or set it to 0";
+  };
+  if (config.minimum_separation_m > 0) return distance(path + "minimum_separation_m", "a minimum separation");
+  for (const BodyConfig& body : config.bodies) {
+    const std::string own = listed ? path + "bodies/" + body.body.name + "/" : path;
+    if (body.body.minimum_separation_m > 0) return distance(own + "minimum_separation_m", "a minimum separation");
+    for (const SeparationFrom& from : body.body.separations) {
+      if (from.separation_m > 0) return distance(path + "minimum_separation_pairs", "a minimum separation");
     }
-    detector.accuracy.rung = Accuracy::CONSERVATIVE;
+    if (body.isUncertain()) return distance(own + "uncertainty", "an uncertainty radius");
   }
+  return "";
+}
+
+/// Only conservative and screen hold a distance. Without a choice by the user it is conservative.
+void settleAccuracy(ParameterReader& reader, MonitorConfig& config) {
+  Accuracy& rung = config.monitor.detector.accuracy.rung;
+  if (!config.holdsDistance() || rung == Accuracy::CONSERVATIVE || rung == Accuracy::SCREEN) return;
+  if (reader.has("accuracy")) {
+    reader.fail("accuracy", std::string("is '") + toString(rung) + "', which cannot hold a distance above 0; " +
+                                distanceAskedBy(reader.path(), config, reader.has("bodies")));
+  }
+  rung = Accuracy::CONSERVATIVE;
 }
 
 void readThresholds(ParameterReader& reader, MonitorConfig& config) {
@@ -191,14 +260,45 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
   section.finish();
 }
 
+/// Their files are not read, their frames not asked for.
+void removeRigidBodies(MonitorConfig& config) {
+  const std::string clock = config.bodies[config.monitor.clock_body].body.name;
+  std::vector<std::uint16_t> moved_to;  // new indices, for what names bodies by theirs
+  std::vector<BodyConfig> kept;
+  for (BodyConfig& body : config.bodies) {
+    moved_to.push_back(body.isRigid() ? OBSTACLE_BODY : static_cast<std::uint16_t>(kept.size()));
+    if (!body.isRigid()) kept.push_back(std::move(body));
+  }
+  config.bodies = std::move(kept);
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (config.bodies[b].body.name == clock) config.monitor.clock_body = b;
+    std::vector<SeparationFrom> separations;
+    for (const SeparationFrom& from : config.bodies[b].body.separations) {
+      const bool map = from.body == OBSTACLE_BODY;
+      if (!map && moved_to[from.body] == OBSTACLE_BODY) continue;
+      separations.push_back({map ? OBSTACLE_BODY : moved_to[from.body], from.separation_m});
+    }
+    config.bodies[b].body.separations = std::move(separations);
+  }
+}
+
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
   const auto off = [&](const char* name) { return config.effects[name] == EffectSetting::OFF; };
+  if (off("rigid_bodies")) removeRigidBodies(config);
+  if (off("minimum_separation")) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {
     if (off("self_collision")) body.body.self_collision = false;
     if (off("body_body")) body.body.against_bodies = false;
     if (off("octomap")) body.body.against_obstacle = false;
-    if (off("minimum_separation")) body.body.minimum_separation_m = 0;
+    if (off("minimum_separation")) {
+      body.body.minimum_separation_m = 0;
+      body.body.separations.clear();
+    }
+    if (off("tracker_noise")) {
+      body.input.noise_field.clear();
+      body.input.noise_radius_m = 0;
+    }
   }
   if (off("start_state")) config.monitor.detector.check_start_state = false;
   if (off("look_ahead")) config.monitor.look_ahead_s = 0;
@@ -213,6 +313,20 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 
 }  // namespace
 
+double MonitorConfig::largestSeparation() const {
+  double largest = 0;
+  for (const BodyConfig& body : bodies) {
+    largest = std::max(largest, body.body.minimum_separation_m);
+    for (const SeparationFrom& from : body.body.separations) largest = std::max(largest, from.separation_m);
+  }
+  return largest;
+}
+
+bool MonitorConfig::holdsDistance() const {
+  return largestSeparation() > 0 ||
+         std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.isUncertain(); });
+}
+
 MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
@@ -223,9 +337,11 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   readEffects(reader.section("effects"), config);
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
+  readSeparationPairs(reader, config);
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
   applyEffects(config);
+  settleAccuracy(reader, config);
   XmlRpcValue copy = tree;
   config.hash = hashOf(copy.valid() ? copy.toXml() : std::string());
   return config;

@@ -27,6 +27,7 @@ struct BodyConfig {
   std::string tf_frame;
   double mesh_scale = 1;
   bool isRigid() const { return body.rigid; }
+  bool isUncertain() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
 };
 
 struct MarkerConfig {
@@ -42,7 +43,7 @@ struct MonitorConfig {
   std::vector<BodyConfig> bodies;
   MonitorOptions monitor;
   std::map<std::string, EffectSetting> effects;
-  double minimum_separation_m = 0;
+  double minimum_separation_m = 0;  ///< of bodies that name none
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = "octomap", octomap_file, octomap_frame;
@@ -55,6 +56,11 @@ struct MonitorConfig {
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
   std::uint64_t hash = 0;           ///< of all values in force
+
+  /// The largest separation that is asked for, of meshes or from the map [m].
+  double largestSeparation() const;
+  /// A separation or an uncertainty is asked for, so that only conservative and screen will do.
+  bool holdsDistance() const;
 };
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.

@@ -1,5 +1,6 @@
 #include "ros/monitor_pipeline.h"
 
+#include <chrono>
 #include <utility>
 
 #include "ros/advice.h"
@@ -14,6 +15,23 @@ std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
   std::vector<MonitorBody> bodies;
   for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
   return bodies;
+}
+
+MeshResource loadFile(const BodyConfig& body, const std::string& parameter, const std::string& file, double scale) {
+  try {
+    return loadMeshResource(file, scale);
+  } catch (const std::invalid_argument& error) {
+    throw ParameterError("parameter " + parameter + " of body '" + body.body.name + "': " + error.what() +
+                         "; write the path of an STL, OBJ or PLY mesh, or package://NAME/PATH");
+  }
+}
+
+void checkGrid(const BodyConfig& body) {
+  const std::size_t rows = body.input.rows, cols = body.input.cols, points = body.input.file_topology->vertexCount();
+  if (rows == 0 || rows * cols == points) return;
+  throw ParameterError("parameter topology/rows of body '" + body.body.name + "': " + std::to_string(rows) + " x " +
+                       std::to_string(cols) + " = " + std::to_string(rows * cols) + ", but " + body.topology_file +
+                       " has " + std::to_string(points) + " points; remove rows and cols, or file");
 }
 
 }  // namespace
@@ -34,12 +52,39 @@ void MonitorPipeline::loadFiles() {
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     BodyConfig& body = config_.bodies[b];
     if (!body.topology_file.empty()) {
-      body.input.file_topology = loadMeshResource(body.topology_file, 1).topology;
+      body.input.file_topology = loadFile(body, "topology/file", body.topology_file, 1).topology;
+      checkGrid(body);
     }
     if (!body.isRigid()) continue;
-    MeshResource mesh = loadMeshResource(body.mesh_file, body.mesh_scale);
-    rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions)};
+    MeshResource mesh = loadFile(body, "rigid/mesh", body.mesh_file, body.mesh_scale);
+    rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
+    if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
   }
+}
+
+void MonitorPipeline::measureUnknown(StepOutcome& outcome) const {
+  if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return;
+  const auto start = std::chrono::steady_clock::now();
+  SweptSpace sum;
+  Positions map_t0, map_t1;
+  std::vector<std::uint8_t> active;
+  for (std::size_t b = 0; b < outcome.topologies->size(); ++b) {
+    const MonitorBody& body = monitor_->bodies()[b];
+    if (!body.against_obstacle) continue;
+    const Topology& topology = *(*outcome.topologies)[b];
+    active.assign(topology.vertexCount(), 1);
+    for (const Index v : body.vertex_mask) active[v] = 0;
+    map_t0 = (*outcome.positions_t0)[b];
+    map_t1 = (*outcome.positions_t1)[b];
+    transform(outcome.map_from_fixed, map_t0);
+    transform(outcome.map_from_fixed, map_t1);
+    const SweptSpace one = known_->sweptSpace(topology, map_t0, map_t1, active.data());
+    sum.voxels += one.voxels;
+    sum.unknown += one.unknown;
+  }
+  outcome.unknown_fraction = sum.unknownFraction();
+  const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
+  outcome.stats[Effect::UNKNOWN_SPACE] = {sum.voxels, sum.unknown, spent.count()};
 }
 
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
@@ -91,7 +136,8 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    MeshFrame frame{stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity()};
+    MeshFrame frame{stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity(),
+                    rigid_[b]->radius_m};
     if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) return false;
     transform(frame.pose, frame.positions);
     frames.emplace_back(b, std::move(frame));
@@ -124,7 +170,7 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
   }
   transform(fixed_from_mesh, done.mesh.positions);
   monitor_->push(body, {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
-                        Eigen::Isometry3d::Identity()}, now_ns);
+                        Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m)}, now_ns);
   if (is_clock) arrivals_.push_back(done.arrival_ns);
   return true;
 }
@@ -167,6 +213,7 @@ bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
   }
   if (finishing_) monitor_->finish();
   if (!monitor_->next(now_ns, outcome)) return false;
+  measureUnknown(outcome);
   outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
   if (!arrivals_.empty()) arrivals_.pop_front();
   return true;
@@ -190,22 +237,6 @@ void MonitorPipeline::reset(StepStatus status) {
   monitor_->reset(status);
   arrivals_.clear();
   if (config_.fixed_frame.empty()) fixed_frame_.clear();
-}
-
-double MonitorPipeline::unknownFraction(const StepOutcome& outcome) const {
-  if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return 0;
-  SweptSpace sum;
-  Positions map_t0, map_t1;
-  for (std::size_t b = 0; b < outcome.topologies->size(); ++b) {
-    map_t0 = (*outcome.positions_t0)[b];
-    map_t1 = (*outcome.positions_t1)[b];
-    transform(outcome.map_from_fixed, map_t0);
-    transform(outcome.map_from_fixed, map_t1);
-    const SweptSpace one = known_->sweptSpace(*(*outcome.topologies)[b], map_t0, map_t1, nullptr);
-    sum.voxels += one.voxels;
-    sum.unknown += one.unknown;
-  }
-  return sum.unknownFraction();
 }
 
 std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }

@@ -63,8 +63,6 @@ class MonitorPipeline {
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
   std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
-  /// unknown_space: report. Share of the voxels swept in this outcome's step that the map does not know; else 0.
-  double unknownFraction(const StepOutcome& outcome) const;
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none.
   std::string takeComplaint(std::size_t body);
   /// What looks like a mistake in the body's messages, though they are valid (advice.h); empty: nothing does.
@@ -78,6 +76,7 @@ class MonitorPipeline {
   struct RigidMesh {
     std::shared_ptr<const Topology> topology;
     Positions rest;
+    std::vector<double> radius_m;
   };
   MonitorConfig config_;
   tf2::BufferCore& transforms_;
@@ -101,6 +100,8 @@ class MonitorPipeline {
   void takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// False: still waits.
+  /// unknown_space: report. How much of what the step swept the map does not know.
+  void measureUnknown(StepOutcome& outcome) const;
   bool place(std::size_t body, std::int64_t now_ns);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
   void placeMap(std::int64_t now_ns);

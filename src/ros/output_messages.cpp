@@ -121,6 +121,28 @@ void fillStages(const core::StepStats& stats, StatsMessage& out) {
   out.body_body_ms = stats[Effect::BODY_BODY].ms;
   out.obstacle_in = stats[Effect::OBSTACLE].in;
   out.obstacle_out = stats[Effect::OBSTACLE].out;
+  out.start_state_in = stats[Effect::START_STATE].in;
+  out.start_state_out = stats[Effect::START_STATE].out;
+  out.rigid_bodies_in = stats[Effect::RIGID_BODIES].in;
+  out.rigid_bodies_out = stats[Effect::RIGID_BODIES].out;
+  out.rigid_bodies_ms = stats[Effect::RIGID_BODIES].ms;
+  out.unknown_space_in = stats[Effect::UNKNOWN_SPACE].in;
+  out.unknown_space_out = stats[Effect::UNKNOWN_SPACE].out;
+  out.unknown_space_ms = stats[Effect::UNKNOWN_SPACE].ms;
+  out.minimum_separation_in = stats[Effect::MINIMUM_SEPARATION].in;
+  out.minimum_separation_out = stats[Effect::MINIMUM_SEPARATION].out;
+  out.minimum_separation_ms = stats[Effect::MINIMUM_SEPARATION].ms;
+  out.tracker_noise_in = stats[Effect::TRACKER_NOISE].in;
+  out.tracker_noise_out = stats[Effect::TRACKER_NOISE].out;
+  out.tracker_noise_ms = stats[Effect::TRACKER_NOISE].ms;
+  out.look_ahead_in = stats[Effect::LOOK_AHEAD].in;
+  out.look_ahead_out = stats[Effect::LOOK_AHEAD].out;
+  out.look_ahead_ms = stats[Effect::LOOK_AHEAD].ms;
+  out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
+  out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
+  out.body_pairs = static_cast<std::uint32_t>(stats.body_pairs);
+  out.left_out_listed = stats.left_out_listed;
+  out.left_out_met = stats.left_out_met;
   const auto tier = [&](Tier t) { return stats.tiers.settled[static_cast<std::size_t>(t)]; };
   out.tier_coincidence = tier(Tier::COINCIDENCE);
   out.tier_double_batch = tier(Tier::DOUBLE_BATCH);
@@ -199,11 +221,28 @@ StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context
     out.map_leaves = outcome.obstacle->leafCount();
     out.map_age = static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9;
   }
-  out.unknown_fraction = context.unknown_fraction;
+  out.unknown_fraction = outcome.unknown_fraction;
+  out.look_ahead_compared = static_cast<std::uint32_t>(context.look_ahead.compared);
+  out.look_ahead_median_error = context.look_ahead.median_error_s;
+  out.look_ahead_p95_error = context.look_ahead.p95_error_s;
   out.maps_received = context.maps_received;
   out.maps_refused = context.maps_refused;
   out.markers_built = context.markers_built;
   out.parameter_hash = context.parameter_hash;
+  return out;
+}
+
+LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies,
+                            StampNs stamp_ns, const std::string& frame) {
+  LeftOutPairs out;
+  out.header = header(stamp_ns, frame);
+  for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
+  out.pairs.resize(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    out.pairs[i].kind = static_cast<std::uint8_t>(pairs[i].kind);
+    out.pairs[i].body = pairs[i].body;
+    std::copy(pairs[i].vertex.begin(), pairs[i].vertex.end(), out.pairs[i].vertex.begin());
+  }
   return out;
 }
 

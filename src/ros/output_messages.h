@@ -4,10 +4,12 @@
 // Generated headers before the core's: see contact.h. Whoever includes this header includes it first.
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/LeftOutPairs.h>
 #include <deformable_ccd/StepStats.h>
 #include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
+#include "deformable_ccd/look_ahead_score.h"
 #include "deformable_ccd/monitor.h"
 
 namespace deformable_ccd {
@@ -21,7 +23,7 @@ struct StatsContext {
   double latency_s = 0;
   std::uint64_t maps_received = 0, maps_refused = 0;
   std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
-  double unknown_fraction = 0;
+  LookAheadSummary look_ahead;
   std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;
 };
@@ -31,6 +33,8 @@ FirstContact toFirstContact(const StepOutcome& outcome, const std::string& frame
 /// The message of the package, not core::StepStats.
 StepStats_<std::allocator<void>> toStepStats(const StepOutcome& outcome, const StatsContext& context,
                                              const std::string& frame);
+LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies,
+                            StampNs stamp_ns, const std::string& frame);
 /// From a prediction (Monitor::predict) over horizon_s.
 TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s, const std::string& frame);
 

@@ -13,7 +13,7 @@ constexpr std::uint32_t QUEUE = 32;
 
 }  // namespace
 
-Outputs::Outputs(ros::NodeHandle& node, bool look_ahead) {
+Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
   contacts_ = node.advertise<ContactArray>("contacts", QUEUE);
   first_contact_ = node.advertise<FirstContact>("first_contact", QUEUE);
   clear_ = node.advertise<std_msgs::Bool>("clear", QUEUE, true);
@@ -24,11 +24,12 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead) {
     predicted_ = node.advertise<ContactArray>("predicted_contacts", QUEUE);
     time_to_contact_ = node.advertise<TimeToContact>("time_to_contact", QUEUE);
   }
+  if (separates) left_out_ = node.advertise<LeftOutPairs>("left_out", 1, true);
   publishNotClear();
 }
 
-void Outputs::publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, StatsContext context,
-                      const MarkerConfig& markers, const std::string& frame) {
+void Outputs::publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
+                      const std::string& frame) {
   std_msgs::Bool clear;
   clear.data = outcome.clear;
   clear_.publish(clear);
@@ -38,10 +39,12 @@ void Outputs::publish(const StepOutcome& outcome, const std::vector<MonitorBody>
     ++markers_built_;
     markers_.publish(toMarkers(outcome, bodies, markers, frame));
   }
-  if (stats_.getNumSubscribers() > 0) {
-    context.markers_built = markers_built_;
-    stats_.publish(toStepStats(outcome, context, frame));
-  }
+}
+
+void Outputs::publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame) {
+  if (stats_.getNumSubscribers() == 0) return;
+  context.markers_built = markers_built_;
+  stats_.publish(toStepStats(outcome, context, frame));
 }
 
 bool Outputs::wantsPrediction() const {
@@ -58,6 +61,10 @@ void Outputs::publishPrediction(const StepOutcome& prediction, double horizon_s,
 }
 
 void Outputs::publishEffects(const EffectArray& effects) { effects_.publish(effects); }
+
+void Outputs::publishLeftOut(const LeftOutPairs& pairs) {
+  if (left_out_) left_out_.publish(pairs);
+}
 
 void Outputs::publishNotClear() { clear_.publish(std_msgs::Bool()); }
 

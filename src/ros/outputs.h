@@ -16,21 +16,25 @@ namespace deformable_ccd {
 
 class Outputs {
  public:
-  Outputs(ros::NodeHandle& private_node, bool look_ahead);
+  Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates);
 
-  void publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, StatsContext context,
-               const MarkerConfig& markers, const std::string& frame);
+  void publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
+               const std::string& frame);
+  /// After the step's prediction, which it tells of.
+  void publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame);
   /// Whether anybody listens to predictions.
   bool wantsPrediction() const;
   void publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
                          const std::string& frame);
   void publishEffects(const EffectArray& effects);
+  /// Latched. Only where some body separates.
+  void publishLeftOut(const LeftOutPairs& pairs);
   /// Not clear, and nothing shown: after a reset or when disabled.
   void publishNotClear();
   std::uint64_t markersBuilt() const { return markers_built_; }
 
  private:
-  ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, predicted_, time_to_contact_;
+  ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;
   std::uint64_t markers_built_ = 0;
 };
 

@@ -35,7 +35,7 @@ struct Reconfigure::Impl {
 
   Impl(const ros::NodeHandle& node, const MonitorConfig& config, Changed call)
       : options(config.monitor), markers(config.markers), changed(std::move(call)), server(mutex, node) {
-    for (const BodyConfig& body : config.bodies) separates = separates || body.body.minimum_separation_m > 0;
+    separates = config.holdsDistance();
     server.updateConfig(toLive(config));
     bool first = true;  // setCallback calls at once, with what is in force already
     server.setCallback([this, first](CollisionMonitorConfig& live, std::uint32_t) mutable {
@@ -47,7 +47,7 @@ struct Reconfigure::Impl {
   void apply(CollisionMonitorConfig& live) {
     Accuracy rung = static_cast<Accuracy>(live.accuracy);
     if (separates && (rung == Accuracy::EXACT || rung == Accuracy::FAST)) {
-      rung = Accuracy::CONSERVATIVE;  // the only rungs that hold a separation are this and screen
+      rung = Accuracy::CONSERVATIVE;  // the only rungs that hold a distance are this and screen
       live.accuracy = static_cast<int>(rung);
     }
     options.detector.accuracy.rung = rung;

@@ -35,14 +35,14 @@ std::string datatypeOf(const TypedMesh& mesh) {
       mesh);
 }
 
-CloudView viewOf(const sensor_msgs::PointCloud2& cloud) {
+CloudView viewOf(const sensor_msgs::PointCloud2& cloud, const std::string& extra_field) {
   CloudView view;
   view.header = headerView(cloud.header);
   view.height = cloud.height;
   view.width = cloud.width;
-  CloudFieldFinder finder;
+  CloudFieldFinder finder(extra_field);
   for (const auto& field : cloud.fields) finder.add(field.name, field.offset, field.datatype, view);
-  finder.finish();
+  finder.finish(view);
   if (cloud.is_bigendian) throw WireError("is_bigendian is set; send little-endian clouds");
   view.point_step = cloud.point_step;
   view.row_step = cloud.row_step;
@@ -66,10 +66,10 @@ IndexedView viewOf(const shape_msgs::Mesh& mesh) {
   return view;
 }
 
-IndexedView viewOf(const pcl_msgs::PolygonMesh& mesh) {
+IndexedView viewOf(const pcl_msgs::PolygonMesh& mesh, const std::string& extra_field) {
   IndexedView view;
   view.header = headerView(mesh.header);
-  view.cloud = viewOf(mesh.cloud);
+  view.cloud = viewOf(mesh.cloud, extra_field);
   fillHeader(view);
   view.polygons.reserve(mesh.polygons.size());
   for (const auto& polygon : mesh.polygons) view.polygons.push_back(spanOf<std::uint32_t>(polygon.vertices));

@@ -24,10 +24,10 @@ using TypedMesh = std::variant<MeshStamped::ConstPtr, sensor_msgs::PointCloud2::
 std::string datatypeOf(const TypedMesh& mesh);
 
 /// The same views as of serialised messages, with the same checks: they throw WireError. The message must outlive them.
-CloudView viewOf(const sensor_msgs::PointCloud2& cloud);
+CloudView viewOf(const sensor_msgs::PointCloud2& cloud, const std::string& extra_field = {});
 IndexedView viewOf(const MeshStamped& mesh);
 IndexedView viewOf(const shape_msgs::Mesh& mesh);
-IndexedView viewOf(const pcl_msgs::PolygonMesh& mesh);
+IndexedView viewOf(const pcl_msgs::PolygonMesh& mesh, const std::string& extra_field = {});
 MarkerView viewOf(const visualization_msgs::Marker& marker);
 std::vector<MarkerView> viewOf(const visualization_msgs::MarkerArray& array);
 

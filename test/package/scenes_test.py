@@ -1,5 +1,6 @@
 """Every scene of config/scenes, recorded and analysed by the tools: the facts that the scene states must come out."""
 import csv
+import json
 import os
 import pathlib
 import shutil
@@ -20,7 +21,7 @@ def run(*command):
 
 
 def analyse(scene, folder):
-    """Records and analyses a scene; the rows of contacts.csv."""
+    """Records and analyses a scene; the rows of contacts.csv, and report.json."""
     bag, config = folder / (scene.stem + '.bag'), folder / (scene.stem + '.yaml')
     recorded = run(TOOLS / 'make_scene_bag', scene, bag, '--monitor-config', config, '--quiet')
     assert recorded.returncode == 0, recorded.stderr
@@ -28,7 +29,7 @@ def analyse(scene, folder):
     analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet', '--no-accuracy-table')
     assert analysed.returncode == 0, analysed.stderr
     with open(report / 'contacts.csv', newline='') as stream:
-        return list(csv.DictReader(stream))
+        return list(csv.DictReader(stream)), json.loads((report / 'report.json').read_text())
 
 
 def first_s(rows, belongs):
@@ -56,16 +57,38 @@ class SceneFactsTest(unittest.TestCase):
         self.assertTrue(low <= first <= high, '%s: first contact (%s) at %g s, expected from %g to %g' % (
             scene.stem, what, first, low, high))
 
+    def check_effects(self, monitor, report):
+        """What runs is what the scene lists, each with its reason; what does not run has counted nothing."""
+        effects = {e['name']: e for e in report['effects'] if e['name'] != 'octomap_corner_face'}
+        self.assertEqual({name for name, e in effects.items() if e['running']}, set(monitor['effects']))
+        for name, effect in effects.items():
+            self.assertTrue(effect['reason'], name)
+            if effect['running']:
+                self.assertGreater(effect['ms'], 0, '%s: %s' % (monitor, name))
+            else:
+                self.assertEqual((effect['in'], effect['out'], effect['ms']), (0, 0, 0), name)
+        if 'look_ahead' in monitor['effects']:
+            score = report['look_ahead']
+            self.assertGreater(score['compared'], 20)
+            self.assertLessEqual(score['median_error_s'], score['p95_error_s'])
+            self.assertLess(score['median_error_s'], monitor['look_ahead_s'] / 2)
+        else:
+            self.assertIsNone(report['look_ahead'])
+        if 'minimum_separation' in monitor['effects']:
+            self.assertGreater(report['left_out']['pairs'], 100)
+            self.assertIn('%d pairs' % report['left_out']['pairs'], effects['minimum_separation']['reason'])
+
     def test_the_facts_that_each_scene_states(self):
         scenes = sorted((CHECKOUT / 'config/scenes').glob('*.yaml'))
         self.assertGreaterEqual(len(scenes), 6)
         for scene in scenes:
             with self.subTest(scene=scene.stem):
-                rows = analyse(scene, self.folder)
-                expect = yaml.safe_load(scene.read_text())['expect']
-                self.assertTrue(expect)
-                for what, expected in expect.items():
+                rows, report = analyse(scene, self.folder)
+                text = yaml.safe_load(scene.read_text())
+                self.assertTrue(text['expect'])
+                for what, expected in text['expect'].items():
                     self.check(scene, rows, what, expected)
+                self.check_effects(text['monitor'], report)
 
 
 class MakeSceneBagTest(unittest.TestCase):

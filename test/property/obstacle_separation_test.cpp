@@ -68,5 +68,54 @@ TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
   EXPECT_GT(apart, scenes / 10);
 }
 
+// Per vertex uncertainty: each feature alone, against the distance that its own most uncertain vertex asks for.
+TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
+  std::mt19937_64 random(12);
+  const int scenes = test::longRun() ? 20000 : 400;
+  int within = 0, sure_apart = 0;
+  ObstacleOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.accuracy.max_subdivisions = 1 << 16;
+  for (int i = 0; i < scenes; ++i) {
+    const ObstacleScene scene = randomScene(random);
+    options.minimum_separation_m = random() % 2 ? 0.0 : 0.006;
+    std::vector<double> radius(3, 0.0);
+    radius[random() % 3] = 0.005 * static_cast<double>(1 + random() % 8);
+    ObstacleTest test(options);
+    std::vector<Contact> contacts;
+    ObstacleStats stats;
+    test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
+             contacts, stats, radius.data());
+    for (const Edge& edge : scene.topology.edges()) {
+      ObstacleScene alone = scene;
+      alone.topology = Topology::polyline(2);
+      alone.t0 = {scene.t0[edge[0]], scene.t0[edge[1]]};
+      alone.t1 = {scene.t1[edge[0]], scene.t1[edge[1]]};
+      const double separation = options.minimum_separation_m + std::max(radius[edge[0]], radius[edge[1]]);
+      double earliest = 2;
+      for (const Contact& c : contacts) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          // Whatever says of the edge that it is near: itself, an end of it, a face at it.
+          if (c.vertex[k] == edge[0] || c.vertex[k] == edge[1]) earliest = std::min(earliest, c.toc_lower);
+        }
+        const bool own = c.kind == PairKind::EDGE_VOXEL_EDGE && c.vertex[0] == edge[0] && c.vertex[1] == edge[1];
+        if (!own || c.certainty != Certainty::CERTAIN) continue;
+        ASSERT_LE(test::distanceToBoxes(alone, c.toc_lower), separation + 1.1e-6) << test::describe(scene);
+      }
+      bool close = false;
+      for (int k = 0; k <= 64 && !close; ++k) {
+        const double t = k / 64.0;
+        if (test::distanceToBoxes(alone, t) > separation - 1e-9) continue;
+        close = true;
+        ASSERT_LE(earliest, t) << "separation " << separation << "\n" << test::describe(scene);
+      }
+      ++(close ? within : sure_apart);
+    }
+  }
+  std::cout << within << " edges came within their separation, " << sure_apart << " did not\n";
+  EXPECT_GT(within, scenes / 4);
+  EXPECT_GT(sure_apart, scenes / 4);
+}
+
 }  // namespace
 }  // namespace deformable_ccd

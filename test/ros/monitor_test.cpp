@@ -5,6 +5,7 @@
 #include <deformable_ccd/StepStats.h>
 #include <deformable_ccd/TimeToContact.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -320,6 +321,22 @@ TEST_F(Grid, OctomapBinaryAndFull) {
   }
 }
 
+TEST_F(Grid, UnknownSpaceIsReported) {
+  giveMap(blockBelowZero(true, 90));
+  send(mesh, cloud(gridAt(3, 4, 0.35), 100));
+  send(mesh, cloud(gridAt(3, 4, 0.15), 100.1));
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.1); }));
+  const Stats swept = stats.last();
+  EXPECT_EQ(swept.unknown_fraction, 1) << "the map knows what is occupied, and nothing of the air";
+  EXPECT_GT(swept.unknown_space_in, 0u);
+  EXPECT_EQ(swept.unknown_space_out, swept.unknown_space_in);
+  EXPECT_GT(swept.unknown_space_ms, 0);
+  EXPECT_NEAR(swept.map_age, 10.1, 1e-6);
+  send(mesh, cloud(gridAt(3, 4, -0.05), 100.2));
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.2); }));
+  EXPECT_LT(stats.last().unknown_fraction, 1) << "into what is known";
+}
+
 TEST_F(Grid, MalformedMapsAreRefused) {
   giveMap(blockBelowZero(true));
   const std::uint64_t refused = stats.last().maps_refused;
@@ -369,6 +386,12 @@ TEST_F(Grid, LyingCloudsAreRefused) {
 
 // --- several bodies --------------------------------------------------------------------------------------------------
 
+bool isAdvertised(const std::string& topic) {
+  ros::master::V_TopicInfo topics;
+  EXPECT_TRUE(ros::master::getTopics(topics));
+  return std::any_of(topics.begin(), topics.end(), [&](const auto& info) { return info.name == topic; });
+}
+
 struct Pair : MonitorTest {
   Pair() : MonitorTest("/pair") {}
   ros::Publisher cloth = advertiseAndWait<MeshStamped>(node, "/pair/cloth");
@@ -379,6 +402,20 @@ struct Pair : MonitorTest {
   static Mesh tip(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}}}; }
   void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
 };
+
+// What is off has no topic, neither to listen to nor to speak on.
+TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
+  const auto wanted = node.advertise<octomap_msgs::Octomap>("/plain/octomap", 1);
+  const auto unwanted = node.advertise<octomap_msgs::Octomap>("/pair/octomap", 1);
+  const auto rigid = node.advertise<MeshStamped>("/pair/finger", 1);
+  EXPECT_TRUE(waitUntil([&] { return wanted.getNumSubscribers() > 0; })) << "auto listens for a map";
+  EXPECT_EQ(unwanted.getNumSubscribers(), 0u) << "octomap: off";
+  EXPECT_EQ(rigid.getNumSubscribers(), 0u) << "a rigid body has no stream";
+  EXPECT_TRUE(isAdvertised("/plain/time_to_contact"));
+  EXPECT_FALSE(isAdvertised("/pair/time_to_contact")) << "no look-ahead";
+  EXPECT_FALSE(isAdvertised("/pair/predicted_contacts"));
+  EXPECT_FALSE(isAdvertised("/pair/left_out")) << "no separation";
+}
 
 TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
   finger(300, -5);

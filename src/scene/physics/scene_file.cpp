@@ -171,6 +171,34 @@ Wind readWind(YamlMap map) {
   return wind;
 }
 
+/// One body of the monitor's block, held against the body of the scene on its topic.
+void checkMonitorBody(YamlMap map, const SceneSpec& spec) {
+  map.number("minimum_separation_m", 0.0, LARGE, 0.0);
+  if (map.has("rigid") && map.boolean("self_collision", false)) {
+    map.fail("self_collision", "the body is rigid and cannot meet itself; remove this line");
+  }
+  std::optional<YamlMap> topology = map.optionalMap("topology");
+  if (!topology || !map.has("topic") || !topology->has("rows")) return;
+  const int rows = topology->integer("rows", 2, 100000), cols = topology->integer("cols", 2, 100000);
+  for (const Body& body : spec.bodies) {
+    const int points = body.shape.rows * body.shape.cols;
+    if (body.topic != map.text("topic") || rows * cols == points) continue;
+    topology->fail("rows", std::to_string(rows) + " x " + std::to_string(cols) + " = " + std::to_string(rows * cols) +
+                               ", but " + body.name + " has " + std::to_string(points) + " points; write rows: " +
+                               std::to_string(body.shape.rows) + ", cols: " + std::to_string(body.shape.cols));
+  }
+}
+
+/// The monitor reads its block itself; what contradicts the scene is refused before anything is recorded.
+void checkMonitor(YamlMap& scene, const SceneSpec& spec) {
+  std::optional<YamlMap> monitor = scene.optionalMap("monitor");
+  if (!monitor) return;
+  monitor->number("minimum_separation_m", 0.0, LARGE, 0.0);
+  std::optional<YamlMap> bodies = monitor->optionalMap("bodies");
+  if (!bodies) return;
+  for (const std::string& name : bodies->keys()) checkMonitorBody(bodies->map(name), spec);
+}
+
 SceneSpec readScene(const YAML::Node& root, const std::string& name) {
   YamlMap map(root, name, "");
   SceneSpec spec;
@@ -193,6 +221,7 @@ SceneSpec readScene(const YAML::Node& root, const std::string& name) {
   if (spec.bodies.empty()) map.fail("bodies", "write at least one body: what moves in this scene");
   if (auto obstacle = map.optionalMap("obstacle")) spec.obstacle = readObstacle(*obstacle, spec.fixed_frame);
   for (YamlMap& body : map.list("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
+  checkMonitor(map, spec);
   spec.monitor_yaml = map.raw("monitor");
   spec.expect_yaml = map.raw("expect");
   map.finish();

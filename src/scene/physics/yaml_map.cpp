@@ -138,6 +138,12 @@ std::string YamlMap::raw(const std::string& key) {
   return emitter.c_str();
 }
 
+std::vector<std::string> YamlMap::keys() const {
+  std::vector<std::string> names;
+  for (const auto& item : node_) names.push_back(item.first.Scalar());
+  return names;
+}
+
 void YamlMap::finish() const {
   for (const auto& item : node_) {
     const std::string key = item.first.Scalar();

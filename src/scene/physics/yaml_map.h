@@ -45,6 +45,9 @@ class YamlMap {
   /// The value of a key as YAML text, unread; empty when the key is absent.
   std::string raw(const std::string& key);
 
+  /// Keys of the map, in the order of the file.
+  std::vector<std::string> keys() const;
+
   /// Refuses the first key that nobody asked for. To be called when all have been read.
   void finish() const;
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;

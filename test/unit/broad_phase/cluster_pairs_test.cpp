@@ -23,7 +23,7 @@ struct Scene {
     core::StepStats stats;
     arrays.setBodies(step.setups(), step.positions());
     arrays.record(step.motion(), stats);
-    arrays.refit([](std::size_t n, const auto& f) { f(0, n); });
+    arrays.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
   }
 };
 

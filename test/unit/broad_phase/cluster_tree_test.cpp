@@ -113,7 +113,7 @@ TEST(ClusterTree, EveryLevelBoundsWhatIsBelow) {
   core::StepStats stats;
   scene.setBodies(step.setups(), step.positions());
   scene.record(step.motion(), stats);
-  scene.refit([](std::size_t n, const auto& f) { f(0, n); });
+  scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
 
   double low[8], high[8], scale[8];
   std::fill_n(low, 8, HUGE_VAL);

@@ -371,6 +371,41 @@ TEST(RigidBody, LargeTurnsAreSplit) {
   EXPECT_NEAR(outcome.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
 }
 
+// The budget is one for the whole step: once it is spent, the parts that are left are not begun.
+TEST(RigidBody, TheBudgetIsForTheWholeStep) {
+  MonitorOptions options = loose();
+  MonitorBody bar = named("bar");
+  bar.rigid = true;
+  const auto at = [](StampNs stamp_ns, double angle) {
+    MeshFrame frame{stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true, Eigen::Isometry3d::Identity()};
+    frame.pose.linear() = Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix();
+    for (Vec3& p : frame.positions) p = frame.pose * p;
+    return frame;
+  };
+  const auto run = [&](double budget_ms) {
+    options.detector.step_budget_ms = budget_ms;
+    Monitor monitor(options, {named("tip"), bar});
+    StepOutcome outcome;
+    monitor.push(0, tip(0, -3), NOW);
+    monitor.push(1, at(0, 0), NOW);
+    monitor.push(1, at(100 * MS, 3.1), NOW);
+    monitor.push(0, tip(100 * MS, -3), NOW);
+    EXPECT_TRUE(monitor.next(NOW, outcome) && monitor.next(NOW, outcome));
+    return outcome;
+  };
+  const StepOutcome whole = run(0);
+  ASSERT_EQ(whole.status, StepStatus::OK);
+  ASSERT_GT(whole.substeps, 30u);
+  EXPECT_EQ(whole.stats.bodies_refitted + whole.stats.bodies_kept, 2 * whole.substeps) << "two bodies in every part";
+  EXPECT_TRUE(run(1000).complete);
+  const StepOutcome cut = run(1e-6);
+  EXPECT_EQ(cut.status, StepStatus::DEADLINE);
+  EXPECT_FALSE(cut.complete);
+  EXPECT_FALSE(cut.clear);
+  EXPECT_EQ(cut.stats.bodies_refitted + cut.stats.bodies_kept, 2u) << "the first part alone";
+  EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));
+}
+
 TEST(MonitorOptionsTest, OutOfRangeNamesTheOption) {
   MonitorOptions options;
   options.sync_timeout_s = -1;

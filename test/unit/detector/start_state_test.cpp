@@ -114,7 +114,7 @@ struct Scene {
   void record(const TestStep& step) {
     core::StepStats stats;
     arrays.record(step.motion(), stats);
-    arrays.refit([](std::size_t n, const auto& f) { f(0, n); });
+    arrays.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
   }
 };
 

@@ -231,6 +231,8 @@ StepInput inputOf(const StepRecording& r, std::vector<MonitorBody>& bodies) {
     input.rigid[b] = r.bodies[b].rigid;
     input.pose_t0[b] = r.bodies[b].pose_t0;
     input.pose_t1[b] = r.bodies[b].pose_t1;
+    input.radius_m[b] = r.bodies[b].radius_m;
+    input.references[b] = r.bodies[b].reference;
   }
   return input;
 }

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -21,6 +22,14 @@ std::string errorOf(XmlRpcValue tree) {
 }
 
 bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+XmlRpcValue separationPair(const std::string& a, const std::string& b, double separation_m) {
+  XmlRpcValue pair;
+  pair["between"][0] = a;
+  pair["between"][1] = b;
+  pair["separation_m"] = separation_m;
+  return pair;
+}
 
 TEST(Parameters, NoneAtAllIsOneBodyWithDefaults) {
   const MonitorConfig config = readConfig(XmlRpcValue());
@@ -60,8 +69,34 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
   };
   const Case cases[] = {
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
-      {"conservative", [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["minimum_separation_m"] = 0.01; }},
-      {"minimum_separation_m", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
+      {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
+       "separation: write accuracy: conservative",
+       [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["minimum_separation_m"] = 0.01; }},
+      {"~bodies/cloth/minimum_separation_m asks for a minimum separation: write accuracy: conservative",
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["bodies"]["cloth"]["minimum_separation_m"] = 0.01;
+       }},
+      {"~minimum_separation_pairs asks for",
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "fast";
+         t["minimum_separation_pairs"][0] = separationPair("mesh", "octomap", 0.01);
+       }},
+      {"~uncertainty asks for an uncertainty radius: write accuracy: conservative",
+       [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["uncertainty"]["radius_m"] = 0.01; }},
+      {"~minimum_separation_m is -0.1, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
+      {"~minimum_separation_m is nan, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = NAN; }},
+      {"~minimum_separation_m is inf, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = INFINITY; }},
+      {"~bodies/cloth/minimum_separation_m is -1, it must be from 0",
+       [](XmlRpcValue& t) { t["bodies"]["cloth"]["minimum_separation_m"] = -1; }},
+      {"minimum_separation_pairs[0]/separation_m is nan",
+       [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("mesh", "mesh", NAN); }},
+      {"names 'mush', which is no body and not octomap; nearest is 'mesh'",
+       [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("mush", "octomap", 0.01); }},
+      {"names octomap twice",
+       [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("octomap", "octomap", 0.01); }},
+      {"~uncertainty/radius_m is -0.1", [](XmlRpcValue& t) { t["uncertainty"]["radius_m"] = -0.1; }},
+      {"~uncertainty/scale has no meaning without field", [](XmlRpcValue& t) { t["uncertainty"]["scale"] = 3.0; }},
       {"nearest is 'exact'", [](XmlRpcValue& t) { t["accuracy"] = "exakt"; }},
       {"topology/file", [](XmlRpcValue& t) { t["topology"]["source"] = "file"; }},
       {"clock_body", [](XmlRpcValue& t) { t["clock_body"] = "sleeve"; }},
@@ -79,6 +114,45 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
     one.set(tree);
     EXPECT_TRUE(mentions(errorOf(tree), one.expected)) << one.expected << ": " << errorOf(tree);
   }
+}
+
+TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
+  XmlRpcValue tree;
+  tree["bodies"]["felt"]["topic"] = "felt";
+  tree["bodies"]["felt"]["minimum_separation_m"] = 0.01;
+  tree["bodies"]["other"]["uncertainty"]["field"] = "sigma";
+  tree["bodies"]["other"]["uncertainty"]["scale"] = 3.0;
+  tree["minimum_separation_pairs"][0] = separationPair("octomap", "felt", 0.0);
+  tree["minimum_separation_pairs"][1] = separationPair("felt", "other", 0.02);
+  const MonitorConfig config = readConfig(tree);
+  EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::CONSERVATIVE);
+  EXPECT_EQ(config.largestSeparation(), 0.02);
+  ASSERT_EQ(config.bodies[0].body.separations.size(), 2u);
+  EXPECT_EQ(config.bodies[0].body.separations[0].body, OBSTACLE_BODY);
+  EXPECT_EQ(config.bodies[0].body.separations[1].body, 1u);
+  EXPECT_EQ(config.bodies[1].input.noise_field, "sigma");
+  EXPECT_EQ(config.bodies[1].input.noise_scale, 3.0);
+  tree["effects"]["minimum_separation"] = "off";
+  tree["effects"]["tracker_noise"] = "off";
+  tree["accuracy"] = "exact";
+  const MonitorConfig off = readConfig(tree);
+  EXPECT_EQ(off.monitor.detector.accuracy.rung, Accuracy::EXACT) << "what is off asks for nothing";
+  EXPECT_FALSE(off.holdsDistance());
+}
+
+TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
+  XmlRpcValue tree;
+  tree["bodies"]["a_finger"]["rigid"]["mesh"] = "no_such_file.stl";
+  tree["bodies"]["a_finger"]["rigid"]["frame"] = "finger";
+  tree["bodies"]["cloth"]["topic"] = "cloth";
+  tree["minimum_separation_pairs"][0] = separationPair("cloth", "a_finger", 0.01);
+  tree["minimum_separation_pairs"][1] = separationPair("cloth", "cloth", 0.02);
+  tree["effects"]["rigid_bodies"] = "off";
+  const MonitorConfig config = readConfig(tree);
+  ASSERT_EQ(config.bodies.size(), 1u);
+  EXPECT_EQ(config.monitor.clock_body, 0u);
+  ASSERT_EQ(config.bodies[0].body.separations.size(), 1u);
+  EXPECT_EQ(config.bodies[0].body.separations[0].body, 0u);
 }
 
 TEST(Parameters, OnAndOffAreWordsThoughYamlTakesThemForBooleans) {

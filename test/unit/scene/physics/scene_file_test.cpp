@@ -84,6 +84,23 @@ TEST(SceneFile, ContradictionsAreRefused) {
   EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"), std::string::npos);
 }
 
+TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
+  const auto with = [](const std::string& monitor) { return errorOf(GOOD, "bodies:", "monitor:\n" + monitor + "bodies:"); };
+  EXPECT_EQ(with("  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: 4}}\n"), "accepted");
+  EXPECT_NE(with("  minimum_separation_m: -0.01\n").find("s.yaml:7: monitor.minimum_separation_m: write a number from 0"),
+            std::string::npos);
+  EXPECT_NE(with("  minimum_separation_m: .nan\n").find("monitor.minimum_separation_m: write a number from 0"), std::string::npos);
+  EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, minimum_separation_m: .inf}\n")
+                .find("s.yaml:8: monitor.bodies.cloth.minimum_separation_m: write a number from 0"),
+            std::string::npos);
+  EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\n")
+                .find("s.yaml:8: monitor.bodies.cloth.topology.rows: 4 x 4 = 16, but sheet has 12 points; write rows: 3, cols: 4"),
+            std::string::npos);
+  EXPECT_NE(with("  bodies:\n    finger: {rigid: {mesh: a.stl, frame: finger}, self_collision: true}\n")
+                .find("s.yaml:8: monitor.bodies.finger.self_collision: the body is rigid"),
+            std::string::npos);
+}
+
 TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
   EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
   EXPECT_THROW(readSceneFile("no/such/scene.yaml"), SceneFileError);

@@ -1,0 +1,198 @@
+// Whole steps with a minimum separation and tracker noise, against the exact distance: nothing that comes closer than the
+// pair's separation is missed or late, and nothing is called a contact that stays farther than it plus the tolerance.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <iostream>
+#include <map>
+
+#include "support/exact_distance.h"
+#include "support/query_property.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr double TOLERANCE_M = 1e-6;
+constexpr int TIMES = 8;
+
+struct NoisyStep {
+  TestStep step;
+  std::vector<double> separation_m;           // per body
+  std::vector<std::vector<double>> radius_m;  // per body, empty: none
+};
+
+NoisyStep randomNoisyStep(const Draw& draw) {
+  NoisyStep noisy;
+  noisy.step = randomStep(draw, draw(1, 10), Coordinates::REAL);
+  for (StepBody& body : noisy.step.bodies) {
+    body.vertex_active.clear();
+    for (Positions* x : {&body.t0, &body.t1}) {
+      for (Vec3& p : *x) p = p.allFinite() ? p : Vec3::Zero();
+    }
+    noisy.separation_m.push_back(draw(0, 1) ? 0.0 : draw(1, 40) * 0.01);
+    noisy.radius_m.emplace_back();
+    if (draw(0, 2) == 0) continue;
+    for (std::size_t v = 0; v < body.t0.size(); ++v) {
+      noisy.radius_m.back().push_back(draw(0, 3) ? 0.0 : draw(1, 60) * 0.01);
+    }
+  }
+  return noisy;
+}
+
+double radiusOf(const NoisyStep& noisy, std::uint16_t body, const Index* v, int n) {
+  double radius = 0;
+  if (noisy.radius_m[body].empty()) return 0;
+  for (int i = 0; i < n; ++i) radius = std::max(radius, noisy.radius_m[body][v[i]]);
+  return radius;
+}
+
+double separationOf(const NoisyStep& noisy, const core::Contact& c) {
+  const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
+  return std::max(noisy.separation_m[c.body[0]], noisy.separation_m[c.body[1]]) +
+         radiusOf(noisy, c.body[0], c.vertex.data(), first) +
+         radiusOf(noisy, c.body[1], c.vertex.data() + first, 4 - first);
+}
+
+StepResult run(const NoisyStep& noisy, BroadPhase broad_phase) {
+  DetectorOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.accuracy.tolerance_m = TOLERANCE_M;
+  options.broad_phase = broad_phase;
+  options.check_start_state = false;
+  Detector detector(options);
+  std::vector<BodySetup> setups = noisy.step.setups();
+  MotionStep step = noisy.step.motion();
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    setups[b].minimum_separation_m = noisy.separation_m[b];
+    if (!noisy.radius_m[b].empty()) step.bodies[b].radius_m = &noisy.radius_m[b];
+  }
+  detector.setBodies(setups, noisy.step.positions());
+  return detector.run(step);
+}
+
+using Key = std::tuple<PairKind, std::array<std::uint16_t, 2>, std::array<Index, 4>>;
+
+/// Calls visit(contact without times) for each pair of features that the step asks for.
+template <class Visit>
+void forEachPair(const TestStep& step, const Visit& visit) {
+  const auto pair = [&](PairKind kind, std::size_t a, std::size_t b, std::array<Index, 4> v) {
+    if (a == b) {
+      for (int i = 0; i < (kind == PairKind::VERTEX_FACE ? 1 : 2); ++i) {
+        for (int j = kind == PairKind::VERTEX_FACE ? 1 : 2; j < 4; ++j) {
+          if (v[i] == v[j]) return;
+        }
+      }
+    }
+    core::Contact c;
+    c.kind = kind;
+    c.body = {static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)};
+    c.vertex = v;
+    visit(c);
+  };
+  for (std::size_t a = 0; a < step.bodies.size(); ++a) {
+    for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+      const StepBody &x = step.bodies[a], &y = step.bodies[b];
+      if (a == b ? !x.self_collision : !x.against_bodies || !y.against_bodies) continue;
+      for (const Index v : x.topology.usedVertices()) {
+        for (const Face& f : y.topology.faces()) pair(PairKind::VERTEX_FACE, a, b, {v, f[0], f[1], f[2]});
+      }
+      if (b < a) continue;
+      for (const Edge& e : x.topology.edges()) {
+        for (const Edge& f : y.topology.edges()) {
+          if (a < b || e < f) pair(PairKind::EDGE_EDGE, a, b, {e[0], e[1], f[0], f[1]});
+        }
+      }
+    }
+  }
+}
+
+TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
+  const int steps = longRun() ? 3000 : 60;
+  std::uint64_t pairs = 0, within = 0, noisy_within = 0;
+  for (int seed = 0; seed < steps; ++seed) {
+    const Draw draw = drawFrom(4200 + static_cast<std::uint64_t>(seed));
+    const NoisyStep noisy = randomNoisyStep(draw);
+    const StepResult result = run(noisy, BroadPhase::CLUSTERED);
+    ASSERT_EQ(difference(result.contacts, run(noisy, BroadPhase::BRUTE_FORCE).contacts), "") << "seed " << seed;
+    std::map<Key, const core::Contact*> found;
+    for (const core::Contact& c : result.contacts) {
+      found[{c.kind, c.body, c.vertex}] = &c;
+      if (c.certainty != Certainty::CERTAIN) continue;
+      const double reach = (separationOf(noisy, c) + TOLERANCE_M) * (1 + 1e-12);
+      ASSERT_TRUE(isWithin(c.kind, motionOf(noisy.step, c), c.toc_lower, reach)) << "seed " << seed << describe(c);
+    }
+    forEachPair(noisy.step, [&](const core::Contact& c) {
+      ++pairs;
+      const PairMotion motion = motionOf(noisy.step, c);
+      const double separation_m = separationOf(noisy, c);
+      for (int k = 0; k <= TIMES; ++k) {
+        const double t = static_cast<double>(k) / TIMES;
+        if (approximateDistanceAt(c.kind, motion, t) > separation_m * (1 + 1e-9) + 1e-9) continue;
+        if (!isWithin(c.kind, motion, t, separation_m)) continue;
+        const auto at = found.find({c.kind, c.body, c.vertex});
+        ASSERT_TRUE(at != found.end()) << "missed, seed " << seed << " " << describe(c);
+        ASSERT_LE(at->second->toc_lower, t) << "late, seed " << seed << " " << describe(c);
+        ++within;
+        noisy_within += separation_m > std::max(noisy.separation_m[c.body[0]], noisy.separation_m[c.body[1]]);
+        break;
+      }
+    });
+    if (HasFatalFailure()) return;
+  }
+  std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within << " of them with noise\n";
+  EXPECT_GT(within, pairs / 100);
+  EXPECT_GT(noisy_within, within / 10);
+}
+
+// Just those vertices: a pair without an uncertain vertex gives the same bits as without any noise.
+TEST(StepSeparation, OtherPairsAreAsWithoutNoise) {
+  int same = 0;
+  for (int seed = 0; seed < 40; ++seed) {
+    const Draw draw = drawFrom(9100 + static_cast<std::uint64_t>(seed));
+    NoisyStep noisy = randomNoisyStep(draw), quiet = noisy;
+    for (auto& radius : quiet.radius_m) radius.clear();
+    std::map<Key, core::Contact> without;
+    for (const core::Contact& c : run(quiet, BroadPhase::CLUSTERED).contacts) without[{c.kind, c.body, c.vertex}] = c;
+    for (const core::Contact& c : run(noisy, BroadPhase::CLUSTERED).contacts) {
+      const bool uncertain = separationOf(noisy, c) > separationOf(quiet, c);
+      const auto at = without.find({c.kind, c.body, c.vertex});
+      if (uncertain) continue;
+      ASSERT_TRUE(at != without.end()) << describe(c);
+      EXPECT_EQ(difference({c}, {at->second}), "");
+      ++same;
+    }
+  }
+  EXPECT_GT(same, 20);
+}
+
+TEST(StepSeparation, BadRadiiAndRungsAreRefused) {
+  const TestStep step = crossing();
+  const auto error = [&](std::vector<double> radius, Accuracy rung) -> std::string {
+    DetectorOptions options;
+    options.accuracy.rung = rung;
+    Detector detector(options);
+    detector.setBodies(step.setups(), step.positions());
+    MotionStep motion = step.motion();
+    motion.bodies[0].radius_m = &radius;
+    try {
+      detector.run(motion);
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return "";
+  };
+  const std::size_t n = step.bodies[0].t0.size();
+  const auto names = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  EXPECT_EQ(error(std::vector<double>(n, 0.1), Accuracy::CONSERVATIVE), "");
+  EXPECT_EQ(error(std::vector<double>(n, 0.0), Accuracy::EXACT), "") << "no radius, no distance";
+  EXPECT_TRUE(names(error(std::vector<double>(n, 0.1), Accuracy::EXACT), "conservative"));
+  EXPECT_TRUE(names(error(std::vector<double>(n, -0.1), Accuracy::CONSERVATIVE), "body_0"));
+  EXPECT_TRUE(names(error(std::vector<double>(n, NAN), Accuracy::CONSERVATIVE), "nan"));
+  EXPECT_TRUE(names(error(std::vector<double>(n + 1, 0.1), Accuracy::CONSERVATIVE), "radii"));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd

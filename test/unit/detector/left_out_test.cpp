@@ -1,0 +1,225 @@
+// What the minimum separation leaves out: a body's own features that are closer in its reference frame.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "deformable_ccd/monitor.h"
+#include "support/exact_distance.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr double EDGE_M = 0.01, SEPARATION_M = 0.012;
+constexpr std::size_t SIZE = 6;
+
+Positions flat(double z = 0) {
+  Positions x;
+  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+    x.emplace_back(EDGE_M * static_cast<double>(i % SIZE), EDGE_M * static_cast<double>(i / SIZE), z);
+  }
+  return x;
+}
+
+/// Two layers of one body, `gap` apart; the upper one is the second half of the vertices.
+struct Layers {
+  std::shared_ptr<const Topology> topology;
+  Positions at(double gap) const {
+    Positions x = flat(), upper = flat(gap);
+    // A little aside, so that no vertex is above another one.
+    for (Vec3& p : upper) p += Vec3(0.003, 0.002, 0);
+    x.insert(x.end(), upper.begin(), upper.end());
+    return x;
+  }
+  Layers() {
+    std::vector<Face> faces = Topology::grid(SIZE, SIZE).faces();
+    const std::size_t n = faces.size();
+    for (std::size_t f = 0; f < n; ++f) {
+      Face upper = faces[f];
+      for (Index& v : upper) v += static_cast<Index>(SIZE * SIZE);
+      faces.push_back(upper);
+    }
+    topology = std::make_shared<const Topology>(Topology::fromTriangles(2 * SIZE * SIZE, faces));
+  }
+};
+
+DetectorOptions conservative() {
+  DetectorOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  return options;
+}
+
+BodySetup felt(const Layers& layers, const Positions* reference) {
+  BodySetup body;
+  body.name = "felt";
+  body.topology = layers.topology;
+  body.minimum_separation_m = SEPARATION_M;
+  if (reference) body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*reference, {}});
+  return body;
+}
+
+StepResult run(Detector& detector, const Positions& t0, const Positions& t1) {
+  MotionStep step;
+  step.bodies = {{&t0, &t1}};
+  return detector.run(step);
+}
+
+using Pair = std::pair<PairKind, std::array<Index, 4>>;
+
+/// Every pair of the body's features without a common vertex that is certainly, or not certainly not, within `bound`.
+std::set<Pair> pairsWithin(const Topology& topology, const Positions& x, double bound) {
+  std::set<Pair> found;
+  const auto add = [&](PairKind kind, const std::array<Index, 4>& v) {
+    for (int i = 0; i < 4; ++i) {
+      for (int j = i + 1; j < 4; ++j) {
+        if (v[i] == v[j]) return;
+      }
+    }
+    PairMotion pair;
+    for (auto& time : pair.x) {
+      for (int i = 0; i < 4; ++i) std::copy_n(x[v[i]].data(), 3, time[i]);
+    }
+    if (isWithin(kind, pair, 0, bound)) found.insert({kind, v});
+  };
+  for (const Index v : topology.usedVertices()) {
+    for (const Face& f : topology.faces()) add(PairKind::VERTEX_FACE, {v, f[0], f[1], f[2]});
+  }
+  for (std::size_t a = 0; a < topology.edges().size(); ++a) {
+    for (std::size_t b = a + 1; b < topology.edges().size(); ++b) {
+      const Edge &e = topology.edges()[a], &f = topology.edges()[b];
+      add(PairKind::EDGE_EDGE, {e[0], e[1], f[0], f[1]});
+    }
+  }
+  return found;
+}
+
+TEST(LeftOut, IsExactlyWhatIsCloserInTheReferenceFrame) {
+  const Layers layers;
+  const Positions apart = layers.at(0.03);
+  Detector detector(conservative());
+  detector.setBodies({felt(layers, &apart)}, {&apart});
+  std::set<Pair> listed;
+  for (const LeftOutPair& pair : detector.leftOut()) {
+    EXPECT_EQ(pair.body, 0u);
+    EXPECT_TRUE(listed.insert({pair.kind, pair.vertex}).second) << "listed twice";
+  }
+  const std::set<Pair> sure = pairsWithin(*layers.topology, apart, SEPARATION_M);
+  const std::set<Pair> possible = pairsWithin(*layers.topology, apart, SEPARATION_M + 1e-6);
+  EXPECT_GT(sure.size(), 100u);
+  for (const Pair& pair : sure) EXPECT_TRUE(listed.count(pair));
+  for (const Pair& pair : listed) EXPECT_TRUE(possible.count(pair));
+
+  const StepResult rest = run(detector, apart, apart);
+  EXPECT_TRUE(rest.contacts.empty()) << "neighbours are no contacts";
+  EXPECT_EQ(rest.stats.left_out_listed, listed.size());
+  EXPECT_GT(rest.stats.left_out_met, 0u);
+  EXPECT_EQ(rest.stats[Effect::MINIMUM_SEPARATION].out, 0u);
+
+  Detector without(conservative());
+  without.setBodies({felt(layers, nullptr)}, {&apart});
+  EXPECT_EQ(run(without, apart, apart).contacts.size(), listed.size()) << "else they would all be contacts";
+  EXPECT_TRUE(without.leftOut().empty());
+}
+
+TEST(LeftOut, LayersThatComeNearAreFoundAllTheSame) {
+  const Layers layers;
+  const Positions apart = layers.at(0.03), near = layers.at(0.01);
+  Detector detector(conservative());
+  detector.setBodies({felt(layers, &apart)}, {&apart});
+  const StepResult result = run(detector, apart, near);
+  ASSERT_FALSE(result.contacts.empty());
+  for (const core::Contact& c : result.contacts) {
+    const bool first_below = c.vertex[0] < SIZE * SIZE, last_below = c.vertex[3] < SIZE * SIZE;
+    EXPECT_NE(first_below, last_below) << "between the layers only";
+  }
+  EXPECT_NEAR(result.earliestToc(), (0.03 - SEPARATION_M) / 0.02, 1e-3);
+  EXPECT_GT(result.stats[Effect::MINIMUM_SEPARATION].out, 0u);
+  EXPECT_GT(result.stats[Effect::MINIMUM_SEPARATION].in, result.stats[Effect::MINIMUM_SEPARATION].out);
+}
+
+// Left out of the separation only: that its features truly meet is found without one.
+TEST(LeftOut, TrueContactIsNotLost) {
+  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
+  const Positions apart{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 0.1}, {0.25, 0.25, 1}, {0.5, 0.25, 1}};
+  Positions through = apart;
+  through[3].z() = -0.1;
+  BodySetup body;
+  body.name = "pair";
+  body.topology = topology;
+  body.minimum_separation_m = 0.2;
+  body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{apart, {}});
+  Detector detector(conservative());
+  detector.setBodies({body}, {&apart});
+  EXPECT_GT(detector.leftOut().size(), 0u);
+  EXPECT_TRUE(run(detector, apart, apart).contacts.empty());
+  const StepResult result = run(detector, apart, through);
+  ASSERT_FALSE(result.contacts.empty());
+  EXPECT_LE(result.earliestToc(), 0.5);
+  EXPECT_NEAR(result.earliestToc(), 0.5, 1e-4);
+}
+
+TEST(LeftOut, SeparationsOfPairsReplaceTheBodies) {
+  const Layers layers;
+  const Positions apart = layers.at(0.03), near = layers.at(0.01);
+  BodySetup body = felt(layers, &apart);
+  body.separations = {{0, 0.0}};  // from itself: none
+  Detector detector(conservative());
+  detector.setBodies({body}, {&apart});
+  EXPECT_TRUE(detector.leftOut().empty());
+  EXPECT_TRUE(run(detector, apart, near).contacts.empty());
+  const Positions other = layers.at(5);
+  BodySetup second = felt(layers, nullptr);
+  second.separations = {{0, 6.0}};
+  second.self_collision = body.self_collision = false;
+  detector.setBodies({body, second}, {&apart, &other});
+  MotionStep step;
+  step.bodies = {{&apart, &apart}, {&other, &other}};
+  EXPECT_FALSE(detector.run(step).contacts.empty()) << "5 m apart, 6 m asked for by the other body";
+  second.separations = {{7, 1.0}};
+  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  second.separations = {{0, -1.0}};
+  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  second.separations = {{0, std::numeric_limits<double>::quiet_NaN()}};
+  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+}
+
+TEST(LeftOut, TheMonitorsReferenceIsTheFirstFrame) {
+  const Layers layers;
+  MonitorOptions options;
+  options.detector = conservative();
+  options.look_ahead_s = 0.1;
+  MonitorBody body;
+  body.name = "felt";
+  body.minimum_separation_m = SEPARATION_M;
+  Monitor monitor(options, {body});
+  StampNs stamp_ns = 0;
+  const auto feed = [&](double gap) {
+    monitor.push(0, {stamp_ns += 100000000, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity()}, 0);
+    StepOutcome outcome;
+    EXPECT_TRUE(monitor.next(0, outcome));
+    return outcome;
+  };
+  feed(0.03);
+  EXPECT_TRUE(feed(0.03).contacts.empty());
+  const std::size_t neighbours = monitor.leftOut().size();
+  EXPECT_GT(neighbours, 100u);
+  EXPECT_TRUE(monitor.checkNow().contacts.empty());
+  EXPECT_TRUE(monitor.predict().contacts.empty()) << "predictions leave out the same";
+  EXPECT_FALSE(feed(0.01).contacts.empty());
+  EXPECT_FALSE(feed(0.01).contacts.empty()) << "and stay contacts";
+  monitor.reset(StepStatus::TIME_JUMP);
+  feed(0.01);
+  EXPECT_FALSE(feed(0.01).contacts.empty()) << "the reference stays with the topology";
+  EXPECT_EQ(monitor.leftOut().size(), neighbours);
+  monitor.reset(StepStatus::RESET);
+  feed(0.01);
+  EXPECT_TRUE(feed(0.01).contacts.empty()) << "after ~reset the body is fit as it is";
+  EXPECT_GT(monitor.leftOut().size(), neighbours);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd

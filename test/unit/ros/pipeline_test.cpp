@@ -1,0 +1,273 @@
+// The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and files.
+#include "ros/monitor_pipeline.h"
+
+#include <gtest/gtest.h>
+#include <octomap/OcTree.h>
+#include <octomap_msgs/Octomap.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "ros/effects.h"
+#include "ros/map_loader.h"
+
+namespace deformable_ccd {
+namespace {
+
+using XmlRpc::XmlRpcValue;
+
+template <typename Message>
+std::vector<std::uint8_t> bytesOf(const Message& message) {
+  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, message);
+  return bytes;
+}
+
+/// 2 x 2 points, 0.1 m apart, first corner at (0.15, 0.15, z); the field sigma where wanted.
+std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float>& sigma = {}) {
+  sensor_msgs::PointCloud2 out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = "world";
+  out.height = out.width = 2;
+  for (const char* name : {"x", "y", "z", "sigma"}) {
+    if (sigma.empty() && std::string(name) == "sigma") continue;
+    sensor_msgs::PointField field;
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    out.fields.push_back(field);
+  }
+  out.point_step = 16;
+  out.row_step = 32;
+  out.data.resize(64);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const float p[4] = {0.15f + 0.1f * static_cast<float>(i % 2), 0.15f + 0.1f * static_cast<float>(i / 2), z,
+                        sigma.empty() ? 0 : sigma[i]};
+    std::memcpy(out.data.data() + 16 * i, p, 16);
+  }
+  return bytesOf(out);
+}
+
+/// Occupied below 0, free up to 0.2, unknown from there on; 0.1 m voxels over 0.5 m x 0.5 m.
+std::vector<std::uint8_t> map(double stamp_s) {
+  octomap_msgs::Octomap out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = "world";
+  out.binary = true;
+  out.id = "OcTree";
+  out.resolution = 0.1;
+  octomap::OcTree tree(0.1);
+  for (int x = 0; x < 5; ++x) {
+    for (int y = 0; y < 5; ++y) {
+      for (int z = -2; z < 2; ++z) tree.updateNode(0.1 * x + 0.05, 0.1 * y + 0.05, 0.1 * z + 0.05, z < 0);
+    }
+  }
+  std::ostringstream stream;
+  tree.writeBinaryData(stream);
+  const std::string bytes = stream.str();
+  out.data.assign(bytes.begin(), bytes.end());
+  return bytesOf(out);
+}
+
+struct Driven {
+  tf2::BufferCore transforms;
+  MonitorConfig config;
+  MonitorPipeline pipeline;
+  EffectTracker effects;
+  StepOutcome outcome;
+
+  explicit Driven(const XmlRpcValue& tree)
+      : config(readConfig(tree)), pipeline(config, transforms), effects(config) {}
+
+  void giveMap(double stamp_s) {
+    LoadedMap loaded = decodeMapMessage(map(stamp_s), config);
+    EXPECT_EQ(loaded.problem, "");
+    pipeline.setMap(std::move(loaded), 0);
+    effects.apply(pipeline.monitor(), true);
+  }
+  const StepOutcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {}) {
+    pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma), 0, 0});
+    EXPECT_TRUE(pipeline.next(0, outcome));
+    effects.update(outcome, pipeline.monitor());
+    return outcome;
+  }
+};
+
+XmlRpcValue scene() {
+  XmlRpcValue tree;
+  tree["fixed_frame"] = "world";
+  tree["max_vertex_step_m"] = 0.0;
+  return tree;
+}
+
+TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
+  Driven free(scene());
+  free.giveMap(1);
+  free.feed(1, 0.35f);
+  const StepOutcome& outcome = free.feed(1.1, 0.15f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_TRUE(outcome.clear) << "the unknown is no obstacle";
+  EXPECT_EQ(outcome.unknown_fraction, 0);
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 0u);
+  EXPECT_FALSE(free.effects.plan().running("unknown_space"));
+}
+
+TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  Driven report(tree);
+  report.giveMap(1);
+  report.feed(1, 0.35f);
+  // Swept: 2 x 2 columns of voxels, z from 0.1 to 0.4; the upper two of three are unknown.
+  const StepOutcome& outcome = report.feed(1.1, 0.15f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_TRUE(outcome.clear) << "reported, and no obstacle";
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 12u);
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].out, 8u);
+  EXPECT_NEAR(outcome.unknown_fraction, 2.0 / 3, 1e-12);
+  EXPECT_EQ(report.feed(1.2, 0.12f).unknown_fraction, 0) << "within what is known";
+  EXPECT_TRUE(report.effects.plan().running("unknown_space"));
+}
+
+TEST(UnknownSpace, MaskedVerticesSweepNothing) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  tree["vertex_mask"][0] = 0;  // of the two triangles of the grid one is left, or none
+  Driven masked(tree);
+  masked.giveMap(1);
+  masked.feed(1, 0.35f);
+  const std::uint64_t some = masked.feed(1.1, 0.15f).stats[Effect::UNKNOWN_SPACE].in;
+  EXPECT_LE(some, 12u);
+  for (int v = 0; v < 4; ++v) tree["vertex_mask"][v] = v;
+  Driven all(tree);
+  all.giveMap(1);
+  all.feed(1, 0.35f);
+  EXPECT_EQ(all.feed(1.1, 0.15f).stats[Effect::UNKNOWN_SPACE].in, 0u);
+  EXPECT_EQ(all.outcome.unknown_fraction, 0);
+}
+
+TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "occupied";
+  const double box[6] = {0, 0, 0, 0.5, 0.5, 0.6};
+  for (int i = 0; i < 6; ++i) tree["unknown_box"][i] = box[i];
+  Driven occupied(tree);
+  occupied.giveMap(1);
+  occupied.feed(1, 0.12f);
+  const StepOutcome& outcome = occupied.feed(1.1, 0.28f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  ASSERT_FALSE(outcome.contacts.empty()) << "from the known into the unknown";
+  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-4);
+}
+
+TEST(UnknownSpace, AnOldMapIsNoMap) {
+  XmlRpcValue tree = scene();
+  tree["octomap_timeout_s"] = 1.0;
+  tree["unknown_space"] = "report";
+  Driven old(tree);
+  old.giveMap(1);
+  old.feed(1.8, 0.12f);
+  EXPECT_EQ(old.feed(1.9, 0.13f).status, StepStatus::OK);
+  const StepOutcome& late = old.feed(2.1, 0.14f);
+  EXPECT_EQ(late.status, StepStatus::NO_MAP);
+  EXPECT_NE(late.reason.find("octomap_timeout_s"), std::string::npos) << late.reason;
+  EXPECT_EQ(late.unknown_fraction, 0) << "of no map nothing is unknown";
+}
+
+TEST(TrackerNoise, ComesFromThePointField) {
+  XmlRpcValue tree = scene();
+  tree["uncertainty"]["field"] = "sigma";
+  tree["uncertainty"]["scale"] = 3.0;
+  Driven noisy(tree);
+  noisy.giveMap(1);
+  EXPECT_TRUE(noisy.effects.plan().running("tracker_noise"));
+  noisy.feed(1, 0.17f, {0, 0, 0, 0});
+  EXPECT_TRUE(noisy.feed(1.1, 0.15f, {0, 0, 0, 0}).clear) << "15 cm above the map";
+  // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
+  const StepOutcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
+  ASSERT_FALSE(outcome.contacts.empty());
+  for (const core::Contact& c : outcome.contacts) {
+    EXPECT_TRUE(std::count(c.vertex.begin(), c.vertex.end(), 2u)) << "feature without the uncertain vertex";
+  }
+  EXPECT_LE(outcome.earliest_toc, 0.6 + 1e-6);
+  EXPECT_NEAR(outcome.earliest_toc, 0.6, 1e-3);
+  EXPECT_GT(outcome.stats[Effect::TRACKER_NOISE].out, 0u);
+  for (const core::Contact& c : outcome.contacts) {
+    EXPECT_EQ(c.body[1], OBSTACLE_BODY) << "neighbours on the mesh are no contacts, however uncertain";
+  }
+  EXPECT_GT(noisy.pipeline.monitor().leftOut().size(), 0u);
+  EXPECT_TRUE(noisy.feed(1.3, 0.13f, {0, 0, 0, 0}).answered);
+  EXPECT_TRUE(noisy.feed(1.4, 0.13f, {0, 0, 0, 0}).clear) << "as soon as the tracker is sure again";
+}
+
+TEST(TrackerNoise, BadFieldsAreRefusedByNameAndValue) {
+  XmlRpcValue tree = scene();
+  tree["uncertainty"]["field"] = "sigma";
+  Driven noisy(tree);
+  EXPECT_EQ(noisy.feed(1, 0.2f).status, StepStatus::BAD_MESSAGE);
+  EXPECT_NE(noisy.outcome.reason.find("'sigma'"), std::string::npos) << noisy.outcome.reason;
+  EXPECT_EQ(noisy.feed(1.1, 0.2f, {0, -1, 0, 0}).status, StepStatus::BAD_MESSAGE);
+  EXPECT_NE(noisy.outcome.reason.find("of point 1 is -1"), std::string::npos) << noisy.outcome.reason;
+  EXPECT_EQ(noisy.feed(1.2, 0.2f, {0, 0, NAN, 0}).status, StepStatus::BAD_MESSAGE);
+  EXPECT_EQ(noisy.feed(1.3, 0.2f, {0, 0, 0, 0}).status, StepStatus::FIRST_FRAME) << "and nothing is lost";
+}
+
+TEST(TrackerNoise, ANumberHoldsForAllVertices) {
+  XmlRpcValue tree = scene();
+  tree["uncertainty"]["radius_m"] = 0.12;
+  Driven noisy(tree);
+  noisy.giveMap(1);
+  noisy.feed(1, 0.17f);
+  EXPECT_NEAR(noisy.feed(1.1, 0.07f).earliest_toc, 0.5, 1e-3);
+}
+
+std::string errorOf(const XmlRpcValue& tree) {
+  tf2::BufferCore transforms;
+  try {
+    MonitorPipeline pipeline(readConfig(tree), transforms);
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
+  const std::string text_file = ::testing::TempDir() + "no_mesh.stl", ply = ::testing::TempDir() + "square.ply";
+  std::ofstream(text_file) << "this is no mesh\n";
+  std::ofstream(ply) << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                        "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+                        "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n";
+  const auto rigid = [](const std::string& file) {
+    XmlRpcValue tree;
+    tree["bodies"]["cloth"]["topic"] = "cloth";
+    tree["bodies"]["finger"]["rigid"]["mesh"] = file;
+    tree["bodies"]["finger"]["rigid"]["frame"] = "finger";
+    return tree;
+  };
+  const auto names = [](const std::string& error, const std::string& part) {
+    EXPECT_NE(error.find(part), std::string::npos) << part << ": " << error;
+  };
+  for (const std::string file : {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
+    const std::string error = errorOf(rigid(file));
+    names(error, "rigid/mesh of body 'finger'");
+    names(error, file);
+    names(error, "write the path of an STL, OBJ or PLY mesh");
+  }
+  EXPECT_EQ(errorOf(rigid(ply)), "");
+  XmlRpcValue topology;
+  topology["topology"]["file"] = "missing.ply";
+  names(errorOf(topology), "topology/file of body 'mesh': missing.ply");
+  topology["topology"]["file"] = ply;
+  EXPECT_EQ(errorOf(topology), "");
+  topology["topology"]["rows"] = 2;
+  topology["topology"]["cols"] = 3;
+  names(errorOf(topology), "topology/rows of body 'mesh': 2 x 3 = 6, but " + ply + " has 4 points");
+}
+
+}  // namespace
+}  // namespace deformable_ccd
