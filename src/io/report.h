@@ -11,6 +11,7 @@
 
 #include "deformable_ccd/effect_plan.h"
 #include "deformable_ccd/monitor.h"
+#include "io/latency_histogram.h"
 
 namespace deformable_ccd {
 
@@ -84,6 +85,7 @@ class Report {
   std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effect_sum_{};
   TierCounters tiers_;
   std::vector<double> total_ms_;
+  LatencyHistogram step_times_;
   EffectPlan plan_;
   std::vector<RungCost> rungs_;
   std::vector<std::pair<std::string, std::string>> facts_;

@@ -338,9 +338,10 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
-  StatsContext context = statsContext();
+  outputs.publishResult(outcome, bodies, frame);
+  StatsContext context = statsContext();  // its latency ends here
   context.unknown_fraction = pipeline.unknownFraction(outcome);
-  outputs.publish(outcome, bodies, context, config.markers, frame);
+  outputs.publishDetails(outcome, bodies, context, config.markers, frame);
   diagnostics.add(outcome, context);
   if (effects.update(outcome)) {
     outputs.publishEffects(effects.message(toRosTime(outcome.stamp_ns), frame));

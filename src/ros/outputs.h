@@ -18,8 +18,11 @@ class Outputs {
  public:
   Outputs(ros::NodeHandle& private_node, bool look_ahead);
 
-  void publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, StatsContext context,
-               const MarkerConfig& markers, const std::string& frame);
+  /// What a robot waits for, before all else: clear, first contact, contacts.
+  void publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
+  /// Markers and statistics.
+  void publishDetails(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, StatsContext context,
+                      const MarkerConfig& markers, const std::string& frame);
   /// Whether anybody listens to predictions.
   bool wantsPrediction() const;
   void publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
