@@ -2,7 +2,6 @@
 
 #include <pcl/PolygonMesh.h>
 #include <pcl/console/print.h>
-#include <pcl/io/obj_io.h>
 #include <pcl/io/ply_io.h>
 
 #include <algorithm>
@@ -10,6 +9,8 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+
+#include "ros/obj_file.h"
 
 namespace deformable_ccd {
 namespace {
@@ -85,13 +86,14 @@ MeshFile loadMeshFile(const std::string& path) {
   if (type != "ply" && type != "obj") {
     throw MeshFileError(path + ": unknown mesh format '" + type + "'; .ply and .obj can be read");
   }
-  if (type == "ply") checkClaims(path);
+  if (type == "obj") return loadObjFile(path);
+  checkClaims(path);
   try {
-    result = type == "ply" ? pcl::io::loadPLYFile(path, mesh) : pcl::io::loadOBJFile(path, mesh);
+    result = pcl::io::loadPLYFile(path, mesh);
   } catch (const std::exception& error) {
-    throw MeshFileError(path + ": not a readable ." + type + " mesh: " + error.what());
+    throw MeshFileError(path + ": not a readable .ply mesh: " + error.what());
   }
-  if (result < 0) throw MeshFileError(path + ": not a readable ." + type + " mesh");
+  if (result < 0) throw MeshFileError(path + ": not a readable .ply mesh");
   MeshFile file;
   file.positions = positionsOf(mesh.cloud, path);
   for (std::size_t i = 0; i < mesh.polygons.size(); ++i) {
