@@ -169,3 +169,46 @@ def write_effects(folder, result):
                 "rounds of the whole recording. The rope had %.1f pairs with itself, %.1f with the map and %.1f contacts a "
                 "step.\n\n" % (rope["self_pairs_a_step"], rope["map_pairs_a_step"], rope["contacts_a_step"]) +
                 table(header, rows))
+
+
+def write_latency(folder, result):
+    """Table, histogram and page of benchmark/latency.py."""
+    header = ["run", "frames", "answered", "dropped", "ran into the budget", "contacts (median)", "what", "median ms", "p99 ms",
+              "worst ms"]
+    rows = []
+    plt = pyplot()
+    figure, axes = plt.subplots(1, len(result["runs"]), figsize=(5 * len(result["runs"]), 3.2))
+    for r, axis in zip(result["runs"], axes):
+        name = r["name"].replace("_", " ") + (" of %.2f ms" % r["budget_ms"] if "budget_ms" in r else "")
+        for key in ("step_ms", "latency_ms", "round_trip_ms"):
+            v = r[key]
+            rows.append([name, str(r["frames"]), str(r["answered"]), str(r["dropped"]), str(r["deadline"]),
+                         str(r["contacts_median"]), key[:-3].replace("_", " "), "%.2f" % v[len(v) // 2],
+                         "%.2f" % v[min(len(v) - 1, int(0.99 * len(v)))], "%.2f" % v[-1]])
+        low = max(1e-3, r["latency_ms"][0])
+        edges = [low * (max(r["latency_ms"][-1], 2 * low) / low) ** (i / 40) for i in range(41)]
+        axis.hist(r["latency_ms"], bins=edges, color="#3182bd")
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_title(name, fontsize=9)
+        axis.set_xlabel("message to published contacts [ms]")
+        axis.set_ylabel("frames")
+    figure.tight_layout()
+    figure.savefig(os.path.join(folder, "latency.png"), dpi=120)
+    figure.savefig(os.path.join(folder, "latency.svg"))
+    plt.close(figure)
+    write_rows(os.path.join(folder, "latency.csv"), header, rows)
+    text = "# Latency of the live node\n\n%d vertices at %g Hz; %d busy processes on %d cores.\n\n" % (
+        result["vertices"], result["rate_hz"], result["busy_processes"], result["cores"])
+    lost = [r["name"] for r in result["runs"] if not r["adds_up"] or r["received"] != r["frames"]]
+    text += "Counters add up, every frame is accounted for.\n\n" if not lost else "NOT ACCOUNTED FOR: %s\n\n" % ", ".join(lost)
+    text += table(header, rows)
+    with open(os.path.join(folder, "latency.svg")) as source:
+        picture = source.read()
+    cells = "".join("<tr>%s</tr>" % "".join("<td>%s</td>" % cell for cell in row) for row in [header] + rows)
+    with open(os.path.join(folder, "latency.html"), "w") as page:
+        page.write("<!doctype html><meta charset='utf-8'><title>Latency</title><h1>Latency of the live node</h1><p>%d vertices at "
+                   "%g Hz; %d busy processes on %d cores.</p><table border='1' cellpadding='4'>%s</table>%s" % (
+                       result["vertices"], result["rate_hz"], result["busy_processes"], result["cores"], cells,
+                       picture[picture.index("<svg"):]))
+    return save(folder, "latency", text)

@@ -9,6 +9,7 @@
 #include "detector/float_mode.h"
 #include "detector/scene_arrays.h"
 #include "detector/toc_bound.h"
+#include "detector/unfolded.h"
 #include "simd/fused_filter.h"
 
 namespace deformable_ccd {
@@ -92,6 +93,7 @@ class Tracer {
     for (Feature& f : features_) findSlot(scene, f);
     if (!traceRules(scene)) return;
     setSeparation(scene, detector.leftOut());
+    traceUnfolded(scene);
     traceLinear(t0, t1);
     traceBroadPhase(scene);
     tracePlanar(scene);
@@ -131,6 +133,15 @@ class Tracer {
     }
     say("rules", why.empty() ? Says::KEPT : Says::REJECTED, why.empty() ? "a pair that the step asks about" : why);
     return why.empty();
+  }
+
+  /// Is the whole body left out of self-collision?
+  void traceUnfolded(const SceneArrays& scene) {
+    const SceneBody& body = scene.bodies()[features_[0].body];
+    if (features_[0].body != features_[1].body || !options_.detector.unfolded_test || separation() > 0 || body.masked) return;
+    const bool unfolded = UnfoldedTest(body).run(body, scene.vertices());
+    say("unfolded", unfolded ? Says::REJECTED : Says::KEPT,
+        unfolded ? "the whole surface certainly does not fold onto itself in this step" : "the surface may fold onto itself");
   }
 
   PairMotion motion(const std::vector<Positions>& t0, const std::vector<Positions>& t1) const {

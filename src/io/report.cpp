@@ -205,6 +205,7 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   left_out_met_ += s.left_out_met;
   unknown_fraction_.push_back(o.unknown_fraction);
   total_ms_.push_back(s.total_ms);
+  step_times_.add(s.total_ms * 1e-3);
 }
 
 std::string Report::headline() const {
@@ -299,7 +300,12 @@ nlohmann::json Report::json() const {
     j["stages"].push_back({{"name", toString(static_cast<Stage>(s))}, {"in", stage_sum_[s].in}, {"out", stage_sum_[s].out},
                            {"median_ms", quantile(stage_ms_[s], 0.5)}, {"p95_ms", quantile(stage_ms_[s], 0.95)}});
   }
-  j["total"] = {{"median_ms", quantile(total_ms_, 0.5)}, {"p95_ms", quantile(total_ms_, 0.95)}, {"max_ms", quantile(total_ms_, 1)}};
+  j["total"] = {{"median_ms", quantile(total_ms_, 0.5)}, {"p95_ms", quantile(total_ms_, 0.95)}, {"p99_ms", quantile(total_ms_, 0.99)},
+                {"max_ms", quantile(total_ms_, 1)}};
+  j["histogram"] = nlohmann::json::array();
+  for (const LatencyHistogram::Bin& bin : step_times_.bins()) {
+    j["histogram"].push_back({{"upper_ms", bin.upper_s * 1e3}, {"steps", bin.count}});
+  }
   j["effects"] = effectsJson();
   j["bounds"] = {{"bodies_refitted", bodies_refitted_}, {"bodies_kept", bodies_kept_}};
   j["left_out"] = {{"pairs", left_out_}, {"met", left_out_met_}};

@@ -13,6 +13,7 @@
 #include "deformable_ccd/effect_plan.h"
 #include "deformable_ccd/look_ahead_score.h"
 #include "deformable_ccd/monitor.h"
+#include "io/latency_histogram.h"
 
 namespace deformable_ccd {
 
@@ -96,6 +97,7 @@ class Report {
   std::size_t left_out_ = 0;
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;
+  LatencyHistogram step_times_;
   EffectPlan plan_;
   std::vector<RungCost> rungs_;
   std::vector<std::pair<std::string, std::string>> facts_;

@@ -35,6 +35,7 @@ initial ones included. 0 is the beginning of the step, 1 its end.</p>
 <h2>Gaps, resets and other frames that are not OK</h2><table id="seams"></table>
 <h2>Where the time goes</h2><table id="stages"></table>
 <h2>Milliseconds per step</h2><div id="latency"></div><p class="note" id="latency_note"></p>
+<h2>Steps by milliseconds</h2><div id="histogram"></div><p class="note">Bins of equal ratio, 20 a decade.</p>
 <h2>Effects</h2><table id="effects"></table><p class="note" id="effects_note"></p>
 <h2>Look-ahead: predicted against later observed</h2><table id="look_ahead"></table>
 <p class="note">Times at which vertices first touch another body, their own, or the map. The error is that of each prediction which came
@@ -121,7 +122,14 @@ table('facts', null, R.facts);
     stroke: '#2a6fb0', 'stroke-width': 1.3 }, a.svg);
   el('line', { x1: LEFT, x2: W - RIGHT, y1: a.y(R.total.median_ms), y2: a.y(R.total.median_ms), stroke: '#f0a030' }, a.svg);
   document.getElementById('latency_note').textContent = `Median ${number(R.total.median_ms)} ms (orange line), 95 % below ` +
-    `${number(R.total.p95_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
+    `${number(R.total.p95_ms)} ms, 99 % below ${number(R.total.p99_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
+{ const H = 160, floor = H - 34, bins = R.histogram, most = Math.max(1, ...bins.map(b => b.steps));
+  const w = (W - LEFT - RIGHT) / Math.max(bins.length, 1), every = Math.ceil(bins.length / 10);
+  const svg = el('svg', { viewBox: `0 0 ${W} ${H}`, width: W, height: H }, document.getElementById('histogram'));
+  bins.forEach((b, i) => { const h = (floor - 10) * b.steps / most, upper = number(+b.upper_ms.toPrecision(3)) + ' ms';
+    const bar = el('rect', { x: LEFT + i * w, y: floor - h, width: Math.max(1, w - 1), height: h, fill: '#2a6fb0' }, svg);
+    el('title', {}, bar, `${b.steps} steps of up to ${upper}`);
+    if (i % every == 0) el('text', { x: LEFT + (i + 1) * w, y: floor + 18, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg, upper); }); }
 )PAGE";
 
 const char* const MAPS_AND_TABLES = R"PAGE(

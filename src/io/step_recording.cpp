@@ -199,6 +199,7 @@ void visitOptions(Archive& a, Options& o) {
   a.number(o.detector.step_budget_ms);
   a.flag(o.detector.earliest_only);
   a.flag(o.detector.check_start_state);
+  a.flag(o.detector.unfolded_test);
   a.size(o.max_contacts);
   a.flag(o.suppress_initial);
   a.array(o.exclude_boxes);

@@ -344,8 +344,9 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
+  outputs.publishResult(outcome, bodies, frame);
   const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
-  outputs.publish(outcome, bodies, config.markers, frame);
+  outputs.publishMarkers(outcome, bodies, config.markers, frame);
   publishEffects(outcome);
   predict(outcome);
   StatsContext context = statsContext();

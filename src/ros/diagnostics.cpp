@@ -37,6 +37,7 @@ void Diagnostics::add(const StepOutcome& outcome, const StatsContext& context) {
   ++outcomes_;
   answers_ += outcome.answered;
   worst_latency_s_ = std::max(worst_latency_s_, context.latency_s);
+  latency_.add(context.latency_s);
   status_ = outcome.status;
   reason_ = outcome.reason;
   map_present_ = outcome.obstacle != nullptr;
@@ -84,6 +85,9 @@ void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::s
   put(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
   put(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
   put(status, "worst latency [s]", worst_latency_s_);
+  put(status, "latency since start: median [s]", latency_.quantile(0.5));
+  put(status, "latency since start: p99 [s]", latency_.quantile(0.99));
+  put(status, "latency since start: worst [s]", latency_.worst());
   put(status, "frames received", context_.frames.received);
   put(status, "frames processed", context_.frames.processed());
   put(status, "frames started anew", context_.frames.started());

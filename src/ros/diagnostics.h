@@ -9,6 +9,8 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 
+#include "io/latency_histogram.h"
+
 namespace deformable_ccd {
 
 class Diagnostics {
@@ -30,6 +32,7 @@ class Diagnostics {
   std::uint64_t outcomes_ = 0, answers_ = 0, dropped_before_ = 0;
   double worst_latency_s_ = 0;
   // Of the newest outcome.
+  LatencyHistogram latency_;  // since the start
   StepStatus status_ = StepStatus::FIRST_FRAME;
   std::string reason_;
   double map_age_s_ = 0;

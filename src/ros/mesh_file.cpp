@@ -2,14 +2,16 @@
 
 #include <pcl/PolygonMesh.h>
 #include <pcl/console/print.h>
-#include <pcl/io/obj_io.h>
 #include <pcl/io/ply_io.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <sstream>
+
+#include "ros/obj_file.h"
 
 namespace deformable_ccd {
 namespace {
@@ -58,21 +60,102 @@ Positions positionsOf(const pcl::PCLPointCloud2& cloud, const std::string& path)
   return positions;
 }
 
-/// PCL allocates what a PLY header claims before it reads on. An element takes a byte at least.
-void checkClaims(const std::string& path) {
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const std::uint64_t bytes = static_cast<std::uint64_t>(file.tellg());
-  file.seekg(0);
-  for (std::string line; std::getline(file, line) && line.compare(0, 10, "end_header") != 0;) {
-    std::istringstream words(line);
-    std::string word, name;
-    std::uint64_t count = 0;
-    if (!(words >> word) || word != "element") continue;
-    if (!(words >> name >> count) || count > bytes) {
-      throw MeshFileError(path + ": '" + line.substr(0, 80) + "' claims more than the file holds");
+/// PCL allocates what a PLY header claims before it reads on, and ends the program on headers of shapes that it does not
+/// expect. So a header is read here first, strictly: known words and types only, lists in faces only, no element without
+/// properties, and no more elements than the file has bytes.
+class PlyHeaderCheck {
+ public:
+  explicit PlyHeaderCheck(const std::string& path) : path_(path) {}
+
+  void run() {
+    std::ifstream file(path_, std::ios::binary | std::ios::ate);
+    bytes_ = static_cast<std::uint64_t>(file.tellg());
+    file.seekg(0);
+    std::string line;
+    bool first = true, ended = false;
+    while (!ended && std::getline(file, line)) {
+      if (!line.empty() && line.back() == '\r') line.pop_back();
+      line_ = &line;
+      if (first && line != "ply") fail("is no PLY file");
+      if (!first) ended = take(line);
+      first = false;
     }
+    if (!ended) throw MeshFileError(path_ + ": the header has no end");
   }
-}
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw MeshFileError(path_ + ": header line '" + line_->substr(0, 80) + "' " + what);
+  }
+
+  /// True at the end of the header.
+  bool take(const std::string& line) {
+    std::istringstream words(line);
+    std::string word, name, rest;
+    words >> word;
+    if (word == "comment" || word == "obj_info") return false;
+    if (word == "end_header") {
+      finishElement();
+      return true;
+    }
+    if (word == "format") {
+      if (!(words >> name) || (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian")) fail("names no format");
+      return false;
+    }
+    if (word == "property") {
+      takeProperty(words);
+    } else if (word == "element") {
+      finishElement();
+      std::uint64_t count = 0;
+      if (!(words >> name >> count)) fail("needs a name and a count");
+      if (count > bytes_) fail("claims more than the file holds");
+      in_faces_ = name == "face";
+      properties_ = lists_ = 0;
+      in_element_ = true;
+    } else {
+      fail("cannot be understood");
+    }
+    if (words >> rest) fail("holds too many words");
+    return false;
+  }
+
+  void takeProperty(std::istringstream& words) {
+    std::string type, name;
+    if (!in_element_) fail("belongs to no element");
+    words >> type;
+    if (type == "list") {
+      std::string count, item;
+      if (!in_faces_) fail("is a list outside of the faces");
+      if (!(words >> count >> item) || !isInteger(count) || !isInteger(item)) fail("is no list of indices");
+      ++lists_;
+    } else if (!isInteger(type) && !isReal(type)) {
+      fail("names no type");
+    }
+    if (!(words >> name)) fail("has no name");
+    if ((type == "list") != (name == "vertex_indices" || name == "vertex_index")) fail("is not what a mesh has");
+    ++properties_;
+  }
+
+  void finishElement() const {
+    if (in_element_ && properties_ == 0) fail("ends an element without properties");
+    if (in_element_ && in_faces_ && lists_ != 1) fail("ends faces that do not have one list of vertices");
+  }
+
+  static bool isInteger(const std::string& type) {
+    static const char* const NAMES[] = {"char", "uchar", "short", "ushort", "int", "uint",
+                                        "int8", "uint8", "int16", "uint16", "int32", "uint32"};
+    return std::find(std::begin(NAMES), std::end(NAMES), type) != std::end(NAMES);
+  }
+  static bool isReal(const std::string& type) {
+    return type == "float" || type == "double" || type == "float32" || type == "float64";
+  }
+
+  const std::string& path_;
+  const std::string* line_ = nullptr;
+  std::uint64_t bytes_ = 0;
+  std::size_t properties_ = 0, lists_ = 0;
+  bool in_element_ = false, in_faces_ = false;
+};
 
 }  // namespace
 
@@ -85,13 +168,14 @@ MeshFile loadMeshFile(const std::string& path) {
   if (type != "ply" && type != "obj") {
     throw MeshFileError(path + ": unknown mesh format '" + type + "'; .ply and .obj can be read");
   }
-  if (type == "ply") checkClaims(path);
+  if (type == "obj") return loadObjFile(path);
+  PlyHeaderCheck(path).run();
   try {
-    result = type == "ply" ? pcl::io::loadPLYFile(path, mesh) : pcl::io::loadOBJFile(path, mesh);
+    result = pcl::io::loadPLYFile(path, mesh);
   } catch (const std::exception& error) {
-    throw MeshFileError(path + ": not a readable ." + type + " mesh: " + error.what());
+    throw MeshFileError(path + ": not a readable .ply mesh: " + error.what());
   }
-  if (result < 0) throw MeshFileError(path + ": not a readable ." + type + " mesh");
+  if (result < 0) throw MeshFileError(path + ": not a readable .ply mesh");
   MeshFile file;
   file.positions = positionsOf(mesh.cloud, path);
   for (std::size_t i = 0; i < mesh.polygons.size(); ++i) {

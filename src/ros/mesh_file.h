@@ -1,4 +1,4 @@
-// Mesh files by PCL's readers: PLY (ASCII, binary of either byte order) and OBJ.
+// Mesh files: PLY by PCL's reader (ASCII, binary of either byte order), OBJ by our own (obj_file.h).
 #pragma once
 
 #include <stdexcept>

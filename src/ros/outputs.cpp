@@ -28,13 +28,17 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
   publishNotClear();
 }
 
-void Outputs::publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
-                      const std::string& frame) {
+void Outputs::publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                            const std::string& frame) {
   std_msgs::Bool clear;
   clear.data = outcome.clear;
   clear_.publish(clear);
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, frame));
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
+}
+
+void Outputs::publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
+                             const std::string& frame) {
   if (markers_.getNumSubscribers() > 0 && !frame.empty()) {
     ++markers_built_;
     markers_.publish(toMarkers(outcome, bodies, markers, frame));

@@ -18,8 +18,10 @@ class Outputs {
  public:
   Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates);
 
-  void publish(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
-               const std::string& frame);
+  /// What a robot waits for, before all else: clear, first contact, contacts.
+  void publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
+  void publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
+                      const std::string& frame);
   /// After the step's prediction, which it tells of.
   void publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame);
   /// Whether anybody listens to predictions.
