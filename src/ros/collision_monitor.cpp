@@ -44,7 +44,8 @@ constexpr double SERVICE_TIMEOUT_S = 10;
 const ros::WallDuration RENEWAL(0.05);
 
 std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 std::vector<std::uint8_t> bytesOf(const ShapeShifter& message) {
@@ -90,10 +91,16 @@ struct CollisionMonitor::Impl {
   std::thread worker;
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
-      : node(n), private_node(p), config(configOf(p)), pipeline(config, transforms),
-        recorder(config, pipeline.monitor()), outputs(private_node, config.monitor.look_ahead_s > 0),
+      : node(n),
+        private_node(p),
+        config(configOf(p)),
+        pipeline(config, transforms),
+        recorder(config, pipeline.monitor()),
+        outputs(private_node, config.monitor.look_ahead_s > 0),
         queue(config.bodies.size(), config.queue_size, config.queue_policy),
-        diagnostics(private_node.getNamespace(), node), log(node, private_node.getNamespace(), config), effects(config) {}
+        diagnostics(private_node.getNamespace(), node),
+        log(node, private_node.getNamespace(), config),
+        effects(config) {}
 
   void start();
   void stop();

@@ -92,7 +92,9 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
     MeshFrame frame{stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity()};
-    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) return false;
+    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) {
+      return false;
+    }
     transform(frame.pose, frame.positions);
     frames.emplace_back(b, std::move(frame));
   }

@@ -28,6 +28,7 @@ NOT_RUN = {
     'scripts/benchmark': 'takes half an hour of a quiet machine',
     'scripts/test': 'is what runs this test',
     'scripts/build': 'was run before this test, or there would be nothing to test',
+    'doxygen': 'doxygen_test.py does it, in a folder of its own',
     'cmake -S . -B build-core': 'the build of scripts/test --sanitize, in minutes',
     'rosbag play --rate-control-topic': "needs the reader's own bag",
 }
