@@ -11,5 +11,7 @@ set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+# Headers that differ by processor, which a native compiler finds by itself.
+set(CMAKE_CXX_FLAGS_INIT "-isystem ${AARCH64_ROOT}/usr/include/aarch64-linux-gnu")
 # Libraries of libraries, which the linker looks up by itself.
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-rpath-link,${AARCH64_ROOT}/usr/lib/aarch64-linux-gnu")

@@ -1,8 +1,8 @@
-// A client of the monitor in a page: says when an arm must stop. It publishes ~stop (std_msgs/Bool) twenty times a second;
-// connect it to whatever stops your arm, and let that stop, too, when ~stop itself falls silent.
+// A client of the monitor in a page: says when an arm must stop. It publishes ~stop (std_msgs/Bool) twenty times a
+// second; connect it to whatever stops your arm, and let that stop, too, when ~stop itself falls silent.
 //
-// Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~clear is false, and when either
-// is old: what is not known to be clear is not clear. This is no safety function; see doc/guarantees.md.
+// Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~clear is false, and when
+// either is old: what is not known to be clear is not clear. This is no safety function; see doc/guarantees.md.
 #include <algorithm>
 #include <string>
 

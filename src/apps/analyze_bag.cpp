@@ -44,7 +44,9 @@ MonitorConfig configure(const Arguments& a) {
 // The input's messages with the results between them, as the node would have published them.
 class ResultBag {
  public:
-  explicit ResultBag(const std::string& path) : bag_(path, rosbag::bagmode::Write) { bag_.setCompression(rosbag::CompressionType::LZ4); }
+  explicit ResultBag(const std::string& path) : bag_(path, rosbag::bagmode::Write) {
+    bag_.setCompression(rosbag::CompressionType::LZ4);
+  }
   void copy(const rosbag::MessageInstance& m) { bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader()); }
   void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
@@ -73,7 +75,9 @@ std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config
     one.monitor.max_contacts = std::numeric_limits<std::size_t>::max();
     if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
     logs.emplace_back();
-    BagReplay(a.bag, one, options).run([&](const StepOutcome& o, MonitorPipeline&, const ros::Time&) { logs.back().add(o); });
+    BagReplay(a.bag, one, options).run([&](const StepOutcome& o, MonitorPipeline&, const ros::Time&) {
+      logs.back().add(o);
+    });
   }
   std::vector<RungCost> rungs;
   for (std::size_t i = 0; i < names.size(); ++i) rungs.push_back(logs[i].against(logs.back(), names[i]));
@@ -119,9 +123,14 @@ int analyze(const Arguments& a) {
   std::string topics;
   for (const std::string& t : summary.mesh_topics) topics += (topics.empty() ? "" : ", ") + (t.empty() ? "(rigid)" : t);
   std::vector<std::pair<std::string, std::string>> facts{
-      {"bag", a.bag}, {"mesh topics", topics}, {"fixed frame", frame}, {"duration", std::to_string(summary.duration_s) + " s"},
-      {"mesh messages", std::to_string(summary.mesh_messages)}, {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
-      {"accuracy", toString(config.monitor.detector.accuracy.rung)}, {"threads", std::to_string(config.monitor.detector.num_threads)},
+      {"bag", a.bag},
+      {"mesh topics", topics},
+      {"fixed frame", frame},
+      {"duration", std::to_string(summary.duration_s) + " s"},
+      {"mesh messages", std::to_string(summary.mesh_messages)},
+      {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
+      {"accuracy", toString(config.monitor.detector.accuracy.rung)},
+      {"threads", std::to_string(config.monitor.detector.num_threads)},
       {"SIMD target", simdTarget()}};
   for (const std::string& c : summary.complaints) facts.push_back({"complaint", c});
   report.setFacts(std::move(facts));

@@ -29,14 +29,18 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("FRAME_1", a.frame_1, "mesh at t=1, same faces")->required();
   app.add_option("--contacts", a.contacts, "write the contacts as CSV");
   app.add_option("--stats", a.stats, "write pairs and milliseconds per stage as JSON");
-  app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact; all: one after the other, as a table")->capture_default_str();
+  app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact; all: one after the other, as a table")
+      ->capture_default_str();
   app.add_option("--tolerance", a.tolerance_m, "of conservative [m]")->capture_default_str();
-  app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")->capture_default_str();
+  app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
+      ->capture_default_str();
   app.add_option("--broad-phase", a.broad_phase, "clustered or brute_force")
       ->check(CLI::IsMember({"clustered", "brute_force"}))->capture_default_str();
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
-  app.add_option("--repeat", a.repeat, "run the step this often for the times")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--repeat", a.repeat, "run the step this often for the times")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
   app.add_flag("--start-state", a.start_state, "test the state at t=0 as well");
   app.add_flag("--earliest-only", a.earliest_only, "only the first contacts");
@@ -51,7 +55,8 @@ void writeContacts(const std::string& path, const StepResult& result) {
   for (const core::Contact& c : result.contacts) {
     out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
     for (Index v : c.vertex) out << ',' << v;
-    out << ',' << c.toc_lower << ',' << c.toc_upper << ',' << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';
+    out << ',' << c.toc_lower << ',' << c.toc_upper << ','
+        << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';
   }
   if (!out) throw std::runtime_error(path + ": cannot be written");
 }
@@ -127,12 +132,13 @@ nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const 
 
 void print(const std::string& accuracy, const Run& run, bool header) {
   if (header) {
-    std::cout << std::left << std::setw(14) << "accuracy" << std::right << std::setw(10) << "contacts" << std::setw(11) << "undecided"
-              << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11) << "median ms" << '\n';
+    std::cout << std::left << std::setw(14) << "accuracy" << std::right << std::setw(10) << "contacts" << std::setw(11)
+              << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
+              << "median ms" << '\n';
   }
   const double earliest = run.result.earliestToc();
-  std::cout << std::left << std::setw(14) << accuracy << std::right << std::setw(10) << run.result.contacts.size() << std::setw(11)
-            << run.result.stats.undecided << std::setw(14);
+  std::cout << std::left << std::setw(14) << accuracy << std::right << std::setw(10) << run.result.contacts.size()
+            << std::setw(11) << run.result.stats.undecided << std::setw(14);
   if (earliest <= 1) std::cout << earliest; else std::cout << "none";
   std::cout << std::fixed << std::setprecision(2) << std::setw(11) << run.times.at("total").best() << std::setw(11)
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
@@ -142,13 +148,15 @@ int checkStep(const Arguments& a) {
   setSimdTarget(a.simd);
   const MeshFile m0 = loadMeshFile(a.frame_0), m1 = loadMeshFile(a.frame_1);
   if (m0.positions.size() != m1.positions.size() || m0.faces != m1.faces) {
-    throw std::runtime_error(a.frame_1 + ": not the topology of " + a.frame_0 + " (" + std::to_string(m1.positions.size()) +
-                             " vertices and " + std::to_string(m1.faces.size()) + " faces, expected " +
-                             std::to_string(m0.positions.size()) + " and " + std::to_string(m0.faces.size()) + ", the same ones)");
+    throw std::runtime_error(a.frame_1 + ": not the topology of " + a.frame_0 + " (" +
+                             std::to_string(m1.positions.size()) + " vertices and " + std::to_string(m1.faces.size()) +
+                             " faces, expected " + std::to_string(m0.positions.size()) + " and " +
+                             std::to_string(m0.faces.size()) + ", the same ones)");
   }
   const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(m0.positions.size(), m0.faces));
-  const std::vector<std::string> rungs =
-      a.accuracy == "all" ? std::vector<std::string>{"screen", "fast", "conservative", "exact"} : std::vector<std::string>{a.accuracy};
+  const std::vector<std::string> rungs = a.accuracy == "all"
+                                             ? std::vector<std::string>{"screen", "fast", "conservative", "exact"}
+                                             : std::vector<std::string>{a.accuracy};
   nlohmann::json all;
   for (std::size_t i = 0; i < rungs.size(); ++i) {
     const Run run = runStep(a, rungs[i], topology, m0.positions, m1.positions);

@@ -10,7 +10,8 @@
 #include "scene/physics/scene_file.h"
 
 int main(int argc, char** argv) {
-  CLI::App app("Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf. The same seed gives the same bag.");
+  CLI::App app(
+      "Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf. The same seed gives the same bag.");
   std::string scene_path, bag_path;
   deformable_ccd::RecorderOptions options;
   app.add_option("scene", scene_path, "Scene file")->required();
@@ -21,7 +22,8 @@ int main(int argc, char** argv) {
   app.add_option("--output", options.output, "Message type of every body, instead of the scene's own")
       ->check(CLI::IsMember({"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}));
   app.add_flag("--full", options.full_octomap, "Write the octomap with log-odds instead of binary");
-  app.add_option("--monitor-config", options.monitor_config_path, "Also write the scene's parameters for the monitor here");
+  app.add_option("--monitor-config", options.monitor_config_path,
+                 "Also write the scene's parameters for the monitor here");
   app.add_flag("--quiet", options.quiet, "No progress bar");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -8,8 +8,8 @@
 
 namespace deformable_ccd {
 
-/// Each position in the plane in which the points spread most, turned so that their bounding box is smallest and lies along
-/// the page. [m], about the centroid; what is not finite lands on it.
+/// Each position in the plane in which the points spread most, turned so that their bounding box is smallest and lies
+/// along the page. [m], about the centroid; what is not finite lands on it.
 std::vector<std::array<double, 2>> flatLayout(const Positions& positions);
 
 }  // namespace deformable_ccd

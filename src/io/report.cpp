@@ -47,7 +47,8 @@ void ContactLog::add(const StepOutcome& outcome) {
   for (const core::Contact& c : outcome.contacts) {
     const Key key{std::uint64_t{static_cast<std::uint8_t>(c.kind)} << 32 | std::uint64_t{c.body[0]} << 16 | c.body[1],
                   std::uint64_t{c.vertex[0]} << 32 | c.vertex[1], std::uint64_t{c.vertex[2]} << 32 | c.vertex[3],
-                  std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z, std::uint64_t{c.leaving}};
+                  std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z,
+                  std::uint64_t{c.leaving}};
     step[key] = {c.toc_lower, c.certainty == Certainty::CERTAIN};
   }
 }
@@ -88,11 +89,13 @@ Report::Report(const std::string& folder) : folder_(folder) {
   open(contacts_, "contacts.csv");
   open(steps_, "steps.csv");
   open(timing_, "timing.csv");
-  contacts_ << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
-               "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step\n";
-  steps_ << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
-            "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,elementary_pairs,"
-            "obstacle_pairs\n";
+  contacts_
+      << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
+         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step\n";
+  steps_
+      << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
+         "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,"
+         "elementary_pairs,obstacle_pairs\n";
   timing_ << "step,total_ms";
   for (std::size_t s = 0; s < stage_ms_.size(); ++s) timing_ << ',' << toString(static_cast<Stage>(s)) << "_ms";
   timing_ << '\n';
@@ -112,11 +115,11 @@ void Report::writeContacts(const StepOutcome& outcome, const std::vector<Monitor
     } else {
       contacts_ << ",,,,";
     }
-    contacts_ << ',' << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << ',' << c.initial << ',' << c.leaving << ','
-              << c.toc_lower << ',' << c.toc_upper << ','
+    contacts_ << ',' << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << ',' << c.initial << ','
+              << c.leaving << ',' << c.toc_lower << ',' << c.toc_upper << ','
               << static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9 + c.toc_lower * outcome.duration_s() << ','
-              << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y() << ','
-              << g.normal.z() << ',' << g.approach_speed << '\n';
+              << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y()
+              << ',' << g.normal.z() << ',' << g.approach_speed << '\n';
   }
 }
 
@@ -158,10 +161,10 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
     leaving += c.leaving;
     if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
   }
-  steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ',' << csvField(o.reason) << ','
-         << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ',' << o.complete << ',' << o.total_contacts << ','
-         << undecided << ',' << initial << ',' << leaving << ',' << o.intersections.size() << ',' << s.unchecked_vertices << ','
-         << s.unchecked_faces << ',';
+  steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
+         << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ','
+         << o.complete << ',' << o.total_contacts << ',' << undecided << ',' << initial << ',' << leaving << ','
+         << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces << ',';
   if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
   steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
          << s[Stage::OBSTACLE].in << '\n';
@@ -184,10 +187,11 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
                                         [](const auto& a, const auto& b) { return a.toc_lower < b.toc_lower; });
     first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
     std::ostringstream text;
-    text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " (" << KINDS[static_cast<int>(first->kind)]
-         << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
+    text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
+         << KINDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
     for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
-    text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided") << (first->initial ? ", initial" : "") << ")";
+    text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided")
+         << (first->initial ? ", initial" : "") << ")";
     first_contact_ = text.str();
   }
   timing_ << o.sequence << ',' << s.total_ms;
@@ -212,14 +216,16 @@ std::string Report::headline() const {
   std::ostringstream text;
   text << std::fixed << std::setprecision(6);
   if (!first_contact_.empty()) {
-    text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in " << with_contact_
-         << " of " << answered_ << " answered steps";
+    text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
+         << with_contact_ << " of " << answered_ << " answered steps";
   } else if (answered_ > 0) {
     text << "No contact in " << answered_ << " answered steps";
   } else {
     text << "No answer: no step could be checked";
   }
-  if (not_answered_ > 0) text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";
+  if (not_answered_ > 0) {
+    text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";
+  }
   text << '.';
   return text.str();
 }
@@ -290,17 +296,25 @@ nlohmann::json Report::json() const {
   j["facts"] = nlohmann::json::array();
   for (const auto& [name, value] : facts_) j["facts"].push_back(nlohmann::json::array({name, value}));
   j["steps"] = rows_;
-  j["counters"] = {{"received", counters_.received}, {"processed", counters_.processed()}, {"started", counters_.started()},
-                   {"skipped", counters_.skipped()}, {"waiting", counters_.waiting()}};
+  j["counters"] = {{"received", counters_.received},
+                   {"processed", counters_.processed()},
+                   {"started", counters_.started()},
+                   {"skipped", counters_.skipped()},
+                   {"waiting", counters_.waiting()}};
   for (std::size_t s = 0; s < counters_.by_status.size(); ++s) {
     j["counters"]["by_status"][toString(static_cast<StepStatus>(s))] = counters_.by_status[s];
   }
   j["stages"] = nlohmann::json::array();
   for (std::size_t s = 0; s < stage_ms_.size(); ++s) {
-    j["stages"].push_back({{"name", toString(static_cast<Stage>(s))}, {"in", stage_sum_[s].in}, {"out", stage_sum_[s].out},
-                           {"median_ms", quantile(stage_ms_[s], 0.5)}, {"p95_ms", quantile(stage_ms_[s], 0.95)}});
+    j["stages"].push_back({{"name", toString(static_cast<Stage>(s))},
+                           {"in", stage_sum_[s].in},
+                           {"out", stage_sum_[s].out},
+                           {"median_ms", quantile(stage_ms_[s], 0.5)},
+                           {"p95_ms", quantile(stage_ms_[s], 0.95)}});
   }
-  j["total"] = {{"median_ms", quantile(total_ms_, 0.5)}, {"p95_ms", quantile(total_ms_, 0.95)}, {"p99_ms", quantile(total_ms_, 0.99)},
+  j["total"] = {{"median_ms", quantile(total_ms_, 0.5)},
+                {"p95_ms", quantile(total_ms_, 0.95)},
+                {"p99_ms", quantile(total_ms_, 0.99)},
                 {"max_ms", quantile(total_ms_, 1)}};
   j["histogram"] = nlohmann::json::array();
   for (const LatencyHistogram::Bin& bin : step_times_.bins()) {
@@ -311,7 +325,9 @@ nlohmann::json Report::json() const {
   j["left_out"] = {{"pairs", left_out_}, {"met", left_out_met_}};
   j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
-  for (std::size_t t = 0; t < tiers_.settled.size(); ++t) j["tiers"][toString(static_cast<Tier>(t))] = tiers_.settled[t];
+  for (std::size_t t = 0; t < tiers_.settled.size(); ++t) {
+    j["tiers"][toString(static_cast<Tier>(t))] = tiers_.settled[t];
+  }
   j["rungs"] = nlohmann::json::array();
   for (const RungCost& r : rungs_) {
     j["rungs"].push_back({{"rung", r.rung}, {"steps", r.steps}, {"contacts", r.contacts}, {"missed", r.missed},

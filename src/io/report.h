@@ -17,7 +17,8 @@
 
 namespace deformable_ccd {
 
-/// One rung over the whole run, for the table of what accuracy costs. Missed and false are against the run with `exact`.
+/// One rung over the whole run, for the table of what accuracy costs. Missed and false are against the run with
+/// `exact`.
 struct RungCost {
   std::string rung;
   std::size_t steps = 0, contacts = 0, missed = 0, false_contacts = 0, undecided = 0;
@@ -41,8 +42,9 @@ class ContactLog {
   std::vector<double> ms_;
 };
 
-/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv, left_out.csv (pairs
-/// that the minimum separation leaves out, where there are any), report.json and report.html. Outcomes are added in order; nothing but their summaries is kept.
+/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv, left_out.csv
+/// (pairs that the minimum separation leaves out, where there are any), report.json and report.html. Outcomes are added in
+/// order; nothing but their summaries is kept.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.

@@ -8,6 +8,7 @@
 namespace deformable_ccd {
 
 /// One sentence with the figures that decided, for what MeshStore::push said of `after`; empty for OK and FIRST_FRAME.
-std::string seamReason(StepStatus status, const MeshFrame& before, const MeshFrame& after, const MeshStoreOptions& options);
+std::string seamReason(StepStatus status, const MeshFrame& before, const MeshFrame& after,
+                       const MeshStoreOptions& options);
 
 }  // namespace deformable_ccd

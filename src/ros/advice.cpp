@@ -10,8 +10,8 @@ namespace {
 
 // A mesh that a robot handles is smaller, and one in millimetres is larger, whatever it is.
 constexpr double LARGEST_PLAUSIBLE_M = 50;
-// A grid read with rows and columns swapped has neighbours several times as far apart; a cloth that is merely crumpled or
-// sheared does not reach this.
+// A grid read with rows and columns swapped has neighbours several times as far apart; a cloth that is merely crumpled
+// or sheared does not reach this.
 constexpr double SWAPPED_RATIO = 0.6;
 
 double extentOf(const Positions& positions) {
@@ -47,7 +47,8 @@ double meanSpacing(const Positions& positions, std::size_t rows, std::size_t col
 void addSize(const DecodedMesh& mesh, std::ostringstream& text) {
   const double extent = extentOf(mesh.positions);
   if (extent <= LARGEST_PLAUSIBLE_M) return;
-  text << "the mesh is " << extent << " m across; coordinates are in metres, are these millimetres? Then scale them in the "
+  text << "the mesh is " << extent
+       << " m across; coordinates are in metres, are these millimetres? Then scale them in the "
        << "publisher (rigid bodies: rigid/scale)";
 }
 
@@ -58,8 +59,9 @@ void addSwapped(const DecodedMesh& mesh, const MeshInputConfig& config, std::ost
   const double given = meanSpacing(mesh.positions, rows, cols), swapped = meanSpacing(mesh.positions, cols, rows);
   if (!(swapped < SWAPPED_RATIO * given)) return;
   if (text.tellp() > 0) text << "; ";
-  text << "topology/rows and topology/cols look swapped: neighbours are " << given << " m apart as " << rows << " x " << cols
-       << ", but " << swapped << " m as " << cols << " x " << rows << "; set rows: " << cols << ", cols: " << rows;
+  text << "topology/rows and topology/cols look swapped: neighbours are " << given << " m apart as " << rows << " x "
+       << cols << ", but " << swapped << " m as " << cols << " x " << rows << "; set rows: " << cols
+       << ", cols: " << rows;
 }
 
 }  // namespace
@@ -69,8 +71,8 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
   if (status == StepStatus::NO_MAP && reason.compare(0, 12, "no transform") == 0) status = StepStatus::NO_TRANSFORM;
   switch (status) {
     case StepStatus::NO_TRANSFORM:
-      return "publish it on /tf or /tf_static for these stamps (see rosrun tf tf_echo), or set fixed_frame to a frame of "
-             "the same tree";
+      return "publish it on /tf or /tf_static for these stamps (see rosrun tf tf_echo), "
+             "or set fixed_frame to a frame of the same tree";
     case StepStatus::NO_MAP:
       return "see rostopic hz " + map_source + ", or do without with effects/octomap: off";
     case StepStatus::NO_BODY:
@@ -103,7 +105,8 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   addSize(mesh, text);
   addSwapped(mesh, config, text);
   if (mesh.stamp_ns == 0) {
-    text << (text.tellp() > 0 ? "; " : "") << "messages carry no stamp, so that the time of receipt stands in for it, with "
+    text << (text.tellp() > 0 ? "; " : "")
+         << "messages carry no stamp, so that the time of receipt stands in for it, with "
          << "all its jitter; set header.stamp in the publisher";
   }
   return text.str();

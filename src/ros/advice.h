@@ -11,8 +11,8 @@ namespace deformable_ccd {
 /// One clause; empty when the reason already says all. `map_source` is the octomap's resolved topic or file.
 std::string adviceFor(StepStatus status, const std::string& reason, const std::string& map_source);
 
-/// What looks like a mistake though the message is valid: a mesh too large for metres, a grid whose rows and columns are
-/// swapped, no stamp. Empty: nothing does. Linear in the number of points; meant for the first frame of a topology.
+/// What looks like a mistake though the message is valid: a mesh too large for metres, a grid whose rows and columns
+/// are swapped, no stamp. Empty: nothing does. Linear in the number of points; meant for the first frame of a topology.
 std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config);
 
 }  // namespace deformable_ccd

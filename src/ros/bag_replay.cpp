@@ -148,7 +148,10 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
     wanted += (wanted.empty() ? "" : ", ") + absolute(body.topic);
   }
   for (const std::string& t : topics) present += (present.empty() ? "" : ", ") + t;
-  if (!found) throw std::runtime_error(path_ + ": no topic " + wanted + "; the bag has " + (present.empty() ? "no messages" : present));
+  if (!found) {
+    throw std::runtime_error(path_ + ": no topic " + wanted + "; the bag has " +
+                             (present.empty() ? "no messages" : present));
+  }
 }
 
 BagReplay::~BagReplay() = default;
@@ -179,7 +182,9 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
   rosbag::View all(run.bag);
   if (all.size() == 0) return run.summary;
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
-  if (!config_.octomap_file.empty() && run.effects.mayUseMap()) run.setMap(loadMapFile(config_.octomap_file, config_), 0);
+  if (!config_.octomap_file.empty() && run.effects.mayUseMap()) {
+    run.setMap(loadMapFile(config_.octomap_file, config_), 0);
+  }
 
   rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
   ros::Time first_map;
@@ -205,7 +210,9 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
   for (const rosbag::MessageInstance& m : all) {
     at = m.getTime();
     for (; next_tf != tf_view.end() && next_tf->getTime() <= at + TF_AHEAD; ++next_tf) {
-      if (const auto tf = next_tf->instantiate<tf2_msgs::TFMessage>()) run.feed.add(*tf, next_tf->getTopic() == "/tf_static");
+      if (const auto tf = next_tf->instantiate<tf2_msgs::TFMessage>()) {
+        run.feed.add(*tf, next_tf->getTopic() == "/tf_static");
+      }
       ++run.summary.transforms;
     }
     if (messages) messages(m);

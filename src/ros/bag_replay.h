@@ -1,4 +1,5 @@
-// A bag through the monitor without a master: the same pipeline as the node's, driven by the bag's clock, nothing dropped.
+// A bag through the monitor without a master: the same pipeline as the node's, driven by the bag's clock, nothing
+// dropped.
 #pragma once
 
 #include <functional>
@@ -48,8 +49,8 @@ class BagReplay {
   /// The first topic of the bag that carries octomaps. Empty: none.
   static std::string firstMapTopic(const std::string& bag);
 
-  /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds; a map that was
-  /// recorded after the first frame (latched ones are, often) is known from the start.
+  /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds; a map that
+  /// was recorded after the first frame (latched ones are, often) is known from the start.
   BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr);
 
  private:

@@ -45,7 +45,8 @@ const ros::WallDuration RENEWAL(0.05);
 constexpr std::size_t LOOK_AHEAD_SAMPLES = 1000;  // newest comparisons that the statistics summarise
 
 std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 std::vector<std::uint8_t> bytesOf(const ShapeShifter& message) {
@@ -92,11 +93,16 @@ struct CollisionMonitor::Impl {
   std::thread worker;
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
-      : node(n), private_node(p), config(configOf(p)), pipeline(config, transforms),
+      : node(n),
+        private_node(p),
+        config(configOf(p)),
+        pipeline(config, transforms),
         recorder(config, pipeline.monitor()),
         outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
         queue(config.bodies.size(), config.queue_size, config.queue_policy),
-        diagnostics(private_node.getNamespace(), node), log(node, private_node.getNamespace(), config), effects(config),
+        diagnostics(private_node.getNamespace(), node),
+        log(node, private_node.getNamespace(), config),
+        effects(config),
         look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
 
   void start();

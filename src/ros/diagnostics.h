@@ -17,8 +17,8 @@ class Diagnostics {
  public:
   Diagnostics(const std::string& name, ros::NodeHandle& node);
   void add(const StepOutcome& outcome, const StatsContext& context);
-  /// At most once a second. `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty when
-  /// none is expected.
+  /// At most once a second. `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty
+  /// when none is expected.
   void publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic, const std::string& hint);
 
  private:

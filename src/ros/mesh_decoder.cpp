@@ -14,7 +14,9 @@ std::vector<Face> triangulated(const IndexedView& mesh, std::size_t points) {
   std::vector<Face> faces;
   const auto add = [&](Index a, Index b, Index c) {
     for (const Index v : {a, b, c}) {
-      if (v >= points) refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
+      if (v >= points) {
+        refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
+      }
     }
     if (a != b && b != c && a != c) faces.push_back({a, b, c});  // one without area touches nothing of its own
   };
@@ -94,7 +96,8 @@ DecodedMesh MeshDecoder::guarded(const std::string& datatype, Read read) {
   const auto& types = meshTypes();
   const auto type = std::find_if(types.begin(), types.end(), [&](const MeshType& t) { return datatype == t.datatype; });
   if (type == types.end()) {
-    refuse("type " + datatype + " is not a mesh; accepted are MeshStamped, PointCloud2, PolygonMesh, Marker, MarkerArray, "
+    refuse("type " + datatype +
+           " is not a mesh; accepted are MeshStamped, PointCloud2, PolygonMesh, Marker, MarkerArray, "
            "shape_msgs/Mesh");
   }
   if (config_.type != "auto" && config_.type != type->name) {
@@ -191,7 +194,8 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
     mismatch("topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
              std::to_string(rows * cols));
   }
-  if (!topology_ || last_faces_.size() != 1 || last_faces_[0] != Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}) {
+  if (!topology_ || last_faces_.size() != 1 ||
+      last_faces_[0] != Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}) {
     topology_ = std::make_shared<const Topology>(Topology::grid(rows, cols));
     last_faces_ = {Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}};  // stands for the grid's shape
   }
@@ -240,7 +244,8 @@ DecodedMesh MeshDecoder::decodeIndexed(const IndexedView& view) {
     // A publisher may send the triangles once and vertices ever after.
     if (!topology_) refuse("the message has no triangles and no topology is known yet");
     if (topology_->vertexCount() != count) {
-      throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) + " vertices without triangles, but the last topology has " +
+      throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) +
+                                                    " vertices without triangles, but the last topology has " +
                                                     std::to_string(topology_->vertexCount()));
     }
     mesh.topology = topology_;

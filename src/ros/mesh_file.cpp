@@ -48,14 +48,17 @@ Positions positionsOf(const pcl::PCLPointCloud2& cloud, const std::string& path)
       throw MeshFileError(path + ": vertex property '" + name + "' is neither float nor double");
     }
     const std::size_t size = type == pcl::PCLPointField::FLOAT64 ? 8 : 4;
-    if (fields[axis]->offset + size > cloud.point_step) throw MeshFileError(path + ": the vertex layout is inconsistent");
+    if (fields[axis]->offset + size > cloud.point_step) {
+      throw MeshFileError(path + ": the vertex layout is inconsistent");
+    }
   }
   const std::size_t n = std::size_t{cloud.width} * cloud.height;
   if (n == 0) throw MeshFileError(path + ": no vertices");
   if (cloud.data.size() < n * cloud.point_step) throw MeshFileError(path + ": fewer vertices than the header says");
   Positions positions(n);
   for (std::size_t i = 0; i < n; ++i) {
-    positions[i] = {coordinate(cloud, *fields[0], i), coordinate(cloud, *fields[1], i), coordinate(cloud, *fields[2], i)};
+    positions[i] = {coordinate(cloud, *fields[0], i), coordinate(cloud, *fields[1], i),
+                    coordinate(cloud, *fields[2], i)};
   }
   return positions;
 }
@@ -187,7 +190,8 @@ MeshFile loadMeshFile(const std::string& path) {
       }
     }
     for (std::size_t k = 2; k < corners.size(); ++k) {
-      file.faces.push_back({static_cast<Index>(corners[0]), static_cast<Index>(corners[k - 1]), static_cast<Index>(corners[k])});
+      file.faces.push_back(
+          {static_cast<Index>(corners[0]), static_cast<Index>(corners[k - 1]), static_cast<Index>(corners[k])});
     }
   }
   return file;

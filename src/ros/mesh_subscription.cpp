@@ -70,9 +70,9 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
   callback_(message);
 }
 
-/// What is handed over comes at once, and overtakes the bytes of messages before it that are still on their way; until the
-/// first subscription is closed, every message comes both ways. So the first objects are held back until the bytes have
-/// caught up with them.
+/// What is handed over comes at once, and overtakes the bytes of messages before it that are still on their way; until
+/// the first subscription is closed, every message comes both ways. So the first objects are held back until the bytes
+/// have caught up with them.
 void MeshSubscription::onTyped(TypedMesh message) {
   if (!any_) return callback_(std::move(message));
   if (held_.empty() && last_bytes_ && isSame(*last_bytes_, message)) return closeAny();  // came as bytes already

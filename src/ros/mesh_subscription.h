@@ -19,10 +19,11 @@ namespace deformable_ccd {
 /// Bytes from another process, or the object itself from a publisher in this one.
 using MeshMessage = std::variant<topic_tools::ShapeShifter::ConstPtr, TypedMesh>;
 
-/// A subscription that is open to any type until the first message. When that comes from a publisher in the same process (a
-/// nodelet beside this one), it subscribes anew with the concrete type, so that the messages after it come without being
-/// serialised; none is lost or doubled on the way. Messages of other processes stay bytes, which are checked in place before
-/// anything is allocated for them. Its calls and callbacks belong to the one thread that serves the handle's callback queue.
+/// A subscription that is open to any type until the first message. When that comes from a publisher in the same
+/// process (a nodelet beside this one), it subscribes anew with the concrete type, so that the messages after it come
+/// without being serialised; none is lost or doubled on the way. Messages of other processes stay bytes, which are
+/// checked in place before anything is allocated for them. Its calls and callbacks belong to the one thread that serves
+/// the handle's callback queue.
 class MeshSubscription {
  public:
   using Callback = std::function<void(MeshMessage)>;
@@ -32,8 +33,8 @@ class MeshSubscription {
   MeshSubscription(const MeshSubscription&) = delete;
   MeshSubscription& operator=(const MeshSubscription&) = delete;
 
-  /// A subscription takes on the type of its first publisher for good. When the last publisher is gone, this one opens to
-  /// any type again. To be called now and then.
+  /// A subscription takes on the type of its first publisher for good. When the last publisher is gone, this one opens
+  /// to any type again. To be called now and then.
   void renew();
   /// As of the last renew(). From any thread.
   std::uint32_t getNumPublishers() const { return publishers_; }

@@ -14,7 +14,8 @@ namespace {
 constexpr std::int64_t PATIENCE_NS = 3000000000;
 
 std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 }  // namespace
@@ -35,9 +36,15 @@ void MonitorLog::complain(std::size_t body, const std::string& kind, const std::
 void MonitorLog::tell(const StepOutcome& outcome) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
   const std::string advice = adviceFor(outcome.status, outcome.reason, mapSource());
-  complain(config_.monitor.clock_body, toString(outcome.status),
-           toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
-               (advice.empty() ? "" : "; " + advice));
+  const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
+                           (advice.empty() ? "" : "; " + advice);
+  if (outcome.status != StepStatus::TIME_JUMP) {
+    return complain(config_.monitor.clock_body, toString(outcome.status), text);
+  }
+  // A replay that loops is no reason to warn.
+  const std::string topic = topicOf(config_.monitor.clock_body);
+  const std::string line = throttle_.line(topic + " TIME_JUMP", topic + ": " + text, steadyNs());
+  if (!line.empty()) ROS_INFO_STREAM(line);
 }
 
 bool MonitorLog::isSilenceDue(std::int64_t now_ns) {

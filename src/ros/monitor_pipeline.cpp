@@ -136,9 +136,11 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    MeshFrame frame{stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity(),
-                    rigid_[b]->radius_m};
-    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) return false;
+    MeshFrame frame{
+        stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
+    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) {
+      return false;
+    }
     transform(frame.pose, frame.positions);
     frames.emplace_back(b, std::move(frame));
   }

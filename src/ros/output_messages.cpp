@@ -160,7 +160,8 @@ ros::Time toRosTime(StampNs stamp_ns) {
   return time;
 }
 
-ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame) {
+ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                            const std::string& frame) {
   ContactArray out;
   out.header = header(outcome.stamp_ns, frame);
   out.start = toRosTime(outcome.start_ns);

@@ -95,10 +95,13 @@ double ParameterReader::number(const std::string& name, double fallback, double 
 int ParameterReader::integer(const std::string& name, int fallback, int min, int max) {
   XmlRpcValue value = raw(name);
   if (!value.valid()) return fallback;
-  if (value.getType() != XmlRpcValue::TypeInt) fail(name, std::string("is ") + typeName(value) + ", an integer is needed");
+  if (value.getType() != XmlRpcValue::TypeInt) {
+    fail(name, std::string("is ") + typeName(value) + ", an integer is needed");
+  }
   const int result = static_cast<int>(value);
   if (result < min || result > max) {
-    fail(name, "is " + std::to_string(result) + ", it must be from " + std::to_string(min) + " to " + std::to_string(max));
+    fail(name,
+         "is " + std::to_string(result) + ", it must be from " + std::to_string(min) + " to " + std::to_string(max));
   }
   return result;
 }
@@ -106,14 +109,18 @@ int ParameterReader::integer(const std::string& name, int fallback, int min, int
 bool ParameterReader::get(const std::string& name, bool fallback) {
   XmlRpcValue value = raw(name);
   if (!value.valid()) return fallback;
-  if (value.getType() != XmlRpcValue::TypeBoolean) fail(name, std::string("is ") + typeName(value) + ", true or false is needed");
+  if (value.getType() != XmlRpcValue::TypeBoolean) {
+    fail(name, std::string("is ") + typeName(value) + ", true or false is needed");
+  }
   return static_cast<bool>(value);
 }
 
 std::string ParameterReader::get(const std::string& name, const std::string& fallback) {
   XmlRpcValue value = raw(name);
   if (!value.valid()) return fallback;
-  if (value.getType() != XmlRpcValue::TypeString) fail(name, std::string("is ") + typeName(value) + ", a string is needed");
+  if (value.getType() != XmlRpcValue::TypeString) {
+    fail(name, std::string("is ") + typeName(value) + ", a string is needed");
+  }
   return static_cast<std::string>(value);
 }
 
@@ -148,7 +155,9 @@ std::vector<XmlRpcValue> ParameterReader::list(const std::string& name) {
   XmlRpcValue value = raw(name);
   std::vector<XmlRpcValue> items;
   if (!value.valid()) return items;
-  if (value.getType() != XmlRpcValue::TypeArray) fail(name, std::string("is ") + typeName(value) + ", a list is needed");
+  if (value.getType() != XmlRpcValue::TypeArray) {
+    fail(name, std::string("is ") + typeName(value) + ", a list is needed");
+  }
   for (int i = 0; i < value.size(); ++i) items.push_back(value[i]);
   return items;
 }

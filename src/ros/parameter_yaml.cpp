@@ -39,7 +39,9 @@ XmlRpcValue value(const YAML::Node& node) {
 XmlRpcValue readYaml(const std::string& file) {
   try {
     const YAML::Node root = YAML::LoadFile(file);
-    if (root.IsDefined() && !root.IsNull() && !root.IsMap()) throw ParameterError(file + ": parameters must be a map of names");
+    if (root.IsDefined() && !root.IsNull() && !root.IsMap()) {
+      throw ParameterError(file + ": parameters must be a map of names");
+    }
     return value(root);
   } catch (const YAML::BadFile&) {
     throw ParameterError(file + " cannot be read");

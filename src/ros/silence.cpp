@@ -42,7 +42,8 @@ std::string meshTopics() {
 
 std::string silenceHint(const std::vector<AwaitedTopic>& silent) {
   if (ros::Time::isSimTime() && ros::Time::now().isZero()) {
-    return "/use_sim_time is set, but nobody publishes /clock; play the bag with --clock, or rosparam set use_sim_time false";
+    return "/use_sim_time is set, but nobody publishes /clock; play the bag with --clock, or rosparam set use_sim_time "
+           "false";
   }
   std::string text;
   bool unpublished = false;

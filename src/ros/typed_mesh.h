@@ -1,4 +1,5 @@
-// Mesh messages as the objects that a publisher in the same process hands over: nothing was serialised, nothing is copied.
+// Mesh messages as the objects that a publisher in the same process hands over: nothing was serialised, nothing is
+// copied.
 #pragma once
 
 #include <string>
@@ -16,9 +17,9 @@
 namespace deformable_ccd {
 
 /// One for each of meshTypes(). The publisher must not write to what it has published, as for every message of roscpp.
-using TypedMesh = std::variant<MeshStamped::ConstPtr, sensor_msgs::PointCloud2::ConstPtr, pcl_msgs::PolygonMesh::ConstPtr,
-                               visualization_msgs::Marker::ConstPtr, visualization_msgs::MarkerArray::ConstPtr,
-                               shape_msgs::Mesh::ConstPtr>;
+using TypedMesh = std::variant<MeshStamped::ConstPtr, sensor_msgs::PointCloud2::ConstPtr,
+                               pcl_msgs::PolygonMesh::ConstPtr, visualization_msgs::Marker::ConstPtr,
+                               visualization_msgs::MarkerArray::ConstPtr, shape_msgs::Mesh::ConstPtr>;
 
 /// As the ROS name, for example "sensor_msgs/PointCloud2".
 std::string datatypeOf(const TypedMesh& mesh);

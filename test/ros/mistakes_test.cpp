@@ -21,8 +21,8 @@ class Mistake : public ::testing::Test {
   Probe<rosgraph_msgs::Log> log{node, "/rosout"};
   Probe<diagnostic_msgs::DiagnosticArray> diagnostics{node, "/diagnostics"};
 
-  /// Publishes again and again, as a tracker does, until the monitor has said `what` and `advice` in one line of the log and
-  /// in its diagnostics.
+  /// Publishes again and again, as a tracker does, until the monitor has said `what` and `advice` in one line of the
+  /// log and in its diagnostics.
   void expectTold(const std::string& name, const std::string& what, const std::string& advice,
                   const std::function<void()>& publish) {
     std::string logged, diagnosed;
@@ -86,7 +86,8 @@ TEST_F(Mistake, NoTransform) {
 
 TEST_F(Mistake, WrongTopicType) {
   const auto publisher = advertiseAndWait<std_msgs::Bool>(node, "/wrong_type/mesh");
-  expectTold("/wrong_type", "type std_msgs/Bool is not a mesh", "publish deformable_ccd/MeshStamped, sensor_msgs/PointCloud2",
+  expectTold("/wrong_type", "type std_msgs/Bool is not a mesh",
+             "publish deformable_ccd/MeshStamped, sensor_msgs/PointCloud2",
              [&] { publisher.publish(std_msgs::Bool()); });
 }
 
@@ -129,7 +130,8 @@ TEST_F(Mistake, StampsOfZero) {
 TEST_F(Mistake, CloudWithoutTopology) {
   Tracker tracker;
   const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/no_topology/mesh");
-  expectTold("/no_topology", "an unorganised PointCloud2 has no topology", "set topology/rows and topology/cols for a grid",
+  expectTold("/no_topology", "an unorganised PointCloud2 has no topology",
+             "set topology/rows and topology/cols for a grid",
              [&] { publisher.publish(cloud(gridAt(3, 4, 0), tracker.next())); });
 }
 
@@ -153,7 +155,8 @@ TEST_F(Mistake, Millimetres) {
 TEST_F(Mistake, FramesTooFarApart) {
   double stamp_s = 100;
   const auto publisher = advertiseAndWait<MeshStamped>(node, "/too_slow/mesh");
-  expectTold("/too_slow", "GAP: 2 s since the last frame, max_step_s is 0.5", "a slower publisher needs a larger max_step_s",
+  expectTold("/too_slow", "GAP: 2 s since the last frame, max_step_s is 0.5",
+             "a slower publisher needs a larger max_step_s",
              [&] { publisher.publish(meshStamped(tipAbove(1), stamp_s += 2)); });
 }
 
@@ -161,8 +164,8 @@ TEST_F(Mistake, AnotherMeshEveryFrame) {
   Tracker tracker;
   bool more = false;
   const auto publisher = advertiseAndWait<MeshStamped>(node, "/remeshed/mesh");
-  expectTold("/remeshed", "TOPOLOGY_CHANGED: the mesh has 6 vertices and 1 faces", "use a tracker, or give topology/file",
-             [&] {
+  expectTold("/remeshed", "TOPOLOGY_CHANGED: the mesh has 6 vertices and 1 faces",
+             "use a tracker, or give topology/file", [&] {
                Mesh mesh = tipAbove(1);
                if ((more = !more)) mesh.faces.pop_back();
                publisher.publish(meshStamped(mesh, tracker.next()));

@@ -77,8 +77,9 @@ TEST_F(Subscription, NoneIsLostOrDoubledAtTheChange) {
   ASSERT_EQ(received.size(), static_cast<std::size_t>(COUNT));
   for (int i = 0; i < COUNT; ++i) {
     const auto* typed = std::get_if<TypedMesh>(&received[static_cast<std::size_t>(i)]);
-    const MeshStamped::ConstPtr mesh = typed ? std::get<MeshStamped::ConstPtr>(*typed)
-                                             : std::get<ShapeShifter::ConstPtr>(received[i])->instantiate<MeshStamped>();
+    const MeshStamped::ConstPtr mesh = typed
+                                           ? std::get<MeshStamped::ConstPtr>(*typed)
+                                           : std::get<ShapeShifter::ConstPtr>(received[i])->instantiate<MeshStamped>();
     ASSERT_TRUE(mesh);
     EXPECT_EQ(mesh->header.stamp, ros::Time(10 + i)) << "in order";
   }

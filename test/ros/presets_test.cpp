@@ -21,8 +21,8 @@ constexpr double RATE_HZ = 30;
 constexpr double TABLE_M = 0;  // height of the table's top in the map
 constexpr std::size_t MONITORS = 4;
 
-/// A table of 2 m x 2 m below z = 0 and, where `more` says so, other voxels; as octomap_server sends it: latched, binary, in
-/// the frame map, stamped when the sensor saw it.
+/// A table of 2 m x 2 m below z = 0 and, where `more` says so, other voxels; as octomap_server sends it: latched,
+/// binary, in the frame map, stamped when the sensor saw it.
 octomap_msgs::Octomap tableMap(const std::function<bool(const Vec3&)>& more = [](const Vec3&) { return false; }) {
   octomap_msgs::Octomap map;
   map.header.stamp = ros::Time::now();
@@ -46,7 +46,8 @@ Positions grid(std::size_t rows, std::size_t cols, double spacing_m, double z) {
   return positions;
 }
 
-/// A camera that looks straight down from a metre above the table; its optical frame has z ahead and y down in the image.
+/// A camera that looks straight down from a metre above the table; its optical frame has z ahead and y down in the
+/// image.
 void toOpticalFrame(Positions& positions) {
   for (Vec3& p : positions) p = Vec3(p.x(), -p.y(), 1 - p.z());
 }
@@ -61,7 +62,8 @@ geometry_msgs::TransformStamped cameraPose(const std::string& frame) {
   return pose;
 }
 
-/// A cloud as pcl_ros publishes it: points of 32 bytes with a colour behind the coordinates, stamps in whole microseconds.
+/// A cloud as pcl_ros publishes it: points of 32 bytes with a colour behind the coordinates, stamps in whole
+/// microseconds.
 sensor_msgs::PointCloud2 pclCloud(const Positions& positions, const std::string& frame) {
   sensor_msgs::PointCloud2 out = cloud(positions, 0, frame);
   out.header.stamp.fromNSec(ros::Time::now().toNSec() / 1000 * 1000);
@@ -86,8 +88,8 @@ class Preset : public ::testing::Test {
     EXPECT_TRUE(ros::service::waitForService("/" + name + "/collision_monitor/reset", 20000));
   }
 
-  /// Frames at rest until the monitor has the map and says OK; then frames sink by `speed` for 10 frames. Returns the last
-  /// outcome at rest and those of the fall.
+  /// Frames at rest until the monitor has the map and says OK, then ten that sink. Leaves the last outcome at rest and
+  /// those of the fall.
   ContactArray rest;
   std::vector<ContactArray> fall;
   void drop(double from_z, double to_z, const std::function<void(double z)>& publish) {
@@ -175,8 +177,8 @@ TEST_F(Trackdlo, RopeOf45Points) {
 struct FabricSimulator : Preset {
   FabricSimulator() : Preset("fabric_simulator") {}
 
-  /// 16 x 23 = 368 vertices: spheres for the vertices, lines for the edges, and a soup of triangles, all in one array, without
-  /// namespaces, in the frame map.
+  /// 16 x 23 = 368 vertices: spheres for the vertices, lines for the edges, and a soup of triangles, all in one array,
+  /// without namespaces, in the frame map.
   static visualization_msgs::MarkerArray markers(double z) {
     Mesh mesh{grid(16, 23, 1.0 / 15, z), {}};
     for (Index r = 0; r + 1 < 16; ++r) {

@@ -16,8 +16,8 @@
 namespace deformable_ccd {
 namespace {
 
-// Stamps count from here, not from the day of the recording, so that equal seeds give equal bags. Not zero, since a zero
-// stamp means "unset" in ROS.
+// Stamps count from here, not from the day of the recording, so that equal seeds give equal bags. Not zero, since a
+// zero stamp means "unset" in ROS.
 constexpr double START_STAMP_S = 1000.0;
 
 /// Writes messages to a bag; latched topics carry the header that makes rosbag play latch them.
@@ -95,7 +95,8 @@ void overrideOutput(scene::SceneSpec& spec, const std::string& output) {
     if (output == "polygon_mesh") body.output = scene::MeshOutput::POLYGON_MESH;
     if (output == "marker") body.output = scene::MeshOutput::MARKER;
     if (body.shape.kind == scene::Shape::Kind::ROPE && body.output != scene::MeshOutput::POINT_CLOUD_GRID) {
-      throw std::runtime_error("--output " + output + ": body '" + body.name + "' is a rope and has no faces; use point_cloud_grid");
+      throw std::runtime_error("--output " + output + ": body '" + body.name +
+                               "' is a rope and has no faces; use point_cloud_grid");
     }
   }
 }
@@ -107,14 +108,17 @@ std::string summary(const scene::SceneSpec& spec, const scene::Simulation& simul
     text << "  " << body.topic << ": " << body.shape.rows * body.shape.cols << " vertices\n";
   }
   text << "  physics:";
-  for (const std::string& effect : simulation.effects()) text << " " << effect << (&effect == &simulation.effects().back() ? "" : ",");
+  for (const std::string& effect : simulation.effects()) {
+    text << " " << effect << (&effect == &simulation.effects().back() ? "" : ",");
+  }
   text << "\n";
   return text.str();
 }
 
 }  // namespace
 
-std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& bag_path, const RecorderOptions& options) {
+std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& bag_path,
+                        const RecorderOptions& options) {
   scene::SceneSpec spec = scene_spec;
   if (options.frames > 0) spec.frames = options.frames;
   overrideOutput(spec, options.output);
@@ -127,7 +131,8 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
   writeStaticTransforms(bag, spec, start);
   if (spec.obstacle) {
     const bool binary = spec.obstacle->binary && !options.full_octomap;
-    bag.write(spec.obstacle->topic, start, toOctomap(header(spec.obstacle->frame, start, 0), *spec.obstacle, binary), true);
+    bag.write(spec.obstacle->topic, start, toOctomap(header(spec.obstacle->frame, start, 0), *spec.obstacle, binary),
+              true);
   }
   ProgressBar progress(spec.name, static_cast<std::size_t>(spec.frames), !options.quiet);
   for (int frame = 0; frame < spec.frames; ++frame) {

@@ -29,7 +29,9 @@ TEST(FlatLayout, KeepsDistancesAndLiesAlongThePage) {
   ASSERT_EQ(flat.size(), positions.size());
   double low = 0, high = 0;
   for (std::size_t i = 0; i < flat.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) EXPECT_NEAR(distance(flat[i], flat[j]), (positions[i] - positions[j]).norm(), 1e-5);
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_NEAR(distance(flat[i], flat[j]), (positions[i] - positions[j]).norm(), 1e-5);
+    }
     low = std::min(low, flat[i][1]);
     high = std::max(high, flat[i][1]);
   }

@@ -47,7 +47,13 @@ Bytes marker(const Positions& corners, double x = 0, double qw = 1) {
   out.header().text("cloth").put<std::int32_t>(2).put(MARKER_TRIANGLE_LIST).put(MARKER_ADD);
   out.put(x).put(0.0).put(0.0).put(0.0).put(0.0).put(0.0).put(qw).put(1.0).put(1.0).put(1.0);
   for (int i = 0; i < 4; ++i) out.put(1.0f);
-  out.put<std::uint64_t>(0).put<std::uint8_t>(0).points(corners).put<std::uint32_t>(0).text("").text("").put<std::uint8_t>(0);
+  out.put<std::uint64_t>(0)
+      .put<std::uint8_t>(0)
+      .points(corners)
+      .put<std::uint32_t>(0)
+      .text("")
+      .text("")
+      .put<std::uint8_t>(0);
   return out;
 }
 
@@ -61,7 +67,10 @@ Bytes cloud(const CloudSpec& spec) {
   Bytes out;
   out.header().put(spec.height).put(spec.width).put<std::uint32_t>(3);
   for (int axis = 0; axis < 3; ++axis) {
-    out.text(std::string(1, static_cast<char>('x' + axis))).put(spec.offsets[axis]).put(spec.datatype).put<std::uint32_t>(1);
+    out.text(std::string(1, static_cast<char>('x' + axis)))
+        .put(spec.offsets[axis])
+        .put(spec.datatype)
+        .put<std::uint32_t>(1);
   }
   out.put(spec.big).put(spec.point_step).put(spec.row_step).put(spec.claimed);
   for (int i = 0; i < 16; ++i) out.put(static_cast<float>(i));
@@ -169,7 +178,8 @@ TEST(MeshDecoder, EveryTruncationIsRefused) {
 TEST(MeshDecoder, RandomBytesNeverDoMoreThanFail) {
   std::mt19937 random(7);
   const Bytes honest[] = {mesh(SQUARE, HALVES), cloud({}), marker({SQUARE[0], SQUARE[1], SQUARE[2]})};
-  const char* types[] = {MESH, CLOUD, MARKER, "visualization_msgs/MarkerArray", "pcl_msgs/PolygonMesh", "shape_msgs/Mesh"};
+  const char* types[] = {
+      MESH, CLOUD, MARKER, "visualization_msgs/MarkerArray", "pcl_msgs/PolygonMesh", "shape_msgs/Mesh"};
   std::size_t refused = 0;
   for (int i = 0; i < 20000; ++i) {
     Bytes bytes = honest[random() % 3];
