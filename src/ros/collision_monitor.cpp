@@ -152,10 +152,12 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
   const std::string problem = mapTypeProblem(message->getDataType(), message->getMD5Sum());
   if (!problem.empty()) {
+    maps->countRefused();
     queue.command([this, problem] { log.complain(config.bodies.size(), "map type", problem); });
     return;
   }
   if (message->size() > config.max_map_bytes) {
+    maps->countRefused();
     queue.command([this, size = message->size()] {
       log.complain(config.bodies.size(), "map size",
                "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");

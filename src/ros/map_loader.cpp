@@ -30,6 +30,11 @@ void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns) { pu
 
 void MapLoader::submitFile(const std::string& file) { put({{}, file, 0}); }
 
+void MapLoader::countRefused() {
+  ++received_;
+  ++refused_;
+}
+
 bool MapLoader::take(LoadedMap& map) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!done_) return false;

@@ -32,6 +32,8 @@ class MapLoader {
   /// A serialised octomap_msgs/Octomap; replaces one that still waits. From any thread.
   void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns);
   void submitFile(const std::string& file);
+  /// Counts a message that was refused before it was worth handing over. From any thread.
+  void countRefused();
   /// The newest finished map, once.
   bool take(LoadedMap& map);
 

@@ -1,5 +1,5 @@
 """What happens to processes around the node: overload, a subscriber that never reads, SIGTERM in mid-step, a master that
-goes away. Each test starts a master and a node of its own."""
+goes away, a publisher that is killed, a clock that jumps, a disk that is full. Each test starts a node of its own."""
 import os
 import pathlib
 import random
@@ -8,6 +8,7 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -16,9 +17,11 @@ import xmlrpc.client
 
 import rosgraph
 import rospy
-from deformable_ccd.msg import StepStats
+from deformable_ccd.msg import ContactArray, StepStats
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
 SLOW = 20 if os.environ.get('DEFORMABLE_CCD_SANITIZED') else 1
@@ -98,20 +101,31 @@ class NodeFaultsTest(unittest.TestCase):
     def setUp(self):
         warnings.simplefilter('ignore', ResourceWarning)  # rospy leaves sockets to the collector
 
-    def start_node(self, name, **parameters):
+    def start_node(self, name, process=None, **parameters):
         arguments = ['__name:=' + name, 'mesh:=/%s/mesh' % name, '_fixed_frame:=world', '_max_vertex_step_m:=0.0',
                      '_effects/octomap:=off', '_max_contacts:=100']
         arguments += ['_%s:=%s' % item for item in parameters.items()]
-        node = subprocess.Popen([str(self.tool('collision_monitor_node'))] + arguments)
+        node = subprocess.Popen([str(self.tool('collision_monitor_node'))] + arguments, **(process or {}))
         self.addCleanup(self.end, node)
-        self.stats, self.clear = [], []
-        for topic, kind, into in (('stats', StepStats, self.stats), ('clear', Bool, self.clear)):
+        self.stats, self.clear, self.contacts = [], [], []
+        subscribers = []
+        for topic, kind, into in (('stats', StepStats, self.stats), ('clear', Bool, self.clear),
+                                  ('contacts', ContactArray, self.contacts)):
             subscriber = rospy.Subscriber('/%s/%s' % (name, topic), kind, into.append)
             self.addCleanup(subscriber.unregister)
+            subscribers.append(subscriber)
         self.publisher = rospy.Publisher('/%s/mesh' % name, PointCloud2, queue_size=None, tcp_nodelay=True)
         self.addCleanup(self.publisher.unregister)
         wait_for(lambda: self.publisher.get_num_connections() == 1, 20, 'the node to subscribe')
+        wait_for(lambda: all(s.get_num_connections() == 1 for s in subscribers), 20, 'its topics')
         return node
+
+    def step(self, message):
+        """Publishes one frame; returns the outcome that it leads to, after its statistics have come, too."""
+        seen, counted = len(self.contacts), len(self.stats)
+        self.publisher.publish(message)
+        wait_for(lambda: len(self.contacts) > seen and len(self.stats) > counted, 20, 'a step')
+        return self.contacts[-1]
 
     @staticmethod
     def tool(name):
@@ -222,6 +236,86 @@ class NodeFaultsTest(unittest.TestCase):
         begin = time.monotonic()
         self.assertEqual(node.wait((10 + 3 * step_s) * SLOW), 0)
         self.assertLess(time.monotonic() - begin, (5 + 3 * step_s) * SLOW)
+        self.assert_adds_up(self.stats[-1])
+
+    def test_a_publisher_is_killed_and_another_has_another_topology(self):
+        self.start_node('killed', max_step_s=1e6)
+        self.publisher.unregister()
+
+        def publish(rows, first_stamp_s, until):
+            process = subprocess.Popen([sys.executable, __file__, 'publish', '/killed/mesh', str(rows), str(first_stamp_s)])
+            self.addCleanup(self.end, process)
+            wait_for(until, 30, 'frames of the publisher with %d rows' % rows)
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+
+        publish(5, 100, lambda: len(self.contacts) >= 5)
+        time.sleep(0.2 * SLOW)  # what was under way arrives
+        before = len(self.contacts)
+        self.assertEqual([c.status for c in self.contacts], [ContactArray.FIRST_FRAME] + [ContactArray.OK] * (before - 1))
+        publish(6, 1000, lambda: len(self.contacts) >= before + 5)
+        after = [c.status for c in self.contacts[before:]]
+        self.assertEqual(after[:3], [ContactArray.TOPOLOGY_CHANGED, ContactArray.OK, ContactArray.OK])
+        self.assertFalse(self.contacts[before].answered)
+        wait_for(lambda: self.stats[-1].header.stamp == self.contacts[-1].header.stamp, 20, 'the last statistics')
+        self.assert_adds_up(self.stats[-1])
+
+    def test_the_clock_jumps_both_ways(self):
+        """Frames without a stamp, so that they are taken at the time that /clock says."""
+        rospy.set_param('/use_sim_time', True)
+        try:
+            self.start_node('clocked')
+        finally:
+            rospy.delete_param('/use_sim_time')
+        clock = rospy.Publisher('/clock', Clock, queue_size=10, latch=True)
+        self.addCleanup(clock.unregister)
+        wait_for(lambda: clock.get_num_connections() == 1, 20, 'the node to listen to the clock')
+        cloud = Cloud(4, 4)
+
+        def step_at(now_s):
+            """The frame is sent again while the node has not seen the clock, which comes on a connection of its own."""
+            clock.publish(Clock(rospy.Time.from_sec(now_s)))
+            end = time.monotonic() + 20 * SLOW
+            while time.monotonic() < end:
+                outcome = self.step(cloud.message(0))
+                if outcome.header.stamp.to_sec() == now_s and outcome.status != ContactArray.DUPLICATE:
+                    return outcome
+                time.sleep(0.01)
+            raise AssertionError('the node never saw %g s' % now_s)
+
+        self.assertEqual(step_at(1000).status, ContactArray.FIRST_FRAME)
+        self.assertEqual(step_at(1000.125).status, ContactArray.OK)
+        for jump_to_s, status in ((500, ContactArray.TIME_JUMP), (90000, ContactArray.GAP), (89999.875, ContactArray.TIME_JUMP)):
+            jumped = step_at(jump_to_s)
+            self.assertEqual(jumped.status, status, jumped.reason)
+            self.assertFalse(jumped.answered)
+            self.assertEqual(step_at(jump_to_s + 0.125).status, ContactArray.OK, 'recovered within two')
+        self.assertEqual(self.stats[-1].receipt_stamps, cloud.count)
+        self.assertEqual(self.stats[-1].frames_received, cloud.count)
+        self.assert_adds_up(self.stats[-1])
+
+    def test_a_full_disk_while_recording(self):
+        folder = pathlib.Path(self.folder) / 'recordings'
+        folder.mkdir()
+        self.start_node('full', record_steps=1, record_folder=folder)
+        cloud = Cloud(4, 4)
+        for _ in range(2):
+            self.step(cloud.message())
+        # The file that comes next lies on a device without space.
+        part = folder / ('step_2_%d.step.part' % self.contacts[-1].header.stamp.to_nsec())
+        part.symlink_to('/dev/full')
+        record = rospy.ServiceProxy('/full/record_step', Trigger)
+        answer = record()
+        self.assertFalse(answer.success)
+        self.assertIn('No space left on device', answer.message)
+        self.assertEqual(list(folder.iterdir()), [], 'nothing is left behind')
+        self.assertEqual(self.step(cloud.message()).status, ContactArray.OK, 'and goes on')
+        answer = record()
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual([str(p) for p in folder.iterdir()], [answer.message])
+        self.assertEqual(subprocess.run([str(self.tool('replay_step')), answer.message], stdout=subprocess.DEVNULL).returncode, 0)
+        self.assertEqual(self.stats[-1].frames_received, 3)
+        self.assert_adds_up(self.stats[-1])
 
     def test_the_master_goes_and_comes_back(self):
         node = self.start_node('masterless')
@@ -248,5 +342,18 @@ class NodeFaultsTest(unittest.TestCase):
         self.assertIsNone(node.poll())
 
 
+def publish_until_killed(topic, rows, first_stamp_s):
+    """A process of its own: organised clouds of this many rows, 50 a second."""
+    rospy.init_node('publisher', anonymous=True)
+    publisher = rospy.Publisher(topic, PointCloud2, queue_size=10)
+    wait_for(lambda: publisher.get_num_connections() == 1, 20, 'the node to subscribe')
+    cloud = Cloud(rows, 4)
+    while True:
+        publisher.publish(cloud.message(first_stamp_s + 0.02 * cloud.count))
+        time.sleep(0.02)
+
+
 if __name__ == '__main__':
+    if sys.argv[1:2] == ['publish']:
+        publish_until_killed(sys.argv[2], int(sys.argv[3]), float(sys.argv[4]))
     unittest.main()

@@ -140,6 +140,25 @@ TEST_F(Mapped, AMapThatStopsAndComesBack) {
   }));
   EXPECT_EQ(stats.last().maps_received, maps + 1);
   EXPECT_EQ(answerAt(stamp_s + 0.1).status, ContactArray::OK);
+
+  // One that is larger than max_map_mb is refused unread, and counted.
+  octomap_msgs::Octomap large = blockBelowZero(true, 51.4);
+  large.data.resize(2 << 20);
+  const std::uint64_t refused_before = stats.last().maps_refused;
+  map.publish(large);
+  ASSERT_TRUE(waitUntil([&] {
+    stamp_s += 0.001;
+    return answerAt(stamp_s).status == ContactArray::NO_MAP;
+  }));
+  EXPECT_NE(contacts.last().reason.find("max_map_mb"), std::string::npos) << contacts.last().reason;
+  ASSERT_TRUE(waitUntil([&] { return stats.last().maps_refused == refused_before + 1; }));
+  EXPECT_EQ(stats.last().maps_received, maps + 2);
+  map.publish(blockBelowZero(true, 51.5));
+  ASSERT_TRUE(waitUntil([&] {
+    stamp_s += 0.001;
+    return answerAt(stamp_s).status == ContactArray::OK;
+  }));
+
   const auto refused = trigger("record_step");
   EXPECT_FALSE(refused.success);
   EXPECT_NE(refused.message.find("record_steps is 0"), std::string::npos) << refused.message;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr StampNs STEP_NS = 100000000;
 
-std::vector<MonitorBody> bodies() {
+std::vector<MonitorBody> bodies(bool with_distances) {
   std::vector<MonitorBody> all(3);
   all[0].name = "cloth";
   all[0].vertex_mask = {0};
@@ -21,6 +21,10 @@ std::vector<MonitorBody> bodies() {
   all[1].self_collision = false;
   all[2].name = "rope";
   all[2].motion = BodyMotionKind::STATIC;
+  if (with_distances) {
+    all[0].minimum_separation_m = 0.11;  // more than the grid's spacing: some of its own pairs are left out
+    all[2].separations = {{0, 0.15}};
+  }
   return all;
 }
 
@@ -45,8 +49,9 @@ class Capture : public StepListener {
 
 }  // namespace
 
-RecordedScene::RecordedScene(const MonitorOptions& options, bool with_map)
-    : monitor_(withDefaults(options), bodies()),
+RecordedScene::RecordedScene(const MonitorOptions& options, bool with_map, bool with_distances)
+    : monitor_(withDefaults(options), bodies(with_distances)),
+      with_distances_(with_distances),
       grid_(std::make_shared<const Topology>(Topology::grid(4, 5))),
       finger_(std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 1, 2}, {0, 3, 1}}))),
       rope_(std::make_shared<const Topology>(Topology::polyline(4))) {
@@ -77,7 +82,9 @@ void RecordedScene::push() {
   for (int r = 0; r < 4; ++r) {
     for (int c = 0; c < 5; ++c) grid.emplace_back(0.1 * c + 0.013, 0.1 * r + 0.017, 0.3 - fall + 0.01 * ((r * c) % 3));
   }
-  monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity()}, 0);
+  std::vector<double> radius_m;
+  for (std::size_t i = 0; with_distances_ && i < grid.size(); ++i) radius_m.push_back(1e-3 * static_cast<double>(i % 4));
+  monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity(), radius_m}, 0);
 }
 
 StepOutcome RecordedScene::nextFrames() {
@@ -87,8 +94,8 @@ StepOutcome RecordedScene::nextFrames() {
   return outcome;
 }
 
-StepRecording recordScene(const MonitorOptions& options, bool with_map) {
-  RecordedScene scene(options, with_map);
+StepRecording recordScene(const MonitorOptions& options, bool with_map, bool with_distances) {
+  RecordedScene scene(options, with_map, with_distances);
   scene.nextFrames();
   StepRecording recording;
   Capture capture(recording);

@@ -1,6 +1,7 @@
 // Any bytes as messages of any accepted mesh type: refused with a message that can be read, or decoded to a mesh that holds
 // together. The first byte chooses the type, the second the configuration; the same message follows once more with other
 // coordinates, so that welded and kept topologies are met, too.
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -19,6 +20,8 @@ MeshInputConfig configOf(std::uint8_t byte) {
   config.weld = (byte & 0x20) == 0;
   if ((byte & 0x40) != 0) config.rows = config.cols = 2;
   if ((byte & 0x80) != 0) config.frame_id = "world";
+  // A field that clouds have, so that uncertainty is read from what was meant for something else.
+  if ((byte & 0x10) != 0) config.noise_field = "z";
   config.max_vertices = 100000;
   return config;
 }
@@ -28,6 +31,10 @@ void judge(const DecodedMesh& mesh) {
   if (mesh.topology->vertexCount() != mesh.positions.size()) throw std::logic_error("topology and positions differ");
   for (const Edge& edge : mesh.topology->edges()) {
     if (edge[0] >= edge[1] || edge[1] >= mesh.positions.size()) throw std::logic_error("an edge that cannot be");
+  }
+  if (!mesh.radius_m.empty() && mesh.radius_m.size() != mesh.positions.size()) throw std::logic_error("a radius too many");
+  for (const double radius_m : mesh.radius_m) {
+    if (!(radius_m >= 0 && std::isfinite(radius_m))) throw std::logic_error("an uncertainty that cannot be");
   }
   if (mesh.positions.size() > 100000) throw std::logic_error("more vertices than max_vertices");
 }

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include <gtest/gtest.h>
 
@@ -75,6 +76,40 @@ TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
     }
   }
   setSimdTarget(before);
+}
+
+TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
+  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::CONSERVATIVE}) {
+    const StepRecording without = recordScene(with(rung));
+    StepRecording r = recordScene(with(rung), true, true);
+    const std::vector<std::uint8_t> bytes = recordingBytes(r);
+    r = readRecording(bytes.data(), bytes.size(), "FILE");
+    EXPECT_EQ(recordingBytes(r), bytes);
+    ASSERT_EQ(r.bodies[0].radius_m.size(), 20u);
+    EXPECT_EQ(r.bodies[0].radius_m[7], 3e-3);
+    ASSERT_TRUE(r.bodies[0].reference) << "its first frame";
+    EXPECT_NE(r.bodies[0].reference->positions, r.bodies[0].t0);
+    ASSERT_EQ(r.bodies[2].setup.separations.size(), 1u);
+    EXPECT_EQ(r.bodies[2].setup.separations[0].separation_m, 0.15);
+    EXPECT_GT(r.answer.contacts.size(), without.answer.contacts.size());
+    for (const int threads : {1, 3}) {
+      const StepReplay replay = replayStep(r, threads);
+      EXPECT_TRUE(replay.differences.empty()) << toString(rung) << ": " << replay.differences.front();
+    }
+    // Each of them matters: without it the answer is another.
+    const auto differs = [&r](const std::function<void(StepRecording&)>& change) {
+      StepRecording changed = r;
+      change(changed);
+      return !replayStep(changed).differences.empty();
+    };
+    EXPECT_TRUE(differs([](StepRecording& c) { c.bodies[0].radius_m.assign(20, 0.05); })) << toString(rung);
+    EXPECT_TRUE(differs([](StepRecording& c) { c.bodies[2].setup.separations.clear(); })) << toString(rung);
+    EXPECT_TRUE(differs([](StepRecording& c) {
+      ReferenceFrame spread = *c.bodies[0].reference;
+      for (Vec3& p : spread.positions) p *= 10;  // nothing is close in it, so nothing is left out
+      c.bodies[0].reference = std::make_shared<const ReferenceFrame>(spread);
+    })) << toString(rung);
+  }
 }
 
 TEST(StepReplay, WithoutAMapTheStatusIsTheSame) {
@@ -210,6 +245,17 @@ TEST_F(RecordingFile, AFullDiskIsNamedAndNothingIsLeftBehind) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_NE(error.find("a.step: cannot be written: "), std::string::npos) << error;
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(RecordingFile, ADeviceWithoutSpaceIsNamedAndNothingIsLeftBehind) {
+  fs::create_symlink("/dev/full", folder_ / "a.step.part");
+  try {
+    writeRecording(folder_ / "a.step", recordScene());
+    FAIL() << "/dev/full took it";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
+  }
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
