@@ -38,7 +38,7 @@ add_library(deformable_ccd_decoders STATIC
   src/ros/typed_mesh.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
   src/scene/physics/scene_file.cpp src/scene/physics/yaml_map.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
-target_include_directories(deformable_ccd_decoders SYSTEM PUBLIC ${OWN_MESSAGES} ${ROS_MESSAGES} PRIVATE ${PCL_INCLUDE_DIRS})
+target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
   deformable_ccd yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY})
 
@@ -51,6 +51,7 @@ foreach(source ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES})
   target_link_libraries(${name} PRIVATE deformable_ccd_test_support)
   if(source IN_LIST DECODER_FUZZ_SOURCES)
     target_link_libraries(${name} PRIVATE deformable_ccd_decoders)
+    target_include_directories(${name} SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES})
   endif()
   target_link_options(${name} PRIVATE -fsanitize=fuzzer)
   add_dependencies(fuzzers ${name})
