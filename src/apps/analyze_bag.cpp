@@ -2,8 +2,10 @@
 #include "ros/output_messages.h"
 
 #include <rosbag/bag.h>
+#include <std_msgs/Bool.h>
 
 #include <CLI/CLI.hpp>
+#include <iomanip>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -11,6 +13,7 @@
 #include "deformable_ccd/simd_target.h"
 #include "io/report.h"
 #include "ros/bag_replay.h"
+#include "ros/markers.h"
 
 namespace {
 
@@ -56,7 +59,19 @@ class ResultBag {
     context.parameter_hash = pipeline.config().hash;
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
-    if (outcome.answered) bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, frame));
+    bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, frame));
+    std_msgs::Bool clear;
+    clear.data = outcome.clear;
+    bag_.write("/collision_monitor/clear", at, clear);
+    if (frame.empty()) return;  // no frame was taken yet, so there is none to draw in
+    bag_.write("/collision_monitor/markers", at,
+               toMarkers(outcome, pipeline.monitor().bodies(), pipeline.config().markers, frame));
+  }
+  void addPrediction(const StepOutcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {
+    const std::string& frame = pipeline.fixedFrame();
+    const double horizon_s = pipeline.config().monitor.look_ahead_s;
+    bag_.write("/collision_monitor/predicted_contacts", at, toContactArray(prediction, pipeline.monitor().bodies(), frame));
+    bag_.write("/collision_monitor/time_to_contact", at, toTimeToContact(prediction, horizon_s, frame));
   }
 
  private:
@@ -90,6 +105,12 @@ std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
   return bodies;
 }
 
+std::string seconds(double s) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(3) << s << " s";
+  return text.str();
+}
+
 std::string lookAheadLine(const BagReplaySummary& summary) {
   if (!summary.look_ahead) return "";
   const LookAheadSummary& s = *summary.look_ahead;
@@ -115,7 +136,10 @@ int analyze(const Arguments& a) {
         frame = pipeline.fixedFrame();
         if (out) out->add(outcome, pipeline, at);
       },
-      [&](const rosbag::MessageInstance& m) { if (out) out->copy(m); });
+      [&](const rosbag::MessageInstance& m) { if (out) out->copy(m); },
+      [&](const StepOutcome& prediction, MonitorPipeline& pipeline, const ros::Time& at) {
+        if (out) out->addPrediction(prediction, pipeline, at);
+      });
   report.setEffects(summary.effects);
   report.setLeftOut(summary.left_out, monitorBodies(config));
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
@@ -126,7 +150,7 @@ int analyze(const Arguments& a) {
       {"bag", a.bag},
       {"mesh topics", topics},
       {"fixed frame", frame},
-      {"duration", std::to_string(summary.duration_s) + " s"},
+      {"duration", seconds(summary.duration_s)},
       {"mesh messages", std::to_string(summary.mesh_messages)},
       {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
       {"accuracy", toString(config.monitor.detector.accuracy.rung)},

@@ -13,6 +13,9 @@ namespace deformable_ccd {
 namespace {
 
 const char* const KINDS[] = {"VF", "EE", "vertex-voxel_face", "edge-voxel_edge", "face-voxel_corner"};
+const char* const KINDS_IN_WORDS[] = {"vertex against face", "edge against edge", "vertex against voxel face",
+                                      "edge against voxel edge", "face against voxel corner"};
+constexpr std::size_t LEAVING = 4;  // place of that flag in the key of a contact
 
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
@@ -49,8 +52,17 @@ void ContactLog::add(const StepOutcome& outcome) {
                   std::uint64_t{c.vertex[0]} << 32 | c.vertex[1], std::uint64_t{c.vertex[2]} << 32 | c.vertex[3],
                   std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z,
                   std::uint64_t{c.leaving}};
+    static_assert(std::tuple_size<Key>::value == LEAVING + 1, "the flag is the key's last word");
     step[key] = {c.toc_lower, c.certainty == Certainty::CERTAIN};
   }
+}
+
+// What is undecided may be on its way in or out: a rung that did not look for the time does not know.
+bool ContactLog::covers(const std::map<Key, Entry>& found, Key key) {
+  if (found.count(key) > 0) return true;
+  key[LEAVING] ^= 1;
+  const auto other = found.find(key);
+  return other != found.end() && !other->second.certain;
 }
 
 RungCost ContactLog::against(const ContactLog& exact, const std::string& rung) const {
@@ -73,7 +85,7 @@ RungCost ContactLog::against(const ContactLog& exact, const std::string& rung) c
         cost.max_toc_error = std::max(cost.max_toc_error, std::abs(match->second.toc_lower - entry.toc_lower));
       }
     }
-    for (const auto& [key, entry] : truth) cost.missed += found.count(key) == 0;
+    for (const auto& [key, entry] : truth) cost.missed += !covers(found, key);
   }
   return cost;
 }
@@ -188,7 +200,7 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
     first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
     std::ostringstream text;
     text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
-         << KINDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
+         << KINDS_IN_WORDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
     for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
     text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided")
          << (first->initial ? ", initial" : "") << ")";
@@ -214,7 +226,7 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
 
 std::string Report::headline() const {
   std::ostringstream text;
-  text << std::fixed << std::setprecision(6);
+  text << std::fixed << std::setprecision(4);
   if (!first_contact_.empty()) {
     text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
          << with_contact_ << " of " << answered_ << " answered steps";

@@ -38,6 +38,7 @@ class ContactLog {
     bool certain;
   };
   using Key = std::array<std::uint64_t, 5>;
+  static bool covers(const std::map<Key, Entry>& found, Key key);
   std::map<std::uint64_t, std::map<Key, Entry>> steps_;
   std::vector<double> ms_;
 };

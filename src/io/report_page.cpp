@@ -13,9 +13,11 @@ h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.1rem; margin: 
 p.lead { font-size: 1.1rem; background: #eef3f8; border-left: 4px solid #2a6fb0; padding: .6rem .9rem; }
 table { border-collapse: collapse; font-size: .9rem; }
 td, th { padding: .2rem .7rem; border-bottom: 1px solid #dde3ea; text-align: right; }
-td.text, th.text { text-align: left; } th { color: #556; font-weight: 600; }
+td.text, th.text { text-align: left; } td.text + td.text { min-width: 11rem; } th { color: #556; font-weight: 600; }
 td.bar { width: 120px; } td.bar div { background: #2a6fb0; height: .7rem; }
-svg { display: block; background: #fff; border: 1px solid #dde3ea; max-width: 100%; }
+svg { display: block; background: #fff; border: 1px solid #dde3ea; width: 100%; height: auto; min-width: 640px;
+  box-sizing: border-box; }
+div.plot, div.wide { overflow-x: auto; } tr.off td { color: #8a95a3; }
 .note { color: #556; font-size: .88rem; } .maps { display: flex; flex-wrap: wrap; gap: 1rem; }
 .maps figure { margin: 0; } figcaption { font-size: .88rem; color: #556; }
 canvas { border: 1px solid #dde3ea; max-width: 100%; display: block; }
@@ -23,26 +25,31 @@ canvas { border: 1px solid #dde3ea; max-width: 100%; display: block; }
 i { display: inline-block; width: .8rem; height: .8rem; margin: 0 .3rem 0 .8rem; vertical-align: middle; }
 </style></head><body>
 <h1>Contacts of a recorded run</h1><p class="lead" id="headline"></p><table id="facts"></table>
-<h2>Contacts over time</h2><div id="contacts"></div>
-<p class="note"><i style="background:#2a6fb0"></i>contacts of a step <i style="background:#f0a030"></i>of them undecided
-<i style="background:#9aa4b0"></i>of them initial, there when the step began <i style="background:#f6c9c5"></i>no answer, which
-is never "no contact"</p>
-<h2>Earliest time of contact within each step</h2><div id="toc"></div>
+<h2>Contacts over time</h2><div id="contacts" class="plot"></div>
+<p class="note">Of each step: <i style="background:#2a6fb0"></i>new contacts, certain <i style="background:#f0a030"></i>undecided
+<i style="background:#9aa4b0"></i>initial, there when the step began. <i style="background:#f6c9c5"></i>No answer, which
+is never "no contact".</p>
+<h2>Earliest time of contact within each step</h2><div id="toc" class="plot"></div>
 <p class="note"><i style="background:#2a6fb0"></i>earliest new contact <i style="background:#9aa4b0"></i>earliest of all,
 initial ones included. 0 is the beginning of the step, 1 its end.</p>
 <h2>Where on the bodies</h2><div id="heat"></div>
-<p class="note">On the body's own layout in the first answered frame, laid flat; grey: never in contact.</p>
+<p class="note">On the body's own layout in the first answered frame, laid flat (a closed body from one side); grey: never in
+contact.</p>
 <h2>Gaps, resets and other frames that are not OK</h2><table id="seams"></table>
 <h2>Where the time goes</h2><table id="stages"></table>
-<h2>Milliseconds per step</h2><div id="latency"></div><p class="note" id="latency_note"></p>
-<h2>Steps by milliseconds</h2><div id="histogram"></div><p class="note">Bins of equal ratio, 20 a decade.</p>
+<p class="note">Pairs are those of the whole recording, milliseconds those of a step.</p>
+<h2>Milliseconds per step</h2><div id="latency" class="plot"></div><p class="note" id="latency_note"></p>
+<h2>Steps by milliseconds</h2><div id="histogram" class="plot"></div><p class="note">How many steps took how long; bins of equal
+ratio, 20 a decade, named by their upper end.</p>
 <h2>Effects</h2><table id="effects"></table><p class="note" id="effects_note"></p>
 <h2>Look-ahead: predicted against later observed</h2><table id="look_ahead"></table>
 <p class="note">Times at which vertices first touch another body, their own, or the map. The error is that of each prediction which came
-true within its horizon, early ones included.</p>
+true within its horizon, early ones included. Not observed: predicted, but no contact within the horizon; not predicted: the contact
+came unannounced.</p>
 <h2>What accuracy costs on this recording</h2><table id="rungs"></table>
 <p class="note">Missed and false are against the run with exact; undecided ones are reported as such.</p>
 <h2>Tiers of the exact test</h2><table id="tiers"></table>
+<p class="note">Which arithmetic settled a pair: cheap ones first, exact integers for what they leave.</p>
 <script>const R = )PAGE";
 
 // Two literals: compilers need not take one as long as both.
@@ -56,11 +63,14 @@ const el = (name, attributes, parent, text) => {
   return e;
 };
 const number = x => x === null || x === undefined ? '–' : Number.isInteger(x) ? x.toLocaleString('en') :
-  Math.abs(x) >= 1e-3 ? x.toFixed(3) : x.toExponential(1);
+  Math.abs(x) >= 100 ? x.toLocaleString('en', { maximumFractionDigits: 1 }) : Math.abs(x) >= 1e-3 ? x.toFixed(3) : x.toExponential(1);
+// Three digits that mean something: 0.355, 11.2, 1,120.
+const short = x => (+x.toPrecision(3)).toLocaleString('en', { maximumFractionDigits: 6 });
 const bar = share => ({ share });
 function table(id, head, rows) {
   const t = document.getElementById(id);
   if (!rows.length) { t.outerHTML = '<p class="note">None.</p>'; return; }
+  const wide = document.createElement('div'); wide.className = 'wide'; t.replaceWith(wide); wide.appendChild(t);
   const text = rows[0].map((_, k) => rows.every(r => typeof r[k] === 'string'));
   const add = (cells, tag) => {
     const row = t.insertRow();
@@ -77,6 +87,7 @@ function table(id, head, rows) {
   };
   if (head) add(head, 'th');
   rows.forEach(r => add(r, 'td'));
+  return t;
 }
 // Round steps, so that a reader can tell the values between.
 function ticks(max, whole) {
@@ -90,7 +101,7 @@ function ticks(max, whole) {
 function axes(id, height, ymax, ylabel, whole) {
   const steps = R.steps, t0 = steps.length ? steps[0].t : 0;
   const span = Math.max((steps.length > 1 ? steps[steps.length - 1].t : t0 + 1) - t0, 1e-9);
-  const svg = el('svg', { viewBox: `0 0 ${W} ${height}`, width: W, height }, document.getElementById(id));
+  const svg = el('svg', { viewBox: `0 0 ${W} ${height}` }, document.getElementById(id));
   const slot = (W - LEFT - RIGHT) / Math.max(steps.length, 1), inner = W - LEFT - RIGHT - slot;
   const x = t => LEFT + slot / 2 + inner * (t - t0) / span, y = v => height - BOTTOM - (height - BOTTOM - TOP) * v / ymax;
   steps.forEach(s => { if (s.answered) return;
@@ -100,7 +111,7 @@ function axes(id, height, ymax, ylabel, whole) {
   ticks(ymax, whole).forEach(v => {
     el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
     el('text', { x: LEFT - 6, y: y(v) + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
-  ticks(span).forEach(t => el('text', { x: x(t0 + t), y: height - BOTTOM + 18, 'text-anchor': 'middle', 'font-size': 12,
+  ticks(span).forEach(t => x(t0 + t) <= W - RIGHT && el('text', { x: x(t0 + t), y: height - BOTTOM + 18, 'text-anchor': 'middle', 'font-size': 12,
     fill: '#556' }, svg, +(t0 + t).toPrecision(6) + ' s'));
   el('text', { x: 14, y: height / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${height / 2})`,
     'text-anchor': 'middle' }, svg, ylabel);
@@ -125,11 +136,16 @@ table('facts', null, R.facts);
     `${number(R.total.p95_ms)} ms, 99 % below ${number(R.total.p99_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
 { const H = 160, floor = H - 34, bins = R.histogram, most = Math.max(1, ...bins.map(b => b.steps));
   const w = (W - LEFT - RIGHT) / Math.max(bins.length, 1), every = Math.ceil(bins.length / 10);
-  const svg = el('svg', { viewBox: `0 0 ${W} ${H}`, width: W, height: H }, document.getElementById('histogram'));
-  bins.forEach((b, i) => { const h = (floor - 10) * b.steps / most, upper = number(+b.upper_ms.toPrecision(3)) + ' ms';
+  const svg = el('svg', { viewBox: `0 0 ${W} ${H}` }, document.getElementById('histogram'));
+  ticks(most, true).forEach(v => { const y = floor - (floor - 10) * v / most;
+    el('line', { x1: LEFT, x2: W - RIGHT, y1: y, y2: y, stroke: '#e3e8ee' }, svg);
+    el('text', { x: LEFT - 6, y: y + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
+  el('text', { x: 14, y: floor / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${floor / 2})`,
+    'text-anchor': 'middle' }, svg, 'steps');
+  bins.forEach((b, i) => { const h = (floor - 10) * b.steps / most, upper = short(b.upper_ms) + ' ms';
     const bar = el('rect', { x: LEFT + i * w, y: floor - h, width: Math.max(1, w - 1), height: h, fill: '#2a6fb0' }, svg);
     el('title', {}, bar, `${b.steps} steps of up to ${upper}`);
-    if (i % every == 0) el('text', { x: LEFT + (i + 1) * w, y: floor + 18, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg, upper); }); }
+    if (i % every == 0 && i + 1 < bins.length) el('text', { x: LEFT + (i + 1) * w, y: floor + 18, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg, upper); }); }
 )PAGE";
 
 const char* const MAPS_AND_TABLES = R"PAGE(
@@ -165,19 +181,25 @@ R.bodies.forEach(b => {
   map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), 'contacts of a vertex (logarithmic)', '1', String(most));
   if (!times.length) return;
   const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
-  map(row, b, b.first.map(t => t === null ? null : 1 - (t - t0) / Math.max(t1 - t0, 1e-9)), 'first contact', number(t1) + ' s', number(t0) + ' s');
+  map(row, b, b.first.map(t => t === null ? null : 1 - (t - t0) / Math.max(t1 - t0, 1e-9)), 'first contact, late to early', number(t1) + ' s', number(t0) + ' s');
 });
+const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'some vertices could not be checked',
+  DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
+const STAGE = { record: 'takes in the frames', bounds: 'boxes of what the features sweep', broad_phase: 'pairs whose boxes meet',
+  planar: 'filters in a line and a plane', elementary: 'the test of the chosen accuracy', obstacle: 'all of it against the map',
+  start_state: 'do surfaces cross at the start?', sort: 'contacts in their order' };
 const NOT_OK = R.steps.filter(s => s.status !== 'OK'), SHOWN = 500;
-table('seams', ['time [s]', 'step', 'status', 'reason'], NOT_OK.slice(0, SHOWN).map(s => [number(s.t), String(s.step), s.status, s.reason])
+table('seams', ['time [s]', 'step', 'status', 'reason'], NOT_OK.slice(0, SHOWN).map(s => [number(s.t), String(s.step), s.status, s.reason || MEANING[s.status] || ''])
   .concat(NOT_OK.length > SHOWN ? [['', '', '…', `${NOT_OK.length - SHOWN} more in steps.csv`]] : []));
 const longest = list => Math.max(1e-12, ...list);
 { const most = longest(R.stages.map(s => s.median_ms));
-  table('stages', ['stage', 'pairs in', 'pairs out', 'median ms', '', '95 % ms'], R.stages.map(s =>
-    [s.name, s.in, s.out, s.median_ms, bar(s.median_ms / most), s.p95_ms]).concat(
-    [['whole step', '', '', R.total.median_ms, '', R.total.p95_ms]])); }
+  table('stages', ['stage', '', 'pairs in', 'pairs out', 'median ms', '', '95 % ms'], R.stages.map(s =>
+    [s.name, STAGE[s.name] || '', s.in, s.out, s.median_ms, bar(s.median_ms / most), s.p95_ms]).concat(
+    [['whole step', '', '', '', R.total.median_ms, '', R.total.p95_ms]])); }
 { const most = longest(R.effects.map(e => e.ms || 0));
-  table('effects', ['effect', 'runs', 'why', 'pairs in', 'pairs out', 'ms in all', ''], R.effects.map(e =>
-    [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)])); }
+  const t = table('effects', ['effect', 'runs', 'why', 'pairs in', 'pairs out', 'ms in all', ''], R.effects.map(e =>
+    [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)]));
+  R.effects.forEach((e, i) => { if (!e.running) t.rows[i + 1].className = 'off'; }); }
 document.getElementById('effects_note').textContent =
   `Bounds of bodies: ${R.bounds.bodies_refitted} times computed, ${R.bounds.bodies_kept} times kept from the step before.` +
   (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +

@@ -57,7 +57,8 @@ class Progress {
 }  // namespace
 
 struct BagReplay::Run {
-  const BagReplay& replay;
+  const Sink& sink;
+  const Sink& predictions;
   rosbag::Bag bag;
   tf2::BufferCore transforms{TF_KEPT + TF_AHEAD};
   TransformFeed feed{transforms};
@@ -68,8 +69,8 @@ struct BagReplay::Run {
   BagReplaySummary summary;
   std::set<std::string> complained;
 
-  explicit Run(const BagReplay& r)
-      : replay(r), bag(r.path_), pipeline(r.config_, transforms), effects(r.config_) {
+  Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
+      : sink(to), predictions(predictions_to), bag(r.path_), pipeline(r.config_, transforms), effects(r.config_) {
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
       const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
@@ -78,12 +79,15 @@ struct BagReplay::Run {
     }
   }
 
-  void predict(StepOutcome& outcome) {
+  /// The prediction that follows from an answered outcome, whose statistics get its cost.
+  std::optional<StepOutcome> predict(StepOutcome& outcome) {
+    if (!look_ahead) return std::nullopt;
     look_ahead->observe(outcome);
-    if (!outcome.answered) return;
-    const StepOutcome prediction = pipeline.monitor().predict();
-    look_ahead->predict(prediction);
-    outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
+    if (!outcome.answered) return std::nullopt;
+    std::optional<StepOutcome> prediction = pipeline.monitor().predict();
+    look_ahead->predict(*prediction);
+    outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(*prediction);
+    return prediction;
   }
 
   void complain(const std::string& text) {
@@ -100,23 +104,24 @@ struct BagReplay::Run {
     pipeline.setMap(std::move(map), now_ns);
   }
 
-  void drain(const Sink& sink, const ros::Time& at) {
+  void drain(const ros::Time& at) {
     StepOutcome outcome;
     while (pipeline.next(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       effects.update(outcome, pipeline.monitor());
-      if (look_ahead) predict(outcome);
+      const std::optional<StepOutcome> prediction = predict(outcome);
       sink(outcome, pipeline, at);
+      if (prediction && predictions) predictions(*prediction, pipeline, at);
       effects.apply(pipeline.monitor(), summary.maps > 0);
     }
   }
 
-  void mesh(std::size_t body, const rosbag::MessageInstance& message, const Sink& sink) {
+  void mesh(std::size_t body, const rosbag::MessageInstance& message) {
     const ros::Time at = message.getTime();
     const std::int64_t now_ns = static_cast<std::int64_t>(at.toNSec());
     ++summary.mesh_messages;
     const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
     // Nothing is dropped: a frame that still waits gives up before the next one is taken.
-    drain(sink, at);
+    drain(at);
     if (!pipeline.idle(body)) {
       pipeline.refuse(body, now_ns, now_ns, "the frame before it still waited for its transform");
     } else if (!problem.empty()) {
@@ -127,7 +132,7 @@ struct BagReplay::Run {
     const std::string complaint = pipeline.takeComplaint(body);
     if (!complaint.empty()) complain(summary.mesh_topics[body] + ": refused: " + complaint);
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
-    drain(sink, at);
+    drain(at);
   }
 };
 
@@ -174,8 +179,8 @@ std::string BagReplay::firstMapTopic(const std::string& bag) {
   return "";
 }
 
-BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
-  Run run(*this);
+BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
+  Run run(*this, sink, predictions);
   const std::string map_topic = absolute(config_.octomap_topic);
   const bool bag_maps = config_.octomap_file.empty() && run.effects.mayUseMap();
 
@@ -218,7 +223,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
     if (messages) messages(m);
     const auto body = run.body_of_topic.find(m.getTopic());
     if (body != run.body_of_topic.end()) {
-      run.mesh(body->second, m, sink);
+      run.mesh(body->second, m);
     } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
       const std::string problem = mapTypeProblem(m.getDataType(), m.getMD5Sum());
       run.setMap(problem.empty() ? decodeMapMessage(bytesOf(m), config_) : refusedMap(problem),
@@ -227,7 +232,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages) {
     progress.step(++done);
   }
   run.pipeline.finish();
-  run.drain(sink, at);
+  run.drain(at);
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.effects = run.effects.plan();
   run.summary.left_out = run.pipeline.monitor().leftOut();

@@ -51,7 +51,8 @@ class BagReplay {
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds; a map that
   /// was recorded after the first frame (latched ones are, often) is known from the start.
-  BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr);
+  /// `predictions` gets the look-ahead of each answered step, where there is one, after the step itself.
+  BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr);
 
  private:
   struct Run;

@@ -257,6 +257,7 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
   markers.line_width_m = section.number("line_width_m", markers.line_width_m, 1e-6, LARGE);
   markers.max_contacts = section.integer("max_contacts", markers.max_contacts, 1, MANY);
   markers.mesh = section.get("mesh", markers.mesh);
+  markers.obstacle_m = section.number("obstacle_m", markers.obstacle_m, 0, LARGE);
   section.finish();
 }
 

@@ -35,7 +35,8 @@ struct MarkerConfig {
   double normal_length_m = 0.05;
   double line_width_m = 0.002;
   int max_contacts = 2000;
-  bool mesh = false;  ///< republish the bodies as markers
+  bool mesh = false;      ///< republish the bodies as markers
+  double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
 };
 
 struct MonitorConfig {

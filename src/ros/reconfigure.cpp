@@ -20,6 +20,7 @@ CollisionMonitorConfig toLive(const MonitorConfig& config) {
   live.marker_point_size_m = config.markers.point_size_m;
   live.marker_normal_length_m = config.markers.normal_length_m;
   live.marker_mesh = config.markers.mesh;
+  live.marker_obstacle_m = config.markers.obstacle_m;
   return live;
 }
 
@@ -59,6 +60,7 @@ struct Reconfigure::Impl {
     markers.point_size_m = live.marker_point_size_m;
     markers.normal_length_m = live.marker_normal_length_m;
     markers.mesh = live.marker_mesh;
+    markers.obstacle_m = live.marker_obstacle_m;
     changed(options, markers);
   }
 };
