@@ -22,6 +22,11 @@ def bytes_of(message):
     return buffer.getvalue()
 
 
+def messages_of(path):
+    with rosbag.Bag(str(path)) as bag:
+        return list(bag.read_messages())
+
+
 class AnalyzeBagTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -29,7 +34,7 @@ class AnalyzeBagTest(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.folder, True)
         cls.bag = cls.folder / 'scene.bag'
         cls.tool('make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', cls.bag, '--frames', 25, '--quiet')
-        cls.messages = list(rosbag.Bag(str(cls.bag)).read_messages())
+        cls.messages = messages_of(cls.bag)
         cls.plain = cls.analyze('plain', cls.bag)
 
     @classmethod
@@ -56,7 +61,7 @@ class AnalyzeBagTest(unittest.TestCase):
         for threads in (1, 3):
             out = self.folder / ('threads_%d.bag' % threads)
             self.expect_same(self.analyze('threads_%d' % threads, self.bag, '--threads', threads, '-o', out))
-            contents.append([(topic, bytes_of(message), at) for topic, message, at in rosbag.Bag(str(out)).read_messages()
+            contents.append([(topic, bytes_of(message), at) for topic, message, at in messages_of(out)
                              if topic != OWN + 'stats'])  # these carry milliseconds
         self.assertEqual(contents[0], contents[1])
 
@@ -115,7 +120,7 @@ class AnalyzeBagTest(unittest.TestCase):
         params.write_text('markers: {mesh: true, obstacle_m: 0.3}\nlook_ahead_s: 0.1\n')
         self.analyze('out', self.bag, '--params', params, '-o', out)
         by_topic = collections.defaultdict(list)
-        for topic, message, _ in rosbag.Bag(str(out)).read_messages():
+        for topic, message, _ in messages_of(out):
             by_topic[topic].append(message)
         frames = len(by_topic['/cloth'])
         self.assertEqual(frames, sum(topic == '/cloth' for topic, _, _ in self.messages))
