@@ -208,7 +208,7 @@ def main():
     os.environ.update(environment)
     if arguments.rviz:
         return subprocess.call(['roslaunch', '--port', str(arguments.port), 'deformable_ccd', 'demo.launch',
-                                'bag:=%s' % arguments.bag, 'rviz:=true'], env=environment)
+                                'bag:=%s' % arguments.bag, 'mesh:=%s' % arguments.topic, 'rviz:=true'], env=environment)
 
     print('Playing %s (%.1f s) to the monitor' % (arguments.bag.name, arguments.duration_s), flush=True)
     listener = play(arguments, environment)
