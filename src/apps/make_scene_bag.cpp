@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "apps/make_scene_bag/monitor_check.h"
 #include "apps/make_scene_bag/recorder.h"
 #include "scene/physics/scene_file.h"
 
@@ -28,6 +29,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     const deformable_ccd::scene::SceneSpec spec = deformable_ccd::scene::readSceneFile(scene_path);
+    deformable_ccd::checkMonitorBlock(spec, scene_path);
     std::cout << deformable_ccd::recordScene(spec, bag_path, options);
   } catch (const std::exception& error) {
     std::cerr << "make_scene_bag: " << error.what() << "\n";

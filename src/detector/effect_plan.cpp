@@ -69,14 +69,15 @@ Finding unknownSpace(const EffectScene& scene) {
   return {true, true, "unknown_space is not free"};
 }
 
+std::string leftOut(const EffectScene& scene) {
+  if (scene.left_out_pairs == 0) return "";
+  return "; " + std::to_string(scene.left_out_pairs) +
+         " pairs of a body's own features are closer in its reference frame and left out of it";
+}
+
 Finding minimumSeparation(const EffectScene& scene) {
   if (!(scene.minimum_separation_m > 0)) return {false, false, "minimum_separation_m is 0; set it above"};
-  std::string reason = "contacts are reported from " + metres(scene.minimum_separation_m) + " m";
-  if (scene.left_out_pairs > 0) {
-    reason += "; " + std::to_string(scene.left_out_pairs) +
-              " pairs of a body's own features are closer in its reference frame and left out of it";
-  }
-  return {true, true, reason};
+  return {true, true, "contacts are reported from " + metres(scene.minimum_separation_m) + " m" + leftOut(scene)};
 }
 
 Finding trackerNoise(const EffectScene& scene) {
@@ -85,7 +86,7 @@ Finding trackerNoise(const EffectScene& scene) {
     if (!body.noise.empty()) all += (all.empty() ? "" : "; ") + body.name + ": " + body.noise;
   }
   if (all.empty()) return {false, false, "no body has an uncertainty; give one under uncertainty"};
-  return {true, true, "vertices are only known to a radius (" + all + ")"};
+  return {true, true, "vertices are only known to a radius (" + all + ")" + leftOut(scene)};
 }
 
 Finding lookAhead(const EffectScene& scene) {

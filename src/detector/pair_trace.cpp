@@ -137,8 +137,12 @@ class Tracer {
 
   /// Is the whole body left out of self-collision?
   void traceUnfolded(const SceneArrays& scene) {
-    const SceneBody& body = scene.bodies()[features_[0].body];
-    if (features_[0].body != features_[1].body || !options_.detector.unfolded_test || separation() > 0 || body.masked) return;
+    const std::size_t b = features_[0].body;
+    const SceneBody& body = scene.bodies()[b];
+    if (b != features_[1].body || !options_.detector.unfolded_test || scene.separation(b, b) > 0 || body.uncertain ||
+        body.masked) {
+      return;
+    }
     const bool unfolded = UnfoldedTest(body).run(body, scene.vertices());
     say("unfolded", unfolded ? Says::REJECTED : Says::KEPT,
         unfolded ? "the whole surface certainly does not fold onto itself in this step" : "the surface may fold onto itself");

@@ -107,7 +107,7 @@ struct BagReplay::Run {
   void drain(const ros::Time& at) {
     StepOutcome outcome;
     while (pipeline.next(static_cast<std::int64_t>(at.toNSec()), outcome)) {
-      effects.update(outcome, pipeline.monitor());
+      effects.learn(outcome, pipeline.monitor());
       const std::optional<StepOutcome> prediction = predict(outcome);
       sink(outcome, pipeline, at);
       if (prediction && predictions) predictions(*prediction, pipeline, at);

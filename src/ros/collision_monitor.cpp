@@ -126,7 +126,7 @@ struct CollisionMonitor::Impl {
   void takeMessages();
   void publish(StepOutcome& outcome);
   void predict(StepOutcome& outcome);
-  void publishEffects(const StepOutcome& outcome);
+  void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();
   void resetNow(StepStatus status);
@@ -355,7 +355,11 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
-  publishEffects(outcome);
+  effects.learn(outcome, pipeline.monitor());
+  publishEffects(toRosTime(outcome.stamp_ns));
+  if (effects.takeNewLeftOut(pipeline.monitor())) {
+    outputs.publishLeftOut(toLeftOutPairs(pipeline.monitor().leftOut(), bodies, outcome.stamp_ns, frame));
+  }
   predict(outcome);
   StatsContext context = statsContext();
   context.latency_s = latency_s;
@@ -363,12 +367,9 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   diagnostics.add(outcome, context);
 }
 
-void CollisionMonitor::Impl::publishEffects(const StepOutcome& outcome) {
-  const std::string& frame = pipeline.fixedFrame();
-  const Monitor& monitor = pipeline.monitor();
-  if (!effects.update(outcome, monitor)) return;
-  outputs.publishEffects(effects.message(toRosTime(outcome.stamp_ns), frame));
-  outputs.publishLeftOut(toLeftOutPairs(monitor.leftOut(), monitor.bodies(), outcome.stamp_ns, frame));
+void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
+  if (!effects.takeNewPlan()) return;
+  outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
   for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
 }
 
@@ -389,6 +390,7 @@ void CollisionMonitor::Impl::work() {
     if (stopping) return;
     if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
     effects.apply(pipeline.monitor(), map_publisher_seen);
+    publishEffects(ros::Time::now());  // the first plan comes before the first frame
     takeMaps();
     takeMessages();
     accountDropped();

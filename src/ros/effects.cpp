@@ -54,20 +54,32 @@ void EffectTracker::apply(Monitor& monitor, bool map_seen) {
   monitor.setOptions(options);
 }
 
-bool EffectTracker::update(const StepOutcome& outcome, const Monitor& monitor) {
-  if (outcome.answered && outcome.topologies) {
-    bool changed = scene_.left_out_pairs != monitor.leftOut().size();
-    scene_.left_out_pairs = monitor.leftOut().size();
-    for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
-      const bool has_faces = (*outcome.topologies)[b]->hasFaces();
-      changed = changed || !scene_.bodies[b].topology_known || scene_.bodies[b].has_faces != has_faces;
-      scene_.bodies[b].topology_known = true;
-      scene_.bodies[b].has_faces = has_faces;
-    }
-    if (changed) plan_ = EffectPlan(scene_, settings_);
+void EffectTracker::learn(const StepOutcome& outcome, const Monitor& monitor) {
+  if (!outcome.answered || !outcome.topologies) return;
+  bool changed = scene_.left_out_pairs != monitor.leftOut().size();
+  scene_.left_out_pairs = monitor.leftOut().size();
+  for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+    const bool has_faces = (*outcome.topologies)[b]->hasFaces();
+    changed = changed || !scene_.bodies[b].topology_known || scene_.bodies[b].has_faces != has_faces;
+    scene_.bodies[b].topology_known = true;
+    scene_.bodies[b].has_faces = has_faces;
   }
+  if (changed) plan_ = EffectPlan(scene_, settings_);
+}
+
+bool EffectTracker::takeNewPlan() {
   if (plan_ == told_) return false;
   told_ = plan_;
+  return true;
+}
+
+bool EffectTracker::takeNewLeftOut(const Monitor& monitor) {
+  const auto same = [](const LeftOutPair& a, const LeftOutPair& b) {
+    return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex;
+  };
+  const std::vector<LeftOutPair>& now = monitor.leftOut();
+  if (std::equal(now.begin(), now.end(), told_left_out_.begin(), told_left_out_.end(), same)) return false;
+  told_left_out_ = now;
   return true;
 }
 

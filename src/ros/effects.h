@@ -20,8 +20,12 @@ class EffectTracker {
   bool mapExpected() const { return plan_.running("octomap"); }
   /// Brings the monitor's options in line with the plan.
   void apply(Monitor& monitor, bool map_seen);
-  /// Learns topologies and what is left out from the outcome. True when the plan has changed since the last call, or at the first one.
-  bool update(const StepOutcome& outcome, const Monitor& monitor);
+  /// Learns topologies and what is left out from the outcome.
+  void learn(const StepOutcome& outcome, const Monitor& monitor);
+  /// True when the plan has changed since the last call, or at the first one.
+  bool takeNewPlan();
+  /// True when the pairs that are left out have changed since the last call; not at first, while there are none.
+  bool takeNewLeftOut(const Monitor& monitor);
 
   const EffectPlan& plan() const { return plan_; }
   std::vector<std::string> lines() const { return plan_.lines(); }
@@ -31,6 +35,7 @@ class EffectTracker {
   EffectScene scene_;
   std::map<std::string, EffectSetting> settings_;
   EffectPlan plan_, told_;
+  std::vector<LeftOutPair> told_left_out_;
 };
 
 }  // namespace deformable_ccd

@@ -67,7 +67,9 @@ struct MonitorConfig {
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
 
-/// The same tree from a YAML file, typed as rosparam would. Throws ParameterError naming file and line.
-XmlRpc::XmlRpcValue readYaml(const std::string& file);
+/// The same tree from YAML, typed as rosparam would; `name` stands for the text in messages. Throws ParameterError naming
+/// it and the line.
+XmlRpc::XmlRpcValue parseYaml(const std::string& text, const std::string& name);
+XmlRpc::XmlRpcValue readYaml(const std::string& file);  ///< a whole file
 
 }  // namespace deformable_ccd

@@ -1,6 +1,9 @@
 // YAML to the values that rosparam would put on the parameter server, so that offline tools read the same files.
 #include <yaml-cpp/yaml.h>
 
+#include <fstream>
+#include <iterator>
+
 #include "ros/monitor_config.h"
 
 namespace deformable_ccd {
@@ -36,18 +39,22 @@ XmlRpcValue value(const YAML::Node& node) {
 
 }  // namespace
 
-XmlRpcValue readYaml(const std::string& file) {
+XmlRpcValue parseYaml(const std::string& text, const std::string& name) {
   try {
-    const YAML::Node root = YAML::LoadFile(file);
+    const YAML::Node root = YAML::Load(text);
     if (root.IsDefined() && !root.IsNull() && !root.IsMap()) {
-      throw ParameterError(file + ": parameters must be a map of names");
+      throw ParameterError(name + ": parameters must be a map of names");
     }
     return value(root);
-  } catch (const YAML::BadFile&) {
-    throw ParameterError(file + " cannot be read");
   } catch (const YAML::Exception& error) {
-    throw ParameterError(file + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
+    throw ParameterError(name + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
   }
+}
+
+XmlRpcValue readYaml(const std::string& file) {
+  std::ifstream stream(file);
+  if (!stream) throw ParameterError(file + " cannot be read");
+  return parseYaml({std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()}, file);
 }
 
 }  // namespace deformable_ccd

@@ -129,6 +129,39 @@ class MakeSceneBagTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn('cannot be read', result.stderr)
 
+    def test_what_contradicts_itself_is_refused_before_anything_is_recorded(self):
+        """The monitor's block is read as the node reads it: file, parameter, and what to write instead."""
+        felt, table = (CHECKOUT / 'config/scenes/felt_and_finger.yaml').read_text(), self.scene.read_text()
+        mesh, bag = 'package://deformable_ccd/config/scenes/meshes/finger.obj', self.folder / 'e.bag'
+        no_mesh = self.folder / 'no_mesh.stl'
+        no_mesh.write_text('this is no mesh')
+        block = ':{line}: monitor.'
+        cases = [
+            (felt, 'accuracy: conservative', 'accuracy: exact', 'monitor/minimum_separation_m',
+             'accuracy: conservative'),
+            (felt, 'separation_m: 0.012', 'separation_m: -1', block + 'minimum_separation_m', 'write a number from 0'),
+            (felt, '  minimum_separation_m', '  minimum_seperation_m', 'monitor/minimum_seperation_m', 'nearest is'),
+            (felt, mesh, 'missing.stl', "rigid/mesh of body 'finger'", 'missing.stl'),
+            (felt, mesh, str(no_mesh), "rigid/mesh of body 'finger'", 'STL, OBJ or PLY'),
+            (felt, '{topic: /felt}', '{topic: /felt, topology: {rows: 9, cols: 9}}',
+             block + 'bodies.felt.topology.rows', 'write rows: 21, cols: 24'),
+            (felt, 'frame: finger}}', 'frame: finger}, self_collision: true}', block + 'bodies.finger.self_collision',
+             'remove this line'),
+            (table, 'octomap: auto,', 'octomap: auto, body_body: on,', 'effects/body_body is on',
+             'effects/body_body: auto'),
+        ]
+        for text, old, new, where, instead in cases:
+            self.assertEqual(text.count(old), 1, old)
+            bad = self.folder / 'bad.yaml'
+            bad.write_text(text.replace(old, new))
+            line = 1 + bad.read_text().split(new)[0].count('\n')
+            result = run(TOOLS / 'make_scene_bag', bad, bag)
+            with self.subTest(new=new):
+                self.assertEqual(result.returncode, 1, result.stderr)
+                for part in ('bad.yaml', where.format(line=line), instead):
+                    self.assertIn(part, result.stderr)
+                self.assertFalse(bag.exists(), 'nothing is recorded')
+
     def test_a_bag_that_cannot_be_written_is_an_error(self):
         result = run(TOOLS / 'make_scene_bag', self.scene, self.folder / 'no' / 'such' / 'f.bag', '--frames', '2')
         self.assertEqual(result.returncode, 1)

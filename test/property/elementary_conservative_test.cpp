@@ -81,7 +81,7 @@ TEST(ElementaryConservative, MinimumSeparation) {
   const AccuracyOptions options = conservativeOptions(1e-6);
   const auto test = makeElementaryTest(options);
   std::size_t runs = 0, undecided = 0, contacts = 0;
-  checkHardQueries("conservative-separation", longRun() ? 100000 : 10000, [&](const Query& query) -> std::string {
+  checkHardQueries("conservative-separation", longRun() ? 120000 : 10000, [&](const Query& query) -> std::string {
     constexpr double FRACTIONS[] = {1e-6, 1e-3, 0.03, 0.2, 0.7};
     const double separation = sizeOf(query) * FRACTIONS[digestOf(query) % 5];
     if (!(separation > 1e-290 && separation < 1e290)) return {};

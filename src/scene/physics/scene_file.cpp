@@ -151,6 +151,7 @@ Obstacle readObstacle(YamlMap map, const std::string& fixed_frame) {
 
 RigidBody readRigidBody(YamlMap map) {
   RigidBody body;
+  if (map.has("self_collision")) map.fail("self_collision", "the body is rigid and cannot meet itself; remove this line");
   body.name = map.text("name");
   body.frame = map.text("frame", body.name);
   body.size_m = map.numbers("size_m", 3, 1e-4, 1e3);

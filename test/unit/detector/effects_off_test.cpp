@@ -28,6 +28,8 @@ namespace {
 struct Scene {
   MonitorOptions options;
   MonitorBody body;
+  bool second = false;  ///< another body, turning through the first; with body's own settings
+  bool second_is_rigid = false;
   MonitorMap map;
   std::vector<double> radius_m;
   bool predicts = false;
@@ -42,7 +44,7 @@ struct Cost {
 /// Set-up and five steps of a crumpled cloth.
 Cost costOf(const Scene& scene) {
   const auto topology = std::make_shared<const Topology>(Topology::grid(8, 8));
-  std::vector<MeshFrame> frames;
+  std::vector<MeshFrame> frames, others;
   for (int k = 0; k < 6; ++k) {
     MeshFrame frame;
     frame.stamp_ns = 1000000 * (k + 1);
@@ -51,15 +53,29 @@ Cost costOf(const Scene& scene) {
       frame.positions.emplace_back(0.05 * ((i * 37) % 11), 0.05 * ((i * 29) % 13), 0.05 * ((i * 23) % 7) - 0.01 * k * (i % 3));
     }
     frame.radius_m = scene.radius_m;
+    if (scene.second) {
+      others.push_back(frame);
+      others.back().rigid = scene.second_is_rigid;
+      others.back().pose.linear() = Eigen::AngleAxisd(0.3 * k, Vec3::UnitZ()).toRotationMatrix();
+      others.back().positions = frames.empty() ? frame.positions : frames.front().positions;
+      for (Vec3& p : others.back().positions) p = others.back().pose * p;
+    }
     frames.push_back(std::move(frame));
+  }
+  std::vector<MonitorBody> bodies{scene.body};
+  if (scene.second) {
+    bodies.push_back(scene.body);
+    bodies.back().name = "other";
+    bodies.back().rigid = scene.second_is_rigid;
   }
   Cost cost;
   StepOutcome outcome;
   const std::uint64_t before = allocations;
-  Monitor monitor(scene.options, {scene.body});
+  Monitor monitor(scene.options, bodies);
   if (scene.map.surface) monitor.setMap(scene.map);
-  for (MeshFrame& frame : frames) {
-    monitor.push(0, std::move(frame), 0);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (scene.second) monitor.push(1, std::move(others[k]), 0);
+    monitor.push(0, std::move(frames[k]), 0);
     cost.ok = monitor.next(0, outcome) && cost.ok;
     if (scene.predicts && outcome.answered) outcome.stats[Effect::LOOK_AHEAD].in = monitor.predict().stats.vf_candidates;
   }
@@ -96,6 +112,9 @@ std::vector<Case> cases() {
   return {
       {Effect::SELF_COLLISION, [](Scene&) {}, [](Scene& s) { s.body.self_collision = true; }},
       {Effect::OBSTACLE, [=](Scene& s) { s.map.surface = surface; }, [](Scene& s) { s.body.against_obstacle = true; }},
+      {Effect::BODY_BODY, [](Scene& s) { s.second = true; }, [](Scene& s) { s.body.against_bodies = true; }},
+      {Effect::RIGID_BODIES, [](Scene& s) { s.second = s.body.against_bodies = true; },
+       [](Scene& s) { s.second_is_rigid = true; }},
       {Effect::START_STATE, [](Scene& s) { s.body.self_collision = true; }, [](Scene& s) { s.options.detector.check_start_state = true; }},
       {Effect::LOOK_AHEAD, [](Scene& s) { s.body.self_collision = true; },
        [](Scene& s) {

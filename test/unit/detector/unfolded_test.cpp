@@ -12,9 +12,9 @@ namespace deformable_ccd {
 namespace {
 
 StepResult runStep(const Topology& topology, const Positions& t0, const Positions& t1, BroadPhase broad_phase,
-                   double separation_m = 0) {
+                   double separation_m = 0, const std::vector<double>* radius_m = nullptr) {
   DetectorOptions options;
-  options.accuracy.rung = separation_m > 0 ? Accuracy::CONSERVATIVE : Accuracy::EXACT;
+  options.accuracy.rung = separation_m > 0 || radius_m ? Accuracy::CONSERVATIVE : Accuracy::EXACT;
   options.broad_phase = broad_phase;
   options.check_start_state = false;
   Detector detector(options);
@@ -24,7 +24,7 @@ StepResult runStep(const Topology& topology, const Positions& t0, const Position
   body.minimum_separation_m = separation_m;
   detector.setBodies({body}, {&t0});
   MotionStep step;
-  step.bodies = {{&t0, &t1}};
+  step.bodies = {{&t0, &t1, radius_m}};
   return detector.run(step);
 }
 
@@ -64,6 +64,13 @@ TEST(Unfolded, WavingClothIsCertified) {
   EXPECT_EQ(trueContacts(topology, t0, t1), 0u);
   EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 1e-4).stats.unfolded_bodies, 0u)
       << "not touching is not enough with a separation";
+  std::vector<double> radius(1200, 0.0);
+  EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius).stats.unfolded_bodies, 1u)
+      << "a tracker that is sure";
+  radius[77] = 0.03;
+  const StepResult uncertain = runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius);
+  EXPECT_EQ(uncertain.stats.unfolded_bodies, 0u) << "nor with a vertex that is only known to a radius";
+  EXPECT_FALSE(uncertain.contacts.empty()) << "which reaches its neighbours";
 }
 
 TEST(Unfolded, WhatIsCertifiedHasNoContact) {

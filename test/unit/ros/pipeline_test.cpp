@@ -93,7 +93,7 @@ struct Driven {
   const StepOutcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {}) {
     pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma), 0, 0});
     EXPECT_TRUE(pipeline.next(0, outcome));
-    effects.update(outcome, pipeline.monitor());
+    effects.learn(outcome, pipeline.monitor());
     return outcome;
   }
 };
@@ -107,6 +107,7 @@ XmlRpcValue scene() {
 
 TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
   Driven free(scene());
+  EXPECT_EQ(decodeMapMessage(map(1), free.config).known, nullptr) << "nothing is built of it";
   free.giveMap(1);
   free.feed(1, 0.35f);
   const StepOutcome& outcome = free.feed(1.1, 0.15f);

@@ -82,6 +82,10 @@ TEST(SceneFile, ContradictionsAreRefused) {
                 .find("min_m below max_m"),
             std::string::npos);
   EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "bodies:",
+                    "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:")
+                .find("s.yaml:7: rigid_bodies[0].self_collision: the body is rigid and cannot meet itself; remove this line"),
+            std::string::npos);
 }
 
 TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {

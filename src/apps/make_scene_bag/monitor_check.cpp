@@ -1,0 +1,25 @@
+#include "apps/make_scene_bag/monitor_check.h"
+
+#include <stdexcept>
+
+#include <tf2/buffer_core.h>
+
+#include "ros/effects.h"
+#include "ros/monitor_config.h"
+#include "ros/monitor_pipeline.h"
+
+namespace deformable_ccd {
+
+void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path) {
+  if (spec.monitor_yaml.empty()) return;
+  const MonitorConfig config = readConfig(parseYaml(spec.monitor_yaml, scene_path), scene_path + ": monitor/");
+  try {
+    const EffectTracker effects(config);  // an effect that is on, but not to be had
+    tf2::BufferCore transforms;
+    const MonitorPipeline pipeline(config, transforms);  // files
+  } catch (const std::exception& error) {
+    throw std::runtime_error(scene_path + ": monitor: " + error.what());
+  }
+}
+
+}  // namespace deformable_ccd

@@ -1,0 +1,14 @@
+// Holds a scene's `monitor` block to what the node and analyze_bag would say of it, before anything is recorded.
+#pragma once
+
+#include <string>
+
+#include "scene/physics/scene_spec.h"
+
+namespace deformable_ccd {
+
+/// Throws std::runtime_error naming the file, the parameter and what to write instead: what is unknown, out of range or
+/// contradicts itself, and mesh files that are missing or hold no mesh.
+void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path);
+
+}  // namespace deformable_ccd

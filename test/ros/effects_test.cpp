@@ -1,0 +1,220 @@
+// Effects through the live node: what is left out of the map, unknown space, separations of bodies and of pairs, ropes,
+// and rigid bodies that turn.
+#include <deformable_ccd/ContactArray.h>
+#include <deformable_ccd/EffectArray.h>
+#include <deformable_ccd/LeftOutPairs.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+
+#include "ros/support/monitor_fixture.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr std::size_t MONITORS = 4;  // in effects.test; each listens to /tf
+
+using ContactMessage = ContactArray::_contacts_type::value_type;
+
+double earliest(const ContactArray& outcome) {
+  double toc = 2;
+  for (const ContactMessage& contact : outcome.contacts) toc = std::min(toc, contact.toc_lower);
+  return toc;
+}
+
+// --- a grid above a block of voxels ----------------------------------------------------------------------------------
+
+struct OverMap : MonitorTest {
+  explicit OverMap(const std::string& name)
+      : MonitorTest(name),
+        mesh(advertiseAndWait<sensor_msgs::PointCloud2>(node, name + "/mesh")),
+        map(advertiseAndWait<octomap_msgs::Octomap>(node, name + "/octomap", true)) {}
+
+  /// A step between two heights that has seen the map, with the stamp of its end.
+  ContactArray step(double from_z, double to_z, double end_s) {
+    map.publish(blockBelowZero(true));
+    double stamp_s = end_s - 40;
+    EXPECT_TRUE(waitUntil([&] {
+      const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, from_z), stamp_s += 0.1));
+      return outcome.answered && outcome.status != ContactArray::NO_MAP;
+    }));
+    send(mesh, cloud(gridAt(3, 4, from_z), end_s - 0.1));
+    const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, to_z), end_s));
+    EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(end_s); }));
+    return outcome;
+  }
+  ros::Publisher mesh, map;
+};
+
+struct Filtered : OverMap {
+  Filtered() : OverMap("/filtered") {}
+};
+
+TEST_F(Filtered, MaskedVerticesAndExcludedBoxesMeetNothing) {
+  const ContactArray outcome = step(0.3, -0.05, 50);
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  std::size_t vertices = 0;
+  for (const ContactMessage& contact : outcome.contacts) {
+    vertices += contact.kind == ContactMessage::VERTEX_VOXEL_FACE;
+    EXPECT_FALSE(contact.kind == ContactMessage::VERTEX_VOXEL_FACE && contact.vertex[0] <= 1)
+        << "vertex 0 is masked; vertex 1 falls on a voxel that is left out";
+    EXPECT_FALSE(std::count(contact.vertex.begin(), contact.vertex.end(), 0u)) << "no feature of a masked vertex";
+  }
+  EXPECT_EQ(vertices, 10u);
+}
+
+TEST_F(Filtered, InitialContactsAreSuppressedByChoiceAndCounted) {
+  const ContactArray outcome = step(-0.05, -0.06, 50);
+  EXPECT_TRUE(outcome.contacts.empty()) << "all of it has been inside from the start";
+  EXPECT_GT(stats.last().suppressed, 0u);
+  EXPECT_GE(stats.last().contacts_initial, stats.last().suppressed);
+  EXPECT_FALSE(clear.last().data) << "suppressed is not clear";
+}
+
+struct Occupied : OverMap {
+  Occupied() : OverMap("/occupied") {}
+};
+
+TEST_F(Occupied, TheUnknownIsAnObstacleWithinItsBox) {
+  const ContactArray outcome = step(0.8, 0.4, 50);
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  EXPECT_NEAR(earliest(outcome), 0.5, 1e-6) << "the box ends at 0.6 m";
+  EXPECT_NEAR(stats.last().map_age, 49, 1e-6);
+}
+
+TEST_F(Occupied, AnOldMapIsNoMap) {
+  step(0.8, 0.7, 50);
+  trigger("reset");
+  send(mesh, cloud(gridAt(3, 4, 0.8), 101.5));
+  const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.7), 101.6));
+  EXPECT_EQ(outcome.status, ContactArray::NO_MAP);
+  EXPECT_NE(outcome.reason.find("octomap_timeout_s"), std::string::npos) << outcome.reason;
+}
+
+// --- separations -----------------------------------------------------------------------------------------------------
+
+struct Felt : MonitorTest {
+  Felt() : MonitorTest("/felt") {}
+  ros::Publisher felt = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/felt/felt");
+  ros::Publisher tip = advertiseAndWait<MeshStamped>(node, "/felt/tip");
+
+  ContactArray sendBoth(double tip_z, double stamp_s) {
+    const std::size_t seen = contacts.count();
+    const Mesh mesh{{{0.2, 0.2, tip_z}, {0.7, 0.2, tip_z + 1}, {-0.3, 0.2, tip_z + 1}}, {{0, 1, 2}}};
+    tip.publish(meshStamped(mesh, stamp_s));
+    felt.publish(cloud(gridAt(4, 4, 0), stamp_s));
+    return contacts.after(seen);
+  }
+};
+
+// The first case of this monitor: it has not had any frame yet.
+TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
+  Probe<EffectArray> effects(node, "/felt/effects");
+  ASSERT_TRUE(waitUntil([&] { return effects.count() > 0; })) << "before any frame";
+  const std::size_t before = effects.count();
+  const auto reasonOf = [&](const std::string& name) {
+    for (const EffectState& effect : effects.last().effects) {
+      if (effect.name == name) return effect.reason;
+    }
+    return std::string();
+  };
+  EXPECT_EQ(reasonOf("minimum_separation"), "contacts are reported from 0.12 m");
+  sendBoth(1, 10);
+  sendBoth(0.9, 10.1);
+  ASSERT_TRUE(waitUntil([&] { return effects.count() > before; })) << "now it knows which pairs are left out";
+  EXPECT_NE(reasonOf("minimum_separation").find("pairs of a body's own features are closer"), std::string::npos);
+  for (int i = 0; i < 5; ++i) sendBoth(0.9, 10.2 + 0.1 * i);
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.6); }));
+  EXPECT_EQ(effects.count(), before + 1) << "nothing has changed since";
+}
+
+TEST_F(Felt, APairOfBodiesHasItsOwnDistance) {
+  sendBoth(1, 10);
+  const ContactArray outcome = sendBoth(-1, 10.1);
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  ASSERT_FALSE(outcome.contacts.empty());
+  EXPECT_LE(earliest(outcome), 0.49) << "never late: 2 cm above the felt, not 12";
+  EXPECT_NEAR(earliest(outcome), 0.49, 1e-4);
+  for (const ContactMessage& contact : outcome.contacts) {
+    EXPECT_NE(contact.body[0], contact.body[1]) << "neighbours on the felt are closer than 12 cm by nature";
+  }
+}
+
+TEST_F(Felt, WhatIsLeftOutIsListedAndCounted) {
+  sendBoth(1, 10);
+  sendBoth(0.9, 10.1);
+  Probe<LeftOutPairs> left_out(node, "/felt/left_out");
+  const LeftOutPairs listed = left_out.after(0);
+  ASSERT_FALSE(listed.pairs.empty()) << "latched";
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
+  EXPECT_EQ(stats.last().left_out_listed, listed.pairs.size());
+  EXPECT_GT(stats.last().left_out_met, 0u);
+}
+
+// --- a rope, and a finger that turns ---------------------------------------------------------------------------------
+
+struct Turning : MonitorTest {
+  Turning() : MonitorTest("/turning") {}
+  ros::Publisher rope = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/turning/rope");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
+
+  /// The finger, a box of 0.5 x 0.5 x 0.8 m, turns about its vertical axis; the rope hangs straight down at (x, y).
+  ContactArray turn(double angle, double x, double y, double start_s) {
+    const Positions points{{x, y, -1}, {x, y, -0.5}, {x, y, 0}, {x, y, 0.5}, {x, y, 1}};
+    tf2_msgs::TFMessage from = transformAt(start_s, "turning_finger", {0, 0, 0}), to = from;
+    to.transforms[0].header.stamp += ros::Duration(0.1);
+    to.transforms[0].transform.rotation.z = std::sin(angle / 2);
+    to.transforms[0].transform.rotation.w = std::cos(angle / 2);
+    tf.publish(from);
+    tf.publish(to);
+    send(rope, cloud(points, start_s));
+    const ContactArray outcome = send(rope, cloud(points, start_s + 0.1));
+    EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == to.transforms[0].header.stamp; }));
+    return outcome;
+  }
+};
+
+TEST_F(Turning, ALargeTurnSplitsTheStepAndTheStatisticsSaySo) {
+  const ContactArray outcome = turn(1.5, 5, 5, 20);
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  EXPECT_TRUE(outcome.contacts.empty());
+  // Corners 0.534 m from the frame's origin: arcs of 0.123 rad stay within 1 mm of their chords.
+  EXPECT_EQ(stats.last().substeps, 13u);
+  EXPECT_GT(stats.last().rigid_bodies_ms, 0);
+  EXPECT_EQ(stats.last().body_pairs, 0u) << "bodies that are apart are not paired";
+  turn(0.05, 5, 5, 30);
+  EXPECT_EQ(stats.last().substeps, 1u);
+}
+
+TEST_F(Turning, ARopeOnTheArcIsMetThoughBothEndsAreClearOfIt) {
+  // A corner is 0.354 m from the axis, a side 0.25 m. The corner at 45 degrees passes the rope at 90.
+  const ContactArray outcome = turn(1.5, 0, 0.34, 40);
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  EXPECT_EQ(outcome.start_state, ContactArray::CLEAR);
+  bool vertex_face = false, edge_edge = false;
+  for (const ContactMessage& contact : outcome.contacts) {
+    vertex_face |= contact.kind == ContactMessage::VERTEX_FACE;
+    edge_edge |= contact.kind == ContactMessage::EDGE_EDGE;
+  }
+  EXPECT_TRUE(vertex_face) << "the rope's vertices against faces";
+  EXPECT_TRUE(edge_edge) << "its edges against edges";
+  // A side is 0.25 m from the axis and reaches (0, 0.34) when it has turned by a with 0.34 cos(a) = 0.25.
+  EXPECT_NEAR(earliest(outcome), std::acos(0.25 / 0.34) / 1.5, 0.02);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "effects_test");
+  ros::NodeHandle node;
+  ros::AsyncSpinner spinner(2);
+  spinner.start();
+  return RUN_ALL_TESTS();
+}
