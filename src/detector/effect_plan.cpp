@@ -30,17 +30,20 @@ bool ropesOnly(const EffectScene& scene) {
 Finding selfCollision(const EffectScene& scene) {
   std::string can, rope;
   bool all_rigid = true;
+  std::size_t deforming = 0;
   for (const EffectBody& body : scene.bodies) {
     all_rigid = all_rigid && body.rigid;
     if (body.rigid || !body.self_collision) continue;
     can += (can.empty() ? "" : ", ") + body.name;
+    ++deforming;
     if (body.topology_known && !body.has_faces) rope += (rope.empty() ? "" : ", ") + body.name;
   }
   if (can.empty()) {
     return {false, !all_rigid, all_rigid ? (scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid")
                                          : "it is switched off for every body that deforms"};
   }
-  return {true, true, can + " deforms" + (rope.empty() ? "" : "; of " + rope + " only edges, a polyline has no faces")};
+  can += deforming == 1 ? " deforms" : " deform";
+  return {true, true, can + (rope.empty() ? "" : "; of " + rope + " only edges, a polyline has no faces")};
 }
 
 Finding bodyBody(const EffectScene& scene) {

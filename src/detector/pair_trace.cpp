@@ -103,13 +103,13 @@ class Tracer {
   void findSlot(const SceneArrays& scene, Feature& f) const {
     const SceneBody& body = scene.bodies()[f.body];
     const ClusterTree& tree = body.tree(f.kind);
-    std::array<Index, 3> wanted{};
+    std::array<Index, 3> wanted{NO_INDEX, NO_INDEX, NO_INDEX};
     std::copy_n(question_.vertex.begin() + f.first, f.size, wanted.begin());
-    std::sort(wanted.begin(), wanted.begin() + f.size);
+    std::sort(wanted.begin(), wanted.end());
     for (f.slot = 0; f.slot < tree.featureCount(); ++f.slot) {
-      std::array<Index, 3> found{};
+      std::array<Index, 3> found{NO_INDEX, NO_INDEX, NO_INDEX};
       for (std::size_t i = 0; i < f.size; ++i) found[i] = body.slot_vertex[tree.feature(f.slot)[i] - body.internal_begin];
-      std::sort(found.begin(), found.begin() + f.size);
+      std::sort(found.begin(), found.end());
       if (found == wanted) return;
     }
     throw std::invalid_argument(nameOf(f, question_, body.setup.name));
