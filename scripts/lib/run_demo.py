@@ -16,6 +16,7 @@ import time
 import rosbag
 import rosgraph
 import rospy
+import yaml
 from deformable_ccd.msg import Contact, ContactArray, StepStats
 
 NODE = '/collision_monitor'
@@ -55,7 +56,7 @@ class Listener:
 def start_launch(arguments, environment, extra):
     log = open(arguments.folder / 'roslaunch.log', 'w')
     return subprocess.Popen(['roslaunch', '--port', str(arguments.port), 'deformable_ccd', 'demo.launch',
-                             'bag:=%s' % arguments.bag] + extra, env=environment, stdout=log, stderr=subprocess.STDOUT,
+                             'bag:=%s' % arguments.bag, 'params:=%s' % arguments.params] + extra, env=environment, stdout=log, stderr=subprocess.STDOUT,
                             stdin=subprocess.DEVNULL, start_new_session=True)
 
 
@@ -71,16 +72,18 @@ def stop(process):
 
 
 def kind_of(contact):
-    return {Contact.VERTEX_FACE: 'cloth vertex - cloth face', Contact.EDGE_EDGE: 'cloth edge - cloth edge',
-            Contact.VERTEX_VOXEL_FACE: 'cloth vertex - octomap face', Contact.EDGE_VOXEL_EDGE: 'cloth edge - octomap edge',
-            Contact.FACE_VOXEL_CORNER: 'cloth face - octomap corner'}[contact.kind]
+    return {Contact.VERTEX_FACE: 'mesh vertex - mesh face', Contact.EDGE_EDGE: 'mesh edge - mesh edge',
+            Contact.VERTEX_VOXEL_FACE: 'mesh vertex - octomap face', Contact.EDGE_VOXEL_EDGE: 'mesh edge - octomap edge',
+            Contact.FACE_VOXEL_CORNER: 'mesh face - octomap corner'}[contact.kind]
 
 
-def frames_of(path):
-    info = rosbag.Bag(str(path)).get_type_and_topic_info().topics
-    topic, of_topic = next((name, i) for name, i in info.items() if i.msg_type in MESH_TYPES)
-    start = rosbag.Bag(str(path)).get_start_time()
-    return topic, of_topic.message_count, start
+def frames_of(bag, params):
+    """Frames that the monitor gets: the mesh messages, and one of each rigid body with each of those."""
+    with rosbag.Bag(str(bag)) as opened:
+        topics = opened.get_type_and_topic_info().topics.values()
+    bodies = (yaml.safe_load(params.read_text()) or {}).get('bodies', {})
+    rigid = sum('rigid' in (body or {}) for body in bodies.values())
+    return sum(topic.message_count for topic in topics if topic.msg_type in MESH_TYPES) * (1 + rigid)
 
 
 def summarize(arguments, listener, start):
@@ -96,7 +99,7 @@ def summarize(arguments, listener, start):
                 first[name] = (at, contact)
     last = stats[-1] if stats else None
     summary = {
-        'frames_in_bag': arguments.frames, 'contacts': {k: kinds[k] for k in sorted(kinds)},
+        'frames_expected': arguments.frames, 'contacts': {k: kinds[k] for k in sorted(kinds)},
         'first_contact_s': {k: first[k][0] for k in sorted(first)},
         'statuses': {}, 'start_states': {},
         'latency_ms': {}, 'step_ms': {},
@@ -137,8 +140,8 @@ def write_report(folder, summary, arrays, stats, start):
 
 
 def print_summary(summary, folder):
-    print('Frames: %d in the bag, %d received: %d ended a step, %d started anew, %d skipped, %d waiting' % tuple(
-        [summary['frames_in_bag']] + [summary.get('frames_' + n, 0)
+    print('Frames: %d recorded, %d received: %d ended a step, %d started anew, %d skipped, %d waiting' % tuple(
+        [summary['frames_expected']] + [summary.get('frames_' + n, 0)
                                       for n in ('received', 'processed', 'started', 'skipped', 'waiting')]))
     print('Status: ' + ', '.join('%s %d' % item for item in summary['statuses'].items()) +
           '; start of the step: ' + ', '.join('%s %d' % item for item in summary['start_states'].items()))
@@ -152,16 +155,17 @@ def print_summary(summary, folder):
     print('Report: %s' % os.path.relpath(folder))
 
 
-def problems(summary):
-    """What must hold of a run, whatever the scene."""
+def problems(summary, expected):
+    """What must hold of a run; `expected` is what the scene says of its contacts."""
     found = []
     total = sum(summary.get('frames_' + n, 0) for n in ('processed', 'started', 'skipped', 'waiting'))
-    if summary.get('frames_received', 0) != summary['frames_in_bag']:
-        found.append('the monitor received %d of %d frames' % (summary.get('frames_received', 0), summary['frames_in_bag']))
+    if summary.get('frames_received', 0) != summary['frames_expected']:
+        found.append('the monitor received %d of %d frames' % (summary.get('frames_received', 0), summary['frames_expected']))
     if total != summary.get('frames_received', 0):
         found.append('the counters account for %d of %d frames' % (total, summary.get('frames_received', 0)))
-    if not summary['contacts']:
-        found.append('no contact was found')
+    touches = any(what != 'none' for what in expected.values())
+    if touches != bool(summary['contacts']):
+        found.append('no contact was found' if touches else 'contacts were found, and the scene has none')
     return found
 
 
@@ -177,7 +181,7 @@ def wait_for_node(launch, environment, limit_s=30):
 
 def play(arguments, environment):
     """Plays the bag once; the listener, or None when the launch failed."""
-    launch = start_launch(arguments, environment, ['loop:=false', 'mesh:=%s' % arguments.topic])
+    launch = start_launch(arguments, environment, ['loop:=false'])
     try:
         if not wait_for_node(launch, environment):
             return None
@@ -195,20 +199,23 @@ def play(arguments, environment):
 
 def main():
     parser = argparse.ArgumentParser()
+    parser.add_argument('--scene', type=pathlib.Path, required=True)
     parser.add_argument('--bag', type=pathlib.Path, required=True)
+    parser.add_argument('--params', type=pathlib.Path, required=True)
     parser.add_argument('--folder', type=pathlib.Path, required=True)
     parser.add_argument('--tools', type=pathlib.Path, required=True)
     parser.add_argument('--rviz', action='store_true')
     arguments = parser.parse_args()
     arguments.port = free_port()
-    arguments.topic, arguments.frames, start = frames_of(arguments.bag)
-    arguments.duration_s = rosbag.Bag(str(arguments.bag)).get_end_time() - start
+    arguments.frames = frames_of(arguments.bag, arguments.params)
+    with rosbag.Bag(str(arguments.bag)) as opened:
+        start, arguments.duration_s = opened.get_start_time(), opened.get_end_time() - opened.get_start_time()
     environment = dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % arguments.port, ROS_HOSTNAME='localhost',
                        ROS_HOME=str(arguments.folder / 'ros_home'), ROS_LOG_DIR=str(arguments.folder / 'ros_log'))
     os.environ.update(environment)
     if arguments.rviz:
         return subprocess.call(['roslaunch', '--port', str(arguments.port), 'deformable_ccd', 'demo.launch',
-                                'bag:=%s' % arguments.bag, 'mesh:=%s' % arguments.topic, 'rviz:=true'], env=environment)
+                                'bag:=%s' % arguments.bag, 'params:=%s' % arguments.params, 'rviz:=true'], env=environment)
 
     print('Playing %s (%.1f s) to the monitor' % (arguments.bag.name, arguments.duration_s), flush=True)
     listener = play(arguments, environment)
@@ -222,9 +229,9 @@ def main():
     analyze = arguments.tools / 'analyze_bag'
     if analyze.exists():
         subprocess.run([str(analyze), str(arguments.bag), '--report', str(report), '--params',
-                        str(arguments.folder / 'monitor.yaml'), '--quiet'], check=True)
+                        str(arguments.params), '--quiet'], check=True)
     print_summary(summary, report)
-    found = problems(summary)
+    found = problems(summary, yaml.safe_load(arguments.scene.read_text())['expect'])
     for problem in found:
         print('demo: ' + problem, file=sys.stderr)
     return 1 if found else 0
