@@ -10,8 +10,17 @@ foreach(library deformable_ccd_octomap deformable_ccd_ros)
 endforeach()
 
 if(DEFORMABLE_CCD_CORE_ONLY)
-  install(TARGETS ${LIBRARY_TARGETS} ${TOOL_TARGETS})
+  include(CMakePackageConfigHelpers)
+  install(TARGETS ${TOOL_TARGETS})
+  install(TARGETS deformable_ccd EXPORT ${PROJECT_NAME} INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   install(DIRECTORY include/deformable_ccd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+  set(CONFIG_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/${PROJECT_NAME})
+  install(EXPORT ${PROJECT_NAME} NAMESPACE ${PROJECT_NAME}:: FILE ${PROJECT_NAME}-targets.cmake DESTINATION ${CONFIG_DIR})
+  write_basic_package_version_file(${PROJECT_NAME}-config-version.cmake COMPATIBILITY SameMinorVersion)
+  # Generated here, and no catkin package's.
+  #catkin_lint: ignore_once missing_file wrong_install_destination
+  install(FILES cmake/${PROJECT_NAME}-config.cmake ${CMAKE_CURRENT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake
+    DESTINATION ${CONFIG_DIR})
   return()
 endif()
 

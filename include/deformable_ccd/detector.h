@@ -17,7 +17,7 @@ namespace deformable_ccd {
 
 /// The stages of the flow, in order. Names by toString().
 enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
-/// What a scene can call for (DESIGN.md, Effects). Names by toString().
+/// What a scene can call for (doc/interface.md). Names by toString().
 enum class Effect : std::uint8_t {
   SELF_COLLISION,
   BODY_BODY,
@@ -69,7 +69,7 @@ struct StepStats {
 
 }  // namespace core
 
-/// Do surfaces already cross at t=0? (DESIGN.md, Start state)
+/// Do surfaces already cross at t=0? (doc/algorithm.md)
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
 const char* toString(StartState state);
 

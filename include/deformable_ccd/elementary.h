@@ -38,7 +38,7 @@ struct PairMotion {
 
 enum class Verdict : std::uint8_t { NO_CONTACT = 0, CONTACT = 1, UNDECIDED = 2 };
 
-/// Which tier settled the pair (EXACT_TEST.md, Tiers). Purely informative.
+/// Which tier settled the pair (doc/algorithm.md). Purely informative.
 enum class Tier : std::uint8_t { COINCIDENCE = 0, DOUBLE_BATCH, BERNSTEIN, DOUBLE_DOUBLE, FIXED_INTEGER, BIG_INTEGER, COUNT };
 
 /// toc_lower <= TOC; all in units of the step, [0,1].

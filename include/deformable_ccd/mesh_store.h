@@ -93,7 +93,7 @@ class MeshStore {
   StepStatus runReason() const { return run_reason_; }
 
   /// Position at a stamp for which lookup is READY: a frame's own positions, bit for bit, or interpolated between two.
-  /// The rounded doubles are the truth from there on (DESIGN.md, Several bodies).
+  /// The rounded doubles are the truth from there on (doc/algorithm.md, "The question").
   void positionsAt(StampNs stamp_ns, Positions& out) const;
   /// Rigid bodies: the pose at a stamp for which lookup is READY.
   Eigen::Isometry3d poseAt(StampNs stamp_ns) const;

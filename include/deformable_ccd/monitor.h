@@ -92,7 +92,7 @@ struct StepOutcome {
   core::StepStats stats;
   double unknown_fraction = 0;  ///< [1] of the swept voxels, those that the map does not know; filled by whoever has the map
   std::size_t substeps = 0;
-  bool clear = false;  ///< INTERFACE.md, ~clear
+  bool clear = false;  ///< doc/interface.md, ~clear
 
   /// Positions at both ends and the map used, for geometry and display. Shared with the monitor's next step: copy
   /// nothing, but finish with the outcome before the next call.

@@ -17,7 +17,7 @@ struct OccupiedLeaf {
   std::uint32_t size = 1;
 };
 
-/// Coordinate of plane k in the map's frame, in metres; this double is the truth (DESIGN.md, Maps).
+/// Coordinate of plane k in the map's frame, in metres; this double is the truth (doc/algorithm.md, "Obstacles").
 inline double voxelPlane(std::int64_t k, double resolution_m) {
   return static_cast<double>(k - 32768) * resolution_m;
 }

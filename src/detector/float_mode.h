@@ -1,5 +1,5 @@
 // Round to nearest, denormals on: what every proof of a rounding margin assumes. Set on each worker for the time of
-// its work and restored after it (DESIGN.md, invariant 3).
+// its work and restored after it (doc/algorithm.md, last section).
 #pragma once
 
 #include <cfenv>

@@ -1,4 +1,4 @@
-// The start state of a step (DESIGN.md): do an edge and a face already meet at t=0?
+// The start state of a step (doc/algorithm.md): do an edge and a face already meet at t=0?
 #pragma once
 
 #include <array>

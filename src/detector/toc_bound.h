@@ -1,5 +1,5 @@
 // Lower bound of a pair's TOC from the linear filter: the latest over the 8 directions of the first time at which
-// the moving projections meet (DESIGN.md, "The accuracy ladder").
+// the moving projections meet (doc/algorithm.md, "The elementary test").
 #pragma once
 
 #include "deformable_ccd/elementary.h"

@@ -1,4 +1,4 @@
-// The exact rung: the tiers of EXACT_TEST.md, cheapest first, until one decides. Complete: never undecided.
+// The exact rung: the tiers of doc/algorithm.md, cheapest first, until one decides. Complete: never undecided.
 #pragma once
 
 #include "deformable_ccd/elementary.h"

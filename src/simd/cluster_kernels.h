@@ -1,4 +1,4 @@
-// Kernels of the clustered broad phase over raw arrays (DESIGN.md, "Two forms of the same filter", clustered form).
+// Kernels of the clustered broad phase over raw arrays (doc/algorithm.md, "Linear filter").
 //
 // Every vertex has a record of 16 int16: its projections onto the 8 directions at t0, then at t1. Sixteen nodes
 // (features, or groups of the level below) form a group, stored as structure of arrays:

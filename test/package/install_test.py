@@ -39,6 +39,10 @@ guard=$!
 timeout 30 rostopic echo -n 3 /collision_monitor/first_contact >first_contact.txt
 timeout 10 rostopic echo -n 1 /guard/stop >stop.txt
 kill -INT $guard
+cmake -S "$share/examples/library" -B library -DCMAKE_PREFIX_PATH="$INSTALLED" >library.log
+cmake --build library >>library.log
+library/two_frames | grep -q 'contacts, starts CLEAR'
+
 grep -q 'answered: True' first_contact.txt
 grep -q 'data: True' stop.txt
 echo finished
@@ -80,6 +84,17 @@ class InstallTest(unittest.TestCase):
                              capture_output=True, text=True, timeout=240, check=False)
         logs = ''.join(p.read_text(errors='replace')[-2000:] for p in home.glob('*.log'))
         self.assertEqual((ran.returncode, ran.stdout.splitlines()[-1:]), (0, ['finished']), ran.stdout + ran.stderr + logs)
+
+    @unittest.skipIf(os.environ.get('DEFORMABLE_CCD_SANITIZED'), 'only the ordinary build is installed')
+    def test_the_core_alone_configures_with_a_target_to_export(self):
+        """Its build takes minutes; scripts/test --aarch64 and --long build it, for their own ends."""
+        with tempfile.TemporaryDirectory() as tree:
+            ran = subprocess.run(['cmake', '-S', str(CHECKOUT), '-B', tree, '-DDEFORMABLE_CCD_CORE_ONLY=ON',
+                                  '-DDEFORMABLE_CCD_TESTS=OFF'], capture_output=True, text=True, check=False)
+            self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+            exported = list(pathlib.Path(tree).rglob('deformable_ccd-targets.cmake'))
+            self.assertEqual(len(exported), 1)
+            self.assertIn('add_library(deformable_ccd::deformable_ccd SHARED IMPORTED)', exported[0].read_text())
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""The layering rules of DESIGN.md, held against the includes of every source file."""
+"""The layering rules of doc/development.md, held against the includes of every source file."""
 import re
 import unittest
 

@@ -1,4 +1,4 @@
-// What each rung promises (DESIGN.md, "The accuracy ladder"), judged against the oracle with no tolerance of its own.
+// What each rung promises (doc/algorithm.md, "The elementary test"), judged against the oracle with no tolerance of its own.
 #pragma once
 
 #include <optional>
