@@ -59,7 +59,7 @@ class ResultBag {
     context.parameter_hash = pipeline.config().hash;
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
-    bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, frame));
+    bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
     std_msgs::Bool clear;
     clear.data = outcome.clear;
     bag_.write("/collision_monitor/clear", at, clear);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace deformable_ccd {
 
@@ -31,6 +32,37 @@ std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
 ros::Time timeOf(const StepOutcome& outcome, double toc) {
   const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
   return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
+}
+
+std::string nameOf(const core::Contact& contact, const std::vector<MonitorBody>& bodies) {
+  static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
+  static const std::size_t SIZES[][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}};
+  const std::size_t* size = SIZES[static_cast<std::size_t>(contact.kind)];
+  std::string text;
+  std::size_t next = 0;
+  for (int side = 0; side < 2; ++side) {
+    if (side == 1) text += " and ";
+    if (size[side] == 0) return text + "the map";
+    text += SIZED[size[side]];
+    for (std::size_t i = 0; i < size[side]; ++i) text += (i ? "-" : "") + std::to_string(contact.vertex[next++]);
+    text += " of " + bodies.at(contact.body[static_cast<std::size_t>(side)]).name;
+  }
+  return text;
+}
+
+/// A line for people; `first` is null where nothing known touches.
+std::string summaryOf(const StepOutcome& outcome, const core::Contact* first, const std::vector<MonitorBody>& bodies) {
+  if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
+  const std::string start = std::string(", starts ") + toString(outcome.start_state);
+  if (!std::isfinite(outcome.earliest_toc)) return "no contact" + start;
+  char when[64];
+  std::snprintf(when, sizeof when, "%.6f s into the step", outcome.earliest_toc * outcome.duration_s());
+  if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + start;
+  if (first->certainty != Certainty::CERTAIN) {
+    return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + start;
+  }
+  return std::string(first->initial ? "in contact from the start" : "contact " + std::string(when)) + ": " +
+         nameOf(*first, bodies) + start;
 }
 
 ContactMessage toMessage(const StepOutcome& outcome, const core::Contact& contact) {
@@ -185,7 +217,7 @@ ContactArray toContactArray(const StepOutcome& outcome, const std::vector<Monito
   return out;
 }
 
-FirstContact toFirstContact(const StepOutcome& outcome, const std::string& frame) {
+FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame) {
   FirstContact out;
   out.header = header(outcome.stamp_ns, frame);
   out.status = static_cast<std::uint8_t>(outcome.status);
@@ -194,12 +226,18 @@ FirstContact toFirstContact(const StepOutcome& outcome, const std::string& frame
   out.contact = std::isfinite(outcome.earliest_toc);
   out.toc = outcome.earliest_toc;
   out.seconds_from_start = outcome.earliest_toc;
-  if (!out.contact) return out;
+  const core::Contact* first = nullptr;
   for (const core::Contact& contact : outcome.contacts) {
-    out.certain |= contact.toc_lower == outcome.earliest_toc && contact.certainty == Certainty::CERTAIN;
+    if (contact.toc_lower != outcome.earliest_toc) continue;
+    const bool certain = contact.certainty == Certainty::CERTAIN;
+    if (!first || (certain && !out.certain)) first = &contact;
+    out.certain |= certain;
   }
-  out.time_of_contact = timeOf(outcome, outcome.earliest_toc);
-  out.seconds_from_start = outcome.earliest_toc * outcome.duration_s();
+  if (out.contact) {
+    out.time_of_contact = timeOf(outcome, outcome.earliest_toc);
+    out.seconds_from_start = outcome.earliest_toc * outcome.duration_s();
+  }
+  out.summary = summaryOf(outcome, first, bodies);
   return out;
 }
 

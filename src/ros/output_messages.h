@@ -29,7 +29,7 @@ struct StatsContext {
 };
 
 ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
-FirstContact toFirstContact(const StepOutcome& outcome, const std::string& frame);
+FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
 /// The message of the package, not core::StepStats.
 StepStats_<std::allocator<void>> toStepStats(const StepOutcome& outcome, const StatsContext& context,
                                              const std::string& frame);

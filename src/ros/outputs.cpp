@@ -33,7 +33,7 @@ void Outputs::publishResult(const StepOutcome& outcome, const std::vector<Monito
   std_msgs::Bool clear;
   clear.data = outcome.clear;
   clear_.publish(clear);
-  if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, frame));
+  if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
 }
 

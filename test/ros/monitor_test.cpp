@@ -63,6 +63,7 @@ TEST_F(Plain, MeshStampedKnownTime) {
   EXPECT_NEAR(contact.approach_speed, 40, 1e-3) << "m/s, not m per step";
   ASSERT_TRUE(waitUntil([&] { return first.count() > 0 && first.last().contact; }));
   EXPECT_NEAR(first.last().seconds_from_start, 0.025, 1e-6);
+  EXPECT_EQ(first.last().summary.rfind("contact 0.025000 s into the step: ", 0), 0u) << first.last().summary;
   expectAddsUp();
 }
 
