@@ -41,7 +41,7 @@ struct MonitorOptions {
   std::size_t max_waiting = 16;    ///< steps that may wait for other bodies; the oldest gives way
   std::size_t max_contacts = 10000;     ///< per outcome; the earliest are kept, status TRUNCATED
   bool suppress_initial = false;        ///< leave initial obstacle contacts out of the list (they still count)
-  std::vector<Box> exclude_boxes;       ///< [m], fixed frame: voxels with their centre inside are not reported
+  std::vector<Box> exclude_boxes;       ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;       ///< without a map the status is NO_MAP
   double octomap_timeout_s = 0;         ///< a map older than this at the end of the step is no map; 0: never
   double rigid_tolerance_m = 1e-3;      ///< a step is split until straight paths are this close to a rotation's arc
@@ -83,7 +83,7 @@ struct StepOutcome {
   std::vector<core::Contact> contacts;  ///< canonical order, filtered and cut as the options say; toc of the whole step
   std::size_t total_contacts = 0;       ///< before the cut to max_contacts
   std::size_t suppressed = 0;           ///< initial contacts left out by choice
-  std::size_t excluded = 0;             ///< obstacle contacts left out by exclude_boxes
+  std::uint64_t excluded_voxels = 0;    ///< finest voxels of the map taken out by exclude_boxes
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
   bool complete = true;

@@ -7,6 +7,7 @@
 
 #include "detector/step_runner.h"
 #include "mesh/seam_reason.h"
+#include "obstacle/excluded_leaves.h"
 
 namespace deformable_ccd {
 
@@ -86,6 +87,8 @@ struct Monitor::Impl {
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
   MonitorMap map;
+  std::shared_ptr<const VoxelSurface> reduced_from, reduced;  // the map's surface, and what exclude_boxes leave of it
+  std::uint64_t excluded_voxels = 0;
   StepRunner runner;
   std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
   StepInput input, side_input;
@@ -120,6 +123,7 @@ struct Monitor::Impl {
   void forgetReferences();
   bool separates(std::size_t body, const std::vector<double>& radius_m) const;
   MonitorMap usableMap(StampNs stamp_ns) const;
+  MonitorMap withoutExcluded(MonitorMap used);
   void runStep(const Pending& step, StepOutcome& outcome);
   void finishOutcome(StepOutcome& outcome, const MonitorMap& used) const;
   StepRunner& side();
@@ -147,6 +151,9 @@ void Monitor::setOptions(const MonitorOptions& options) {
   for (MeshStore& store : impl_->stores) store.setOptions(options.store);
   impl_->runner.setOptions(options.detector);
   impl_->side_runner.reset();
+  // Other boxes are another map.
+  impl_->map_changed |= !options.exclude_boxes.empty() || !impl_->options.exclude_boxes.empty();
+  impl_->reduced_from = nullptr;
   impl_->options = options;
 }
 
@@ -176,6 +183,7 @@ FrameCounters Monitor::total() const {
 void Monitor::setMap(MonitorMap map) {
   impl_->map = std::move(map);
   impl_->map_changed = true;
+  impl_->reduced_from = nullptr;
 }
 
 StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns) {
@@ -365,6 +373,21 @@ MonitorMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
   return used;
 }
 
+MonitorMap Monitor::Impl::withoutExcluded(MonitorMap used) {
+  if (options.exclude_boxes.empty() || !used.surface) return used;
+  if (reduced_from != used.surface) {
+    RemainingLeaves remaining = leavesOutside(used.surface->leaves(), used.surface->resolution(),
+                                              used.map_from_fixed.inverse(), options.exclude_boxes);
+    reduced = remaining.excluded_voxels == 0
+                  ? used.surface
+                  : VoxelSurface::build(used.surface->resolution(), std::move(remaining.leaves));
+    excluded_voxels = remaining.excluded_voxels;
+    reduced_from = used.surface;
+  }
+  used.surface = reduced;
+  return used;
+}
+
 void Monitor::Impl::finishOutcome(StepOutcome& outcome, const MonitorMap& used) const {
   if (!options.obstacle_expected || used.surface) return;
   outcome.status = StepStatus::NO_MAP;
@@ -383,7 +406,8 @@ void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
     listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
                       &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &input.radius_m, &input.references, &used});
   }
-  runner.run(input, bodies, options, used, continues, outcome);
+  runner.run(input, bodies, options, withoutExcluded(used), continues, outcome);
+  if (used.surface && !options.exclude_boxes.empty()) outcome.excluded_voxels = excluded_voxels;
   finishOutcome(outcome, used);
   has_last = true;
   map_changed = map_changed && !used.surface && map.surface;
@@ -449,7 +473,7 @@ StepOutcome Monitor::checkNow() {
   m.keepReferences(m.side_input);
   outcome.start_ns = outcome.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   const MonitorMap used = m.usableMap(outcome.stamp_ns);
-  m.side().run(m.side_input, m.bodies, m.options, used, false, outcome);
+  m.side().run(m.side_input, m.bodies, m.options, m.withoutExcluded(used), false, outcome);
   m.finishOutcome(outcome, used);
   return outcome;
 }
@@ -485,7 +509,7 @@ StepOutcome Monitor::predict() {
   outcome.start_ns = m.last_end_ns;
   outcome.stamp_ns = m.last_end_ns + static_cast<StampNs>(std::llround(m.options.look_ahead_s * 1e9));
   const MonitorMap used = m.usableMap(m.last_end_ns);
-  m.side().run(m.side_input, m.bodies, m.options, used, false, outcome);
+  m.side().run(m.side_input, m.bodies, m.options, m.withoutExcluded(used), false, outcome);
   m.finishOutcome(outcome, used);
   return outcome;
 }

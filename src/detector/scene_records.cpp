@@ -194,6 +194,7 @@ void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t*
 }
 
 void SceneArrays::quantize(std::size_t first, std::size_t last) {
+  if (first == last) return;  // a body without edges has no vertices here, and a scene of such no array
   simd::quantize(vertices_[first].t0, last - first, low_, scale_, records_.data() + first * simd::RECORD);
 }
 

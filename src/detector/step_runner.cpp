@@ -48,36 +48,6 @@ double scaleUp(double toc, std::size_t i, std::size_t n) {
   return n == 1 ? toc : std::min(1.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 2.0));
 }
 
-bool inAny(const std::vector<Box>& boxes, const Vec3& point) {
-  return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
-    return (point.array() >= box.min.array()).all() && (point.array() <= box.max.array()).all();
-  });
-}
-
-Vec3 voxelCentre(const core::Contact& contact, double resolution_m) {
-  const double half = 0.5 * contact.voxel_size * resolution_m;
-  return Vec3(voxelPlane(contact.voxel.x, resolution_m), voxelPlane(contact.voxel.y, resolution_m),
-              voxelPlane(contact.voxel.z, resolution_m)) + Vec3::Constant(half);
-}
-
-void exclude(const std::vector<Box>& boxes, const StepInput& input, StepOutcome& outcome) {
-  if (boxes.empty() || !outcome.obstacle) return;
-  const Eigen::Isometry3d fixed_from_map = outcome.map_from_fixed.inverse();
-  const auto excluded = [&](const core::Contact& contact) {
-    return contact.body[1] == OBSTACLE_BODY &&
-           inAny(boxes, fixed_from_map * voxelCentre(contact, outcome.obstacle->resolution()));
-  };
-  auto& contacts = outcome.contacts;
-  const auto kept = std::remove_if(contacts.begin(), contacts.end(), excluded);
-  outcome.excluded = static_cast<std::size_t>(contacts.end() - kept);
-  contacts.erase(kept, contacts.end());
-  auto& found = outcome.intersections;
-  found.erase(std::remove_if(found.begin(), found.end(), [&](const StartIntersection& at) {
-    return at.body[1] == OBSTACLE_BODY && inAny(boxes, input.t0[at.body[0]][at.vertex[0]]);
-  }), found.end());
-  if (outcome.start_state == StartState::INTERSECTING && found.empty()) outcome.start_state = StartState::CLEAR;
-}
-
 void keepEarliest(std::size_t count, std::vector<core::Contact>& contacts) {
   if (contacts.size() <= count) return;
   std::stable_sort(contacts.begin(), contacts.end(),
@@ -87,8 +57,7 @@ void keepEarliest(std::size_t count, std::vector<core::Contact>& contacts) {
 }
 
 /// What of the raw contacts is reported, and what the step may be called.
-void conclude(const MonitorOptions& options, const StepInput& input, StepOutcome& outcome) {
-  exclude(options.exclude_boxes, input, outcome);
+void conclude(const MonitorOptions& options, StepOutcome& outcome) {
   auto& contacts = outcome.contacts;
   const bool touched = !contacts.empty();
   if (options.suppress_initial) {
@@ -271,7 +240,7 @@ void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bod
   outcome.positions_t0 = &input.t0;
   outcome.positions_t1 = &input.t1;
   outcome.topologies = &input.topologies;
-  conclude(options, input, outcome);
+  conclude(options, outcome);
   if (parts < wanted) {
     outcome.status = StepStatus::PARTIAL;
     outcome.clear = false;

@@ -292,7 +292,7 @@ void visitAnswer(Archive& a, Answer& answer) {
   a.choice(answer.start_state, StartState::NOT_CHECKED);
   a.number(answer.total_contacts);
   a.number(answer.suppressed);
-  a.number(answer.excluded);
+  a.number(answer.excluded_voxels);
   a.number(answer.substeps);
   a.number(answer.unchecked_toc_lower);
   a.number(answer.earliest_toc);
@@ -412,7 +412,7 @@ void setAnswer(const StepOutcome& outcome, StepRecording& recording) {
   answer.start_state = outcome.start_state;
   answer.total_contacts = outcome.total_contacts;
   answer.suppressed = outcome.suppressed;
-  answer.excluded = outcome.excluded;
+  answer.excluded_voxels = outcome.excluded_voxels;
   answer.substeps = outcome.substeps;
   answer.unchecked_toc_lower = outcome.unchecked_toc_lower;
   answer.earliest_toc = outcome.earliest_toc;

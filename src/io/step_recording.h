@@ -39,7 +39,7 @@ struct RecordedAnswer {
   std::string reason;
   bool answered = false, complete = true, clear = false;
   StartState start_state = StartState::NOT_CHECKED;
-  std::uint64_t total_contacts = 0, suppressed = 0, excluded = 0, substeps = 0;
+  std::uint64_t total_contacts = 0, suppressed = 0, excluded_voxels = 0, substeps = 0;
   double unchecked_toc_lower = 0, earliest_toc = 0;
   std::vector<core::Contact> contacts;
   std::vector<StartIntersection> intersections;

@@ -106,7 +106,7 @@ std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const Re
   out.field("start state", std::string(toString(recorded.start_state)), std::string(toString(replayed.start_state)));
   out.field("contacts before the cut to max_contacts", recorded.total_contacts, replayed.total_contacts);
   out.field("suppressed contacts", recorded.suppressed, replayed.suppressed);
-  out.field("excluded contacts", recorded.excluded, replayed.excluded);
+  out.field("excluded voxels", recorded.excluded_voxels, replayed.excluded_voxels);
   out.field("parts of the step", recorded.substeps, replayed.substeps);
   out.field("earliest toc", recorded.earliest_toc, replayed.earliest_toc);
   compareContacts(recorded, replayed, out);

@@ -120,7 +120,7 @@ void fillContacts(const StepOutcome& outcome, StatsMessage& out) {
     out.contacts_initial += contact.initial;
     out.contacts_leaving += contact.leaving;
   }
-  out.suppressed = static_cast<std::uint32_t>(outcome.suppressed + outcome.excluded);
+  out.suppressed = static_cast<std::uint32_t>(outcome.suppressed);
   out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
   out.earliest_toc = outcome.earliest_toc;
 }
@@ -204,7 +204,7 @@ ContactArray toContactArray(const StepOutcome& outcome, const std::vector<Monito
   out.complete = outcome.complete;
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
-  out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed + outcome.excluded);
+  out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
   for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
   out.contacts.reserve(outcome.contacts.size());
   for (const core::Contact& contact : outcome.contacts) out.contacts.push_back(toMessage(outcome, contact));
@@ -260,6 +260,7 @@ StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context
     out.map_leaves = outcome.obstacle->leafCount();
     out.map_age = static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9;
   }
+  out.excluded_voxels = outcome.excluded_voxels;
   out.unknown_fraction = outcome.unknown_fraction;
   out.look_ahead_compared = static_cast<std::uint32_t>(context.look_ahead.compared);
   out.look_ahead_median_error = context.look_ahead.median_error_s;

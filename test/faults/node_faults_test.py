@@ -283,7 +283,8 @@ class NodeFaultsTest(unittest.TestCase):
                 time.sleep(0.01)
             raise AssertionError('the node never saw %g s' % now_s)
 
-        self.assertEqual(step_at(1000).status, ContactArray.FIRST_FRAME)
+        # A gap where a frame came before the clock did, at a time of 0.
+        self.assertIn(step_at(1000).status, (ContactArray.FIRST_FRAME, ContactArray.GAP))
         self.assertEqual(step_at(1000.125).status, ContactArray.OK)
         for jump_to_s, status in ((500, ContactArray.TIME_JUMP), (90000, ContactArray.GAP), (89999.875, ContactArray.TIME_JUMP)):
             jumped = step_at(jump_to_s)

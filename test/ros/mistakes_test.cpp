@@ -164,7 +164,7 @@ TEST_F(Mistake, AnotherMeshEveryFrame) {
   Tracker tracker;
   bool more = false;
   const auto publisher = advertiseAndWait<MeshStamped>(node, "/remeshed/mesh");
-  expectTold("/remeshed", "TOPOLOGY_CHANGED: the mesh has 6 vertices and 1 faces",
+  expectTold("/remeshed", "TOPOLOGY_CHANGED: the mesh has 6 vertices and ",  // 1 or 2 faces in turn; one line in some seconds
              "use a tracker, or give topology/file", [&] {
                Mesh mesh = tipAbove(1);
                if ((more = !more)) mesh.faces.pop_back();

@@ -184,8 +184,28 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   feed(at(200 * MS, 12));
   const StepOutcome excluded = feed(at(300 * MS, 10));
   EXPECT_TRUE(excluded.contacts.empty());
-  EXPECT_GT(excluded.excluded, 0u);
+  EXPECT_EQ(excluded.excluded_voxels, 1u);
   EXPECT_TRUE(excluded.clear) << "what is excluded is not looked at";
+}
+
+// An excluded voxel is free space, so what lies behind it is exposed.
+TEST_F(OneBody, WhatLiesBehindAnExcludedVoxelIsTouched) {
+  MonitorOptions options = loose();
+  options.exclude_boxes = {{{0, 0, 1}, {2, 2, 2}}};
+  monitor.setOptions(options);
+  monitor.setMap({VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 2}}), 0, Eigen::Isometry3d::Identity(), {}});
+  const auto at = [](StampNs stamp_ns, double z) {
+    return MeshFrame{stamp_ns, oneTriangle(), {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}}, false,
+                     Eigen::Isometry3d::Identity()};
+  };
+  feed(at(0, 3));
+  const StepOutcome outcome = feed(at(100 * MS, 0.5));
+  EXPECT_EQ(outcome.excluded_voxels, 4u);
+  ASSERT_FALSE(outcome.contacts.empty());
+  EXPECT_NEAR(outcome.earliest_toc, 0.8, 1e-9) << "from 3 m to the upper face of what is left, at 1 m";
+  monitor.setOptions(loose());
+  feed(at(200 * MS, 3));
+  EXPECT_NEAR(feed(at(300 * MS, 0.5)).earliest_toc, 0.4, 1e-9) << "nothing is excluded any more";
 }
 
 TEST_F(OneBody, TooManyContactsKeepTheEarliest) {

@@ -1,0 +1,82 @@
+#include "obstacle/excluded_leaves.h"
+
+#include <algorithm>
+
+namespace deformable_ccd {
+namespace {
+
+constexpr std::size_t MAX_VISITS = std::size_t{1} << 24;
+
+class Splitter {
+ public:
+  Splitter(double resolution_m, const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes)
+      : resolution_m_(resolution_m),
+        fixed_from_map_(fixed_from_map),
+        reach_(fixed_from_map.linear().cwiseAbs() * Vec3::Ones()),
+        boxes_(boxes) {}
+
+  void add(const OccupiedLeaf& leaf) {
+    const double half = 0.5 * leaf.size * resolution_m_;
+    const Vec3 corner(voxelPlane(leaf.min.x, resolution_m_), voxelPlane(leaf.min.y, resolution_m_),
+                      voxelPlane(leaf.min.z, resolution_m_));
+    const Vec3 centre = fixed_from_map_ * Vec3(corner + Vec3::Constant(half)), reach = half * reach_;
+    const auto any = [this](const auto& condition) { return std::any_of(boxes_.begin(), boxes_.end(), condition); };
+    const bool near = any([&](const Box& box) {
+      return ((centre + reach).array() >= box.min.array()).all() && ((centre - reach).array() <= box.max.array()).all();
+    });
+    if (!near || ++visits_ > MAX_VISITS) {
+      remaining_.leaves.push_back(leaf);
+      return;
+    }
+    // The whole cube, or for a finest voxel its centre.
+    const Vec3 within = leaf.size == 1 ? Vec3(Vec3::Zero()) : reach;
+    const bool inside = any([&](const Box& box) {
+      return ((centre - within).array() >= box.min.array()).all() && ((centre + within).array() <= box.max.array()).all();
+    });
+    if (inside) {
+      remaining_.excluded_voxels += std::uint64_t{leaf.size} * leaf.size * leaf.size;
+    } else if (leaf.size == 1) {
+      remaining_.leaves.push_back(leaf);
+    } else {
+      split(leaf);
+    }
+  }
+
+  RemainingLeaves take() { return std::move(remaining_); }
+
+ private:
+  void split(const OccupiedLeaf& leaf) {
+    const std::size_t first = remaining_.leaves.size();
+    const std::uint64_t before = remaining_.excluded_voxels;
+    const std::uint32_t half = leaf.size / 2;
+    for (std::uint32_t child = 0; child < 8; ++child) {
+      OccupiedLeaf part;
+      part.size = half;
+      part.min.x = static_cast<std::uint16_t>(leaf.min.x + (child & 1) * half);
+      part.min.y = static_cast<std::uint16_t>(leaf.min.y + (child >> 1 & 1) * half);
+      part.min.z = static_cast<std::uint16_t>(leaf.min.z + (child >> 2) * half);
+      add(part);
+    }
+    if (remaining_.excluded_voxels > before) return;
+    remaining_.leaves.resize(first);
+    remaining_.leaves.push_back(leaf);
+  }
+
+  double resolution_m_;
+  Eigen::Isometry3d fixed_from_map_;
+  Vec3 reach_;  // of a cube's half edge along the fixed frame's axes
+  const std::vector<Box>& boxes_;
+  RemainingLeaves remaining_;
+  std::size_t visits_ = 0;
+};
+
+}  // namespace
+
+RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double resolution_m,
+                              const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes) {
+  Splitter splitter(resolution_m, fixed_from_map, boxes);
+  for (const OccupiedLeaf& leaf : leaves) splitter.add(leaf);
+  return splitter.take();
+}
+
+}  // namespace deformable_ccd
