@@ -212,7 +212,7 @@ int run(int argc, char** argv) {
     step.bodies = {{&m0.vertices, &m1.vertices}};
     core::StepStats stats;
     scenes.back()->record(step, stats);
-    scenes.back()->refit([](std::size_t n, const auto& f) { f(0, n); });
+    scenes.back()->refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
     addSurvivors(frames[i], *scenes.back(), sets);
   }
   AccuracyOptions finest;
