@@ -90,6 +90,9 @@ struct DetectorOptions {
   double step_budget_ms = 0;      ///< 0: none
   bool earliest_only = false;     ///< only the contacts with the earliest TOC cell are returned
   bool check_start_state = true;  ///< run the static tests when the step needs them
+  /// Bodies that move bit for bit as in the step before keep their bounds (no answer changes). Off: to time a step again
+  /// and again.
+  bool keep_bounds = true;
   bool unfolded_test = true;      ///< leave out the self-collision of surfaces that certainly do not fold (no answer changes)
 };
 

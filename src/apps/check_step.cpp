@@ -80,6 +80,7 @@ struct Run {
 Run runStep(const Arguments& a, const std::string& accuracy, const std::shared_ptr<const Topology>& topology,
             const Positions& t0, const Positions& t1) {
   DetectorOptions options;
+  options.keep_bounds = false;  // the same step again and again
   options.accuracy.rung = accuracyFromString(accuracy.c_str());
   options.accuracy.tolerance_m = a.tolerance_m;
   options.accuracy.toc_bits = a.toc_bits;

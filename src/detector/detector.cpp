@@ -55,6 +55,7 @@ void Detector::Impl::setOptions(const DetectorOptions& o) {
   checkSeparation(o, scene.largestSeparation());
   if (!arena || o.num_threads != options.num_threads) arena.emplace(o.num_threads);
   elementary = std::move(test);
+  scene.setKeepBounds(o.keep_bounds);
   options = o;
   obstacle_tests.clear();
 }

@@ -57,6 +57,9 @@ class SceneArrays {
   /// Throws std::invalid_argument naming the body when a frame has the wrong number of vertices.
   void record(const MotionStep& step, core::StepStats& stats);
 
+  /// Off: every body is refitted in every step.
+  void setKeepBounds(bool keep) { keep_bounds_ = keep; }
+
   /// Records and bounds of every body that is not kept. pieces(n, f): calls f(first, last) over [0, n), in parallel or not.
   template <class Pieces>
   void refit(const Pieces& pieces, core::StepStats& stats) {
@@ -124,6 +127,7 @@ class SceneArrays {
   double range_min_[8] = {}, range_max_[8] = {};  // what the records span
   double low_[8] = {}, scale_[8] = {}, unit_[8] = {};
   bool range_padded_ = false;
+  bool keep_bounds_ = true;
   bool bounds_valid_ = false;  // trees and records are those of the vertices
   double largest_separation_ = 0;
   bool uncertain_ = false;

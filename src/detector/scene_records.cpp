@@ -130,7 +130,7 @@ void SceneArrays::record(const MotionStep& step, core::StepStats& stats) {
   uncertain_ = false;
   std::fill(radii_.begin(), radii_.end(), 0.0);
   bool any_kept = false;
-  const bool valid = bounds_valid_;
+  const bool valid = bounds_valid_ && keep_bounds_;
   bounds_valid_ = false;  // until refit(), also when a body is refused on the way
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     uncertain_ |= recordRadii(bodies_[b], step.bodies[b]);

@@ -97,6 +97,12 @@ TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
   EXPECT_EQ(run(rest, moved).stats.bodies_kept, 1u) << "one vertex by one representable number";
   EXPECT_EQ(run(moved, moved).stats.bodies_kept, 1u);
   EXPECT_EQ(run(moved, moved).stats.bodies_kept, 2u);
+  DetectorOptions always;
+  always.keep_bounds = false;
+  detector.setOptions(always);
+  EXPECT_EQ(run(moved, moved).stats.bodies_kept, 0u) << "by choice";
+  detector.setOptions(DetectorOptions());
+  EXPECT_EQ(run(moved, moved).stats.bodies_kept, 2u);
   Positions lost = moved;
   lost[3].x() = std::nan("");
   EXPECT_EQ(run(lost, lost).stats.bodies_kept, 1u);
