@@ -183,6 +183,8 @@ def write_latency(folder, result):
         name = r["name"].replace("_", " ") + (" of %.2f ms" % r["budget_ms"] if "budget_ms" in r else "")
         for key in ("step_ms", "latency_ms", "round_trip_ms"):
             v = r[key]
+            if not v:  # the contacts went to another program
+                continue
             rows.append([name, str(r["vertices"]), "%g" % r["rate_hz"], str(r["frames"]), str(r["answered"]),
                          str(r["dropped"]), str(r["deadline"]), str(r["contacts_median"]), key[:-3].replace("_", " "), "%.2f" % v[len(v) // 2],
                          "%.2f" % v[min(len(v) - 1, int(0.99 * len(v)))], "%.2f" % v[-1]])
