@@ -223,7 +223,8 @@ HWY_INLINE void writeOut(const RootBlock& roots, std::size_t j, double cells, co
   out.verdict[pair] = static_cast<std::uint8_t>(roots.outcome[j]);
   out.lo[pair] = roots.root_lo[j];
   out.hi[pair] = roots.root_hi[j];
-  out.cell[pair] = static_cast<std::uint64_t>(roots.root_lo[j] * cells);
+  const double lo = roots.root_lo[j];  // anything where there is no root in the step, and no cell then
+  out.cell[pair] = lo >= 0 && lo <= 1 ? static_cast<std::uint64_t>(lo * cells) : 0;
 }
 
 /// Leaves a pair to subdivision, which starts afresh; solves what is there when the block is full.
