@@ -327,6 +327,13 @@ Query drawn(RandomSource& random, PairKind kind, Hardness hardness) {
   return general(random, kind);
 }
 
+Hardness drawHardness(RandomSource& random) {
+  constexpr int COMMON = static_cast<int>(Hardness::MIXED_150);
+  int hardness = integer(random, 0, COMMON - 1);
+  if (oneIn(random, 400)) hardness = integer(random, COMMON, static_cast<int>(Hardness::COUNT) - 1);
+  return static_cast<Hardness>(hardness);
+}
+
 }  // namespace
 
 const char* toString(Hardness hardness) {
@@ -347,11 +354,13 @@ Query hardQuery(RandomSource& random, PairKind kind, Hardness hardness) {
 }
 
 Query hardQuery(RandomSource& random) {
-  constexpr int COMMON = static_cast<int>(Hardness::MIXED_150);
-  int hardness = integer(random, 0, COMMON - 1);
-  if (oneIn(random, 400)) hardness = integer(random, COMMON, static_cast<int>(Hardness::COUNT) - 1);
-  const PairKind kind = oneIn(random, 2) ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
-  return hardQuery(random, kind, static_cast<Hardness>(hardness));
+  const Hardness hardness = drawHardness(random);
+  return hardQuery(random, oneIn(random, 2) ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE, hardness);
+}
+
+Query hardQuery(RandomSource& random, PairKind kind) {
+  const Hardness hardness = drawHardness(random);
+  return hardQuery(random, kind, hardness);
 }
 
 std::vector<std::array<int, 4>> vertexPermutations(PairKind kind) {

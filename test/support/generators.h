@@ -41,6 +41,7 @@ using RandomSource = std::mt19937_64;
 /// A hard pair of random hardness (MIXED_150 and EXTREME are rare, since they are slow to judge), kind and symmetry.
 /// `contact` is left false. All coordinates are finite.
 Query hardQuery(RandomSource& random);
+Query hardQuery(RandomSource& random, PairKind kind);
 Query hardQuery(RandomSource& random, PairKind kind, Hardness hardness);
 
 /// Simpler pairs in the order to try: points at rest or at the origin, fewer digits, coordinates of zero.

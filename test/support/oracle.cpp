@@ -88,25 +88,22 @@ struct TriangleTest {
 /// The convex hull of moving points, asked for the origin.
 class MovingHull {
  public:
-  explicit MovingHull(const std::vector<PolynomialVector>& points) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      for (std::size_t j = i + 1; j < points.size(); ++j) {
-        sides_.emplace_back(points[i], points[j]);
-        for (std::size_t k = j + 1; k < points.size(); ++k) triangles_.emplace_back(points[i], points[j], points[k]);
-      }
-    }
-  }
+  explicit MovingHull(std::vector<PolynomialVector> points)
+      : points_(std::move(points)), coplanar_(dot(points_[0], cross(points_[1], points_[2]))) {}
 
-  bool hasOriginAt(Root& time) const {
+  bool hasOriginAt(Root& time) {
+    makeTests();
     const auto holds = [&time](const auto& test) { return test.holdsAt(time); };
     return std::any_of(triangles_.begin(), triangles_.end(), holds) || std::any_of(sides_.begin(), sides_.end(), holds);
   }
 
-  /// Zero where the points stay coplanar with the origin; without a zero, at no time is there a contact.
-  const Polynomial& coplanar() const { return triangles_.front().coplanar; }
+  /// Zero where the points stay coplanar with the origin; without a zero, at no time is there a contact. (EE: the four
+  /// differences are the corners of a parallelogram, so that this holds for all of them when it holds for three.)
+  const Polynomial& coplanar() const { return coplanar_; }
 
   /// All polynomials whose signs decide.
-  std::vector<Polynomial> events() const {
+  std::vector<Polynomial> events() {
+    makeTests();
     std::vector<Polynomial> result;
     for (const SideTest& side : sides_) side.appendTo(result);
     for (const TriangleTest& triangle : triangles_) triangle.appendTo(result);
@@ -114,6 +111,19 @@ class MovingHull {
   }
 
  private:
+  /// Most pairs are never coplanar, so that the tests are made when they are asked for.
+  void makeTests() {
+    if (!sides_.empty()) return;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      for (std::size_t j = i + 1; j < points_.size(); ++j) {
+        sides_.emplace_back(points_[i], points_[j]);
+        for (std::size_t k = j + 1; k < points_.size(); ++k) triangles_.emplace_back(points_[i], points_[j], points_[k]);
+      }
+    }
+  }
+
+  std::vector<PolynomialVector> points_;
+  Polynomial coplanar_;
   std::vector<SideTest> sides_;
   std::vector<TriangleTest> triangles_;
 };
@@ -136,9 +146,9 @@ std::vector<Root> mergedRoots(const std::vector<Polynomial>& polynomials) {
 }  // namespace
 
 std::optional<Root> firstContact(PairKind kind, const PairMotion& pair) {
-  const MovingHull hull(minkowskiDifference(kind, pair));
+  MovingHull hull(minkowskiDifference(kind, pair));
   Root start(Dyadic{0, 0});
-  if (hull.hasOriginAt(start)) return start;
+  if (start.signOf(hull.coplanar()) == 0 && hull.hasOriginAt(start)) return start;
   const bool always_coplanar = hull.coplanar().isZero();
   for (Root& root : always_coplanar ? mergedRoots(hull.events()) : rootsInUnitInterval(hull.coplanar())) {
     if (hull.hasOriginAt(root)) return root;
@@ -147,7 +157,7 @@ std::optional<Root> firstContact(PairKind kind, const PairMotion& pair) {
 }
 
 std::optional<Root> firstContactThorough(PairKind kind, const PairMotion& pair) {
-  const MovingHull hull(minkowskiDifference(kind, pair));
+  MovingHull hull(minkowskiDifference(kind, pair));
   std::vector<Polynomial> events = hull.events();
   events.push_back(Polynomial({0, 1}));   // the time 0
   events.push_back(Polynomial({-1, 1}));  // the time 1

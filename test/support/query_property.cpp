@@ -23,11 +23,6 @@ static void showValue(const Query& query, std::ostream& out) {
 namespace test {
 namespace {
 
-std::uint64_t seed() {
-  const char* text = std::getenv("DEFORMABLE_CCD_SEED");
-  return text != nullptr ? std::strtoull(text, nullptr, 10) : 20170601;
-}
-
 rc::Gen<Query> arbitraryHardQuery() {
   const auto drawn = rc::gen::map(rc::gen::noShrink(rc::gen::resize(100, rc::gen::arbitrary<std::uint64_t>())),
                                   [](std::uint64_t draw) {
@@ -42,6 +37,11 @@ rc::Gen<Query> arbitraryHardQuery() {
 bool longRun() {
   const char* text = std::getenv("DEFORMABLE_CCD_LONG");
   return text != nullptr && *text != '\0' && std::string(text) != "0";
+}
+
+std::uint64_t propertySeed() {
+  const char* text = std::getenv("DEFORMABLE_CCD_SEED");
+  return text != nullptr ? std::strtoull(text, nullptr, 10) : 20170601;
 }
 
 std::string writeReplayFile(const std::string& name, Query query) {
@@ -70,7 +70,7 @@ void checkHardQueries(const std::string& name, int queries, const QueryProperty&
     RC_FAIL(wrong);
   };
   rc::detail::TestParams params;
-  params.seed = seed();
+  params.seed = propertySeed();
   params.maxSuccess = queries;
   const rc::detail::TestResult result = rc::detail::checkTestable(holds, rc::detail::TestMetadata(), params);
   if (result.is<rc::detail::SuccessResult>()) {

@@ -41,17 +41,21 @@ std::string judgeStart(const StepResult& result, const std::vector<StartIntersec
 std::string judgeStep(const TestStep& step) {
   std::vector<TrueContact> contacts = trueContacts(step);
   const std::vector<StartIntersection> start = trueIntersections(step);
-  for (const BroadPhase broad_phase : {BroadPhase::CLUSTERED, BroadPhase::BRUTE_FORCE}) {
-    DetectorOptions options;
-    options.broad_phase = broad_phase;
-    Detector detector(options);
-    detector.setBodies(step.setups(), step.positions());
-    const StepResult& result = detector.run(step.motion());
-    std::string wrong = judgeContacts(result.contacts, contacts, options.accuracy.toc_bits);
-    if (wrong.empty()) wrong = judgeStart(result, start);
-    if (!wrong.empty()) return (broad_phase == BroadPhase::CLUSTERED ? "clustered: " : "brute force: ") + wrong;
-  }
-  return "";
+  std::string finding;
+  forEachSimdTarget([&](const std::string& target) {
+    for (const BroadPhase broad_phase : {BroadPhase::CLUSTERED, BroadPhase::BRUTE_FORCE}) {
+      DetectorOptions options;
+      options.broad_phase = broad_phase;
+      Detector detector(options);
+      detector.setBodies(step.setups(), step.positions());
+      const StepResult& result = detector.run(step.motion());
+      std::string wrong = judgeContacts(result.contacts, contacts, options.accuracy.toc_bits);
+      if (wrong.empty()) wrong = judgeStart(result, start);
+      if (wrong.empty() || !finding.empty()) continue;
+      finding = (broad_phase == BroadPhase::CLUSTERED ? "clustered, " : "brute force, ") + target + ": " + wrong;
+    }
+  });
+  return finding;
 }
 
 std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests, int& full_tests) {

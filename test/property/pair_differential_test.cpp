@@ -1,0 +1,125 @@
+// Hard pairs by the million: every elementary test, on every SIMD target, in batches, against the oracle.
+// DEFORMABLE_CCD_LONG=1 runs 1e7 of them; the seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file that
+// run_queries replays; the single-pair tests beside this one shrink it.
+#include <gtest/gtest.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "deformable_ccd/elementary.h"
+#include "support/generators.h"
+#include "support/oracle.h"
+#include "support/promises.h"
+#include "support/query_property.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+constexpr std::size_t BLOCK = 10000, CHUNK = 250;
+
+std::vector<AccuracyOptions> allRungs() {
+  std::vector<AccuracyOptions> rungs;
+  AccuracyOptions options;
+  for (const int bits : {10, 32, 52}) {
+    options.toc_bits = bits;
+    rungs.push_back(options);
+  }
+  for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::FAST}) {
+    options = AccuracyOptions();
+    options.rung = rung;
+    rungs.push_back(options);
+  }
+  return rungs;
+}
+
+bool same(const ElementaryResult& a, const ElementaryResult& b) {
+  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
+}
+
+/// Pairs of one kind as the detector lays them out, with their truth.
+struct Block {
+  std::vector<Query> queries;
+  std::vector<std::optional<Root>> truth;
+  std::vector<VertexMotion> vertices;
+  std::vector<Quad> quads;
+
+  Block(std::uint64_t first_seed, PairKind kind) : queries(BLOCK), truth(BLOCK), vertices(4 * BLOCK), quads(BLOCK) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        RandomSource random(first_seed + i);
+        queries[i] = hardQuery(random, kind);
+        truth[i] = firstContact(kind, queries[i].motion);
+        for (std::size_t v = 0; v < 4; ++v) {
+          quads[i][v] = static_cast<Index>(4 * i + v);
+          std::copy_n(queries[i].motion.x[0][v], 3, vertices[4 * i + v].t0);
+          std::copy_n(queries[i].motion.x[1][v], 3, vertices[4 * i + v].t1);
+        }
+      }
+    });
+  }
+
+  PairBatch batch(std::size_t begin, std::size_t end) const {
+    PairBatch result;
+    result.kind = queries.front().kind;
+    result.vertices = vertices.data();
+    result.pairs = quads.data() + begin;
+    result.count = end - begin;
+    return result;
+  }
+};
+
+TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
+  const std::size_t blocks = longRun() ? 1000 : 2;
+  const std::vector<AccuracyOptions> rungs = allRungs();
+  std::atomic<std::size_t> tested{0}, contacts{0};
+  std::mutex failure;
+  std::string targets;
+  for (std::size_t b = 0; b < blocks && !HasFailure(); ++b) {
+    const PairKind kind = b % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
+    Block block(propertySeed() + b * BLOCK, kind);
+    contacts += static_cast<std::size_t>(
+        std::count_if(block.truth.begin(), block.truth.end(), [](const auto& toc) { return toc.has_value(); }));
+    // What a target before said of the pairs: the same answer need not be judged again.
+    std::vector<std::vector<ElementaryResult>> judged(rungs.size());
+    forEachSimdTarget([&](const std::string& target) {
+      if (b == 0) targets += " " + target;
+      const bool first = judged[0].empty();
+      if (first) std::fill(judged.begin(), judged.end(), std::vector<ElementaryResult>(BLOCK));
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
+        std::vector<ElementaryResult> results(range.size());
+        for (std::size_t r = 0; r < rungs.size(); ++r) {
+          const AccuracyOptions& options = rungs[r];
+          TierCounters counters;
+          makeElementaryTest(options)->run(block.batch(range.begin(), range.end()), results.data(), counters);
+          for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const ElementaryResult& result = results[i - range.begin()];
+            if (!first && same(result, judged[r][i])) continue;
+            judged[r][i] = result;
+            const std::string broken = brokenPromise(options, block.queries[i], block.truth[i], result);
+            if (broken.empty()) continue;
+            const std::lock_guard<std::mutex> lock(failure);
+            ADD_FAILURE() << toString(options.rung) << " " << options.toc_bits << " bits on " << target << ": " << broken
+                          << "\nreplay: run_queries " << writeReplayFile("pair-differential", block.queries[i]);
+            return;
+          }
+        }
+        tested += range.size();
+      });
+    });
+  }
+  std::cout << blocks * BLOCK << " hard pairs, " << contacts << " in contact, each by " << rungs.size() << " rungs on"
+            << targets << ": " << tested * rungs.size() << " answers judged\n";
+  EXPECT_GT(contacts, blocks * BLOCK / 10);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
