@@ -1,5 +1,6 @@
 // Any bytes as the recording of a step: refused with a message that can be read, or written again without loss and, where
 // that takes no time, replayed.
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -20,6 +21,15 @@ bool isSmall(const StepRecording& recording) {
          recording.options.rigid_tolerance_m >= 1e-3 && recording.options.detector.accuracy.max_subdivisions <= 5000;
 }
 
+/// A replay costs as much as a hundred recordings read: the fuzzer replays one in sixteen, as its bytes say.
+bool isToReplay([[maybe_unused]] const std::uint8_t* data, [[maybe_unused]] std::size_t size) {
+#ifdef DEFORMABLE_CCD_FUZZER
+  return std::accumulate(data, data + size, 0u) % 16 == 0;
+#else
+  return true;
+#endif
+}
+
 void recording(const std::uint8_t* data, std::size_t size) {
   StepRecording read;
   try {
@@ -32,7 +42,7 @@ void recording(const std::uint8_t* data, std::size_t size) {
   const std::vector<std::uint8_t> written = test::recordingBytes(read);
   const StepRecording again = readRecording(written.data(), written.size(), "copy");
   if (test::recordingBytes(again) != written) throw std::logic_error("written and read again, the step differs");
-  if (!isSmall(read)) return;
+  if (!isSmall(read) || !isToReplay(data, size)) return;
   try {
     replayStep(read);
   } catch (const std::invalid_argument&) {
