@@ -1,4 +1,5 @@
-// Any bytes as a pair: every rung against the oracle, and exact against itself in another order of the vertices.
+// Any bytes as a pair: every rung against the oracle and on every SIMD target, and exact against itself in another order of
+// the vertices.
 //
 // The first byte chooses how the rest is read: a seed of the generators of hard pairs; coordinates of few bits, one or
 // two bytes each, between which coincidences are likely; or doubles as they are. Missing bytes are zeros.
@@ -14,6 +15,7 @@
 #include "fuzz/fuzz_target.h"
 #include "support/generators.h"
 #include "support/promises.h"
+#include "support/step_support.h"
 
 namespace {
 
@@ -118,18 +120,24 @@ const std::vector<Rung>& rungs() {
   throw std::logic_error(text.str());
 }
 
+bool same(const ElementaryResult& a, const ElementaryResult& b) {
+  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
+}
+
 void pair(const std::uint8_t* data, std::size_t size) {
   const Query query = decode(data, size);
   std::optional<test::Root> toc = test::firstContact(query.kind, query.motion);
+  const auto orders = test::vertexPermutations(query.kind);
+  const Query other = test::permuted(query, orders[size % orders.size()]);
   for (const Rung& rung : rungs()) {
     const ElementaryResult result = test::testQuery(*rung.test, query);
     const std::string broken = test::brokenPromise(rung.options, query, toc, result);
     if (!broken.empty()) report(query, rung, broken);
+    test::forEachSimdTarget([&](const std::string& target) {
+      if (!same(test::testQuery(*rung.test, query), result)) report(query, rung, "another answer on " + target);
+    });
     if (rung.options.rung != Accuracy::EXACT) continue;
-    const auto orders = test::vertexPermutations(query.kind);
-    const Query other = test::permuted(query, orders[size % orders.size()]);
-    const ElementaryResult again = test::testQuery(*rung.test, other);
-    if (again.verdict != result.verdict || again.toc_lower != result.toc_lower) {
+    if (!same(test::testQuery(*rung.test, other), result)) {
       report(query, rung, "another order of the vertices, another answer");
     }
   }
