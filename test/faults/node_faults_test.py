@@ -49,19 +49,20 @@ def resident_kb(pid):
 
 
 class Cloud:
-    """A grid of points that is crumpled anew in each frame, so that a step has much to do."""
+    """A grid of points that is crumpled anew in each frame, so that a step has much to do; `padding` bytes a point are no
+    field's, so that frames that are kept show in the memory."""
 
-    def __init__(self, rows, cols):
-        self.rows, self.cols = rows, cols
+    def __init__(self, rows, cols, padding=0):
+        self.rows, self.cols, self.point_step = rows, cols, 24 + padding
         noise = random.Random(1)
-        self.variants = [b''.join(struct.pack('<3d', 0.01 * c + noise.uniform(-0.02, 0.02),
+        self.variants = [b''.join(struct.pack('<3d%dx' % padding, 0.01 * c + noise.uniform(-0.02, 0.02),
                                               0.01 * r + noise.uniform(-0.02, 0.02), noise.uniform(-0.02, 0.02))
                                   for r in range(rows) for c in range(cols)) for _ in range(4)]
         self.count = 0
 
     def message(self, stamp_s=None):
         self.count += 1
-        m = PointCloud2(height=self.rows, width=self.cols, point_step=24, row_step=24 * self.cols, is_dense=True,
+        m = PointCloud2(height=self.rows, width=self.cols, point_step=self.point_step, row_step=self.point_step * self.cols, is_dense=True,
                         data=self.variants[self.count % len(self.variants)])
         m.fields = [PointField(name=n, offset=8 * i, datatype=PointField.FLOAT64, count=1) for i, n in enumerate('xyz')]
         m.header.frame_id = 'world'
@@ -150,7 +151,7 @@ class NodeFaultsTest(unittest.TestCase):
     def overload(self, name, policy, size, factor):
         """Frames at `factor` times the rate at which steps are done; returns the newest stamps and the last statistics."""
         node = self.start_node(name, queue_size=size, queue_policy=policy)
-        cloud = Cloud(24, 24)
+        cloud = Cloud(24, 24, padding=152)  # 101 kB a frame
         for _ in range(6):
             seen = len(self.stats)
             self.publisher.publish(cloud.message())
@@ -176,7 +177,9 @@ class NodeFaultsTest(unittest.TestCase):
         # A frame waits for those before it in the queue and for the step that runs, however long the overload lasts.
         longest_s = max(s.total_ms for s in self.stats) * 1e-3
         self.assertLess(max(s.latency for s in self.stats), (size + 3) * longest_s + 0.5 * SLOW)
-        self.assertLess(memory_kb[-1], memory_kb[0] + 20000, 'memory grows: %s kB' % memory_kb)
+        # Between the two, 200 frames came: 20 MB, had they been kept. Under sanitizers what is freed stays a while.
+        if SLOW == 1:
+            self.assertLess(memory_kb[-1], memory_kb[0] + 10000, 'memory grows: %s kB' % memory_kb)
         return cloud, last
 
     def test_overload_newest_first(self):
@@ -188,8 +191,7 @@ class NodeFaultsTest(unittest.TestCase):
     def test_overload_oldest_first(self):
         for factor in (2, 10):
             with self.subTest(factor=factor):
-                cloud, last = self.overload('oldest_%d' % factor, 'oldest', 3, factor)
-                self.assertLessEqual(last.header.stamp.to_sec(), 100 + 0.01 * cloud.count)
+                self.overload('oldest_%d' % factor, 'oldest', 3, factor)  # which frames are kept: InputQueue's test
 
     def test_a_subscriber_that_never_reads(self):
         node = self.start_node('unread', queue_size=100)

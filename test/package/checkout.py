@@ -1,8 +1,11 @@
 """Where the checkout is and what belongs to it; for the tests beside this file."""
+import os
 import pathlib
 import subprocess
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
+# Of the build under test: scripts/test --sanitize has a workspace of its own.
+TOOLS = pathlib.Path(os.environ.get('DEFORMABLE_CCD_WORKSPACE', CHECKOUT / 'build')) / 'devel/lib/deformable_ccd'
 CODE_SUFFIXES = {'.h', '.cpp'}
 
 

@@ -11,19 +11,18 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 MAY_INCLUDE = {
     'simd': set(),
     'mesh': set(),
-    'projection': {'mesh', 'simd'},
     'filter': {'simd'},
-    'broad_phase': {'mesh', 'projection', 'filter', 'simd'},
+    'broad_phase': {'mesh', 'filter', 'simd'},
     'elementary': {'simd'},
     'obstacle': {'simd'},
-    'detector': {'mesh', 'projection', 'broad_phase', 'filter', 'elementary', 'obstacle', 'simd'},
+    'detector': {'mesh', 'broad_phase', 'filter', 'elementary', 'obstacle', 'simd'},
     'io': {'mesh'},
     'octomap': {'obstacle'},
     'scene': set(),
     'ros': {'octomap', 'io'},
     'apps': None,  # everything
 }
-CORE = ['simd', 'mesh', 'projection', 'filter', 'broad_phase', 'elementary', 'obstacle', 'detector', 'io']
+CORE = ['simd', 'mesh', 'filter', 'broad_phase', 'elementary', 'obstacle', 'detector', 'io']
 ROS_OR_PCL = re.compile(r'^(ros/|ros\.h|tf2|pcl|rosbag|roslib|nodelet|pluginlib|topic_tools|dynamic_reconfigure|'
                         r'diagnostic_updater|xmlrpcpp|message_filters|[a-z_]+_msgs/|std_srvs/)')
 OCTOMAP = re.compile(r'^octomap/(?!.*\.hh)')

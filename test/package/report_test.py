@@ -6,9 +6,8 @@ import subprocess
 import tempfile
 import unittest
 
-from checkout import CHECKOUT
+from checkout import CHECKOUT, TOOLS
 
-TOOLS = CHECKOUT / 'build/devel/lib/deformable_ccd'
 BROWSER = next((b for b in ('chromium', 'chromium-browser', 'google-chrome') if shutil.which(b)), None)
 
 

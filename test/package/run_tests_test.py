@@ -2,6 +2,8 @@
 import importlib.util
 import pathlib
 import stat
+import subprocess
+import sys
 import tempfile
 import textwrap
 import unittest
@@ -55,6 +57,27 @@ class RunTestsTest(unittest.TestCase):
     def test_a_binary_that_was_not_built_failed(self):
         result, _ = run_tests.GtestRunner(self.path / 'not_there', 0, 1, '')(self.path)
         self.assertEqual((result.passed, result.failed), (0, 1))
+
+    def test_a_filter_that_nothing_matches_failed(self):
+        (self.path / 'gtest_suites.txt').write_text('suite_tests')
+        (self.path / 'gtest').mkdir()
+        binary = self.path / 'gtest/suite_tests'
+        binary.write_text('#!/bin/sh\nfor a in "$@"; do case $a in --gtest_output=xml:*) '
+                          'echo "<testsuites/>" >"${a#*xml:}";; esac; done\n')
+        binary.chmod(0o755)
+        ran = subprocess.run([sys.executable, str(CHECKOUT / 'scripts/lib/run_tests.py'), '--build', str(self.path),
+                              '--filter', 'NoSuchTest.*'], capture_output=True, text=True, check=False)
+        self.assertEqual((ran.returncode, ran.stdout.splitlines()[-1]), (1, '0 passed, 1 failed, 0 skipped'))
+
+    def test_each_report_of_a_sanitizer_failed(self):
+        result = run_tests.Result()
+        run_tests.sanitizer_reports(self.path, result)
+        self.assertEqual(result.failed, 0)
+        (self.path / 'report.node.17').write_text('WARNING: ThreadSanitizer: data race\n')
+        (self.path / 'report.node.18').write_text('ERROR: LeakSanitizer: detected memory leaks\n')
+        run_tests.sanitizer_reports(self.path, result)
+        self.assertEqual(result.failed, 2)
+        self.assertIn('data race', result.notes[0])
 
     def test_python_tests_are_counted(self):
         test = CHECKOUT / 'build' / 'counted_test.py'

@@ -10,9 +10,8 @@ import unittest
 
 import yaml
 
-from checkout import CHECKOUT
+from checkout import CHECKOUT, TOOLS
 
-TOOLS = CHECKOUT / 'build/devel/lib/deformable_ccd'
 OBSTACLE = 'octomap'
 
 

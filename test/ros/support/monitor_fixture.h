@@ -59,6 +59,11 @@ class MonitorTest : public ::testing::Test {
     waitUntil([this] { return clear.count() > 0 && !clear.last().data; });
   }
 
+  /// Whatever a test does, no frame is lost.
+  void TearDown() override {
+    if (stats.count() > 0) expectAddsUp();
+  }
+
   std_srvs::Trigger::Response trigger(const std::string& service) {
     std_srvs::Trigger call;
     EXPECT_TRUE(ros::service::call(name_ + "/" + service, call));

@@ -1,7 +1,6 @@
 #include "deformable_ccd/detector.h"
 
 #include <gtest/gtest.h>
-#include <malloc.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <limits>
 #include <set>
 
+#include "support/heap.h"
 #include "support/step_support.h"
 
 namespace deformable_ccd {
@@ -339,9 +339,9 @@ TEST(Detector, MemoryIsFlat) {
       detector.run(motion);
     };
     for (int i = 0; i < 10; ++i) round();
-    const std::size_t before = mallinfo2().uordblks;
+    const std::size_t before = heapInUse();
     for (int i = 0; i < 20; ++i) round();
-    const std::size_t after = mallinfo2().uordblks;
+    const std::size_t after = heapInUse();
     // Which worker does which piece varies with more threads, and with it how far each one's buffers grow.
     if (threads == 1) {
       EXPECT_LE(after, before) << "bytes in use after and before 40 steps";

@@ -3,7 +3,6 @@
 // 1e3 frames; 1e5 with DEFORMABLE_CCD_LONG=1.
 #include "ros/output_messages.h"
 
-#include <malloc.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -15,6 +14,7 @@
 
 #include "io/flight_recorder.h"
 #include "ros/monitor_pipeline.h"
+#include "support/heap.h"
 #include "support/query_property.h"
 #include "support/recordings.h"
 
@@ -116,7 +116,7 @@ TEST(Soak, FlatMemoryAndTheSameBytesForTheSameStep) {
     ASSERT_EQ(bytes, expected) << "frame " << i;
     ++known_steps;
     // Bytes that are in use; a sanitizer's allocator says 0. Buffers have found their size by the second period.
-    const std::size_t memory = mallinfo2().uordblks;
+    const std::size_t memory = test::heapInUse();
     if (known_steps == 2) first_memory = memory;
     if (known_steps > 2) {
       ASSERT_LE(memory, first_memory + (256 << 10)) << "frame " << i;
