@@ -1,0 +1,163 @@
+// What a step is computed from: where every body is at both of its ends, reference frames, the map.
+#include <algorithm>
+#include <utility>
+
+#include "detector/monitor_impl.h"
+#include "obstacle/excluded_leaves.h"
+
+namespace deformable_ccd {
+namespace {
+
+std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  std::vector<double> larger(a.size());
+  for (std::size_t v = 0; v < a.size(); ++v) larger[v] = std::max(a[v], b[v]);
+  return larger;
+}
+
+double largest(const std::vector<double>& values) {
+  return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
+}
+
+}  // namespace
+
+Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, bool timed_out) {
+  const MeshStore& store = stores[body];
+  const std::string name = "body '" + bodies[body].name + "' ";
+  if (!isStream(body)) {
+    if (!store.empty()) return Ready::YES;
+    if (!timed_out) return Ready::WAIT;
+    drop(step, StepStatus::NO_BODY, name + "has not been received yet");
+    return Ready::NEVER;
+  }
+  std::uint64_t run_t0 = 0;
+  const Lookup at_t1 = store.lookup(step.to->stamp_ns, &runs[body]);
+  if (at_t1 == Lookup::NOT_YET) {
+    if (!timed_out) return Ready::WAIT;
+    drop(step, StepStatus::NO_BODY, name + (store.empty() ? "has not been received yet"
+                                                          : "has no frame at or after the end of the step"));
+    return Ready::NEVER;
+  }
+  const Lookup at_t0 = store.lookup(step.from->stamp_ns, &run_t0);
+  if (at_t1 == Lookup::READY && at_t0 == Lookup::READY && run_t0 == runs[body]) return Ready::YES;
+  drop(step, store.runReason() == StepStatus::FIRST_FRAME ? StepStatus::NO_BODY : store.runReason(),
+       name + "has no unbroken frames around the step (" + toString(store.runReason()) + ")");
+  return Ready::NEVER;
+}
+
+Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
+  Ready all = Ready::YES;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (b == options.clock_body) continue;
+    const Ready one = placeable(b, step, timed_out);
+    if (one == Ready::NEVER) return one;
+    if (one == Ready::WAIT) all = Ready::WAIT;
+  }
+  return all;
+}
+
+void Monitor::Impl::place(const Pending& step) {
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    MeshStore& store = stores[b];
+    if (b == options.clock_body) {
+      input.t0[b] = step.from->positions;
+      input.t1[b] = step.to->positions;
+      input.topologies[b] = step.to->topology;
+      input.rigid[b] = step.to->rigid;
+      input.pose_t0[b] = step.from->pose;
+      input.pose_t1[b] = step.to->pose;
+      input.radius_m[b] = largerRadii(step.from->radius_m, step.to->radius_m);
+      continue;
+    }
+    input.topologies[b] = store.newest().topology;
+    input.rigid[b] = isStream(b) && store.newest().rigid;
+    if (!isStream(b)) {
+      input.t0[b] = input.t1[b] = store.newest().positions;
+      input.radius_m[b] = store.newest().radius_m;
+      continue;
+    }
+    store.positionsAt(step.from->stamp_ns, input.t0[b]);
+    store.positionsAt(step.to->stamp_ns, input.t1[b]);
+    if (input.rigid[b]) {
+      input.pose_t0[b] = store.poseAt(step.from->stamp_ns);
+      input.pose_t1[b] = store.poseAt(step.to->stamp_ns);
+    }
+    store.radiiOver(step.from->stamp_ns, step.to->stamp_ns, input.radius_m[b]);
+    store.forgetBefore(step.to->stamp_ns);
+  }
+  keepReferences(input);
+}
+
+void Monitor::Impl::forgetReferences() {
+  references.assign(bodies.size(), nullptr);
+  reference_topologies.assign(bodies.size(), nullptr);
+}
+
+/// The first frame of each topology is what a minimum separation measures neighbours in. Radii that grow past those of
+/// the reference make a new list; twice as large, so that it happens seldom.
+void Monitor::Impl::keepReferences(StepInput& at) {
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const bool same = reference_topologies[b] && (reference_topologies[b] == at.topologies[b] ||
+                                                  *reference_topologies[b] == *at.topologies[b]);
+    if (!same) {
+      reference_topologies[b] = at.topologies[b];
+      const bool needed = bodies[b].self_collision && !bodies[b].rigid && separates(b, at.radius_m[b]);
+      references[b] = needed ? std::make_shared<const ReferenceFrame>(ReferenceFrame{at.t0[b], {}}) : nullptr;
+    }
+    const double now_m = largest(at.radius_m[b]), listed_m = references[b] ? largest(references[b]->radius_m) : now_m;
+    if (now_m > listed_m) {
+      std::vector<double> radius_m(at.t0[b].size(), std::max(now_m, 2 * listed_m));
+      references[b] =
+          std::make_shared<const ReferenceFrame>(ReferenceFrame{references[b]->positions, std::move(radius_m)});
+    }
+    at.references[b] = references[b];
+  }
+}
+
+bool Monitor::Impl::separates(std::size_t body, const std::vector<double>& radius_m) const {
+  const auto named = [](const SeparationFrom& from) { return from.separation_m > 0; };
+  return bodies[body].minimum_separation_m > 0 || !radius_m.empty() ||
+         std::any_of(bodies[body].separations.begin(), bodies[body].separations.end(), named);
+}
+
+void Monitor::setReference(std::size_t body, std::shared_ptr<const Topology> topology,
+                           std::shared_ptr<const ReferenceFrame> reference) {
+  impl_->reference_topologies.at(body) = std::move(topology);
+  impl_->references.at(body) = std::move(reference);
+}
+
+void Monitor::setMap(MonitorMap map) {
+  impl_->map = std::move(map);
+  impl_->map_changed = true;
+  impl_->reduced_from = nullptr;
+}
+
+MonitorMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
+  MonitorMap used = map;
+  if (!options.obstacle_expected) return used;
+  if (!used.surface) {
+    if (used.problem.empty()) used.problem = "no octomap has been received yet";
+  } else if (options.octomap_timeout_s > 0 && used.stamp_ns > 0 &&
+             seconds(used.stamp_ns, stamp_ns) > options.octomap_timeout_s) {
+    used.surface = nullptr;
+    used.problem = "the octomap is older than octomap_timeout_s";
+  }
+  return used;
+}
+
+MonitorMap Monitor::Impl::withoutExcluded(MonitorMap used) {
+  if (options.exclude_boxes.empty() || !used.surface) return used;
+  if (reduced_from != used.surface) {
+    RemainingLeaves remaining = leavesOutside(used.surface->leaves(), used.surface->resolution(),
+                                              used.map_from_fixed.inverse(), options.exclude_boxes);
+    reduced = remaining.excluded_voxels == 0
+                  ? used.surface
+                  : VoxelSurface::build(used.surface->resolution(), std::move(remaining.leaves));
+    excluded_voxels = remaining.excluded_voxels;
+    reduced_from = used.surface;
+  }
+  used.surface = reduced;
+  return used;
+}
+
+}  // namespace deformable_ccd
