@@ -1,11 +1,12 @@
 // replay_step FILE: a recorded step once more; exit status 0 when it gives the recorded contacts bit for bit.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
 
 #include "deformable_ccd/simd_target.h"
-#include "detector/pair_trace.h"
+#include "detector/voxel_trace.h"
 #include "io/step_replay.h"
 
 namespace {
@@ -22,9 +23,11 @@ struct Arguments {
 Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
   app.add_option("FILE", a.file, "a file that ~record_step, a surprise or the crash handler wrote")->required();
-  app.add_option("--pair", a.pairs, "VF:v,a,b,c (vertex, face) or EE:a,b,c,d (two edges): the pair's way through the stages");
-  app.add_option("--bodies", a.bodies, "the two features' bodies for --pair, by name; default: the first body for both")
-      ->expected(2);
+  app.add_option("--pair", a.pairs,
+                 "the pair's way through the stages: VF:v,a,b,c (vertex, face), EE:a,b,c,d (two edges), or with the map "
+                 "VX:v,x,y,z, EX:a,b,x,y,z, FX:a,b,c,x,y,z (vertex, edge or face, and the key of a voxel)");
+  app.add_option("--bodies", a.bodies, "the features' bodies for --pair, by name, one for both; default: the first body")
+      ->expected(1, 2);
   app.add_option("--threads", a.threads, "worker threads; the answer does not depend on them")->check(CLI::Range(1, 256))
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto; the answer does not depend on it")->capture_default_str();
@@ -33,29 +36,57 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   return a;
 }
 
-PairQuestion question(const std::string& text, const Arguments& a, const StepRecording& recording) {
-  PairQuestion q;
-  const std::string kind = text.substr(0, 3);
-  if (kind != "VF:" && kind != "EE:") throw std::invalid_argument("--pair " + text + ": write VF:v,a,b,c or EE:a,b,c,d");
-  q.kind = kind == "VF:" ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
-  std::istringstream numbers(text.substr(3));
-  for (std::size_t i = 0; i < 4; ++i) {
-    std::int64_t vertex = -1;
+/// What stands behind the colon, as many numbers as the kind has, each below the limit.
+std::vector<std::uint32_t> numbersOf(const std::string& text, std::size_t count) {
+  std::istringstream in(text.substr(3));
+  std::vector<std::uint32_t> numbers;
+  while (numbers.size() < count) {
+    std::int64_t number = -1;
     char comma = ',';
-    if ((i > 0 && !(numbers >> comma)) || comma != ',' || !(numbers >> vertex) || vertex < 0 || vertex >= NO_INDEX) {
-      throw std::invalid_argument("--pair " + text + ": four vertices are needed, separated by commas");
+    if ((!numbers.empty() && !(in >> comma)) || comma != ',' || !(in >> number) || number < 0 || number >= NO_INDEX) {
+      throw std::invalid_argument("--pair " + text + ": " + std::to_string(count) + " numbers are needed, separated by commas");
     }
-    q.vertex[i] = static_cast<Index>(vertex);
+    numbers.push_back(static_cast<std::uint32_t>(number));
   }
   std::string rest;
-  if (numbers >> rest) throw std::invalid_argument("--pair " + text + ": '" + rest + "' is too much");
-  for (std::size_t side = 0; side < a.bodies.size(); ++side) {
-    std::size_t b = 0;
-    while (b < recording.bodies.size() && recording.bodies[b].setup.name != a.bodies[side]) ++b;
-    if (b == recording.bodies.size()) throw std::invalid_argument("--bodies: no body is called '" + a.bodies[side] + "'");
-    q.body[side] = static_cast<std::uint16_t>(b);
+  if (in >> rest) throw std::invalid_argument("--pair " + text + ": '" + rest + "' is too much");
+  return numbers;
+}
+
+std::uint16_t bodyOf(const Arguments& a, std::size_t side, const StepRecording& recording) {
+  if (a.bodies.empty()) return 0;
+  const std::string& name = a.bodies[std::min(side, a.bodies.size() - 1)];
+  std::size_t b = 0;
+  while (b < recording.bodies.size() && recording.bodies[b].setup.name != name) ++b;
+  if (b == recording.bodies.size()) throw std::invalid_argument("--bodies: no body is called '" + name + "'");
+  return static_cast<std::uint16_t>(b);
+}
+
+std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, const StepRecording& recording,
+                               const StepInput& input, const std::vector<MonitorBody>& bodies) {
+  const std::string kind = text.substr(0, 3);
+  if (kind == "VF:" || kind == "EE:") {
+    PairQuestion q;
+    q.kind = kind == "VF:" ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
+    const std::vector<std::uint32_t> numbers = numbersOf(text, 4);
+    std::copy(numbers.begin(), numbers.end(), q.vertex.begin());
+    for (std::size_t side = 0; side < 2; ++side) q.body[side] = bodyOf(a, side, recording);
+    return tracePair(input, bodies, recording.options, q);
   }
-  return q;
+  const std::size_t vertices = kind == "VX:" ? 1 : kind == "EX:" ? 2 : kind == "FX:" ? 3 : 0;
+  if (vertices == 0) {
+    throw std::invalid_argument("--pair " + text + ": write VF:v,a,b,c, EE:a,b,c,d, VX:v,x,y,z, EX:a,b,x,y,z or FX:a,b,c,x,y,z");
+  }
+  static const PairKind KINDS[] = {PairKind::VERTEX_VOXEL_FACE, PairKind::EDGE_VOXEL_EDGE, PairKind::FACE_VOXEL_CORNER};
+  std::vector<std::uint32_t> numbers = numbersOf(text, vertices + 3);
+  const std::uint32_t* key = numbers.data() + vertices;
+  if (*std::max_element(key, key + 3) > 65535) throw std::invalid_argument("--pair " + text + ": a voxel's key is at most 65535");
+  VoxelQuestion q;
+  q.kind = KINDS[vertices - 1];
+  q.body = bodyOf(a, 0, recording);
+  q.vertex.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(vertices));
+  q.voxel = {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]), static_cast<std::uint16_t>(key[2])};
+  return traceVoxel(input, bodies, recording.options, recording.map, q);
 }
 
 void trace(const Arguments& a, const StepRecording& recording) {
@@ -77,7 +108,7 @@ void trace(const Arguments& a, const StepRecording& recording) {
   for (const std::string& text : a.pairs) {
     std::cout << '\n' << text << "  (* the rung of the recording)\n";
     std::size_t part = 0;
-    for (const TraceLine& line : tracePair(input, bodies, recording.options, question(text, a, recording))) {
+    for (const TraceLine& line : traceOf(text, a, recording, input, bodies)) {
       if (line.part != part) std::cout << "  part " << (part = line.part) + 1 << " of the step\n";
       std::cout << "  " << std::left << std::setw(15) << line.stage << std::setw(10) << toString(line.says) << line.text << '\n';
     }

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "deformable_ccd/simd_target.h"
-#include "detector/pair_trace.h"
+#include "detector/voxel_trace.h"
 #include "io/step_replay.h"
 #include "support/recordings.h"
 
@@ -327,6 +327,87 @@ TEST(PairTrace, SaysWhyAPairIsRejected) {
   EXPECT_EQ(far[1].stage, "linear");
   EXPECT_EQ(far[1].says, TraceLine::Says::REJECTED);
   EXPECT_EQ(far.back().says, TraceLine::Says::REJECTED);
+}
+
+/// What the traces of a question say at the rung of the recording, one word a part.
+std::vector<TraceLine::Says> atTheRung(const std::vector<TraceLine>& lines) {
+  std::vector<TraceLine::Says> said;
+  for (const TraceLine& line : lines) {
+    if (line.stage.find('*') != std::string::npos) said.push_back(line.says);
+  }
+  return said;
+}
+
+TEST(VoxelTrace, ContactsWithTheMapAreTheRecordedOnes) {
+  const StepRecording r = recordScene();
+  std::vector<MonitorBody> bodies;
+  const StepInput input = inputOf(r, bodies);
+  std::size_t traced = 0;
+  for (const core::Contact& c : r.answer.contacts) {
+    if (c.body[1] != OBSTACLE_BODY) continue;
+    VoxelQuestion q{c.kind, c.body[0], {}, c.voxel};
+    for (const Index v : c.vertex) {
+      if (v != NO_INDEX) q.vertex.push_back(v);
+    }
+    std::reverse(q.vertex.begin(), q.vertex.end());  // the order does not matter
+    const std::vector<TraceLine> lines = traceVoxel(input, bodies, r.options, r.map, q);
+    const std::vector<TraceLine::Says> said = atTheRung(lines);
+    EXPECT_NE(std::count(said.begin(), said.end(), TraceLine::Says::CONTACT), 0) << describeContact(c, r.bodies);
+    for (const TraceLine& line : lines) {
+      const bool proof = line.stage == "rules" || line.stage == "bounds";
+      EXPECT_FALSE(proof && said.size() == 1 && line.says == TraceLine::Says::REJECTED) << line.stage << ": " << line.text;
+    }
+    ++traced;
+  }
+  EXPECT_GT(traced, 0u);
+}
+
+TEST(VoxelTrace, SaysWhyThereIsNone) {
+  StepRecording r = recordScene();
+  std::vector<MonitorBody> bodies;
+  const StepInput input = inputOf(r, bodies);
+  const auto contact = std::find_if(r.answer.contacts.begin(), r.answer.contacts.end(), [](const core::Contact& c) {
+    return c.kind == PairKind::EDGE_VOXEL_EDGE;
+  });
+  ASSERT_NE(contact, r.answer.contacts.end());
+  const VoxelQuestion q{contact->kind, contact->body[0], {contact->vertex[0], contact->vertex[1]}, contact->voxel};
+  const auto first = [&](const MonitorOptions& options, const VoxelQuestion& question) {
+    return traceVoxel(input, bodies, options, r.map, question).front().text;
+  };
+  VoxelQuestion nowhere = q;
+  nowhere.voxel = {1, 2, 3};
+  EXPECT_EQ(first(r.options, nowhere), "the map has no occupied voxel there");
+  MonitorOptions excluding = r.options;
+  excluding.exclude_boxes = {{Vec3::Constant(-1000), Vec3::Constant(1000)}};
+  EXPECT_EQ(first(excluding, q), "the voxel is in one of exclude_boxes");
+  bodies[q.body].vertex_mask = {q.vertex[0]};
+  EXPECT_NE(first(r.options, q).find("masked"), std::string::npos);
+  bodies[q.body].against_obstacle = false;
+  bodies[q.body].vertex_mask.clear();
+  EXPECT_NE(first(r.options, q).find("against_obstacle"), std::string::npos);
+
+  // Far from the leaf the bounds tell, and the rungs agree.
+  bodies[q.body].against_obstacle = true;
+  StepInput far = input;
+  for (Positions* positions : {&far.t0[q.body], &far.t1[q.body]}) {
+    for (Vec3& p : *positions) p.x() += 100;
+  }
+  const std::vector<TraceLine> lines = traceVoxel(far, bodies, r.options, r.map, q);
+  ASSERT_GE(lines.size(), 3u);
+  EXPECT_EQ(lines[1].stage, "bounds");
+  EXPECT_EQ(lines[1].says, TraceLine::Says::REJECTED);
+  EXPECT_EQ(atTheRung(lines).front(), TraceLine::Says::REJECTED);
+}
+
+TEST(VoxelTrace, WhatDoesNotExistIsNamed) {
+  const StepRecording r = recordScene();
+  std::vector<MonitorBody> bodies;
+  const StepInput input = inputOf(r, bodies);
+  const auto ask = [&](const MonitorMap& map, const VoxelQuestion& q) { return traceVoxel(input, bodies, r.options, map, q); };
+  EXPECT_THROW(ask(r.map, {PairKind::VERTEX_VOXEL_FACE, 9, {0}, {}}), std::invalid_argument);
+  EXPECT_THROW(ask(r.map, {PairKind::VERTEX_VOXEL_FACE, 0, {300}, {}}), std::invalid_argument);
+  EXPECT_THROW(ask(r.map, {PairKind::EDGE_VOXEL_EDGE, 0, {0, 19}, {}}), std::invalid_argument) << "no such edge";
+  EXPECT_THROW(ask(MonitorMap(), {PairKind::VERTEX_VOXEL_FACE, 0, {0}, {}}), std::invalid_argument) << "no map";
 }
 
 TEST(PairTrace, WhatDoesNotExistIsNamed) {
