@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <future>
 #include <thread>
 
 #include <ros/callback_queue.h>
@@ -116,11 +115,10 @@ struct CollisionMonitor::Impl {
   // Service thread.
   void advertiseServices();
   void reconfigureNow(MonitorOptions options, const MarkerConfig& markers);
-  template <typename Result>
-  bool onWorker(const std::function<Result()>& run, Result& result);
 
   // Worker.
   void work();
+  void run(const std::function<void()>& command);
   void takeMaps();
   void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
@@ -202,51 +200,43 @@ void CollisionMonitor::Impl::subscribe() {
 
 // --- service thread --------------------------------------------------------------------------------------------------
 
-template <typename Result>
-bool CollisionMonitor::Impl::onWorker(const std::function<Result()>& run, Result& result) {
-  const auto promise = std::make_shared<std::promise<Result>>();
-  std::future<Result> future = promise->get_future();
-  queue.command([promise, run] { promise->set_value(run()); });
-  if (future.wait_for(std::chrono::duration<double>(SERVICE_TIMEOUT_S)) != std::future_status::ready) return false;
-  result = future.get();
-  return true;
-}
-
 void CollisionMonitor::Impl::advertiseServices() {
   using Trigger = std_srvs::Trigger;
   using SetBool = std_srvs::SetBool;
-  using Reply = std::pair<bool, std::string>;
   ros::NodeHandle service(private_node);
   service.setCallbackQueue(&service_callbacks);
   const auto advertise = [&](const char* name, const std::function<Reply()>& run) {
     services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
         name, [this, run](Trigger::Request&, Trigger::Response& response) {
-          Reply reply;
-          if (!onWorker(run, reply)) reply = {false, "the worker is busy"};
-          response.success = reply.first;
-          response.message = reply.second;
+          const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+          response.success = reply.success;
+          response.message = reply.message;
           return true;
         }));
   };
   advertise("reset", [this] {
     resetNow(StepStatus::RESET);
-    return Reply(true, "frames forgotten; the next one is a first frame");
+    return Reply{true, "frames forgotten; the next one is a first frame"};
   });
   advertise("check_now", [this] {
     const StepOutcome outcome = pipeline.monitor().checkNow();
-    return Reply(outcome.answered, describe(outcome));
+    return Reply{outcome.answered, describe(outcome)};
   });
   advertise("record_step", [this] {
     Reply reply;
-    reply.first = recorder.record(reply.second);
+    reply.success = recorder.record(reply.message);
     return reply;
   });
   services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
       "enable", [this](SetBool::Request& request, SetBool::Response& response) {
         enabled = request.data;
-        bool done = false;
-        response.success = onWorker<bool>([this] { resetNow(StepStatus::DISABLED); return true; }, done) && done;
-        response.message = request.data ? "enabled" : "disabled; frames are counted and dropped";
+        const auto run = [this, on = request.data] {
+          resetNow(StepStatus::DISABLED);
+          return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped"};
+        };
+        const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+        response.success = reply.success;
+        response.message = reply.message;
         return true;
       }));
   reconfigure = std::make_unique<Reconfigure>(
@@ -377,17 +367,34 @@ void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
   if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
   look_ahead.observe(outcome);
   if (!outcome.answered) return;
-  const StepOutcome prediction = pipeline.monitor().predict();
+  StepOutcome prediction;
+  try {
+    prediction = pipeline.monitor().predict();
+  } catch (const std::exception& error) {
+    prediction.status = StepStatus::INTERNAL_ERROR;
+    prediction.reason = error.what();
+    prediction.start_ns = prediction.stamp_ns = outcome.stamp_ns;
+  }
   look_ahead.predict(prediction);
   outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
   outputs.publishPrediction(prediction, config.monitor.look_ahead_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
 }
 
+/// Whatever a command throws, the node goes on; a service's caller has been told by then (InputQueue::call).
+void CollisionMonitor::Impl::run(const std::function<void()>& command) {
+  try {
+    command();
+  } catch (const std::exception& error) {
+    ROS_ERROR_STREAM("a command failed: " << error.what());
+  }
+}
+
 void CollisionMonitor::Impl::work() {
   bool more = false;
   while (!stopping) {
-    for (auto& command : queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP)) command();
+    const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
     if (stopping) return;
+    for (const auto& command : commands) run(command);
     if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
     effects.apply(pipeline.monitor(), map_publisher_seen);
     publishEffects(ros::Time::now());  // the first plan comes before the first frame
@@ -417,10 +424,11 @@ void CollisionMonitor::Impl::stop() {
   stopping = true;
   renewal.stop();
   input_spinner.stop();
-  service_spinner.stop();
-  reconfigure.reset();
   queue.wake();
   if (worker.joinable()) worker.join();
+  queue.close();  // before the service thread is waited for: it may itself wait for a command
+  service_spinner.stop();
+  reconfigure.reset();
   maps.reset();
 }
 

@@ -1,6 +1,8 @@
 #include "ros/input_queue.h"
 
 #include <chrono>
+#include <future>
+#include <memory>
 #include <utility>
 
 namespace deformable_ccd {
@@ -55,10 +57,39 @@ std::size_t InputQueue::size(std::size_t body) const {
 void InputQueue::command(std::function<void()> run) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (closed_) return;
     commands_.push_back(std::move(run));
     woken_ = true;
   }
   changed_.notify_one();
+}
+
+Reply InputQueue::call(const std::function<Reply()>& run, double timeout_s) {
+  auto promise = std::make_shared<std::promise<Reply>>();
+  std::future<Reply> future = promise->get_future();
+  // The command alone holds the promise: dropped, it breaks it, and the wait ends.
+  command([promise = std::move(promise), run] {
+    try {
+      promise->set_value(run());
+    } catch (const std::exception& error) {
+      promise->set_value({false, error.what()});
+    }
+  });
+  if (future.wait_for(std::chrono::duration<double>(timeout_s)) != std::future_status::ready) {
+    return {false, "the worker is busy with a step; this will be done after it"};
+  }
+  try {
+    return future.get();
+  } catch (const std::future_error&) {  // the promise went with its command
+    return {false, "the monitor is being stopped"};
+  }
+}
+
+void InputQueue::close() {
+  std::vector<std::function<void()>> dropped;  // ends outside of the lock
+  const std::lock_guard<std::mutex> lock(mutex_);
+  closed_ = true;
+  dropped.swap(commands_);
 }
 
 std::vector<std::function<void()>> InputQueue::wait(std::chrono::microseconds timeout) {

@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "ros/mesh_subscription.h"
@@ -18,6 +19,12 @@ struct QueuedMessage {
   MeshMessage message;
   StampNs receipt_ns = 0;
   std::int64_t arrival_ns = 0;
+};
+
+/// What a service answers.
+struct Reply {
+  bool success = false;
+  std::string message;
 };
 
 /// One queue a body, and commands for the worker. Safe to call from any thread.
@@ -37,6 +44,11 @@ class InputQueue {
 
   /// For the worker to run between steps.
   void command(std::function<void()> run);
+  /// The same, and waits for the answer. Without success: what `run` throws, in words; a timeout, after which the command
+  /// is still carried out when its turn comes; a closed queue.
+  Reply call(const std::function<Reply()>& run, double timeout_s);
+  /// The worker has ended: what it has not run is dropped, and so is all that follows, so that no call waits for it.
+  void close();
   /// Waits for a message, a command, a wake-up or the timeout; returns the commands that arrived.
   std::vector<std::function<void()>> wait(std::chrono::microseconds timeout);
   void wake();
@@ -49,7 +61,7 @@ class InputQueue {
   std::vector<std::function<void()>> commands_;
   std::size_t capacity_;
   QueuePolicy policy_;
-  bool woken_ = false;
+  bool woken_ = false, closed_ = false;
 };
 
 }  // namespace deformable_ccd

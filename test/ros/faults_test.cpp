@@ -10,7 +10,7 @@ namespace deformable_ccd {
 namespace test {
 namespace {
 
-constexpr std::size_t MONITORS = 3;  // in faults.test; each listens to /tf
+constexpr std::size_t MONITORS = 4;  // in faults.test; each listens to /tf
 
 struct Recording : MonitorTest {
   Recording() : MonitorTest("/recording") {}
@@ -162,6 +162,23 @@ TEST_F(Mapped, AMapThatStopsAndComesBack) {
   const auto refused = trigger("record_step");
   EXPECT_FALSE(refused.success);
   EXPECT_NE(refused.message.find("record_steps is 0"), std::string::npos) << refused.message;
+  expectAddsUp();
+}
+
+struct Masked : MonitorTest {
+  Masked() : MonitorTest("/masked") {}
+};
+
+TEST_F(Masked, AStepThatFailsEndsNeitherTheNodeNorACheck) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/masked/mesh");
+  send(publisher, meshStamped(tipAbove(1), 10));
+  const ContactArray failed = send(publisher, meshStamped(tipAbove(0.9), 10.1));
+  EXPECT_EQ(failed.status, ContactArray::INTERNAL_ERROR);
+  EXPECT_NE(failed.reason.find("vertex 500"), std::string::npos) << failed.reason;
+  const auto checked = trigger("check_now");
+  EXPECT_FALSE(checked.success);
+  EXPECT_NE(checked.message.find("vertex 500"), std::string::npos) << checked.message;
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.8), 10.2)).status, ContactArray::INTERNAL_ERROR) << "and goes on";
   expectAddsUp();
 }
 

@@ -6,6 +6,9 @@
 #include <nodelet/loader.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
+#include <std_srvs/Trigger.h>
+
+#include <random>
 
 #include "ros/mesh_subscription.h"
 #include "ros/support/meshes.h"
@@ -141,6 +144,43 @@ TEST(Nodelet, FindsTheSameContactsWithoutSerialising) {
     return "";
   };
   EXPECT_TRUE(waitUntil([&] { return handedOver() == std::to_string(FRAMES - 1); }, 5)) << handedOver();
+}
+
+/// A grid that is crumpled so that a step has much to do.
+sensor_msgs::PointCloud2ConstPtr crumpled(std::size_t side, double stamp_s) {
+  std::mt19937 random(static_cast<std::uint32_t>(stamp_s * 100));
+  std::uniform_real_distribution<double> noise(-0.2, 0.2);
+  Positions positions = gridAt(side, side, 0);
+  for (Vec3& p : positions) p += Vec3(noise(random), noise(random), noise(random));
+  return boost::make_shared<const sensor_msgs::PointCloud2>(cloud(positions, stamp_s));
+}
+
+TEST(Nodelet, UnloadingEndsCallsThatWaitForTheWorker) {
+  nodelet::Loader loader;
+  constexpr int SIDE = 40, FRAMES = 100;
+  ros::param::set("/busy/topology/rows", SIDE);
+  ros::param::set("/busy/topology/cols", SIDE);
+  ros::param::set("/busy/max_vertex_step_m", 0.0);
+  ros::param::set("/busy/queue_size", FRAMES);
+  ros::param::set("/busy/record_steps", 0);
+  ASSERT_TRUE(loader.load("/busy", "deformable_ccd/CollisionMonitor", {{"/mesh", "/busy/mesh"}}, {}));
+  ros::NodeHandle node;
+  const ros::Publisher publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/busy/mesh");
+  Probe<ContactArray> contacts(node, "/busy/contacts");
+  // Far more than is done before the end, so that the worker takes no command but between two steps.
+  for (int i = 0; i < FRAMES; ++i) publisher.publish(crumpled(SIDE, 10 + 0.1 * i));
+  ASSERT_TRUE(waitUntil([&] { return contacts.count() >= 2; }, 60));
+  std::vector<std::string> answers;
+  std::thread caller([&] {
+    std_srvs::Trigger call;
+    while (ros::service::call("/busy/record_step", call)) answers.push_back(call.response.message);
+  });
+  ASSERT_TRUE(waitUntil([&] { return contacts.count() >= 4; }, 60));
+  EXPECT_TRUE(loader.unload("/busy"));
+  caller.join();
+  EXPECT_LT(contacts.count(), static_cast<std::size_t>(FRAMES)) << "it was not busy";
+  ASSERT_FALSE(answers.empty());
+  EXPECT_EQ(answers.back(), "the monitor is being stopped") << "and not 10 s later that the worker is busy";
 }
 
 TEST(Nodelet, AWrongParameterIsRefusedByName) {

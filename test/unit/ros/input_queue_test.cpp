@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
 namespace deformable_ccd {
 namespace {
 
@@ -34,6 +38,51 @@ TEST(InputQueue, ClearSaysWhatItDropped) {
   EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 0})) << "what was cleared was not too much";
   QueuedMessage message;
   EXPECT_FALSE(queue.pop(0, message));
+}
+
+/// Runs what is queued, as the worker does.
+void serve(InputQueue& queue) {
+  for (const auto& command : queue.wait(std::chrono::seconds(10))) command();
+}
+
+TEST(InputQueue, ACallIsAnsweredByTheWorkerAlsoWhenItThrows) {
+  InputQueue queue(1, 1, QueuePolicy::NEWEST);
+  std::thread worker([&] {
+    serve(queue);
+    serve(queue);
+  });
+  const Reply good = queue.call([] { return Reply{true, "done"}; }, 10);
+  EXPECT_TRUE(good.success);
+  EXPECT_EQ(good.message, "done");
+  const Reply bad = queue.call([]() -> Reply { throw std::invalid_argument("vertex 500"); }, 10);
+  EXPECT_FALSE(bad.success);
+  EXPECT_EQ(bad.message, "vertex 500");
+  worker.join();
+}
+
+TEST(InputQueue, ACallThatTimesOutIsDoneLaterAndSaysSo) {
+  InputQueue queue(1, 1, QueuePolicy::NEWEST);
+  bool done = false;
+  const Reply reply = queue.call([&] { done = true; return Reply{true, "done"}; }, 0.01);
+  EXPECT_FALSE(reply.success);
+  EXPECT_NE(reply.message.find("will be done"), std::string::npos) << reply.message;
+  EXPECT_FALSE(done);
+  serve(queue);
+  EXPECT_TRUE(done);
+}
+
+TEST(InputQueue, ClosingEndsCallsAtOnce) {
+  InputQueue queue(1, 1, QueuePolicy::NEWEST);
+  Reply reply{true, ""};
+  const auto start = std::chrono::steady_clock::now();
+  std::thread caller([&] { reply = queue.call([] { return Reply{true, "done"}; }, 30); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  queue.close();
+  caller.join();
+  EXPECT_FALSE(reply.success);
+  EXPECT_NE(reply.message.find("stopped"), std::string::npos) << reply.message;
+  EXPECT_FALSE(queue.call([] { return Reply{true, "done"}; }, 30).success) << "nor does a later one wait";
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
 }
 
 }  // namespace
