@@ -113,6 +113,10 @@ struct BagReplay::Run {
       if (prediction && predictions) predictions(*prediction, pipeline, at);
       effects.apply(pipeline.monitor(), summary.maps > 0);
     }
+    for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {
+      const std::string complaint = pipeline.takeComplaint(b);
+      if (!complaint.empty()) complain(summary.mesh_topics[b] + ": " + complaint);
+    }
   }
 
   void mesh(std::size_t body, const rosbag::MessageInstance& message) {
@@ -129,8 +133,6 @@ struct BagReplay::Run {
     } else {
       pipeline.take(body, {message.getDataType(), bytesOf(message), now_ns, now_ns});
     }
-    const std::string complaint = pipeline.takeComplaint(body);
-    if (!complaint.empty()) complain(summary.mesh_topics[body] + ": refused: " + complaint);
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(at);
   }

@@ -122,6 +122,7 @@ struct CollisionMonitor::Impl {
   void takeMaps();
   void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
+  void tellComplaints();
   void publish(StepOutcome& outcome);
   void predict(StepOutcome& outcome);
   void publishEffects(const ros::Time& stamp);
@@ -219,7 +220,7 @@ void CollisionMonitor::Impl::advertiseServices() {
     return Reply{true, "frames forgotten; the next one is a first frame"};
   });
   advertise("check_now", [this] {
-    const StepOutcome outcome = pipeline.monitor().checkNow();
+    const StepOutcome outcome = pipeline.checkNow();
     return Reply{outcome.answered, describe(outcome)};
   });
   advertise("record_step", [this] {
@@ -310,9 +311,14 @@ void CollisionMonitor::Impl::takeMessages() {
     QueuedMessage queued;
     if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
     takeMessage(b, queued);
+  }
+}
+
+void CollisionMonitor::Impl::tellComplaints() {
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     const std::string complaint = pipeline.takeComplaint(b);
     // The clock body's come as outcomes, which are logged when they are published.
-    if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", "refused: " + complaint);
+    if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", complaint);
   }
 }
 
@@ -403,6 +409,7 @@ void CollisionMonitor::Impl::work() {
     accountDropped();
     StepOutcome outcome;
     while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
+    tellComplaints();
     const std::string surprise = recorder.takeSurprise();
     if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
     more = false;

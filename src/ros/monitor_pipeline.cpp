@@ -90,7 +90,7 @@ void MonitorPipeline::measureUnknown(StepOutcome& outcome) const {
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
                            const std::string& reason) {
   monitor_->skip(body, status, stamp_ns, reason);
-  complaints_[body] = reason;
+  complaints_[body] = "refused: " + reason;
   if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
 }
 
@@ -114,6 +114,7 @@ void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changed;
   if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
+  if (waiting_[body]) monitor_->countDropped(body, StepStatus::NO_TRANSFORM);  // one that was kept
   waiting_[body] = std::move(waiting);
 }
 
@@ -151,6 +152,25 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   return true;
 }
 
+void MonitorPipeline::keep(std::size_t body, std::string reason) {
+  Waiting& waiting = *waiting_[body];
+  waiting.kept = true;
+  waiting.reason = std::move(reason);
+  // Before the clock body's first message there may be no fixed frame, and nothing is wrong.
+  if (fixed_frame_.empty() || waiting.told) return;
+  waiting.told = true;
+  complaints_[body] = "waits: " + waiting.reason;
+}
+
+void MonitorPipeline::nameMissing(StepOutcome& outcome) const {
+  if (outcome.status != StepStatus::NO_BODY) return;
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (!waiting_[b] || !waiting_[b]->kept) continue;
+    outcome.reason = waiting_[b]->reason + "; body '" + config_.bodies[b].body.name + "' waits for it";
+    return;
+  }
+}
+
 bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
   const bool timed_out =
@@ -162,12 +182,18 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
                       lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id, waiting.mesh.stamp_ns,
                                       fixed_from_mesh, reason) &&
                       (!is_clock || placeRigid(waiting.mesh.stamp_ns, now_ns, reason));
-  if (!placed && !timed_out) return false;
+  if (!placed) {
+    if (!timed_out) return false;
+    reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
+    if (isStatic(body) && !finishing_) {
+      keep(body, std::move(reason));
+      return false;
+    }
+  }
   Waiting done = std::move(waiting);
   waiting_[body].reset();
   if (!placed) {
-    skip(body, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns,
-         "no transform from '" + done.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason);
+    skip(body, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns, reason);
     return true;
   }
   transform(fixed_from_mesh, done.mesh.positions);
@@ -215,6 +241,7 @@ bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
   }
   if (finishing_) monitor_->finish();
   if (!monitor_->next(now_ns, outcome)) return false;
+  nameMissing(outcome);
   measureUnknown(outcome);
   outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
   if (!arrivals_.empty()) arrivals_.pop_front();
@@ -233,12 +260,18 @@ void MonitorPipeline::finish() { finishing_ = true; }
 
 void MonitorPipeline::reset(StepStatus status) {
   for (std::size_t b = 0; b < waiting_.size(); ++b) {
-    if (waiting_[b]) monitor_->countDropped(b, status);
+    if (!waiting_[b] || isStatic(b)) continue;
+    monitor_->countDropped(b, status);
     waiting_[b].reset();
   }
   monitor_->reset(status);
   arrivals_.clear();
-  if (config_.fixed_frame.empty()) fixed_frame_.clear();
+}
+
+StepOutcome MonitorPipeline::checkNow() {
+  StepOutcome outcome = monitor_->checkNow();
+  nameMissing(outcome);
+  return outcome;
 }
 
 std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }

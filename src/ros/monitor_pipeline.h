@@ -39,8 +39,9 @@ class MonitorPipeline {
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file.
   MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms);
 
-  /// Whether the body can take a message: none of its frames waits for tf.
-  bool idle(std::size_t body) const { return !waiting_[body]; }
+  /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain and
+  /// gives way to the next.
+  bool idle(std::size_t body) const { return !waiting_[body] || waiting_[body]->kept; }
   /// Counts, decodes and keeps one message of an idle body.
   void take(std::size_t body, const RawMessage& message);
   /// The same of a message that a publisher in this process handed over.
@@ -54,7 +55,11 @@ class MonitorPipeline {
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of next().
   void finish();
+  /// Forgets all frames but those of static bodies. The fixed frame stays, also one that was learnt: the map and static
+  /// bodies are placed in it.
   void reset(StepStatus status);
+  /// Monitor::checkNow(), with the reason why a static body has no place yet.
+  StepOutcome checkNow();
 
   Monitor& monitor() { return *monitor_; }
   const Monitor& monitor() const { return *monitor_; }
@@ -63,7 +68,8 @@ class MonitorPipeline {
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
   std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
-  /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none.
+  /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a static
+  /// body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
   /// What looks like a mistake in the body's messages, though they are valid (advice.h); empty: nothing does.
   const std::string& hint(std::size_t body) const { return hints_[body]; }
@@ -72,6 +78,9 @@ class MonitorPipeline {
   struct Waiting {
     DecodedMesh mesh;
     std::int64_t arrival_ns = 0;
+    bool kept = false;   // past transform_timeout_s: a static body sends its only frame once
+    bool told = false;   // the complaint about it has been set
+    std::string reason;  // why it has no place yet
   };
   struct RigidMesh {
     std::shared_ptr<const Topology> topology;
@@ -99,9 +108,14 @@ class MonitorPipeline {
   template <typename Decode>
   void takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
-  /// False: still waits.
   /// unknown_space: report. How much of what the step swept the map does not know.
   void measureUnknown(StepOutcome& outcome) const;
+  bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
+  /// A static body's frame waits on.
+  void keep(std::size_t body, std::string reason);
+  /// Says of an outcome without a body whether it waits for its transform.
+  void nameMissing(StepOutcome& outcome) const;
+  /// False: still waits.
   bool place(std::size_t body, std::int64_t now_ns);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
   void placeMap(std::int64_t now_ns);

@@ -1,5 +1,6 @@
 """analyze_bag as people use it: the same output for any number of threads, maps wherever they are, a bag of results."""
 import collections
+import copy
 import io
 import pathlib
 import shutil
@@ -112,6 +113,24 @@ class AnalyzeBagTest(unittest.TestCase):
         steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
         statuses = collections.Counter(row[steps[0].index('status')] for row in steps[1:])
         self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': frames - 2, 'GAP': 1})
+
+    def test_a_static_body_that_was_recorded_before_the_first_frame(self):
+        """Without fixed_frame it has no place before the cloth's first message, and it is sent only once."""
+        cloths = [(topic, message, at) for topic, message, at in self.messages if topic == '/cloth']
+        table = copy.deepcopy(cloths[0][1])
+        table.header.stamp = cloths[0][2] - genpy.Duration(5)
+        tabled = self.folder / 'tabled.bag'
+        with rosbag.Bag(str(tabled), 'w') as bag:
+            bag.write('/table', table, table.header.stamp)
+            for topic, message, at in cloths:
+                bag.write(topic, message, at)
+        params = self.folder / 'tabled.yaml'
+        params.write_text('bodies: {cloth: {topic: /cloth}, table: {topic: /table, motion: static, against_bodies: false, '
+                          'self_collision: false}}\neffects: {octomap: "off"}\nsync_timeout_s: 0.0\n')
+        report = self.analyze('tabled', tabled, '--params', params)
+        steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
+        statuses = collections.Counter(row[steps[0].index('status')] for row in steps[1:])
+        self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': len(cloths) - 1})
 
     def test_the_bag_of_results(self):
         out = self.folder / 'out.bag'

@@ -1,6 +1,7 @@
 // The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and files.
 #include "ros/monitor_pipeline.h"
 
+#include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 #include <octomap_msgs/Octomap.h>
@@ -28,10 +29,11 @@ std::vector<std::uint8_t> bytesOf(const Message& message) {
 }
 
 /// 2 x 2 points, 0.1 m apart, first corner at (0.15, 0.15, z); the field sigma where wanted.
-std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float>& sigma = {}) {
+std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float>& sigma = {},
+                                const std::string& frame = "world") {
   sensor_msgs::PointCloud2 out;
   out.header.stamp = ros::Time(stamp_s);
-  out.header.frame_id = "world";
+  out.header.frame_id = frame;
   out.height = out.width = 2;
   for (const char* name : {"x", "y", "z", "sigma"}) {
     if (sigma.empty() && std::string(name) == "sigma") continue;
@@ -90,8 +92,18 @@ struct Driven {
     pipeline.setMap(std::move(loaded), 0);
     effects.apply(pipeline.monitor(), true);
   }
-  const StepOutcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {}) {
-    pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma), 0, 0});
+  /// The frame `child`, at all times `z` above the world.
+  void raise(const std::string& child, double z) {
+    geometry_msgs::TransformStamped transform;
+    transform.header.frame_id = "world";
+    transform.child_frame_id = child;
+    transform.transform.translation.z = z;
+    transform.transform.rotation.w = 1;
+    transforms.setTransform(transform, "test", true);
+  }
+  const StepOutcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {},
+                          const std::string& frame = "world") {
+    pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma, frame), 0, 0});
     EXPECT_TRUE(pipeline.next(0, outcome));
     effects.learn(outcome, pipeline.monitor());
     return outcome;
@@ -225,6 +237,90 @@ TEST(TrackerNoise, ANumberHoldsForAllVertices) {
   noisy.giveMap(1);
   noisy.feed(1, 0.17f);
   EXPECT_NEAR(noisy.feed(1.1, 0.07f).earliest_toc, 0.5, 1e-3);
+}
+
+TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
+  XmlRpcValue tree;
+  tree["max_vertex_step_m"] = 0.0;
+  Driven learnt(tree);
+  learnt.raise("camera", 0.1);
+  learnt.giveMap(1);
+  learnt.feed(1, 0.25f, {}, "camera");
+  learnt.pipeline.reset(StepStatus::RESET);
+  learnt.feed(2, 0.35f);
+  const StepOutcome& outcome = learnt.feed(2.1, -0.05f);
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "camera");
+  EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map is where it was, 0.35 m below the mesh";
+}
+
+constexpr std::int64_t SECOND_NS = 1000000000;
+
+/// A cloth in the world over a static table in a frame of its own, whose transform is not there.
+struct Tabled : Driven {
+  Tabled() : Driven(bodies()) {}
+  static XmlRpcValue bodies() {
+    XmlRpcValue tree;
+    tree["max_vertex_step_m"] = 0.0;
+    tree["effects"]["octomap"] = "off";
+    tree["bodies"]["cloth"]["topic"] = "cloth";
+    tree["bodies"]["table"]["topic"] = "table";
+    tree["bodies"]["table"]["motion"] = "static";
+    return tree;
+  }
+  void take(std::size_t body, double stamp_s, float z, std::int64_t now_ns) {
+    pipeline.take(body, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
+  }
+  const FrameCounters& tables() const { return pipeline.monitor().counters(TABLE); }
+  static constexpr std::size_t CLOTH = 0, TABLE = 1;
+};
+
+TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
+  Tabled scene;
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  EXPECT_FALSE(scene.pipeline.next(0, scene.outcome));
+  EXPECT_FALSE(scene.pipeline.idle(Tabled::TABLE)) << "a newer one waits its turn at first";
+  EXPECT_FALSE(scene.pipeline.next(SECOND_NS, scene.outcome)) << "nobody knows the fixed frame yet";
+  EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "which is no mistake";
+
+  scene.take(Tabled::CLOTH, 2, 0.3f, 2 * SECOND_NS);
+  ASSERT_TRUE(scene.pipeline.next(2 * SECOND_NS, scene.outcome));
+  const std::string complaint = scene.pipeline.takeComplaint(Tabled::TABLE);
+  EXPECT_EQ(complaint.rfind("waits: no transform from 'table' to 'world'", 0), 0u) << complaint;
+  scene.take(Tabled::CLOTH, 2.1, 0.3f, 3 * SECOND_NS);
+  scene.pipeline.next(3 * SECOND_NS, scene.outcome);
+  ASSERT_TRUE(scene.pipeline.next(4 * SECOND_NS, scene.outcome));
+  EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+  EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'table' to 'world'", 0), 0u) << scene.outcome.reason;
+  EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "said once";
+  EXPECT_EQ(scene.pipeline.checkNow().reason, scene.outcome.reason);
+  EXPECT_EQ(scene.tables().waiting(), 1u);
+
+  ASSERT_TRUE(scene.pipeline.idle(Tabled::TABLE));
+  scene.take(Tabled::TABLE, 1.5, 0, 5 * SECOND_NS);
+  EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u) << "the newer one takes its place";
+  EXPECT_EQ(scene.tables().waiting(), 1u);
+  scene.pipeline.reset(StepStatus::RESET);
+  EXPECT_EQ(scene.tables().waiting(), 1u) << "static bodies stay over a reset";
+
+  scene.raise("table", 0.1);
+  scene.take(Tabled::CLOTH, 3, 0.3f, 6 * SECOND_NS);
+  ASSERT_TRUE(scene.pipeline.next(6 * SECOND_NS, scene.outcome));
+  scene.take(Tabled::CLOTH, 3.1, -0.1f, 7 * SECOND_NS);
+  ASSERT_TRUE(scene.pipeline.next(7 * SECOND_NS, scene.outcome));
+  ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+  EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+  EXPECT_EQ(scene.tables().processed(), 1u);
+  EXPECT_EQ(scene.pipeline.monitor().total().waiting(), 0u);
+}
+
+TEST(StaticBodies, WhatStillWaitsAtTheEndIsCounted) {
+  Tabled scene;
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  scene.pipeline.next(SECOND_NS, scene.outcome);
+  scene.pipeline.finish();
+  EXPECT_FALSE(scene.pipeline.next(SECOND_NS, scene.outcome));
+  EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u);
+  EXPECT_EQ(scene.tables().waiting(), 0u);
 }
 
 std::string errorOf(const XmlRpcValue& tree) {
