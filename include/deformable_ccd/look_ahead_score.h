@@ -22,6 +22,9 @@ struct LookAheadSummary {
   double median_signed_error_s = 0;  ///< [s] above 0: predicted too late
 };
 
+/// Newest comparisons that running statistics (~stats) summarise.
+constexpr std::size_t LOOK_AHEAD_SAMPLES = 1000;
+
 /// What a prediction cost, for the statistics of the step that it begins after.
 StageStats lookAheadStats(const StepOutcome& prediction);
 

@@ -13,6 +13,7 @@
 #include "deformable_ccd/simd_target.h"
 #include "io/report.h"
 #include "ros/bag_replay.h"
+#include "ros/known_types.h"
 #include "ros/markers.h"
 
 namespace {
@@ -44,18 +45,32 @@ MonitorConfig configure(const Arguments& a) {
   return readConfig(tree, a.params.empty() ? "--" : a.params + ": ");
 }
 
-// The input's messages with the results between them, as the node would have published them.
+// The input's messages with the results between them, as the node would have published them to subscribers of all topics.
 class ResultBag {
  public:
-  explicit ResultBag(const std::string& path) : bag_(path, rosbag::bagmode::Write) {
+  ResultBag(const std::string& path, const MonitorConfig& config)
+      : bag_(path, rosbag::bagmode::Write), look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {
     bag_.setCompression(rosbag::CompressionType::LZ4);
   }
-  void copy(const rosbag::MessageInstance& m) { bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader()); }
-  void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
+  /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
+  void copy(const rosbag::MessageInstance& m) {
+    const std::string own = std::string(MONITOR_NAMESPACE) + "/";
+    if (m.getTopic().compare(0, own.size(), own) == 0) return;
+    bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
+  }
+  void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
     StatsContext context;
     context.frames = pipeline.monitor().total();
     context.weld_changes = pipeline.weldChanges();
+    context.maps_received = so_far.maps;
+    context.maps_refused = so_far.maps_refused;
+    if (pipeline.config().monitor.look_ahead_s > 0) {
+      look_ahead_.observe(outcome);
+      context.look_ahead = look_ahead_.summary();
+    }
+    if (!frame.empty()) ++markers_built_;  // before a frame was taken there is none to draw in
+    context.markers_built = markers_built_;
     context.parameter_hash = pipeline.config().hash;
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
@@ -63,39 +78,46 @@ class ResultBag {
     std_msgs::Bool clear;
     clear.data = outcome.clear;
     bag_.write("/collision_monitor/clear", at, clear);
-    if (frame.empty()) return;  // no frame was taken yet, so there is none to draw in
+    if (frame.empty()) return;
     bag_.write("/collision_monitor/markers", at,
                toMarkers(outcome, pipeline.monitor().bodies(), pipeline.config().markers, frame));
   }
   void addPrediction(const StepOutcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
     const double horizon_s = pipeline.config().monitor.look_ahead_s;
+    look_ahead_.predict(prediction);
     bag_.write("/collision_monitor/predicted_contacts", at, toContactArray(prediction, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/time_to_contact", at, toTimeToContact(prediction, horizon_s, frame));
   }
 
  private:
   rosbag::Bag bag_;
+  LookAheadScore look_ahead_;
+  std::uint64_t markers_built_ = 0;
 };
 
 std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config, const BagReplayOptions& options) {
   std::vector<std::string> names{"screen", "fast", "conservative", "exact"};
   if (config.holdsDistance()) names = {"screen", "conservative"};  // the others cannot hold a distance
-  std::vector<ContactLog> logs;
-  for (const std::string& name : names) {
+  const auto run = [&](const std::string& name) {
     MonitorConfig one = config;
     one.monitor.detector.accuracy.rung = accuracyFromString(name.c_str());
     one.monitor.detector.step_budget_ms = 0;
     one.monitor.look_ahead_s = 0;
     one.monitor.max_contacts = std::numeric_limits<std::size_t>::max();
     if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
-    logs.emplace_back();
-    BagReplay(a.bag, one, options).run([&](const StepOutcome& o, MonitorPipeline&, const ros::Time&) {
-      logs.back().add(o);
-    });
-  }
+    ContactLog log;
+    BagReplay(a.bag, one, options)
+        .run([&](const StepOutcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { log.add(o); });
+    return log;
+  };
+  // The last is what the others are held against; a log holds every contact of the bag, so no more than two are kept.
+  const ContactLog truth = run(names.back());
+  const RungCost best = truth.against(truth, names.back());
+  names.pop_back();
   std::vector<RungCost> rungs;
-  for (std::size_t i = 0; i < names.size(); ++i) rungs.push_back(logs[i].against(logs.back(), names[i]));
+  for (const std::string& name : names) rungs.push_back(run(name).against(truth, name));
+  rungs.push_back(best);
   return rungs;
 }
 
@@ -127,17 +149,17 @@ int analyze(const Arguments& a) {
   options.octomap_file = a.octomap;
   options.show_progress = !a.quiet;
   BagReplay replay(a.bag, config, options);
-  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out);
+  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   Report report(a.report);
   std::string frame;
   const BagReplaySummary summary = replay.run(
-      [&](const StepOutcome& outcome, MonitorPipeline& pipeline, const ros::Time& at) {
+      [&](const StepOutcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
         report.add(outcome, pipeline.monitor().bodies());
         frame = pipeline.fixedFrame();
-        if (out) out->add(outcome, pipeline, at);
+        if (out) out->add(outcome, pipeline, so_far, at);
       },
       [&](const rosbag::MessageInstance& m) { if (out) out->copy(m); },
-      [&](const StepOutcome& prediction, MonitorPipeline& pipeline, const ros::Time& at) {
+      [&](const StepOutcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
   report.setEffects(summary.effects);
@@ -158,8 +180,12 @@ int analyze(const Arguments& a) {
       {"SIMD target", simdTarget()}};
   for (const std::string& c : summary.complaints) facts.push_back({"complaint", c});
   report.setFacts(std::move(facts));
-  if (!a.no_rungs) report.setRungs(otherRungs(a, config, options));
   report.finish();
+  if (!a.no_rungs) {  // takes long, and what there is should not be lost with it
+    out.reset();
+    report.setRungs(otherRungs(a, config, options));
+    report.finish();
+  }
   std::cout << report.headline() << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"

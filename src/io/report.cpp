@@ -359,7 +359,7 @@ void Report::finish() {
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
   page << reportPage(text);
   for (std::ofstream* file : {&contacts_, &steps_, &timing_, &json_file, &page}) {
-    file->close();
+    if (file->is_open()) file->close();
     if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
   }
 }

@@ -61,7 +61,8 @@ class Report {
   void setFacts(std::vector<std::pair<std::string, std::string>> facts) { facts_ = std::move(facts); }
   void setCounters(const FrameCounters& counters) { counters_ = counters; }
 
-  /// Writes the page and report.json, closes the files. Throws std::runtime_error naming the file.
+  /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
+  /// naming the file.
   void finish();
   /// One sentence: the first contact, or that there was none, or that there was no answer.
   std::string headline() const;

@@ -2,18 +2,20 @@
 
 #include "ros/bag_replay.h"
 
-#include <algorithm>
-#include <cstdio>
 #include <map>
 #include <optional>
 #include <set>
 
 #include <rosbag/view.h>
+#include <shape_msgs/Mesh.h>
 #include <tf2_msgs/TFMessage.h>
+#include <visualization_msgs/MarkerArray.h>
 
+#include "io/progress_bar.h"
 #include "ros/effects.h"
 #include "ros/known_types.h"
 #include "ros/transforms.h"
+#include "ros/wire.h"
 
 namespace deformable_ccd {
 namespace {
@@ -21,6 +23,8 @@ namespace {
 // Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
 const ros::Duration TF_AHEAD(10.0);
 const ros::Duration TF_KEPT(60.0);
+// Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
+const ros::Duration SEAM(1.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
@@ -37,21 +41,68 @@ std::vector<std::uint8_t> bytesOf(const rosbag::MessageInstance& message) {
   return bytes;
 }
 
-class Progress {
+/// Of a serialised message of a mesh type; 0: none.
+StampNs stampOf(const std::string& datatype, const std::vector<std::uint8_t>& bytes) {
+  if (datatype == ros::message_traits::datatype<shape_msgs::Mesh>()) return 0;
+  try {
+    WireReader reader(bytes.data(), bytes.size());
+    // A header comes first; that of an array is its first marker's.
+    if (datatype == ros::message_traits::datatype<visualization_msgs::MarkerArray>() && reader.readCount("markers", 1) == 0) {
+      return 0;
+    }
+    reader.read<std::uint32_t>("seq");
+    const auto seconds = reader.read<std::uint32_t>("secs");
+    return StampNs{seconds} * 1000000000 + reader.read<std::uint32_t>("nsecs");
+  } catch (const WireError&) {
+    return 0;  // the decoder will say what is wrong
+  }
+}
+
+/// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the meshes
+/// have gone back, too.
+class TransformWindow {
  public:
-  Progress(bool show, std::uint64_t total) : show_(show), total_(std::max<std::uint64_t>(total, 1)) {}
-  void step(std::uint64_t done) {
-    const int percent = static_cast<int>(100 * done / total_);
-    if (!show_ || percent == last_) return;
-    last_ = percent;
-    std::fprintf(stderr, "\r[%-50s] %3d %%", std::string(static_cast<std::size_t>(percent / 2), '#').c_str(), percent);
-    if (percent == 100) std::fputc('\n', stderr);
+  TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
+      : feed_(feed), view_(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"})), next_(view_.begin()) {
+    rosbag::View statics(bag, rosbag::TopicQuery("/tf_static"));
+    for (const rosbag::MessageInstance& m : statics) {
+      if (const auto tf = m.instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);
+    }
+  }
+
+  /// A mesh with this stamp (0: none) is the next message of the bag.
+  void meshComes(std::size_t body, StampNs stamp_ns, const ros::Time& at) {
+    if (stamp_ns == 0) return;
+    const auto [newest, first] = newest_mesh_.try_emplace(body, stamp_ns);
+    if (!first && stamp_ns < newest->second - JUMP_BACK_NS) {
+      meshes_went_back_ = at;
+      newest_mesh_.clear();
+      newest_mesh_[body] = stamp_ns;
+    } else {
+      newest->second = std::max(newest->second, stamp_ns);
+    }
+  }
+
+  void feedUntil(const ros::Time& at) {
+    for (; next_ != view_.end() && next_->getTime() <= at + TF_AHEAD; ++next_) {
+      const bool is_static = next_->getTopic() == "/tf_static";
+      if (!waiting_) waiting_ = next_->instantiate<tf2_msgs::TFMessage>();
+      // Where the meshes never go back, its turn comes all the same.
+      const ros::Time recorded = next_->getTime();
+      const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);
+      if (waiting_ && feed_.clears(*waiting_, is_static) && !due) return;
+      if (waiting_) feed_.add(*waiting_, is_static);
+      waiting_.reset();
+    }
   }
 
  private:
-  bool show_;
-  std::uint64_t total_;
-  int last_ = -1;
+  TransformFeed& feed_;
+  rosbag::View view_;
+  rosbag::View::iterator next_;
+  tf2_msgs::TFMessage::ConstPtr waiting_;  // the message at next_, where it was read already
+  std::map<std::size_t, StampNs> newest_mesh_;
+  std::optional<ros::Time> meshes_went_back_;
 };
 
 }  // namespace
@@ -109,8 +160,8 @@ struct BagReplay::Run {
     while (pipeline.next(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       effects.learn(outcome, pipeline.monitor());
       const std::optional<StepOutcome> prediction = predict(outcome);
-      sink(outcome, pipeline, at);
-      if (prediction && predictions) predictions(*prediction, pipeline, at);
+      sink(outcome, pipeline, summary, at);
+      if (prediction && predictions) predictions(*prediction, pipeline, summary, at);
       effects.apply(pipeline.monitor(), summary.maps > 0);
     }
     for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {
@@ -119,19 +170,16 @@ struct BagReplay::Run {
     }
   }
 
-  void mesh(std::size_t body, const rosbag::MessageInstance& message) {
+  void mesh(std::size_t body, const rosbag::MessageInstance& message, std::vector<std::uint8_t> bytes) {
     const ros::Time at = message.getTime();
     const std::int64_t now_ns = static_cast<std::int64_t>(at.toNSec());
     ++summary.mesh_messages;
     const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
-    // Nothing is dropped: a frame that still waits gives up before the next one is taken.
-    drain(at);
-    if (!pipeline.idle(body)) {
-      pipeline.refuse(body, now_ns, now_ns, "the frame before it still waited for its transform");
-    } else if (!problem.empty()) {
-      pipeline.refuse(body, now_ns, now_ns, problem);
+    drain(at);  // what waited for other bodies until now gives up first
+    if (problem.empty()) {
+      pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns});
     } else {
-      pipeline.take(body, {message.getDataType(), bytesOf(message), now_ns, now_ns});
+      pipeline.refuse(body, now_ns, now_ns, problem);
     }
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(at);
@@ -166,8 +214,10 @@ BagReplay::~BagReplay() = default;
 std::string BagReplay::firstMeshTopic(const std::string& bag) {
   rosbag::Bag file(bag);
   rosbag::View view(file);
+  std::map<std::string, std::string> types;
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
-    if (meshTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
+    if (meshTypeProblem(c->datatype, c->md5sum).empty() && !isMonitorsMarkers(c->topic, types)) return c->topic;
   }
   return "";
 }
@@ -205,33 +255,28 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.effects.apply(run.pipeline.monitor(), run.summary.maps > 0);
 
-  rosbag::View tf_view(run.bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"}));
-  rosbag::View static_view(run.bag, rosbag::TopicQuery("/tf_static"));
-  for (const rosbag::MessageInstance& m : static_view) {
-    if (const auto tf = m.instantiate<tf2_msgs::TFMessage>()) run.feed.add(*tf, true);
-  }
-  auto next_tf = tf_view.begin();
-  Progress progress(options_.show_progress, all.size());
-  std::uint64_t done = 0;
+  TransformWindow transforms(run.bag, run.feed);
+  ProgressBar progress(path_, all.size(), options_.show_progress);
   ros::Time at = all.getBeginTime();
   for (const rosbag::MessageInstance& m : all) {
     at = m.getTime();
-    for (; next_tf != tf_view.end() && next_tf->getTime() <= at + TF_AHEAD; ++next_tf) {
-      if (const auto tf = next_tf->instantiate<tf2_msgs::TFMessage>()) {
-        run.feed.add(*tf, next_tf->getTopic() == "/tf_static");
-      }
-      ++run.summary.transforms;
-    }
     if (messages) messages(m);
     const auto body = run.body_of_topic.find(m.getTopic());
-    if (body != run.body_of_topic.end()) {
-      run.mesh(body->second, m);
+    const bool is_mesh = body != run.body_of_topic.end();
+    std::vector<std::uint8_t> bytes;
+    if (is_mesh) {
+      bytes = bytesOf(m);
+      transforms.meshComes(body->second, stampOf(m.getDataType(), bytes), at);
+    }
+    transforms.feedUntil(at);
+    if (is_mesh) {
+      run.mesh(body->second, m, std::move(bytes));
     } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
       const std::string problem = mapTypeProblem(m.getDataType(), m.getMD5Sum());
       run.setMap(problem.empty() ? decodeMapMessage(bytesOf(m), config_) : refusedMap(problem),
                  static_cast<std::int64_t>(at.toNSec()));
     }
-    progress.step(++done);
+    progress.advance();
   }
   run.pipeline.finish();
   run.drain(at);

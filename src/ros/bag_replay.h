@@ -24,7 +24,7 @@ struct BagReplayOptions {
 /// What a replay met besides outcomes.
 struct BagReplaySummary {
   std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
-  std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0, transforms = 0;
+  std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0;
   std::vector<std::string> complaints;   ///< refused messages, each kind once
   FrameCounters frames;
   EffectPlan effects;                    ///< at the end
@@ -35,8 +35,10 @@ struct BagReplaySummary {
 
 class BagReplay {
  public:
-  /// Called for each outcome, in order; `at` is the bag time of the message that led to it.
-  using Sink = std::function<void(const StepOutcome&, MonitorPipeline&, const ros::Time& at)>;
+  /// Called for each outcome, in order; `at` is the bag time of the message that led to it, `so_far` counts messages up to
+  /// that one.
+  using Sink =
+      std::function<void(const StepOutcome&, MonitorPipeline&, const BagReplaySummary& so_far, const ros::Time& at)>;
   /// Called for each message of the bag, in order, before its outcomes.
   using MessageSink = std::function<void(const rosbag::MessageInstance&)>;
 
@@ -44,12 +46,14 @@ class BagReplay {
   BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
   ~BagReplay();
 
-  /// The first message topic of the bag that carries meshes, for configurations that name none. Empty: none.
+  /// The first topic of the bag that carries meshes and is no monitor's own, for configurations that name none. Empty:
+  /// none.
   static std::string firstMeshTopic(const std::string& bag);
   /// The first topic of the bag that carries octomaps. Empty: none.
   static std::string firstMapTopic(const std::string& bag);
 
-  /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds; a map that
+  /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
+  /// across a loop's end before the meshes have come to it, too; a map that
   /// was recorded after the first frame (latched ones are, often) is known from the start.
   /// `predictions` gets the look-ahead of each answered step, where there is one, after the step itself.
   BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr);

@@ -41,7 +41,6 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
 const ros::WallDuration RENEWAL(0.05);
-constexpr std::size_t LOOK_AHEAD_SAMPLES = 1000;  // newest comparisons that the statistics summarise
 
 std::int64_t steadyNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())

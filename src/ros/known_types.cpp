@@ -1,5 +1,6 @@
 #include "ros/known_types.h"
 
+#include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/MeshStamped.h>
 #include <octomap_msgs/Octomap.h>
 #include <pcl_msgs/PolygonMesh.h>
@@ -39,6 +40,15 @@ std::string mapTypeProblem(const std::string& datatype, const std::string& md5) 
   std::string problem;
   if (is<octomap_msgs::Octomap>(datatype, md5, problem)) return problem;
   return "type " + datatype + " is not an octomap; publish octomap_msgs/Octomap";
+}
+
+bool isMonitorsMarkers(const std::string& topic, const std::map<std::string, std::string>& types) {
+  const std::string name = "/markers";
+  if (topic.size() < name.size() || topic.compare(topic.size() - name.size(), name.size(), name) != 0) return false;
+  const std::string monitor = topic.substr(0, topic.size() - name.size());
+  const auto contacts = types.find(monitor + "/contacts");
+  return monitor == MONITOR_NAMESPACE ||
+         (contacts != types.end() && contacts->second == ros::message_traits::datatype<ContactArray>());
 }
 
 }  // namespace deformable_ccd

@@ -1,6 +1,5 @@
 #include "ros/map_loader.h"
 
-#include <chrono>
 #include <utility>
 
 namespace deformable_ccd {
@@ -53,10 +52,8 @@ void MapLoader::loop() {
       job = std::move(*job_);
       job_.reset();
     }
-    const auto start = std::chrono::steady_clock::now();
     LoadedMap map = job.file.empty() ? decodeMapMessage(job.bytes, config_) : loadMapFile(job.file, config_);
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
-    last_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (!map.surface) ++refused_;
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -39,8 +39,6 @@ class MapLoader {
 
   std::uint64_t received() const { return received_; }
   std::uint64_t refused() const { return refused_; }
-  /// Decoding and building of the newest map [ms].
-  double lastMs() const { return last_ms_; }
 
  private:
   struct Job {
@@ -56,7 +54,6 @@ class MapLoader {
   std::optional<LoadedMap> done_;
   bool stopping_ = false;
   std::atomic<std::uint64_t> received_{0}, refused_{0};
-  std::atomic<double> last_ms_{0};
   std::thread thread_;
 
   void put(Job job);

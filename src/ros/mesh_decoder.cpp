@@ -84,13 +84,6 @@ const std::vector<MeshType>& meshTypes() {
 
 MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)) {}
 
-void MeshDecoder::reset() {
-  last_faces_.clear();
-  topology_.reset();
-  weld_.clear();
-  representative_.clear();
-}
-
 template <typename Read>
 DecodedMesh MeshDecoder::guarded(const std::string& datatype, Read read) {
   const auto& types = meshTypes();

@@ -66,9 +66,6 @@ class MeshDecoder {
   /// The same of a message that was never serialised.
   DecodedMesh decode(const TypedMesh& message);
 
-  /// Forgets topology and weld, as after a restart of the publisher.
-  void reset();
-
  private:
   MeshInputConfig config_;
   std::vector<Face> last_faces_;

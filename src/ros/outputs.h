@@ -33,7 +33,6 @@ class Outputs {
   void publishLeftOut(const LeftOutPairs& pairs);
   /// Not clear, and nothing shown: after a reset or when disabled.
   void publishNotClear();
-  std::uint64_t markersBuilt() const { return markers_built_; }
 
  private:
   ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;

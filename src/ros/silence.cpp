@@ -1,9 +1,12 @@
 #include "ros/silence.h"
 
+#include <map>
+
 #include <ros/master.h>
 #include <ros/this_node.h>
 #include <ros/time.h>
 
+#include "ros/known_types.h"
 #include "ros/mesh_decoder.h"
 
 namespace deformable_ccd {
@@ -26,13 +29,12 @@ std::string meshTopics() {
   request[1] = "";
   // Not getTopics(), which would wait for a master that is gone.
   if (!ros::master::execute("getPublishedTopics", request, response, topics, false)) return {};
+  std::map<std::string, std::string> types;
+  for (int i = 0; i < topics.size(); ++i) types[topics[i][0]] = static_cast<std::string>(topics[i][1]);
   std::string names;
   std::size_t count = 0;
-  for (int i = 0; i < topics.size(); ++i) {
-    const std::string name = topics[i][0], datatype = topics[i][1];
-    // What monitors show is of mesh types, too.
-    const bool own = name.size() > 8 && name.compare(name.size() - 8, 8, "/markers") == 0;
-    if (!isMesh(datatype) || own || ++count > MAX_NAMES) continue;
+  for (const auto& [name, datatype] : types) {
+    if (!isMesh(datatype) || isMonitorsMarkers(name, types) || ++count > MAX_NAMES) continue;
     names += (names.empty() ? "" : ", ") + name + " (" + datatype + ")";
   }
   return names;

@@ -7,26 +7,28 @@
 
 namespace deformable_ccd {
 
-namespace {
+bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
+  const auto known = newest_.find(transform.child_frame_id);
+  return known != newest_.end() &&
+         static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second - JUMP_BACK_NS;
+}
 
-// Broadcasters of one tree are late against each other by less than this; a loop goes back by more.
-constexpr StampNs JUMP_BACK_NS = 1000000000;
-
-}  // namespace
+bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {
+  return !is_static && std::any_of(message.transforms.begin(), message.transforms.end(),
+                                   [&](const auto& transform) { return goesBack(transform); });
+}
 
 bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
   bool cleared = false;
   for (const auto& transform : message.transforms) {
     if (!is_static) {
-      const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
-      const auto known = newest_.find(transform.child_frame_id);
-      if (known != newest_.end() && stamp_ns < known->second - JUMP_BACK_NS) {
+      if (goesBack(transform)) {
         buffer_.clear();  // keeps static transforms
         newest_.clear();
         cleared = true;
       }
       StampNs& newest = newest_[transform.child_frame_id];
-      newest = std::max(newest, stamp_ns);
+      newest = std::max(newest, static_cast<StampNs>(transform.header.stamp.toNSec()));
     }
     buffer_.setTransform(transform, "tf", is_static);
   }

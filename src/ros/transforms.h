@@ -11,17 +11,24 @@
 
 namespace deformable_ccd {
 
+/// Broadcasters of one tree are late against each other by less than this; a loop goes back by more.
+constexpr StampNs JUMP_BACK_NS = 1000000000;
+
 /// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of the
 /// end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
 class TransformFeed {
  public:
   explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
+  /// Whether add() would clear the buffer.
+  bool clears(const tf2_msgs::TFMessage& message, bool is_static) const;
   /// Returns true when the buffer was cleared.
   bool add(const tf2_msgs::TFMessage& message, bool is_static);
 
  private:
   tf2::BufferCore& buffer_;
   std::unordered_map<std::string, StampNs> newest_;  // per child frame
+
+  bool goesBack(const geometry_msgs::TransformStamped& transform) const;
 };
 
 /// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no transform.

@@ -2,6 +2,7 @@
 import collections
 import copy
 import io
+import json
 import pathlib
 import shutil
 import subprocess
@@ -10,6 +11,8 @@ import unittest
 
 import genpy
 import rosbag
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
 
 from checkout import CHECKOUT, TOOLS
 
@@ -25,6 +28,16 @@ def bytes_of(message):
 def messages_of(path):
     with rosbag.Bag(str(path)) as bag:
         return list(bag.read_messages())
+
+
+def write_moving(bag, cloth, stamp, at, transform_at):
+    """A frame of the cloth in a frame that moves, and the transform that it needs."""
+    message, moving = copy.deepcopy(cloth), TransformStamped()
+    message.header.stamp, message.header.frame_id = stamp, 'camera'
+    bag.write('/cloth', message, at)
+    moving.header.stamp, moving.header.frame_id, moving.child_frame_id = stamp, 'world', 'camera'
+    moving.transform.rotation.w = 1
+    bag.write('/tf', TFMessage([moving]), transform_at)
 
 
 class AnalyzeBagTest(unittest.TestCase):
@@ -49,6 +62,13 @@ class AnalyzeBagTest(unittest.TestCase):
         report = cls.folder / name
         cls.tool('analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words)
         return report
+
+    def statuses(self, bag):
+        params = self.folder / 'statuses.yaml'
+        params.write_text('fixed_frame: world\nmax_step_s: 1.0\n')
+        report = self.analyze('statuses', bag, '--params', params)
+        steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
+        return collections.Counter(row[steps[0].index('status')] for row in steps[1:])
 
     def expect_same(self, report, names=('contacts.csv', 'steps.csv')):
         for name in names:
@@ -90,8 +110,6 @@ class AnalyzeBagTest(unittest.TestCase):
 
     def test_transforms_of_a_long_bag(self):
         """Ten minutes between the halves of the bag, the cloth in a frame that moves: each frame finds its transform."""
-        from geometry_msgs.msg import TransformStamped
-        from tf2_msgs.msg import TFMessage
         long_bag, frames = self.folder / 'long.bag', 0
         with rosbag.Bag(str(long_bag), 'w') as bag:
             for topic, message, at in self.messages:
@@ -101,18 +119,26 @@ class AnalyzeBagTest(unittest.TestCase):
                 frames += 1
                 if frames > 12:
                     at = at + genpy.Duration(600)
-                message.header.stamp, message.header.frame_id = at, 'camera'
-                bag.write(topic, message, at)
-                moving = TransformStamped()
-                moving.header.stamp, moving.header.frame_id, moving.child_frame_id = at, 'world', 'camera'
-                moving.transform.rotation.w = 1
-                bag.write('/tf', TFMessage([moving]), at + genpy.Duration(1))  # recorded after the frame that needs it
-        params = self.folder / 'long.yaml'
-        params.write_text('fixed_frame: world\n')
-        report = self.analyze('long', long_bag, '--params', params)
-        steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
-        statuses = collections.Counter(row[steps[0].index('status')] for row in steps[1:])
-        self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': frames - 2, 'GAP': 1})
+                write_moving(bag, message, at, at, at + genpy.Duration(1))  # recorded after the frame that needs it
+        self.assertEqual(self.statuses(long_bag), {'FIRST_FRAME': 1, 'OK': frames - 2, 'GAP': 1})
+
+    def test_transforms_of_a_bag_of_a_loop(self):
+        """Two rounds of 15 s, whose stamps are the same: at the seam none of the frames loses its transform, whether tf is
+        recorded before or after the frames that need it."""
+        cloth = [message for topic, message, _ in self.messages if topic == '/cloth']
+        others = [(topic, message) for topic, message, _ in self.messages if topic != '/cloth']
+        start, pause_s = self.messages[0][2] + genpy.Duration(10), 0.6
+        for early_s in (-0.3, 0.7):
+            with self.subTest(early_s=early_s):
+                looped = self.folder / 'looped.bag'
+                with rosbag.Bag(str(looped), 'w') as bag:
+                    for topic, message in others:
+                        bag.write(topic, message, start)
+                    for i in range(2 * len(cloth)):
+                        stamp = start + genpy.Duration.from_sec(pause_s * (i % len(cloth)))
+                        at = start + genpy.Duration.from_sec(pause_s * i)
+                        write_moving(bag, cloth[i % len(cloth)], stamp, at, at - genpy.Duration.from_sec(early_s))
+                self.assertEqual(self.statuses(looped), {'FIRST_FRAME': 1, 'OK': 2 * len(cloth) - 2, 'TIME_JUMP': 1})
 
     def test_a_static_body_that_was_recorded_before_the_first_frame(self):
         """Without fixed_frame it has no place before the cloth's first message, and it is sent only once."""
@@ -153,6 +179,56 @@ class AnalyzeBagTest(unittest.TestCase):
         self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels'}, set(points))
         self.assertGreater(points['obstacle'], points['voxels'])
         self.assertEqual(points['normals'], 2 * points['contacts'])
+        # What the statistics say beyond the step.
+        stats = by_topic[OWN + 'stats']
+        self.assertEqual([s.markers_built for s in stats], list(range(1, frames + 1)))
+        self.assertEqual({(s.maps_received, s.maps_refused) for s in stats}, {(1, 0)})
+        score = json.loads((self.folder / 'out/report.json').read_text())['look_ahead']
+        self.assertGreater(score['compared'], 0)
+        self.assertEqual(stats[-1].look_ahead_compared, min(score['compared'], 1000))
+        self.assertLess(stats[0].look_ahead_compared, stats[-1].look_ahead_compared)
+
+    def test_a_bag_that_was_recorded_beside_monitors(self):
+        """As `rosbag record -a` does: their markers, of a mesh type, come before the tracker's topic."""
+        once, recorded, again = (self.folder / name for name in ('once.bag', 'recorded.bag', 'again.bag'))
+        self.analyze('once', self.bag, '-o', once)
+        results = messages_of(once)
+        with rosbag.Bag(str(recorded), 'w') as bag:
+            for own in (OWN, '/guard/'):
+                for topic, message, at in results:
+                    if topic.startswith(OWN):
+                        bag.write(topic.replace(OWN, own), message, at - genpy.Duration(1))
+            for topic, message, at in self.messages:
+                bag.write(topic, message, at)
+        self.expect_same(self.analyze('recorded', recorded, '-o', again))
+        count = collections.Counter(topic for topic, _, _ in results)
+        found = collections.Counter(topic for topic, _, _ in messages_of(again))
+        self.assertGreater(count[OWN + 'markers'], 20)
+        self.assertEqual({t: n for t, n in found.items() if not t.startswith('/guard/')}, count, 'nothing twice')
+        self.assertEqual(found['/guard/contacts'], count[OWN + 'contacts'], 'of others, everything')
+
+    def test_the_report_comes_before_the_accuracy_table(self):
+        """That replays the bag for each rung, which may go wrong."""
+        early = self.folder / 'early'
+        command = [str(TOOLS / 'analyze_bag'), str(self.bag), '--report', str(early)]
+        process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        with process:
+            first = next(line for line in process.stderr if line.startswith('accuracy table'))
+            process.kill()
+        self.assertEqual(first, 'accuracy table: exact\n', 'what the others are held against')
+        self.expect_same(early)
+        self.assertIn('First contact', json.loads((early / 'report.json').read_text())['headline'])
+        self.assertIn('</html>', (early / 'report.html').read_text())
+
+        full = self.folder / 'full'
+        self.tool('analyze_bag', self.bag, '--report', full, '--quiet')
+        self.expect_same(full)
+        rungs = {r['rung']: r for r in json.loads((full / 'report.json').read_text())['rungs']}
+        self.assertEqual(list(rungs), ['screen', 'fast', 'conservative', 'exact'])
+        self.assertEqual((rungs['exact']['missed'], rungs['exact']['false'], rungs['exact']['undecided']), (0, 0, 0))
+        self.assertEqual(rungs['exact']['contacts'], (full / 'contacts.csv').read_text().count('\n') - 1)
+        self.assertGreater(rungs['screen']['undecided'], 0)
+        self.assertEqual([rungs[r]['missed'] for r in rungs], [0, 0, 0, 0])
 
 
 if __name__ == '__main__':
