@@ -16,7 +16,10 @@ std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
     octomap::OcTreeKey low, high;
     // Both corners lie in their voxels' closed boxes; one voxel more on each side costs little and misses none.
     const Vec3 min = bounds.min.array() - resolution_m, max = bounds.max.array() + resolution_m;
-    if (!tree.coordToKeyChecked(octomap::point3d(min[0], min[1], min[2]), low) ||
+    // OctoMap's own check casts to int before it looks.
+    const double half_span_m = 32768 * resolution_m;
+    const bool inside = (min.array() >= -half_span_m).all() && (max.array() <= half_span_m).all();
+    if (!inside || !tree.coordToKeyChecked(octomap::point3d(min[0], min[1], min[2]), low) ||
         !tree.coordToKeyChecked(octomap::point3d(max[0], max[1], max[2]), high)) {
       throw std::invalid_argument("octomap: the shapes reach beyond the 65536 voxels that a map can span");
     }

@@ -217,8 +217,10 @@ class NodeFaultsTest(unittest.TestCase):
             wait_for(lambda: len(self.stats) > seen, 20, 'a step while others do not read')
             if i % 500 == 499:
                 memory_kb.append(resident_kb(node.pid))
-        # Queues towards subscribers have a length; the first third fills them and the socket's buffers.
-        self.assertLess(memory_kb[2], memory_kb[1] + 8000, 'memory grows: %s kB' % memory_kb)
+        # Queues towards subscribers have a length; the first third fills them and the socket's buffers. Under sanitizers
+        # what is freed stays a while.
+        if SLOW == 1:
+            self.assertLess(memory_kb[2], memory_kb[1] + 8000, 'memory grows: %s kB' % memory_kb)
         self.assertEqual(self.stats[-1].frames_received, 1500)
         self.assert_adds_up(self.stats[-1])
         self.assertIsNone(node.poll())
