@@ -12,7 +12,6 @@ import math
 import multiprocessing
 import os
 import pathlib
-import socket
 import struct
 import subprocess
 import sys
@@ -25,22 +24,11 @@ from deformable_ccd.msg import ContactArray, StepStats
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2, PointField
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'scripts/lib'))
+from ros_process import free_port, wait_for
+
 DEADLINE = ContactArray.DEADLINE
 SINK = ['rosrun', 'topic_tools', 'drop']  # in C++: taking the contacts costs next to nothing
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(('localhost', 0))
-        return s.getsockname()[1]
-
-
-def wait_for(done, seconds, what):
-    end = time.monotonic() + seconds
-    while not done():
-        if time.monotonic() > end:
-            sys.exit('latency: waited %g s for %s' % (seconds, what))
-        time.sleep(0.01)
 
 
 def burn():

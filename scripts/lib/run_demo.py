@@ -5,8 +5,6 @@ import csv
 import json
 import os
 import pathlib
-import signal
-import socket
 import statistics
 import subprocess
 import sys
@@ -19,6 +17,8 @@ import rospy
 import yaml
 from deformable_ccd.msg import Contact, ContactArray, StepStats
 
+from ros_process import free_port, stop
+
 NODE = '/collision_monitor'
 START_STATE = {ContactArray.CLEAR: 'CLEAR', ContactArray.INTERSECTING: 'INTERSECTING',
                ContactArray.NOT_CHECKED: 'NOT_CHECKED'}
@@ -27,12 +27,6 @@ STATUS_NAMES = ['OK', 'FIRST_FRAME', 'TOPOLOGY_CHANGED', 'GAP', 'TIME_JUMP', 'NO
                 'RESET', 'INTERNAL_ERROR']
 MESH_TYPES = {'deformable_ccd/MeshStamped', 'sensor_msgs/PointCloud2', 'pcl_msgs/PolygonMesh',
               'visualization_msgs/MarkerArray'}
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
 
 
 class Listener:
@@ -58,17 +52,6 @@ def start_launch(arguments, environment, extra):
     return subprocess.Popen(['roslaunch', '--port', str(arguments.port), 'deformable_ccd', 'demo.launch',
                              'bag:=%s' % arguments.bag, 'params:=%s' % arguments.params] + extra, env=environment, stdout=log, stderr=subprocess.STDOUT,
                             stdin=subprocess.DEVNULL, start_new_session=True)
-
-
-def stop(process):
-    """Ends roslaunch as Ctrl-C would, which ends its nodes."""
-    if process.poll() is None:
-        process.send_signal(signal.SIGINT)
-        try:
-            process.wait(timeout=20)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
 
 
 def kind_of(contact):

@@ -24,21 +24,8 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
-SLOW = 20 if os.environ.get('DEFORMABLE_CCD_SANITIZED') else 1
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(('localhost', 0))
-        return s.getsockname()[1]
-
-
-def wait_for(done, seconds, what):
-    end = time.monotonic() + seconds * SLOW
-    while not done():
-        if time.monotonic() > end:
-            raise AssertionError('waited %g s for %s' % (seconds * SLOW, what))
-        time.sleep(0.01)
+sys.path.append(str(CHECKOUT / 'scripts/lib'))
+from ros_process import SLOW, free_port, wait_for
 
 
 def resident_kb(pid):

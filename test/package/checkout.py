@@ -2,11 +2,13 @@
 import os
 import pathlib
 import subprocess
+import sys
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
 # Of the build under test: scripts/test --sanitize has a workspace of its own.
 TOOLS = pathlib.Path(os.environ.get('DEFORMABLE_CCD_WORKSPACE', CHECKOUT / 'build')) / 'devel/lib/deformable_ccd'
 CODE_SUFFIXES = {'.h', '.cpp'}
+sys.path.append(str(CHECKOUT / 'scripts/lib'))  # ros_process
 
 
 def tracked_files():

@@ -7,20 +7,17 @@ import os
 import pathlib
 import re
 import shlex
-import signal
-import socket
 import subprocess
 import tempfile
-import time
 import unittest
 
 from checkout import CHECKOUT, TOOLS
+from ros_process import SLOW, free_port, stop, wait_for
 
 PAGES = [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md'))
 TOOL_NAMES = {'analyze_bag', 'check_step', 'make_scene_bag', 'replay_step', 'run_queries'}
 WORDS = {'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'cmake', 'catkin_make', 'doxygen', 'git',
          'apt-get'} | TOOL_NAMES
-SLOW = 20 if os.environ.get('DEFORMABLE_CCD_SANITIZED') else 1
 # Words of a command -> why it is not run here. A command that begins with them is excused.
 NOT_RUN = {
     'scripts/demo': 'installs packages and takes minutes; its parts are run by the scene test and by hand on a fresh machine',
@@ -59,12 +56,6 @@ def excuse(command):
     return next((why for start, why in NOT_RUN.items() if words[:len(start.split())] == start.split()), None)
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
-
-
 class CommandsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -78,51 +69,33 @@ class CommandsTest(unittest.TestCase):
         # The bag of the pages' stories, and a monitor that works on it.
         subprocess.run(['make_scene_bag', str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(cls.home / 'last_week.bag'),
                         '--frames', '20'], env=cls.environment, check=True, capture_output=True)
-        cls.wait_for(lambda: cls.run_command('rostopic list').returncode == 0, 'no master')
+        wait_for(lambda: cls.run_command('rostopic list').returncode == 0, 30, 'the master')
 
     @classmethod
     def start(cls, words):
         process = subprocess.Popen(words, env=cls.environment, cwd=cls.home, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-        cls.addClassCleanup(cls.stop, process)
+        cls.addClassCleanup(stop, process)
         return process
-
-    @staticmethod
-    def stop(process):
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-            try:
-                process.wait(timeout=15 * SLOW)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
 
     @classmethod
     def run_command(cls, command, timeout=60):
         return subprocess.run(shlex.split(command), env=cls.environment, cwd=cls.home, capture_output=True, text=True,
                               timeout=timeout * SLOW, stdin=subprocess.DEVNULL, check=False)
 
-    @staticmethod
-    def wait_for(done, why, seconds=30):
-        end = time.monotonic() + seconds * SLOW
-        while not done():
-            if time.monotonic() > end:
-                raise AssertionError(why)
-            time.sleep(0.2)
-
     def expect_service(self, name):
-        self.wait_for(lambda: name in self.run_command('rosservice list').stdout, name + ' did not come')
+        wait_for(lambda: name in self.run_command('rosservice list').stdout, 30, name)
 
     # One method for each kind of command.
     def run_forever(self, command, topic):
         """A node or a launch file: it comes up, and its topic is there."""
         process = self.start(shlex.split(command))
         try:
-            self.wait_for(lambda: topic in self.run_command('rostopic list').stdout, topic + ' did not come')
+            wait_for(lambda: topic in self.run_command('rostopic list').stdout, 30, topic)
             self.assertIsNone(process.poll(), 'it ended')
         finally:
-            self.stop(process)
-            self.wait_for(lambda: topic not in self.run_command('rostopic list').stdout, topic + ' stayed')
+            stop(process)
+            wait_for(lambda: topic not in self.run_command('rostopic list').stdout, 30, 'the end of ' + topic)
 
     def hold_against_help(self, command):
         """A synopsis: the tool knows every option in it."""

@@ -2,13 +2,13 @@
 import os
 import pathlib
 import shutil
-import socket
 import subprocess
 import tempfile
 import textwrap
 import unittest
 
 from checkout import CHECKOUT
+from ros_process import free_port
 
 # What a user does with the installed tree, in a shell that knows nothing else.
 STORY = r'''
@@ -55,12 +55,6 @@ def may_hide():
         return False
     tried = subprocess.run(['unshare', '--mount', 'mount', '-t', 'tmpfs', 'none', '/mnt'], capture_output=True, check=False)
     return tried.returncode == 0
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
 
 
 class InstallTest(unittest.TestCase):

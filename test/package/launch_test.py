@@ -1,19 +1,16 @@
 """The launch files' arguments against a parameter file: it is honoured, what is given on the command line wins over it."""
 import os
 import pathlib
-import signal
-import socket
 import subprocess
 import tempfile
-import time
 import unittest
 
 import rosgraph
 import yaml
 
 from checkout import CHECKOUT
+from ros_process import free_port, stop, wait_for
 
-SLOW = 20 if os.environ.get('DEFORMABLE_CCD_SANITIZED') else 1
 NODE = '/collision_monitor/'
 BODIES = '''
 fixed_frame: world
@@ -35,12 +32,6 @@ num_threads: 3
 step_budget_ms: 7.5
 look_ahead_s: 0.5
 '''
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
 
 
 class LaunchTest(unittest.TestCase):
@@ -130,38 +121,23 @@ class LaunchTest(unittest.TestCase):
             self.addCleanup(log.close)
             process = subprocess.Popen(words, env=self.environment, stdin=subprocess.DEVNULL, stdout=log,
                                        stderr=subprocess.STDOUT, start_new_session=True)
-            self.addCleanup(self.stop, process)
+            self.addCleanup(stop, process)
             return process
 
         master = rosgraph.Master('/launch_test', self.environment['ROS_MASTER_URI'])
         start('roscore', '-p', str(port))
-        self.wait_for(master.is_online, 'no master')
+        wait_for(master.is_online, 30, 'the master')
         master.setParam(NODE + 'topology', {'rows': 5})
         start('roslaunch', '--wait', str(CHECKOUT / 'launch/monitor.launch'), self.file(BODIES))
 
         def subscribed():
             return {topic for topic, nodes in master.getSystemState()[1] if NODE[:-1] in nodes}
 
-        log = self.home / 'roslaunch.txt'
-        self.wait_for(lambda: subscribed() >= {'/felt', '/finger'}, log.read_text)
-        self.assertFalse(master.hasParam(NODE + 'topology'), 'an earlier launch shows through')
-
-    @staticmethod
-    def wait_for(done, why):
-        end = time.monotonic() + 30 * SLOW
-        while not done():
-            if time.monotonic() > end:
-                raise AssertionError(why if isinstance(why, str) else why())
-            time.sleep(0.2)
-
-    @staticmethod
-    def stop(process):
-        process.send_signal(signal.SIGINT)
         try:
-            process.wait(timeout=20 * SLOW)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            wait_for(lambda: subscribed() >= {'/felt', '/finger'}, 30, 'the monitor')
+        except TimeoutError:
+            self.fail((self.home / 'roslaunch.txt').read_text())
+        self.assertFalse(master.hasParam(NODE + 'topology'), 'an earlier launch shows through')
 
 
 if __name__ == '__main__':
