@@ -39,6 +39,12 @@ std::string csvField(const std::string& text) {
   return quoted + '"';
 }
 
+/// What stands in the way of "no contact" in a step that found none.
+std::string doubtOf(const StepOutcome& outcome) {
+  if (outcome.status != StepStatus::OK) return toString(outcome.status);
+  return outcome.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(outcome.start_state);
+}
+
 nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
 
 }  // namespace
@@ -192,6 +198,8 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   }
   ++answered_;
   with_contact_ += o.total_contacts > 0;
+  clear_ += o.clear;
+  if (o.total_contacts == 0 && !o.clear) ++doubtful_[doubtOf(o)];
   writeContacts(o, bodies);
   addHeat(o, bodies);
   if (first_contact_.empty() && !o.contacts.empty()) {
@@ -230,10 +238,23 @@ std::string Report::headline() const {
   if (!first_contact_.empty()) {
     text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
          << with_contact_ << " of " << answered_ << " answered steps";
-  } else if (answered_ > 0) {
-    text << "No contact in " << answered_ << " answered steps";
-  } else {
+  } else if (answered_ == 0) {
     text << "No answer: no step could be checked";
+  } else if (clear_ == 0) {
+    text << "No contact found in " << answered_ << " answered steps, but it is not ruled out";
+  } else if (clear_ < answered_) {
+    text << "No contact in " << clear_ << " of " << answered_ << " answered steps";
+  } else {
+    text << "No contact in " << answered_ << " answered steps";
+  }
+  if (!doubtful_.empty()) {
+    if (clear_ > 0 || !first_contact_.empty()) text << "; in others none was found, but it is not ruled out";
+    const char* separator = " (";
+    for (const auto& [doubt, steps] : doubtful_) {
+      text << separator << doubt << ' ' << steps;
+      separator = ", ";
+    }
+    text << ')';
   }
   if (not_answered_ > 0) {
     text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";

@@ -50,11 +50,23 @@ std::string nameOf(const core::Contact& contact, const std::vector<MonitorBody>&
   return text;
 }
 
+/// "No contact" is said of clear steps alone; of others, what stands in the way of it.
+std::string noContact(const StepOutcome& outcome) {
+  const std::string start = std::string("starts ") + toString(outcome.start_state);
+  if (outcome.clear) return "no contact, " + start;
+  std::string text = "no contact found, but ";
+  if (outcome.status != StepStatus::OK) {
+    text += toString(outcome.status) + (outcome.reason.empty() ? "" : " (" + outcome.reason + ")") + ", ";
+  }
+  if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
+  return text + start;
+}
+
 /// A line for people; `first` is null where nothing known touches.
 std::string summaryOf(const StepOutcome& outcome, const core::Contact* first, const std::vector<MonitorBody>& bodies) {
   if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
   const std::string start = std::string(", starts ") + toString(outcome.start_state);
-  if (!std::isfinite(outcome.earliest_toc)) return "no contact" + start;
+  if (!std::isfinite(outcome.earliest_toc)) return noContact(outcome);
   char when[64];
   std::snprintf(when, sizeof when, "%.6f s into the step", outcome.earliest_toc * outcome.duration_s());
   if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + start;

@@ -1,0 +1,40 @@
+// Messages out of outcomes: what a line for people says, and what is counted.
+#include "ros/output_messages.h"
+
+#include <gtest/gtest.h>
+
+namespace deformable_ccd {
+namespace {
+
+/// A step that found nothing.
+StepOutcome nothingFound(StepStatus status, StartState start, const std::string& reason = "") {
+  StepOutcome outcome;
+  outcome.answered = true;
+  outcome.status = status;
+  outcome.reason = reason;
+  outcome.start_state = start;
+  outcome.clear = status == StepStatus::OK && start == StartState::CLEAR;
+  return outcome;
+}
+
+std::string summaryOf(const StepOutcome& outcome) { return toFirstContact(outcome, {}, "world").summary; }
+
+TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
+  EXPECT_EQ(summaryOf(nothingFound(StepStatus::OK, StartState::CLEAR)), "no contact, starts CLEAR");
+  EXPECT_EQ(summaryOf(nothingFound(StepStatus::NO_MAP, StartState::CLEAR, "none came; checked without it")),
+            "no contact found, but NO_MAP (none came; checked without it), starts CLEAR");
+  EXPECT_EQ(summaryOf(nothingFound(StepStatus::PARTIAL, StartState::NOT_CHECKED, "2 vertices were lost")),
+            "no contact found, but PARTIAL (2 vertices were lost), starts NOT_CHECKED");
+  EXPECT_EQ(summaryOf(nothingFound(StepStatus::OK, StartState::INTERSECTING)),
+            "no contact found, but starts INTERSECTING");
+  StepOutcome suppressed = nothingFound(StepStatus::OK, StartState::CLEAR);
+  suppressed.suppressed = 3;
+  suppressed.clear = false;
+  EXPECT_EQ(summaryOf(suppressed), "no contact found, but 3 initial ones suppressed, starts CLEAR");
+  StepOutcome unanswered;
+  unanswered.status = StepStatus::GAP;
+  EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");
+}
+
+}  // namespace
+}  // namespace deformable_ccd
