@@ -72,6 +72,13 @@ struct FrameCounters {
   FrameCounters& operator+=(const FrameCounters& other);
 };
 
+/// Of how many contacts what holds.
+struct ContactCounts {
+  std::size_t certain = 0, undecided = 0;
+  std::size_t initial = 0, leaving = 0;
+  std::size_t mesh = 0, obstacle = 0;  ///< with a body, with the map
+};
+
 /// What became of one frame of the clock body.
 struct StepOutcome {
   StepStatus status = StepStatus::FIRST_FRAME;
@@ -82,6 +89,7 @@ struct StepOutcome {
 
   std::vector<core::Contact> contacts;  ///< canonical order, filtered and cut as the options say; toc of the whole step
   std::size_t total_contacts = 0;       ///< before the cut to max_contacts
+  ContactCounts counts;                 ///< of all of these
   std::size_t suppressed = 0;           ///< initial contacts left out by choice
   std::uint64_t excluded_voxels = 0;    ///< finest voxels of the map taken out by exclude_boxes
   StartState start_state = StartState::NOT_CHECKED;

@@ -48,6 +48,17 @@ double scaleUp(double toc, std::size_t i, std::size_t n) {
   return n == 1 ? toc : std::min(1.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 2.0));
 }
 
+ContactCounts countsOf(const std::vector<core::Contact>& contacts) {
+  ContactCounts counts;
+  for (const core::Contact& contact : contacts) {
+    ++(contact.certainty == Certainty::CERTAIN ? counts.certain : counts.undecided);
+    ++(contact.body[1] == OBSTACLE_BODY ? counts.obstacle : counts.mesh);
+    counts.initial += contact.initial;
+    counts.leaving += contact.leaving;
+  }
+  return counts;
+}
+
 void keepEarliest(std::size_t count, std::vector<core::Contact>& contacts) {
   if (contacts.size() <= count) return;
   std::stable_sort(contacts.begin(), contacts.end(),
@@ -68,6 +79,7 @@ void conclude(const MonitorOptions& options, StepOutcome& outcome) {
     contacts.erase(kept, contacts.end());
   }
   outcome.total_contacts = contacts.size();
+  outcome.counts = countsOf(contacts);
   outcome.earliest_toc = outcome.unchecked_toc_lower;
   for (const auto& contact : contacts) outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
   keepEarliest(options.max_contacts, contacts);

@@ -171,17 +171,14 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
   any_ = true;
   const core::StepStats& s = o.stats;
-  std::size_t undecided = 0, initial = 0, leaving = 0;
   double earliest_new = std::numeric_limits<double>::infinity();
   for (const core::Contact& c : o.contacts) {
-    undecided += c.certainty == Certainty::UNDECIDED;
-    initial += c.initial;
-    leaving += c.leaving;
     if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
   }
   steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
          << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ','
-         << o.complete << ',' << o.total_contacts << ',' << undecided << ',' << initial << ',' << leaving << ','
+         << o.complete << ',' << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ','
+         << o.counts.leaving << ','
          << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces << ',';
   if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
   steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
@@ -189,7 +186,7 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   const double time_s = static_cast<double>(o.stamp_ns - origin_ns_) * 1e-9;
   rows_.push_back({{"step", o.sequence}, {"t", time_s}, {"status", toString(o.status)}, {"reason", o.reason},
                    {"answered", o.answered}, {"start_state", toString(o.start_state)}, {"clear", o.clear},
-                   {"contacts", o.total_contacts}, {"undecided", undecided}, {"initial", initial},
+                   {"contacts", o.total_contacts}, {"undecided", o.counts.undecided}, {"initial", o.counts.initial},
                    {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
                    {"toc_new", finiteOrNull(earliest_new)}, {"ms", s.total_ms}});
   if (!o.answered) {

@@ -161,7 +161,7 @@ struct BagReplay::Run {
       effects.learn(outcome, pipeline.monitor());
       const std::optional<StepOutcome> prediction = predict(outcome);
       sink(outcome, pipeline, summary, at);
-      if (prediction && predictions) predictions(*prediction, pipeline, summary, at);
+      if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
       effects.apply(pipeline.monitor(), summary.maps > 0);
     }
     for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {

@@ -89,6 +89,7 @@ struct CollisionMonitor::Impl {
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
   std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
+  StampNs newest_ns = 0;  // stamp of the last outcome; the worker's
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
       : node(n),
@@ -124,6 +125,7 @@ struct CollisionMonitor::Impl {
   void tellComplaints();
   void publish(StepOutcome& outcome);
   void predict(StepOutcome& outcome);
+  void publishPrediction(const StepOutcome& prediction);
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();
@@ -267,7 +269,12 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
     pipeline.monitor().countDropped(b, status, cleared[b]);
   }
   pipeline.reset(status);
-  outputs.publishNotClear();
+  outputs.publishNotClear(pipeline.fixedFrame());
+  if (!outputs.wantsPrediction()) return;
+  StepOutcome none;
+  none.status = status;
+  none.start_ns = none.stamp_ns = newest_ns;
+  publishPrediction(none);
 }
 
 void CollisionMonitor::Impl::accountDropped() {
@@ -347,6 +354,7 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
+  newest_ns = outcome.stamp_ns;
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
@@ -371,7 +379,8 @@ void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
 void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
   if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
   look_ahead.observe(outcome);
-  if (!outcome.answered) return;
+  // Nothing to go on from, which whoever listens to predictions alone must hear, too.
+  if (!outcome.answered) return publishPrediction(outcome);
   StepOutcome prediction;
   try {
     prediction = pipeline.monitor().predict();
@@ -382,6 +391,10 @@ void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
   }
   look_ahead.predict(prediction);
   outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
+  publishPrediction(prediction);
+}
+
+void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
   outputs.publishPrediction(prediction, config.monitor.look_ahead_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
 }
 

@@ -126,12 +126,12 @@ void fillFrames(const FrameCounters& frames, StatsMessage& out) {
 
 void fillContacts(const StepOutcome& outcome, StatsMessage& out) {
   out.contacts = static_cast<std::uint32_t>(outcome.total_contacts);
-  for (const core::Contact& contact : outcome.contacts) {
-    ++(contact.certainty == Certainty::CERTAIN ? out.contacts_certain : out.contacts_undecided);
-    ++(contact.body[1] == OBSTACLE_BODY ? out.contacts_obstacle : out.contacts_mesh);
-    out.contacts_initial += contact.initial;
-    out.contacts_leaving += contact.leaving;
-  }
+  out.contacts_certain = static_cast<std::uint32_t>(outcome.counts.certain);
+  out.contacts_undecided = static_cast<std::uint32_t>(outcome.counts.undecided);
+  out.contacts_initial = static_cast<std::uint32_t>(outcome.counts.initial);
+  out.contacts_leaving = static_cast<std::uint32_t>(outcome.counts.leaving);
+  out.contacts_mesh = static_cast<std::uint32_t>(outcome.counts.mesh);
+  out.contacts_obstacle = static_cast<std::uint32_t>(outcome.counts.obstacle);
   out.suppressed = static_cast<std::uint32_t>(outcome.suppressed);
   out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
   out.earliest_toc = outcome.earliest_toc;

@@ -25,7 +25,7 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
     time_to_contact_ = node.advertise<TimeToContact>("time_to_contact", QUEUE);
   }
   if (separates) left_out_ = node.advertise<LeftOutPairs>("left_out", 1, true);
-  publishNotClear();
+  publishNotClear("");
 }
 
 void Outputs::publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
@@ -70,6 +70,10 @@ void Outputs::publishLeftOut(const LeftOutPairs& pairs) {
   if (left_out_) left_out_.publish(pairs);
 }
 
-void Outputs::publishNotClear() { clear_.publish(std_msgs::Bool()); }
+void Outputs::publishNotClear(const std::string& frame) {
+  clear_.publish(std_msgs::Bool());
+  // Of an outcome without an answer all that is shown is that what was there before is gone.
+  if (markers_.getNumSubscribers() > 0 && !frame.empty()) markers_.publish(toMarkers({}, {}, {}, frame));
+}
 
 }  // namespace deformable_ccd

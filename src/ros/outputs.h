@@ -26,13 +26,14 @@ class Outputs {
   void publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame);
   /// Whether anybody listens to predictions.
   bool wantsPrediction() const;
+  /// Also one without an answer.
   void publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
                          const std::string& frame);
   void publishEffects(const EffectArray& effects);
   /// Latched. Only where some body separates.
   void publishLeftOut(const LeftOutPairs& pairs);
-  /// Not clear, and nothing shown: after a reset or when disabled.
-  void publishNotClear();
+  /// Not clear, and nothing shown: after a reset or when disabled. An empty frame: nothing was shown yet.
+  void publishNotClear(const std::string& frame);
 
  private:
   ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;

@@ -169,8 +169,9 @@ class AnalyzeBagTest(unittest.TestCase):
         frames = len(by_topic['/cloth'])
         self.assertEqual(frames, sum(topic == '/cloth' for topic, _, _ in self.messages))
         for name, count in (('contacts', frames), ('first_contact', frames), ('clear', frames), ('stats', frames),
-                            ('markers', frames), ('predicted_contacts', frames - 1), ('time_to_contact', frames - 1)):
+                            ('markers', frames), ('predicted_contacts', frames), ('time_to_contact', frames)):
             self.assertEqual(len(by_topic[OWN + name]), count, name)
+        self.assertEqual([m.answered for m in by_topic[OWN + 'time_to_contact']], [False] + [True] * (frames - 1))
         listed = sum(len(array.contacts) for array in by_topic[OWN + 'contacts'])
         self.assertEqual(listed, (self.plain / 'contacts.csv').read_text().count('\n') - 1)
         drawn = by_topic[OWN + 'markers'][-1].markers

@@ -186,6 +186,15 @@ TEST_F(Plain, MarkersAreBuiltForSubscribersOnly) {
   EXPECT_EQ(array.markers[0].header.frame_id, "world");
   EXPECT_TRUE(array.markers[0].ns.empty());
   EXPECT_EQ(stats.last().markers_built, 2u);
+  std_srvs::SetBool enable;
+  enable.request.data = false;
+  ASSERT_TRUE(ros::service::call("/plain/enable", enable));
+  EXPECT_TRUE(waitUntil([&] { return markers.count() == 3; })) << "what is shown is out of date";
+  EXPECT_EQ(markers.last().markers.size(), 1u);
+  EXPECT_EQ(markers.last().markers.at(0).action, visualization_msgs::Marker::DELETEALL);
+  EXPECT_EQ(markers.last().markers.at(0).header.frame_id, "world");
+  enable.request.data = true;
+  ASSERT_TRUE(ros::service::call("/plain/enable", enable));
 }
 
 TEST_F(Plain, FramesWaitForMovingTransforms) {
@@ -217,13 +226,27 @@ TEST_F(Plain, LookAheadPredictsWhatComes) {
   const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(2), 10));
   send(publisher, meshStamped(tipAbove(1.5), 10.1));
-  const TimeToContact time = ahead.after(0);
+  const auto told = [&](double stamp_s, std::uint8_t status) {
+    TimeToContact found;
+    EXPECT_TRUE(waitUntil([&] {
+      for (const TimeToContact& m : ahead.all()) {
+        if (m.header.stamp == ros::Time(stamp_s) && m.status == status) found = m;
+      }
+      return found.header.stamp == ros::Time(stamp_s);
+    })) << stamp_s;
+    return found;
+  };
+  const TimeToContact time = told(10.1, ContactArray::OK);
   ASSERT_TRUE(time.answered);
   EXPECT_TRUE(time.contact);
   EXPECT_NEAR(time.seconds, 0.3, 1e-6);
-  EXPECT_EQ(time.header.stamp, ros::Time(10.1));
-  EXPECT_FALSE(predicted.after(0).contacts.empty());
+  EXPECT_TRUE(waitUntil([&] { return predicted.count() > 0 && !predicted.last().contacts.empty(); }));
   EXPECT_TRUE(contacts.last().contacts.empty()) << "predictions are never mixed with what was observed";
+  // Whoever hears predictions alone hears of an outage, too.
+  send(publisher, meshStamped(tipAbove(1.4), 10.2, "nowhere"));
+  EXPECT_FALSE(told(10.2, ContactArray::NO_TRANSFORM).answered);
+  EXPECT_TRUE(trigger("reset").success);
+  EXPECT_FALSE(told(10.2, ContactArray::RESET).answered);
 }
 
 TEST_F(Plain, Services) {

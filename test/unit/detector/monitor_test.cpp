@@ -218,6 +218,9 @@ TEST_F(OneBody, TooManyContactsKeepTheEarliest) {
   EXPECT_EQ(outcome.status, StepStatus::TRUNCATED);
   ASSERT_EQ(outcome.contacts.size(), 1u);
   EXPECT_EQ(outcome.contacts[0].toc_lower, outcome.earliest_toc);
+  EXPECT_EQ(outcome.counts.certain + outcome.counts.undecided, outcome.total_contacts) << "counted before the cut";
+  EXPECT_EQ(outcome.counts.mesh, outcome.total_contacts);
+  EXPECT_EQ(outcome.counts.obstacle, 0u);
 }
 
 TEST_F(OneBody, MaskedVerticesMeetNothing) {

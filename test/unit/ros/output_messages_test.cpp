@@ -36,5 +36,19 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");
 }
 
+TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
+  StepOutcome cut = nothingFound(StepStatus::TRUNCATED, StartState::CLEAR);
+  cut.total_contacts = 7;
+  cut.counts = {5, 2, 3, 1, 4, 3};
+  const auto stats = toStepStats(cut, {}, "world");
+  EXPECT_EQ(stats.contacts, 7u);
+  EXPECT_EQ(stats.contacts_certain, 5u);
+  EXPECT_EQ(stats.contacts_undecided, 2u);
+  EXPECT_EQ(stats.contacts_initial, 3u);
+  EXPECT_EQ(stats.contacts_leaving, 1u);
+  EXPECT_EQ(stats.contacts_mesh, 4u);
+  EXPECT_EQ(stats.contacts_obstacle, 3u);
+}
+
 }  // namespace
 }  // namespace deformable_ccd
