@@ -71,7 +71,7 @@ class ResultBag {
     }
     if (!frame.empty()) ++markers_built_;  // before a frame was taken there is none to draw in
     context.markers_built = markers_built_;
-    context.parameter_hash = pipeline.config().hash;
+    context.parameter_hash = pipeline.config().hash();
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
     bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));

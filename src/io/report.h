@@ -86,7 +86,7 @@ class Report {
   std::ofstream contacts_, steps_, timing_;
   StampNs origin_ns_ = 0;
   bool any_ = false;
-  std::map<std::string, std::size_t> doubtful_;  // steps that found no contact and cannot rule it out, by what is in the way
+  std::map<std::string, std::size_t> doubtful_;  // steps that found no contact and cannot rule it out, by the reason
   std::size_t answered_ = 0, with_contact_ = 0, clear_ = 0, not_answered_ = 0, undecided_only_ = 0;
   double first_contact_s_ = 0;
   std::string first_contact_;

@@ -55,8 +55,8 @@ class BagReplay {
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that
   /// was recorded after the first frame (latched ones are, often) is known from the start.
-  /// `predictions` gets, where there is a look-ahead, that of each step after the step itself; of one without an answer the
-  /// step again.
+  /// `predictions` gets, where there is a look-ahead, that of each step after the step itself; of a step without an answer
+  /// the step again.
   BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr);
 
  private:

@@ -256,6 +256,7 @@ void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const Marker
   options.detector.check_start_state = pipeline.monitor().options().detector.check_start_state;
   try {
     pipeline.monitor().setOptions(options);
+    config.monitor = options;
   } catch (const std::invalid_argument& error) {
     ROS_WARN_STREAM("reconfiguration refused: " << error.what());
   }
@@ -346,7 +347,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.maps_received = maps ? maps->received() : 0;
   context.frames_handed_over = frames_handed_over;
   context.maps_refused = maps ? maps->refused() : 0;
-  context.parameter_hash = config.hash;
+  context.parameter_hash = config.hash();
   return context;
 }
 
@@ -395,7 +396,8 @@ void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
 }
 
 void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
-  outputs.publishPrediction(prediction, config.monitor.look_ahead_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
+  const double horizon_s = config.monitor.look_ahead_s;
+  outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
 }
 
 /// Whatever a command throws, the node goes on; a service's caller has been told by then (InputQueue::call).

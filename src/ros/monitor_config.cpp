@@ -1,6 +1,8 @@
 #include "ros/monitor_config.h"
 
 #include <algorithm>
+#include <iomanip>
+#include <sstream>
 
 namespace deformable_ccd {
 
@@ -306,6 +308,16 @@ void applyEffects(MonitorConfig& config) {
   if (off("unknown_space")) config.unknown_space = UnknownSpace::FREE;
 }
 
+/// The parameters proper as text. What dynamic_reconfigure writes back under ~live is not what was given.
+std::string givenText(XmlRpcValue tree) {
+  if (!tree.valid() || tree.getType() != XmlRpcValue::TypeStruct) return {};
+  std::string text;
+  for (auto& member : tree) {
+    if (member.first != "live") text += member.first + member.second.toXml();
+  }
+  return text;
+}
+
 std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every machine
   std::uint64_t hash = 1469598103934665603ull;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
@@ -328,6 +340,19 @@ bool MonitorConfig::holdsDistance() const {
          std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.isUncertain(); });
 }
 
+std::uint64_t MonitorConfig::hash() const {
+  std::ostringstream text;
+  text << std::setprecision(17) << given_hash;
+  for (const double value :
+       {monitor.detector.step_budget_ms, monitor.store.max_step_s, monitor.store.max_vertex_step_m,
+        markers.point_size_m, markers.normal_length_m, markers.obstacle_m}) {
+    text << ' ' << value;
+  }
+  text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.max_contacts << ' '
+       << monitor.suppress_initial << ' ' << markers.mesh;
+  return hashOf(text.str());
+}
+
 MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
@@ -343,8 +368,7 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   reader.finish();
   applyEffects(config);
   settleAccuracy(reader, config);
-  XmlRpcValue copy = tree;
-  config.hash = hashOf(copy.valid() ? copy.toXml() : std::string());
+  config.given_hash = hashOf(givenText(tree));
   return config;
 }
 

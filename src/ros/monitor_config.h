@@ -56,12 +56,13 @@ struct MonitorConfig {
   std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
-  std::uint64_t hash = 0;           ///< of all values in force
-
+  std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
   /// The largest separation that is asked for, of meshes or from the map [m].
   double largestSeparation() const;
   /// A separation or an uncertainty is asked for, so that only conservative and screen will do.
   bool holdsDistance() const;
+  /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
+  std::uint64_t hash() const;
 };
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.

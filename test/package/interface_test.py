@@ -90,6 +90,22 @@ class InterfaceTest(unittest.TestCase):
         listed = re.findall(r'`(\w+)`', paragraph[paragraph.index('):'):paragraph.index('\n\n')])
         self.assertEqual(sorted(listed), sorted(code))
 
+    def test_live_limits(self):
+        """A live set of one value sets all of them: narrower limits than the parameters' would clamp the others."""
+        source = (ROS / 'monitor_config.cpp').read_text()
+        limits = {}
+        for name, least, most in re.findall(
+                r'\.(?:number|integer)\(\s*"(\w+)", [^;]*?, ([-\w.]+), ([\w.]+)\)', source):
+            limits[name] = (least, most)
+        numbers = {'LARGE': 1e9, 'MANY': 1e9}
+        live = re.findall(r'gen\.add\("(\w+)", (?:double|int)_t, 0, "[^"]*", [\w.-]+, ([\w.-]+), ([\w.-]+)\)',
+                          (CHECKOUT / 'cfg/CollisionMonitor.cfg').read_text())
+        self.assertEqual(len(live), 7, 'all but the accuracy and the switches')
+        for name, *ends in live:
+            expected = limits[name[len('marker_'):] if name.startswith('marker_') else name]
+            for end, limit in zip(ends, expected):
+                self.assertEqual(float(numbers.get(end, end)), float(numbers.get(limit, limit)), name)
+
     def test_monitor_yaml_holds_defaults_that_are_read(self):
         text = (CHECKOUT / 'config/monitor.yaml').read_text()
         names = set(re.findall(r'(?m)^(\w+):', text))

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
 #include <octomap_msgs/Octomap.h>
@@ -269,6 +270,35 @@ TEST_F(Plain, Services) {
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.2); }));
   EXPECT_GE(stats.last().skipped_disabled, 1u);
   expectAddsUp();
+}
+
+TEST_F(Plain, LiveChangesShowInTheParameterHashAndTouchNothingElse) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  double stamp_s = 10;
+  const auto hash = [&] {
+    send(publisher, meshStamped(tipAbove(1), stamp_s += 0.1));
+    EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(stamp_s); }));
+    return stats.last().parameter_hash;
+  };
+  const auto setMesh = [&](bool shown) {
+    dynamic_reconfigure::Reconfigure call;
+    dynamic_reconfigure::BoolParameter mesh;
+    mesh.name = "marker_mesh";
+    mesh.value = shown;
+    call.request.config.bools.push_back(mesh);
+    EXPECT_TRUE(ros::service::call("/plain/live/set_parameters", call));
+    return call.response.config;
+  };
+  const std::uint64_t before = hash();
+  const dynamic_reconfigure::Config in_force = setMesh(true);
+  EXPECT_TRUE(waitUntil([&] { return hash() != before; }));
+  for (const auto& value : in_force.doubles) {
+    if (value.name == "marker_point_size_m") {
+      EXPECT_EQ(value.value, 2) << "a size that the parameter may have";
+    }
+  }
+  setMesh(false);
+  EXPECT_TRUE(waitUntil([&] { return hash() == before; })) << "nothing else was changed on the way";
 }
 
 TEST_F(Plain, EffectsSayWhy) {

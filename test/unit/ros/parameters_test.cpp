@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
+#include <set>
 
 #include "ros/monitor_config.h"
 
@@ -167,8 +168,34 @@ TEST(Parameters, OnAndOffAreWordsThoughYamlTakesThemForBooleans) {
 TEST(Parameters, TheHashTellsConfigurationsApart) {
   XmlRpcValue tree;
   tree["max_step_s"] = 0.25;
-  EXPECT_NE(readConfig(tree).hash, readConfig(XmlRpcValue()).hash);
-  EXPECT_EQ(readConfig(tree).hash, readConfig(tree).hash);
+  const MonitorConfig config = readConfig(tree);
+  EXPECT_NE(config.hash(), readConfig(XmlRpcValue()).hash());
+  EXPECT_EQ(config.hash(), readConfig(tree).hash());
+  tree["live"]["max_step_s"] = 0.3;
+  EXPECT_EQ(readConfig(tree).hash(), config.hash()) << "what an earlier node wrote back is not in force";
+}
+
+TEST(Parameters, TheHashTellsLiveValuesApart) {
+  const MonitorConfig given = readConfig(XmlRpcValue());
+  const std::function<void(MonitorConfig&)> changes[] = {
+      [](MonitorConfig& c) { c.monitor.detector.accuracy.rung = Accuracy::FAST; },
+      [](MonitorConfig& c) { c.monitor.detector.step_budget_ms = 5; },
+      [](MonitorConfig& c) { c.monitor.store.max_step_s = 0.25; },
+      [](MonitorConfig& c) { c.monitor.store.max_vertex_step_m = 0.25; },
+      [](MonitorConfig& c) { c.monitor.max_contacts = 5; },
+      [](MonitorConfig& c) { c.monitor.suppress_initial = true; },
+      [](MonitorConfig& c) { c.markers.point_size_m = 0.02; },
+      [](MonitorConfig& c) { c.markers.normal_length_m = 0.02; },
+      [](MonitorConfig& c) { c.markers.mesh = true; },
+      [](MonitorConfig& c) { c.markers.obstacle_m = 0.02; },
+  };
+  std::set<std::uint64_t> seen{given.hash()};
+  for (const auto& change : changes) {
+    MonitorConfig live = given;
+    change(live);
+    seen.insert(live.hash());
+  }
+  EXPECT_EQ(seen.size(), std::size(changes) + 1);
 }
 
 TEST(Parameters, YamlReadsAsTheParameterServerWould) {
