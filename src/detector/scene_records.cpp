@@ -177,7 +177,9 @@ void SceneArrays::setRange(bool keep) {
   }
 }
 
-/// How many record units `reach_m` is, rounded up. Both bodies of a pair are widened, each by its half.
+/// How many record units `reach_m` is, rounded up. Both bodies of a pair are widened, each by half of the separation and
+/// by its own radii; the sum of the two margins is never less than what the pair asks for, since a margin that does not
+/// fit is UNBOUNDED. (Cut off at half the range, one alone would not reach from one end of the records to the other.)
 void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const {
   if (!(reach_m > 0) && body.reach_m == 0) {
     std::fill_n(margin16, 16, std::int16_t{0});
@@ -189,7 +191,7 @@ void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t*
     // A unit for the truncation of both values, and the rounding of both sums; enough where one side alone is widened.
     const double rounding = std::ldexp(std::max(std::abs(range_min_[d]), std::abs(range_max_[d])), -51) * scale_[d];
     const double units = std::ceil(1.0000002 * reach_m * length * scale_[d] + rounding) + 1;
-    margin16[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min(units, 32766.0) : 0);
+    margin16[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min<double>(units, simd::UNBOUNDED) : 0);
   }
 }
 

@@ -148,10 +148,14 @@ void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRI
             large = hn::Max(large, r);
           }
           if (margin16) {
-            // Saturation at the empty values would hide a feature; the record range leaves room on both sides.
+            // Saturation at the empty values would hide a feature; the record range leaves room on both sides. What
+            // ends there reaches every record, which all lie within; but a margin of half the range reaches no end from
+            // the other one, so that what is cut off at UNBOUNDED goes there outright.
             const auto m = hn::LoadU(d, margin16 + k);
-            small = hn::Max(hn::SaturatedSub(small, m), hn::Set(d, int16_t{-32766}));
-            large = hn::Min(hn::SaturatedAdd(large, m), hn::Set(d, int16_t{32766}));
+            const auto lowest = hn::Set(d, int16_t{-32766}), highest = hn::Set(d, int16_t{32766});
+            const auto unbounded = hn::Eq(m, hn::Set(d, UNBOUNDED));
+            small = hn::IfThenElse(unbounded, lowest, hn::Max(hn::SaturatedSub(small, m), lowest));
+            large = hn::IfThenElse(unbounded, highest, hn::Min(hn::SaturatedAdd(large, m), highest));
           }
         }
         hn::Store(small, d, lo + i * RECORD + k);

@@ -28,6 +28,7 @@ constexpr std::size_t SOA_SIZE = 512;     ///< int16 of a group
 constexpr std::size_t AOS_SIZE = 32;      ///< int16 of a group's bounds
 constexpr std::int16_t EMPTY_LO = 32767;  ///< larger than any record value
 constexpr std::int16_t EMPTY_HI = -32767; ///< smaller than any record value
+constexpr std::int16_t UNBOUNDED = 32767; ///< as a margin: as far as the records go, on both sides
 constexpr double RECORD_RANGE = 65528.0;  ///< record values lie in [-32764, 32764]
 
 /// Smallest and largest projection per direction over both times. vertices: n x 8 doubles (x0 y0 z0 0 x1 y1 z1 0).
@@ -38,7 +39,8 @@ void projectionBounds(const double* vertices, std::size_t n, double* min8, doubl
 void quantize(const double* vertices, std::size_t n, const double* low8, const double* scale8, std::int16_t* records);
 
 /// Groups of features with `arity` vertices each (1 to 3). indices: count x arity, UINT32_MAX in the first place
-/// marks an empty lane; count is a multiple of 16. margin16: widens both sides of value k (minimum separation), or null.
+/// marks an empty lane; count is a multiple of 16. margin16: widens both sides of value k (separation, radii) by 0 to
+/// 32766, or by UNBOUNDED for all that is more; or null.
 void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
                  const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos);
 

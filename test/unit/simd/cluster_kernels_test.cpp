@@ -280,7 +280,9 @@ TEST(ClusterKernels, LeavesHoldTheBoundsOfTheirVertices) {
         std::vector<std::int16_t> records(vertices * RECORD);
         for (auto& r : records) r = anyRecordValue(random, 32764);
         std::int16_t margin[RECORD];
-        for (auto& m : margin) m = static_cast<std::int16_t>(random() % 3 == 0 ? 32766 : random() % 1000);
+        for (auto& m : margin) {
+          m = static_cast<std::int16_t>(random() % 3 == 0 ? 32766 + random() % 2 : random() % 1000);
+        }
         std::vector<std::uint32_t> indices(groups * GROUP * arity);
         for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint32_t>(random() % vertices);
         for (std::size_t lane = 0; lane < groups * GROUP; lane += 1 + random() % 7) indices[lane * arity] = UINT32_MAX;
@@ -295,8 +297,8 @@ TEST(ClusterKernels, LeavesHoldTheBoundsOfTheirVertices) {
               hi = std::max<int>(hi, records[indices[lane * arity + j] * RECORD + k]);
             }
             if (with_margin) {
-              lo = std::max(lo - margin[k], -32766);
-              hi = std::min(hi + margin[k], 32766);
+              lo = margin[k] == simd::UNBOUNDED ? -32766 : std::max(lo - margin[k], -32766);
+              hi = margin[k] == simd::UNBOUNDED ? 32766 : std::min(hi + margin[k], 32766);
             }
             n.lo[k] = static_cast<std::int16_t>(lo);
             n.hi[k] = static_cast<std::int16_t>(hi);
@@ -349,17 +351,25 @@ TEST(ClusterKernels, WidenedNodesStillMeetWhatTheyTouch) {
     std::vector<std::uint32_t> indices(GROUP, UINT32_MAX);
     indices[0] = 0;
     indices[1] = 1;
-    std::int16_t margin[RECORD];
-    for (const int m : {0, 32763, 32764, 32766}) {
+    const auto widened = [&](int m) {
+      std::int16_t margin[RECORD];
       std::fill_n(margin, RECORD, static_cast<std::int16_t>(m));
       Groups groups;
       groups.count = 1;
       groups.soa = hwy::AllocateAligned<std::int16_t>(SOA_SIZE);
       groups.aos = hwy::AllocateAligned<std::int16_t>(AOS_SIZE);
       simd::buildLeaves(records.data(), indices.data(), 1, GROUP, margin, groups.soa.get(), groups.aos.get());
+      return groups;
+    };
+    const Groups none = widened(0);
+    for (const int m : {0, 32763, 32764, 32766, int{simd::UNBOUNDED}}) {
+      const Groups groups = widened(m);
       const auto pairs = kernelPairs(groups, groups, {0, 0}, true, simd::Diagonal::UPPER_WITH_DIAGONAL, false, 256);
       // Each lane meets itself; the two meet when 2 m reaches the distance of 65528.
       EXPECT_EQ(pairs.size(), m >= 32764 ? 3u : 2u) << target << ", margin " << m;
+      // On one side alone the largest margin with an end is half the distance.
+      const auto across = kernelPairs(groups, none, {0, 0}, false, simd::Diagonal::ALL, false, 256);
+      EXPECT_EQ(across.size(), m == simd::UNBOUNDED ? 4u : 2u) << target << ", margin " << m;
     }
   });
 }

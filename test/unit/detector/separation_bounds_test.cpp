@@ -1,0 +1,62 @@
+// Bounds of bodies and groups that a separation or a radius widens: what comes within it is never culled, however large
+// it is against the scene, and whichever vertices and bodies have it.
+#include <gtest/gtest.h>
+
+#include "deformable_ccd/detector.h"
+#include "support/step_support.h"
+
+namespace deformable_ccd {
+namespace test {
+namespace {
+
+struct Radii {
+  std::vector<std::vector<double>> of_body;  // empty: none
+};
+
+StepResult run(const TestStep& step, const Radii& radii, BroadPhase broad_phase) {
+  DetectorOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.broad_phase = broad_phase;
+  Detector detector(options);
+  detector.setBodies(step.setups(), step.positions());
+  MotionStep motion = step.motion();
+  for (std::size_t b = 0; b < radii.of_body.size(); ++b) {
+    if (!radii.of_body[b].empty()) motion.bodies[b].radius_m = &radii.of_body[b];
+  }
+  return detector.run(motion);
+}
+
+StepBody flat(std::size_t size, double z) {
+  StepBody body;
+  body.topology = Topology::grid(size, size);
+  for (std::size_t i = 0; i < size * size; ++i) {
+    const double cells = static_cast<double>(size - 1);
+    body.t0.push_back(Vec3(static_cast<double>(i % size) / cells, static_cast<double>(i / size) / cells, z));
+  }
+  body.t1 = body.t0;
+  body.self_collision = false;
+  return body;
+}
+
+// The records of two flat bodies span no more than the distance between them, and a radius may be many times that
+// range: on one body alone it has to reach over all of it.
+TEST(SeparationBounds, RadiusOfOneBodyLargerThanTheScene) {
+  TestStep step;
+  step.bodies = {flat(2, 0), flat(3, 0.02)};
+  for (const std::size_t with : {0u, 1u}) {
+    for (const double radius_m : {0.0101, 0.02, 0.03, 1.0, 1e6, 1e300}) {
+      Radii radii;
+      radii.of_body.resize(2);
+      radii.of_body[with].assign(step.bodies[with].t0.size(), radius_m);
+      const StepResult result = run(step, radii, BroadPhase::CLUSTERED);
+      EXPECT_EQ(result.contacts.empty(), radius_m < 0.02) << "radius " << radius_m << " m of body " << with;
+      EXPECT_EQ(result.earliestToc() == 0, radius_m >= 0.02);
+      EXPECT_EQ(difference(result.contacts, run(step, radii, BroadPhase::BRUTE_FORCE).contacts), "")
+          << "radius " << radius_m << " m of body " << with;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace deformable_ccd
