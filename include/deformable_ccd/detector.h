@@ -88,7 +88,7 @@ struct DetectorOptions {
   BroadPhase broad_phase = BroadPhase::CLUSTERED;
   int num_threads = 1;            ///< 1 or more
   double step_budget_ms = 0;      ///< 0: none
-  bool earliest_only = false;     ///< only the contacts with the earliest TOC cell are returned
+  bool earliest_only = false;     ///< only contacts that may be the first; with `exact` those in the earliest TOC cell
   bool check_start_state = true;  ///< run the static tests when the step needs them
   /// Bodies that move bit for bit as in the step before keep their bounds (no answer changes). Off: to time a step again
   /// and again.

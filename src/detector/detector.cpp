@@ -26,6 +26,23 @@ void check(const DetectorOptions& o) {
   }
 }
 
+/// Erases what cannot be the first contact: it begins after another one has certainly happened. How wide a bracket is
+/// says nothing: `conservative` may find the first contact at once, in [0, 1], and a later one in a narrow bracket.
+/// cells: the brackets are cells that do not overlap, and where one ends, the next begins (the last, [1, 1], as well).
+void keepEarliest(bool cells, std::vector<core::Contact>& contacts) {
+  double lower = 2, upper = 2;
+  for (const core::Contact& c : contacts) {
+    if (c.certainty != Certainty::CERTAIN) continue;
+    lower = std::min(lower, c.toc_lower);
+    upper = std::min(upper, c.toc_upper);
+  }
+  const auto late = [&](const core::Contact& c) {
+    const bool next_cell = cells && c.certainty == Certainty::CERTAIN && c.toc_lower == upper && c.toc_lower > lower;
+    return c.toc_lower > upper || next_cell;
+  };
+  contacts.erase(std::remove_if(contacts.begin(), contacts.end(), late), contacts.end());
+}
+
 }  // namespace
 
 const char* toString(Stage stage) {
@@ -118,20 +135,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   collect();
   if (step.obstacle && scene.meetsObstacle()) runObstacle(step);
   rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
-  if (options.earliest_only && !result.contacts.empty()) {
-    double lower = 2, upper = 2;
-    for (const core::Contact& c : result.contacts) {
-      if (c.certainty != Certainty::CERTAIN) continue;
-      lower = std::min(lower, c.toc_lower);
-      upper = std::min(upper, c.toc_upper);
-    }
-    // The cell [1, 1] ends where the one before it does, and is later all the same.
-    const auto late = [&](const core::Contact& c) {
-      if (c.certainty != Certainty::CERTAIN) return c.toc_lower > upper;
-      return c.toc_upper > upper || (c.toc_lower > lower && c.toc_lower >= upper);
-    };
-    result.contacts.erase(std::remove_if(result.contacts.begin(), result.contacts.end(), late), result.contacts.end());
-  }
+  if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
   if (options.check_start_state) {
     start = Clock::now();
     // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the

@@ -225,8 +225,9 @@ void PairWorker::countOut(std::size_t i) {
 void PairWorker::dropLate() {
   const double best = context_->best_toc_upper.load(std::memory_order_relaxed);
   if (best >= 2) return;
-  // With the tolerance, so that nothing is dropped that the elementary test would have called a contact before `best`:
-  // the answer must not depend on which pair was looked at first.
+  // The answer must not depend on which pair was looked at first: only what keepEarliest() would erase is dropped. The
+  // bound is taken with the tolerance: until then the features are certainly farther than that, so that the bracket of
+  // a contact begins at the bound or later, and a cell of `exact` not before `best`, which is the end of one.
   std::size_t n = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const double distance = separationOf(i) + context_->tolerance_m;

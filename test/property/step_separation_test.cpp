@@ -59,8 +59,9 @@ double separationOf(const NoisyStep& noisy, const core::Contact& c) {
          radiusOf(noisy, c.body[1], c.vertex.data() + first, 4 - first);
 }
 
-StepResult run(const NoisyStep& noisy, BroadPhase broad_phase) {
+StepResult run(const NoisyStep& noisy, BroadPhase broad_phase, bool earliest_only = false) {
   DetectorOptions options;
+  options.earliest_only = earliest_only;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   options.accuracy.tolerance_m = TOLERANCE_M;
   options.broad_phase = broad_phase;
@@ -148,6 +149,29 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
   std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within << " of them with noise\n";
   EXPECT_GT(within, pairs / 100);
   EXPECT_GT(noisy_within, within / 10);
+}
+
+// Of brackets of any width the earliest is kept, and all that may be as early.
+TEST(StepSeparation, EarliestOnlyIsTheFirstOfAll) {
+  int left_out = 0, several = 0;
+  for (int seed = 0; seed < 200; ++seed) {
+    const NoisyStep noisy = randomNoisyStep(drawFrom(7700 + static_cast<std::uint64_t>(seed)));
+    const StepResult full = run(noisy, BroadPhase::CLUSTERED), first = run(noisy, BroadPhase::CLUSTERED, true);
+    ASSERT_EQ(first.earliestToc(), full.earliestToc()) << "seed " << seed;
+    double upper = 1;
+    for (const core::Contact& c : full.contacts) {
+      if (c.certainty == Certainty::CERTAIN) upper = std::min(upper, c.toc_upper);
+    }
+    std::vector<core::Contact> expected;
+    for (const core::Contact& c : full.contacts) {
+      if (c.toc_lower <= upper) expected.push_back(c);
+    }
+    ASSERT_EQ(difference(first.contacts, expected), "") << "seed " << seed;
+    left_out += full.contacts.size() > first.contacts.size();
+    several += first.contacts.size() > 1;
+  }
+  EXPECT_GT(left_out, 20);
+  EXPECT_GT(several, 20);
 }
 
 // Just those vertices: a pair without an uncertain vertex gives the same bits as without any noise.

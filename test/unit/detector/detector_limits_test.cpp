@@ -45,6 +45,41 @@ TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
   }
 }
 
+// The brackets of `conservative` are as wide as the way to them was short: a contact found at once ends at 1, and is
+// the first all the same.
+TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
+  TestStep step = crossing();  // body 1 meets body 0 at 0.5, in a narrow bracket
+  StepBody near = step.bodies[0];  // too close to body 0 from the start: the bracket is [0, 1]
+  for (Positions* x : {&near.t0, &near.t1}) {
+    for (Vec3& p : *x) p.z() -= 0.05;
+  }
+  step.bodies.push_back(near);
+  DetectorOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.check_start_state = false;
+  std::vector<BodySetup> setups = step.setups();
+  for (BodySetup& setup : setups) setup.self_collision = false;
+  setups[2].separations = {{0, 0.1}};
+  const auto run = [&] {
+    Detector detector(options);
+    detector.setBodies(setups, step.positions());
+    return detector.run(step.motion());
+  };
+  const StepResult full = run();
+  ASSERT_EQ(full.earliestToc(), 0);
+  const auto narrow = [](const core::Contact& c) { return c.toc_lower > 0.49 && c.toc_upper < 0.51; };
+  ASSERT_TRUE(std::any_of(full.contacts.begin(), full.contacts.end(), narrow)) << "nothing to take for the first";
+  options.earliest_only = true;
+  const StepResult first = run();
+  EXPECT_EQ(first.earliestToc(), 0);
+  // What begins before the narrow one ends may be the first; what begins later is not.
+  for (const core::Contact& c : full.contacts) {
+    const bool listed = std::any_of(first.contacts.begin(), first.contacts.end(),
+                                    [&](const core::Contact& f) { return difference({c}, {f}).empty(); });
+    EXPECT_EQ(listed, c.toc_lower < 0.51) << describe(c);
+  }
+}
+
 // Nothing that the budget leaves over may touch before its bound.
 TEST(DetectorLimits, BudgetKeepsItsWord) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
