@@ -92,6 +92,10 @@ class MeshStore {
   /// Why the run that the newest frame is in began (FIRST_FRAME, GAP, ...).
   StepStatus runReason() const { return run_reason_; }
 
+  /// The frame at or next after a stamp for which lookup is READY: its topology is that of the whole run. (The newest
+  /// frame may be in a later one.)
+  const MeshFrame& frameAtOrAfter(StampNs stamp_ns) const { return *frames_[firstAtOrAfter(stamp_ns)].frame; }
+
   /// Position at a stamp for which lookup is READY: a frame's own positions, bit for bit, or interpolated between two.
   /// The rounded doubles are the truth from there on (doc/algorithm.md, "The question").
   void positionsAt(StampNs stamp_ns, Positions& out) const;

@@ -69,11 +69,13 @@ void Monitor::Impl::place(const Pending& step) {
       input.radius_m[b] = largerRadii(step.from->radius_m, step.to->radius_m);
       continue;
     }
-    input.topologies[b] = store.newest().topology;
-    input.rigid[b] = isStream(b) && store.newest().rigid;
+    // Not the newest frame, which may have begun another run with another topology while the step waited.
+    const MeshFrame& frame = isStream(b) ? store.frameAtOrAfter(step.to->stamp_ns) : store.newest();
+    input.topologies[b] = frame.topology;
+    input.rigid[b] = isStream(b) && frame.rigid;
     if (!isStream(b)) {
-      input.t0[b] = input.t1[b] = store.newest().positions;
-      input.radius_m[b] = store.newest().radius_m;
+      input.t0[b] = input.t1[b] = frame.positions;
+      input.radius_m[b] = frame.radius_m;
       continue;
     }
     store.positionsAt(step.from->stamp_ns, input.t0[b]);

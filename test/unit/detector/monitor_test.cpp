@@ -318,6 +318,43 @@ TEST_F(TwoBodies, SeamOfAnotherBodyIsASeamOfTheStep) {
   EXPECT_NE(outcome.reason.find("tip"), std::string::npos);
 }
 
+// The other body has gone on to another topology while the step waited; the step is still in the one before.
+TEST_F(TwoBodies, TopologyIsThatOfTheStepNotTheNewest) {
+  // Of the same four vertices, the first topology takes the tip and the second does not.
+  const auto with_tip = std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 1, 2}}));
+  const auto without = std::make_shared<const Topology>(Topology::fromTriangles(4, {{1, 2, 3}}));
+  const auto four = [](StampNs stamp_ns, const std::shared_ptr<const Topology>& topology, double z) {
+    return MeshFrame{stamp_ns, topology, {{0, 0, z}, {0.5, 0, z + 5}, {-0.5, 0, z + 5}, {0, 0.5, z + 5}}};
+  };
+  const MeshFrame fewer = tip(200 * MS, 9);
+  for (const MeshFrame& newest : {four(200 * MS, without, 9), fewer}) {
+    monitor.reset();
+    feed(0, floor(0, 0));
+    only(monitor);
+    feed(1, four(0, with_tip, 1));
+    feed(1, four(100 * MS, with_tip, -1));
+    feed(1, newest);
+    feed(0, floor(100 * MS, 0));
+    const StepOutcome outcome = only(monitor);
+    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+    EXPECT_EQ((*outcome.topologies)[1], with_tip);
+    ASSERT_FALSE(outcome.contacts.empty());
+    EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
+    // From the seam on it is the new one that counts.
+    feed(0, floor(200 * MS, 0));
+    EXPECT_EQ(only(monitor).status, StepStatus::TOPOLOGY_CHANGED);
+    MeshFrame last = newest;
+    last.stamp_ns = 300 * MS;
+    feed(1, last);
+    feed(0, floor(300 * MS, 0));
+    const StepOutcome next = only(monitor);
+    EXPECT_EQ(next.status, StepStatus::OK) << next.reason;
+    EXPECT_EQ(*(*next.topologies)[1], *newest.topology);
+    EXPECT_TRUE(next.contacts.empty());
+  }
+  expectAddsUp(monitor);
+}
+
 TEST_F(TwoBodies, TimeJumpDropsWhatWaits) {
   feed(0, floor(1000 * MS, 0));
   only(monitor);
