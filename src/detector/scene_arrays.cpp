@@ -181,9 +181,18 @@ double SceneArrays::separation(std::size_t a, std::size_t b) const {
 
 void SceneArrays::refitBodies() {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    // The vertices' tree bounds the whole body; with a separation it is widened like the others.
-    const ClusterTree& tree = bodies_[b].tree(FeatureKind::VERTEX);
-    std::copy_n(tree.level(height_ - 1).aos.data(), simd::AOS_SIZE, body_bounds_.data() + b * simd::AOS_SIZE);
+    // All three trees: a feature is widened by the largest radius of its vertices, which may lie in another group of
+    // vertices than the feature's outermost one. An empty tree's bounds are neutral.
+    std::int16_t* bounds = body_bounds_.data() + b * simd::AOS_SIZE;
+    std::fill_n(bounds, simd::RECORD, simd::EMPTY_LO);
+    std::fill_n(bounds + simd::RECORD, simd::RECORD, simd::EMPTY_HI);
+    for (const ClusterTree& tree : bodies_[b].trees) {
+      const std::int16_t* top = tree.level(height_ - 1).aos.data();
+      for (std::size_t k = 0; k < simd::RECORD; ++k) {
+        bounds[k] = std::min(bounds[k], top[k]);
+        bounds[simd::RECORD + k] = std::max(bounds[simd::RECORD + k], top[simd::RECORD + k]);
+      }
+    }
   }
   simd::buildUpper(body_bounds_.data(), bodies_.size(), body_levels_[0].soa.data(), body_levels_[0].aos.data());
   for (std::size_t l = 1; l < body_levels_.size(); ++l) {

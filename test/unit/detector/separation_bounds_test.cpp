@@ -57,6 +57,30 @@ TEST(SeparationBounds, RadiusOfOneBodyLargerThanTheScene) {
   }
 }
 
+// A feature reaches as far as the most uncertain of its vertices. Here that vertex is in another group than the
+// feature's outermost one, so that no group of vertices reaches as far as the feature does.
+TEST(SeparationBounds, FeatureReachesFartherThanItsVertices) {
+  TestStep step;
+  step.bodies.resize(2);
+  StepBody &rope = step.bodies[0], &bar = step.bodies[1];
+  rope.topology = Topology::polyline(17);  // sixteen vertices in a group: the last has one of its own
+  for (int i = 0; i < 17; ++i) rope.t0.push_back(Vec3(0.1 * i, 0, 0));
+  bar.topology = Topology::polyline(2);
+  bar.t0 = {Vec3(1.7, -1, 0), Vec3(1.7, 1, 0)};
+  for (StepBody& body : step.bodies) {
+    body.t1 = body.t0;
+    body.self_collision = false;
+  }
+  Radii radii;
+  radii.of_body = {std::vector<double>(17, 0.0), {}};
+  radii.of_body[0][15] = 0.15;  // at x = 1.5; the edge from there to x = 1.6 is 0.1 from the bar
+  const StepResult result = run(step, radii, BroadPhase::CLUSTERED);
+  ASSERT_EQ(result.contacts.size(), 1u);
+  EXPECT_EQ(result.contacts[0].kind, PairKind::EDGE_EDGE);
+  EXPECT_EQ(result.contacts[0].vertex, (std::array<Index, 4>{15, 16, 0, 1}));
+  EXPECT_EQ(difference(result.contacts, run(step, radii, BroadPhase::BRUTE_FORCE).contacts), "");
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace deformable_ccd
