@@ -53,8 +53,10 @@ void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_R
     project(vertices + 4 * i, p);
     for (size_t d = 0; d < 8; d += hn::Lanes(dd)) {
       const auto value = hn::Mul(hn::Sub(hn::Load(dd, p + d), hn::LoadU(dd, low8 + d)), hn::LoadU(dd, scale8 + d));
-      // A sum that overflowed meets a scale of 0 only; the direction then says nothing about any vertex.
-      hn::Store(hn::DemoteTo(di, hn::IfThenElseZero(hn::Eq(value, value), value)), di, q + d);
+      // A sum that overflowed meets a scale of 0 only; the direction then says nothing about any vertex. What lies
+      // outside the range (a body without any active vertex) takes its end, which keeps the order, too.
+      const auto number = hn::IfThenElseZero(hn::Eq(value, value), value);
+      hn::Store(hn::DemoteTo(di, hn::Clamp(number, hn::Zero(dd), hn::Set(dd, RECORD_RANGE))), di, q + d);
     }
     for (int d = 0; d < 8; ++d) records[8 * i + d] = static_cast<int16_t>(q[d] - 32764);
   }

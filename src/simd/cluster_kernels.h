@@ -35,7 +35,7 @@ constexpr double RECORD_RANGE = 65528.0;  ///< record values lie in [-32764, 327
 /// min8 and max8 are read first, so that calls over pieces can be chained.
 void projectionBounds(const double* vertices, std::size_t n, double* min8, double* max8);
 
-/// Records of n vertices: trunc((projection - low[d]) * scale[d]) - 32764, scale > 0, low <= every projection.
+/// Records of n vertices: trunc((projection - low[d]) * scale[d]) - 32764, cut off at both ends of the range.
 void quantize(const double* vertices, std::size_t n, const double* low8, const double* scale8, std::int16_t* records);
 
 /// Groups of features with `arity` vertices each (1 to 3). indices: count x arity, UINT32_MAX in the first place

@@ -2,6 +2,8 @@
 // it is against the scene, and whichever vertices and bodies have it.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "deformable_ccd/detector.h"
 #include "support/step_support.h"
 
@@ -79,6 +81,30 @@ TEST(SeparationBounds, FeatureReachesFartherThanItsVertices) {
   EXPECT_EQ(result.contacts[0].kind, PairKind::EDGE_EDGE);
   EXPECT_EQ(result.contacts[0].vertex, (std::array<Index, 4>{15, 16, 0, 1}));
   EXPECT_EQ(difference(result.contacts, run(step, radii, BroadPhase::BRUTE_FORCE).contacts), "");
+}
+
+// A body that is not seen at all has no place in the range of the records, which may lie anywhere.
+TEST(SeparationBounds, BodyWithoutAnyPositionFarFromTheOthers) {
+  constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
+  TestStep step = crossing();
+  for (const double at : {5e5, -5e5}) {
+    TestStep far = step;
+    for (StepBody& body : far.bodies) {
+      for (Positions* x : {&body.t0, &body.t1}) {
+        for (Vec3& p : *x) p += Vec3::Constant(at);
+      }
+    }
+    const std::size_t seen = runOnce(far, {}).contacts.size();
+    StepBody lost = step.bodies[0];
+    for (Positions* x : {&lost.t0, &lost.t1}) {
+      for (Vec3& p : *x) p.setConstant(NONE);
+    }
+    far.bodies.push_back(lost);
+    const StepResult result = runOnce(far, {});
+    EXPECT_EQ(result.contacts.size(), seen);
+    EXPECT_GT(seen, 0u);
+    EXPECT_EQ(result.stats.unchecked_vertices, 3u);
+  }
 }
 
 }  // namespace

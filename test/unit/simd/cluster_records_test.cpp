@@ -136,6 +136,25 @@ TEST(ClusterRecords, RecordsUseTheirRange) {
   });
 }
 
+// A body without any active vertex is not in the range, but has records all the same.
+TEST(ClusterRecords, WhatLiesOutsideTheRangeTakesItsEnd) {
+  const double below = 5e5 - 1e-4, above = 5e5 + 1.0001;  // by more than a unit, by less than what wraps around
+  const double far[8] = {0, 0, 0, 0, 1e9, 1e9, 1e9, 0}, near[8] = {below, below, below, 0, above, above, above, 0};
+  double low[8], scale[8];
+  std::fill_n(low, 8, 5e5);
+  std::fill_n(scale, 8, simd::RECORD_RANGE);
+  forEachSimdTarget([&](const std::string& target) {
+    for (const double* vertex : {far, near}) {
+      std::int16_t records[RECORD];
+      simd::quantize(vertex, 1, low, scale, records);
+      for (std::size_t d = 0; d < 3; ++d) {
+        EXPECT_EQ(records[d], -32764) << target;
+        EXPECT_EQ(records[8 + d], 32764) << target;
+      }
+    }
+  });
+}
+
 TEST(ClusterRecords, RecordsAndBoundsAreTheSameOnEveryTarget) {
   for (int style = 0; style < static_cast<int>(Coordinates::COUNT); ++style) {
     const auto vertices = randomVertices(drawFrom(5), 33, static_cast<Coordinates>(style));
