@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
 #include "broad_phase/cluster_pairs.h"
 #include "detector/float_mode.h"
+#include "detector/left_out.h"
+#include "detector/pair_separation.h"
 #include "detector/scene_arrays.h"
 #include "detector/toc_bound.h"
 #include "detector/unfolded.h"
@@ -92,7 +95,7 @@ class Tracer {
     scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
     for (Feature& f : features_) findSlot(scene, f);
     if (!traceRules(scene)) return;
-    setSeparation(scene, detector.leftOut());
+    setSeparation(scene, input, detector.leftOut());
     traceUnfolded(scene);
     traceLinear(t0, t1);
     traceBroadPhase(scene);
@@ -161,28 +164,41 @@ class Tracer {
     return pair;
   }
 
-  /// What the pair carries into the elementary test; see PairWorker::setSeparations.
-  void setSeparation(const SceneArrays& scene, const std::vector<LeftOutPair>& left_out) {
-    const Feature &a = features_[0], &b = features_[1];
-    separation_ = scene.separation(a.body, b.body);
-    const double own = separation_;
-    if (scene.uncertain()) {
-      for (const Feature& f : features_) {
-        const Index* internal = scene.bodies()[f.body].tree(f.kind).feature(f.slot);
-        double radius = 0;
-        for (std::size_t i = 0; i < f.size; ++i) radius = std::max(radius, scene.radii()[internal[i]]);
-        separation_ += radius;
-      }
+  /// The pair by its vertices' numbers in the scene's arrays.
+  Quad internalVertices(const SceneArrays& scene) const {
+    Quad quad{};
+    for (const Feature& f : features_) {
+      const Index* found = scene.bodies()[f.body].tree(f.kind).feature(f.slot);
+      std::copy_n(found, f.size, quad.begin() + static_cast<std::ptrdiff_t>(f.first));
     }
-    const bool listed = std::any_of(left_out.begin(), left_out.end(), [&](const LeftOutPair& pair) {
-      return pair.kind == question_.kind && pair.body == a.body && a.body == b.body && sameFeatures(pair.vertex);
-    });
-    if (listed) {
+    return quad;
+  }
+
+  /// How far the pair is apart in the reference frame, as the list of what is left out has it; infinity: not listed.
+  double apartInReference(const StepInput& input, const std::vector<LeftOutPair>& left_out) const {
+    const std::size_t body = features_[0].body;
+    for (const LeftOutPair& pair : left_out) {
+      if (pair.kind != question_.kind || pair.body != body || features_[1].body != body) continue;
+      if (!sameFeatures(pair.vertex)) continue;
+      const Positions& at = input.references[body]->positions;
+      return restDistance(pair.kind, {at[pair.vertex[0]], at[pair.vertex[1]], at[pair.vertex[2]], at[pair.vertex[3]]});
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  /// What the pair carries into the elementary test.
+  void setSeparation(const SceneArrays& scene, const StepInput& input, const std::vector<LeftOutPair>& left_out) {
+    const AccuracyOptions& accuracy = options_.detector.accuracy;
+    const SeparationRule rule(scene, features_[0].body, features_[1].body,
+                              accuracy.rung == Accuracy::CONSERVATIVE ? accuracy.tolerance_m : 0);
+    const PairSeparation pair = rule.of(question_.kind, internalVertices(scene), apartInReference(input, left_out));
+    separation_ = pair.total_m;
+    separated_ = rule.applies();
+    if (pair.left_out) {
       say("separation", Says::KEPT, "closer than the separation in the reference frame: left out of it");
-      separation_ = 0;
     } else if (separation_ > 0) {
       std::ostringstream text;
-      text << "contact from " << separation_ << " m, " << separation_ - own << " m of it tracker noise";
+      text << "contact from " << pair.total_m << " m, " << pair.noise_m << " m of it tracker noise";
       say("separation", Says::KEPT, text.str());
     }
   }
@@ -249,12 +265,9 @@ class Tracer {
   }
 
   void tracePlanar(const SceneArrays& scene) {
-    if (separation() > 0) return say("planar", Says::KEPT, "not asked: it proves 'never touch', not 'never closer than'");
-    Quad quad{};
-    for (const Feature& f : features_) {
-      const Index* found = scene.bodies()[f.body].tree(f.kind).feature(f.slot);
-      std::copy_n(found, f.size, quad.begin() + f.first);
-    }
+    // Nor of what is left out, whose task carries distances.
+    if (separated_) return say("planar", Says::KEPT, "not asked: it proves 'never touch', not 'never closer than'");
+    const Quad quad = internalVertices(scene);
     const auto keeps = [&](simd::FusedPlanes planes) {
       std::uint32_t kept = 0;
       return simd::fusedFilter(scene.vertices()->t0, quad.data(), 1, question_.kind == PairKind::EDGE_EDGE, planes, &kept) == 1;
@@ -308,6 +321,7 @@ class Tracer {
   std::array<Feature, 2> features_;
   std::size_t part_ = 0;
   double separation_ = 0;
+  bool separated_ = false;  // the pair's task carries distances, be the pair's own 0
   std::vector<TraceLine> lines_;
 };
 

@@ -48,9 +48,8 @@ void PairWorker::begin(StepContext& context, const PairTask& task) {
   task_ = &task;
   a_ = &context.scene->bodies()[task.body_a];
   b_ = &context.scene->bodies()[task.body_b];
-  separation_ = context.scene->separation(task.body_a, task.body_b);
-  uncertain_ = a_->uncertain || b_->uncertain;
-  separated_ = separation_ > 0 || uncertain_;
+  rule_ = SeparationRule(*context.scene, task.body_a, task.body_b, context.tolerance_m);
+  separated_ = rule_.applies();
   left_out_ = task.self && separated_ && context.left_out && !(*context.left_out)[task.body_a].empty()
                   ? &(*context.left_out)[task.body_a]
                   : nullptr;
@@ -156,8 +155,8 @@ void PairWorker::flush() {
     decide();
   }
   const double ms = msSince(start);
-  if (separation_ > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
-  if (uncertain_) stats_[Effect::TRACKER_NOISE].ms += ms;
+  if (rule_.bodies_m > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
+  if (rule_.uncertain) stats_[Effect::TRACKER_NOISE].ms += ms;
   count_ = 0;
 }
 
@@ -191,26 +190,14 @@ void PairWorker::makeCanonical() {
   }
 }
 
-// By how much the vertices' uncertainty widens the pair: a point of a feature is a convex combination of its vertices, so
-// that it is off by the largest of their radii at most.
-double PairWorker::radius(const Quad& pair) const {
-  const double* r = context_->scene->radii();
-  if (task_->kind == PairKind::EDGE_EDGE) return std::max(r[pair[0]], r[pair[1]]) + std::max(r[pair[2]], r[pair[3]]);
-  return r[pair[0]] + std::max({r[pair[1]], r[pair[2]], r[pair[3]]});
-}
-
 void PairWorker::setSeparations() {
   for (std::size_t i = 0; i < count_; ++i) {
-    double noise = uncertain_ ? radius(quads_[i]) : 0;
-    // Rounded up, so that a contact at exactly the sum is none too far.
-    separations_[i] = noise > 0 ? (separation_ + noise) * (1 + 0x1p-50) : separation_;
-    // The list is made for the largest radii so far; what counts is what the vertices are known to now.
     const double apart_m = left_out_ ? left_out_->distance(task_->kind, keys_[i]) : INFINITE;
-    const bool left_out = apart_m < INFINITE && (!uncertain_ || apart_m <= separations_[i] + context_->tolerance_m);
-    if (left_out) separations_[i] = noise = 0;
-    stats_.left_out_met += left_out;
-    stats_[Effect::MINIMUM_SEPARATION].in += separation_ > 0 && !left_out;
-    stats_[Effect::TRACKER_NOISE].in += noise > 0;
+    const PairSeparation pair = rule_.of(task_->kind, quads_[i], apart_m);
+    separations_[i] = pair.total_m;
+    stats_.left_out_met += pair.left_out;
+    stats_[Effect::MINIMUM_SEPARATION].in += rule_.bodies_m > 0 && !pair.left_out;
+    stats_[Effect::TRACKER_NOISE].in += pair.noise_m > 0;
   }
 }
 
@@ -218,8 +205,8 @@ void PairWorker::countOut(std::size_t i) {
   ++stats_[effect()].out;
   if (rigid()) ++stats_[Effect::RIGID_BODIES].out;
   if (!separated_) return;
-  stats_[Effect::MINIMUM_SEPARATION].out += separation_ > 0 && separations_[i] > 0;
-  stats_[Effect::TRACKER_NOISE].out += separations_[i] > separation_;
+  stats_[Effect::MINIMUM_SEPARATION].out += rule_.bodies_m > 0 && separations_[i] > 0;
+  stats_[Effect::TRACKER_NOISE].out += separations_[i] > rule_.bodies_m;
 }
 
 void PairWorker::dropLate() {

@@ -9,6 +9,7 @@
 
 #include "broad_phase/cluster_pairs.h"
 #include "detector/left_out.h"
+#include "detector/pair_separation.h"
 #include "detector/scene_arrays.h"
 
 namespace deformable_ccd {
@@ -79,7 +80,6 @@ class PairWorker {
   Effect effect() const { return task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY; }
   bool rigid() const { return !task_->self && (a_->setup.rigid || b_->setup.rigid); }
   void setSeparations();
-  double radius(const Quad& pair) const;
   double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
   void countOut(std::size_t i);
   void addMs(double ms);
@@ -95,9 +95,8 @@ class PairWorker {
   std::vector<std::uint32_t> kept_;
   std::vector<ElementaryResult> results_;
   std::vector<double> separations_;
-  double separation_ = 0;   // of the task's bodies
-  bool uncertain_ = false;  // some vertex of theirs has a radius
-  bool separated_ = false;  // either of the two: separations_ holds a value for each pair
+  SeparationRule rule_;     // of the task's bodies
+  bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
   const LeftOutOfBody* left_out_ = nullptr;
   std::size_t count_ = 0;
   std::vector<Hit> hits_[2];

@@ -410,6 +410,50 @@ TEST(VoxelTrace, WhatDoesNotExistIsNamed) {
   EXPECT_THROW(ask(MonitorMap(), {PairKind::VERTEX_VOXEL_FACE, 0, {0}, {}}), std::invalid_argument) << "no map";
 }
 
+// A listed pair is left out only while it is closer in the reference frame than its present separation; its radii may
+// be smaller now than those of the list.
+TEST(PairTrace, HoldsAListedPairToItsPresentSeparation) {
+  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
+  const auto at = [](double z) {
+    return Positions{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}};
+  };
+  std::vector<MonitorBody> bodies(1);
+  bodies[0].name = "cloth";
+  MonitorOptions options;
+  options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
+  const PairQuestion question{PairKind::VERTEX_FACE, {0, 0}, {3, 0, 1, 2}};
+  for (const double radius_m : {0.001, 0.004}) {
+    StepInput input;
+    input.resize(1);
+    input.topologies = {topology};
+    input.t0[0] = input.t1[0] = at(0.0015);
+    input.radius_m[0].assign(6, radius_m);
+    const ReferenceFrame reference{at(0.005), std::vector<double>(6, 0.01)};
+    input.references[0] = std::make_shared<const ReferenceFrame>(reference);
+    Detector detector(options.detector);
+    detector.setBodies(bodySetups(input, bodies), {&input.t0[0]});
+    const auto listed = [&](const LeftOutPair& pair) {
+      return pair.kind == question.kind && std::equal(pair.vertex.begin(), pair.vertex.end(), question.vertex.begin());
+    };
+    ASSERT_TRUE(std::any_of(detector.leftOut().begin(), detector.leftOut().end(), listed));
+    MotionStep step;
+    step.bodies = {{&input.t0[0], &input.t1[0], &input.radius_m[0]}};
+    const StepResult result = detector.run(step);
+    const bool contact = std::any_of(result.contacts.begin(), result.contacts.end(), [&](const core::Contact& c) {
+      return c.kind == question.kind && std::equal(c.vertex.begin(), c.vertex.end(), question.vertex.begin());
+    });
+    EXPECT_EQ(contact, radius_m < 0.0025);  // 0.005 apart there, and 0.0015 now
+    const std::vector<TraceLine> trace = tracePair(input, bodies, options, question);
+    const auto lineOf = [&](const std::string& stage) {
+      const auto line = std::find_if(trace.begin(), trace.end(), [&](const TraceLine& l) { return l.stage == stage; });
+      return line == trace.end() ? TraceLine() : *line;
+    };
+    EXPECT_EQ(lineOf("conservative *").says == TraceLine::Says::CONTACT, contact);
+    EXPECT_EQ(lineOf("separation").text.find("left out") == std::string::npos, contact) << lineOf("separation").text;
+    EXPECT_NE(lineOf("planar").text.find("not asked"), std::string::npos) << lineOf("planar").text;
+  }
+}
+
 TEST(PairTrace, WhatDoesNotExistIsNamed) {
   const StepRecording r = recordScene();
   std::vector<MonitorBody> bodies;
