@@ -43,7 +43,9 @@ struct MonitorOptions {
   bool suppress_initial = false;        ///< leave initial obstacle contacts out of the list (they still count)
   std::vector<Box> exclude_boxes;       ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;       ///< without a map the status is NO_MAP
-  double octomap_timeout_s = 0;         ///< a map older than this at the end of the step is no map; 0: never
+  /// With obstacle_expected, a map older than this at the end of the step is no map; 0: never. (Where none is expected,
+  /// leaving a map out would go unsaid: it is used whatever its age.)
+  double octomap_timeout_s = 0;
   double rigid_tolerance_m = 1e-3;      ///< a step is split until straight paths are this close to a rotation's arc
   std::size_t max_substeps = 64;
   double look_ahead_s = 0;              ///< horizon of predictions; 0: none
