@@ -73,8 +73,8 @@ struct StepStats {
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
 const char* toString(StartState state);
 
-/// An edge through a face at t=0 (kind EDGE_FACE: body[0], v[0..1] edge; body[1], v[2..4] face), or a
-/// mesh vertex inside occupied space (body[1] = OBSTACLE_BODY, v[0] the vertex).
+/// An edge through a face at t=0 (vertex[0..1] of body[0] the edge, vertex[2..4] of body[1] the face), or a mesh vertex
+/// inside occupied space (body[1] = OBSTACLE_BODY, vertex[0] the vertex).
 struct StartIntersection {
   std::array<std::uint16_t, 2> body{0, 0};
   std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};

@@ -61,7 +61,6 @@ struct ObstacleStats {
 struct ObstacleOptions {
   AccuracyOptions accuracy;
   double minimum_separation_m = 0;  ///< contact when closer than this; conservative only when > 0
-  bool earliest_only = false;
 };
 
 /// Mesh vertices against exposed voxel faces, mesh edges against convex voxel edges, voxel corners against mesh faces, over

@@ -113,10 +113,4 @@ void ClusterTree::refitUpper() {
   }
 }
 
-std::size_t ClusterTree::memoryBytes() const {
-  std::size_t bytes = (features_.capacity() + masked_.capacity()) * sizeof(Index);
-  for (const Level& l : levels_) bytes += l.soa.capacityBytes() + l.aos.capacityBytes();
-  return bytes;
-}
-
 }  // namespace deformable_ccd

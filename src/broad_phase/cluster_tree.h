@@ -23,7 +23,6 @@ class AlignedRecords {
   void resize(std::size_t n);
   std::int16_t* data() { return data_.get(); }
   const std::int16_t* data() const { return data_.get(); }
-  std::size_t capacityBytes() const { return capacity_ * sizeof(std::int16_t); }
 
  private:
   hwy::AlignedFreeUniquePtr<std::int16_t[]> data_;
@@ -58,7 +57,6 @@ class ClusterTree {
   const Level& level(std::size_t l) const { return levels_[l]; }
   /// Vertex indices of the feature in a slot; only slots below featureCount() hold one.
   const Index* feature(std::size_t slot) const { return features_.data() + slot * arity_; }
-  std::size_t memoryBytes() const;
 
  private:
   std::size_t feature_count_ = 0;

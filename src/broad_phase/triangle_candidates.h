@@ -1,6 +1,6 @@
-// The PAPER and BRUTE_FORCE broad phases: candidate pairs of features of triangle pairs with overlapping swept bounds,
-// each feature pair once (mesh/feature_ownership.h), pairs that share a vertex left out. This is the candidate set of the
-// paper's culling ratios.
+// The paper's broad phase and that of all triangles with all: candidate pairs of features of triangle pairs with
+// overlapping swept bounds, each feature pair once (mesh/feature_ownership.h), pairs that share a vertex left out. This
+// is the candidate set of the paper's culling ratios.
 #pragma once
 
 #include <cstddef>

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "deformable_ccd/detector.h"
@@ -61,6 +62,7 @@ struct Detector::Impl {
   tbb::enumerable_thread_specific<PairWorker> workers;
   std::vector<PairTask> tasks;
   std::vector<std::uint32_t> group_pairs, found_groups, scratch;
+  std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc;  // and place, pair of groups
   std::vector<std::uint32_t> body_pairs;
   HitOrder order;
   StartStateTest start_state;

@@ -22,13 +22,16 @@ void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, c
   const TreePair trees{&ta, &tb, same_tree, false};
   superclusterPairs(trees, found_groups, scratch);
   if (context.deadline != Clock::time_point::max()) {
-    // What the deadline leaves over should be what can touch last.
-    std::vector<std::array<std::uint32_t, 2>> pairs(found_groups.size() / 2);
-    for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i] = {found_groups[2 * i], found_groups[2 * i + 1]};
-    std::stable_sort(pairs.begin(), pairs.end(), [&](const auto& x, const auto& y) {
-      return superclusterTocBound(trees, x[0], x[1]) < superclusterTocBound(trees, y[0], y[1]);
-    });
-    for (std::size_t i = 0; i < pairs.size(); ++i) std::copy(pairs[i].begin(), pairs[i].end(), &found_groups[2 * i]);
+    // What the deadline leaves over should be what can touch last; of equal ones what was found last.
+    by_toc.clear();
+    for (std::uint32_t i = 0; 2 * i < found_groups.size(); ++i) {
+      const std::array<std::uint32_t, 2> pair{found_groups[2 * i], found_groups[2 * i + 1]};
+      by_toc.push_back({superclusterTocBound(trees, pair[0], pair[1]), i, pair});
+    }
+    std::sort(by_toc.begin(), by_toc.end());
+    for (std::size_t i = 0; i < by_toc.size(); ++i) {
+      std::copy_n(std::get<2>(by_toc[i]).begin(), 2, &found_groups[2 * i]);
+    }
   }
   const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
   const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);

@@ -278,10 +278,4 @@ void PairWorker::decide() {
   lap(Stage::ELEMENTARY, start);
 }
 
-std::size_t PairWorker::memoryBytes() const {
-  return quads_.capacity() * sizeof(Quad) + (slots_.capacity() + keys_.capacity()) * 8 + kept_.capacity() * 4 +
-         results_.capacity() * sizeof(ElementaryResult) + separations_.capacity() * 8 +
-         (hits_[0].capacity() + hits_[1].capacity()) * sizeof(Hit);
-}
-
 }  // namespace deformable_ccd

@@ -66,7 +66,6 @@ class PairWorker {
   const std::vector<Hit>& hits(PairKind kind) const { return hits_[static_cast<int>(kind)]; }
   const core::StepStats& stats() const { return stats_; }
   double uncheckedTocLower() const { return unchecked_toc_lower_; }
-  std::size_t memoryBytes() const;
 
  private:
   void begin(StepContext& context, const PairTask& task);

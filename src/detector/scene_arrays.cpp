@@ -240,14 +240,4 @@ void SceneArrays::featureVertices(FeatureKind kind, std::size_t body_index, Inde
   }
 }
 
-std::size_t SceneArrays::memoryBytes() const {
-  std::size_t bytes = vertex_capacity_ * sizeof(VertexMotion) + records_.capacityBytes() + face_order_.capacity() * sizeof(Index);
-  for (const SceneBody& b : bodies_) {
-    for (const ClusterTree& t : b.trees) bytes += t.memoryBytes();
-    for (const auto& r : b.ranks) bytes += r.capacity() * sizeof(Index);
-    bytes += b.slot_vertex.capacity() * sizeof(Index) + b.active.capacity();
-  }
-  return bytes;
-}
-
 }  // namespace deformable_ccd

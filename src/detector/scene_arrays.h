@@ -81,9 +81,6 @@ class SceneArrays {
   const std::vector<SceneBody>& bodies() const { return bodies_; }
   const VertexMotion* vertices() const { return vertices_.get(); }
   std::size_t vertexCount() const { return vertex_count_; }
-  /// Bounds of the bodies as a tree whose features are the bodies.
-  const ClusterTree::Level& bodyLevel(std::size_t l) const { return body_levels_[l]; }
-  std::size_t bodyLevels() const { return body_levels_.size(); }
   /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
   void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
   std::size_t height() const { return height_; }
@@ -103,11 +100,6 @@ class SceneArrays {
   /// The body-local vertices (1, 2 or 3) of the feature with the rank, in the input's order.
   void featureVertices(FeatureKind kind, std::size_t body, Index rank, Index* out) const;
 
-  /// Real width of a record unit per direction and the real value of record 0, for bounds on times.
-  const double* unit() const { return unit_; }
-
-  std::size_t memoryBytes() const;
-
  private:
   void setReaches();
   void recordBody(SceneBody& body, const BodyMotion& motion, bool bounds_valid, core::StepStats& stats);
@@ -125,14 +117,14 @@ class SceneArrays {
   std::size_t vertex_count_ = 0, vertex_capacity_ = 0;
   std::size_t height_ = 2;
   double range_min_[8] = {}, range_max_[8] = {};  // what the records span
-  double low_[8] = {}, scale_[8] = {}, unit_[8] = {};
+  double low_[8] = {}, scale_[8] = {};
   bool range_padded_ = false;
   bool keep_bounds_ = true;
   bool bounds_valid_ = false;  // trees and records are those of the vertices
   double largest_separation_ = 0;
   bool uncertain_ = false;
   std::vector<double> radii_;
-  std::vector<ClusterTree::Level> body_levels_;
+  std::vector<ClusterTree::Level> body_levels_;  // bounds of the bodies, as a tree whose features they are
   AlignedRecords body_bounds_;
 };
 

@@ -164,7 +164,7 @@ void SceneArrays::setRange(bool keep) {
   for (SceneBody& body : bodies_) body.kept = false;
   range_padded_ = keep;
   for (int d = 0; d < 8; ++d) {
-    // Half ranges: a difference of finite doubles can overflow. Scale and unit only have to be positive and finite.
+    // Half ranges: a difference of finite doubles can overflow. The scale only has to be positive and finite.
     const double pad = keep ? PADDING * (high[d] - low[d]) : 0;
     range_min_[d] = low[d] - pad;
     range_max_[d] = high[d] + pad;
@@ -173,7 +173,6 @@ void SceneArrays::setRange(bool keep) {
         range > 0 && std::isfinite(range_min_[d]) && std::isfinite(range_max_[d]) && std::isfinite(2 * range);
     low_[d] = usable ? range_min_[d] : 0;
     scale_[d] = usable ? std::min(simd::RECORD_RANGE / 2 / range, 1e300) : 0;
-    unit_[d] = usable ? 2 * range / simd::RECORD_RANGE : std::numeric_limits<double>::infinity();
   }
 }
 

@@ -1,4 +1,4 @@
-// The filters over chunks of pairs, by name: what the PAPER broad phase, the tests and the benchmark call.
+// The filters over chunks of pairs, by name: what the tests and the benchmarks of the paper's pipeline call.
 #pragma once
 
 #include <array>

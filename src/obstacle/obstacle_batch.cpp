@@ -61,8 +61,7 @@ void join(Contact& into, const Contact& other) {
 
 }  // namespace
 
-ObstacleBatch::ObstacleBatch(PairKind kind, const ElementaryTest* test, double* toc_limit)
-    : kind_(kind), test_(test), toc_limit_(toc_limit) {
+ObstacleBatch::ObstacleBatch(PairKind kind, const ElementaryTest* test) : kind_(kind), test_(test) {
   quads_.resize(CHUNK);
   for (std::size_t i = 0; i < CHUNK; ++i) {
     for (std::size_t k = 0; k < 4; ++k) quads_[i][k] = static_cast<Index>(4 * i + k);
@@ -85,7 +84,6 @@ void ObstacleBatch::clear() {
 }
 
 void ObstacleBatch::add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m) {
-  if (toc_limit_ != nullptr && toc_bound > *toc_limit_) return;
   pairs_.push_back(pair);
   toc_bounds_.push_back(toc_bound);
   points_.insert(points_.end(), points, points + 4);
@@ -129,7 +127,6 @@ void ObstacleBatch::append(std::size_t index, const ElementaryResult& result) {
   contact.initial = certain && separations_[index] > 0 && result.toc_lower <= 0;
   contact.leaving = !contact.initial && pair.started_inside &&
                     movesOutward(kind_, &points_[4 * index], pair.outward, contact.toc_lower);
-  if (certain && toc_limit_ != nullptr) *toc_limit_ = std::min(*toc_limit_, contact.toc_upper);
   contacts_.push_back(contact);
 }
 

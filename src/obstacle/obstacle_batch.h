@@ -20,9 +20,8 @@ struct ObstaclePair {
 /// Collects pairs of one elementary kind and appends what the rung finds to a vector of contacts. Reuses its memory.
 class ObstacleBatch {
  public:
-  /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`. toc_limit: null, or
-  /// where to note the upper bound of each contact; pairs that cannot touch by then are left out.
-  ObstacleBatch(PairKind kind, const ElementaryTest* test, double* toc_limit);
+  /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`.
+  ObstacleBatch(PairKind kind, const ElementaryTest* test);
 
   /// Drops whatever an earlier run left behind.
   void clear();
@@ -40,7 +39,6 @@ class ObstacleBatch {
   static constexpr std::size_t CHUNK = 512;
   PairKind kind_;
   const ElementaryTest* test_;
-  double* toc_limit_;
   bool any_separation_ = false;  // of the pairs that wait
   std::vector<ObstaclePair> pairs_;
   std::vector<double> toc_bounds_;

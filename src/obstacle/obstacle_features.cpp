@@ -92,7 +92,6 @@ void ObstacleTest::Impl::setInitial(Contact& contact) {
   contact.initial = true;
   contact.toc_lower = 0;
   contact.toc_upper = options.accuracy.rung == Accuracy::EXACT ? std::ldexp(1.0, -options.accuracy.toc_bits) : 0.0;
-  toc_limit = 0;
 }
 
 void ObstacleTest::Impl::setTime(Contact& contact, const CrossingTime& time) {
@@ -115,7 +114,6 @@ void ObstacleTest::Impl::setTime(Contact& contact, const CrossingTime& time) {
     contact.certainty = Certainty::UNDECIDED;
     contact.toc_upper = 1;
   }
-  if (contact.certainty == Certainty::CERTAIN) toc_limit = std::min(toc_limit, contact.toc_upper);
 }
 
 void ObstacleTest::Impl::findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box) {

@@ -144,21 +144,10 @@ void ObstacleTest::Impl::collect(std::vector<Contact>& contacts, std::size_t fir
   append(vertex_contacts, vertex_batch, stats.vertex_contacts);
   append(edge_contacts, edge_batch, stats.edge_contacts);
   append(face_contacts, corner_batch, stats.corner_contacts);
-  if (options.earliest_only) keepEarliest(contacts, first);
   for (std::size_t i = first; i < contacts.size(); ++i) {
     stats.initial += contacts[i].initial;
     stats.leaving += contacts[i].leaving;
   }
-}
-
-void ObstacleTest::Impl::keepEarliest(std::vector<Contact>& contacts, std::size_t first) const {
-  double earliest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = first; i < contacts.size(); ++i) {
-    if (contacts[i].certainty == Certainty::CERTAIN) earliest = std::min(earliest, contacts[i].toc_lower);
-  }
-  contacts.erase(std::remove_if(contacts.begin() + static_cast<std::ptrdiff_t>(first), contacts.end(),
-                                [earliest](const Contact& contact) { return contact.toc_lower > earliest; }),
-                 contacts.end());
 }
 
 ObstacleTest::ObstacleTest(const ObstacleOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -177,7 +166,6 @@ void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, co
   const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats, vertex_radius_m};
   impl.prepareReaches(run);
   if (surface.leafCount() > 0 && impl.reachesSurface(run)) {
-    impl.toc_limit = 1;
     impl.vertex_batch.clear();
     impl.edge_batch.clear();
     impl.corner_batch.clear();

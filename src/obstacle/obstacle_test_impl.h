@@ -31,9 +31,9 @@ struct ObstacleTest::Impl {
   explicit Impl(const ObstacleOptions& o)
       : options(o),
         test(elementaryTestFor(o)),
-        vertex_batch(PairKind::VERTEX_FACE, test.get(), tocLimit()),
-        edge_batch(PairKind::EDGE_EDGE, test.get(), tocLimit()),
-        corner_batch(PairKind::VERTEX_FACE, test.get(), tocLimit()) {}
+        vertex_batch(PairKind::VERTEX_FACE, test.get()),
+        edge_batch(PairKind::EDGE_EDGE, test.get()),
+        corner_batch(PairKind::VERTEX_FACE, test.get()) {}
 
   /// What one run works on.
   struct Run {
@@ -89,10 +89,6 @@ struct ObstacleTest::Impl {
                    double separation_m, std::uint32_t leaf, bool inside);
   void collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats);
 
-  void keepEarliest(std::vector<Contact>& contacts, std::size_t first) const;
-
-  /// Earliest-only runs: no contact after this matters.
-  double* tocLimit() { return options.earliest_only ? &toc_limit : nullptr; }
   Contact contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const;
   void setInitial(Contact& contact);
   void setTime(Contact& contact, const CrossingTime& time);
@@ -116,7 +112,6 @@ struct ObstacleTest::Impl {
 
   ObstacleOptions options;
   std::unique_ptr<ElementaryTest> test;
-  double toc_limit = 1;   ///< upper bound of the earliest contact so far
   ObstacleBatch vertex_batch, edge_batch, corner_batch;
 
   std::vector<double> reaches;       ///< per vertex: the largest separation of a feature at it, rounded up; [0] for all

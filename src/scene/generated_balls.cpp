@@ -43,7 +43,7 @@ class NBody : public GeneratedSequence {
       balls_.push_back(b);
       addBody("ball_" + std::to_string(i), shape_.vertices.size(), shape_.faces, true);
     }
-    const Shape ground = sheet(GROUND_CELLS, 4 * half_box_m_);
+    const TriangleShape ground = sheet(GROUND_CELLS, 4 * half_box_m_);
     ground_ = ground.vertices;
     addBody("ground", ground.vertices.size(), ground.faces, false);
     publish(0);
@@ -119,7 +119,7 @@ class NBody : public GeneratedSequence {
     publish(static_cast<double>(frame) * FRAME_S);
   }
 
-  Shape shape_;
+  TriangleShape shape_;
   Positions ground_;
   double half_box_m_;
   std::vector<Ball> balls_;

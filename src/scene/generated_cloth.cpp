@@ -76,7 +76,7 @@ class NearVertices {
 /// A square sheet under gravity.
 class Cloth {
  public:
-  Cloth(const Shape& shape, double height_m, std::uint64_t seed)
+  Cloth(const TriangleShape& shape, double height_m, std::uint64_t seed)
       : position_(shape.vertices),
         thickness_m_(0.7 * (shape.vertices[1] - shape.vertices[0]).norm()),
         columns_(static_cast<Index>(std::lround(std::sqrt(static_cast<double>(shape.vertices.size()))))),
@@ -174,8 +174,8 @@ std::size_t sheetCells(std::size_t triangles) {
 
 class ClothOnObstacle : public GeneratedSequence {
  protected:
-  ClothOnObstacle(std::size_t frames, const Shape& sheet_shape, double height_m, std::uint64_t seed,
-                  const Shape& obstacle_shape, const std::string& obstacle_name)
+  ClothOnObstacle(std::size_t frames, const TriangleShape& sheet_shape, double height_m, std::uint64_t seed,
+                  const TriangleShape& obstacle_shape, const std::string& obstacle_name)
       : GeneratedSequence(frames), cloth_(sheet_shape, height_m, seed), obstacle_vertices_(obstacle_shape.vertices) {
     addBody("cloth", sheet_shape.vertices.size(), sheet_shape.faces, true);
     addBody(obstacle_name, obstacle_shape.vertices.size(), obstacle_shape.faces, false);
@@ -221,8 +221,8 @@ class ClothBall : public ClothOnObstacle {
  private:
   static constexpr double RADIUS_M = 0.5, START_S = 1.2, SPEED_RAD_PER_S = 1.2;
   static double angularSpeed(double time_s) { return time_s > START_S ? SPEED_RAD_PER_S : 0.0; }
-  static Shape ball(std::size_t cells) {
-    Shape s = cubeSphere(cells);
+  static TriangleShape ball(std::size_t cells) {
+    TriangleShape s = cubeSphere(cells);
     for (Vec3& v : s.vertices) v *= RADIUS_M;
     return s;
   }

@@ -61,7 +61,7 @@ class Fragments {
   Fragments(std::size_t cells, std::size_t layers, double edges_between_layers, std::size_t faces_per_piece,
             std::mt19937_64& random) {
     const Lumps lumps(random);
-    const Shape sphere = cubeSphere(cells);
+    const TriangleShape sphere = cubeSphere(cells);
     edge_m_ = 1.57 / static_cast<double>(cells);  // a quarter turn of the unit sphere
     std::normal_distribution<double> normal;
     for (std::size_t layer = 0; layer < layers; ++layer) {
@@ -90,7 +90,7 @@ class Fragments {
   }
 
  private:
-  void cut(const Shape& sphere, const Lumps& lumps, double depth, const Positions& seeds) {
+  void cut(const TriangleShape& sphere, const Lumps& lumps, double depth, const Positions& seeds) {
     std::vector<std::vector<Face>> faces_of(seeds.size());
     for (const Face& f : sphere.faces) {
       const Vec3 middle = (sphere.vertices[f[0]] + sphere.vertices[f[1]] + sphere.vertices[f[2]]) / 3;

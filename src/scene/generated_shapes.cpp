@@ -6,8 +6,8 @@
 namespace deformable_ccd {
 namespace scene {
 
-Shape sheet(std::size_t cells, double side_m) {
-  Shape s;
+TriangleShape sheet(std::size_t cells, double side_m) {
+  TriangleShape s;
   const std::size_t n = cells + 1;
   for (std::size_t r = 0; r < n; ++r) {
     for (std::size_t c = 0; c < n; ++c) {
@@ -31,8 +31,8 @@ Shape sheet(std::size_t cells, double side_m) {
   return s;
 }
 
-Shape cubeSphere(std::size_t cells) {
-  Shape s;
+TriangleShape cubeSphere(std::size_t cells) {
+  TriangleShape s;
   std::map<std::array<std::size_t, 3>, Index> number;  // by position on the integer cube
   const auto vertex = [&](const std::array<std::size_t, 3>& p) {
     const auto [it, is_new] = number.try_emplace(p, static_cast<Index>(s.vertices.size()));
@@ -73,9 +73,9 @@ Shape cubeSphere(std::size_t cells) {
   return s;
 }
 
-Shape revolution(std::size_t rings, std::size_t segments, double half_length_m,
+TriangleShape revolution(std::size_t rings, std::size_t segments, double half_length_m,
                  const std::function<double(double)>& radius_m) {
-  Shape s;
+  TriangleShape s;
   const double pi = std::acos(-1.0);
   s.vertices.emplace_back(-half_length_m, 0.0, 0.0);
   for (std::size_t r = 1; r < rings; ++r) {

@@ -157,18 +157,6 @@ TEST(ObstacleTest, FeaturesOnInactiveVerticesAreLeftOut) {
   EXPECT_EQ(run(*surface, TRIANGLE, broken, t1).contacts.size(), 2u) << "not finite is as good as inactive";
 }
 
-TEST(ObstacleTest, EarliestOnlyKeepsTheEarliestCell) {
-  const auto surface = unitVoxels({leafAt(32768, 32768, 32768), leafAt(32778, 32768, 32768)});
-  const Positions t0 = {{0.5, 0.5, 3}, {10.5, 0.5, 2}}, t1 = {{0.5, 0.5, 0}, {10.5, 0.5, 0}};
-  EXPECT_EQ(run(*surface, ROPE, t0, t1).contacts.size(), 4u) << "both ends, and the edge on both voxels' rims";
-  ObstacleOptions options;
-  options.earliest_only = true;
-  const Answer answer = run(*surface, ROPE, t0, t1, options);
-  ASSERT_EQ(answer.contacts.size(), 1u);
-  EXPECT_EQ(answer.contacts[0].vertex[0], 1u);
-  EXPECT_EQ(answer.contacts[0].toc_lower, 0.5);
-}
-
 TEST(ObstacleTest, ScreenSaysUndecidedWithALowerBound) {
   const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
   ObstacleOptions options;

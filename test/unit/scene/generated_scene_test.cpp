@@ -75,7 +75,7 @@ TEST(GeneratedKinds, NamesAreParsedAndOthersRefused) {
 }
 
 /// Every edge of a closed surface has two faces.
-void expectClosed(const Shape& shape) {
+void expectClosed(const TriangleShape& shape) {
   std::multiset<Edge> edges;
   for (const Face& f : shape.faces) {
     for (std::size_t k = 0; k < 3; ++k) {
