@@ -15,6 +15,7 @@
 
 #include "deformable_ccd/detector.h"
 #include "detector/float_mode.h"
+#include "detector/fork_join.h"
 #include "detector/hit_order.h"
 #include "detector/left_out.h"
 #include "detector/pair_worker.h"
@@ -83,12 +84,16 @@ void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body
     body(0, n);
     return;
   }
+  ForkJoin fork_join;
   arena->execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece), [&](const tbb::blocked_range<std::size_t>& r) {
+      fork_join.begin();
       const ScopedFloatMode mode;
       body(r.begin(), r.end());
+      fork_join.end();
     }, tbb::simple_partitioner());
   });
+  fork_join.join();
 }
 
 }  // namespace deformable_ccd

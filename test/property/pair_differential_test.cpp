@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "deformable_ccd/elementary.h"
+#include "detector/fork_join.h"
 #include "support/generators.h"
 #include "support/oracle.h"
 #include "support/promises.h"
@@ -24,6 +25,18 @@ namespace test {
 namespace {
 
 constexpr std::size_t BLOCK = 10000, CHUNK = 250;
+
+/// body(begin, end) for all of a block, on all cores.
+template <class Body>
+void inChunks(const Body& body) {
+  ForkJoin order;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
+    order.begin();
+    body(range.begin(), range.end());
+    order.end();
+  });
+  order.join();
+}
 
 std::vector<AccuracyOptions> allRungs() {
   std::vector<AccuracyOptions> rungs;
@@ -52,8 +65,8 @@ struct Block {
   std::vector<Quad> quads;
 
   Block(std::uint64_t first_seed, PairKind kind) : queries(BLOCK), truth(BLOCK), vertices(4 * BLOCK), quads(BLOCK) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+    inChunks([&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i != end; ++i) {
         RandomSource random(first_seed + i);
         queries[i] = hardQuery(random, kind);
         truth[i] = firstContact(kind, queries[i].motion);
@@ -93,14 +106,14 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
       if (b == 0) targets += " " + target;
       const bool first = answers[0].empty();
       if (first) std::fill(answers.begin(), answers.end(), std::vector<ElementaryResult>(BLOCK));
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
-        std::vector<ElementaryResult> results(range.size());
+      inChunks([&](std::size_t begin, std::size_t end) {
+        std::vector<ElementaryResult> results(end - begin);
         for (std::size_t r = 0; r < rungs.size(); ++r) {
           const AccuracyOptions& options = rungs[r];
           TierCounters counters;
-          makeElementaryTest(options)->run(block.batch(range.begin(), range.end()), results.data(), counters);
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            const ElementaryResult& result = results[i - range.begin()];
+          makeElementaryTest(options)->run(block.batch(begin, end), results.data(), counters);
+          for (std::size_t i = begin; i != end; ++i) {
+            const ElementaryResult& result = results[i - begin];
             std::string wrong;
             if (first) {
               answers[r][i] = result;
@@ -115,7 +128,7 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
             return;
           }
         }
-        tested += range.size();
+        tested += end - begin;
       });
     });
   }
