@@ -84,16 +84,16 @@ void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body
     body(0, n);
     return;
   }
-  ForkJoin fork_join;
+  const ForkJoin fork_join;
   arena->execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece), [&](const tbb::blocked_range<std::size_t>& r) {
-      fork_join.begin();
+      ForkJoin::begin();
       const ScopedFloatMode mode;
       body(r.begin(), r.end());
-      fork_join.end();
+      ForkJoin::end();
     }, tbb::simple_partitioner());
   });
-  fork_join.join();
+  ForkJoin::join();
 }
 
 }  // namespace deformable_ccd

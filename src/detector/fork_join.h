@@ -8,21 +8,22 @@
 
 namespace deformable_ccd {
 
-/// One for each loop, made before it.
+/// One for each loop, made before it. What stands for the order is static, since a piece may not even read its loop's own
+/// variables before it is told that they were written.
 class ForkJoin {
  public:
 #if defined(__SANITIZE_THREAD__)
   ForkJoin() { __tsan_release(&fork_); }
-  void begin() { __tsan_acquire(&fork_); }  ///< of a piece
-  void end() { __tsan_release(&join_); }    ///< of a piece
-  void join() { __tsan_acquire(&join_); }   ///< after the loop
+  static void begin() { __tsan_acquire(&fork_); }  ///< of a piece
+  static void end() { __tsan_release(&join_); }    ///< of a piece
+  static void join() { __tsan_acquire(&join_); }   ///< after the loop
 
  private:
-  char fork_ = 0, join_ = 0;
+  static inline char fork_ = 0, join_ = 0;
 #else
-  void begin() {}
-  void end() {}
-  void join() {}
+  static void begin() {}
+  static void end() {}
+  static void join() {}
 #endif
 };
 

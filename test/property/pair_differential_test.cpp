@@ -29,13 +29,13 @@ constexpr std::size_t BLOCK = 10000, CHUNK = 250;
 /// body(begin, end) for all of a block, on all cores.
 template <class Body>
 void inChunks(const Body& body) {
-  ForkJoin order;
+  const ForkJoin fork_join;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
-    order.begin();
+    ForkJoin::begin();
     body(range.begin(), range.end());
-    order.end();
+    ForkJoin::end();
   });
-  order.join();
+  ForkJoin::join();
 }
 
 std::vector<AccuracyOptions> allRungs() {
