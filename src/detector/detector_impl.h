@@ -84,7 +84,7 @@ void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body
     body(0, n);
     return;
   }
-  const ForkJoin fork_join;
+  ForkJoin::fork();
   arena->execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece), [&](const tbb::blocked_range<std::size_t>& r) {
       ForkJoin::begin();

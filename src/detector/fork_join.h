@@ -8,12 +8,11 @@
 
 namespace deformable_ccd {
 
-/// One for each loop, made before it. What stands for the order is static, since a piece may not even read its loop's own
-/// variables before it is told that they were written.
+/// Static, since a piece may not even read its loop's own variables before it is told that they were written.
 class ForkJoin {
  public:
 #if defined(__SANITIZE_THREAD__)
-  ForkJoin() { __tsan_release(&fork_); }
+  static void fork() { __tsan_release(&fork_); }   ///< before the loop
   static void begin() { __tsan_acquire(&fork_); }  ///< of a piece
   static void end() { __tsan_release(&join_); }    ///< of a piece
   static void join() { __tsan_acquire(&join_); }   ///< after the loop
@@ -21,6 +20,7 @@ class ForkJoin {
  private:
   static inline char fork_ = 0, join_ = 0;
 #else
+  static void fork() {}
   static void begin() {}
   static void end() {}
   static void join() {}

@@ -29,7 +29,7 @@ constexpr std::size_t BLOCK = 10000, CHUNK = 250;
 /// body(begin, end) for all of a block, on all cores.
 template <class Body>
 void inChunks(const Body& body) {
-  const ForkJoin fork_join;
+  ForkJoin::fork();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
     ForkJoin::begin();
     body(range.begin(), range.end());
