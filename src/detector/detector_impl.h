@@ -84,14 +84,17 @@ void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body
     body(0, n);
     return;
   }
+  const auto in_mode = [&](std::size_t first, std::size_t last) {
+    const ScopedFloatMode mode;
+    body(first, last);
+  };
   ForkJoin::fork();
   arena->execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece), [&](const tbb::blocked_range<std::size_t>& r) {
-      ForkJoin::begin();
-      const ScopedFloatMode mode;
-      body(r.begin(), r.end());
-      ForkJoin::end();
-    }, tbb::simple_partitioner());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece),
+                      [&](const tbb::blocked_range<std::size_t>& r) DEFORMABLE_CCD_COPIED_BY_TBB {
+                        ForkJoin::piece(in_mode, r.begin(), r.end());
+                      },
+                      tbb::simple_partitioner());
   });
   ForkJoin::join();
 }

@@ -30,11 +30,10 @@ constexpr std::size_t BLOCK = 10000, CHUNK = 250;
 template <class Body>
 void inChunks(const Body& body) {
   ForkJoin::fork();
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK), [&](const auto& range) {
-    ForkJoin::begin();
-    body(range.begin(), range.end());
-    ForkJoin::end();
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK),
+                    [&](const tbb::blocked_range<std::size_t>& range) DEFORMABLE_CCD_COPIED_BY_TBB {
+                      ForkJoin::piece(body, range.begin(), range.end());
+                    });
   ForkJoin::join();
 }
 
