@@ -33,7 +33,8 @@ void inChunks(const Body& body) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK),
                     [&](const tbb::blocked_range<std::size_t>& range) DEFORMABLE_CCD_COPIED_BY_TBB {
                       ForkJoin::piece(body, range.begin(), range.end());
-                    });
+                    },
+                    tbb::simple_partitioner());
   ForkJoin::join();
 }
 
