@@ -72,10 +72,14 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
 
 /// What is handed over comes at once, and overtakes the bytes of messages before it that are still on their way; until
 /// the first subscription is closed, every message comes both ways. So the first objects are held back until the bytes
-/// have caught up with them.
+/// have caught up with them. A message that was on its way when the second subscription was made comes through that one
+/// as bytes, too, right behind itself and perhaps behind objects that overtook it.
 void MeshSubscription::onTyped(TypedMesh message) {
   if (!any_) return callback_(std::move(message));
-  if (held_.empty() && last_bytes_ && isSame(*last_bytes_, message)) return closeAny();  // came as bytes already
+  if (last_bytes_ && isSame(*last_bytes_, message)) {  // came as bytes already
+    if (held_.empty()) closeAny();
+    return;
+  }
   held_.push_back(std::move(message));
   if (held_.size() >= SUBSCRIBER_QUEUE) closeAny();
 }
