@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "detector/detector_impl.h"
+#include "detector/map_frame.h"
 
 namespace deformable_ccd {
 namespace {
@@ -196,15 +197,6 @@ void Detector::Impl::collect() {
   stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
 }
 
-const Positions& Detector::Impl::inMap(const MotionStep& step, const Positions& fixed, Positions& out) const {
-  if (step.map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix()) return fixed;
-  out.resize(fixed.size());
-  const Eigen::Matrix3d R = step.map_from_fixed.linear();
-  const Vec3 p = step.map_from_fixed.translation();
-  for (std::size_t i = 0; i < fixed.size(); ++i) out[i] = R * fixed[i] + p;
-  return out;
-}
-
 void Detector::Impl::runObstacle(const MotionStep& step) {
   const Clock::time_point start = Clock::now();
   const std::size_t n = scene.bodies().size();
@@ -228,9 +220,10 @@ void Detector::Impl::runObstacle(const MotionStep& step) {
     }
     const Clock::time_point body_start = Clock::now();
     const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
-    obstacle_tests[b]->run(*step.obstacle, *body.setup.topology, inMap(step, *step.bodies[b].t0, map_t0),
-                           inMap(step, *step.bodies[b].t1, map_t1), active, static_cast<std::uint16_t>(b), result.contacts,
-                           total, body.uncertain ? step.bodies[b].radius_m->data() : nullptr);
+    obstacle_tests[b]->run(*step.obstacle, *body.setup.topology, inMapFrame(step.map_from_fixed, *step.bodies[b].t0, map_t0),
+                           inMapFrame(step.map_from_fixed, *step.bodies[b].t1, map_t1), active,
+                           static_cast<std::uint16_t>(b), result.contacts, total,
+                           body.uncertain ? step.bodies[b].radius_m->data() : nullptr);
     const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(body_start)};
     if (scene.separation(b, OBSTACLE_BODY) > 0) result.stats[Effect::MINIMUM_SEPARATION] += of_body;
     if (body.uncertain) result.stats[Effect::TRACKER_NOISE] += of_body;

@@ -52,7 +52,6 @@ struct Detector::Impl {
   void runObstacle(const MotionStep& step);
   void collect();
   void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
-  const Positions& inMap(const MotionStep& step, const Positions& fixed, Positions& scratch) const;
   template <class Body>
   void parallel(std::size_t n, std::size_t piece, const Body& body);
 

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "detector/float_mode.h"
+#include "detector/map_frame.h"
 #include "obstacle/excluded_leaves.h"
 
 namespace deformable_ccd {
@@ -36,6 +37,10 @@ class VoxelTracer {
 
   std::vector<TraceLine> run() {
     check();
+    surface_ = VoxelSurface::build(map_.surface->resolution(),
+                                   leavesOutside(map_.surface->leaves(), map_.surface->resolution(),
+                                                 map_.map_from_fixed.inverse(), options_.exclude_boxes)
+                                       .leaves);
     const std::size_t parts = std::min(requiredSubsteps(input_, options_.rigid_tolerance_m), options_.max_substeps);
     std::vector<Positions> t0, t1;
     for (part_ = 0; part_ < parts; ++part_) {
@@ -75,19 +80,17 @@ class VoxelTracer {
 
   void tracePart(const Positions& fixed_t0, const Positions& fixed_t1) {
     const ScopedFloatMode mode;
-    const RemainingLeaves remaining = leavesOutside(map_.surface->leaves(), map_.surface->resolution(),
-                                                    map_.map_from_fixed.inverse(), options_.exclude_boxes);
-    const OccupiedLeaf* leaf = leafOf(remaining.leaves, question_.voxel);
+    const OccupiedLeaf* leaf = leafOf(surface_->leaves(), question_.voxel);
     if (!traceRules(leaf, fixed_t0, fixed_t1)) return;
     setSeparation();
-    const Positions t0 = inMap(fixed_t0), t1 = inMap(fixed_t1);
+    Positions moved_t0, moved_t1;
+    const Positions& t0 = inMapFrame(map_.map_from_fixed, fixed_t0, moved_t0);
+    const Positions& t1 = inMapFrame(map_.map_from_fixed, fixed_t1, moved_t1);
     traceBounds(*leaf, t0, t1);
-    const double resolution_m = map_.surface->resolution();
-    const auto surface = VoxelSurface::build(resolution_m, remaining.leaves);
-    const auto alone = VoxelSurface::build(resolution_m, {*leaf});
+    const auto alone = VoxelSurface::build(surface_->resolution(), {*leaf});
     for (const Accuracy rung : {Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
       if ((separation_m_ > 0 || radius_m_ > 0) && rung != Accuracy::CONSERVATIVE) continue;
-      traceRung(rung, *leaf, *surface, *alone, t0, t1);
+      traceRung(rung, *leaf, *alone, t0, t1);
     }
   }
 
@@ -125,15 +128,6 @@ class VoxelTracer {
     std::ostringstream text;
     text << "contact from " << separation_m_ + radius_m_ << " m, " << radius_m_ << " m of it tracker noise";
     say("separation", Says::KEPT, text.str());
-  }
-
-  Positions inMap(const Positions& fixed) const {
-    Positions moved = fixed;
-    if (map_.map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix()) return moved;
-    const Eigen::Matrix3d rotation = map_.map_from_fixed.linear();
-    const Vec3 translation = map_.map_from_fixed.translation();
-    for (Vec3& p : moved) p = rotation * p + translation;
-    return moved;
   }
 
   /// The box of the feature's way and the leaf's.
@@ -185,10 +179,9 @@ class VoxelTracer {
     return nullptr;
   }
 
-  void traceRung(Accuracy rung, const OccupiedLeaf& leaf, const VoxelSurface& surface, const VoxelSurface& alone,
-                 const Positions& t0, const Positions& t1) {
+  void traceRung(Accuracy rung, const OccupiedLeaf& leaf, const VoxelSurface& alone, const Positions& t0, const Positions& t1) {
     const std::string name = std::string(toString(rung)) + (rung == options_.detector.accuracy.rung ? " *" : "");
-    const std::vector<core::Contact> found = contacts(rung, surface, t0, t1);
+    const std::vector<core::Contact> found = contacts(rung, *surface_, t0, t1);
     std::ostringstream text;
     text.precision(17);
     if (const core::Contact* contact = ofQuestion(found, leaf)) {
@@ -215,6 +208,7 @@ class VoxelTracer {
   const MonitorOptions& options_;
   const MonitorMap& map_;
   const VoxelQuestion& question_;
+  std::shared_ptr<const VoxelSurface> surface_;  // what exclude_boxes leave of the map
   std::size_t part_ = 0;
   double separation_m_ = 0, radius_m_ = 0;
   std::vector<TraceLine> lines_;

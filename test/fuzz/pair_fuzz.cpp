@@ -120,10 +120,6 @@ const std::vector<Rung>& rungs() {
   throw std::logic_error(text.str());
 }
 
-bool same(const ElementaryResult& a, const ElementaryResult& b) {
-  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
-}
-
 void pair(const std::uint8_t* data, std::size_t size) {
   const Query query = decode(data, size);
   std::optional<test::Root> toc = test::firstContact(query.kind, query.motion);
@@ -134,10 +130,10 @@ void pair(const std::uint8_t* data, std::size_t size) {
     const std::string broken = test::brokenPromise(rung.options, query, toc, result);
     if (!broken.empty()) report(query, rung, broken);
     test::forEachSimdTarget([&](const std::string& target) {
-      if (!same(test::testQuery(*rung.test, query), result)) report(query, rung, "another answer on " + target);
+      if (!test::sameAnswer(test::testQuery(*rung.test, query), result)) report(query, rung, "another answer on " + target);
     });
     if (rung.options.rung != Accuracy::EXACT) continue;
-    if (!same(test::testQuery(*rung.test, other), result)) {
+    if (!test::sameAnswer(test::testQuery(*rung.test, other), result)) {
       report(query, rung, "another order of the vertices, another answer");
     }
   }

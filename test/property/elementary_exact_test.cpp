@@ -24,10 +24,6 @@ AccuracyOptions exactOptions(int toc_bits) {
   return options;
 }
 
-bool same(const ElementaryResult& a, const ElementaryResult& b) {
-  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
-}
-
 std::string described(const ElementaryResult& result) {
   std::ostringstream text;
   text.precision(17);
@@ -57,7 +53,7 @@ TEST(ElementaryExact, NoOrderAxisOrScaleChangesTheAnswer) {
     const ElementaryResult expected = testQuery(*test, query);
     const auto differs = [&](const Query& variant, const char* what) -> std::string {
       const ElementaryResult result = testQuery(*test, variant);
-      if (same(result, expected)) return {};
+      if (sameAnswer(result, expected)) return {};
       return std::string(what) + " changes " + described(expected) + " to " + described(result);
     };
     for (const auto& order : vertexPermutations(query.kind)) {
@@ -144,7 +140,7 @@ TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
     EXPECT_EQ(settled, count) << "every pair is settled by one tier";
     for (std::size_t i = 0; i < count; ++i) {
       const ElementaryResult single = testQuery(*test, queries[i]);
-      ASSERT_TRUE(same(results[i], single) && results[i].tier == single.tier)
+      ASSERT_TRUE(sameAnswer(results[i], single) && results[i].tier == single.tier)
           << "pair " << i << " of " << count << ": " << described(results[i]) << ", alone " << described(single)
           << "\nreplay: run_queries " << writeReplayFile("exact-batch", queries[i]);
     }

@@ -53,10 +53,6 @@ std::vector<AccuracyOptions> allRungs() {
   return rungs;
 }
 
-bool same(const ElementaryResult& a, const ElementaryResult& b) {
-  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
-}
-
 /// Pairs of one kind as the detector lays them out, with their truth.
 struct Block {
   std::vector<Query> queries;
@@ -118,7 +114,7 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
             if (first) {
               answers[r][i] = result;
               wrong = brokenPromise(options, block.queries[i], block.truth[i], result);
-            } else if (!same(result, answers[r][i])) {
+            } else if (!sameAnswer(result, answers[r][i])) {
               wrong = "another answer than on the first target";
             }
             if (wrong.empty()) continue;

@@ -27,5 +27,10 @@ std::string brokenSeparationPromise(const AccuracyOptions& options, const Query&
 /// One pair through run(), with a minimum separation where it is greater than 0.
 ElementaryResult testQuery(const ElementaryTest& test, const Query& query, double minimum_separation_m = 0);
 
+/// Verdict and bracket, not the tier that settled them.
+inline bool sameAnswer(const ElementaryResult& a, const ElementaryResult& b) {
+  return a.verdict == b.verdict && a.toc_lower == b.toc_lower && a.toc_upper == b.toc_upper;
+}
+
 }  // namespace test
 }  // namespace deformable_ccd
