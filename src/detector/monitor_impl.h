@@ -25,6 +25,11 @@ struct Monitor::Impl {
     std::string reason;
   };
   enum class Ready : std::uint8_t { YES, WAIT, NEVER };
+  /// What the minimum separation measures neighbours in, one entry a body; frames are null where nothing is left out.
+  struct References {
+    std::vector<std::shared_ptr<const ReferenceFrame>> frames;
+    std::vector<std::shared_ptr<const Topology>> topologies;
+  };
 
   MonitorOptions options;
   std::vector<MonitorBody> bodies;
@@ -37,8 +42,7 @@ struct Monitor::Impl {
   StepRunner runner;
   std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
   StepInput input, side_input;
-  std::vector<std::shared_ptr<const ReferenceFrame>> references;
-  std::vector<std::shared_ptr<const Topology>> reference_topologies;
+  References references;
   std::vector<std::uint64_t> runs, last_runs;
   StampNs last_end_ns = 0;
   double last_duration_s = 0;
@@ -65,7 +69,7 @@ struct Monitor::Impl {
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   void place(const Pending& step);
-  void keepReferences(StepInput& at);
+  void keepReferences(StepInput& at, References& kept) const;
   void forgetReferences();
   bool separates(std::size_t body, const std::vector<double>& radius_m) const;
   MonitorMap usableMap(StampNs stamp_ns) const;

@@ -87,32 +87,33 @@ void Monitor::Impl::place(const Pending& step) {
     store.radiiOver(step.from->stamp_ns, step.to->stamp_ns, input.radius_m[b]);
     store.forgetBefore(step.to->stamp_ns);
   }
-  keepReferences(input);
+  keepReferences(input, references);
 }
 
 void Monitor::Impl::forgetReferences() {
-  references.assign(bodies.size(), nullptr);
-  reference_topologies.assign(bodies.size(), nullptr);
+  references.frames.assign(bodies.size(), nullptr);
+  references.topologies.assign(bodies.size(), nullptr);
 }
 
-/// The first frame of each topology is what a minimum separation measures neighbours in. Radii that grow past those of
-/// the reference make a new list; twice as large, so that it happens seldom.
-void Monitor::Impl::keepReferences(StepInput& at) {
+/// The first frame of each topology is what a minimum separation measures neighbours in: the first that asks for a
+/// distance, for radii may come later. Radii that grow past those of the reference make a new list; twice as large, so
+/// that it happens seldom.
+void Monitor::Impl::keepReferences(StepInput& at, References& kept) const {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const bool same = reference_topologies[b] && (reference_topologies[b] == at.topologies[b] ||
-                                                  *reference_topologies[b] == *at.topologies[b]);
-    if (!same) {
-      reference_topologies[b] = at.topologies[b];
-      const bool needed = bodies[b].self_collision && !bodies[b].rigid && separates(b, at.radius_m[b]);
-      references[b] = needed ? std::make_shared<const ReferenceFrame>(ReferenceFrame{at.t0[b], {}}) : nullptr;
+    std::shared_ptr<const Topology>& topology = kept.topologies[b];
+    std::shared_ptr<const ReferenceFrame>& frame = kept.frames[b];
+    if (!topology || (topology != at.topologies[b] && *topology != *at.topologies[b])) {
+      topology = at.topologies[b];
+      frame = nullptr;
     }
-    const double now_m = largest(at.radius_m[b]), listed_m = references[b] ? largest(references[b]->radius_m) : now_m;
+    const bool needed = bodies[b].self_collision && !bodies[b].rigid && separates(b, at.radius_m[b]);
+    if (needed && !frame) frame = std::make_shared<const ReferenceFrame>(ReferenceFrame{at.t0[b], {}});
+    const double now_m = largest(at.radius_m[b]), listed_m = frame ? largest(frame->radius_m) : now_m;
     if (now_m > listed_m) {
       std::vector<double> radius_m(at.t0[b].size(), std::max(now_m, 2 * listed_m));
-      references[b] =
-          std::make_shared<const ReferenceFrame>(ReferenceFrame{references[b]->positions, std::move(radius_m)});
+      frame = std::make_shared<const ReferenceFrame>(ReferenceFrame{frame->positions, std::move(radius_m)});
     }
-    at.references[b] = references[b];
+    at.references[b] = frame;
   }
 }
 
@@ -124,8 +125,8 @@ bool Monitor::Impl::separates(std::size_t body, const std::vector<double>& radiu
 
 void Monitor::setReference(std::size_t body, std::shared_ptr<const Topology> topology,
                            std::shared_ptr<const ReferenceFrame> reference) {
-  impl_->reference_topologies.at(body) = std::move(topology);
-  impl_->references.at(body) = std::move(reference);
+  impl_->references.topologies.at(body) = std::move(topology);
+  impl_->references.frames.at(body) = std::move(reference);
 }
 
 void Monitor::setMap(MonitorMap map) {

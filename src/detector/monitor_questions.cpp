@@ -26,7 +26,9 @@ StepOutcome Monitor::checkNow() {
     m.side_input.rigid[b] = 0;
     m.side_input.radius_m[b] = frame.radius_m;
   }
-  m.keepReferences(m.side_input);
+  // A copy: what waiting steps are measured in must not depend on whether somebody asked.
+  Impl::References references = m.references;
+  m.keepReferences(m.side_input, references);
   outcome.start_ns = outcome.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   m.runOn(m.side(), m.side_input, m.usableMap(outcome.stamp_ns), false, outcome);
   return outcome;

@@ -1,6 +1,7 @@
 // What the minimum separation leaves out: a body's own features that are closer in its reference frame.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -197,7 +198,7 @@ TEST(LeftOut, TheMonitorsReferenceIsTheFirstFrame) {
   Monitor monitor(options, {body});
   StampNs stamp_ns = 0;
   const auto feed = [&](double gap) {
-    monitor.push(0, {stamp_ns += 100000000, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity()}, 0);
+    monitor.push(0, {stamp_ns += 100000000, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), {}}, 0);
     StepOutcome outcome;
     EXPECT_TRUE(monitor.next(0, outcome));
     return outcome;
@@ -218,6 +219,72 @@ TEST(LeftOut, TheMonitorsReferenceIsTheFirstFrame) {
   feed(0.01);
   EXPECT_TRUE(feed(0.01).contacts.empty()) << "after ~reset the body is fit as it is";
   EXPECT_GT(monitor.leftOut().size(), neighbours);
+}
+
+// Folded after the first frame: with the fold as the reference, the contacts in it would be left out.
+TEST(LeftOut, AQuestionChangesNoReference) {
+  const Layers layers;
+  MonitorOptions options;
+  options.detector = conservative();
+  MonitorBody felt, other;
+  felt.name = "felt";
+  felt.minimum_separation_m = SEPARATION_M;
+  other.name = "other";
+  const auto triangle = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  const Positions far{{5, 0, 0}, {6, 0, 0}, {5, 1, 0}};
+  const auto contactsWith = [&](bool questions) {
+    Monitor monitor(options, {felt, other});
+    const auto push = [&](std::size_t body, StampNs stamp_ns, const std::shared_ptr<const Topology>& topology,
+                          Positions x) {
+      monitor.push(body, {stamp_ns, topology, std::move(x), false, Eigen::Isometry3d::Identity(), {}}, 0);
+      if (questions) monitor.checkNow();
+    };
+    std::array<std::size_t, 2> contacts{};
+    StepOutcome outcome;
+    const auto step = [&](std::size_t i, StampNs stamp_ns) {
+      EXPECT_FALSE(monitor.next(0, outcome)) << "the step waits for the other body";
+      push(1, stamp_ns, triangle, far);
+      while (monitor.next(0, outcome)) contacts[i] += outcome.contacts.size();
+    };
+    push(1, 0, triangle, far);
+    push(0, 10000000, layers.topology, layers.at(0.03));
+    EXPECT_TRUE(monitor.next(0, outcome));
+    push(0, 20000000, layers.topology, layers.at(0.01));
+    step(0, 20000000);
+    push(0, 30000000, layers.topology, layers.at(0.01));
+    push(0, 40000000, triangle, far);
+    step(1, 40000000);
+    return contacts;
+  };
+  const std::array<std::size_t, 2> unasked = contactsWith(false);
+  EXPECT_GT(unasked[0], 0u);
+  EXPECT_GT(unasked[1], 0u);
+  EXPECT_EQ(contactsWith(true), unasked);
+}
+
+// A tracker may know its errors only later: neighbours within them are left out from then on.
+TEST(LeftOut, RadiiMayComeAfterTheFirstFrame) {
+  const Layers layers;
+  MonitorOptions options;
+  options.detector = conservative();
+  MonitorBody body;
+  body.name = "felt";
+  Monitor monitor(options, {body});
+  const std::vector<double> radius_m(2 * SIZE * SIZE, 0.006);
+  StampNs stamp_ns = 0;
+  const auto feed = [&](double gap, const std::vector<double>& radii) {
+    stamp_ns += 100000000;
+    monitor.push(0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), radii}, 0);
+    StepOutcome outcome;
+    EXPECT_TRUE(monitor.next(0, outcome));
+    return outcome;
+  };
+  feed(0.03, {});
+  EXPECT_TRUE(feed(0.03, {}).contacts.empty());
+  EXPECT_TRUE(monitor.leftOut().empty());
+  EXPECT_TRUE(feed(0.03, radius_m).contacts.empty()) << "neighbours are no contacts";
+  EXPECT_GT(monitor.leftOut().size(), 100u);
+  EXPECT_FALSE(feed(0.01, radius_m).contacts.empty());
 }
 
 }  // namespace
