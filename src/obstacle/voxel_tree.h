@@ -123,7 +123,9 @@ inline std::uint32_t VoxelTree::find(int level, std::int32_t x, std::int32_t y, 
   const Level& l = levels_[level];
   if (l.table.empty()) return NONE;
   const std::uint32_t mask = static_cast<std::uint32_t>(l.table.size() - 1);
-  for (std::size_t slot = hash(pack(x, y, z), l.table_shift);; slot = (slot + 1) & mask) {
+  // Coordinates below 0 are in no slot: they hash to wherever their bits lead, and no cell compares equal.
+  const auto bits = [](std::int32_t coordinate) { return static_cast<std::uint32_t>(coordinate); };
+  for (std::size_t slot = hash(pack(bits(x), bits(y), bits(z)), l.table_shift);; slot = (slot + 1) & mask) {
     const std::uint32_t node = l.table[slot];
     if (node == NONE) return NONE;
     const std::array<std::uint16_t, 3>& cell = l.cells[node];
