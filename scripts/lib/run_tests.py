@@ -184,7 +184,7 @@ class FuzzRunner:
     """A libFuzzer target: a decoder in rounds, until one brings no new coverage, and for a least number of runs; the core's,
     which the long property tests give their numbers (PairDifferential, StepProperty), for one round."""
     ROUND_S = int(os.environ.get('DEFORMABLE_CCD_FUZZ_SECONDS') or 600)
-    CORE = ('pair_fuzz', 'mesh_step_fuzz')
+    CORE = ('pair_fuzz', 'mesh_step_fuzz', 'replay_fuzz')
     DECODER_RUNS = 10**6
     MAX_ROUNDS = 18
     # Most of a decoder's time under AddressSanitizer would go into the call stacks of its allocations.
