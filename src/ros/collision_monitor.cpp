@@ -138,7 +138,8 @@ struct CollisionMonitor::Impl {
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
   frames_handed_over += std::holds_alternative<TypedMesh>(message);
-  if (!enabled) {
+  // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
+  if (!enabled && !pipeline.isStatic(body)) {
     queue.command([this, body] {
       pipeline.monitor().countReceived(body);
       pipeline.monitor().countDropped(body, StepStatus::DISABLED);
@@ -234,7 +235,7 @@ void CollisionMonitor::Impl::advertiseServices() {
         enabled = request.data;
         const auto run = [this, on = request.data] {
           resetNow(StepStatus::DISABLED);
-          return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped"};
+          return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
         };
         const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
         response.success = reply.success;
@@ -264,7 +265,9 @@ void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const Marker
 
 void CollisionMonitor::Impl::resetNow(StepStatus status) {
   accountDropped();
-  const auto cleared = queue.clear();
+  std::vector<bool> spared(config.bodies.size());
+  for (std::size_t b = 0; b < spared.size(); ++b) spared[b] = pipeline.isStatic(b);
+  const auto cleared = queue.clear(spared);
   for (std::size_t b = 0; b < cleared.size(); ++b) {
     pipeline.monitor().countReceived(b, cleared[b]);
     pipeline.monitor().countDropped(b, status, cleared[b]);

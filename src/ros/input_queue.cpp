@@ -34,12 +34,13 @@ bool InputQueue::pop(std::size_t body, QueuedMessage& message) {
   return true;
 }
 
-std::vector<std::uint64_t> InputQueue::clear() {
+std::vector<std::uint64_t> InputQueue::clear(const std::vector<bool>& spared) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<std::uint64_t> counts;
-  for (auto& queue : queues_) {
-    counts.push_back(queue.size());
-    queue.clear();
+  std::vector<std::uint64_t> counts(queues_.size(), 0);
+  for (std::size_t b = 0; b < queues_.size(); ++b) {
+    if (b < spared.size() && spared[b]) continue;
+    counts[b] = queues_[b].size();
+    queues_[b].clear();
   }
   return counts;
 }

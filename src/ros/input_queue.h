@@ -36,8 +36,8 @@ class InputQueue {
   void push(std::size_t body, QueuedMessage message);
   /// False when the body has none.
   bool pop(std::size_t body, QueuedMessage& message);
-  /// Drops all messages of all bodies; returns how many of each.
-  std::vector<std::uint64_t> clear();
+  /// Drops all messages of all bodies but the `spared` ones (none where it is empty); returns how many of each.
+  std::vector<std::uint64_t> clear(const std::vector<bool>& spared = {});
   /// Messages dropped since the last call, per body.
   std::vector<std::uint64_t> takeDropped();
   std::size_t size(std::size_t body) const;

@@ -42,6 +42,7 @@ MonitorPipeline::MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& t
   monitor_ = std::make_unique<Monitor>(config_.monitor, monitorBodies(config_));
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
+  placed_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
   hints_.resize(config_.bodies.size());
   hinted_.resize(config_.bodies.size());
@@ -114,7 +115,11 @@ void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changed;
   if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
-  if (waiting_[body]) monitor_->countDropped(body, StepStatus::NO_TRANSFORM);  // one that was kept
+  if (waiting_[body]) {  // one that was kept; steps have waited for its transform, and need not do so once more
+    monitor_->countDropped(body, StepStatus::NO_TRANSFORM);
+    waiting.kept = true;
+    waiting.reason = std::move(waiting_[body]->reason);
+  }
   waiting_[body] = std::move(waiting);
 }
 
@@ -152,54 +157,78 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   return true;
 }
 
-void MonitorPipeline::keep(std::size_t body, std::string reason) {
+void MonitorPipeline::keep(std::size_t body) {
   Waiting& waiting = *waiting_[body];
   waiting.kept = true;
-  waiting.reason = std::move(reason);
   // Before the clock body's first message there may be no fixed frame, and nothing is wrong.
   if (fixed_frame_.empty() || waiting.told) return;
   waiting.told = true;
   complaints_[body] = "waits: " + waiting.reason;
 }
 
+std::string MonitorPipeline::missing(std::size_t body) const {
+  return waiting_[body]->reason + "; body '" + config_.bodies[body].body.name + "' waits for it";
+}
+
 void MonitorPipeline::nameMissing(StepOutcome& outcome) const {
   if (outcome.status != StepStatus::NO_BODY) return;
   for (std::size_t b = 0; b < waiting_.size(); ++b) {
     if (!waiting_[b] || !waiting_[b]->kept) continue;
-    outcome.reason = waiting_[b]->reason + "; body '" + config_.bodies[b].body.name + "' waits for it";
+    outcome.reason = missing(b);
     return;
   }
 }
 
+std::size_t MonitorPipeline::misplaced() const {
+  std::size_t b = 0;
+  while (b < waiting_.size() && !(waiting_[b] && placed_[b])) ++b;
+  return b;
+}
+
+bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason) {
+  const std::size_t body = misplaced();
+  if (body == waiting_.size()) return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, reason);
+  problem = StepStatus::NO_BODY;
+  reason = missing(body);
+  return false;
+}
+
 bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
-  const bool timed_out =
-      finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
+  StepStatus problem = StepStatus::NO_TRANSFORM;
   Eigen::Isometry3d fixed_from_mesh;
   const bool is_clock = body == config_.monitor.clock_body;
   const bool placed = !fixed_frame_.empty() &&
                       lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id, waiting.mesh.stamp_ns,
                                       fixed_from_mesh, reason) &&
-                      (!is_clock || placeRigid(waiting.mesh.stamp_ns, now_ns, reason));
+                      (!is_clock || placeOthers(now_ns, problem, reason));
   if (!placed) {
+    if (problem == StepStatus::NO_TRANSFORM) {
+      reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
+    }
+    waiting.reason = reason;
+    // There is no use in waiting for a static body that has waited in vain itself.
+    const bool timed_out =
+        finishing_ || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept) ||
+        static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
     if (!timed_out) return false;
-    reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
-    if (isStatic(body) && !finishing_) {
-      keep(body, std::move(reason));
+    if (isStatic(body)) {
+      keep(body);
       return false;
     }
   }
   Waiting done = std::move(waiting);
   waiting_[body].reset();
   if (!placed) {
-    skip(body, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns, reason);
+    skip(body, problem, done.mesh.stamp_ns, done.arrival_ns, reason);
     return true;
   }
   transform(fixed_from_mesh, done.mesh.positions);
   monitor_->push(body, {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
                         Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m)}, now_ns);
   if (is_clock) arrivals_.push_back(done.arrival_ns);
+  placed_[body] = isStatic(body);
   return true;
 }
 
@@ -236,10 +265,13 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
 
 bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
   placeMap(now_ns);
-  for (std::size_t b = 0; b < waiting_.size(); ++b) {
-    if (waiting_[b]) place(b, now_ns);
+  // Static bodies first: the clock body's frame is a step, which is to find them where they are.
+  for (const bool statics : {true, false}) {
+    for (std::size_t b = 0; b < waiting_.size(); ++b) {
+      if (waiting_[b] && isStatic(b) == statics) place(b, now_ns);
+    }
   }
-  if (finishing_) monitor_->finish();
+  if (finishing_) giveUp();
   if (!monitor_->next(now_ns, outcome)) return false;
   nameMissing(outcome);
   measureUnknown(outcome);
@@ -258,6 +290,16 @@ bool MonitorPipeline::waiting() const {
 
 void MonitorPipeline::finish() { finishing_ = true; }
 
+void MonitorPipeline::giveUp() {
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (!waiting_[b]) continue;
+    const Waiting done = std::move(*waiting_[b]);
+    waiting_[b].reset();
+    skip(b, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns, done.reason);
+  }
+  monitor_->finish();
+}
+
 void MonitorPipeline::reset(StepStatus status) {
   for (std::size_t b = 0; b < waiting_.size(); ++b) {
     if (!waiting_[b] || isStatic(b)) continue;
@@ -269,7 +311,13 @@ void MonitorPipeline::reset(StepStatus status) {
 }
 
 StepOutcome MonitorPipeline::checkNow() {
-  StepOutcome outcome = monitor_->checkNow();
+  StepOutcome outcome;
+  if (const std::size_t body = misplaced(); body < waiting_.size()) {
+    outcome.status = StepStatus::NO_BODY;
+    outcome.reason = missing(body);
+    return outcome;
+  }
+  outcome = monitor_->checkNow();
   nameMissing(outcome);
   return outcome;
 }

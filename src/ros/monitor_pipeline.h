@@ -55,12 +55,14 @@ class MonitorPipeline {
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of next().
   void finish();
-  /// Forgets all frames but those of static bodies. The fixed frame stays, also one that was learnt: the map and static
+  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was learnt: the map and static
   /// bodies are placed in it.
   void reset(StepStatus status);
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
   StepOutcome checkNow();
 
+  /// The body's newest frame holds at all times. Safe to call from any thread.
+  bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
   Monitor& monitor() { return *monitor_; }
   const Monitor& monitor() const { return *monitor_; }
   const MonitorConfig& config() const { return config_; }
@@ -92,6 +94,7 @@ class MonitorPipeline {
   std::unique_ptr<Monitor> monitor_;
   std::vector<MeshDecoder> decoders_;
   std::vector<std::optional<Waiting>> waiting_;
+  std::vector<bool> placed_;  // a static body of which the monitor has a frame
   std::vector<std::optional<RigidMesh>> rigid_;
   std::vector<std::string> complaints_, hints_;
   std::vector<std::shared_ptr<const Topology>> hinted_;  // the topology that the hint is about
@@ -110,13 +113,20 @@ class MonitorPipeline {
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// unknown_space: report. How much of what the step swept the map does not know.
   void measureUnknown(StepOutcome& outcome) const;
-  bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
   /// A static body's frame waits on.
-  void keep(std::size_t body, std::string reason);
+  void keep(std::size_t body);
+  /// The end has come for what still waits.
+  void giveUp();
+  /// The static body that the monitor has where it is no more, since its newer frame waits; none: bodies' number.
+  std::size_t misplaced() const;
+  /// Why the body, whose frame waits, has no place.
+  std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(StepOutcome& outcome) const;
   /// False: still waits.
   bool place(std::size_t body, std::int64_t now_ns);
+  /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
+  bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
   void placeMap(std::int64_t now_ns);
 };

@@ -26,7 +26,7 @@ namespace deformable_ccd {
 namespace test {
 namespace {
 
-constexpr std::size_t MONITORS = 3;  // in monitor.test; each listens to /tf
+constexpr std::size_t MONITORS = 4;  // in monitor.test; each listens to /tf
 
 // --- any mesh type ---------------------------------------------------------------------------------------------------
 
@@ -446,6 +446,9 @@ bool isAdvertised(const std::string& topic) {
   return std::any_of(topics.begin(), topics.end(), [&](const auto& info) { return info.name == topic; });
 }
 
+Mesh floorAt(double z) { return {{{-1, -1, z}, {1, -1, z}, {0, 1, z}}, {{0, 1, 2}}}; }
+Mesh tipAt(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}}}; }
+
 struct Pair : MonitorTest {
   Pair() : MonitorTest("/pair") {}
   ros::Publisher cloth = advertiseAndWait<MeshStamped>(node, "/pair/cloth");
@@ -474,20 +477,20 @@ TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
 TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
   finger(300, -5);
   finger(300.4, -5);
-  cloth.publish(meshStamped(floor(0), 300));
-  gripper.publish(meshStamped(tip(4), 299.9));
+  cloth.publish(meshStamped(floorAt(0), 300));
+  gripper.publish(meshStamped(tipAt(4), 299.9));
   ASSERT_TRUE(waitUntil([&] { return contacts.count() > 0; }));
   const std::size_t seen = contacts.count();
-  cloth.publish(meshStamped(floor(0), 300.1));
+  cloth.publish(meshStamped(floorAt(0), 300.1));
   ros::Duration(0.05).sleep();
   EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
-  gripper.publish(meshStamped(tip(-4), 300.3));  // 2 at 300, 0 at 300.1
+  gripper.publish(meshStamped(tipAt(-4), 300.3));  // 2 at 300, 0 at 300.1
   const ContactArray outcome = contacts.after(seen);
   ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
   ASSERT_EQ(outcome.bodies.size(), 3u);
   EXPECT_FALSE(outcome.contacts.empty());
 
-  const ContactArray late = send(cloth, meshStamped(floor(0), 300.35));
+  const ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
   EXPECT_EQ(late.status, ContactArray::NO_BODY);
   EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
   expectAddsUp();
@@ -496,16 +499,64 @@ TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
 TEST_F(Pair, RigidBodiesMoveByTf) {
   finger(400, 2);
   finger(400.2, -2);
-  gripper.publish(meshStamped(tip(50), 400));
-  gripper.publish(meshStamped(tip(50), 400.3));
+  gripper.publish(meshStamped(tipAt(50), 400));
+  gripper.publish(meshStamped(tipAt(50), 400.3));
   ros::Duration(0.1).sleep();
-  send(cloth, meshStamped(floor(0), 400));
-  const ContactArray outcome = send(cloth, meshStamped(floor(0), 400.2));
+  send(cloth, meshStamped(floorAt(0), 400));
+  const ContactArray outcome = send(cloth, meshStamped(floorAt(0), 400.2));
   ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
   ASSERT_FALSE(outcome.contacts.empty());
   double earliest = 1;
   for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
   EXPECT_NEAR(earliest, 0.5, 1e-6);
+}
+
+// --- a static body, whose frames are sent once -----------------------------------------------------------------------
+
+struct Tabled : MonitorTest {
+  Tabled() : MonitorTest("/tabled") {}
+  ros::Publisher cloth = advertiseAndWait<MeshStamped>(node, "/tabled/cloth");
+  ros::Publisher table = advertiseAndWait<MeshStamped>(node, "/tabled/table", true);
+  double stamp_s = 10;
+
+  void enable(bool on) {
+    std_srvs::SetBool call;
+    call.request.data = on;
+    ASSERT_TRUE(ros::service::call("/tabled/enable", call));
+  }
+  /// A step of the cloth, four metres through the height 0.
+  ContactArray fall() {
+    send(cloth, meshStamped(tipAt(2), stamp_s += 1));
+    return send(cloth, meshStamped(tipAt(-2), stamp_s += 0.1));
+  }
+  bool meetsTheTable() {
+    const ContactArray step = fall();
+    return step.status == ContactArray::OK && !step.contacts.empty();
+  }
+  bool isPastTheTable() {
+    const ContactArray step = fall();
+    return step.status == ContactArray::OK && step.contacts.empty();
+  }
+};
+
+TEST_F(Tabled, AStaticBodysOnlyFrameCountsWhileTheMonitorIsDisabled) {
+  table.publish(meshStamped(floorAt(0), 1));
+  ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
+  enable(false);
+  table.publish(meshStamped(floorAt(-20), 2));
+  ros::Duration(0.2).sleep();
+  enable(true);
+  EXPECT_TRUE(isPastTheTable()) << "the table is where it was last said to be";
+}
+
+TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
+  table.publish(meshStamped(floorAt(0), 1));
+  ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
+  table.publish(meshStamped(floorAt(0), 2, "nowhere"));  // waits for its transform, and the next one behind it
+  table.publish(meshStamped(floorAt(-20), 3));
+  ros::Duration(0.2).sleep();
+  ASSERT_TRUE(trigger("reset").success);
+  EXPECT_TRUE(waitUntil([&] { return isPastTheTable(); }));
 }
 
 }  // namespace

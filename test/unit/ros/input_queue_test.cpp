@@ -40,6 +40,14 @@ TEST(InputQueue, ClearSaysWhatItDropped) {
   EXPECT_FALSE(queue.pop(0, message));
 }
 
+TEST(InputQueue, ClearSparesWhatItIsTold) {
+  InputQueue queue(3, 3, QueuePolicy::NEWEST);
+  for (std::size_t body = 0; body < 3; ++body) queue.push(body, {});
+  EXPECT_EQ(queue.clear({false, true, false}), (std::vector<std::uint64_t>{1, 0, 1}));
+  EXPECT_EQ(queue.size(0) + queue.size(2), 0u);
+  EXPECT_EQ(queue.size(1), 1u);
+}
+
 /// Runs what is queued, as the worker does.
 void serve(InputQueue& queue) {
   for (const auto& command : queue.wait(std::chrono::seconds(10))) command();

@@ -313,6 +313,46 @@ TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   EXPECT_EQ(scene.pipeline.monitor().total().waiting(), 0u);
 }
 
+TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  double stamp_s = 1;
+  const auto feed = [&](float z, std::int64_t now_ns) {
+    scene.take(Tabled::CLOTH, stamp_s += 0.1, z, now_ns);
+    return scene.pipeline.next(now_ns, scene.outcome);
+  };
+  ASSERT_TRUE(feed(0.3f, 0));
+  ASSERT_TRUE(feed(0.3f, 0));
+  ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+
+  const auto moved = cloud(2, 0, {}, "lorry");
+  scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, SECOND_NS});
+  EXPECT_FALSE(feed(0.3f, SECOND_NS)) << "waits with the table's frame, as long as that may wait";
+  ASSERT_TRUE(scene.pipeline.next(2 * SECOND_NS, scene.outcome));
+  EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+  EXPECT_FALSE(scene.outcome.answered);
+  EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'lorry' to 'world'", 0), 0u) << scene.outcome.reason;
+  EXPECT_NE(scene.outcome.reason.find("body 'table'"), std::string::npos) << scene.outcome.reason;
+  const StepOutcome now = scene.pipeline.checkNow();
+  EXPECT_FALSE(now.answered);
+  EXPECT_EQ(now.status, StepStatus::NO_BODY);
+  EXPECT_EQ(now.reason, scene.outcome.reason);
+  scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, 3 * SECOND_NS});
+  ASSERT_TRUE(feed(0.3f, 3 * SECOND_NS)) << "what comes in a frame that is known to be missing holds nothing up again";
+  EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+
+  scene.raise("lorry", 0.1);
+  ASSERT_TRUE(feed(0.3f, 4 * SECOND_NS));
+  ASSERT_TRUE(feed(-0.1f, 4 * SECOND_NS));
+  ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+  EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+  const FrameCounters total = scene.pipeline.monitor().total();
+  EXPECT_EQ(total.of(StepStatus::NO_BODY), 2u);
+  EXPECT_EQ(total.of(StepStatus::NO_TRANSFORM), 1u) << "the table's second frame gave way to the third";
+  EXPECT_EQ(total.waiting(), 0u);
+}
+
 TEST(StaticBodies, WhatStillWaitsAtTheEndIsCounted) {
   Tabled scene;
   scene.take(Tabled::TABLE, 1, 0, 0);
