@@ -90,6 +90,7 @@ struct CollisionMonitor::Impl {
   std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
   StampNs newest_ns = 0;  // stamp of the last outcome; the worker's
+  std::uint64_t steps_unpublished = 0;  // the worker's, too
 
   Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
       : node(n),
@@ -124,6 +125,7 @@ struct CollisionMonitor::Impl {
   void takeMessages();
   void tellComplaints();
   void publish(StepOutcome& outcome);
+  void publishAll(StepOutcome& outcome);
   void predict(StepOutcome& outcome);
   void publishPrediction(const StepOutcome& prediction);
   void publishEffects(const ros::Time& stamp);
@@ -347,6 +349,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.frames = pipeline.monitor().total();
   context.weld_changes = pipeline.weldChanges();
   if (config.monitor.look_ahead_s > 0) context.look_ahead = look_ahead.summary();
+  context.steps_unpublished = steps_unpublished;
   context.maps_received = maps ? maps->received() : 0;
   context.frames_handed_over = frames_handed_over;
   context.maps_refused = maps ? maps->refused() : 0;
@@ -354,7 +357,19 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   return context;
 }
 
+/// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
 void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
+  try {
+    publishAll(outcome);
+  } catch (const std::exception& error) {
+    ++steps_unpublished;
+    log.complain(config.monitor.clock_body, "publishing",
+                 std::string("not all of a step's results could be published: ") + error.what());
+    run([this] { outputs.publishNotClear(pipeline.fixedFrame()); });
+  }
+}
+
+void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);

@@ -95,6 +95,7 @@ void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::s
   put(status, "frames dropped", dropped);
   put(status, "time jumps", context_.frames.of(StepStatus::TIME_JUMP));
   put(status, "gaps", context_.frames.of(StepStatus::GAP));
+  put(status, "steps not wholly published", context_.steps_unpublished);
   put(status, "frames handed over in process", context_.frames_handed_over);
   put(status, "maps received", context_.maps_received);
   put(status, "maps refused", context_.maps_refused);

@@ -199,8 +199,10 @@ void fillStages(const core::StepStats& stats, StatsMessage& out) {
 }  // namespace
 
 ros::Time toRosTime(StampNs stamp_ns) {
+  // Beyond this ros::Time throws; a message may bring such a stamp, or one so late that a prediction leads there.
+  constexpr StampNs LAST_NS = 4294967295999999999;
   ros::Time time;
-  time.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
+  time.fromNSec(static_cast<std::uint64_t>(std::clamp<StampNs>(stamp_ns, 0, LAST_NS)));
   return time;
 }
 

@@ -14,6 +14,7 @@
 
 namespace deformable_ccd {
 
+/// The nearest that a message can hold: 0 to 2^32 s.
 ros::Time toRosTime(StampNs stamp_ns);
 
 /// What the statistics say beyond the outcome itself.
@@ -22,6 +23,7 @@ struct StatsContext {
   std::uint64_t weld_changes = 0;
   double latency_s = 0;
   std::uint64_t maps_received = 0, maps_refused = 0;
+  std::uint64_t steps_unpublished = 0;   ///< of which not everything was published
   std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
   LookAheadSummary look_ahead;
   std::uint64_t markers_built = 0;

@@ -250,6 +250,21 @@ TEST_F(Plain, LookAheadPredictsWhatComes) {
   EXPECT_FALSE(told(10.2, ContactArray::RESET).answered);
 }
 
+TEST_F(Plain, StampsAtTheEndOfTimeAreFramesLikeAnyOther) {
+  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  Probe<ContactArray> predictions(node, "/plain/predicted_contacts");
+  const auto sendAt = [&](std::uint32_t nsec, double z) {
+    MeshStamped message = meshStamped(tipAbove(z), 0);
+    message.header.stamp = ros::Time(4294967295, nsec);
+    return send(publisher, message);
+  };
+  sendAt(600000000, 2);
+  EXPECT_EQ(sendAt(633000000, 1.9).status, ContactArray::OK);
+  // The prediction ends half a second later, which no message can say.
+  EXPECT_TRUE(waitUntil([&] { return predictions.count() > 0 && predictions.last().answered; }));
+  EXPECT_TRUE(trigger("reset").success) << "and the node is there";
+}
+
 TEST_F(Plain, Services) {
   const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
   EXPECT_FALSE(trigger("check_now").success) << "nothing to check yet";

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace deformable_ccd {
 namespace {
 
@@ -34,6 +36,15 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   StepOutcome unanswered;
   unanswered.status = StepStatus::GAP;
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");
+}
+
+TEST(Times, WhatRosCannotHoldIsTheNearestThatItCan) {
+  EXPECT_EQ(toRosTime(1500000000), ros::Time(1, 500000000));
+  EXPECT_EQ(toRosTime(-1), ros::Time(0, 0));
+  const StampNs last_ns = 4294967295999999999;
+  EXPECT_EQ(toRosTime(last_ns), ros::Time(4294967295, 999999999));
+  EXPECT_EQ(toRosTime(last_ns + 1), ros::Time(4294967295, 999999999));
+  EXPECT_EQ(toRosTime(std::numeric_limits<StampNs>::max()), ros::Time(4294967295, 999999999));
 }
 
 TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
