@@ -100,8 +100,12 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
 }
 
-/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
-void readSeparationPair(ParameterReader entry, MonitorConfig& config) {
+/// Two bodies, in either order, of an entry of minimum_separation_pairs.
+using NamedPair = std::pair<std::uint16_t, std::uint16_t>;
+
+/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map. `before`
+/// are the pairs of the entries before it.
+void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vector<NamedPair>& before) {
   const std::string octomap = "octomap";
   std::vector<std::string> known{octomap};
   for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
@@ -118,6 +122,14 @@ void readSeparationPair(ParameterReader entry, MonitorConfig& config) {
   if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
   if (pair[0] == OBSTACLE_BODY) std::swap(pair[0], pair[1]);
   if (pair[0] == OBSTACLE_BODY) entry.fail("between", "names octomap twice; name a body and octomap");
+  const NamedPair named = std::minmax(pair[0], pair[1]);
+  const auto twice = std::find(before.begin(), before.end(), named);
+  if (twice != before.end()) {
+    const auto nameOf = [&](std::uint16_t body) { return body == OBSTACLE_BODY ? octomap : known[body + 1u]; };
+    entry.fail("between", "names " + nameOf(pair[0]) + " and " + nameOf(pair[1]) + ", as minimum_separation_pairs[" +
+                              std::to_string(twice - before.begin()) + "] does; remove one of the two");
+  }
+  before.push_back(named);
   if (!entry.has("separation_m")) entry.fail("separation_m", "is needed");
   const double separation_m = entry.number("separation_m", 0.0, 0, LARGE);
   entry.finish();
@@ -125,9 +137,10 @@ void readSeparationPair(ParameterReader entry, MonitorConfig& config) {
 }
 
 void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
-  std::size_t i = 0;
+  std::vector<NamedPair> before;
   for (XmlRpcValue& entry : reader.list("minimum_separation_pairs")) {
-    readSeparationPair({entry, reader.path() + "minimum_separation_pairs[" + std::to_string(i++) + "]/"}, config);
+    const std::string path = reader.path() + "minimum_separation_pairs[" + std::to_string(before.size()) + "]/";
+    readSeparationPair({entry, path}, config, before);
   }
 }
 

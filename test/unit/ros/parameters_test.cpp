@@ -96,6 +96,19 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("mush", "octomap", 0.01); }},
       {"names octomap twice",
        [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("octomap", "octomap", 0.01); }},
+      {"minimum_separation_pairs[1]/between names mesh and octomap, as minimum_separation_pairs[0] does",
+       [](XmlRpcValue& t) {
+         t["minimum_separation_pairs"][0] = separationPair("octomap", "mesh", 0.01);
+         t["minimum_separation_pairs"][1] = separationPair("mesh", "octomap", 0.01);
+       }},
+      {"minimum_separation_pairs[2]/between names finger and felt, as minimum_separation_pairs[0] does",
+       [](XmlRpcValue& t) {
+         t["bodies"]["felt"]["topic"] = "felt";
+         t["bodies"]["finger"]["topic"] = "finger";
+         t["minimum_separation_pairs"][0] = separationPair("felt", "finger", 0.004);
+         t["minimum_separation_pairs"][1] = separationPair("felt", "felt", 0.004);
+         t["minimum_separation_pairs"][2] = separationPair("finger", "felt", 0.01);
+       }},
       {"~uncertainty/radius_m is -0.1", [](XmlRpcValue& t) { t["uncertainty"]["radius_m"] = -0.1; }},
       {"~uncertainty/scale has no meaning without field", [](XmlRpcValue& t) { t["uncertainty"]["scale"] = 3.0; }},
       {"nearest is 'exact'", [](XmlRpcValue& t) { t["accuracy"] = "exakt"; }},
