@@ -40,9 +40,11 @@ void Diagnostics::add(const StepOutcome& outcome, const StatsContext& context) {
   latency_.add(context.latency_s);
   status_ = outcome.status;
   reason_ = outcome.reason;
-  map_present_ = outcome.obstacle != nullptr;
-  map_age_s_ = map_present_ ? static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9 : 0;
   context_ = context;
+  if (!outcome.answered) return;
+  map_present_ = outcome.obstacle != nullptr;
+  map_reason_ = outcome.reason;
+  map_age_s_ = map_present_ ? static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9 : 0;
 }
 
 void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::string& map_topic,
@@ -58,8 +60,8 @@ void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::strin
   };
   if (!enabled) raise(DiagnosticStatus::WARN, "disabled");
   if (outcomes_ > 0 && answers_ == 0) raise(DiagnosticStatus::ERROR, because("no answer: "));
-  if (!map_topic.empty() && outcomes_ > 0 && !map_present_) {
-    raise(DiagnosticStatus::ERROR, status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + reason_);
+  if (!map_topic.empty() && answers_ > 0 && !map_present_) {
+    raise(DiagnosticStatus::ERROR, status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_);
   }
   if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
   if (context_.frames.of(StepStatus::QUEUE_FULL) > dropped_before_) {

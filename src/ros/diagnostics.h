@@ -31,10 +31,12 @@ class Diagnostics {
   // Since the last status.
   std::uint64_t outcomes_ = 0, answers_ = 0, dropped_before_ = 0;
   double worst_latency_s_ = 0;
-  // Of the newest outcome.
   LatencyHistogram latency_;  // since the start
+  // Of the newest outcome.
   StepStatus status_ = StepStatus::FIRST_FRAME;
   std::string reason_;
+  // Of the newest one with an answer: the others had no use for a map.
+  std::string map_reason_;
   double map_age_s_ = 0;
   bool map_present_ = false;
   StatsContext context_;

@@ -406,6 +406,32 @@ TEST_F(Grid, UnknownSpaceIsReported) {
   EXPECT_LT(stats.last().unknown_fraction, 1) << "into what is known";
 }
 
+TEST_F(Grid, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {
+  giveMap(blockBelowZero(true));
+  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
+  const auto ofGrid = [&] {
+    std::vector<diagnostic_msgs::DiagnosticStatus> found;
+    for (const auto& array : diagnostics.all()) {
+      for (const auto& status : array.status) {
+        if (status.name == "/grid: steps") found.push_back(status);
+      }
+    }
+    return found;
+  };
+  double stamp_s = 600;
+  ASSERT_TRUE(waitUntil([&] {
+    send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
+    for (int i = 0; i < 10; ++i) {  // so that one of these is nearly always the newest
+      EXPECT_EQ(send(mesh, cloud(gridAt(3, 4, 5), stamp_s)).status, ContactArray::DUPLICATE);
+    }
+    return ofGrid().size() > 3;
+  }));
+  const auto found = ofGrid();
+  for (std::size_t i = 1; i < found.size(); ++i) {  // the first may tell of the time before
+    EXPECT_EQ(found[i].level, diagnostic_msgs::DiagnosticStatus::OK) << found[i].message;
+  }
+}
+
 TEST_F(Grid, MalformedMapsAreRefused) {
   giveMap(blockBelowZero(true));
   const std::uint64_t refused = stats.last().maps_refused;
