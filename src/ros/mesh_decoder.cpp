@@ -280,19 +280,28 @@ bool MeshDecoder::weldHolds(const Positions& corners) const {
   return true;
 }
 
-void MeshDecoder::weldAnew(const Positions& corners, bool refine) {
+void MeshDecoder::forgetWeld() {
+  weld_.clear();
+  representative_.clear();
+}
+
+std::size_t MeshDecoder::weldAnew(const Positions& corners, bool refine) {
   // Refining splits groups and never joins any: what touches now for the first time is contact, not mesh.
   std::unordered_map<CornerKey, Index, CornerHash> groups;
   groups.reserve(corners.size());
   std::vector<Index> weld(corners.size());
+  std::vector<std::size_t> pieces(refine ? representative_.size() : 0, 0);  // of each vertex
   representative_.clear();
   for (std::size_t c = 0; c < corners.size(); ++c) {
     const auto [it, fresh] =
         groups.try_emplace(cornerKey(corners[c], refine ? weld_[c] : 0), static_cast<Index>(representative_.size()));
     if (fresh) representative_.push_back(static_cast<Index>(c));
+    if (fresh && refine) ++pieces[weld_[c]];
     weld[c] = it->second;
   }
   weld_ = std::move(weld);
+  const auto apart = [](std::size_t count) { return count > 1; };
+  return static_cast<std::size_t>(std::count_if(pieces.begin(), pieces.end(), apart));
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
@@ -314,8 +323,7 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     for (std::size_t c = 0; c < count; ++c) weld_[c] = static_cast<Index>(c);
     representative_ = weld_;
   } else if (welds && !(known && weldHolds(corners))) {
-    mesh.weld_changed = known;
-    weldAnew(corners, known);
+    mesh.weld_changes = weldAnew(corners, known);
   }
   if (config_.source == TopologySource::FILE) {
     mesh.topology = fixedTopology(count, 0, 0);

@@ -44,7 +44,7 @@ struct DecodedMesh {
   std::shared_ptr<const Topology> topology;
   Positions positions;
   std::vector<double> radius_m;  ///< uncertainty per vertex; empty: none
-  bool weld_changed = false;  ///< welded corners came apart
+  std::size_t weld_changes = 0;  ///< welded vertices whose corners came apart
 };
 
 /// An accepted message type: its name in parameters and in ROS.
@@ -65,6 +65,8 @@ class MeshDecoder {
   DecodedMesh decode(const std::string& datatype, const std::uint8_t* data, std::size_t size);
   /// The same of a message that was never serialised.
   DecodedMesh decode(const TypedMesh& message);
+  /// The next triangle soup is welded as a first one.
+  void forgetWeld();
 
  private:
   MeshInputConfig config_;
@@ -89,7 +91,8 @@ class MeshDecoder {
   std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
   std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
   bool weldHolds(const Positions& corners) const;
-  void weldAnew(const Positions& corners, bool refine);
+  /// Returns how many vertices came apart, which they do only where it refines.
+  std::size_t weldAnew(const Positions& corners, bool refine);
 };
 
 }  // namespace deformable_ccd

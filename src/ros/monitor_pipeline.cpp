@@ -113,7 +113,7 @@ void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = receipt_ns;
   monitor_->countReceived(body, 1, unstamped);
-  weld_changes_ += waiting.mesh.weld_changed;
+  weld_changes_ += waiting.mesh.weld_changes;
   if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
   if (waiting_[body]) {  // one that was kept; steps have waited for its transform, and need not do so once more
     monitor_->countDropped(body, StepStatus::NO_TRANSFORM);
@@ -307,6 +307,9 @@ void MonitorPipeline::reset(StepStatus status) {
     waiting_[b].reset();
   }
   monitor_->reset(status);
+  if (status == StepStatus::RESET) {
+    for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
+  }
   arrivals_.clear();
 }
 

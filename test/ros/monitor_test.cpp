@@ -496,8 +496,6 @@ struct Pair : MonitorTest {
   ros::Publisher gripper = advertiseAndWait<MeshStamped>(node, "/pair/gripper");
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
 
-  static Mesh floor(double z) { return {{{-1, -1, z}, {1, -1, z}, {0, 1, z}}, {{0, 1, 2}}}; }
-  static Mesh tip(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}}}; }
   void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
 };
 
