@@ -18,6 +18,7 @@ struct SweptSpace {
   std::uint64_t voxels = 0;   ///< voxels that the swept bounds of faces (of a polyline: edges) touch, each once
   std::uint64_t unknown = 0;  ///< of those, the ones that the map does not know
   bool complete = true;       ///< false: the sweep was larger than the limit, and only a part of it was counted
+  /// Of what was counted, which is all only where it is complete.
   double unknownFraction() const { return voxels == 0 ? 0.0 : static_cast<double>(unknown) / static_cast<double>(voxels); }
 };
 
@@ -41,7 +42,8 @@ class KnownSpace {
   /// std::invalid_argument for a crop box that is not finite.
   std::vector<OccupiedLeaf> unknownLeaves(const Box& crop_m, std::size_t max_leaves = 2'000'000) const;
 
-  /// Counts what the mesh's swept bounds touch. vertex_active as for ObstacleTest::run. limit: blocks of 4^3 voxels.
+  /// Counts what the mesh's swept bounds touch. vertex_active as for ObstacleTest::run. limit: blocks of 4^3
+  /// voxels, each once however many faces touch it.
   SweptSpace sweptSpace(const Topology& topology, const Positions& map_t0, const Positions& map_t1,
                         const std::uint8_t* vertex_active, std::size_t limit = 1'000'000) const;
 

@@ -224,7 +224,7 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   bodies_refitted_ += s.bodies_refitted;
   bodies_kept_ += s.bodies_kept;
   left_out_met_ += s.left_out_met;
-  unknown_fraction_.push_back(o.unknown_fraction);
+  if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
   total_ms_.push_back(s.total_ms);
   step_times_.add(s.total_ms * 1e-3);
 }

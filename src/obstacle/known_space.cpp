@@ -71,13 +71,32 @@ std::uint64_t packBlock(std::int32_t x, std::int32_t y, std::int32_t z) {
   return static_cast<std::uint64_t>(x) << 32 | static_cast<std::uint64_t>(y) << 16 | static_cast<std::uint64_t>(z);
 }
 
-/// Appends the blocks of a key box; false when that makes more than the limit.
+/// Sorts them, each block once.
+void uniteBlocks(std::vector<TouchedBlock>& blocks) {
+  std::sort(blocks.begin(), blocks.end());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    if (kept > 0 && blocks[kept - 1].first == blocks[i].first) {
+      blocks[kept - 1].second |= blocks[i].second;
+    } else {
+      blocks[kept++] = blocks[i];
+    }
+  }
+  blocks.resize(kept);
+}
+
+/// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to twice
+/// the limit is held before they are united, so that this comes seldom.
 bool addBlocks(const KeyBox& keys, std::size_t limit, std::vector<TouchedBlock>& blocks) {
   std::size_t count = 1;
   for (int axis = 0; axis < 3; ++axis) {
     count *= static_cast<std::size_t>((keys.hi[axis] >> 2) - (keys.lo[axis] >> 2) + 1);
   }
-  if (count > limit - blocks.size()) return false;
+  if (count > limit) return false;
+  if (count > 2 * limit - blocks.size()) {
+    uniteBlocks(blocks);
+    if (blocks.size() > limit) return false;
+  }
   const auto range = [&keys](int axis, std::int32_t block) {
     const std::int32_t lo = std::max(0, keys.lo[axis] - 4 * block), hi = std::min(3, keys.hi[axis] - 4 * block);
     return RANGE_MASKS[axis][lo][hi];
@@ -167,6 +186,7 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   SweptSpace swept;
   std::vector<TouchedBlock> blocks;
   const auto add = [&](const auto& feature) {
+    if (!swept.complete) return;
     Box box;
     for (const Index v : feature) {
       if (vertex_active != nullptr && vertex_active[v] == 0) return;
@@ -181,12 +201,10 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   if (!topology.hasFaces()) {
     for (const Edge& edge : topology.edges()) add(edge);
   }
-  std::sort(blocks.begin(), blocks.end());
-  for (std::size_t i = 0; i < blocks.size();) {
-    const std::uint64_t block = blocks[i].first;
-    std::uint64_t touched = 0;
-    for (; i < blocks.size() && blocks[i].first == block; ++i) touched |= blocks[i].second;
-    const auto at = [block](int shift) { return static_cast<std::int32_t>(block >> shift & 0xffff); };
+  uniteBlocks(blocks);
+  swept.complete = swept.complete && blocks.size() <= limit;
+  for (const auto& [block, touched] : blocks) {
+    const auto at = [packed = block](int shift) { return static_cast<std::int32_t>(packed >> shift & 0xffff); };
     swept.voxels += bitCount(touched);
     swept.unknown += bitCount(touched & ~impl_->knownCells(at(32), at(16), at(0)));
   }

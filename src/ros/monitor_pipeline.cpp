@@ -1,6 +1,7 @@
 #include "ros/monitor_pipeline.h"
 
 #include <chrono>
+#include <limits>
 #include <utility>
 
 #include "ros/advice.h"
@@ -82,8 +83,10 @@ void MonitorPipeline::measureUnknown(StepOutcome& outcome) const {
     const SweptSpace one = known_->sweptSpace(topology, map_t0, map_t1, active.data());
     sum.voxels += one.voxels;
     sum.unknown += one.unknown;
+    sum.complete = sum.complete && one.complete;
   }
-  outcome.unknown_fraction = sum.unknownFraction();
+  // Of a sweep too large to be counted there is no share: that of a part may be anything.
+  outcome.unknown_fraction = sum.complete ? sum.unknownFraction() : std::numeric_limits<double>::quiet_NaN();
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
   outcome.stats[Effect::UNKNOWN_SPACE] = {sum.voxels, sum.unknown, spent.count()};
 }

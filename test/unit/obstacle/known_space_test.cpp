@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -96,6 +97,29 @@ TEST(KnownSpace, SweptSpaceCountsVoxelsOnce) {
   const std::uint8_t active[3] = {1, 0, 1};
   EXPECT_EQ(space->sweptSpace(triangle, t0, t1, active).voxels, 0u);
   EXPECT_EQ(space->sweptSpace(triangle, t0, t1, active).unknownFraction(), 0.0);
+}
+
+TEST(KnownSpace, TheLimitCountsABlockOnceHoweverManyFacesTouchIt) {
+  const auto space = KnownSpace::build(RESOLUTION, blockWithHole());
+  // Eight blocks of 4^3 voxels, touched by each of 100 faces; the only unknown voxel is the hole.
+  std::vector<Face> faces;
+  Positions t0;
+  for (Index f = 0; f < 100; ++f) {
+    faces.push_back({3 * f, 3 * f + 1, 3 * f + 2});
+    t0.insert(t0.end(), {{0.11, 0.11, 0.11}, {0.39, 0.11, 0.11}, {0.11, 0.39, 0.39}});
+  }
+  const Topology many = Topology::fromTriangles(t0.size(), faces);
+  const SweptSpace all = space->sweptSpace(many, t0, t0, nullptr), bounded = space->sweptSpace(many, t0, t0, nullptr, 8);
+  EXPECT_TRUE(bounded.complete);
+  EXPECT_EQ(bounded.voxels, all.voxels);
+  EXPECT_EQ(bounded.unknown, 1u);
+  EXPECT_FALSE(space->sweptSpace(many, t0, t0, nullptr, 7).complete);
+  // In any order: one face alone fits, all of them do not.
+  Positions apart = t0;
+  for (std::size_t v = 297; v < 300; ++v) apart[v] += Vec3(2, 2, 2);
+  EXPECT_FALSE(space->sweptSpace(many, apart, apart, nullptr, 8).complete);
+  std::rotate(apart.begin(), apart.begin() + 297, apart.end());
+  EXPECT_FALSE(space->sweptSpace(many, apart, apart, nullptr, 8).complete);
 }
 
 TEST(KnownSpace, SweptSpaceIsBoundedAndSaysSo) {

@@ -148,6 +148,29 @@ TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
   EXPECT_TRUE(report.effects.plan().running("unknown_space"));
 }
 
+TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  tree["max_step_s"] = 10.0;
+  Driven report(tree);
+  report.giveMap(1);
+  const auto spread = [&](double stamp_s, float reach) {
+    auto bytes = cloud(stamp_s, 0.35f);
+    const float far[3] = {reach, reach, reach};
+    std::memcpy(bytes.data() + bytes.size() - 1 - 16, far, sizeof far);  // the last point; is_dense follows
+    report.pipeline.take(0, {"sensor_msgs/PointCloud2", bytes, 0, 0});
+    EXPECT_TRUE(report.pipeline.next(0, report.outcome));
+  };
+  spread(1, 0.5f);
+  spread(1.1, 2000);  // across 5000 blocks of voxels an axis
+  ASSERT_TRUE(report.outcome.answered) << report.outcome.reason;
+  EXPECT_TRUE(std::isnan(report.outcome.unknown_fraction)) << report.outcome.unknown_fraction;
+  spread(1.2, 2000);
+  spread(1.3, 0.5f);
+  spread(1.4, 0.5f);
+  EXPECT_GT(report.outcome.unknown_fraction, 0) << "and is there again as soon as all is counted";
+}
+
 TEST(UnknownSpace, MaskedVerticesSweepNothing) {
   XmlRpcValue tree = scene();
   tree["unknown_space"] = "report";
