@@ -28,17 +28,20 @@ const ros::Duration SEAM(1.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
-LoadedMap refusedMap(const std::string& problem) {
-  LoadedMap map;
-  map.problem = problem;
-  return map;
-}
-
 std::vector<std::uint8_t> bytesOf(const rosbag::MessageInstance& message) {
   std::vector<std::uint8_t> bytes(message.size());
   ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
   message.write(stream);
   return bytes;
+}
+
+/// As the node takes it: without a stamp of its own the map is of the time at which it came.
+LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config) {
+  LoadedMap map;
+  map.problem = mapTypeProblem(message.getDataType(), message.getMD5Sum());
+  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config);
+  if (map.stamp_ns == 0) map.stamp_ns = static_cast<StampNs>(message.getTime().toNSec());
+  return map;
 }
 
 /// Of a serialised message of a mesh type; 0: none.
@@ -116,7 +119,7 @@ struct BagReplay::Run {
   MonitorPipeline pipeline;
   EffectTracker effects;
   std::optional<LookAheadScore> look_ahead;
-  std::map<std::string, std::size_t> body_of_topic;
+  std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one MarkerArray
   BagReplaySummary summary;
   std::set<std::string> complained;
 
@@ -126,7 +129,7 @@ struct BagReplay::Run {
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
       const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
       summary.mesh_topics.push_back(topic);
-      if (!topic.empty()) body_of_topic[topic] = b;
+      if (!topic.empty()) bodies_of_topic[topic].push_back(b);
     }
   }
 
@@ -249,9 +252,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
     const rosbag::MessageInstance& first = *at_first;
     first_map = first.getTime();
-    const std::string problem = mapTypeProblem(first.getDataType(), first.getMD5Sum());
-    run.setMap(problem.empty() ? decodeMapMessage(bytesOf(first), config_) : refusedMap(problem),
-               static_cast<std::int64_t>(all.getBeginTime().toNSec()));
+    run.setMap(readMap(first, config_), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
   }
   run.effects.apply(run.pipeline.monitor(), run.summary.maps > 0);
 
@@ -261,20 +262,18 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   for (const rosbag::MessageInstance& m : all) {
     at = m.getTime();
     if (messages) messages(m);
-    const auto body = run.body_of_topic.find(m.getTopic());
-    const bool is_mesh = body != run.body_of_topic.end();
+    const auto bodies = run.bodies_of_topic.find(m.getTopic());
+    const bool is_mesh = bodies != run.bodies_of_topic.end();
     std::vector<std::uint8_t> bytes;
     if (is_mesh) {
       bytes = bytesOf(m);
-      transforms.meshComes(body->second, stampOf(m.getDataType(), bytes), at);
+      for (const std::size_t body : bodies->second) transforms.meshComes(body, stampOf(m.getDataType(), bytes), at);
     }
     transforms.feedUntil(at);
     if (is_mesh) {
-      run.mesh(body->second, m, std::move(bytes));
+      for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
     } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
-      const std::string problem = mapTypeProblem(m.getDataType(), m.getMD5Sum());
-      run.setMap(problem.empty() ? decodeMapMessage(bytesOf(m), config_) : refusedMap(problem),
-                 static_cast<std::int64_t>(at.toNSec()));
+      run.setMap(readMap(m, config_), static_cast<std::int64_t>(at.toNSec()));
     }
     progress.advance();
   }

@@ -11,8 +11,9 @@ import unittest
 
 import genpy
 import rosbag
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Point, TransformStamped
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
 
 from checkout import CHECKOUT, TOOLS
 
@@ -66,7 +67,10 @@ class AnalyzeBagTest(unittest.TestCase):
     def statuses(self, bag):
         params = self.folder / 'statuses.yaml'
         params.write_text('fixed_frame: world\nmax_step_s: 1.0\n')
-        report = self.analyze('statuses', bag, '--params', params)
+        return self.statuses_of(self.analyze('statuses', bag, '--params', params))
+
+    @staticmethod
+    def statuses_of(report):
         steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
         return collections.Counter(row[steps[0].index('status')] for row in steps[1:])
 
@@ -157,6 +161,44 @@ class AnalyzeBagTest(unittest.TestCase):
         steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
         statuses = collections.Counter(row[steps[0].index('status')] for row in steps[1:])
         self.assertEqual(statuses, {'FIRST_FRAME': 1, 'OK': len(cloths) - 1})
+
+    def test_bodies_that_share_a_topic(self):
+        """Parts of one MarkerArray, told apart by their namespaces: each has its frames."""
+        shared = self.folder / 'shared.bag'
+        with rosbag.Bag(str(shared), 'w') as bag:
+            for frame in range(5):
+                at, array = genpy.Time(100 + 0.1 * frame), MarkerArray()
+                for height, name in enumerate(('lower', 'upper')):
+                    marker = Marker(ns=name, type=Marker.TRIANGLE_LIST)
+                    marker.header.stamp, marker.header.frame_id = at, 'world'
+                    marker.pose.orientation.w = marker.scale.x = marker.scale.y = marker.scale.z = 1
+                    marker.points = [Point(0, 0, height), Point(1, 0, height), Point(0, 1, height)]
+                    array.markers.append(marker)
+                bag.write('/parts', array, at)
+        params = self.folder / 'shared.yaml'
+        params.write_text('effects: {octomap: "off"}\nbodies:\n'
+                          '  lower: {topic: /parts, marker: {namespace: lower}}\n'
+                          '  upper: {topic: /parts, marker: {namespace: upper}}\n')
+        report = self.analyze('shared', shared, '--params', params)
+        self.assertEqual(self.statuses_of(report), {'FIRST_FRAME': 1, 'OK': 4})
+
+    def test_a_map_without_a_stamp_is_as_old_as_its_message(self):
+        unstamped, frames = self.folder / 'unstamped.bag', 0
+        octomap = copy.deepcopy(next(m for t, m, _ in self.messages if t == '/octomap_binary'))
+        octomap.header.stamp = genpy.Time()
+        with rosbag.Bag(str(unstamped), 'w') as bag:
+            start = next(at for topic, _, at in self.messages if topic == '/cloth')
+            bag.write('/octomap_binary', octomap, start)
+            for topic, message, at in self.messages:
+                if topic == '/cloth':
+                    bag.write(topic, message, at)
+                    frames += message.header.stamp - start > genpy.Duration.from_sec(0.31)
+        params = self.folder / 'unstamped.yaml'
+        params.write_text('fixed_frame: world\nmax_step_s: 1.0\noctomap_timeout_s: 0.31\n')
+        self.assertGreater(frames, 2)
+        statuses = self.statuses_of(self.analyze('unstamped', unstamped, '--params', params))
+        self.assertEqual(statuses['NO_MAP'], frames, statuses)
+        self.assertGreater(statuses['OK'], 2)
 
     def test_the_bag_of_results(self):
         out = self.folder / 'out.bag'
