@@ -102,7 +102,7 @@ struct CollisionMonitor::Impl {
         queue(config.bodies.size(), config.queue_size, config.queue_policy),
         diagnostics(private_node.getNamespace(), node),
         log(node, private_node.getNamespace(), config),
-        effects(config),
+        effects(config, log.mapSource()),
         look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
 
   void start();

@@ -18,7 +18,7 @@ std::string noiseOf(const MeshInputConfig& input) {
 
 }  // namespace
 
-EffectTracker::EffectTracker(const MonitorConfig& config) : settings_(config.effects) {
+EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map_source) : settings_(config.effects) {
   for (const BodyConfig& body : config.bodies) {
     EffectBody one;
     one.name = body.body.name;
@@ -29,6 +29,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config) : settings_(config.eff
   }
   scene_.minimum_separation_m = config.largestSeparation();
   scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
+  if (!map_source.empty()) scene_.map_source = map_source;
   scene_.map_seen = !config.octomap_file.empty();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;

@@ -13,7 +13,8 @@ namespace deformable_ccd {
 class EffectTracker {
  public:
   /// Throws std::invalid_argument when an effect is asked for that the scene cannot have.
-  explicit EffectTracker(const MonitorConfig& config);
+  /// `map_source`: the octomap's resolved topic or its file; empty: as the configuration calls it.
+  explicit EffectTracker(const MonitorConfig& config, const std::string& map_source = {});
 
   /// False: the octomap is switched off, nothing is subscribed to for it.
   bool mayUseMap() const;

@@ -146,8 +146,9 @@ void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
 
 void readBodies(ParameterReader& reader, MonitorConfig& config) {
   const std::string clock = reader.get("clock_body", std::string());
+  const std::string default_topic = reader.get("default_topic", std::string("mesh"));  // no contradiction to bodies
   if (!reader.has("bodies")) {
-    BodyConfig body = readBody(reader, "mesh", "mesh");
+    BodyConfig body = readBody(reader, "mesh", default_topic);
     if (body.isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
     readBodyEffects(reader, config, body);
     config.bodies.push_back(std::move(body));

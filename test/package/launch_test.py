@@ -8,7 +8,7 @@ import unittest
 import rosgraph
 import yaml
 
-from checkout import CHECKOUT
+from checkout import CHECKOUT, TOOLS
 from ros_process import free_port, stop, wait_for
 
 NODE = '/collision_monitor/'
@@ -32,6 +32,9 @@ num_threads: 3
 step_budget_ms: 7.5
 look_ahead_s: 0.5
 '''
+# What the launch files set where the file does not.
+DEFAULTS = {'monitor.launch': {'octomap_topic': 'octomap_binary'},
+            'replay.launch': {'octomap_topic': 'octomap_binary', 'default_topic': '/cloth'}}
 
 
 class LaunchTest(unittest.TestCase):
@@ -61,10 +64,10 @@ class LaunchTest(unittest.TestCase):
         return {name[len(NODE):]: value for name, value in yaml.safe_load(ran.stdout).items() if name.startswith(NODE)}
 
     def test_a_file_alone(self):
-        for launch in ('monitor.launch', 'replay.launch'):
+        for launch, defaults in DEFAULTS.items():
             for text in (BODIES, EVERYTHING):
                 with self.subTest(launch, text=text):
-                    expected = {}
+                    expected = dict(defaults)
 
                     def flatten(tree, prefix=''):
                         for name, value in tree.items():
@@ -73,7 +76,7 @@ class LaunchTest(unittest.TestCase):
                             else:
                                 expected[prefix + name] = value
 
-                    flatten(yaml.safe_load(text))
+                    flatten(yaml.safe_load(text))  # over the launch file's defaults
                     self.assertEqual(self.parameters(launch, self.file(text)), expected, 'and nothing else')
 
     def test_arguments_win_over_the_file(self):
@@ -81,7 +84,7 @@ class LaunchTest(unittest.TestCase):
                  'rows': ('topology/rows', 0), 'cols': ('topology/cols', 0), 'accuracy': ('accuracy', 'exact'),
                  'num_threads': ('num_threads', 1), 'step_budget_ms': ('step_budget_ms', 0.0),
                  'look_ahead_s': ('look_ahead_s', 0.0)}
-        for launch in ('monitor.launch', 'replay.launch'):
+        for launch in DEFAULTS:
             with self.subTest(launch):
                 arguments = [self.file(EVERYTHING), 'mesh:=/mine', 'octomap:=/my_map']
                 arguments += ['%s:=%s' % (argument, value) for argument, (_, value) in given.items()]
@@ -96,12 +99,16 @@ class LaunchTest(unittest.TestCase):
         self.assertEqual((found['octomap_topic'], found['octomap_file']), ('octomap', ''))
 
     def test_neither(self):
-        for launch in ('monitor.launch', 'replay.launch'):
+        for launch, defaults in DEFAULTS.items():
             found = self.parameters(launch)
-            defaults = yaml.safe_load((CHECKOUT / 'config/monitor.yaml').read_text())
-            self.assertEqual({name.split('/')[0] for name in found}, set(defaults))
-            self.assertIn('octomap:=octomap_binary', self.words(launch))
-        self.assertIn('mesh:=/cloth', self.words('replay.launch'))
+            file = yaml.safe_load((CHECKOUT / 'config/monitor.yaml').read_text())
+            self.assertEqual({name.split('/')[0] for name in found}, set(file) | set(defaults))
+            self.assertEqual({name: found[name] for name in defaults}, defaults)
+
+    def test_names_that_are_not_given_are_not_remapped(self):
+        """A remapping holds for the resolved name, too: what the file calls /octomap or /mesh would be sent elsewhere."""
+        for launch in DEFAULTS:
+            self.assertFalse([word for word in self.words(launch) if word.startswith(('octomap:=', 'mesh:='))], launch)
 
     def test_demo(self):
         shown = {'markers/mesh': True, 'markers/obstacle_m': 1.0}
@@ -113,31 +120,55 @@ class LaunchTest(unittest.TestCase):
 
     def test_a_monitor_starts_with_bodies_from_a_file(self):
         """And without what an earlier launch left on the same master."""
+        master = self.start_master()
+        master.setParam(NODE + 'topology', {'rows': 5})
+        self.launch_until_subscribed(master, {'/felt', '/finger'}, 'monitor.launch', self.file(BODIES))
+        self.assertFalse(master.hasParam(NODE + 'topology'), 'an earlier launch shows through')
+
+    def test_a_monitor_listens_to_the_topics_that_the_file_names(self):
+        """Also where they are those that the node has by default."""
+        master = self.start_master()
+        topics = self.launch_until_subscribed(master, {'/octomap', '/mesh'}, 'monitor.launch',
+                                              self.file('{octomap_topic: /octomap, topic: /mesh}'))
+        self.assertFalse(topics & {'/octomap_binary', '/cloth'})
+
+    def test_a_replay_listens_to_the_topics_that_the_file_names(self):
+        master = self.start_master()
+        scene = self.home / 'scene.bag'
+        subprocess.run([str(TOOLS / 'make_scene_bag'), str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(scene),
+                        '--frames', '2', '--quiet'], check=True, stdin=subprocess.DEVNULL)
+        topics = self.launch_until_subscribed(
+            master, {'/octomap', '/mesh'}, 'replay.launch', 'bag:=%s' % scene, 'start_paused:=true',
+            self.file('{octomap_topic: octomap, bodies: {mesh: {self_collision: true}}}'))
+        self.assertFalse(topics & {'/octomap_binary', '/cloth'})
+
+    def start(self, *words):
+        log = open(self.home / (words[0] + '.txt'), 'w')
+        self.addCleanup(log.close)
+        process = subprocess.Popen(words, env=self.environment, stdin=subprocess.DEVNULL, stdout=log,
+                                   stderr=subprocess.STDOUT, start_new_session=True)
+        self.addCleanup(stop, process)
+
+    def start_master(self):
         port = free_port()
         self.environment.update(ROS_MASTER_URI='http://localhost:%d' % port, ROS_HOSTNAME='localhost')
-
-        def start(*words):
-            log = open(self.home / (words[0] + '.txt'), 'w')
-            self.addCleanup(log.close)
-            process = subprocess.Popen(words, env=self.environment, stdin=subprocess.DEVNULL, stdout=log,
-                                       stderr=subprocess.STDOUT, start_new_session=True)
-            self.addCleanup(stop, process)
-            return process
-
         master = rosgraph.Master('/launch_test', self.environment['ROS_MASTER_URI'])
-        start('roscore', '-p', str(port))
+        self.start('roscore', '-p', str(port))
         wait_for(master.is_online, 30, 'the master')
-        master.setParam(NODE + 'topology', {'rows': 5})
-        start('roslaunch', '--wait', str(CHECKOUT / 'launch/monitor.launch'), self.file(BODIES))
+        return master
+
+    def launch_until_subscribed(self, master, topics, launch, *arguments):
+        """All that the monitor listens to, as soon as these topics are among it."""
+        self.start('roslaunch', '--wait', str(CHECKOUT / 'launch' / launch), *arguments)
 
         def subscribed():
             return {topic for topic, nodes in master.getSystemState()[1] if NODE[:-1] in nodes}
 
         try:
-            wait_for(lambda: subscribed() >= {'/felt', '/finger'}, 30, 'the monitor')
+            wait_for(lambda: subscribed() >= topics, 30, 'the monitor')
         except TimeoutError:
-            self.fail((self.home / 'roslaunch.txt').read_text())
-        self.assertFalse(master.hasParam(NODE + 'topology'), 'an earlier launch shows through')
+            self.fail('%s\n%s' % (subscribed(), (self.home / 'roslaunch.txt').read_text()))
+        return subscribed()
 
 
 if __name__ == '__main__':

@@ -329,7 +329,8 @@ TEST_F(Plain, EffectsSayWhy) {
       EXPECT_TRUE(effect.running);
     }
     if (effect.name == "octomap") {
-      EXPECT_FALSE(effect.running) << effect.reason;
+      EXPECT_FALSE(effect.running);
+      EXPECT_EQ(effect.reason, "nobody publishes /plain/octomap and no octomap_file is given") << "where it was looked for";
     }
   }
 }

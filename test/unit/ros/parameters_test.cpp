@@ -39,6 +39,18 @@ TEST(Parameters, NoneAtAllIsOneBodyWithDefaults) {
   EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::EXACT);
 }
 
+TEST(Parameters, ADefaultTopicIsThatOfASingleBodyWithoutOne) {
+  XmlRpcValue tree;
+  tree["default_topic"] = "/cloth";
+  EXPECT_EQ(readConfig(tree).bodies[0].topic, "/cloth");
+  tree["topic"] = "mesh";
+  EXPECT_EQ(readConfig(tree).bodies[0].topic, "mesh");
+  XmlRpcValue listed;
+  listed["default_topic"] = "/cloth";
+  listed["bodies"]["mesh"]["motion"] = "stream";
+  EXPECT_EQ(readConfig(listed).bodies[0].topic, "mesh");
+}
+
 TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
   XmlRpcValue tree;
   tree["max_stp_s"] = 0.5;
