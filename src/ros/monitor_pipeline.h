@@ -55,8 +55,8 @@ class MonitorPipeline {
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of next().
   void finish();
-  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was learnt: the map and static
-  /// bodies are placed in it.
+  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was learnt:
+  /// the map and static bodies are placed in it. After RESET triangle soups are welded anew.
   void reset(StepStatus status);
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
   StepOutcome checkNow();
