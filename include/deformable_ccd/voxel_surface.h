@@ -1,6 +1,7 @@
 // Occupied space of a map as what a mesh can touch: exposed faces, convex edges, corners. No OctoMap here.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -83,9 +84,11 @@ class ObstacleTest {
   /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
   /// vertex_radius_m: uncertainty per vertex, 0 or more; null means none. A feature's largest one adds to the separation,
   /// so that rungs other than conservative and screen cannot hold it.
-  void run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
+  /// deadline: features that have not been begun by then are left out, and false is returned; null means none.
+  bool run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
            const std::uint8_t* vertex_active, std::uint16_t body, std::vector<core::Contact>& contacts,
-           ObstacleStats& stats, const double* vertex_radius_m = nullptr);
+           ObstacleStats& stats, const double* vertex_radius_m = nullptr,
+           const std::chrono::steady_clock::time_point* deadline = nullptr);
 
  private:
   struct Impl;

@@ -134,7 +134,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   findPairs(context);
   runPairs(context);
   collect();
-  if (step.obstacle && scene.meetsObstacle()) runObstacle(step);
+  if (step.obstacle && scene.meetsObstacle()) runObstacle(step, context);
   rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
   if (options.check_start_state) {
@@ -197,7 +197,7 @@ void Detector::Impl::collect() {
   stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
 }
 
-void Detector::Impl::runObstacle(const MotionStep& step) {
+void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& context) {
   const Clock::time_point start = Clock::now();
   const std::size_t n = scene.bodies().size();
   obstacle_tests.resize(n);
@@ -220,10 +220,17 @@ void Detector::Impl::runObstacle(const MotionStep& step) {
     }
     const Clock::time_point body_start = Clock::now();
     const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
-    obstacle_tests[b]->run(*step.obstacle, *body.setup.topology, inMapFrame(step.map_from_fixed, *step.bodies[b].t0, map_t0),
-                           inMapFrame(step.map_from_fixed, *step.bodies[b].t1, map_t1), active,
-                           static_cast<std::uint16_t>(b), result.contacts, total,
-                           body.uncertain ? step.bodies[b].radius_m->data() : nullptr);
+    const Positions& t0 = inMapFrame(step.map_from_fixed, *step.bodies[b].t0, map_t0);
+    const Positions& t1 = inMapFrame(step.map_from_fixed, *step.bodies[b].t1, map_t1);
+    const bool whole = obstacle_tests[b]->run(
+        *step.obstacle, *body.setup.topology, t0, t1, active, static_cast<std::uint16_t>(b), result.contacts, total,
+        body.uncertain ? step.bodies[b].radius_m->data() : nullptr,
+        context.deadline == Clock::time_point::max() ? nullptr : &context.deadline);
+    if (!whole) {
+      result.complete = false;
+      result.unchecked_toc_lower = 0;
+      if (result.start_state == StartState::CLEAR) result.start_state = StartState::NOT_CHECKED;
+    }
     const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(body_start)};
     if (scene.separation(b, OBSTACLE_BODY) > 0) result.stats[Effect::MINIMUM_SEPARATION] += of_body;
     if (body.uncertain) result.stats[Effect::TRACKER_NOISE] += of_body;

@@ -49,7 +49,8 @@ struct Detector::Impl {
   void rememberApart(bool certain);
   void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
   void runPairs(StepContext& context);
-  void runObstacle(const MotionStep& step);
+  /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
+  void runObstacle(const MotionStep& step, const StepContext& context);
   void collect();
   void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
   template <class Body>

@@ -162,6 +162,7 @@ void ObstacleTest::Impl::runVertices(const Run& run) {
   const double resolution = run.surface->resolution_m;
   for (const Index v : run.topology->usedVertices()) {
     if ((state[v] & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
+    if (isLate(run)) return;
     findLeaves(*run.surface, keys[v].box());
     if (near_leaves.empty()) continue;
     run.stats->vertex_pairs_in += near_leaves.size();
@@ -231,6 +232,7 @@ void ObstacleTest::Impl::runEdges(const Run& run) {
   for (const Edge& edge : run.topology->edges()) {
     const std::uint8_t both = state[edge[0]] & state[edge[1]], either = state[edge[0]] | state[edge[1]];
     if ((both & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
+    if (isLate(run)) return;
     bool inside = (either & INSIDE) != 0;
     // What starts inside at an end is known by that end.
     if (!inside && (both & NEAR_START)) inside = edgeStartsInside(run, edge);
@@ -305,6 +307,7 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
 void ObstacleTest::Impl::runFaces(const Run& run) {
   face_contacts.clear();
   for (const NearFace& near : near_faces) {
+    if (isLate(run)) return;
     const Face& face = run.topology->faces()[near.face];
     const std::uint8_t any = state[face[0]] | state[face[1]] | state[face[2]];
     bool inside = (any & INSIDE) != 0;

@@ -153,9 +153,10 @@ void ObstacleTest::Impl::collect(std::vector<Contact>& contacts, std::size_t fir
 ObstacleTest::ObstacleTest(const ObstacleOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 ObstacleTest::~ObstacleTest() = default;
 
-void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
+bool ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
                        const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
-                       std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m) {
+                       std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m,
+                       const std::chrono::steady_clock::time_point* deadline) {
   const auto start = std::chrono::steady_clock::now();
   if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
     throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +
@@ -163,9 +164,11 @@ void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, co
                                 std::to_string(topology.vertexCount()));
   }
   Impl& impl = *impl_;
-  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats, vertex_radius_m};
+  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats, vertex_radius_m, deadline};
+  impl.late = false;
+  impl.looked_at = 0;
   impl.prepareReaches(run);
-  if (surface.leafCount() > 0 && impl.reachesSurface(run)) {
+  if (surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
     impl.vertex_batch.clear();
     impl.edge_batch.clear();
     impl.corner_batch.clear();
@@ -181,6 +184,7 @@ void ObstacleTest::run(const VoxelSurface& surface, const Topology& topology, co
     impl.collect(contacts, contacts.size(), stats);
   }
   stats.ms += millisecondsSince(start);
+  return !impl.late;
 }
 
 }  // namespace deformable_ccd

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <memory>
 #include <vector>
 
@@ -44,6 +45,7 @@ struct ObstacleTest::Impl {
     std::uint16_t body;
     ObstacleStats* stats;
     const double* radius_m = nullptr;  ///< uncertainty per vertex; null: none
+    const std::chrono::steady_clock::time_point* deadline = nullptr;
   };
 
   /// Distance from which on a feature of these vertices is in contact.
@@ -58,6 +60,12 @@ struct ObstacleTest::Impl {
   }
   /// The same, as far as bounds must reach.
   static double reachOf(double separation_m) { return separation_m * (1 + 0x1p-40); }
+
+  /// The clock is read for one feature in 32.
+  bool isLate(const Run& run) {
+    if (!run.deadline || late) return late;
+    return late = (looked_at++ & 31) == 0 && std::chrono::steady_clock::now() >= *run.deadline;
+  }
 
   bool reachesSurface(const Run& run) const;
   void prepareReaches(const Run& run);
@@ -113,6 +121,8 @@ struct ObstacleTest::Impl {
   ObstacleOptions options;
   std::unique_ptr<ElementaryTest> test;
   ObstacleBatch vertex_batch, edge_batch, corner_batch;
+  bool late = false;  ///< the deadline of this run has passed
+  std::uint32_t looked_at = 0;
 
   std::vector<double> reaches;       ///< per vertex: the largest separation of a feature at it, rounded up; [0] for all
   std::vector<KeyLanes> keys;        ///< over the step, as far as the reaches

@@ -140,6 +140,51 @@ TEST(DetectorLimits, BudgetEndsTheStep) {
   EXPECT_LT(shortest_ms, full_ms / 2);
 }
 
+// The map's part of a step is cut like the rest: what is listed is true, and of what is not nothing is said.
+TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
+  constexpr std::size_t SIZE = 40;
+  std::vector<OccupiedLeaf> leaves;
+  for (std::uint16_t x = 0; x < SIZE; ++x) {
+    for (std::uint16_t y = 0; y < SIZE; ++y) {
+      leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32768}, 1});
+    }
+  }
+  BodySetup cloth;
+  cloth.name = "cloth";
+  cloth.topology = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
+  cloth.self_collision = false;
+  Positions above, below;
+  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+    const double x = static_cast<double>(i % SIZE), y = static_cast<double>(i / SIZE), wave = 0.3 * std::sin(x + 2 * y);
+    above.emplace_back(0.9 * x + 0.45, 0.9 * y + 0.35, 1.5 + wave);
+    below.emplace_back(0.9 * x + 0.5, 0.9 * y + 0.3, 0.8 - wave);
+  }
+  MotionStep step;
+  step.bodies = {{&above, &below}};
+  step.obstacle = VoxelSurface::build(1.0, leaves);
+  const auto run = [&](double budget_ms) {
+    DetectorOptions options;
+    options.step_budget_ms = budget_ms;
+    Detector detector(options);
+    detector.setBodies({cloth}, {&above});
+    return detector.run(step);
+  };
+  const StepResult full = run(0);
+  EXPECT_TRUE(full.complete);
+  ASSERT_GT(full.contacts.size(), 1000u);
+  for (const double share : {1e-6, 0.5}) {
+    const StepResult part = run(share * full.stats.total_ms);
+    EXPECT_FALSE(part.complete) << share;
+    EXPECT_EQ(part.unchecked_toc_lower, 0);
+    EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
+    EXPECT_LT(part.contacts.size(), full.contacts.size());
+    for (const core::Contact& c : part.contacts) {
+      const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
+      ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
+    }
+  }
+}
+
 TEST(DetectorLimits, ScreenReportsBoundsOfItsPairs) {
   const TestStep step = crossing();
   DetectorOptions options;
