@@ -19,6 +19,7 @@ struct PairSeparation {
 struct SeparationRule {
   double bodies_m = 0;            ///< the separation of the two
   bool uncertain = false;         ///< some vertex of theirs has a radius
+  bool wide_list = false;         ///< what may be left out was listed for radii, so farther than the separation
   double tolerance_m = 0;         ///< the elementary test may call features this far apart a contact
   const double* radii = nullptr;  ///< per internal vertex; only where some vertex is uncertain
 
@@ -26,6 +27,7 @@ struct SeparationRule {
   SeparationRule(const SceneArrays& scene, std::size_t body_a, std::size_t body_b, double tolerance)
       : bodies_m(scene.separation(body_a, body_b)),
         uncertain(scene.bodies()[body_a].uncertain || scene.bodies()[body_b].uncertain),
+        wide_list(scene.bodies()[body_a].setup.reference && !scene.bodies()[body_a].setup.reference->radius_m.empty()),
         tolerance_m(tolerance),
         radii(scene.radii()) {}
 
@@ -49,7 +51,7 @@ struct SeparationRule {
     s.total_m = s.noise_m > 0 ? (bodies_m + s.noise_m) * (1 + 0x1p-50) : bodies_m;
     // The list is made for the largest radii so far; what counts is what the vertices are known to now.
     const bool listed = apart_m < std::numeric_limits<double>::infinity();
-    s.left_out = listed && (!uncertain || apart_m <= s.total_m + tolerance_m);
+    s.left_out = listed && (!wide_list || apart_m <= s.total_m + tolerance_m);
     if (s.left_out) s.total_m = s.noise_m = 0;
     return s;
   }

@@ -262,6 +262,39 @@ TEST(LeftOut, AQuestionChangesNoReference) {
   EXPECT_EQ(contactsWith(true), unasked);
 }
 
+// Large radii list pairs that are far apart; when the radii go, they are no neighbours any more.
+TEST(LeftOut, RadiiThatGoLeaveNoPairOut) {
+  const Layers layers;
+  MonitorOptions options;
+  options.detector = conservative();
+  MonitorBody body;
+  body.name = "felt";
+  body.minimum_separation_m = SEPARATION_M;
+  const auto contactsAfter = [&](double radius_m, double later_m) {
+    Monitor monitor(options, {body});
+    StampNs stamp_ns = 0;
+    std::size_t contacts = 0;
+    const auto feed = [&](double gap, double radius) {
+      MeshFrame frame{stamp_ns += 100000000, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), {}};
+      if (radius >= 0) frame.radius_m.assign(2 * SIZE * SIZE, radius);
+      monitor.push(0, std::move(frame), 0);
+      StepOutcome outcome;
+      EXPECT_TRUE(monitor.next(0, outcome));
+      contacts = outcome.contacts.size();
+    };
+    feed(0.03, radius_m);
+    feed(0.03, radius_m);
+    feed(0.03, later_m);
+    EXPECT_EQ(contacts, 0u);
+    feed(0.01, later_m);
+    return contacts;
+  };
+  const std::size_t never = contactsAfter(-1, -1);
+  EXPECT_GT(never, 0u);
+  EXPECT_EQ(contactsAfter(0.012, -1), never);
+  EXPECT_EQ(contactsAfter(0.012, 0), never);
+}
+
 // A tracker may know its errors only later: neighbours within them are left out from then on.
 TEST(LeftOut, RadiiMayComeAfterTheFirstFrame) {
   const Layers layers;
