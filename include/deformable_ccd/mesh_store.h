@@ -50,13 +50,14 @@ struct MeshFrame {
   /// Rigid bodies: fixed_from_body at the stamp. Between two frames they then move along the rotation, not the chord.
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  std::vector<double> radius_m;  ///< uncertainty per vertex, finite and 0 or more; empty: none
+  std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
 };
 
 struct MeshStoreOptions {
   double max_step_s = 0.5;         ///< a longer pause is a gap; > 0
   double max_vertex_step_m = 0.5;  ///< a vertex that moves further is a teleport; 0: never
-  std::size_t capacity = 64;       ///< frames kept; at least 2
+  std::size_t capacity = 1024;     ///< frames kept at most; at least 2
+  std::size_t max_vertices = 1 << 21;  ///< in the frames kept (50 MB), where they are more than 64
 };
 
 /// Where a body is at a stamp.
@@ -106,6 +107,12 @@ class MeshStore {
   /// empty when none of them has any.
   void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
 
+  /// How many frames lie between two stamps, neither included.
+  std::size_t framesWithin(StampNs from_ns, StampNs to_ns) const;
+  /// How far these frames are from the path that a step between the stamps takes, straight from t0 to t1 or, of a rigid
+  /// body, along the shorter arc between the poses there [m]; both stamps READY, in one run.
+  double offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const;
+
   /// Forgets what is not needed for stamps at or after this one.
   void forgetBefore(StampNs stamp_ns);
 
@@ -118,8 +125,10 @@ class MeshStore {
   std::deque<Kept> frames_;
   std::uint64_t run_ = 0;
   StepStatus run_reason_ = StepStatus::FIRST_FRAME;
+  std::size_t vertices_ = 0;  ///< in all frames kept
 
   StepStatus classify(const MeshFrame& frame) const;
+  void forgetOldest();
   std::size_t firstAtOrAfter(StampNs stamp_ns) const;
 };
 

@@ -33,12 +33,14 @@ struct MonitorBody {
   std::vector<SeparationFrom> separations;  ///< see BodySetup
 };
 
+struct StepInput;  // detector/step_runner.h
+
 struct MonitorOptions {
   DetectorOptions detector;
   MeshStoreOptions store;
   double sync_timeout_s = 0.1;     ///< how long a step waits for the other bodies' frames
   std::size_t clock_body = 0;      ///< a step ends at each of its frames
-  std::size_t max_waiting = 16;    ///< steps that may wait for other bodies; the oldest gives way
+  std::size_t max_waiting = 64;    ///< steps that may wait for other bodies; the oldest gives way
   std::size_t max_contacts = 10000;     ///< per outcome; the earliest are kept, status TRUNCATED
   bool suppress_initial = false;        ///< leave initial obstacle contacts out of the list (they still count)
   std::vector<Box> exclude_boxes;       ///< [m], fixed frame: voxels with their centre inside count as free
@@ -106,6 +108,7 @@ struct StepOutcome {
 
   /// Positions at both ends and the map used, for geometry and display. Shared with the monitor's next step: copy
   /// nothing, but finish with the outcome before the next call.
+  const StepInput* input = nullptr;  ///< both ends, and how rigid bodies come from one to the other
   const std::vector<Positions>* positions_t0 = nullptr;
   const std::vector<Positions>* positions_t1 = nullptr;
   const std::vector<std::shared_ptr<const Topology>>* topologies = nullptr;
@@ -118,6 +121,10 @@ struct StepOutcome {
 
 /// Point, normal, weights and approach speed [m per step] of one of the outcome's contacts, any kind, in the fixed frame.
 ContactGeometry contactGeometry(const StepOutcome& outcome, const core::Contact& contact);
+
+/// Where one of the contact's vertices is at its toc_lower [m], fixed frame; i counts Contact::vertex. Of a rigid body that
+/// turns, on the path that was tested: the chord of that part of the step.
+Vec3 vertexAtContact(const StepOutcome& outcome, const core::Contact& contact, int i);
 
 /// All that a step's answer follows from, before it is computed. One entry a body; valid until the step ends.
 struct StepSource {

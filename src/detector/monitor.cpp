@@ -73,8 +73,10 @@ const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->c
 void Monitor::setOptions(const MonitorOptions& options) {
   check(options, impl_->bodies.size());
   if (options.clock_body != impl_->options.clock_body) throw std::invalid_argument("clock_body must stay");
-  for (MeshStore& store : impl_->stores) store.setOptions(options.store);
+  // All of it or nothing: what may refuse comes first.
+  const MeshStore checked(options.store);
   impl_->runner.setOptions(options.detector);
+  for (MeshStore& store : impl_->stores) store.setOptions(options.store);
   impl_->side_runner.reset();
   // Other boxes are another map.
   impl_->map_changed |= !options.exclude_boxes.empty() || !impl_->options.exclude_boxes.empty();
@@ -105,10 +107,13 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
   m.finishing = false;
   if (!m.isStream(body)) {
     // The newest frame holds at all times; an older one, or the same again, is as good as any.
-    m.stores.at(body).clear();
-    const StepStatus status = m.stores[body].push(std::move(frame));
-    m.counters[body].count(isSeam(status) ? StepStatus::OK : status);
-    m.has_last = false;
+    MeshStore store(m.options.store);
+    const StepStatus status = store.push(std::move(frame));
+    m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
+    if (isSeam(status)) {
+      m.stores[body] = std::move(store);
+      m.has_last = false;
+    }
     return status;
   }
   MeshStore& store = m.stores.at(body);
@@ -229,6 +234,14 @@ bool Monitor::next(std::int64_t now_ns, StepOutcome& outcome) {
       outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
     }
     if (m.listener) m.listener->onOutcome(outcome);
+    // Not the computed answer's, which a recording replays, but about it.
+    if (outcome.answered && !m.off_path.empty()) {
+      outcome.clear = false;
+      if (outcome.status == StepStatus::OK) {
+        outcome.status = StepStatus::PARTIAL;
+        outcome.reason = m.off_path;
+      }
+    }
   } else {
     m.has_last = m.has_last && !isSeam(step.status);
   }

@@ -47,6 +47,7 @@ struct Monitor::Impl {
   StampNs last_end_ns = 0;
   double last_duration_s = 0;
   bool has_last = false, map_changed = true, finishing = false;
+  std::string off_path;  // why the step's paths are not those that were seen; empty: they are
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
 
@@ -69,6 +70,7 @@ struct Monitor::Impl {
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   void place(const Pending& step);
+  void lookBetween(std::size_t body, StampNs from_ns, StampNs to_ns);
   void keepReferences(StepInput& at, References& kept) const;
   void forgetReferences();
   bool separates(std::size_t body, const std::vector<double>& radius_m) const;

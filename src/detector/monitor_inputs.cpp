@@ -1,5 +1,6 @@
 // What a step is computed from: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
+#include <sstream>
 #include <utility>
 
 #include "detector/monitor_impl.h"
@@ -56,7 +57,21 @@ Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
   return all;
 }
 
+/// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the other.
+/// What was seen of it in between must not be contradicted in silence.
+void Monitor::Impl::lookBetween(std::size_t body, StampNs from_ns, StampNs to_ns) {
+  const std::size_t frames = stores[body].framesWithin(from_ns, to_ns);
+  if (frames == 0) return;
+  const double off_m = stores[body].offPath(from_ns, to_ns, input.t0[body], input.t1[body]);
+  if (off_m <= options.rigid_tolerance_m) return;
+  std::ostringstream text;
+  text << "body '" << bodies[body].name << "' was seen up to " << off_m << " m off the path of this step, in " << frames
+       << " frames between its ends; make it the clock_body";
+  off_path = text.str();
+}
+
 void Monitor::Impl::place(const Pending& step) {
+  off_path.clear();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     MeshStore& store = stores[b];
     if (b == options.clock_body) {
@@ -67,6 +82,7 @@ void Monitor::Impl::place(const Pending& step) {
       input.pose_t0[b] = step.from->pose;
       input.pose_t1[b] = step.to->pose;
       input.radius_m[b] = largerRadii(step.from->radius_m, step.to->radius_m);
+      store.forgetBefore(step.to->stamp_ns);
       continue;
     }
     // Not the newest frame, which may have begun another run with another topology while the step waited.
@@ -85,6 +101,7 @@ void Monitor::Impl::place(const Pending& step) {
       input.pose_t1[b] = store.poseAt(step.to->stamp_ns);
     }
     store.radiiOver(step.from->stamp_ns, step.to->stamp_ns, input.radius_m[b]);
+    lookBetween(b, step.from->stamp_ns, step.to->stamp_ns);
     store.forgetBefore(step.to->stamp_ns);
   }
   keepReferences(input, references);

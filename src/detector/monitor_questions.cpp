@@ -42,6 +42,7 @@ StepOutcome Monitor::predict() {
   if (!m.has_last || !(m.options.look_ahead_s > 0) || !(m.last_duration_s > 0)) return outcome;
   const double ahead = m.options.look_ahead_s / m.last_duration_s;
   m.side_input.resize(m.bodies.size());
+  m.side_input.pose_scale = ahead;
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     m.side_input.topologies[b] = m.input.topologies[b];
     m.side_input.rigid[b] = m.input.rigid[b];
@@ -51,9 +52,11 @@ StepOutcome Monitor::predict() {
     Positions& to = m.side_input.t1[b];
     to.resize(m.input.t1[b].size());
     if (m.input.rigid[b]) {
+      // The last step once more, `ahead` times as far, which may be more than half a turn.
       m.side_input.pose_t0[b] = m.input.pose_t1[b];
-      m.side_input.pose_t1[b] = interpolate(m.input.pose_t0[b], m.input.pose_t1[b], 1 + ahead);
-      const Eigen::Isometry3d moved = m.side_input.pose_t1[b] * m.input.pose_t1[b].inverse();
+      m.side_input.pose_t1[b] = interpolate(m.input.pose_t0[b], m.input.pose_t1[b], 2);
+      const Eigen::Isometry3d moved =
+          interpolate(m.side_input.pose_t0[b], m.side_input.pose_t1[b], ahead) * m.input.pose_t1[b].inverse();
       for (std::size_t v = 0; v < to.size(); ++v) to[v] = moved * m.input.t1[b][v];
     } else {
       for (std::size_t v = 0; v < to.size(); ++v) {

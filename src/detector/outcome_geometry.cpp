@@ -6,6 +6,7 @@
 
 #include "deformable_ccd/monitor.h"
 #include "detector/closest_points.h"
+#include "detector/step_runner.h"
 
 namespace deformable_ccd {
 
@@ -78,15 +79,37 @@ void faceOnCorner(const Feature& f, const Cube& cube, ContactGeometry& out) {
   out.approach_speed = -out.normal.dot(motion);
 }
 
+/// The straight part of the step in which a contact begins: a turning body's step is tested in several.
+struct Part {
+  const StepInput& input;
+  std::size_t parts, part;
+  double toc;  ///< [0,1] within the part
+
+  Part(const StepOutcome& outcome, const core::Contact& contact)
+      : input(*outcome.input), parts(std::max<std::size_t>(outcome.substeps, 1)) {
+    const double along = contact.toc_lower * static_cast<double>(parts);
+    part = std::min(static_cast<std::size_t>(along), parts - 1);
+    toc = std::min(along - static_cast<double>(part), 1.0);
+  }
+  Vec3 from(std::size_t body, Index vertex) const { return placeVertex(input, body, vertex, part, parts); }
+  Vec3 to(std::size_t body, Index vertex) const { return placeVertex(input, body, vertex, part + 1, parts); }
+};
+
+/// Bodies of a mesh contact's four vertices; all of body[0] where the second feature is a voxel's.
+std::uint16_t bodyOf(const core::Contact& contact, int i) {
+  const int first = contact.kind == PairKind::VERTEX_FACE ? 1 : 2;  // points of body[0]
+  return contact.body[1] == OBSTACLE_BODY || i < first ? contact.body[0] : contact.body[1];
+}
+
 ContactGeometry obstacleGeometry(const StepOutcome& outcome, const core::Contact& contact) {
-  const Positions& t0 = (*outcome.positions_t0)[contact.body[0]];
-  const Positions& t1 = (*outcome.positions_t1)[contact.body[0]];
+  const Part part(outcome, contact);
   Feature feature;
   const int points = contact.kind == PairKind::VERTEX_VOXEL_FACE ? 1 : contact.kind == PairKind::EDGE_VOXEL_EDGE ? 2 : 3;
   for (int i = 0; i < points; ++i) {
-    const Vec3 from = outcome.map_from_fixed * t0[contact.vertex[i]], to = outcome.map_from_fixed * t1[contact.vertex[i]];
-    feature.at[i] = from + contact.toc_lower * (to - from);
-    feature.motion[i] = to - from;
+    const Vec3 from = outcome.map_from_fixed * part.from(contact.body[0], contact.vertex[i]);
+    const Vec3 to = outcome.map_from_fixed * part.to(contact.body[0], contact.vertex[i]);
+    feature.at[i] = from + part.toc * (to - from);
+    feature.motion[i] = static_cast<double>(part.parts) * (to - from);
   }
   const double resolution = outcome.obstacle->resolution();
   const std::int64_t size = contact.voxel_size;
@@ -108,16 +131,23 @@ ContactGeometry obstacleGeometry(const StepOutcome& outcome, const core::Contact
 
 ContactGeometry contactGeometry(const StepOutcome& outcome, const core::Contact& contact) {
   if (contact.body[1] == OBSTACLE_BODY) return obstacleGeometry(outcome, contact);
+  const Part part(outcome, contact);
   PairMotion pair;
-  const int first = contact.kind == PairKind::VERTEX_FACE ? 1 : 2;  // points of body[0]
   for (int i = 0; i < 4; ++i) {
-    const std::uint16_t body = contact.body[i < first ? 0 : 1];
-    for (int axis = 0; axis < 3; ++axis) {
-      pair.x[0][i][axis] = (*outcome.positions_t0)[body][contact.vertex[i]][axis];
-      pair.x[1][i][axis] = (*outcome.positions_t1)[body][contact.vertex[i]][axis];
-    }
+    const std::uint16_t body = bodyOf(contact, i);
+    std::copy_n(part.from(body, contact.vertex[i]).data(), 3, pair.x[0][i]);
+    std::copy_n(part.to(body, contact.vertex[i]).data(), 3, pair.x[1][i]);
   }
-  return contactGeometry(contact.kind, pair, contact.toc_lower);
+  ContactGeometry geometry = contactGeometry(contact.kind, pair, part.toc);
+  geometry.approach_speed *= static_cast<double>(part.parts);
+  return geometry;
+}
+
+Vec3 vertexAtContact(const StepOutcome& outcome, const core::Contact& contact, int i) {
+  const Part part(outcome, contact);
+  const std::uint16_t body = bodyOf(contact, i);
+  const Vec3 from = part.from(body, contact.vertex[i]);
+  return from + part.toc * (part.to(body, contact.vertex[i]) - from);
 }
 
 }  // namespace deformable_ccd

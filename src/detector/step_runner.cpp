@@ -40,6 +40,13 @@ bool samePair(const core::Contact& a, const core::Contact& b) {
   return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex && a.voxel == b.voxel;
 }
 
+/// The same pair in two parts of a step is one contact: it begins in the earlier part, and is certain if it is in either.
+void join(core::Contact& into, const core::Contact& later) {
+  if (later.certainty != Certainty::CERTAIN || into.certainty == Certainty::CERTAIN) return;
+  into.certainty = Certainty::CERTAIN;
+  into.toc_upper = later.toc_upper;
+}
+
 /// toc of part i of n as a fraction of the whole step. The division is rounded, so one step outwards.
 double scaleDown(double toc, std::size_t i, std::size_t n) {
   return n == 1 ? toc : std::max(0.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 0.0));
@@ -120,7 +127,7 @@ std::size_t requiredSubsteps(const StepInput& input, double tolerance_m) {
   double parts = 1;
   for (std::size_t b = 0; b < input.t0.size(); ++b) {
     if (!input.rigid[b]) continue;
-    const double angle = rotationAngle(input.pose_t0[b], input.pose_t1[b]);
+    const double angle = input.pose_scale * rotationAngle(input.pose_t0[b], input.pose_t1[b]);
     double radius = 0;
     for (const Vec3& p : input.t0[b]) radius = std::max(radius, (p - input.pose_t0[b].translation()).norm());
     // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
@@ -130,6 +137,15 @@ std::size_t requiredSubsteps(const StepInput& input, double tolerance_m) {
   return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
 }
 
+namespace {
+
+/// What moves a rigid body from t0 to where it is at the fraction u of the step.
+Eigen::Isometry3d movedBy(const StepInput& input, std::size_t body, double u) {
+  return interpolate(input.pose_t0[body], input.pose_t1[body], u * input.pose_scale) * input.pose_t0[body].inverse();
+}
+
+}  // namespace
+
 void placeAt(const StepInput& input, std::size_t part, std::size_t parts, std::vector<Positions>& out) {
   const double u = static_cast<double>(part) / static_cast<double>(parts);
   out.resize(input.t0.size());
@@ -138,10 +154,17 @@ void placeAt(const StepInput& input, std::size_t part, std::size_t parts, std::v
       interpolate(input.t0[b], input.t1[b], u, out[b]);
       continue;
     }
-    const Eigen::Isometry3d moved = interpolate(input.pose_t0[b], input.pose_t1[b], u) * input.pose_t0[b].inverse();
+    const Eigen::Isometry3d moved = movedBy(input, b, u);
     out[b].resize(input.t0[b].size());
     for (std::size_t v = 0; v < out[b].size(); ++v) out[b][v] = moved * input.t0[b][v];
   }
+}
+
+Vec3 placeVertex(const StepInput& input, std::size_t body, Index vertex, std::size_t part, std::size_t parts) {
+  const Vec3 &from = input.t0[body][vertex], &to = input.t1[body][vertex];
+  if (part == 0 || part == parts) return part == 0 ? from : to;
+  const double u = static_cast<double>(part) / static_cast<double>(parts);
+  return input.rigid[body] ? Vec3(movedBy(input, body, u) * from) : Vec3(from + u * (to - from));
 }
 
 StepRunner::StepRunner(const DetectorOptions& options) : detector_(options) {}
@@ -208,11 +231,15 @@ bool StepRunner::budgetIsSpent(const StepOutcome& outcome) const {
   return budget_ms > 0 && outcome.stats.total_ms >= budget_ms;
 }
 
-void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts,
+bool StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts,
                           StepOutcome& outcome) {
   step_.obstacle = map.surface;
   step_.map_from_fixed = map.map_from_fixed;
-  if (parts == 1) return runPart(input, continues, 0, 1, outcome);
+  if (parts == 1) {
+    runPart(input, continues, 0, 1, outcome);
+    return true;
+  }
+  bool reached_end = true;
   part_.resize(input.t0.size());
   part_.t1 = input.t0;
   part_.radius_m = input.radius_m;
@@ -221,6 +248,7 @@ void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
       // Of the rest all that is known is that it has not begun yet.
       outcome.complete = false;
       outcome.unchecked_toc_lower = std::min(outcome.unchecked_toc_lower, scaleDown(0, i, parts));
+      reached_end = false;
       break;
     }
     const Clock::time_point start = Clock::now();
@@ -232,8 +260,17 @@ void StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
     runPart(part_, i > 0 || continues, i, parts, outcome);
   }
   auto& contacts = outcome.contacts;
-  std::sort(contacts.begin(), contacts.end(), canonicalLess);
-  contacts.erase(std::unique(contacts.begin(), contacts.end(), samePair), contacts.end());
+  std::stable_sort(contacts.begin(), contacts.end(), canonicalLess);  // of one pair, the earlier part stays first
+  std::size_t kept = 0;
+  for (const core::Contact& contact : contacts) {
+    if (kept > 0 && samePair(contacts[kept - 1], contact)) {
+      join(contacts[kept - 1], contact);
+    } else {
+      contacts[kept++] = contact;
+    }
+  }
+  contacts.resize(kept);
+  return reached_end;
 }
 
 void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
@@ -242,13 +279,17 @@ void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bod
     setBodies(input, bodies);
     continues = false;
   }
+  // The detector knows what is where at the end of the last part that it was given.
+  continues = continues && reached_end_;
+  reached_end_ = false;  // also when it throws
   const std::size_t wanted = requiredSubsteps(input, options.rigid_tolerance_m);
   const std::size_t parts = std::min(wanted, options.max_substeps);
   outcome.substeps = parts;
   outcome.obstacle = map.surface;
   outcome.map_from_fixed = map.map_from_fixed;
   outcome.map_stamp_ns = map.stamp_ns;
-  runParts(input, map, continues, parts, outcome);
+  reached_end_ = runParts(input, map, continues, parts, outcome);
+  outcome.input = &input;
   outcome.positions_t0 = &input.t0;
   outcome.positions_t1 = &input.t1;
   outcome.topologies = &input.topologies;

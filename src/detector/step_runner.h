@@ -16,6 +16,9 @@ struct StepInput {
   std::vector<std::shared_ptr<const Topology>> topologies;
   std::vector<std::uint8_t> rigid;  ///< one a body: moves from pose_t0 to pose_t1 along the rotation
   std::vector<Eigen::Isometry3d> pose_t0, pose_t1;
+  /// The step goes from pose_t0 this many times as far as to pose_t1; t1 is where it ends. Two poses alone tell no turn
+  /// of more than a half, which predictions may be.
+  double pose_scale = 1;
   std::vector<std::vector<double>> radius_m;  ///< one a body: uncertainty per vertex over the step; empty: none
   std::vector<std::shared_ptr<const ReferenceFrame>> references;  ///< one a body; null: nothing is left out
 
@@ -28,6 +31,9 @@ std::size_t requiredSubsteps(const StepInput& input, double tolerance_m);
 
 /// All bodies at the end of the first `part` of `parts` equal parts of the step; rigid ones along their rotation.
 void placeAt(const StepInput& input, std::size_t part, std::size_t parts, std::vector<Positions>& out);
+
+/// One vertex at the end of the first `part` of `parts` equal parts, as placeAt() has it.
+Vec3 placeVertex(const StepInput& input, std::size_t body, Index vertex, std::size_t part, std::size_t parts);
 
 /// The bodies as the detector takes them. Throws std::invalid_argument when a vertex_mask does not fit its topology.
 std::vector<BodySetup> bodySetups(const StepInput& input, const std::vector<MonitorBody>& bodies);
@@ -50,9 +56,11 @@ class StepRunner {
   std::vector<std::shared_ptr<const ReferenceFrame>> set_references_;
   StepInput part_;
   MotionStep step_;
+  bool reached_end_ = false;  ///< of the last run: no part was left out
 
   void setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies);
-  void runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts, StepOutcome& outcome);
+  /// False when the budget left parts out.
+  bool runParts(const StepInput& input, const MonitorMap& map, bool continues, std::size_t parts, StepOutcome& outcome);
   void runPart(const StepInput& at, bool continues, std::size_t part, std::size_t parts, StepOutcome& outcome);
   bool budgetIsSpent(const StepOutcome& outcome) const;
 };

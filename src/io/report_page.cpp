@@ -183,7 +183,7 @@ R.bodies.forEach(b => {
   const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
   map(row, b, b.first.map(t => t === null ? null : 1 - (t - t0) / Math.max(t1 - t0, 1e-9)), 'first contact, late to early', number(t1) + ' s', number(t0) + ' s');
 });
-const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'some vertices could not be checked',
+const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'vertices could not be checked, or left the path',
   DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
 const STAGE = { record: 'takes in the frames', bounds: 'boxes of what the features sweep', broad_phase: 'pairs whose boxes meet',
   planar: 'filters in a line and a plane', elementary: 'the test of the chosen accuracy', obstacle: 'all of it against the map',

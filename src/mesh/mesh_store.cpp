@@ -81,7 +81,15 @@ void MeshStore::setOptions(const MeshStoreOptions& options) {
   options_ = options;
 }
 
-void MeshStore::clear() { frames_.clear(); }
+void MeshStore::clear() {
+  frames_.clear();
+  vertices_ = 0;
+}
+
+void MeshStore::forgetOldest() {
+  vertices_ -= frames_.front().frame->positions.size();
+  frames_.pop_front();
+}
 
 StepStatus MeshStore::classify(const MeshFrame& frame) const {
   if (!frame.topology || frame.positions.size() != frame.topology->vertexCount()) return StepStatus::VERTEX_COUNT;
@@ -102,14 +110,19 @@ StepStatus MeshStore::push(MeshFrame frame) {
   const StepStatus status = classify(frame);
   if (status == StepStatus::VERTEX_COUNT || status == StepStatus::DUPLICATE) return status;
   // Stamps must ascend within the store: after a jump back nothing older can be of use.
-  if (status == StepStatus::TIME_JUMP) frames_.clear();
+  if (status == StepStatus::TIME_JUMP) clear();
   if (status != StepStatus::OK) {
     ++run_;
     run_reason_ = status;
   } else if (frame.topology != newest().topology) {
     frame.topology = newest().topology;  // equal; one object a run, so that pointers tell runs apart
   }
-  if (frames_.size() >= options_.capacity) frames_.pop_front();
+  // A fast stream of few vertices may run far ahead of a clock body that comes late; large meshes may not fill the memory.
+  constexpr std::size_t ALWAYS_KEPT = 64;
+  vertices_ += frame.positions.size();
+  while (frames_.size() >= options_.capacity || (frames_.size() >= ALWAYS_KEPT && vertices_ > options_.max_vertices)) {
+    forgetOldest();
+  }
   frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_});
   return status;
 }
@@ -174,9 +187,30 @@ void MeshStore::radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& o
   }
 }
 
+std::size_t MeshStore::framesWithin(StampNs from_ns, StampNs to_ns) const {
+  const std::size_t first = firstAtOrAfter(from_ns + 1), end = firstAtOrAfter(to_ns);
+  return end > first ? end - first : 0;
+}
+
+double MeshStore::offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const {
+  double off = 0;
+  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < firstAtOrAfter(to_ns); ++i) {
+    const MeshFrame& frame = *frames_[i].frame;
+    const double u = fraction(from_ns, to_ns, frame.stamp_ns);
+    const Eigen::Isometry3d pose_t0 = frame.rigid ? poseAt(from_ns) : Eigen::Isometry3d::Identity();
+    const Eigen::Isometry3d moved =
+        frame.rigid ? interpolate(pose_t0, poseAt(to_ns), u) * pose_t0.inverse() : Eigen::Isometry3d::Identity();
+    for (std::size_t v = 0; v < t0.size(); ++v) {
+      const Vec3 on_path = frame.rigid ? Vec3(moved * t0[v]) : Vec3(t0[v] + u * (t1[v] - t0[v]));
+      off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared
+    }
+  }
+  return off;
+}
+
 void MeshStore::forgetBefore(StampNs stamp_ns) {
   // The frame at or just before the stamp is still needed to interpolate, and the newest two to extrapolate.
-  while (frames_.size() > 2 && frames_[1].frame->stamp_ns <= stamp_ns) frames_.pop_front();
+  while (frames_.size() > 2 && frames_[1].frame->stamp_ns <= stamp_ns) forgetOldest();
 }
 
 }  // namespace deformable_ccd

@@ -43,14 +43,12 @@ Marker list(const StepOutcome& outcome, const std::string& frame, const std::str
 
 /// The mesh face that takes part, at the time of contact; nothing for edge pairs.
 void addFace(const StepOutcome& outcome, const core::Contact& contact, Marker& faces) {
-  int first = -1, body = 0;
-  if (contact.kind == PairKind::VERTEX_FACE) first = 1, body = 1;
+  int first = -1;
+  if (contact.kind == PairKind::VERTEX_FACE) first = 1;
   if (contact.kind == PairKind::FACE_VOXEL_CORNER) first = 0;
   if (first < 0) return;
   for (int i = first; i < first + 3; ++i) {
-    const Vec3& from = (*outcome.positions_t0)[contact.body[body]][contact.vertex[i]];
-    const Vec3& to = (*outcome.positions_t1)[contact.body[body]][contact.vertex[i]];
-    faces.points.push_back(point(from + contact.toc_lower * (to - from)));
+    faces.points.push_back(point(vertexAtContact(outcome, contact, i)));
     faces.colors.push_back(faces.color);  // with colours of its own a list is drawn unlit, so that no side is black
   }
 }

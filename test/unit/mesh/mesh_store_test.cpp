@@ -101,6 +101,29 @@ TEST_F(MeshStoreTest, KeepsNoMoreThanItsCapacity) {
   EXPECT_EQ(store.lookup(985 * MS), Lookup::READY);
 }
 
+// A gripper at 240 Hz beside a tracker that comes 0.4 s late must still be known where the tracker's step begins.
+TEST_F(MeshStoreTest, SmallMeshesAreKeptForLongLargeOnesAreNot) {
+  MeshStore kept{MeshStoreOptions()};
+  for (int i = 0; i < 300; ++i) kept.push(frame(i * 4 * MS));
+  EXPECT_EQ(kept.size(), 300u);
+  EXPECT_EQ(kept.lookup(2 * MS), Lookup::READY);
+  MeshStoreOptions options;
+  options.max_vertices = 100 * frame(0).positions.size();
+  MeshStore large(options);
+  for (int i = 0; i < 300; ++i) {
+    large.push(frame(i * 4 * MS));
+    EXPECT_LE(large.size(), 100u);
+  }
+  EXPECT_EQ(large.size(), 100u);
+  options.max_vertices = 1;
+  MeshStore huge(options);
+  for (int i = 0; i < 300; ++i) huge.push(frame(i * 4 * MS));
+  EXPECT_EQ(huge.size(), 64u);
+  huge.clear();
+  for (int i = 0; i < 10; ++i) huge.push(frame(i * 4 * MS));
+  EXPECT_EQ(huge.size(), 10u);
+}
+
 TEST(MeshStoreOptionsTest, OutOfRangeNamesTheOption) {
   const auto message = [](const MeshStoreOptions& options) -> std::string {
     try {
