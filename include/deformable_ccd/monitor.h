@@ -102,7 +102,7 @@ struct StepOutcome {
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
   core::StepStats stats;
-  double unknown_fraction = 0;  ///< [1] of the swept voxels, those that the map does not know; filled by whoever has the map
+  double unknown_fraction = 0;  ///< [1] of the swept voxels, those not known to the map, which fills it in; NaN: too many to count
   std::size_t substeps = 0;
   bool clear = false;  ///< doc/interface.md, ~clear
 

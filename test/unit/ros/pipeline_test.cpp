@@ -454,7 +454,7 @@ TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
   const auto names = [](const std::string& error, const std::string& part) {
     EXPECT_NE(error.find(part), std::string::npos) << part << ": " << error;
   };
-  for (const std::string file : {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
+  for (const std::string& file : {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
     const std::string error = errorOf(rigid(file));
     names(error, "rigid/mesh of body 'finger'");
     names(error, file);
