@@ -1,58 +1,20 @@
-#include "ros/outputs.h"
+#include "ros/collision_monitor_impl.h"
 
-#include "ros/collision_monitor.h"
-
-#include <atomic>
-#include <chrono>
-#include <thread>
-
-#include <ros/callback_queue.h>
-#include <ros/ros.h>
-#include <ros/spinner.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
-#include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
-#include <topic_tools/shape_shifter.h>
 
 #include "deformable_ccd/simd_target.h"
-#include "ros/advice.h"
-#include "ros/diagnostics.h"
-#include "ros/effects.h"
-#include "ros/input_queue.h"
 #include "ros/known_types.h"
-#include "ros/map_loader.h"
-#include "ros/monitor_log.h"
-#include "ros/monitor_pipeline.h"
-#include "ros/reconfigure.h"
-#include "ros/step_recorder.h"
-#include "ros/transforms.h"
 
 namespace deformable_ccd {
-
 namespace {
 
 using topic_tools::ShapeShifter;
-using std::chrono::microseconds;
 
-// While something waits for tf or another body the worker looks again this often; else it sleeps until it is woken, and
-// this long at most, for diagnostics.
-constexpr microseconds POLL{2000}, SLEEP{100000};
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
 const ros::WallDuration RENEWAL(0.05);
-
-std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-std::vector<std::uint8_t> bytesOf(const ShapeShifter& message) {
-  std::vector<std::uint8_t> bytes(message.size());
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  message.write(stream);
-  return bytes;
-}
 
 MonitorConfig configOf(const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
@@ -64,76 +26,18 @@ MonitorConfig configOf(const ros::NodeHandle& private_node) {
 
 }  // namespace
 
-struct CollisionMonitor::Impl {
-  ros::NodeHandle node, private_node;
-  MonitorConfig config;
-  tf2::BufferCore transforms;
-  TransformFeed feed{transforms};
-  MonitorPipeline pipeline;
-  StepRecorder recorder;
-  Outputs outputs;
-  InputQueue queue;
-  Diagnostics diagnostics;
-  MonitorLog log;
-  EffectTracker effects;
-  LookAheadScore look_ahead;
-  std::unique_ptr<MapLoader> maps;
-
-  ros::CallbackQueue input_callbacks, service_callbacks;
-  ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
-  std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
-  ros::SteadyTimer renewal;
-  ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
-  std::vector<ros::ServiceServer> services;
-  std::unique_ptr<Reconfigure> reconfigure;
-  std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
-  std::atomic<std::uint64_t> frames_handed_over{0};
-  std::thread worker;
-  StampNs newest_ns = 0;  // stamp of the last outcome; the worker's
-  std::uint64_t steps_unpublished = 0;  // the worker's, too
-
-  Impl(const ros::NodeHandle& n, const ros::NodeHandle& p)
-      : node(n),
-        private_node(p),
-        config(configOf(p)),
-        pipeline(config, transforms),
-        recorder(config, pipeline.monitor()),
-        outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
-        queue(config.bodies.size(), config.queue_size, config.queue_policy),
-        diagnostics(private_node.getNamespace(), node),
-        log(node, private_node.getNamespace(), config),
-        effects(config, log.mapSource()),
-        look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
-
-  void start();
-  void stop();
-
-  // Input thread.
-  void subscribe();
-  void onMesh(std::size_t body, MeshMessage message);
-  void onMap(const ShapeShifter::ConstPtr& message);
-
-  // Service thread.
-  void advertiseServices();
-  void reconfigureNow(MonitorOptions options, const MarkerConfig& markers);
-
-  // Worker.
-  void work();
-  void run(const std::function<void()>& command);
-  void takeMaps();
-  void takeMessage(std::size_t body, const QueuedMessage& queued);
-  void takeMessages();
-  void tellComplaints();
-  void publish(StepOutcome& outcome);
-  void publishAll(StepOutcome& outcome);
-  void predict(StepOutcome& outcome);
-  void publishPrediction(const StepOutcome& prediction);
-  void publishEffects(const ros::Time& stamp);
-  void accountDropped();
-  void lookIntoSilence();
-  void resetNow(StepStatus status);
-  StatsContext statsContext() const;
-};
+CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle)
+    : node(node_handle),
+      private_node(private_handle),
+      config(configOf(private_handle)),
+      pipeline(config, transforms),
+      recorder(config, pipeline.monitor()),
+      outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
+      queue(config.bodies.size(), config.queue_size, config.queue_policy),
+      diagnostics(private_node.getNamespace(), node),
+      log(node, private_node.getNamespace(), config),
+      effects(config, log.mapSource()),
+      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
@@ -250,206 +154,7 @@ void CollisionMonitor::Impl::advertiseServices() {
       });
 }
 
-// --- worker ----------------------------------------------------------------------------------------------------------
-
-void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const MarkerConfig& markers) {
-  config.markers = markers;
-  // What the effect plan decides stays with it.
-  options.obstacle_expected = pipeline.monitor().options().obstacle_expected;
-  options.detector.check_start_state = pipeline.monitor().options().detector.check_start_state;
-  try {
-    pipeline.monitor().setOptions(options);
-    config.monitor = options;
-  } catch (const std::invalid_argument& error) {
-    ROS_WARN_STREAM("reconfiguration refused: " << error.what());
-  }
-}
-
-void CollisionMonitor::Impl::resetNow(StepStatus status) {
-  accountDropped();
-  std::vector<bool> spared(config.bodies.size());
-  for (std::size_t b = 0; b < spared.size(); ++b) spared[b] = pipeline.isStatic(b);
-  const auto cleared = queue.clear(spared);
-  for (std::size_t b = 0; b < cleared.size(); ++b) {
-    pipeline.monitor().countReceived(b, cleared[b]);
-    pipeline.monitor().countDropped(b, status, cleared[b]);
-  }
-  pipeline.reset(status);
-  outputs.publishNotClear(pipeline.fixedFrame());
-  if (!outputs.wantsPrediction()) return;
-  StepOutcome none;
-  none.status = status;
-  none.start_ns = none.stamp_ns = newest_ns;
-  publishPrediction(none);
-}
-
-void CollisionMonitor::Impl::accountDropped() {
-  const auto dropped = queue.takeDropped();
-  for (std::size_t b = 0; b < dropped.size(); ++b) {
-    if (dropped[b] == 0) continue;
-    pipeline.monitor().countReceived(b, dropped[b]);
-    pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
-    log.complain(b, "queue", std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
-                             adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
-  }
-}
-
-void CollisionMonitor::Impl::takeMaps() {
-  LoadedMap map;
-  if (!maps || !maps->take(map)) return;
-  if (!map.surface) {
-    log.complain(config.bodies.size(), "map", "refused: " + map.problem);
-    map.problem = "the octomap was refused: " + map.problem;
-  }
-  map_publisher_seen = true;
-  pipeline.setMap(std::move(map), steadyNs());
-}
-
-void CollisionMonitor::Impl::takeMessage(std::size_t body, const QueuedMessage& queued) {
-  if (const auto* typed = std::get_if<TypedMesh>(&queued.message)) {
-    return pipeline.take(body, *typed, queued.receipt_ns, queued.arrival_ns);
-  }
-  const ShapeShifter& message = *std::get<ShapeShifter::ConstPtr>(queued.message);
-  const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
-  if (problem.empty()) {
-    pipeline.take(body, {message.getDataType(), bytesOf(message), queued.receipt_ns, queued.arrival_ns});
-  } else {
-    pipeline.refuse(body, queued.receipt_ns, queued.arrival_ns, problem);
-  }
-}
-
-void CollisionMonitor::Impl::takeMessages() {
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    QueuedMessage queued;
-    if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
-    takeMessage(b, queued);
-  }
-}
-
-void CollisionMonitor::Impl::tellComplaints() {
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    const std::string complaint = pipeline.takeComplaint(b);
-    // The clock body's come as outcomes, which are logged when they are published.
-    if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", complaint);
-  }
-}
-
-void CollisionMonitor::Impl::lookIntoSilence() {
-  if (!log.isSilenceDue(steadyNs())) return;
-  std::vector<AwaitedTopic> silent;
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
-    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
-  }
-  log.hintAt(silent, pipeline);
-}
-
-StatsContext CollisionMonitor::Impl::statsContext() const {
-  StatsContext context;
-  context.frames = pipeline.monitor().total();
-  context.weld_changes = pipeline.weldChanges();
-  if (config.monitor.look_ahead_s > 0) context.look_ahead = look_ahead.summary();
-  context.steps_unpublished = steps_unpublished;
-  context.maps_received = maps ? maps->received() : 0;
-  context.frames_handed_over = frames_handed_over;
-  context.maps_refused = maps ? maps->refused() : 0;
-  context.parameter_hash = config.hash();
-  return context;
-}
-
-/// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
-void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
-  try {
-    publishAll(outcome);
-  } catch (const std::exception& error) {
-    ++steps_unpublished;
-    log.complain(config.monitor.clock_body, "publishing",
-                 std::string("not all of a step's results could be published: ") + error.what());
-    run([this] { outputs.publishNotClear(pipeline.fixedFrame()); });
-  }
-}
-
-void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
-  const auto& bodies = pipeline.monitor().bodies();
-  const std::string& frame = pipeline.fixedFrame();
-  log.tell(outcome);
-  newest_ns = outcome.stamp_ns;
-  outputs.publishResult(outcome, bodies, frame);
-  const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
-  outputs.publishMarkers(outcome, bodies, config.markers, frame);
-  effects.learn(outcome, pipeline.monitor());
-  publishEffects(toRosTime(outcome.stamp_ns));
-  if (effects.takeNewLeftOut(pipeline.monitor())) {
-    outputs.publishLeftOut(toLeftOutPairs(pipeline.monitor().leftOut(), bodies, outcome.stamp_ns, frame));
-  }
-  predict(outcome);
-  StatsContext context = statsContext();
-  context.latency_s = latency_s;
-  outputs.publishStats(outcome, context, frame);
-  diagnostics.add(outcome, context);
-}
-
-void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
-  if (!effects.takeNewPlan()) return;
-  outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
-  for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
-}
-
-void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
-  if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
-  look_ahead.observe(outcome);
-  // Nothing to go on from, which whoever listens to predictions alone must hear, too.
-  if (!outcome.answered) return publishPrediction(outcome);
-  StepOutcome prediction;
-  try {
-    prediction = pipeline.monitor().predict();
-  } catch (const std::exception& error) {
-    prediction.status = StepStatus::INTERNAL_ERROR;
-    prediction.reason = error.what();
-    prediction.start_ns = prediction.stamp_ns = outcome.stamp_ns;
-  }
-  look_ahead.predict(prediction);
-  outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
-  publishPrediction(prediction);
-}
-
-void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
-  const double horizon_s = config.monitor.look_ahead_s;
-  outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
-}
-
-/// Whatever a command throws, the node goes on; a service's caller has been told by then (InputQueue::call).
-void CollisionMonitor::Impl::run(const std::function<void()>& command) {
-  try {
-    command();
-  } catch (const std::exception& error) {
-    ROS_ERROR_STREAM("a command failed: " << error.what());
-  }
-}
-
-void CollisionMonitor::Impl::work() {
-  bool more = false;
-  while (!stopping) {
-    const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
-    if (stopping) return;
-    for (const auto& command : commands) run(command);
-    if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
-    effects.apply(pipeline.monitor(), map_publisher_seen);
-    publishEffects(ros::Time::now());  // the first plan comes before the first frame
-    takeMaps();
-    takeMessages();
-    accountDropped();
-    StepOutcome outcome;
-    while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
-    tellComplaints();
-    const std::string surprise = recorder.takeSurprise();
-    if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
-    more = false;
-    for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
-    lookIntoSilence();
-    diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected() ? log.mapSource() : "", log.hint());
-  }
-}
+// --- start and stop ---------------------------------------------------------------------------------------------------
 
 void CollisionMonitor::Impl::start() {
   subscribe();
