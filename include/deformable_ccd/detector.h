@@ -153,7 +153,7 @@ struct StepResult {
   std::vector<core::Contact> contacts;  ///< canonical order (canonicalLess)
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
-  bool complete = true;  ///< false: the budget ran out
+  bool complete = true;  ///< of the contacts; false: the budget ran out
   /// complete == false: nothing that was left out can touch before this; otherwise infinity.
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   core::StepStats stats;

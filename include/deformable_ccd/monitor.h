@@ -98,7 +98,7 @@ struct StepOutcome {
   std::uint64_t excluded_voxels = 0;    ///< finest voxels of the map taken out by exclude_boxes
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
-  bool complete = true;
+  bool complete = true;  ///< false: the step budget ran out, before the last pair or before the start state was known
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
   core::StepStats stats;

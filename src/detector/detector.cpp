@@ -92,7 +92,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   const ScopedFloatMode mode;
   const Clock::time_point begin = Clock::now();
   result.intersections.clear();
-  result.start_state = StartState::NOT_CHECKED;
+  result.start_state = options.check_start_state ? StartState::CLEAR : StartState::NOT_CHECKED;  // until shown otherwise
   result.complete = true;
   result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
   result.stats = core::StepStats();
@@ -110,13 +110,6 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   start = Clock::now();
   if (needsTrees(step)) scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); }, stats);
   stats[Stage::BOUNDS].ms = msSince(start);
-
-  if (options.check_start_state) {
-    start = Clock::now();
-    result.intersections = start_state.run(scene, step.continues, stats);
-    result.start_state = result.intersections.empty() ? StartState::CLEAR : StartState::INTERSECTING;
-    stats[Stage::START_STATE].ms += msSince(start);
-  }
 
   StepContext context;
   context.scene = &scene;
@@ -138,7 +131,16 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
   if (options.check_start_state) {
+    // After the contacts: of a budget that does not suffice for both they are what is asked for first.
     start = Clock::now();
+    const std::vector<StartIntersection>& met =
+        start_state.run(scene, step.continues, [&] { return context.timeIsUp(); }, stats);
+    if (!met.empty()) {
+      result.start_state = StartState::INTERSECTING;
+    } else if (!start_state.isWhole() && result.start_state == StartState::CLEAR) {
+      result.start_state = StartState::NOT_CHECKED;
+    }
+    result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
     // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the
     // end of the step.
     start_state.remember(scene, result.contacts, result.complete && !options.earliest_only &&

@@ -7,6 +7,7 @@ namespace {
 
 // More candidates than this many an edge, and the full test is no dearer.
 constexpr std::size_t CANDIDATES_PER_EDGE = 2;
+constexpr std::size_t CANDIDATES_PER_LOOK_AT_THE_CLOCK = 256;
 
 bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
 bool shareVertex(const Index* edge, const Index* face) { return contains(face, edge[0]) | contains(face, edge[1]); }
@@ -31,14 +32,19 @@ void StartStateTest::SlotsAtVertex::build(const SceneBody& body, FeatureKind kin
   }
 }
 
-const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& scene, bool continues,
+const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& scene, bool continues, const IsOver& is_over,
                                                           core::StepStats& stats) {
   tested_ = 0;
-  if (continues && known_) {
-    testCandidates(scene);
-  } else {
-    testAll(scene);
+  if (!(continues && known_)) {
+    found_.clear();
+    candidates_.clear();
+    searched_ = false;
+    next_bodies_ = {};
+    next_group_ = 0;
   }
+  testCandidates(scene, is_over);
+  if (!searched_) search(scene, is_over);
+  whole_ = searched_ && candidates_.empty();
   known_ = false;  // until remember() has this step's contacts
 
   const auto order = [&](const EdgeFace& x) {
@@ -46,6 +52,7 @@ const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& sce
                            scene.bodies()[x.face_body].rank(FeatureKind::FACE)[x.face]);
   };
   std::sort(found_.begin(), found_.end(), [&](const EdgeFace& x, const EdgeFace& y) { return order(x) < order(y); });
+  found_.erase(std::unique(found_.begin(), found_.end()), found_.end());  // a candidate that the search came to as well
   intersections_.clear();
   for (const EdgeFace& pair : found_) {
     const SceneBody &a = scene.bodies()[pair.edge_body], &b = scene.bodies()[pair.face_body];
@@ -63,54 +70,79 @@ const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& sce
   return intersections_;
 }
 
-void StartStateTest::testAll(const SceneArrays& scene) {
-  found_.clear();
-  const std::size_t n = scene.bodies().size();
-  for (std::size_t b = 0; b < n; ++b) {
-    if (scene.bodies()[b].setup.self_collision) {
-      testBodies(scene, static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b));
-    }
-  }
-  if (n < 2) return;
-  scene.overlappingBodies(true, body_pairs_, scratch_);
-  for (std::size_t p = 0; p < body_pairs_.size(); p += 2) {
-    const std::uint32_t a = body_pairs_[p], b = body_pairs_[p + 1];
-    if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
-    testBodies(scene, a, b);
-    testBodies(scene, b, a);
-  }
-}
-
-void StartStateTest::testBodies(const SceneArrays& scene, std::uint32_t edge_body, std::uint32_t face_body) {
-  const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
-  const ClusterTree& faces = scene.bodies()[face_body].tree(FeatureKind::FACE);
-  if (edges.featureCount() == 0 || faces.featureCount() == 0) return;
-  TreePair trees;
-  trees.a = &edges;
-  trees.b = &faces;
-  trees.t0_only = true;
-  superclusterPairs(trees, groups_, scratch_);
-  stream_.run(trees, groups_.data(), groups_.size() / 2, [&](const std::uint32_t* slots, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if (shareVertex(edges.feature(slots[2 * i]), faces.feature(slots[2 * i + 1]))) continue;
-      test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
-    }
-  });
-  stream_.clearCounters();
-}
-
-void StartStateTest::testCandidates(const SceneArrays& scene) {
+void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_over) {
   candidates_.insert(candidates_.end(), found_.begin(), found_.end());
   std::sort(candidates_.begin(), candidates_.end());
   candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
   found_.clear();
-  for (const EdgeFace& pair : candidates_) {
+  std::size_t done = 0;
+  for (; done < candidates_.size(); ++done) {
+    if (done % CANDIDATES_PER_LOOK_AT_THE_CLOCK == 0 && is_over()) break;
+    const EdgeFace& pair = candidates_[done];
     // What was active in the last step may have become unchecked.
     if (scene.bodies()[pair.edge_body].holds(FeatureKind::EDGE, pair.edge) &&
         scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face)) {
       test(scene, pair);
     }
   }
+  candidates_.erase(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(done));
+}
+
+void StartStateTest::search(const SceneArrays& scene, const IsOver& is_over) {
+  const std::vector<SceneBody>& bodies = scene.bodies();
+  body_pairs_.clear();
+  for (std::uint32_t b = 0; b < bodies.size(); ++b) {
+    if (bodies[b].setup.self_collision) body_pairs_.push_back({b, b});
+  }
+  overlapping_.clear();
+  if (bodies.size() > 1) scene.overlappingBodies(true, overlapping_, scratch_);
+  for (std::size_t p = 0; p < overlapping_.size(); p += 2) {
+    const std::uint32_t a = overlapping_[p], b = overlapping_[p + 1];
+    if (!bodies[a].setup.against_bodies || !bodies[b].setup.against_bodies) continue;
+    body_pairs_.push_back({a, b});
+    body_pairs_.push_back({b, a});
+  }
+  std::sort(body_pairs_.begin(), body_pairs_.end());
+  for (auto pair = std::lower_bound(body_pairs_.begin(), body_pairs_.end(), next_bodies_); pair != body_pairs_.end();
+       ++pair) {
+    if (*pair != next_bodies_) next_group_ = 0;
+    next_bodies_ = *pair;
+    if (!searchBodies(scene, is_over)) return;
+  }
+  searched_ = true;
+}
+
+/// Goes on at next_group_ of the edges' tree; false: the deadline ended it, and next_group_ says where.
+bool StartStateTest::searchBodies(const SceneArrays& scene, const IsOver& is_over) {
+  const auto [edge_body, face_body] = next_bodies_;
+  const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
+  const ClusterTree& faces = scene.bodies()[face_body].tree(FeatureKind::FACE);
+  if (edges.featureCount() == 0 || faces.featureCount() == 0) return true;
+  if (is_over()) return false;
+  TreePair trees;
+  trees.a = &edges;
+  trees.b = &faces;
+  trees.t0_only = true;
+  superclusterPairs(trees, groups_, scratch_);
+  // By group of edges, so that all before the one that comes next are done.
+  by_group_.clear();
+  for (std::size_t p = 0; p < groups_.size(); p += 2) {
+    if (groups_[p] >= next_group_) by_group_.push_back({groups_[p], groups_[p + 1]});
+  }
+  std::sort(by_group_.begin(), by_group_.end());
+  stream_.clearCounters();
+  for (std::size_t first = 0, last = 0; first < by_group_.size(); first = last) {
+    next_group_ = by_group_[first][0];
+    if (is_over()) return false;
+    while (last < by_group_.size() && by_group_[last][0] == next_group_) ++last;
+    stream_.run(trees, by_group_[first].data(), last - first, [&](const std::uint32_t* slots, std::size_t count) {
+      for (std::size_t i = 0; i < count; ++i) {
+        if (shareVertex(edges.feature(slots[2 * i]), faces.feature(slots[2 * i + 1]))) continue;
+        test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
+      }
+    });
+  }
+  return true;
 }
 
 void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
@@ -123,7 +155,6 @@ void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
 
 void StartStateTest::remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete) {
   known_ = false;
-  candidates_.clear();
   if (!complete) return;
   const std::size_t limit = CANDIDATES_PER_EDGE * edgeCount(scene);
   for (const core::Contact& contact : contacts) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <tuple>
 #include <vector>
 
@@ -30,15 +31,23 @@ bool segmentMeetsTriangle(const double* p, const double* q, const double* a, con
 ///   EE contact (e, e'): e against the faces at e', e' against the faces at e;
 ///   VF contact (v, f): the edges at v against f;
 ///   and the pairs that met already at the step's start.
+/// The same holds for any part of the pairs. So a search that a deadline cuts goes on in the next step where it ended:
+/// what it was past is carried over, what it had not come to is looked at then.
 class StartStateTest {
  public:
+  using IsOver = std::function<bool()>;
+
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
-  /// Sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and effect
-  /// START_STATE.
-  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, core::StepStats& stats);
+  /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
+  /// effect START_STATE. Nothing more is tested once is_over() says so; isWhole() is false then.
+  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const IsOver& is_over,
+                                            core::StepStats& stats);
+
+  /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
+  bool isWhole() const { return whole_; }
 
   /// Whether run() would search the bodies' trees.
-  bool needsTrees(bool continues) const { return !(continues && known_); }
+  bool needsTrees(bool continues) const { return !(continues && known_ && searched_); }
 
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete);
@@ -68,19 +77,28 @@ class StartStateTest {
     SlotsAtVertex edges, faces;
   };
 
-  void testAll(const SceneArrays& scene);
-  void testBodies(const SceneArrays& scene, std::uint32_t edge_body, std::uint32_t face_body);
-  void testCandidates(const SceneArrays& scene);
+  using BodyPair = std::array<std::uint32_t, 2>;  // of the edge, of the face
+
+  void testCandidates(const SceneArrays& scene, const IsOver& is_over);
+  void search(const SceneArrays& scene, const IsOver& is_over);
+  bool searchBodies(const SceneArrays& scene, const IsOver& is_over);
   void test(const SceneArrays& scene, const EdgeFace& pair);
   void addCandidates(const SceneArrays& scene, const core::Contact& contact);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
                       const Index* other_edge);
   void learnNeighbourhoods(const SceneArrays& scene);
 
-  bool known_ = false;
-  std::vector<EdgeFace> candidates_, found_;
+  bool whole_ = false;
+  bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
+  bool searched_ = false;   // the search has come to its end
+  BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the groups of edges
+  std::uint32_t next_group_ = 0;
+  std::vector<EdgeFace> candidates_;  // to be looked at; after run() what the deadline left of them
+  std::vector<EdgeFace> found_;
   std::vector<StartIntersection> intersections_;
-  std::vector<std::uint32_t> groups_, scratch_, body_pairs_;
+  std::vector<std::uint32_t> groups_, scratch_, overlapping_;
+  std::vector<BodyPair> body_pairs_;
+  std::vector<std::array<std::uint32_t, 2>> by_group_;
   ClusterPairStream stream_;
   std::vector<Neighbourhood> neighbourhoods_;  // one a body; empty until a step has contacts
   std::uint64_t tested_ = 0;

@@ -103,8 +103,10 @@ void conclude(const MonitorOptions& options, StepOutcome& outcome) {
   }
   if (!outcome.complete) {
     outcome.status = StepStatus::DEADLINE;
-    outcome.reason = "the step budget ran out; nothing that was left out touches before toc " +
-                     std::to_string(outcome.unchecked_toc_lower);
+    outcome.reason = std::isfinite(outcome.unchecked_toc_lower)
+                         ? "the step budget ran out; nothing that was left out touches before toc " +
+                               std::to_string(outcome.unchecked_toc_lower)
+                         : "the step budget ran out before the start state was known; no contact was left out";
   }
   outcome.answered = true;
   outcome.clear = outcome.status == StepStatus::OK && outcome.start_state == StartState::CLEAR && !touched;
@@ -210,6 +212,7 @@ void StepRunner::runPart(const StepInput& at, bool continues, std::size_t part, 
   const StepResult& result = detector_.run(step_);
   if (part == 0) {
     outcome.start_state = result.start_state;
+    if (detector_.options().check_start_state && result.start_state == StartState::NOT_CHECKED) outcome.complete = false;
     outcome.intersections = result.intersections;
   }
   for (core::Contact contact : result.contacts) {

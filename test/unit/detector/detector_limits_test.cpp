@@ -125,19 +125,48 @@ TEST(DetectorLimits, BudgetKeepsItsWord) {
   }
 }
 
-// The time itself: a step that is cut at a fifth of what it takes ends well before the half, the best of some tries.
+// No pair comes to a test when the deadline is over before the first; what a budget saves in time: scripts/benchmark.
 TEST(DetectorLimits, BudgetEndsTheStep) {
   const TestStep step = crumpled(3, 2, 40);
   DetectorOptions options;
-  const double full_ms = runOnce(step, options).stats.total_ms;
-  options.step_budget_ms = full_ms / 5;
-  double shortest_ms = full_ms;
-  for (int i = 0; i < 5; ++i) {
-    const StepResult part = runOnce(step, options);
-    EXPECT_FALSE(part.complete);
-    shortest_ms = std::min(shortest_ms, part.stats.total_ms);
+  const StepStats full = runOnce(step, options).stats;
+  options.step_budget_ms = 1e-6;
+  const StepResult part = runOnce(step, options);
+  EXPECT_FALSE(part.complete);
+  EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
+  for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY, Stage::START_STATE}) {
+    EXPECT_GT(full[stage].in, 1000u) << toString(stage);
+    EXPECT_EQ(part.stats[stage].in, 0u) << toString(stage);
   }
-  EXPECT_LT(shortest_ms, full_ms / 2);
+}
+
+// The test of the start state, dear on the first frame, takes nothing from the contacts and comes to its end in time.
+TEST(DetectorLimits, AStartStateThatTheBudgetCutsIsKnownLater) {
+  TestStep step = crumpled(3, 2, 40);
+  for (StepBody& body : step.bodies) body.t1 = body.t0;
+  DetectorOptions options;
+  const StepResult full = runOnce(step, options);
+  ASSERT_EQ(full.start_state, StartState::INTERSECTING);
+  Detector detector(options);
+  detector.setBodies(step.setups(), step.positions());
+  MotionStep motion = step.motion();
+  std::size_t cut = 0, steps = 0;
+  // Growing budgets, so that some of the steps end within the search, on a machine of any speed.
+  for (options.step_budget_ms = 0.01; steps < 2000; options.step_budget_ms *= 1.01, ++steps) {
+    detector.setOptions(options);
+    const StepResult& part = detector.run(motion);
+    motion.continues = true;
+    if (!part.complete) {
+      EXPECT_TRUE(part.intersections.empty()) << "the start state came before the contacts";
+      continue;
+    }
+    EXPECT_EQ(difference(part.contacts, full.contacts), "");
+    EXPECT_LE(part.intersections.size(), full.intersections.size());
+    if (part.intersections.size() == full.intersections.size()) break;
+    ++cut;
+  }
+  EXPECT_LT(steps, 2000u);
+  EXPECT_GT(cut, 0u);
 }
 
 // The map's part of a step is cut like the rest: what is listed is true, and of what is not nothing is said.
@@ -172,12 +201,17 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
   const StepResult full = run(0);
   EXPECT_TRUE(full.complete);
   ASSERT_GT(full.contacts.size(), 1000u);
-  for (const double share : {1e-6, 0.5}) {
+  for (const double share : {1e-6, 0.1, 0.3}) {
     const StepResult part = run(share * full.stats.total_ms);
+    // On a busy machine the whole step may have been what took long, and a share of that be enough.
+    if (share > 1e-6 && part.complete) {
+      EXPECT_EQ(difference(part.contacts, full.contacts), "");
+      continue;
+    }
     EXPECT_FALSE(part.complete) << share;
     EXPECT_EQ(part.unchecked_toc_lower, 0);
     EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
-    EXPECT_LT(part.contacts.size(), full.contacts.size());
+    EXPECT_LE(part.contacts.size(), full.contacts.size() - (share > 1e-6 ? 0 : 1));
     for (const core::Contact& c : part.contacts) {
       const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
       ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);

@@ -97,6 +97,24 @@ TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
   EXPECT_EQ(partial.stats.unchecked_vertices, 1u);
 }
 
+// A flat sheet cannot touch itself, which takes no pair and no time; whether it did so at the start is left open.
+TEST_F(OneBody, AStartStateWithoutTimeIsNoClearStep) {
+  feed(floor(100 * MS, 0));
+  EXPECT_TRUE(feed(floor(200 * MS, 1)).clear);
+  monitor.reset(StepStatus::RESET);
+  MonitorOptions hurried = loose();
+  hurried.detector.step_budget_ms = 1e-6;
+  monitor.setOptions(hurried);
+  feed(floor(300 * MS, 0));
+  const StepOutcome outcome = feed(floor(400 * MS, 1));
+  EXPECT_EQ(outcome.status, StepStatus::DEADLINE);
+  EXPECT_EQ(outcome.start_state, StartState::NOT_CHECKED);
+  EXPECT_FALSE(outcome.complete);
+  EXPECT_FALSE(outcome.clear);
+  EXPECT_TRUE(std::isinf(outcome.unchecked_toc_lower)) << "no pair was left out";
+  EXPECT_NE(outcome.reason.find("start state"), std::string::npos) << outcome.reason;
+}
+
 TEST_F(OneBody, NeverAcrossASeam) {
   feed(pair(1000 * MS, 1));
   EXPECT_EQ(feed(pair(2000 * MS, -1)).status, StepStatus::GAP);

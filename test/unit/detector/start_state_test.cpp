@@ -105,6 +105,13 @@ TEST(SegmentTriangle, AgreesWithTheOracleWhereItIsClose) {
 
 // --- the whole test --------------------------------------------------------------------------------------------------
 
+bool never() { return false; }
+
+bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(),
+                    [](const StartIntersection& a, const StartIntersection& b) { return a == b; });
+}
+
 struct Scene {
   SceneArrays arrays;
   explicit Scene(const TestStep& step) {
@@ -131,7 +138,7 @@ TEST(StartState, FullTestListsWhatTheOracleLists) {
     StartStateTest test;
     core::StepStats stats;
     const auto expected = trueIntersections(step);
-    const auto& listed = test.run(scene.arrays, false, stats);
+    const auto& listed = test.run(scene.arrays, false, never, stats);
     ASSERT_TRUE(std::equal(listed.begin(), listed.end(), expected.begin(), expected.end(),
                            [](const auto& x, const auto& y) { return x == y; }))
         << "seed " << seed << ": " << listed.size() << " listed, " << expected.size() << " in truth";
@@ -151,7 +158,7 @@ TEST(StartState, FullTestIsTheSameOnEveryTarget) {
     Scene scene(step);
     StartStateTest test;
     core::StepStats stats;
-    lists.push_back(test.run(scene.arrays, false, stats));
+    lists.push_back(test.run(scene.arrays, false, never, stats));
   });
   for (const auto& list : lists) {
     ASSERT_EQ(list.size(), lists[0].size());
@@ -181,7 +188,7 @@ TEST_F(FallingCloth, CarriesOver) {
   Scene scene(step);
   StartStateTest test;
   core::StepStats stats;
-  EXPECT_TRUE(test.run(scene.arrays, false, stats).empty());
+  EXPECT_TRUE(test.run(scene.arrays, false, never, stats).empty());
   std::vector<core::Contact> contacts;
   for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
   ASSERT_FALSE(contacts.empty());
@@ -192,11 +199,11 @@ TEST_F(FallingCloth, CarriesOver) {
   ASSERT_FALSE(expected.empty());
   scene.record(next);
   core::StepStats carried, full;
-  const auto listed = test.run(scene.arrays, true, carried);
+  const auto listed = test.run(scene.arrays, true, never, carried);
   ASSERT_EQ(listed.size(), expected.size());
   EXPECT_TRUE(
       std::equal(listed.begin(), listed.end(), expected.begin(), [](const auto& x, const auto& y) { return x == y; }));
-  EXPECT_EQ(test.run(scene.arrays, false, full).size(), expected.size());
+  EXPECT_EQ(test.run(scene.arrays, false, never, full).size(), expected.size());
   EXPECT_LE(carried[Stage::START_STATE].in, full[Stage::START_STATE].in);
 }
 
@@ -206,7 +213,7 @@ TEST_F(FallingCloth, ForgetsWhereItMust) {
   core::StepStats stats;
   const auto tested = [&](bool continues) {
     core::StepStats s;
-    test.run(scene.arrays, continues, s);
+    test.run(scene.arrays, continues, never, s);
     return s[Stage::START_STATE].in;
   };
   const std::uint64_t full = tested(false);
@@ -225,6 +232,74 @@ TEST_F(FallingCloth, ForgetsWhereItMust) {
   EXPECT_EQ(tested(true), full) << "other bodies";
   test.remember(scene.arrays, {}, true);
   EXPECT_EQ(tested(false), full) << "a step that does not continue";
+}
+
+// A search that is cut goes on in the next step, while everything moves: cut at any place, it lists nothing that is
+// not there, and once it has come to the end, all that is.
+TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
+  std::size_t cuts = 0, found_later = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Draw draw = drawFrom(900 + seed);
+    TestStep step = randomStep(draw, 8);
+    Scene scene(step);
+    StartStateTest test;
+    bool whole = false;
+    for (int i = 0; i < 20; ++i) {
+      int looks = draw(0, 5);
+      core::StepStats stats;
+      const auto listed = test.run(scene.arrays, i > 0, [&] { return looks-- <= 0; }, stats);
+      const auto expected = trueIntersections(step);
+      if (test.isWhole()) {
+        ASSERT_TRUE(same(listed, expected)) << "seed " << seed << ", step " << i;
+        found_later += i > 0 && !whole && !expected.empty();
+        whole = true;
+      } else {
+        ++cuts;
+        for (const StartIntersection& one : listed) {
+          ASSERT_TRUE(std::any_of(expected.begin(), expected.end(), [&](const auto& x) { return x == one; })) << seed;
+        }
+      }
+      std::vector<core::Contact> contacts;
+      for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
+      test.remember(scene.arrays, contacts, true);
+      std::vector<Positions> ends;
+      for (const StepBody& body : step.bodies) {
+        ends.push_back(body.t1);
+        for (Vec3& x : ends.back()) x += Vec3(draw(-4, 4), draw(-4, 4), draw(-4, 4)) / 8.0;
+      }
+      step = step.continued(ends);
+      scene.record(step);
+    }
+    EXPECT_TRUE(whole) << "seed " << seed;
+  }
+  EXPECT_GT(cuts, 50u);
+  EXPECT_GT(found_later, 5u);
+}
+
+// The same with many groups of edges a body, at rest: cut after any number of them, the parts are the whole.
+TEST(StartState, PartsOfASearchAreTheWhole) {
+  TestStep step = crumpled(3, 2, 24);
+  for (StepBody& body : step.bodies) body.t1 = body.t0;
+  Scene scene(step);
+  StartStateTest full_test;
+  core::StepStats full;
+  const std::vector<StartIntersection> expected = full_test.run(scene.arrays, false, never, full);
+  ASSERT_GT(expected.size(), 100u);
+  for (const int looks_a_step : {2, 3, 5, 8}) {
+    StartStateTest test;
+    std::vector<StartIntersection> listed;
+    int steps = 0;
+    for (bool whole = false; !whole && steps < 1000; ++steps) {
+      // What was found is looked at again first, at one look at the clock for many of them.
+      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 256) + 1 : 0);
+      core::StepStats stats;
+      listed = test.run(scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
+      whole = test.isWhole();
+      test.remember(scene.arrays, {}, true);
+    }
+    EXPECT_TRUE(same(listed, expected)) << looks_a_step << " looks a step: " << listed.size() << " of " << expected.size();
+    EXPECT_GT(steps, 20 / looks_a_step) << "hardly cut";
+  }
 }
 
 }  // namespace
