@@ -7,6 +7,7 @@ import sys
 import tempfile
 import textwrap
 import unittest
+import unittest.mock
 
 from checkout import CHECKOUT
 
@@ -101,6 +102,35 @@ class RunTestsTest(unittest.TestCase):
         result, _ = run_tests.PythonRunner(test)(self.path)
         self.assertGreater(result.failed, 0)
         self.assertEqual(result.passed, 0)
+
+    def fuzz(self, coverages, runs):
+        """The result of a decoder's fuzzer whose rounds reach these coverages, the last one again and again."""
+        (self.path / 'coverages').write_text('\n'.join(str(c) for c in coverages) + '\n')
+        binary = self.path / 'thing_fuzz'
+        binary.write_text(textwrap.dedent('''\
+            #!/bin/sh
+            cd "$(dirname "$0")"; echo round >>rounds
+            echo "#9 DONE cov: $(sed -n "$(wc -l <rounds)p; \\$p" coverages | head -n 1) ft: 1"
+            echo "stat::number_of_executed_units: %d"''') % runs)
+        binary.chmod(0o755)
+        with unittest.mock.patch.object(run_tests.FuzzRunner, 'ROUND_S', 600):
+            result, _ = run_tests.FuzzRunner(binary)(self.path)
+        return result.passed, result.failed, len((self.path / 'rounds').read_text().split())
+
+    def test_a_fuzzer_goes_on_until_a_round_brings_nothing(self):
+        self.assertEqual(self.fuzz([5, 7, 9, 9], 10**6), (1, 0, 4))
+
+    def test_coverage_that_comes_and_goes_is_nothing_new(self):
+        self.assertEqual(self.fuzz([5, 9, 7], 10**6), (1, 0, 3))
+
+    def test_a_fuzzer_has_a_least_number_of_runs(self):
+        self.assertEqual(self.fuzz([5], 10**6 // 4), (1, 0, 4))
+
+    def test_a_fuzzer_that_still_finds_code_failed(self):
+        self.assertEqual(self.fuzz(range(1, 100), 10**6), (0, 1, run_tests.FuzzRunner.MAX_ROUNDS))
+
+    def test_a_fuzzer_with_too_few_runs_failed(self):
+        self.assertEqual(self.fuzz([5], 1), (0, 1, run_tests.FuzzRunner.MAX_ROUNDS))
 
 
 if __name__ == '__main__':
