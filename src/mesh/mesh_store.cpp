@@ -193,13 +193,13 @@ std::size_t MeshStore::framesWithin(StampNs from_ns, StampNs to_ns) const {
 }
 
 double MeshStore::offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const {
+  const Eigen::Isometry3d pose_t0 = poseAt(from_ns), pose_t1 = poseAt(to_ns);
+  const std::size_t end = firstAtOrAfter(to_ns);
   double off = 0;
-  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < firstAtOrAfter(to_ns); ++i) {
+  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < end; ++i) {
     const MeshFrame& frame = *frames_[i].frame;
     const double u = fraction(from_ns, to_ns, frame.stamp_ns);
-    const Eigen::Isometry3d pose_t0 = frame.rigid ? poseAt(from_ns) : Eigen::Isometry3d::Identity();
-    const Eigen::Isometry3d moved =
-        frame.rigid ? interpolate(pose_t0, poseAt(to_ns), u) * pose_t0.inverse() : Eigen::Isometry3d::Identity();
+    const Eigen::Isometry3d moved = interpolate(pose_t0, pose_t1, u) * pose_t0.inverse();
     for (std::size_t v = 0; v < t0.size(); ++v) {
       const Vec3 on_path = frame.rigid ? Vec3(moved * t0[v]) : Vec3(t0[v] + u * (t1[v] - t0[v]));
       off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared

@@ -187,22 +187,43 @@ TEST(LeftOut, SeparationsOfPairsReplaceTheBodies) {
   EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
 }
 
-TEST(LeftOut, TheMonitorsReferenceIsTheFirstFrame) {
-  const Layers layers;
-  MonitorOptions options;
-  options.detector = conservative();
-  options.look_ahead_s = 0.1;
-  MonitorBody body;
-  body.name = "felt";
-  body.minimum_separation_m = SEPARATION_M;
-  Monitor monitor(options, {body});
+/// A monitor of one body of two layers, fed with frames 0.1 s apart.
+struct MonitoredFelt {
+  Layers layers;
+  Monitor monitor;
   StampNs stamp_ns = 0;
-  const auto feed = [&](double gap) {
-    monitor.push(0, {stamp_ns += 100000000, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), {}}, 0);
+
+  explicit MonitoredFelt(double separation_m) : monitor(options(), {body(separation_m)}) {}
+
+  StepOutcome feed(double gap, std::vector<double> radius_m = {}) {
+    stamp_ns += 100000000;
+    monitor.push(0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), std::move(radius_m)},
+                 0);
     StepOutcome outcome;
     EXPECT_TRUE(monitor.next(0, outcome));
     return outcome;
-  };
+  }
+  static std::vector<double> radii(double radius_m) { return std::vector<double>(2 * SIZE * SIZE, radius_m); }
+
+ private:
+  static MonitorOptions options() {
+    MonitorOptions options;
+    options.detector = conservative();
+    options.look_ahead_s = 0.1;
+    return options;
+  }
+  static MonitorBody body(double separation_m) {
+    MonitorBody body;
+    body.name = "felt";
+    body.minimum_separation_m = separation_m;
+    return body;
+  }
+};
+
+TEST(LeftOut, TheMonitorsReferenceIsTheFirstFrame) {
+  MonitoredFelt felt(SEPARATION_M);
+  Monitor& monitor = felt.monitor;
+  const auto feed = [&](double gap) { return felt.feed(gap); };
   feed(0.03);
   EXPECT_TRUE(feed(0.03).contacts.empty());
   const std::size_t neighbours = monitor.leftOut().size();
@@ -264,60 +285,30 @@ TEST(LeftOut, AQuestionChangesNoReference) {
 
 // Large radii list pairs that are far apart; when the radii go, they are no neighbours any more.
 TEST(LeftOut, RadiiThatGoLeaveNoPairOut) {
-  const Layers layers;
-  MonitorOptions options;
-  options.detector = conservative();
-  MonitorBody body;
-  body.name = "felt";
-  body.minimum_separation_m = SEPARATION_M;
-  const auto contactsAfter = [&](double radius_m, double later_m) {
-    Monitor monitor(options, {body});
-    StampNs stamp_ns = 0;
-    std::size_t contacts = 0;
-    const auto feed = [&](double gap, double radius) {
-      MeshFrame frame{stamp_ns += 100000000, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), {}};
-      if (radius >= 0) frame.radius_m.assign(2 * SIZE * SIZE, radius);
-      monitor.push(0, std::move(frame), 0);
-      StepOutcome outcome;
-      EXPECT_TRUE(monitor.next(0, outcome));
-      contacts = outcome.contacts.size();
-    };
-    feed(0.03, radius_m);
-    feed(0.03, radius_m);
-    feed(0.03, later_m);
-    EXPECT_EQ(contacts, 0u);
-    feed(0.01, later_m);
-    return contacts;
+  const std::vector<double> none, zero = MonitoredFelt::radii(0), large = MonitoredFelt::radii(0.012);
+  const auto contactsAfter = [](const std::vector<double>& first, const std::vector<double>& later) {
+    MonitoredFelt felt(SEPARATION_M);
+    felt.feed(0.03, first);
+    EXPECT_TRUE(felt.feed(0.03, first).contacts.empty());
+    EXPECT_TRUE(felt.feed(0.03, later).contacts.empty());
+    return felt.feed(0.01, later).contacts.size();
   };
-  const std::size_t never = contactsAfter(-1, -1);
+  const std::size_t never = contactsAfter(none, none);
   EXPECT_GT(never, 0u);
-  EXPECT_EQ(contactsAfter(0.012, -1), never);
-  EXPECT_EQ(contactsAfter(0.012, 0), never);
+  EXPECT_EQ(contactsAfter(large, none), never);
+  EXPECT_EQ(contactsAfter(large, zero), never);
 }
 
 // A tracker may know its errors only later: neighbours within them are left out from then on.
 TEST(LeftOut, RadiiMayComeAfterTheFirstFrame) {
-  const Layers layers;
-  MonitorOptions options;
-  options.detector = conservative();
-  MonitorBody body;
-  body.name = "felt";
-  Monitor monitor(options, {body});
-  const std::vector<double> radius_m(2 * SIZE * SIZE, 0.006);
-  StampNs stamp_ns = 0;
-  const auto feed = [&](double gap, const std::vector<double>& radii) {
-    stamp_ns += 100000000;
-    monitor.push(0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), radii}, 0);
-    StepOutcome outcome;
-    EXPECT_TRUE(monitor.next(0, outcome));
-    return outcome;
-  };
-  feed(0.03, {});
-  EXPECT_TRUE(feed(0.03, {}).contacts.empty());
-  EXPECT_TRUE(monitor.leftOut().empty());
-  EXPECT_TRUE(feed(0.03, radius_m).contacts.empty()) << "neighbours are no contacts";
-  EXPECT_GT(monitor.leftOut().size(), 100u);
-  EXPECT_FALSE(feed(0.01, radius_m).contacts.empty());
+  MonitoredFelt felt(0);
+  const std::vector<double> radius_m = MonitoredFelt::radii(0.006);
+  felt.feed(0.03);
+  EXPECT_TRUE(felt.feed(0.03).contacts.empty());
+  EXPECT_TRUE(felt.monitor.leftOut().empty());
+  EXPECT_TRUE(felt.feed(0.03, radius_m).contacts.empty()) << "neighbours are no contacts";
+  EXPECT_GT(felt.monitor.leftOut().size(), 100u);
+  EXPECT_FALSE(felt.feed(0.01, radius_m).contacts.empty());
 }
 
 }  // namespace
