@@ -147,6 +147,8 @@ struct MotionStep {
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();     ///< held for the whole step
   bool continues = false;  ///< t0 is the t1 of the previous run(), so the start state can be carried over
   double spent_ms = 0;     ///< of step_budget_ms, by earlier parts of the same step
+  /// What of the meshes meets at t0, where that is known (Detector::intersectionsAtEnd): it is not searched again.
+  const std::vector<StartIntersection>* intersections_t0 = nullptr;
 };
 
 struct StepResult {
@@ -174,6 +176,9 @@ class Detector {
   /// Positions of the first frame guide the order of features in memory; any will do.
   void setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions);
   const StepResult& run(const MotionStep& step);
+  /// What of the meshes meets at t1 of the last step, from what that step found out: the static test without a search.
+  /// False where it is not known.
+  bool intersectionsAtEnd(std::vector<StartIntersection>& out) const;
   /// Known after setBodies; in the order of the bodies, kinds, features.
   const std::vector<LeftOutPair>& leftOut() const;
 

@@ -130,27 +130,7 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   if (step.obstacle && scene.meetsObstacle()) runObstacle(step, context);
   rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
-  if (options.check_start_state) {
-    // After the contacts: of a budget that does not suffice for both they are what is asked for first.
-    start = Clock::now();
-    const std::vector<StartIntersection>& met =
-        start_state.run(scene, step.continues, [&] { return context.timeIsUp(); }, stats);
-    if (!met.empty()) {
-      result.start_state = StartState::INTERSECTING;
-    } else if (!start_state.isWhole() && result.start_state == StartState::CLEAR) {
-      result.start_state = StartState::NOT_CHECKED;
-    }
-    result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
-    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the
-    // end of the step.
-    start_state.remember(scene, result.contacts, result.complete && !options.earliest_only &&
-                                                     stats.unchecked_vertices == 0 &&
-                                                     options.accuracy.rung != Accuracy::FAST);
-    stats[Stage::START_STATE].ms += msSince(start);
-    stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
-  } else {
-    start_state.skip();
-  }
+  runStartState(step, context);  // after the contacts: of a budget too small for both they are asked for first
   stats.total_ms = msSince(begin);
   return result;
 }
@@ -259,6 +239,33 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
   }
 }
 
+void Detector::Impl::runStartState(const MotionStep& step, StepContext& context) {
+  if (!options.check_start_state) return start_state.skip();
+  const Clock::time_point start = Clock::now();
+  core::StepStats& stats = result.stats;
+  const bool known = step.intersections_t0 != nullptr;
+  const std::vector<StartIntersection>& met =
+      known ? *step.intersections_t0
+            : start_state.run(scene, step.continues, [&] { return context.timeIsUp(); }, stats);
+  if (!met.empty()) {
+    result.start_state = StartState::INTERSECTING;
+  } else if (!known && !start_state.isWhole() && result.start_state == StartState::CLEAR) {
+    result.start_state = StartState::NOT_CHECKED;
+  }
+  result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
+  if (known) {
+    start_state.skip();
+  } else {
+    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the
+    // end of the step.
+    start_state.remember(scene, result.contacts, result.complete && !options.earliest_only &&
+                                                     stats.unchecked_vertices == 0 &&
+                                                     options.accuracy.rung != Accuracy::FAST);
+  }
+  stats[Stage::START_STATE].ms += msSince(start);
+  stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
+}
+
 Detector::Detector(const DetectorOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 Detector::~Detector() = default;
 const DetectorOptions& Detector::options() const { return impl_->options; }
@@ -281,6 +288,10 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
 }
 
 const std::vector<LeftOutPair>& Detector::leftOut() const { return impl_->left_out_list; }
+
+bool Detector::intersectionsAtEnd(std::vector<StartIntersection>& out) const {
+  return impl_->start_state.listEnd(impl_->scene, out);
+}
 
 const StepResult& Detector::run(const MotionStep& step) { return impl_->run(step); }
 

@@ -51,6 +51,7 @@ struct Detector::Impl {
   void runPairs(StepContext& context);
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runObstacle(const MotionStep& step, const StepContext& context);
+  void runStartState(const MotionStep& step, StepContext& context);
   void collect();
   void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
   template <class Body>

@@ -180,8 +180,8 @@ void Monitor::reset(StepStatus status) {
 }
 
 void Monitor::Impl::runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues,
-                          StepOutcome& outcome) {
-  on.run(at, bodies, options, withoutExcluded(used), continues, outcome);
+                          StepOutcome& outcome, const std::vector<StartIntersection>* intersections_t0) {
+  on.run(at, bodies, options, withoutExcluded(used), continues, outcome, intersections_t0);
   if (!options.obstacle_expected || used.surface) return;
   outcome.status = StepStatus::NO_MAP;
   outcome.reason = used.problem + "; checked without it";

@@ -40,6 +40,7 @@ struct Monitor::Impl {
   std::shared_ptr<const VoxelSurface> reduced_from, reduced;  // the map's surface, and what exclude_boxes leave of it
   std::uint64_t excluded_voxels = 0;
   StepRunner runner;
+  std::vector<StartIntersection> end_intersections;  // of the last step
   std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
   StepInput input, side_input;
   References references;
@@ -78,7 +79,8 @@ struct Monitor::Impl {
   MonitorMap withoutExcluded(MonitorMap used);
   void runStep(const Pending& step, StepOutcome& outcome);
   /// What a step, a check and a prediction have in common.
-  void runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues, StepOutcome& outcome);
+  void runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues, StepOutcome& outcome,
+             const std::vector<StartIntersection>* intersections_t0 = nullptr);
   StepRunner& side();
 };
 

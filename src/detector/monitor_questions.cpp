@@ -67,7 +67,8 @@ StepOutcome Monitor::predict() {
   outcome.reason.clear();
   outcome.start_ns = m.last_end_ns;
   outcome.stamp_ns = m.last_end_ns + static_cast<StampNs>(std::llround(m.options.look_ahead_s * 1e9));
-  m.runOn(m.side(), m.side_input, m.usableMap(m.last_end_ns), false, outcome);
+  const bool known = m.runner.intersectionsAtEnd(m.end_intersections);
+  m.runOn(m.side(), m.side_input, m.usableMap(m.last_end_ns), false, outcome, known ? &m.end_intersections : nullptr);
   return outcome;
 }
 

@@ -47,27 +47,46 @@ const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& sce
   whole_ = searched_ && candidates_.empty();
   known_ = false;  // until remember() has this step's contacts
 
+  list(scene, found_, intersections_);
+  stats[Stage::START_STATE].in += tested_;
+  stats[Stage::START_STATE].out += found_.size();
+  stats[Effect::START_STATE].in += tested_;
+  stats[Effect::START_STATE].out += found_.size();
+  return intersections_;
+}
+
+void StartStateTest::list(const SceneArrays& scene, std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out) {
   const auto order = [&](const EdgeFace& x) {
     return std::make_tuple(x.edge_body, scene.bodies()[x.edge_body].rank(FeatureKind::EDGE)[x.edge], x.face_body,
                            scene.bodies()[x.face_body].rank(FeatureKind::FACE)[x.face]);
   };
-  std::sort(found_.begin(), found_.end(), [&](const EdgeFace& x, const EdgeFace& y) { return order(x) < order(y); });
-  found_.erase(std::unique(found_.begin(), found_.end()), found_.end());  // a candidate that the search came to as well
-  intersections_.clear();
-  for (const EdgeFace& pair : found_) {
+  std::sort(pairs.begin(), pairs.end(), [&](const EdgeFace& x, const EdgeFace& y) { return order(x) < order(y); });
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());  // a candidate that the search came to as well
+  out.clear();
+  for (const EdgeFace& pair : pairs) {
     const SceneBody &a = scene.bodies()[pair.edge_body], &b = scene.bodies()[pair.face_body];
     StartIntersection found;
     found.body = {static_cast<std::uint16_t>(pair.edge_body), static_cast<std::uint16_t>(pair.face_body)};
     scene.featureVertices(FeatureKind::EDGE, pair.edge_body, a.rank(FeatureKind::EDGE)[pair.edge], found.vertex.data());
     scene.featureVertices(FeatureKind::FACE, pair.face_body, b.rank(FeatureKind::FACE)[pair.face],
                           found.vertex.data() + 2);
-    intersections_.push_back(found);
+    out.push_back(found);
   }
-  stats[Stage::START_STATE].in += tested_;
-  stats[Stage::START_STATE].out += found_.size();
-  stats[Effect::START_STATE].in += tested_;
-  stats[Effect::START_STATE].out += found_.size();
-  return intersections_;
+}
+
+bool StartStateTest::listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out) const {
+  if (!known_ || !searched_) return false;
+  std::vector<EdgeFace> pairs = candidates_;
+  pairs.insert(pairs.end(), found_.begin(), found_.end());
+  const auto apart = [&](const EdgeFace& pair) { return !isChecked(scene, pair) || !meet(scene, pair, 1); };
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), apart), pairs.end());
+  list(scene, pairs, out);
+  return true;
+}
+
+bool StartStateTest::isChecked(const SceneArrays& scene, const EdgeFace& pair) {
+  return scene.bodies()[pair.edge_body].holds(FeatureKind::EDGE, pair.edge) &&
+         scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face);
 }
 
 void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_over) {
@@ -78,12 +97,7 @@ void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_o
   std::size_t done = 0;
   for (; done < candidates_.size(); ++done) {
     if (done % CANDIDATES_PER_LOOK_AT_THE_CLOCK == 0 && is_over()) break;
-    const EdgeFace& pair = candidates_[done];
-    // What was active in the last step may have become unchecked.
-    if (scene.bodies()[pair.edge_body].holds(FeatureKind::EDGE, pair.edge) &&
-        scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face)) {
-      test(scene, pair);
-    }
+    if (isChecked(scene, candidates_[done])) test(scene, candidates_[done]);
   }
   candidates_.erase(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(done));
 }
@@ -145,12 +159,16 @@ bool StartStateTest::searchBodies(const SceneArrays& scene, const IsOver& is_ove
   return true;
 }
 
-void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
+bool StartStateTest::meet(const SceneArrays& scene, const EdgeFace& pair, int at) {
   const Index* e = scene.bodies()[pair.edge_body].tree(FeatureKind::EDGE).feature(pair.edge);
   const Index* f = scene.bodies()[pair.face_body].tree(FeatureKind::FACE).feature(pair.face);
-  const VertexMotion* x = scene.vertices();
+  const auto x = [&](Index v) { return at == 0 ? scene.vertices()[v].t0 : scene.vertices()[v].t1; };
+  return segmentMeetsTriangle(x(e[0]), x(e[1]), x(f[0]), x(f[1]), x(f[2]));
+}
+
+void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
   ++tested_;
-  if (segmentMeetsTriangle(x[e[0]].t0, x[e[1]].t0, x[f[0]].t0, x[f[1]].t0, x[f[2]].t0)) found_.push_back(pair);
+  if (meet(scene, pair, 0)) found_.push_back(pair);
 }
 
 void StartStateTest::remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete) {

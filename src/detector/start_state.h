@@ -52,6 +52,9 @@ class StartStateTest {
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete);
 
+  /// After remember(): what meets at t=1, listed as run() would for a step that continues. False where it is not known.
+  bool listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out) const;
+
   /// The bodies are about to change: everything is forgotten.
   void forget();
   /// A step was done without run() and remember(): the next run() is a full test.
@@ -83,6 +86,10 @@ class StartStateTest {
   void search(const SceneArrays& scene, const IsOver& is_over);
   bool searchBodies(const SceneArrays& scene, const IsOver& is_over);
   void test(const SceneArrays& scene, const EdgeFace& pair);
+  static bool meet(const SceneArrays& scene, const EdgeFace& pair, int at);  ///< at: 0 or 1, of the step's ends
+  /// What was checked in the step before need not be in this one.
+  static bool isChecked(const SceneArrays& scene, const EdgeFace& pair);
+  static void list(const SceneArrays& scene, std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
   void addCandidates(const SceneArrays& scene, const core::Contact& contact);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
                       const Index* other_edge);

@@ -276,8 +276,13 @@ bool StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
   return reached_end;
 }
 
+bool StepRunner::intersectionsAtEnd(std::vector<StartIntersection>& out) const {
+  return reached_end_ && detector_.intersectionsAtEnd(out);
+}
+
 void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
-                     const MonitorMap& map, bool continues, StepOutcome& outcome) {
+                     const MonitorMap& map, bool continues, StepOutcome& outcome,
+                     const std::vector<StartIntersection>* intersections_t0) {
   if (set_topologies_ != input.topologies || set_references_ != input.references) {
     setBodies(input, bodies);
     continues = false;
@@ -291,6 +296,7 @@ void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bod
   outcome.obstacle = map.surface;
   outcome.map_from_fixed = map.map_from_fixed;
   outcome.map_stamp_ns = map.stamp_ns;
+  step_.intersections_t0 = intersections_t0;  // to all parts: only the first one's start is reported
   reached_end_ = runParts(input, map, continues, parts, outcome);
   outcome.input = &input;
   outcome.positions_t0 = &input.t0;

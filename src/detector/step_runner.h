@@ -45,10 +45,14 @@ class StepRunner {
   void setOptions(const DetectorOptions& options);
   const std::vector<LeftOutPair>& leftOut() const { return detector_.leftOut(); }
 
+  /// Detector::intersectionsAtEnd() of the last run; false also where parts of that were left out.
+  bool intersectionsAtEnd(std::vector<StartIntersection>& out) const;
+
   /// Fills the outcome's result from the step. `continues`: t0 is the t1 of the last run here, nothing else changed.
-  /// Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
+  /// intersections_t0: as in MotionStep. Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
   void run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
-           const MonitorMap& map, bool continues, StepOutcome& outcome);
+           const MonitorMap& map, bool continues, StepOutcome& outcome,
+           const std::vector<StartIntersection>* intersections_t0 = nullptr);
 
  private:
   Detector detector_;
