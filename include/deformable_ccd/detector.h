@@ -147,7 +147,10 @@ struct MotionStep {
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();     ///< held for the whole step
   bool continues = false;  ///< t0 is the t1 of the previous run(), so the start state can be carried over
   double spent_ms = 0;     ///< of step_budget_ms, by earlier parts of the same step
-  /// What of the meshes meets at t0, where that is known (Detector::intersectionsAtEnd): it is not searched again.
+  /// (0, 1] of what the contacts leave of step_budget_ms, for the start state; the rest is for later parts of the step.
+  double start_state_share = 1;
+  /// What of the meshes meets at t0, where that is known (Detector::intersectionsAtEnd): it is not searched again, nor is
+  /// anything of it carried over to the next step. Not of this detector's own result.
   const std::vector<StartIntersection>* intersections_t0 = nullptr;
 };
 
@@ -155,6 +158,7 @@ struct StepResult {
   std::vector<core::Contact> contacts;  ///< canonical order (canonicalLess)
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
+  bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
   bool complete = true;  ///< of the contacts; false: the budget ran out
   /// complete == false: nothing that was left out can touch before this; otherwise infinity.
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();

@@ -229,9 +229,10 @@ class FuzzRunner:
                 break
         result.notes.append('%d runs, coverage %d, no finding%s' % (runs, coverage, ' (one round of %d s)' % self.ROUND_S
                                                                     if one_round else ''))
-        if not one_round and not (runs >= least and saturated):
-            result.fail('%s: %d runs, and the last %d s still brought coverage %d -> %d'
-                        % (self.name, runs, self.ROUND_S, most, coverage))
+        if runs < least:
+            result.fail('%s reached %d of %d runs' % (self.name, runs, least))
+        elif not one_round and not saturated:
+            result.fail('%s: the last %d s still brought coverage, %d -> %d' % (self.name, self.ROUND_S, most, coverage))
         else:
             result.passed = 1
         return result, log

@@ -92,11 +92,17 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   const ScopedFloatMode mode;
   const Clock::time_point begin = Clock::now();
   result.intersections.clear();
-  result.start_state = options.check_start_state ? StartState::CLEAR : StartState::NOT_CHECKED;  // until shown otherwise
+  result.start_state = StartState::NOT_CHECKED;
+  result.start_state_complete = true;
   result.complete = true;
   result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
   result.stats = core::StepStats();
   core::StepStats& stats = result.stats;
+  if (!finished) {  // the last step threw, or there was none: what it should have left behind is not there
+    start_state.skip();
+    apart.clear();
+  }
+  finished = false;
 
   Clock::time_point start = Clock::now();
   scene.record(step, stats);
@@ -127,11 +133,14 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   findPairs(context);
   runPairs(context);
   collect();
+  const bool all_pairs = result.complete;
+  if (options.check_start_state) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (step.obstacle && scene.meetsObstacle()) runObstacle(step, context);
-  rememberApart(result.complete && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
+  rememberApart(all_pairs && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
-  runStartState(step, context);  // after the contacts: of a budget too small for both they are asked for first
+  runStartState(step, all_pairs, context);  // after the contacts: of a budget too small for both they are asked for first
   stats.total_ms = msSince(begin);
+  finished = true;
   return result;
 }
 
@@ -211,6 +220,7 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
     if (!whole) {
       result.complete = false;
       result.unchecked_toc_lower = 0;
+      result.start_state_complete = false;
       if (result.start_state == StartState::CLEAR) result.start_state = StartState::NOT_CHECKED;
     }
     const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(body_start)};
@@ -239,17 +249,23 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
   }
 }
 
-void Detector::Impl::runStartState(const MotionStep& step, StepContext& context) {
+void Detector::Impl::runStartState(const MotionStep& step, bool all_pairs, StepContext& context) {
   if (!options.check_start_state) return start_state.skip();
   const Clock::time_point start = Clock::now();
   core::StepStats& stats = result.stats;
   const bool known = step.intersections_t0 != nullptr;
+  Clock::time_point deadline = context.deadline;
+  if (deadline != Clock::time_point::max() && deadline > start) {
+    deadline = start + std::chrono::duration_cast<Clock::duration>(step.start_state_share * (deadline - start));
+  }
+  StartStateTest::IsOver is_over;
+  if (deadline != Clock::time_point::max()) is_over = [deadline] { return Clock::now() >= deadline; };
   const std::vector<StartIntersection>& met =
-      known ? *step.intersections_t0
-            : start_state.run(scene, step.continues, [&] { return context.timeIsUp(); }, stats);
+      known ? *step.intersections_t0 : start_state.run(scene, step.continues, is_over, stats);
+  result.start_state_complete = result.start_state_complete && (known || start_state.isWhole());
   if (!met.empty()) {
     result.start_state = StartState::INTERSECTING;
-  } else if (!known && !start_state.isWhole() && result.start_state == StartState::CLEAR) {
+  } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
     result.start_state = StartState::NOT_CHECKED;
   }
   result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
@@ -258,9 +274,9 @@ void Detector::Impl::runStartState(const MotionStep& step, StepContext& context)
   } else {
     // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the
     // end of the step.
-    start_state.remember(scene, result.contacts, result.complete && !options.earliest_only &&
-                                                     stats.unchecked_vertices == 0 &&
-                                                     options.accuracy.rung != Accuracy::FAST);
+    const bool complete = all_pairs && !options.earliest_only && stats.unchecked_vertices == 0 &&
+                          options.accuracy.rung != Accuracy::FAST;
+    start_state.remember(scene, result.contacts, complete);
   }
   stats[Stage::START_STATE].ms += msSince(start);
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
@@ -278,10 +294,11 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
     for (const SeparationFrom& from : b.separations) separation = std::max(separation, from.separation_m);
   }
   Impl::checkSeparation(impl_->options, separation);
+  impl_->finished = false;
+  impl_->start_state.forget();
   impl_->scene.setBodies(std::move(bodies), rest_positions);
   impl_->unfolded.clear();
   for (const SceneBody& body : impl_->scene.bodies()) impl_->unfolded.emplace_back(body);
-  impl_->start_state.forget();
   impl_->apart.clear();
   impl_->obstacle_tests.clear();
   impl_->findLeftOut(rest_positions);
@@ -290,7 +307,8 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
 const std::vector<LeftOutPair>& Detector::leftOut() const { return impl_->left_out_list; }
 
 bool Detector::intersectionsAtEnd(std::vector<StartIntersection>& out) const {
-  return impl_->start_state.listEnd(impl_->scene, out);
+  const ScopedFloatMode mode;
+  return impl_->finished && impl_->start_state.listEnd(impl_->scene, out);
 }
 
 const StepResult& Detector::run(const MotionStep& step) { return impl_->run(step); }

@@ -51,7 +51,8 @@ struct Detector::Impl {
   void runPairs(StepContext& context);
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runObstacle(const MotionStep& step, const StepContext& context);
-  void runStartState(const MotionStep& step, StepContext& context);
+  /// all_pairs: no pair of meshes was left out.
+  void runStartState(const MotionStep& step, bool all_pairs, StepContext& context);
   void collect();
   void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
   template <class Body>
@@ -76,6 +77,7 @@ struct Detector::Impl {
   std::vector<std::uint8_t> obstacle_active;
   std::vector<LeftOutOfBody> left_out;  // per body
   std::vector<LeftOutPair> left_out_list;
+  bool finished = false;  // the last run() came to its end
   StepResult result;
 };
 

@@ -78,8 +78,6 @@ void Monitor::setOptions(const MonitorOptions& options) {
   impl_->runner.setOptions(options.detector);
   for (MeshStore& store : impl_->stores) store.setOptions(options.store);
   impl_->side_runner.reset();
-  // Other boxes are another map.
-  impl_->map_changed |= !options.exclude_boxes.empty() || !impl_->options.exclude_boxes.empty();
   impl_->reduced_from = nullptr;
   impl_->options = options;
 }
@@ -193,7 +191,7 @@ void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
   outcome.start_ns = step.from->stamp_ns;
   const MonitorMap used = usableMap(step.to->stamp_ns);
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
-  const bool continues = has_last && !map_changed && last_end_ns == outcome.start_ns && last_runs == runs;
+  const bool continues = has_last && last_end_ns == outcome.start_ns && last_runs == runs;
   has_last = false;
   if (listener) {
     listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
@@ -203,7 +201,6 @@ void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
   runOn(runner, input, used, continues, outcome);
   if (used.surface && !options.exclude_boxes.empty()) outcome.excluded_voxels = excluded_voxels;
   has_last = true;
-  map_changed = map_changed && !used.surface && map.surface;
   last_end_ns = outcome.stamp_ns;
   last_duration_s = outcome.duration_s();
   last_runs = runs;

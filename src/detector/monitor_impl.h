@@ -42,12 +42,13 @@ struct Monitor::Impl {
   StepRunner runner;
   std::vector<StartIntersection> end_intersections;  // of the last step
   std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
+  double side_budget_ms = 0;
   StepInput input, side_input;
   References references;
   std::vector<std::uint64_t> runs, last_runs;
   StampNs last_end_ns = 0;
   double last_duration_s = 0;
-  bool has_last = false, map_changed = true, finishing = false;
+  bool has_last = false, finishing = false;
   std::string off_path;  // why the step's paths are not those that were seen; empty: they are
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
@@ -81,7 +82,7 @@ struct Monitor::Impl {
   /// What a step, a check and a prediction have in common.
   void runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues, StepOutcome& outcome,
              const std::vector<StartIntersection>* intersections_t0 = nullptr);
-  StepRunner& side();
+  StepRunner& side(double budget_ms);
 };
 
 }  // namespace deformable_ccd

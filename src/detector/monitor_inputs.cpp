@@ -148,7 +148,6 @@ void Monitor::setReference(std::size_t body, std::shared_ptr<const Topology> top
 
 void Monitor::setMap(MonitorMap map) {
   impl_->map = std::move(map);
-  impl_->map_changed = true;
   impl_->reduced_from = nullptr;
 }
 

@@ -2,11 +2,19 @@
 #include <cmath>
 
 #include "detector/monitor_impl.h"
+#include "detector/pair_worker.h"
 
 namespace deformable_ccd {
 
-StepRunner& Monitor::Impl::side() {
-  if (!side_runner) side_runner = std::make_unique<StepRunner>(options.detector);
+StepRunner& Monitor::Impl::side(double budget_ms) {
+  DetectorOptions side_options = options.detector;
+  side_options.step_budget_ms = budget_ms;
+  if (!side_runner) {
+    side_runner = std::make_unique<StepRunner>(side_options);
+  } else if (budget_ms != side_budget_ms) {
+    side_runner->setOptions(side_options);
+  }
+  side_budget_ms = budget_ms;
   return *side_runner;
 }
 
@@ -30,7 +38,8 @@ StepOutcome Monitor::checkNow() {
   Impl::References references = m.references;
   m.keepReferences(m.side_input, references);
   outcome.start_ns = outcome.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
-  m.runOn(m.side(), m.side_input, m.usableMap(outcome.stamp_ns), false, outcome);
+  // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
+  m.runOn(m.side(0), m.side_input, m.usableMap(outcome.stamp_ns), false, outcome);
   return outcome;
 }
 
@@ -67,8 +76,10 @@ StepOutcome Monitor::predict() {
   outcome.reason.clear();
   outcome.start_ns = m.last_end_ns;
   outcome.stamp_ns = m.last_end_ns + static_cast<StampNs>(std::llround(m.options.look_ahead_s * 1e9));
+  const Clock::time_point start = Clock::now();
   const bool known = m.runner.intersectionsAtEnd(m.end_intersections);
-  m.runOn(m.side(), m.side_input, m.usableMap(m.last_end_ns), false, outcome, known ? &m.end_intersections : nullptr);
+  outcome.stats.total_ms = outcome.stats[Stage::START_STATE].ms = outcome.stats[Effect::START_STATE].ms = msSince(start);
+  m.runOn(m.side(m.options.detector.step_budget_ms), m.side_input, m.usableMap(m.last_end_ns), false, outcome, known ? &m.end_intersections : nullptr);
   return outcome;
 }
 

@@ -5,9 +5,9 @@
 namespace deformable_ccd {
 namespace {
 
-// More candidates than this many an edge, and the full test is no dearer.
-constexpr std::size_t CANDIDATES_PER_EDGE = 2;
-constexpr std::size_t CANDIDATES_PER_LOOK_AT_THE_CLOCK = 256;
+// More candidates than this many an edge, and the full test is no dearer; but with a deadline it may not come to its end.
+constexpr std::size_t CANDIDATES_PER_EDGE = 2, CANDIDATES_PER_EDGE_WITH_DEADLINE = 8;
+constexpr std::size_t CANDIDATES_PER_LOOK_AT_THE_CLOCK = 1024;
 
 bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
 bool shareVertex(const Index* edge, const Index* face) { return contains(face, edge[0]) | contains(face, edge[1]); }
@@ -35,6 +35,7 @@ void StartStateTest::SlotsAtVertex::build(const SceneBody& body, FeatureKind kin
 const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& scene, bool continues, const IsOver& is_over,
                                                           core::StepStats& stats) {
   tested_ = 0;
+  has_deadline_ = static_cast<bool>(is_over);
   if (!(continues && known_)) {
     found_.clear();
     candidates_.clear();
@@ -91,13 +92,18 @@ bool StartStateTest::isChecked(const SceneArrays& scene, const EdgeFace& pair) {
 
 void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_over) {
   candidates_.insert(candidates_.end(), found_.begin(), found_.end());
-  std::sort(candidates_.begin(), candidates_.end());
-  candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
   found_.clear();
+  // Sorted, many are the same and those that follow each other lie together; but all of them is long without the clock.
+  const std::size_t block = is_over ? CANDIDATES_PER_LOOK_AT_THE_CLOCK : candidates_.size();
   std::size_t done = 0;
-  for (; done < candidates_.size(); ++done) {
-    if (done % CANDIDATES_PER_LOOK_AT_THE_CLOCK == 0 && is_over()) break;
-    if (isChecked(scene, candidates_[done])) test(scene, candidates_[done]);
+  while (done < candidates_.size() && !(is_over && is_over())) {
+    const auto first = candidates_.begin() + static_cast<std::ptrdiff_t>(done);
+    const auto last = first + static_cast<std::ptrdiff_t>(std::min(block, candidates_.size() - done));
+    std::sort(first, last);
+    std::for_each(first, std::unique(first, last), [&](const EdgeFace& pair) {
+      if (isChecked(scene, pair)) test(scene, pair);
+    });
+    done += static_cast<std::size_t>(last - first);
   }
   candidates_.erase(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(done));
 }
@@ -126,13 +132,13 @@ void StartStateTest::search(const SceneArrays& scene, const IsOver& is_over) {
   searched_ = true;
 }
 
-/// Goes on at next_group_ of the edges' tree; false: the deadline ended it, and next_group_ says where.
+/// Goes on at next_group_ of the edges' tree, by one group at the least; false: it was ended, and next_group_ says where.
 bool StartStateTest::searchBodies(const SceneArrays& scene, const IsOver& is_over) {
-  const auto [edge_body, face_body] = next_bodies_;
+  const std::uint32_t edge_body = next_bodies_[0], face_body = next_bodies_[1];
   const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
   const ClusterTree& faces = scene.bodies()[face_body].tree(FeatureKind::FACE);
   if (edges.featureCount() == 0 || faces.featureCount() == 0) return true;
-  if (is_over()) return false;
+  if (is_over && is_over()) return false;
   TreePair trees;
   trees.a = &edges;
   trees.b = &faces;
@@ -147,7 +153,7 @@ bool StartStateTest::searchBodies(const SceneArrays& scene, const IsOver& is_ove
   stream_.clearCounters();
   for (std::size_t first = 0, last = 0; first < by_group_.size(); first = last) {
     next_group_ = by_group_[first][0];
-    if (is_over()) return false;
+    if (first > 0 && is_over && is_over()) return false;
     while (last < by_group_.size() && by_group_[last][0] == next_group_) ++last;
     stream_.run(trees, by_group_[first].data(), last - first, [&](const std::uint32_t* slots, std::size_t count) {
       for (std::size_t i = 0; i < count; ++i) {
@@ -174,7 +180,7 @@ void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
 void StartStateTest::remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete) {
   known_ = false;
   if (!complete) return;
-  const std::size_t limit = CANDIDATES_PER_EDGE * edgeCount(scene);
+  const std::size_t limit = edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
   for (const core::Contact& contact : contacts) {
     if (contact.kind != PairKind::VERTEX_FACE && contact.kind != PairKind::EDGE_EDGE) continue;
     if (candidates_.size() > limit) return;

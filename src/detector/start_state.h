@@ -39,7 +39,8 @@ class StartStateTest {
 
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
   /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
-  /// effect START_STATE. Nothing more is tested once is_over() says so; isWhole() is false then.
+  /// effect START_STATE. Nothing more is tested once is_over() says so; isWhole() is false then. Empty: there is
+  /// no deadline.
   const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const IsOver& is_over,
                                             core::StepStats& stats);
 
@@ -95,7 +96,7 @@ class StartStateTest {
                       const Index* other_edge);
   void learnNeighbourhoods(const SceneArrays& scene);
 
-  bool whole_ = false;
+  bool whole_ = false, has_deadline_ = false;
   bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
   bool searched_ = false;   // the search has come to its end
   BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the groups of edges

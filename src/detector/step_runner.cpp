@@ -106,7 +106,7 @@ void conclude(const MonitorOptions& options, StepOutcome& outcome) {
     outcome.reason = std::isfinite(outcome.unchecked_toc_lower)
                          ? "the step budget ran out; nothing that was left out touches before toc " +
                                std::to_string(outcome.unchecked_toc_lower)
-                         : "the step budget ran out before the start state was known; no contact was left out";
+                         : "the step budget ran out before all of the start state was looked at; no pair was left out of the contacts";
   }
   outcome.answered = true;
   outcome.clear = outcome.status == StepStatus::OK && outcome.start_state == StartState::CLEAR && !touched;
@@ -209,10 +209,11 @@ void StepRunner::runPart(const StepInput& at, bool continues, std::size_t part, 
   }
   step_.continues = continues;
   step_.spent_ms = outcome.stats.total_ms;  // the budget is one for the whole step
+  step_.start_state_share = 1 / static_cast<double>(parts - part);  // else its search would take all that later parts need
   const StepResult& result = detector_.run(step_);
   if (part == 0) {
     outcome.start_state = result.start_state;
-    if (detector_.options().check_start_state && result.start_state == StartState::NOT_CHECKED) outcome.complete = false;
+    outcome.complete = outcome.complete && result.start_state_complete;
     outcome.intersections = result.intersections;
   }
   for (core::Contact contact : result.contacts) {

@@ -113,6 +113,9 @@ TEST_F(OneBody, AStartStateWithoutTimeIsNoClearStep) {
   EXPECT_FALSE(outcome.clear);
   EXPECT_TRUE(std::isinf(outcome.unchecked_toc_lower)) << "no pair was left out";
   EXPECT_NE(outcome.reason.find("start state"), std::string::npos) << outcome.reason;
+  const StepOutcome question = monitor.checkNow();
+  EXPECT_TRUE(question.complete) << "a question takes the time that it takes";
+  EXPECT_TRUE(question.clear);
 }
 
 TEST_F(OneBody, NeverAcrossASeam) {
@@ -163,6 +166,33 @@ TEST_F(OneBody, MapIsMissedOnlyWhenExpected) {
   EXPECT_FALSE(none.clear);
   monitor.setMap({VoxelSurface::build(0.1, {}), 0, Eigen::Isometry3d::Identity(), {}});
   EXPECT_EQ(feed(pair(30 * MS, 0.7)).status, StepStatus::OK) << "an empty map is a map";
+}
+
+// What the meshes are to each other does not change with the map.
+TEST_F(OneBody, AMapThatComesStartsNoSearchOfTheMeshes) {
+  // Folded, and turned so that the bounds of the two layers overlap.
+  const auto topology = std::make_shared<const Topology>(Topology::grid(12, 12));
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  StampNs stamp_ns = 0;
+  const auto searched = [&] {
+    MeshFrame frame{stamp_ns += 100 * MS, topology, {}, false, Eigen::Isometry3d::Identity()};
+    for (int i = 0; i < 144; ++i) {
+      const int y = i / 12;
+      const Vec3 folded = y < 6 ? Vec3(i % 12, y, 0) : Vec3(i % 12, 11 - y, 0.05);
+      frame.positions.push_back(turn * folded + Vec3(0, 0, static_cast<double>(stamp_ns) * 1e-9));
+    }
+    return feed(std::move(frame)).stats[Stage::START_STATE].in;
+  };
+  searched();
+  EXPECT_GT(searched(), 0u);
+  EXPECT_EQ(searched(), 0u);
+  for (int i = 0; i < 3; ++i) {
+    monitor.setMap({VoxelSurface::build(0.1, {}), stamp_ns, Eigen::Isometry3d::Identity(), {}});
+    EXPECT_EQ(searched(), 0u);
+  }
+  monitor.reset(StepStatus::RESET);
+  searched();
+  EXPECT_GT(searched(), 0u);
 }
 
 TEST_F(OneBody, OldMapIsNoMap) {

@@ -105,7 +105,7 @@ TEST(SegmentTriangle, AgreesWithTheOracleWhereItIsClose) {
 
 // --- the whole test --------------------------------------------------------------------------------------------------
 
-bool never() { return false; }
+const StartStateTest::IsOver NO_DEADLINE;
 
 bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
   return std::equal(x.begin(), x.end(), y.begin(), y.end(),
@@ -138,7 +138,7 @@ TEST(StartState, FullTestListsWhatTheOracleLists) {
     StartStateTest test;
     core::StepStats stats;
     const auto expected = trueIntersections(step);
-    const auto& listed = test.run(scene.arrays, false, never, stats);
+    const auto& listed = test.run(scene.arrays, false, NO_DEADLINE, stats);
     ASSERT_TRUE(same(listed, expected))
         << "seed " << seed << ": " << listed.size() << " listed, " << expected.size() << " in truth";
     EXPECT_EQ(stats[Stage::START_STATE].out, expected.size());
@@ -157,7 +157,7 @@ TEST(StartState, FullTestIsTheSameOnEveryTarget) {
     Scene scene(step);
     StartStateTest test;
     core::StepStats stats;
-    lists.push_back(test.run(scene.arrays, false, never, stats));
+    lists.push_back(test.run(scene.arrays, false, NO_DEADLINE, stats));
   });
   for (const auto& list : lists) EXPECT_TRUE(same(list, lists[0]));
 }
@@ -183,7 +183,7 @@ TEST_F(FallingCloth, CarriesOver) {
   Scene scene(step);
   StartStateTest test;
   core::StepStats stats;
-  EXPECT_TRUE(test.run(scene.arrays, false, never, stats).empty());
+  EXPECT_TRUE(test.run(scene.arrays, false, NO_DEADLINE, stats).empty());
   std::vector<core::Contact> contacts;
   for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
   ASSERT_FALSE(contacts.empty());
@@ -194,9 +194,9 @@ TEST_F(FallingCloth, CarriesOver) {
   ASSERT_FALSE(expected.empty());
   scene.record(next);
   core::StepStats carried, full;
-  const auto listed = test.run(scene.arrays, true, never, carried);
+  const auto listed = test.run(scene.arrays, true, NO_DEADLINE, carried);
   EXPECT_TRUE(same(listed, expected)) << listed.size() << " listed, " << expected.size() << " in truth";
-  EXPECT_EQ(test.run(scene.arrays, false, never, full).size(), expected.size());
+  EXPECT_EQ(test.run(scene.arrays, false, NO_DEADLINE, full).size(), expected.size());
   EXPECT_LE(carried[Stage::START_STATE].in, full[Stage::START_STATE].in);
 }
 
@@ -206,7 +206,7 @@ TEST_F(FallingCloth, ForgetsWhereItMust) {
   core::StepStats stats;
   const auto tested = [&](bool continues) {
     core::StepStats s;
-    test.run(scene.arrays, continues, never, s);
+    test.run(scene.arrays, continues, NO_DEADLINE, s);
     return s[Stage::START_STATE].in;
   };
   const std::uint64_t full = tested(false);
@@ -238,7 +238,7 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
     StartStateTest test;
     bool whole = false;
     for (int i = 0; i < 20; ++i) {
-      int looks = draw(0, 5);
+      int looks = draw(0, 3);
       core::StepStats stats;
       const auto listed = test.run(scene.arrays, i > 0, [&] { return looks-- <= 0; }, stats);
       const auto expected = trueIntersections(step);
@@ -272,7 +272,7 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
     EXPECT_TRUE(whole) << "seed " << seed;
   }
   EXPECT_GT(cuts, 50u);
-  EXPECT_GT(found_later, 5u);
+  EXPECT_GT(found_later, 0u);
   EXPECT_GT(ends_known, 50u);
 }
 
@@ -283,7 +283,7 @@ TEST(StartState, PartsOfASearchAreTheWhole) {
   Scene scene(step);
   StartStateTest full_test;
   core::StepStats full;
-  const std::vector<StartIntersection> expected = full_test.run(scene.arrays, false, never, full);
+  const std::vector<StartIntersection> expected = full_test.run(scene.arrays, false, NO_DEADLINE, full);
   ASSERT_GT(expected.size(), 100u);
   for (const int looks_a_step : {2, 3, 5, 8}) {
     StartStateTest test;
@@ -291,14 +291,14 @@ TEST(StartState, PartsOfASearchAreTheWhole) {
     int steps = 0;
     for (bool whole = false; !whole && steps < 1000; ++steps) {
       // What was found is looked at again first, at one look at the clock for many of them.
-      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 256) + 1 : 0);
+      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) : 0);
       core::StepStats stats;
       listed = test.run(scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
       whole = test.isWhole();
       test.remember(scene.arrays, {}, true);
     }
     EXPECT_TRUE(same(listed, expected)) << looks_a_step << " looks a step: " << listed.size() << " of " << expected.size();
-    EXPECT_GT(steps, 20 / looks_a_step) << "hardly cut";
+    EXPECT_GT(steps, 12 / looks_a_step) << "hardly cut";
   }
 }
 

@@ -145,6 +145,49 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
   EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));
 }
 
+// A search of the start state that takes longer than the whole budget gets a share of each part's time: the parts after
+// the first are tested all the same, and the search comes to its end.
+TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
+  constexpr std::size_t SIZE = 120;
+  const auto grid = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
+  Positions flat;
+  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+    flat.emplace_back(0.01 * static_cast<double>(i % SIZE), 0.01 * static_cast<double>(i / SIZE), -5);
+  }
+  int at = 0;
+  const auto next = [&](Monitor& monitor) {
+    ++at;
+    return step(monitor, {at * 100 * MS, grid, flat, false, Eigen::Isometry3d::Identity(), {}}, 0.5 * at);
+  };
+  MonitorOptions options = loose();
+  const auto shortest_ms = [&](bool check_start_state) {
+    options.detector.check_start_state = check_start_state;
+    double ms = 1e9;
+    Monitor monitor(options, clockAndBar());
+    for (int i = 0; i < 20; ++i) {
+      monitor.reset(StepStatus::RESET);
+      next(monitor);
+      const StepOutcome outcome = next(monitor);
+      EXPECT_GT(outcome.substeps, 5u);
+      ms = std::min(ms, outcome.stats.total_ms);
+    }
+    return ms;
+  };
+  const double contacts_ms = shortest_ms(false), with_search_ms = shortest_ms(true);
+  ASSERT_GT(with_search_ms, 1.2 * contacts_ms);
+  options.detector.step_budget_ms = (contacts_ms + with_search_ms) / 2;
+  // Something else on the machine may take the time that the contacts need; then again.
+  Monitor monitor(options, clockAndBar());
+  next(monitor);
+  bool known = false;
+  for (int i = 0; i < 500 && !known; ++i) {
+    const StepOutcome outcome = next(monitor);
+    known = outcome.complete;
+    EXPECT_EQ(outcome.clear, known) << outcome.reason;
+  }
+  EXPECT_TRUE(known);
+}
+
 // What the detector knows is where the first part ended; the next step begins where the last one would have.
 TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
   // Pierced in its middle by the bar's long edges when the bar hangs down, and by nothing before.
