@@ -1,12 +1,14 @@
 #include "detector/start_state.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace deformable_ccd {
 namespace {
 
 // More candidates than this many an edge, and the full test is no dearer; but with a deadline it may not come to its end.
 constexpr std::size_t CANDIDATES_PER_EDGE = 2, CANDIDATES_PER_EDGE_WITH_DEADLINE = 8;
+constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
 constexpr std::size_t CANDIDATES_PER_LOOK_AT_THE_CLOCK = 1024;
 
 bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
@@ -39,13 +41,14 @@ const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& sce
   if (!(continues && known_)) {
     found_.clear();
     candidates_.clear();
+    touched_.clear();
     searched_ = false;
     next_bodies_ = {};
     next_group_ = 0;
   }
   testCandidates(scene, is_over);
   if (!searched_) search(scene, is_over);
-  whole_ = searched_ && candidates_.empty();
+  whole_ = searched_ && candidates_.empty() && touched_.empty();
   known_ = false;  // until remember() has this step's contacts
 
   list(scene, found_, intersections_);
@@ -75,10 +78,11 @@ void StartStateTest::list(const SceneArrays& scene, std::vector<EdgeFace>& pairs
   }
 }
 
-bool StartStateTest::listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out) const {
+bool StartStateTest::listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out) {
   if (!known_ || !searched_) return false;
   std::vector<EdgeFace> pairs = candidates_;
   pairs.insert(pairs.end(), found_.begin(), found_.end());
+  for (const Touched& contact : touched_) addCandidates(scene, contact, pairs);
   const auto apart = [&](const EdgeFace& pair) { return !isChecked(scene, pair) || !meet(scene, pair, 1); };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), apart), pairs.end());
   list(scene, pairs, out);
@@ -94,9 +98,13 @@ void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_o
   candidates_.insert(candidates_.end(), found_.begin(), found_.end());
   found_.clear();
   // Sorted, many are the same and those that follow each other lie together; but all of them is long without the clock.
-  const std::size_t block = is_over ? CANDIDATES_PER_LOOK_AT_THE_CLOCK : candidates_.size();
-  std::size_t done = 0;
-  while (done < candidates_.size() && !(is_over && is_over())) {
+  const std::size_t block = is_over ? CANDIDATES_PER_LOOK_AT_THE_CLOCK : std::numeric_limits<std::size_t>::max();
+  std::size_t done = 0, expanded = 0;
+  while (!(is_over && is_over())) {
+    while (expanded < touched_.size() && candidates_.size() - done < block) {
+      addCandidates(scene, touched_[expanded++], candidates_);
+    }
+    if (done == candidates_.size()) break;
     const auto first = candidates_.begin() + static_cast<std::ptrdiff_t>(done);
     const auto last = first + static_cast<std::ptrdiff_t>(std::min(block, candidates_.size() - done));
     std::sort(first, last);
@@ -106,6 +114,7 @@ void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_o
     done += static_cast<std::size_t>(last - first);
   }
   candidates_.erase(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(done));
+  touched_.erase(touched_.begin(), touched_.begin() + static_cast<std::ptrdiff_t>(expanded));
 }
 
 void StartStateTest::search(const SceneArrays& scene, const IsOver& is_over) {
@@ -183,23 +192,23 @@ void StartStateTest::remember(const SceneArrays& scene, const std::vector<core::
   const std::size_t limit = edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
   for (const core::Contact& contact : contacts) {
     if (contact.kind != PairKind::VERTEX_FACE && contact.kind != PairKind::EDGE_EDGE) continue;
-    if (candidates_.size() > limit) return;
-    addCandidates(scene, contact);
+    touched_.push_back({contact.kind, contact.body[0], contact.body[1], contact.vertex});
+    if (CANDIDATES_PER_CONTACT * touched_.size() + candidates_.size() > limit) return;
   }
   known_ = true;
 }
 
-void StartStateTest::addCandidates(const SceneArrays& scene, const core::Contact& contact) {
+void StartStateTest::addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out) {
   learnNeighbourhoods(scene);
-  const std::uint32_t a = contact.body[0], b = contact.body[1];
+  const std::uint32_t a = contact.first_body, b = contact.second_body;
   Index v[4];  // internal numbers
   for (int i = 0; i < 4; ++i) {
     const bool first = i < (contact.kind == PairKind::VERTEX_FACE ? 1 : 2);
     v[i] = neighbourhoods_[first ? a : b].internal_of_local[contact.vertex[i]];
   }
   if (contact.kind == PairKind::EDGE_EDGE) {
-    addFacesAtEdge(scene, a, v, b, v + 2);
-    addFacesAtEdge(scene, b, v + 2, a, v);
+    addFacesAtEdge(scene, a, v, b, v + 2, out);
+    addFacesAtEdge(scene, b, v + 2, a, v, out);
     return;
   }
   const SceneBody &body = scene.bodies()[a], &face_body = scene.bodies()[b];
@@ -212,12 +221,12 @@ void StartStateTest::addCandidates(const SceneArrays& scene, const core::Contact
                                            });
   for (std::uint32_t i = edges.begin[at]; i < edges.begin[at + 1]; ++i) {
     const Index* e = body.tree(FeatureKind::EDGE).feature(edges.slots[i]);
-    if (!shareVertex(e, v + 1)) candidates_.push_back({a, edges.slots[i], b, *face});
+    if (!shareVertex(e, v + 1)) out.push_back({a, edges.slots[i], b, *face});
   }
 }
 
 void StartStateTest::addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge,
-                                    std::uint32_t face_body, const Index* other_edge) {
+                                    std::uint32_t face_body, const Index* other_edge, std::vector<EdgeFace>& out) {
   const SceneBody &a = scene.bodies()[edge_body], &b = scene.bodies()[face_body];
   const SlotsAtVertex &edges = neighbourhoods_[edge_body].edges, &faces = neighbourhoods_[face_body].faces;
   const Index at = edge[0] - a.internal_begin, other = other_edge[0] - b.internal_begin;
@@ -229,7 +238,7 @@ void StartStateTest::addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge
   for (std::uint32_t i = faces.begin[other]; i < faces.begin[other + 1]; ++i) {
     const Index* f = b.tree(FeatureKind::FACE).feature(faces.slots[i]);
     if (contains(f, other_edge[1]) && !shareVertex(edge, f)) {
-      candidates_.push_back({edge_body, *slot, face_body, faces.slots[i]});
+      out.push_back({edge_body, *slot, face_body, faces.slots[i]});
     }
   }
 }
@@ -253,6 +262,7 @@ void StartStateTest::forget() {
   known_ = false;
   found_.clear();
   candidates_.clear();
+  touched_.clear();
   neighbourhoods_.clear();
 }
 

@@ -54,7 +54,7 @@ class StartStateTest {
   void remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete);
 
   /// After remember(): what meets at t=1, listed as run() would for a step that continues. False where it is not known.
-  bool listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out) const;
+  bool listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out);
 
   /// The bodies are about to change: everything is forgotten.
   void forget();
@@ -81,6 +81,12 @@ class StartStateTest {
     SlotsAtVertex edges, faces;
   };
 
+  /// The features of a contact: what crosses after it lies around them.
+  struct Touched {
+    PairKind kind;
+    std::uint16_t first_body, second_body;
+    std::array<Index, 4> vertex;
+  };
   using BodyPair = std::array<std::uint32_t, 2>;  // of the edge, of the face
 
   void testCandidates(const SceneArrays& scene, const IsOver& is_over);
@@ -91,9 +97,9 @@ class StartStateTest {
   /// What was checked in the step before need not be in this one.
   static bool isChecked(const SceneArrays& scene, const EdgeFace& pair);
   static void list(const SceneArrays& scene, std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
-  void addCandidates(const SceneArrays& scene, const core::Contact& contact);
+  void addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
-                      const Index* other_edge);
+                      const Index* other_edge, std::vector<EdgeFace>& out);
   void learnNeighbourhoods(const SceneArrays& scene);
 
   bool whole_ = false, has_deadline_ = false;
@@ -101,7 +107,8 @@ class StartStateTest {
   bool searched_ = false;   // the search has come to its end
   BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the groups of edges
   std::uint32_t next_group_ = 0;
-  std::vector<EdgeFace> candidates_;  // to be looked at; after run() what the deadline left of them
+  std::vector<Touched> touched_;      // of the last step; after run() those that the deadline left
+  std::vector<EdgeFace> candidates_;  // to be looked at; after run() those that the deadline left
   std::vector<EdgeFace> found_;
   std::vector<StartIntersection> intersections_;
   std::vector<std::uint32_t> groups_, scratch_, overlapping_;

@@ -291,7 +291,7 @@ TEST(StartState, PartsOfASearchAreTheWhole) {
     int steps = 0;
     for (bool whole = false; !whole && steps < 1000; ++steps) {
       // What was found is looked at again first, at one look at the clock for many of them.
-      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) : 0);
+      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) + 1 : 0);
       core::StepStats stats;
       listed = test.run(scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
       whole = test.isWhole();
