@@ -140,6 +140,8 @@ struct BodyMotion {
   const std::vector<double>* radius_m = nullptr;
 };
 
+class Detector;
+
 /// One step of all bodies, in the order of setBodies.
 struct MotionStep {
   std::vector<BodyMotion> bodies;
@@ -147,11 +149,12 @@ struct MotionStep {
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();     ///< held for the whole step
   bool continues = false;  ///< t0 is the t1 of the previous run(), so the start state can be carried over
   double spent_ms = 0;     ///< of step_budget_ms, by earlier parts of the same step
-  /// (0, 1] of what the contacts leave of step_budget_ms, for the start state; the rest is for later parts of the step.
-  double start_state_share = 1;
-  /// What of the meshes meets at t0, where that is known (Detector::intersectionsAtEnd): it is not searched again, nor is
-  /// anything of it carried over to the next step. Not of this detector's own result.
-  const std::vector<StartIntersection>* intersections_t0 = nullptr;
+  /// Parts of the same step that follow: the search of the start state leaves them as much time as this part's pairs took.
+  std::size_t parts_after = 0;
+  /// Another detector, whose last step ended at this t0: what it knows of its end is the start state, without a search.
+  /// Nothing is carried over to a step after this one.
+  Detector* predecessor = nullptr;
+  bool start_state_wanted = true;  ///< false: not checked, whatever the options say
 };
 
 struct StepResult {
@@ -180,9 +183,6 @@ class Detector {
   /// Positions of the first frame guide the order of features in memory; any will do.
   void setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions);
   const StepResult& run(const MotionStep& step);
-  /// What of the meshes meets at t1 of the last step, from what that step found out: the static test without a search.
-  /// False where it is not known.
-  bool intersectionsAtEnd(std::vector<StartIntersection>& out) const;
   /// Known after setBodies; in the order of the bodies, kinds, features.
   const std::vector<LeftOutPair>& leftOut() const;
 

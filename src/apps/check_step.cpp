@@ -127,6 +127,7 @@ nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const 
   j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
   j["complete"] = run.result.complete;
   j["start_state"] = toString(run.result.start_state);
+  j["start_state_complete"] = run.result.start_state_complete;
   if (!run.result.complete) j["unchecked_toc_lower"] = run.result.unchecked_toc_lower;
   return j;
 }

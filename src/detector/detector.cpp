@@ -22,8 +22,8 @@ void check(const DetectorOptions& o) {
   if (o.num_threads < 1 || o.num_threads > 1024) {
     refuse("num_threads = " + std::to_string(o.num_threads) + " is out of range; 1 to 1024");
   }
-  if (!(o.step_budget_ms >= 0) || !std::isfinite(o.step_budget_ms)) {
-    refuse("step_budget_ms = " + std::to_string(o.step_budget_ms) + " is out of range; 0 (none) or a positive time");
+  if (!(o.step_budget_ms >= 0 && o.step_budget_ms <= 1e9)) {
+    refuse("step_budget_ms = " + std::to_string(o.step_budget_ms) + " is out of range; 0 (none) to 1e9");
   }
 }
 
@@ -134,11 +134,11 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   runPairs(context);
   collect();
   const bool all_pairs = result.complete;
-  if (options.check_start_state) result.start_state = StartState::CLEAR;  // until shown otherwise
+  if (checksStartState(step)) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (step.obstacle && scene.meetsObstacle()) runObstacle(step, context);
   rememberApart(all_pairs && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
-  runStartState(step, all_pairs, context);  // after the contacts: of a budget too small for both they are asked for first
+  runStartState(step, begin, all_pairs, context);  // after the contacts: of a budget too small for both they are asked for first
   stats.total_ms = msSince(begin);
   finished = true;
   return result;
@@ -237,7 +237,7 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
     result.stats.initial += c.initial;
     result.stats.leaving += c.leaving;
     result.stats.undecided += c.certainty == Certainty::UNDECIDED;
-    if (c.initial && options.check_start_state) {
+    if (c.initial && checksStartState(step)) {
       result.start_state = StartState::INTERSECTING;
       if (c.kind == PairKind::VERTEX_VOXEL_FACE) {
         StartIntersection s;
@@ -249,20 +249,29 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
   }
 }
 
-void Detector::Impl::runStartState(const MotionStep& step, bool all_pairs, StepContext& context) {
-  if (!options.check_start_state) return start_state.skip();
+void Detector::Impl::runStartState(const MotionStep& step, Clock::time_point begin, bool all_pairs,
+                                   const StepContext& context) {
+  if (!checksStartState(step)) return start_state.skip();
   const Clock::time_point start = Clock::now();
   core::StepStats& stats = result.stats;
-  const bool known = step.intersections_t0 != nullptr;
-  Clock::time_point deadline = context.deadline;
-  if (deadline != Clock::time_point::max() && deadline > start) {
-    deadline = start + std::chrono::duration_cast<Clock::duration>(step.start_state_share * (deadline - start));
-  }
   StartStateTest::IsOver is_over;
-  if (deadline != Clock::time_point::max()) is_over = [deadline] { return Clock::now() >= deadline; };
-  const std::vector<StartIntersection>& met =
-      known ? *step.intersections_t0 : start_state.run(scene, step.continues, is_over, stats);
-  result.start_state_complete = result.start_state_complete && (known || start_state.isWhole());
+  if (context.deadline != Clock::time_point::max()) {
+    // Later parts need as much time for their pairs; what is over that is shared.
+    const auto parts = static_cast<Clock::rep>(step.parts_after);
+    const Clock::duration slack = context.deadline - start - parts * (start - begin);
+    is_over = [deadline = start + slack / (parts + 1)] { return Clock::now() >= deadline; };
+  }
+  std::vector<StartIntersection> met;
+  bool whole = false;
+  const bool known = isStartKnown(step);
+  if (known) {
+    Impl& predecessor = *step.predecessor->impl_;
+    whole = predecessor.start_state.listEnd(predecessor.scene, is_over, met);
+  } else {
+    met = start_state.run(scene, step.continues, is_over, stats);
+    whole = start_state.isWhole();
+  }
+  result.start_state_complete = result.start_state_complete && whole;
   if (!met.empty()) {
     result.start_state = StartState::INTERSECTING;
   } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
@@ -280,6 +289,16 @@ void Detector::Impl::runStartState(const MotionStep& step, bool all_pairs, StepC
   }
   stats[Stage::START_STATE].ms += msSince(start);
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
+}
+
+bool Detector::Impl::checksStartState(const MotionStep& step) const {
+  return options.check_start_state && step.start_state_wanted;
+}
+
+bool Detector::Impl::isStartKnown(const MotionStep& step) {
+  if (!step.predecessor) return false;
+  const Impl& predecessor = *step.predecessor->impl_;
+  return predecessor.finished && predecessor.start_state.knowsEnd();
 }
 
 Detector::Detector(const DetectorOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -305,11 +324,6 @@ void Detector::setBodies(std::vector<BodySetup> bodies, const std::vector<const 
 }
 
 const std::vector<LeftOutPair>& Detector::leftOut() const { return impl_->left_out_list; }
-
-bool Detector::intersectionsAtEnd(std::vector<StartIntersection>& out) const {
-  const ScopedFloatMode mode;
-  return impl_->finished && impl_->start_state.listEnd(impl_->scene, out);
-}
 
 const StepResult& Detector::run(const MotionStep& step) { return impl_->run(step); }
 

@@ -51,8 +51,11 @@ struct Detector::Impl {
   void runPairs(StepContext& context);
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runObstacle(const MotionStep& step, const StepContext& context);
+  bool checksStartState(const MotionStep& step) const;
+  /// By the step's predecessor.
+  static bool isStartKnown(const MotionStep& step);
   /// all_pairs: no pair of meshes was left out.
-  void runStartState(const MotionStep& step, bool all_pairs, StepContext& context);
+  void runStartState(const MotionStep& step, Clock::time_point begin, bool all_pairs, const StepContext& context);
   void collect();
   void writeContact(PairKind kind, const Hit& hit, core::Contact& contact) const;
   template <class Body>

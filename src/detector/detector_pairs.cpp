@@ -64,7 +64,7 @@ void Detector::Impl::chooseSelfTests(const MotionStep& step) {
 // A single body that cannot meet itself is tested against the obstacle alone, which has bounds of its own.
 bool Detector::Impl::needsTrees(const MotionStep& step) const {
   return self_tested.size() > 1 || std::count(self_tested.begin(), self_tested.end(), 1) > 0 ||
-         (options.check_start_state && !step.intersections_t0 && start_state.needsTrees(step.continues));
+         (checksStartState(step) && !isStartKnown(step) && start_state.needsTrees(step.continues));
 }
 
 bool Detector::Impl::isUnfolded(std::size_t body) {

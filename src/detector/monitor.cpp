@@ -178,8 +178,8 @@ void Monitor::reset(StepStatus status) {
 }
 
 void Monitor::Impl::runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues,
-                          StepOutcome& outcome, const std::vector<StartIntersection>* intersections_t0) {
-  on.run(at, bodies, options, withoutExcluded(used), continues, outcome, intersections_t0);
+                          StepOutcome& outcome, StepRunner* predecessor) {
+  on.run(at, bodies, options, withoutExcluded(used), continues, outcome, predecessor);
   if (!options.obstacle_expected || used.surface) return;
   outcome.status = StepStatus::NO_MAP;
   outcome.reason = used.problem + "; checked without it";
@@ -187,12 +187,13 @@ void Monitor::Impl::runOn(StepRunner& on, const StepInput& at, const MonitorMap&
 }
 
 void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
+  const bool had_last = has_last;
+  has_last = false;
   place(step);
   outcome.start_ns = step.from->stamp_ns;
   const MonitorMap used = usableMap(step.to->stamp_ns);
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
-  const bool continues = has_last && last_end_ns == outcome.start_ns && last_runs == runs;
-  has_last = false;
+  const bool continues = had_last && last_end_ns == outcome.start_ns && last_runs == runs;
   if (listener) {
     listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
                       &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &input.radius_m,

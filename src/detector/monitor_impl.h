@@ -40,7 +40,6 @@ struct Monitor::Impl {
   std::shared_ptr<const VoxelSurface> reduced_from, reduced;  // the map's surface, and what exclude_boxes leave of it
   std::uint64_t excluded_voxels = 0;
   StepRunner runner;
-  std::vector<StartIntersection> end_intersections;  // of the last step
   std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
   double side_budget_ms = 0;
   StepInput input, side_input;
@@ -81,7 +80,7 @@ struct Monitor::Impl {
   void runStep(const Pending& step, StepOutcome& outcome);
   /// What a step, a check and a prediction have in common.
   void runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues, StepOutcome& outcome,
-             const std::vector<StartIntersection>* intersections_t0 = nullptr);
+             StepRunner* predecessor = nullptr);
   StepRunner& side(double budget_ms);
 };
 

@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "detector/monitor_impl.h"
-#include "detector/pair_worker.h"
 
 namespace deformable_ccd {
 
@@ -76,10 +75,7 @@ StepOutcome Monitor::predict() {
   outcome.reason.clear();
   outcome.start_ns = m.last_end_ns;
   outcome.stamp_ns = m.last_end_ns + static_cast<StampNs>(std::llround(m.options.look_ahead_s * 1e9));
-  const Clock::time_point start = Clock::now();
-  const bool known = m.runner.intersectionsAtEnd(m.end_intersections);
-  outcome.stats.total_ms = outcome.stats[Stage::START_STATE].ms = outcome.stats[Effect::START_STATE].ms = msSince(start);
-  m.runOn(m.side(m.options.detector.step_budget_ms), m.side_input, m.usableMap(m.last_end_ns), false, outcome, known ? &m.end_intersections : nullptr);
+  m.runOn(m.side(m.options.detector.step_budget_ms), m.side_input, m.usableMap(m.last_end_ns), false, outcome, &m.runner);
   return outcome;
 }
 

@@ -1,7 +1,6 @@
 #include "detector/start_state.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace deformable_ccd {
 namespace {
@@ -9,7 +8,7 @@ namespace {
 // More candidates than this many an edge, and the full test is no dearer; but with a deadline it may not come to its end.
 constexpr std::size_t CANDIDATES_PER_EDGE = 2, CANDIDATES_PER_EDGE_WITH_DEADLINE = 8;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
-constexpr std::size_t CANDIDATES_PER_LOOK_AT_THE_CLOCK = 1024;
+constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 
 bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
 bool shareVertex(const Index* edge, const Index* face) { return contains(face, edge[0]) | contains(face, edge[1]); }
@@ -78,15 +77,18 @@ void StartStateTest::list(const SceneArrays& scene, std::vector<EdgeFace>& pairs
   }
 }
 
-bool StartStateTest::listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out) {
-  if (!known_ || !searched_) return false;
-  std::vector<EdgeFace> pairs = candidates_;
+bool StartStateTest::listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out) {
+  std::vector<EdgeFace> pairs = candidates_, met;
   pairs.insert(pairs.end(), found_.begin(), found_.end());
-  for (const Touched& contact : touched_) addCandidates(scene, contact, pairs);
-  const auto apart = [&](const EdgeFace& pair) { return !isChecked(scene, pair) || !meet(scene, pair, 1); };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), apart), pairs.end());
-  list(scene, pairs, out);
-  return true;
+  std::size_t expanded = 0;
+  const bool whole = inBlocks(
+      pairs, is_over, [&] { return expanded < touched_.size(); },
+      [&] { addCandidates(scene, touched_[expanded++], pairs); },
+      [&](const EdgeFace& pair) {
+        if (isChecked(scene, pair) && meet(scene, pair, 1)) met.push_back(pair);
+      });
+  list(scene, met, out);
+  return whole;
 }
 
 bool StartStateTest::isChecked(const SceneArrays& scene, const EdgeFace& pair) {
@@ -94,27 +96,35 @@ bool StartStateTest::isChecked(const SceneArrays& scene, const EdgeFace& pair) {
          scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face);
 }
 
+/// Takes the pairs from the back, a block at a time, and calls test with each: sorted, many are the same and those that
+/// follow each other lie together. expand() adds pairs as long as hasMore(). False: is_over ended it.
+template <class HasMore, class Expand, class Test>
+bool StartStateTest::inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore,
+                              const Expand& expand, const Test& test) {
+  const std::size_t block = is_over ? PAIRS_PER_LOOK_AT_THE_CLOCK : LARGEST_BLOCK;
+  for (;;) {
+    if (pairs.empty() && !hasMore()) return true;
+    if (is_over && is_over()) return false;
+    while (pairs.size() < block && hasMore()) expand();
+    const auto first = pairs.end() - static_cast<std::ptrdiff_t>(std::min(block, pairs.size()));
+    std::sort(first, pairs.end());
+    std::for_each(first, std::unique(first, pairs.end()), test);
+    pairs.erase(first, pairs.end());
+  }
+}
+
 void StartStateTest::testCandidates(const SceneArrays& scene, const IsOver& is_over) {
   candidates_.insert(candidates_.end(), found_.begin(), found_.end());
   found_.clear();
-  // Sorted, many are the same and those that follow each other lie together; but all of them is long without the clock.
-  const std::size_t block = is_over ? CANDIDATES_PER_LOOK_AT_THE_CLOCK : std::numeric_limits<std::size_t>::max();
-  std::size_t done = 0, expanded = 0;
-  while (!(is_over && is_over())) {
-    while (expanded < touched_.size() && candidates_.size() - done < block) {
-      addCandidates(scene, touched_[expanded++], candidates_);
-    }
-    if (done == candidates_.size()) break;
-    const auto first = candidates_.begin() + static_cast<std::ptrdiff_t>(done);
-    const auto last = first + static_cast<std::ptrdiff_t>(std::min(block, candidates_.size() - done));
-    std::sort(first, last);
-    std::for_each(first, std::unique(first, last), [&](const EdgeFace& pair) {
-      if (isChecked(scene, pair)) test(scene, pair);
-    });
-    done += static_cast<std::size_t>(last - first);
-  }
-  candidates_.erase(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(done));
-  touched_.erase(touched_.begin(), touched_.begin() + static_cast<std::ptrdiff_t>(expanded));
+  inBlocks(
+      candidates_, is_over, [&] { return !touched_.empty(); },
+      [&] {
+        addCandidates(scene, touched_.back(), candidates_);
+        touched_.pop_back();
+      },
+      [&](const EdgeFace& pair) {
+        if (isChecked(scene, pair)) test(scene, pair);
+      });
 }
 
 void StartStateTest::search(const SceneArrays& scene, const IsOver& is_over) {

@@ -53,8 +53,10 @@ class StartStateTest {
   /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
   void remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete);
 
-  /// After remember(): what meets at t=1, listed as run() would for a step that continues. False where it is not known.
-  bool listEnd(const SceneArrays& scene, std::vector<StartIntersection>& out);
+  /// After remember(): whether listEnd() can tell what meets at t=1.
+  bool knowsEnd() const { return known_ && searched_; }
+  /// What meets at t=1, listed as run() would for a step that continues. False: is_over ended it. Changes nothing.
+  bool listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out);
 
   /// The bodies are about to change: everything is forgotten.
   void forget();
@@ -89,6 +91,9 @@ class StartStateTest {
   };
   using BodyPair = std::array<std::uint32_t, 2>;  // of the edge, of the face
 
+  template <class HasMore, class Expand, class Test>
+  static bool inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore, const Expand& expand,
+                       const Test& test);
   void testCandidates(const SceneArrays& scene, const IsOver& is_over);
   void search(const SceneArrays& scene, const IsOver& is_over);
   bool searchBodies(const SceneArrays& scene, const IsOver& is_over);

@@ -209,7 +209,8 @@ void StepRunner::runPart(const StepInput& at, bool continues, std::size_t part, 
   }
   step_.continues = continues;
   step_.spent_ms = outcome.stats.total_ms;  // the budget is one for the whole step
-  step_.start_state_share = 1 / static_cast<double>(parts - part);  // else its search would take all that later parts need
+  step_.parts_after = parts - part - 1;
+  step_.start_state_wanted = part == 0 || !aside_;
   const StepResult& result = detector_.run(step_);
   if (part == 0) {
     outcome.start_state = result.start_state;
@@ -277,13 +278,9 @@ bool StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
   return reached_end;
 }
 
-bool StepRunner::intersectionsAtEnd(std::vector<StartIntersection>& out) const {
-  return reached_end_ && detector_.intersectionsAtEnd(out);
-}
-
 void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
                      const MonitorMap& map, bool continues, StepOutcome& outcome,
-                     const std::vector<StartIntersection>* intersections_t0) {
+                     StepRunner* predecessor) {
   if (set_topologies_ != input.topologies || set_references_ != input.references) {
     setBodies(input, bodies);
     continues = false;
@@ -297,7 +294,8 @@ void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bod
   outcome.obstacle = map.surface;
   outcome.map_from_fixed = map.map_from_fixed;
   outcome.map_stamp_ns = map.stamp_ns;
-  step_.intersections_t0 = intersections_t0;  // to all parts: only the first one's start is reported
+  step_.predecessor = predecessor && predecessor->reached_end_ ? &predecessor->detector_ : nullptr;
+  aside_ = predecessor != nullptr;
   reached_end_ = runParts(input, map, continues, parts, outcome);
   outcome.input = &input;
   outcome.positions_t0 = &input.t0;

@@ -45,14 +45,11 @@ class StepRunner {
   void setOptions(const DetectorOptions& options);
   const std::vector<LeftOutPair>& leftOut() const { return detector_.leftOut(); }
 
-  /// Detector::intersectionsAtEnd() of the last run; false also where parts of that were left out.
-  bool intersectionsAtEnd(std::vector<StartIntersection>& out) const;
-
   /// Fills the outcome's result from the step. `continues`: t0 is the t1 of the last run here, nothing else changed.
-  /// intersections_t0: as in MotionStep. Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
+  /// predecessor: as in MotionStep; a step aside from all others, whose later parts need no start state. Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
   void run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
            const MonitorMap& map, bool continues, StepOutcome& outcome,
-           const std::vector<StartIntersection>* intersections_t0 = nullptr);
+           StepRunner* predecessor = nullptr);
 
  private:
   Detector detector_;
@@ -60,6 +57,7 @@ class StepRunner {
   std::vector<std::shared_ptr<const ReferenceFrame>> set_references_;
   StepInput part_;
   MotionStep step_;
+  bool aside_ = false;
   bool reached_end_ = false;  ///< of the last run: no part was left out
 
   void setBodies(const StepInput& input, const std::vector<MonitorBody>& bodies);
