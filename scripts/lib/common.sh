@@ -31,3 +31,36 @@ use_workspace() {
   . "$BUILD/devel/setup.bash"
   set -u
 }
+
+# Runs a command that takes minutes with its output in the file LOG, and says how far it is: `count LOG` prints "N of M".
+# On a terminal one line changes in place, elsewhere there is a line every 20 s.
+# usage: with_progress WHAT LOG COUNT_FUNCTION COMMAND...
+with_progress() {
+  local what=$1 log=$2 count=$3 started=$SECONDS shown=$SECONDS far pid status=0
+  shift 3
+  mkdir -p "$(dirname "$log")"
+  # A process group of its own, so that Ctrl-C ends all of it: a shell's background jobs ignore that signal.
+  set -m
+  "$@" >"$log" 2>&1 </dev/null &
+  pid=$!
+  set +m
+  trap 'kill -TERM -- "-$pid" 2>/dev/null; echo; fail "stopped; run it again, it goes on where it was"' INT TERM
+  while kill -0 "$pid" 2>/dev/null; do
+    sleep 0.5
+    if [ -t 1 ]; then
+      far=$("$count" "$log")
+      printf '\r\033[K%s: %s%s s' "$what" "${far:+$far, }" "$((SECONDS - started))"
+    elif [ $((SECONDS - shown)) -ge 20 ]; then
+      shown=$SECONDS
+      far=$("$count" "$log")
+      echo "$what: ${far:+$far, }$((SECONDS - started)) s"
+    fi
+  done
+  wait "$pid" || status=$?
+  trap - INT TERM
+  [ ! -t 1 ] || printf '\r\033[K'
+  return "$status"
+}
+
+# How far a ninja build is, from its log.
+ninja_steps() { sed -n 's/^\[\([0-9]*\)\/\([0-9]*\)\].*/\1 of \2 steps/p' "$1" | tail -n 1; }

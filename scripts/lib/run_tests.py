@@ -3,7 +3,8 @@
 
 Runners: gtest binaries (listed by CMake in gtest_suites.txt, so that one that was not built counts as failed),
 libFuzzer targets where they were built (--fuzzers),
-Python unittest files (test/**/*_test.py), roslaunch-check on every launch file, rostest on test/ros/*.test.
+Python unittest files (test/**/*_test.py), roslaunch-check on every launch file, rostest on test/ros/*.test, and the
+README's first command with all others of the pages in a bare root.
 A runner that starts fewer tests than it has, crashes or runs out of time adds failures. The last line printed is
 `N passed, N failed, N skipped`.
 """
@@ -20,6 +21,8 @@ import sys
 import threading
 import time
 import xml.etree.ElementTree as ElementTree
+
+from bare_root import CannotMake, bare_root
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
 # No runner is near this; it ends one that hangs (a rostest waits for its node), so that the rest still count.
@@ -161,22 +164,59 @@ class PythonRunner:
         # From its own folder, so that unittest takes the file's name for a module and finds the helpers beside it.
         status = run([sys.executable, '-m', 'unittest', '-v', self.path.name], log, {'PYTHONDONTWRITEBYTECODE': '1'},
                      self.path.parent)
-        output = log.read_text(errors='replace')
-        ran = re.search(r'^Ran (\d+) tests? in', output, re.M)
-        if not ran:
-            result.fail('%s did not run' % self.name)
-            return result, log
-        summary = output[ran.end():]
-        counts = {key: int(number) for key, number in re.findall(r'(\w+)=(\d+)', summary)}
-        result.failed = counts.get('failures', 0) + counts.get('errors', 0) + counts.get('successes', 0)
-        result.skipped = counts.get('skipped', 0)
-        result.passed = max(0, int(ran.group(1)) - result.failed - result.skipped)
-        result.notes += ['failed: ' + line for line in re.findall(r'^(?:FAIL|ERROR): (.*)', output, re.M)]
-        result.notes += ['skipped: %s' % line for line in re.findall(r"^(.*skipped '.*)", output, re.M)]
-        if status != 0 and not result.failed:
-            result.fail('%s exited with status %s' % (self.name, status))
-        elif result.passed + result.failed + result.skipped == 0:
-            result.fail('%s holds no test' % self.name)
+        count_unittest(log.read_text(errors='replace'), status, self.name, result)
+        return result, log
+
+
+def count_unittest(output, status, name, result):
+    """Adds what `python3 -m unittest -v` printed."""
+    ran = re.search(r'^Ran (\d+) tests? in', output, re.M)
+    if not ran:
+        result.fail('%s did not run' % name)
+        return
+    counts = {key: int(number) for key, number in re.findall(r'(\w+)=(\d+)', output[ran.end():])}
+    failed = counts.get('failures', 0) + counts.get('errors', 0) + counts.get('successes', 0)
+    skipped = counts.get('skipped', 0)
+    passed = max(0, int(ran.group(1)) - failed - skipped)
+    result.failed += failed
+    result.skipped += skipped
+    result.passed += passed
+    result.notes += ['failed: ' + line for line in re.findall(r'^(?:FAIL|ERROR): (.*)', output, re.M)]
+    result.notes += ['skipped: %s' % line for line in re.findall(r"^(.*skipped '.*)", output, re.M)]
+    if status != 0 and not failed:
+        result.fail('%s exited with status %s' % (name, status))
+    elif passed + failed + skipped == 0:
+        result.fail('%s holds no test' % name)
+
+
+class BareRootRunner:
+    """The README's first command where nothing is installed, and then every command of the pages: what is installed here
+    would hide what a newcomer lacks."""
+    name = 'bare root'
+
+    def __call__(self, logs):
+        result = Result()
+        log = logs / 'bare_root.log'
+        try:
+            with open(log, 'w') as output, bare_root('bookworm') as root:
+                started = time.monotonic()
+                status = root.run('scripts/demo', stdout=output, stderr=subprocess.STDOUT).returncode
+                result.notes.append('scripts/demo took %.0f s, downloads included' % (time.monotonic() - started))
+                if status != 0:
+                    result.fail('scripts/demo ended with status %d in a bare root' % status)
+                    return result, log
+                result.passed += 1
+                # Its own log, and then behind the demo's: what is printed counts what unittest says.
+                pages = logs / 'bare_root_pages.log'
+                with open(pages, 'w') as page_output:
+                    status = root.run('cd test/package && python3 -m unittest -v commands_test.py',
+                                      stdout=page_output, stderr=subprocess.STDOUT).returncode
+                text = pages.read_text(errors='replace')
+                output.write(text)
+                count_unittest(text, status, 'commands_test.py in a bare root', result)
+        except CannotMake as why:
+            result.skipped += 1
+            result.notes.append('skipped: %s' % why)
         return result, log
 
 
@@ -269,7 +309,7 @@ def sanitizer_reports(folder, result):
 
 
 def find_runners(arguments):
-    """All runners, in two lists: those that keep a core busy, and the live ones, which mostly wait."""
+    """All runners, in three lists: those that keep a core busy, the live ones, which mostly wait, and what takes all cores."""
     suites = (arguments.build / 'gtest_suites.txt').read_text().split()
     busy = []
     for suite in suites:
@@ -278,7 +318,7 @@ def find_runners(arguments):
         busy += [GtestRunner(arguments.build / 'gtest' / suite, shard, shards, arguments.filter, arguments.emulator)
                  for shard in range(shards)]
     if arguments.filter or arguments.emulator:
-        return busy, []
+        return busy, [], []
     if arguments.fuzzers:
         busy += [FuzzRunner(arguments.fuzzers / name)
                  for name in (arguments.fuzzers / 'fuzz_targets.txt').read_text().split()]
@@ -286,7 +326,9 @@ def find_runners(arguments):
               if 'ros' not in p.relative_to(CHECKOUT / 'test').parts]
     launch = [LaunchCheckRunner(p) for p in sorted((CHECKOUT / 'launch').rglob('*.launch'))]
     live = [RostestRunner(p) for p in sorted((CHECKOUT / 'test' / 'ros').glob('*.test'))]
-    return busy + python, launch + live
+    # In a bare root there is no root to be made, and a sanitizer looks at nothing that a stranger's build does.
+    inside = os.environ.get('DEFORMABLE_CCD_IN_BARE_ROOT') or os.environ.get('DEFORMABLE_CCD_SANITIZED')
+    return busy + python, launch + live, [] if inside else [BareRootRunner()]
 
 
 def main():
@@ -324,12 +366,14 @@ def main():
             total.failed += result.failed
             total.skipped += result.skipped
 
-    busy, live = [[r for r in group if arguments.only in r.name] for group in find_runners(arguments)]
+    busy, live, alone = [[r for r in group if arguments.only in r.name] for group in find_runners(arguments)]
     # Live tests have deadlines of their own, so only one runs at a time, beside one that computes.
     with concurrent.futures.ThreadPoolExecutor(1) as live_pool, \
             concurrent.futures.ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - (1 if live else 0))) as busy_pool:
         pending = [live_pool.submit(work, r) for r in live] + [busy_pool.submit(work, r) for r in busy]
         concurrent.futures.wait(pending)
+    for runner in alone:
+        work(runner)
     reports = os.environ.get('DEFORMABLE_CCD_SANITIZER_REPORTS')
     if reports:
         found = Result()

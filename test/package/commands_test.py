@@ -1,151 +1,288 @@
 """Every command in README.md and doc/*.md works as it stands there.
 
-Commands are taken from code blocks and from inline code that begins with one of the words below. Each is run, or its options
-are held against the tool's own help, or it is in NOT_RUN with the reason. A command that is none of these fails the test.
+Commands are the lines of code blocks and the inline code that begin with a program. Each is run by a shell that knows no more
+than a user's: it has sourced what the README says to source. A synopsis is held against the tool's own help. What is not run
+is in NOT_RUN with the reason, and a command that nobody knows how to run fails the test. scripts/test runs this file in a bare
+root, too (scripts/lib/bare_root.py), where nothing is installed but what the README's first command installed.
 """
 import os
 import pathlib
 import re
 import shlex
+import shutil
 import subprocess
 import tempfile
+import time
 import unittest
 
 from checkout import CHECKOUT, TOOLS
 from ros_process import SLOW, free_port, stop, wait_for
 
 PAGES = [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md'))
-TOOL_NAMES = {'analyze_bag', 'check_step', 'make_scene_bag', 'replay_step', 'run_queries'}
-WORDS = {'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'cmake', 'catkin_make', 'doxygen', 'git',
-         'apt-get'} | TOOL_NAMES
-# Words of a command -> why it is not run here. A command that begins with them is excused.
+WORKSPACE = TOOLS.parents[2]
+TRACKER = pathlib.Path(__file__).with_name('emulated_tracker.py')
+# Programs that need not be installed here to be known for commands.
+WORDS = {'source', '.', 'cd', 'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'rosmsg', 'roscore', 'cmake',
+         'catkin_make', 'doxygen', 'git', 'apt', 'apt-get', 'sudo', 'dpkg-buildpackage', 'vcs', 'rosdep', 'clang-format',
+         'qemu-x86_64-static'}
+# Words that are programs too, but stand on the pages as what they mean in English or in a file.
+PROSE = {'file', 'test', 'map', 'time', 'at', 'find', 'look', 'of', 'more', 'if', 'for', 'while', 'case', 'then', 'true', 'false',
+         'size', 'head', 'as', 'cut', 'sort', 'split', 'join', 'type', 'who', 'which', 'last', 'read', 'set', 'c++', 'watch', 'bc'}
+# Words that a command begins with -> why it is not run here.
 NOT_RUN = {
-    'scripts/demo': 'installs packages and takes minutes; its parts are run by the scene test and by hand on a fresh machine',
-    'scripts/setup': 'installs packages',
+    'scripts/demo': 'is the first command in the bare root (scripts/lib/run_tests.py)',
+    'scripts/setup': 'installs packages; the demo and the tests call it',
     'scripts/benchmark': 'takes half an hour of a quiet machine',
-    'scripts/test': 'is what runs this test',
+    'scripts/test': 'is what runs this test; --fresh and --long are run by hand',
     'scripts/build': 'was run before this test, or there would be nothing to test',
     'doxygen': 'doxygen_test.py does it, in a folder of its own',
     'cmake -S . -B build-core': 'takes minutes; install_test.py configures it, scripts/test --aarch64 and --long build it',
+    'cmake -G Ninja': 'takes minutes and another compiler',
+    'qemu-x86_64-static': 'takes minutes and an emulator',
+    'catkin_make': 'builds all of it once more; scripts/build is a catkin_make',
+    'git clone': 'needs the place that the reader cloned from',
     'rosbag play --rate-control-topic': "needs the reader's own bag",
 }
 if os.environ.get('DEFORMABLE_CCD_SANITIZED'):
     NOT_RUN['rosrun nodelet'] = "a library built with a sanitizer cannot be loaded by ROS's own program; nodelet.test loads it"
+# What stands for a value of the reader's in a command, and what is put there.
+PLACEHOLDERS = {'FILE': None, 'v,a,b,c': '0,40,41,61', 'v,x,y,z': '0,32768,32768,32768'}
+
+
+def program_of(text):
+    """The program of a command line, or nothing where the text is no command."""
+    words = re.sub(r'^(\w+=\S+\s+)+', '', text).split()
+    if not words:
+        return None
+    first = words[0]
+    if first in WORDS or re.match(r'(scripts|build|examples)/\S+$', first):
+        return first
+    known = re.fullmatch(r'[a-z][\w.+-]*', first) and first not in PROSE and shutil.which(first)
+    return first if known else None
 
 
 def code_of(page):
-    """Commands of a page: lines of code blocks, without comments, and inline code."""
-    fenced, found = False, []
+    """Commands of a page in their order: lines of code blocks without comments, and inline code."""
+    language, found = None, []
     for line in page.read_text().splitlines():
-        if line.lstrip().startswith('```'):
-            fenced = not fenced
-        elif fenced or re.match(r'    +\S', line):
+        fence = re.match(r'\s*```(\w*)', line)
+        if fence:
+            language = None if language is not None else fence.group(1)
+        elif language in ('', 'sh', 'bash', 'shell') or (language is None and re.match(r'    +\S', line)):
             found.append(re.split(r'\s{2,}#|\s#\s', line.strip())[0].strip())
-        else:
-            found += re.findall(r'`([^`]+)`', line)
-    for text in found:
-        first = text.split()[0] if text.split() else ''
-        if re.fullmatch(r'scripts/\w+', first) or (first in WORDS and ' ' in text):
-            yield text
+        elif language is None:
+            found += [text for text in re.findall(r'`([^`]+)`', line) if ' ' in text or text.startswith('scripts/')]
+    return [text for text in found if program_of(text)]
 
 
 def commands():
-    return sorted({text for page in PAGES for text in code_of(page)})
+    return list(dict.fromkeys(text for page in PAGES for text in code_of(page)))
 
 
 def excuse(command):
-    words = command.split()
+    words = re.sub(r'^(\w+=\S+\s+)+', '', command).split()
     return next((why for start, why in NOT_RUN.items() if words[:len(start.split())] == start.split()), None)
+
+
+def synopsis(command):
+    """Whether it shows what can be given instead of being something to type."""
+    return bool(re.search(r'\[--?\w|\bDIR\.\.\.|…|\b(IN|OUT|SCENE|FRAME_0)\b', command))
 
 
 class CommandsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.home = pathlib.Path(cls.folder.name)
-        cls.port = free_port()
-        cls.environment = {**os.environ, 'ROS_MASTER_URI': 'http://localhost:%d' % cls.port, 'ROS_HOSTNAME': 'localhost',
-                           'ROS_HOME': str(cls.home / 'ros'), 'PATH': '%s:%s' % (TOOLS, os.environ['PATH'])}
-        cls.start(['roscore', '-p', str(cls.port)])
-        # The bag of the pages' stories, and a monitor that works on it.
-        subprocess.run(['make_scene_bag', str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(cls.home / 'last_week.bag'),
-                        '--frames', '20'], env=cls.environment, check=True, capture_output=True)
-        wait_for(lambda: cls.run_command('rostopic list').returncode == 0, 30, 'the master')
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        # The reader types in the checkout; what that writes shall not stay there, so that here it is a folder of links.
+        cls.home = pathlib.Path(folder.name)
+        for entry in CHECKOUT.iterdir():
+            (cls.home / entry.name).symlink_to(WORKSPACE if entry.name == 'build' else entry)
+        port = free_port()
+        cls.environment = {'PATH': '/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin', 'HOME': str(cls.home),
+                           'LANG': 'C.UTF-8', 'ROS_MASTER_URI': 'http://localhost:%d' % port, 'ROS_HOSTNAME': 'localhost',
+                           'ROS_HOME': str(cls.home / 'ros')}
+        cls.environment.update({k: v for k, v in os.environ.items() if k.endswith('SAN_OPTIONS')})
+        sourced = re.search(r'^ +(source build/\S+)', (CHECKOUT / 'README.md').read_text(), re.M)
+        cls.source = sourced.group(1) if sourced else 'false'
+        cls.start('roscore -p %d' % port)
+        # The bag of the pages' stories.
+        ran = cls.shell('rosrun deformable_ccd make_scene_bag config/scenes/table_edge.yaml last_week.bag --frames 20')
+        if ran.returncode != 0:
+            raise RuntimeError(ran.stderr)
+        wait_for(lambda: cls.shell('rostopic list').returncode == 0, 30, 'the master')
+        cls.monitor = None
 
     @classmethod
-    def start(cls, words):
-        process = subprocess.Popen(words, env=cls.environment, cwd=cls.home, stdin=subprocess.DEVNULL,
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    def line(cls, command):
+        return ['bash', '-c', 'set -e; %s; set +e; exec 3>&-; %s' % (cls.source, command)]
+
+    @classmethod
+    def start(cls, command):
+        """What runs until it is stopped."""
+        log = open(cls.home / ('%02d.log' % len(list(cls.home.glob('*.log')))), 'w')
+        process = subprocess.Popen(cls.line('exec ' + command), env=cls.environment, cwd=cls.home, stdin=subprocess.DEVNULL,
+                                   stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+        process.log = log.name
         cls.addClassCleanup(stop, process)
         return process
 
     @classmethod
-    def run_command(cls, command, timeout=60):
-        return subprocess.run(shlex.split(command), env=cls.environment, cwd=cls.home, capture_output=True, text=True,
+    def shell(cls, command, timeout=60):
+        return subprocess.run(cls.line(command), env=cls.environment, cwd=cls.home, capture_output=True, text=True,
                               timeout=timeout * SLOW, stdin=subprocess.DEVNULL, check=False)
 
-    def expect_service(self, name):
-        wait_for(lambda: name in self.run_command('rosservice list').stdout, 30, name)
+    def runs(self, command, timeout=300):
+        ran = self.shell(command, timeout)
+        self.assertEqual(ran.returncode, 0, ran.stdout[-2000:] + ran.stderr[-2000:])
+        return ran.stdout
+
+    def test_the_readme_says_what_to_source(self):
+        self.assertNotEqual(self.source, 'false', 'no line "source build/…" in a code block of README.md')
+        self.assertIn('deformable_ccd', self.runs('rospack find deformable_ccd'))
 
     # One method for each kind of command.
-    def run_forever(self, command, topic):
-        """A node or a launch file: it comes up, and its topic is there."""
-        process = self.start(shlex.split(command))
+    def tracker_of(self, command):
+        """The emulated publisher that a launched monitor is meant for."""
+        given = dict(re.findall(r'(\w+):=(\S+)', command))
+        preset = re.search(r'(cdcpd|trackdlo|fabric_simulator|octomap_server)\.launch', command)
+        kind, topic, rows, cols, frame = {
+            'cdcpd': ('cloud', '/cdcpd/output', 20, 20, 'world'), 'trackdlo': ('cloud', '/trackdlo/results_pc', 1, 40, 'world'),
+            'fabric_simulator': ('markers', '/fabric_markers', 8, 8, 'world'),
+            'octomap_server': ('grid', '/mesh', 10, 10, 'map')}.get(preset and preset.group(1), ('grid', '/mesh', 10, 10, 'world'))
+        if 'rows' in given:
+            kind, rows, cols = 'cloud', given['rows'], given['cols']
+        elif given.get('topology') == 'polyline':
+            kind, rows, cols = 'cloud', 1, 40
+        return '/usr/bin/env python3 %s %s %s %s %s %s' % (TRACKER, kind, given.get('mesh', topic), rows, cols,
+                                                           given.get('fixed_frame', frame))
+
+    def answers(self, monitor):
+        """Waits until a monitor has answered a step."""
+        def answered():
+            self.assertIsNone(monitor.poll(), 'it ended: ' + pathlib.Path(monitor.log).read_text()[-2000:])
+            return 'True' in self.shell('timeout 5 rostopic echo -n 1 /collision_monitor/first_contact/answered').stdout
         try:
-            wait_for(lambda: topic in self.run_command('rostopic list').stdout, 30, topic)
-            self.assertIsNone(process.poll(), 'it ended')
+            wait_for(answered, 40, 'an answer')
+        except TimeoutError as late:
+            self.fail('%s\n%s' % (late, pathlib.Path(monitor.log).read_text()[-3000:]))
+
+    def gone(self, topic):
+        wait_for(lambda: topic not in self.shell('rostopic list').stdout.split(), 30, 'the end of ' + topic)
+
+    def run_monitor(self, command):
+        """A node, nodelet or launch file: an emulated tracker sends, and it answers."""
+        self.stop_monitor()
+        tracker, monitor = self.start(self.tracker_of(command)), self.start(command)
+        try:
+            self.answers(monitor)
         finally:
+            stop(monitor)
+            stop(tracker)
+            self.gone('/collision_monitor/clear')
+
+    @classmethod
+    def stop_monitor(cls):
+        for process in cls.monitor or ():
             stop(process)
-            wait_for(lambda: topic not in self.run_command('rostopic list').stdout, 30, 'the end of ' + topic)
+        cls.monitor = None
+
+    def with_a_monitor(self):
+        """The README's own monitor stays for all commands that ask one."""
+        if not type(self).monitor:
+            command = next(c for c in commands() if 'monitor.launch mesh:=' in c and 'rows:=' in c)
+            tracker, maps = self.start(self.tracker_of(command)), self.start('rosbag play -l --quiet last_week.bag --topics /octomap_binary')
+            type(self).monitor = (self.start(command), tracker, maps)
+            self.answers(self.monitor[0])
+
+    def ask(self, command, answers=True):
+        self.with_a_monitor()
+        once = re.sub(r'^rostopic echo(?! -n)', 'timeout 40 rostopic echo -n 1', command)
+        said = self.runs(once, 90)
+        self.assertTrue(said.strip() or not answers)
+
+    def recorded_step(self):
+        self.with_a_monitor()
+        said = self.runs('rosservice call /collision_monitor/record_step')
+        return re.search(r'\S+\.step', said).group(0)
+
+    def run_tool(self, command):
+        """With values for what the page leaves to the reader."""
+        words = []
+        for word in shlex.split(command):
+            kind, _, value = word.rpartition(':')
+            if word == 'FILE':
+                word = self.recorded_step()
+            elif value in PLACEHOLDERS:
+                word = kind + ':' + PLACEHOLDERS[value]
+            words.append(word)
+        self.runs(' '.join(map(shlex.quote, words)))
+        if '--report' in words:
+            self.assertTrue((self.home / words[words.index('--report') + 1] / 'report.html').stat().st_size > 1000)
 
     def hold_against_help(self, command):
-        """A synopsis: the tool knows every option in it."""
-        tool = command.split()[0]
-        text = self.run_command(tool + ' --help').stdout
+        """A synopsis: the tool is there under these words, and knows every option in it."""
+        start = re.match(r'(rosrun \S+ )?\S+', command).group(0)
+        text = self.runs(start + ' --help')
         for option in re.findall(r'(?<![\w-])(--?[a-z][\w-]*)', command):
             self.assertRegex(text, r'(?<![\w-])%s(?![\w-])' % re.escape(option))
 
-    def with_a_monitor(self, command, answers=True):
-        """What asks a running monitor: against one that works on the bag in a loop."""
-        if not hasattr(type(self), 'monitor'):
-            type(self).monitor = self.start(['rosrun', 'deformable_ccd', 'collision_monitor_node', 'mesh:=/cloth',
-                                             'octomap:=/octomap_binary'])
-            self.start(['rosbag', 'play', '-l', '--quiet', 'last_week.bag'])
-            self.expect_service('/collision_monitor/reset')
-        words = shlex.split(command)
-        once = ' '.join(words[:2] + ['-n', '1'] + words[2:]) if words[:2] == ['rostopic', 'echo'] else command
-        ran = self.run_command(once)
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        self.assertTrue(ran.stdout.strip() or not answers)
-
     def one(self, command):
         words = command.split()
-        if words[0] in TOOL_NAMES:
+        if synopsis(command):
             return self.hold_against_help(command)
-        if words[:2] == ['rosrun', 'nodelet'] or words[:2] == ['roslaunch', 'deformable_ccd']:
-            return self.run_forever(command, '/collision_monitor/clear')
+        if words[0] == 'source':
+            return self.runs(command)
+        if words[:2] == ['rosrun', 'nodelet'] or (words[0] == 'roslaunch' and 'demo' not in words[2] and 'replay' not in words[2]):
+            return self.run_monitor(command)
+        if words[:3] == ['rosrun', 'deformable_ccd', 'collision_monitor_node']:
+            return self.run_monitor(command)
+        if words[0] == 'roslaunch':  # brings what it plays
+            if 'bag:=' not in command and not (WORKSPACE / 'demo/table_edge.bag').exists():
+                return self.skipTest('scripts/demo has not been run here')
+            self.stop_monitor()
+            launched = self.start(command)
+            try:
+                return self.answers(launched)
+            finally:
+                stop(launched)
+                self.gone('/collision_monitor/clear')
+                self.shell('rosparam set use_sim_time false')
+        if words[:3] in (['rosrun', 'deformable_ccd', 'stop_the_arm'], ['rosrun', 'deformable_ccd', 'stop_the_arm.py']):
+            self.with_a_monitor()
+            client = self.start(command)
+            try:
+                said = self.runs('timeout 40 rostopic echo -n 1 /stop_the_arm/stop', 60)
+                return self.assertRegex(said, 'data: (True|False)')
+            finally:
+                stop(client)
+                self.gone('/stop_the_arm/stop')
         if words[:2] == ['rosrun', 'dynamic_reconfigure']:
-            return self.with_a_monitor(command, answers=False)
-        if words[:2] == ['rosrun', 'deformable_ccd'] and words[2] in TOOL_NAMES:
-            ran = self.run_command(command, 300)
-            return self.assertEqual(ran.returncode, 0, ran.stderr)
-        if words[:2] == ['rosrun', 'deformable_ccd'] and words[2].startswith('stop_the_arm'):
-            return self.run_forever(command, '/stop_the_arm/stop')
-        if words[:2] == ['rosrun', 'deformable_ccd']:
-            return self.run_forever(command, '/collision_monitor/clear')
-        if words[0] in ('rostopic', 'rosservice'):
-            return self.with_a_monitor(command)
+            return self.ask(command, answers=False)
+        if words[0] in ('rostopic', 'rosservice', 'rosparam', 'rosmsg'):
+            return self.ask(command)
+        if words[:2] == ['rosrun', 'deformable_ccd'] or words[0].startswith('build/devel/lib/deformable_ccd/'):
+            return self.run_tool(command)
         return self.fail('nobody knows how to run this; teach test/package/commands_test.py, or give a reason in NOT_RUN')
 
     def test_every_command_runs(self):
         found = [c for c in commands() if not excuse(c)]
-        self.assertGreater(len(found), 8, 'the search found too little to mean anything')
-        # Those that bring up a monitor first: the last kind keeps one running.
-        last = ('rostopic', 'rosservice', 'rosrun dynamic_reconfigure')
+        self.assertGreater(len(found), 12, 'the search found too little to mean anything')
+        # Those that ask a monitor come last, so that it is started once.
+        last = ('rostopic', 'rosservice', 'rosrun dynamic_reconfigure', 'rosrun deformable_ccd stop', 'rosrun deformable_ccd replay')
         for command in sorted(found, key=lambda c: c.startswith(last)):
+            started = time.monotonic()
             with self.subTest(command):
                 self.one(command)
+            print('%5.1f s  %s' % (time.monotonic() - started, command), flush=True)
+
+    def test_every_preset_answers_its_tracker(self):
+        """With each tracker emulated as it publishes."""
+        presets = sorted(p.name for p in (CHECKOUT / 'launch/presets').glob('*.launch'))
+        self.assertGreaterEqual(len(presets), 4)
+        for preset in presets:
+            with self.subTest(preset):
+                self.run_monitor('roslaunch deformable_ccd ' + preset)
 
     def test_scripts_know_the_options(self):
         for command in commands():

@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""A tracker that is not there: publishes a waving cloth at 30 Hz, as the trackers of launch/presets send theirs.
+
+usage: emulated_tracker.py cloud|grid|markers TOPIC ROWS COLS FRAME
+  cloud    PointCloud2 of height 1, row by row    grid  an organised PointCloud2    markers  a TRIANGLE_LIST in a MarkerArray
+"""
+import math
+import struct
+import sys
+
+import rospy
+from geometry_msgs.msg import Point
+from sensor_msgs.msg import PointCloud2, PointField
+from visualization_msgs.msg import Marker, MarkerArray
+
+
+def points(rows, cols, t):
+    return [(0.02 * c, 0.02 * r, 2.0 + 0.01 * math.sin(6 * t + 0.5 * c)) for r in range(rows) for c in range(cols)]
+
+
+def cloud(rows, cols, t, organised):
+    message = PointCloud2(height=rows if organised else 1, width=cols if organised else rows * cols, point_step=12,
+                          is_dense=True, data=b''.join(struct.pack('<fff', *p) for p in points(rows, cols, t)))
+    message.row_step = 12 * message.width
+    message.fields = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate('xyz')]
+    return message
+
+
+def markers(rows, cols, t):
+    at = [Point(*p) for p in points(rows, cols, t)]
+    marker = Marker(ns='', id=2, type=Marker.TRIANGLE_LIST, action=Marker.ADD)
+    marker.scale.x = marker.scale.y = marker.scale.z = marker.color.a = marker.pose.orientation.w = 1.0
+    for corner in (r * cols + c for r in range(rows - 1) for c in range(cols - 1)):
+        marker.points += [at[corner + i] for i in (0, 1, cols, 1, cols + 1, cols)]
+    return marker
+
+
+def main():
+    kind, topic, rows, cols, frame = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5]
+    rospy.init_node('emulated_tracker', anonymous=True, disable_signals=True)
+    publisher = rospy.Publisher(topic, MarkerArray if kind == 'markers' else PointCloud2, queue_size=3)
+    while not rospy.is_shutdown():
+        now = rospy.Time.now()
+        message = markers(rows, cols, now.to_sec()) if kind == 'markers' else cloud(rows, cols, now.to_sec(), kind == 'grid')
+        message.header.stamp, message.header.frame_id = now, frame
+        publisher.publish(MarkerArray([message]) if kind == 'markers' else message)
+        rospy.sleep(1 / 30)
+
+
+if __name__ == '__main__':
+    main()
