@@ -24,7 +24,7 @@ TRACKER = pathlib.Path(__file__).with_name('emulated_tracker.py')
 # Programs that need not be installed here to be known for commands.
 WORDS = {'source', '.', 'cd', 'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'rosmsg', 'roscore', 'cmake',
          'catkin_make', 'doxygen', 'git', 'apt', 'apt-get', 'sudo', 'dpkg-buildpackage', 'vcs', 'rosdep', 'clang-format',
-         'qemu-x86_64-static'}
+         'qemu-x86_64-static', 'analyze_bag', 'check_step', 'make_scene_bag', 'replay_step', 'run_queries'}
 # Words that are programs too, but stand on the pages as what they mean in English or in a file.
 PROSE = {'file', 'test', 'map', 'time', 'at', 'find', 'look', 'of', 'more', 'if', 'for', 'while', 'case', 'then', 'true', 'false',
          'size', 'head', 'as', 'cut', 'sort', 'split', 'join', 'type', 'who', 'which', 'last', 'read', 'set', 'c++', 'watch', 'bc'}
@@ -115,15 +115,16 @@ class CommandsTest(unittest.TestCase):
 
     @classmethod
     def line(cls, command):
-        return ['bash', '-c', 'set -e; %s; set +e; exec 3>&-; %s' % (cls.source, command)]
+        return ['bash', '-c', 'set -e; %s; set +e; %s' % (cls.source, command)]
 
     @classmethod
     def start(cls, command):
         """What runs until it is stopped."""
-        log = open(cls.home / ('%02d.log' % len(list(cls.home.glob('*.log')))), 'w')
-        process = subprocess.Popen(cls.line('exec ' + command), env=cls.environment, cwd=cls.home, stdin=subprocess.DEVNULL,
-                                   stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
-        process.log = log.name
+        path = cls.home / ('%02d.log' % len(list(cls.home.glob('*.log'))))
+        with open(path, 'w') as log:
+            process = subprocess.Popen(cls.line('exec ' + command), env=cls.environment, cwd=cls.home,
+                                       stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+        process.log = path
         cls.addClassCleanup(stop, process)
         return process
 
@@ -160,15 +161,17 @@ class CommandsTest(unittest.TestCase):
     def answers(self, monitor):
         """Waits until a monitor has answered a step."""
         def answered():
-            self.assertIsNone(monitor.poll(), 'it ended: ' + pathlib.Path(monitor.log).read_text()[-2000:])
+            self.assertIsNone(monitor.poll(), 'it ended: ' + monitor.log.read_text()[-2000:])
             return 'True' in self.shell('timeout 5 rostopic echo -n 1 /collision_monitor/first_contact/answered').stdout
         try:
             wait_for(answered, 40, 'an answer')
         except TimeoutError as late:
-            self.fail('%s\n%s' % (late, pathlib.Path(monitor.log).read_text()[-3000:]))
+            self.fail('%s\n%s' % (late, monitor.log.read_text()[-3000:]))
 
     def gone(self, topic):
+        """A reader's master ends with his roslaunch and takes its parameters along; this one stays."""
         wait_for(lambda: topic not in self.shell('rostopic list').stdout.split(), 30, 'the end of ' + topic)
+        self.shell('rosparam delete /collision_monitor; rosparam delete /use_sim_time')
 
     def run_monitor(self, command):
         """A node, nodelet or launch file: an emulated tracker sends, and it answers."""
@@ -221,7 +224,7 @@ class CommandsTest(unittest.TestCase):
             self.assertTrue((self.home / words[words.index('--report') + 1] / 'report.html').stat().st_size > 1000)
 
     def hold_against_help(self, command):
-        """A synopsis: the tool is there under these words, and knows every option in it."""
+        """A synopsis: the tool is there under the name that rosrun knows, and knows every option in it."""
         start = re.match(r'(rosrun \S+ )?\S+', command).group(0)
         text = self.runs(start + ' --help')
         for option in re.findall(r'(?<![\w-])(--?[a-z][\w-]*)', command):
@@ -247,7 +250,6 @@ class CommandsTest(unittest.TestCase):
             finally:
                 stop(launched)
                 self.gone('/collision_monitor/clear')
-                self.shell('rosparam set use_sim_time false')
         if words[:3] in (['rosrun', 'deformable_ccd', 'stop_the_arm'], ['rosrun', 'deformable_ccd', 'stop_the_arm.py']):
             self.with_a_monitor()
             client = self.start(command)
