@@ -33,26 +33,37 @@ def read_parameters():
     return found - ENTRY_FIELDS
 
 
-def expand(text):
-    """`a/{b, c}` as a/b and a/c."""
-    family = re.fullmatch(r'([\w/]+/)\{(.*)\}', text)
-    return [family.group(1) + name.strip() for name in family.group(2).split(',')] if family else [text]
+def names_of(line):
+    """The parameters of a row, `a/b`, `c` as a/b and a/c; none of a line that is no such row."""
+    found, prefix = [], ''
+    for name in re.findall(r'`([^`]+)`', line.split('|')[1] if line.startswith('| `') else ''):
+        prefix = name[:name.rindex('/') + 1] if '/' in name else prefix
+        found.append(name if '/' in name else prefix + name)
+    return found
+
+
+def numbers_of_bodies():
+    """The parameters of a body that the code reads as a number with a fraction."""
+    source = (ROS / 'monitor_config.cpp').read_text()
+    found = set()
+    for name, body in functions(source[:source.index('void readSeparationPair(')]):
+        found |= {SECTIONS.get(name, '') + parameter for parameter in re.findall(r'\.number\(\s*"(\w+)"', body)}
+    return found
 
 
 def page_parameters():
     table = PAGE[PAGE.index('## Parameters'):]
-    found = set()
-    for line in table[:table.index('Per body')].splitlines():
-        if not line.startswith('| `'):
-            continue
-        prefix = ''
-        for name in re.findall(r'`([^`]+)`', line.split('|')[1]):
-            prefix = name[:name.rindex('/') + 1] if '/' in name else prefix
-            found.add(name if '/' in name else prefix + name)
-    paragraph = table[table.index('Per body'):]
-    for code in re.findall(r'`([^`]+)`', paragraph[paragraph.index(':'):paragraph.index('\n\n')]):
-        found.update(expand(code))
-    return found
+    return {name for line in table[:table.index('**A whole example')].splitlines() for name in names_of(line)}
+
+
+def body_parameters():
+    """Of each row of the table of per-body parameters: the names, and the units, one for all names or one for each."""
+    table = PAGE[PAGE.index('Per body, as'):PAGE.index('**A whole example')]
+    for line in table.splitlines():
+        names = names_of(line)
+        if names:
+            units = line.split(' | ')[2].strip().split(', ')
+            yield from zip(names, units if len(units) > 1 else units * len(names))
 
 
 class InterfaceTest(unittest.TestCase):
@@ -61,8 +72,18 @@ class InterfaceTest(unittest.TestCase):
         self.assertGreater(len(code), 50, 'the search found too little to mean anything')
         sections = {name[:-1] for name in SECTIONS.values()} | {'marker', 'effects', 'bodies', 'live'}
         explained = {'unknown_box'}  # in the row of unknown_space
-        self.assertEqual(code - sections - explained, {name for name in page if not name.startswith('effects/')} -
-                         {'stream', 'static'})
+        self.assertEqual(code - sections - explained, {name for name in page if not name.startswith('effects/')})
+
+    def test_units_of_a_bodys_parameters(self):
+        """Metres are the unit of the names that end in it; what the code reads as a real number, and only that, has one.
+
+        Counts have what they count. The defaults are held by InterfacePage in test/unit/ros/parameters_test.cpp, through the node's own reader."""
+        units = dict(body_parameters())
+        self.assertGreater(len(units), 20, 'the search found too little to mean anything')
+        self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
+        numbers = numbers_of_bodies()
+        self.assertEqual(numbers, {'minimum_separation_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale'})
+        self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):
         source = (CHECKOUT / 'src/detector/effect_plan.cpp').read_text()
