@@ -1,4 +1,4 @@
-"""Every command in README.md and doc/*.md works as it stands there.
+"""Every command in README.md, the pages beside it and doc/*.md works as it stands there.
 
 Commands are taken from code blocks and from inline code that begins with one of the words below. Each is run, or its options
 are held against the tool's own help, or it is in NOT_RUN with the reason. A command that is none of these fails the test.
@@ -9,15 +9,18 @@ import re
 import shlex
 import subprocess
 import tempfile
+import time
 import unittest
+
+import yaml
 
 from checkout import CHECKOUT, TOOLS
 from ros_process import SLOW, free_port, stop, wait_for
 
-PAGES = [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md'))
+PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
 TOOL_NAMES = {'analyze_bag', 'check_step', 'make_scene_bag', 'replay_step', 'run_queries'}
 WORDS = {'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'cmake', 'catkin_make', 'doxygen', 'git',
-         'apt-get'} | TOOL_NAMES
+         'apt-get', 'source', 'echo'} | TOOL_NAMES
 # Words of a command -> why it is not run here. A command that begins with them is excused.
 NOT_RUN = {
     'scripts/demo': 'installs packages and takes minutes; its parts are run by the scene test and by hand on a fresh machine',
@@ -68,14 +71,22 @@ class CommandsTest(unittest.TestCase):
         cls.environment = {**os.environ, 'ROS_MASTER_URI': 'http://localhost:%d' % cls.port, 'ROS_HOSTNAME': 'localhost',
                            'ROS_HOME': str(cls.home / 'ros'), 'PATH': '%s:%s' % (TOOLS, os.environ['PATH'])}
         cls.start(['roscore', '-p', str(cls.port)])
-        # The bag of the pages' stories, and a monitor that works on it.
-        subprocess.run(['make_scene_bag', str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(cls.home / 'last_week.bag'),
-                        '--frames', '20'], env=cls.environment, check=True, capture_output=True)
+        # The bag of the pages' stories: the demo's cloth as a tracker would send it, 20 x 30 points row by row.
+        scene = yaml.safe_load((CHECKOUT / 'config/scenes/table_edge.yaml').read_text())
+        scene['bodies'][0]['topic'] = scene['monitor']['bodies']['cloth']['topic'] = '/tracker/cloth'
+        scene['bodies'][0]['sheet'].update(rows=20, cols=30)
+        (cls.home / 'tracked.yaml').write_text(yaml.safe_dump(scene))
+        subprocess.run(['make_scene_bag', 'tracked.yaml', 'last_week.bag', '--frames', '20', '--output',
+                        'point_cloud_grid'], env=cls.environment, cwd=cls.home, check=True, capture_output=True)
+        # Files that a page shows under a name, to be saved as that.
+        for page in PAGES:
+            for name, block in re.findall(r'As\s`([\w.]+)`:\n\n```\w*\n(.*?)```', page.read_text(), re.S):
+                (cls.home / name).write_text(block)
         wait_for(lambda: cls.run_command('rostopic list').returncode == 0, 30, 'the master')
 
     @classmethod
-    def start(cls, words):
-        process = subprocess.Popen(words, env=cls.environment, cwd=cls.home, stdin=subprocess.DEVNULL,
+    def start(cls, words, folder=None):
+        process = subprocess.Popen(words, env=cls.environment, cwd=folder or cls.home, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
         cls.addClassCleanup(stop, process)
         return process
@@ -89,6 +100,33 @@ class CommandsTest(unittest.TestCase):
         wait_for(lambda: name in self.run_command('rosservice list').stdout, 30, name)
 
     # One method for each kind of command.
+    def in_a_shell(self, command):
+        """A line for a shell: sourcing, after which ROS knows the package, or a file that is written."""
+        words = shlex.split(command)
+        workspace = str(TOOLS.parents[1].parent / 'devel/setup.bash')
+        line = command.replace('build/devel/setup.bash', workspace)
+        check = 'rospack find deformable_ccd' if words[0] == 'source' else 'test -s ' + words[-1]
+        ran = subprocess.run(['bash', '-e', '-c', line + '\n' + check], cwd=self.home, capture_output=True, text=True,
+                             timeout=60 * SLOW, env={**self.environment, 'ROS_PACKAGE_PATH': ''}, check=False)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def record(self, command):
+        """In a folder of its own, from the bag that plays in a loop; Ctrl-C ends it."""
+        self.start_monitor()
+        folder = self.home / 'recorded'
+        folder.mkdir()
+        words = shlex.split(command)
+        bag = folder / words[words.index('-O') + 1]
+        process = self.start(words, folder)
+        try:
+            wait_for(lambda: bag.with_suffix('.bag.active').exists(), 30, 'the recording')
+            time.sleep(3 * SLOW)
+        finally:
+            stop(process)
+        recorded = self.run_command('rosbag info -y -k topics %s' % bag)
+        topics = [entry['topic'] for entry in yaml.safe_load(recorded.stdout) or []]
+        self.assertIn('/tracker/cloth', topics, recorded.stderr)
+
     def run_forever(self, command, topic):
         """A node or a launch file: it comes up, and its topic is there."""
         process = self.start(shlex.split(command))
@@ -106,13 +144,17 @@ class CommandsTest(unittest.TestCase):
         for option in re.findall(r'(?<![\w-])(--?[a-z][\w-]*)', command):
             self.assertRegex(text, r'(?<![\w-])%s(?![\w-])' % re.escape(option))
 
-    def with_a_monitor(self, command, answers=True):
-        """What asks a running monitor: against one that works on the bag in a loop."""
+    def start_monitor(self):
+        """As the README starts it, on the bag in a loop; it stays."""
         if not hasattr(type(self), 'monitor'):
-            type(self).monitor = self.start(['rosrun', 'deformable_ccd', 'collision_monitor_node', 'mesh:=/cloth',
-                                             'octomap:=/octomap_binary'])
+            type(self).monitor = self.start(['roslaunch', 'deformable_ccd', 'monitor.launch', 'mesh:=/tracker/cloth',
+                                             'rows:=20', 'cols:=30', 'octomap:=/octomap_binary'])
             self.start(['rosbag', 'play', '-l', '--quiet', 'last_week.bag'])
             self.expect_service('/collision_monitor/reset')
+
+    def with_a_monitor(self, command, answers=True):
+        """What asks a running monitor: against one that works on the bag in a loop."""
+        self.start_monitor()
         words = shlex.split(command)
         once = ' '.join(words[:2] + ['-n', '1'] + words[2:]) if words[:2] == ['rostopic', 'echo'] else command
         ran = self.run_command(once)
@@ -127,9 +169,15 @@ class CommandsTest(unittest.TestCase):
             return self.run_forever(command, '/collision_monitor/clear')
         if words[:2] == ['rosrun', 'dynamic_reconfigure']:
             return self.with_a_monitor(command, answers=False)
-        if words[:2] == ['rosrun', 'deformable_ccd'] and words[2] in TOOL_NAMES:
+        if words[0] in ('source', 'echo'):
+            return self.in_a_shell(command)
+        if words[:2] == ['rosbag', 'record']:
+            return self.record(command)
+        if words[:3] == ['rosrun', 'deformable_ccd', 'analyze_bag']:
             ran = self.run_command(command, 300)
-            return self.assertEqual(ran.returncode, 0, ran.stderr)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            self.assertRegex(ran.stdout, '^First contact ', 'frames without an answer only')
+            return self.assertTrue((self.home / 'report/report.html').exists())
         if words[:2] == ['rosrun', 'deformable_ccd'] and words[2].startswith('stop_the_arm'):
             return self.run_forever(command, '/stop_the_arm/stop')
         if words[:2] == ['rosrun', 'deformable_ccd']:
@@ -141,9 +189,10 @@ class CommandsTest(unittest.TestCase):
     def test_every_command_runs(self):
         found = [c for c in commands() if not excuse(c)]
         self.assertGreater(len(found), 8, 'the search found too little to mean anything')
-        # Those that bring up a monitor first: the last kind keeps one running.
-        last = ('rostopic', 'rosservice', 'rosrun dynamic_reconfigure')
-        for command in sorted(found, key=lambda c: c.startswith(last)):
+        # First what writes files for others; then what brings up a monitor, since the last kind keeps one running.
+        first = ('echo', 'source')
+        last = ('rostopic', 'rosservice', 'rosrun dynamic_reconfigure', 'rosbag record')
+        for command in sorted(found, key=lambda c: (not c.startswith(first), c.startswith(last))):
             with self.subTest(command):
                 self.one(command)
 
