@@ -5,6 +5,7 @@ import unittest
 from checkout import CHECKOUT
 
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
+ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
 ROS = CHECKOUT / 'src/ros'
 READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|section)\(\s*"(\w+)"')
 # What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
@@ -75,9 +76,9 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual(code - sections - explained, {name for name in page if not name.startswith('effects/')})
 
     def test_units_of_a_bodys_parameters(self):
-        """Metres are the unit of the names that end in it; what the code reads as a real number, and only that, has one.
+        """Metres where a name says so; what the code reads as a real number, and only that, has metres or metres per unit.
 
-        Counts have what they count. The defaults are held by InterfacePage in test/unit/ros/parameters_test.cpp, through the node's own reader."""
+        InterfacePage in test/unit/ros/parameters_test.cpp holds the defaults, through the node's own reader."""
         units = dict(body_parameters())
         self.assertGreater(len(units), 20, 'the search found too little to mean anything')
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
@@ -133,9 +134,36 @@ class InterfaceTest(unittest.TestCase):
         self.assertLessEqual(names, read_parameters() | {'effects', 'markers'})
 
 
+class GlossaryTest(unittest.TestCase):
+    PAGES = [page for page in ALL_PAGES if page.stem != 'glossary']
+
+    def setUp(self):
+        rows = re.findall(r'(?m)^\| \*\*(.+?)\*\* \| (.+) \|$', (CHECKOUT / 'doc/glossary.md').read_text())
+        self.words = [word for word, _ in rows]
+        self.lines = dict(rows)
+
+    def test_words_stand_once_and_in_order(self):
+        self.assertEqual(self.words, sorted(set(self.words), key=str.lower))
+        wanted = {'step', 'frame', 'record', 'cluster', 'TOC', 'initial', 'undecided', 'start state', 'rung', 'tier'}
+        self.assertEqual(wanted - set(self.words), set())
+
+    def test_words_are_those_of_the_pages(self):
+        text = re.sub(r'[\s_-]+', ' ', ' '.join(page.read_text() for page in self.PAGES)).lower()
+        spoken = [part.replace('-', ' ').lower() for word in self.words for part in word.split(', ')]
+        self.assertEqual([word for word in spoken if word not in text], [])
+
+    def test_references_have_a_line_of_their_own(self):
+        known = {part for word in self.words for part in word.split(', ')}
+        for word, line in self.lines.items():
+            for reference in re.findall(r'(?<!\*)\*([^*]+)\*(?!\*)', line):
+                forms = {reference, re.sub("('s|s)$", '', reference), re.sub('es$', 'e', reference)}
+                with self.subTest('%s: %s' % (word, reference)):
+                    self.assertTrue(forms & known)
+
+
 class LinksTest(unittest.TestCase):
     def test_no_link_is_dead(self):
-        pages = [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md'))
+        pages = ALL_PAGES
         count = 0
         for page in pages:
             for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text()):
@@ -154,7 +182,7 @@ class LinksTest(unittest.TestCase):
 
     def test_files_that_pages_name_exist(self):
         """`src/…`, `test/…` and the like, in the pages' code words."""
-        for page in [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md')):
+        for page in ALL_PAGES:
             for name in re.findall(r'`((?:src|test|include|config|launch|examples|scripts|doc|benchmark|msg|cmake)/[\w./-]*)`',
                                    page.read_text()):
                 with self.subTest('%s: %s' % (page.name, name)):
