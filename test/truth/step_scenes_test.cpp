@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(Truth, StepScenes, testing::Values("cloth-ball", "n-bod
   return name;
 });
 
-// --- times of contact that others found symbolically ---------------------------------------------------------------------
+// --- times of contact that others found symbolically -----------------------------------------------------------------
 
 /// What `decimal` stands for, exactly: digits, or digits, a point and digits.
 Rational rationalOf(const std::string& decimal) {

@@ -244,7 +244,7 @@ TEST(Parameters, YamlReadsAsTheParameterServerWould) {
   EXPECT_THROW(readYaml(file), ParameterError);
 }
 
-// --- doc/interface.md --------------------------------------------------------------------------------------------------
+// --- doc/interface.md ------------------------------------------------------------------------------------------------
 
 std::string interfacePage() {
   std::ifstream in(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/doc/interface.md");
@@ -293,8 +293,8 @@ std::string shown(double value) {
 }
 std::string shown(std::size_t value) { return std::to_string(value); }
 
-/// The defaults that the code gives a body of a list with nothing set. Of rigid/mesh and rigid/frame there is none: they
-/// are needed, as the test below sees.
+/// The defaults that the code gives a body of a list with nothing set. Of rigid/mesh and rigid/frame there is none:
+/// they are needed, as the test below sees.
 std::map<std::string, std::string> defaultsInTheCode() {
   XmlRpcValue tree;
   tree["bodies"]["NAME"]["weld"] = "on";  // XML-RPC has no empty section; the default is that of `single`
