@@ -2,6 +2,7 @@
 # scripts/ serve the checkout and are no part of the installed package.
 #catkin_lint: ignore uninstalled_script
 include(GNUInstallDirs)
+list(SORT TOOL_TARGETS)
 set(LIBRARY_TARGETS deformable_ccd)
 foreach(library deformable_ccd_octomap deformable_ccd_ros)
   if(TARGET ${library})
@@ -19,7 +20,7 @@ if(DEFORMABLE_CCD_CORE_ONLY)
   write_basic_package_version_file(${PROJECT_NAME}-config-version.cmake COMPATIBILITY SameMinorVersion)
   # Generated here, and no catkin package's.
   #catkin_lint: ignore_once missing_file wrong_install_destination
-  install(FILES cmake/${PROJECT_NAME}-config.cmake ${CMAKE_CURRENT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake cmake/${PROJECT_NAME}-config.cmake
     DESTINATION ${CONFIG_DIR})
   return()
 endif()
@@ -36,7 +37,7 @@ endif()
 install(DIRECTORY ${TRUE_SOURCE_DIR}/include/ DESTINATION ${CATKIN_GLOBAL_INCLUDE_DESTINATION}
   FILES_MATCHING PATTERN "*.h")
 #catkin_lint: ignore_once missing_directory external_directory
-install(DIRECTORY ${TRUE_SOURCE_DIR}/launch ${TRUE_SOURCE_DIR}/config ${TRUE_SOURCE_DIR}/examples
+install(DIRECTORY ${TRUE_SOURCE_DIR}/config ${TRUE_SOURCE_DIR}/examples ${TRUE_SOURCE_DIR}/launch
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 #catkin_lint: ignore_once missing_file external_file
 install(FILES ${TRUE_SOURCE_DIR}/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

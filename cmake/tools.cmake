@@ -12,7 +12,7 @@ target_link_libraries(deformable_ccd_oracle PUBLIC deformable_ccd ${GMP_LIBRARY}
 
 set(CORE_TOOLS run_queries replay_step)
 foreach(tool ${CORE_TOOLS})
-  if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/src/apps/${tool}.cpp)
+  if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/src/apps/${tool}.cpp")
     add_executable(${tool} src/apps/${tool}.cpp)
     target_include_directories(${tool} PRIVATE src)
     target_link_libraries(${tool} deformable_ccd_oracle deformable_ccd CLI11::CLI11 nlohmann_json::nlohmann_json)

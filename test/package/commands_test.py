@@ -1,4 +1,4 @@
-"""Every command in README.md and doc/*.md works as it stands there.
+"""Every command in README.md, the pages beside it and doc/*.md works as it stands there.
 
 Commands are the lines of code blocks and the inline code that begin with a program. Each is run by a shell that knows no more
 than a user's: it has sourced what the README says to source. A synopsis is held against the tool's own help. What is not run
@@ -15,14 +15,16 @@ import tempfile
 import time
 import unittest
 
+import yaml
+
 from checkout import CHECKOUT, TOOLS
 from ros_process import SLOW, free_port, stop, wait_for
 
-PAGES = [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md'))
+PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
 WORKSPACE = TOOLS.parents[2]
 TRACKER = pathlib.Path(__file__).with_name('emulated_tracker.py')
 # Programs that need not be installed here to be known for commands.
-WORDS = {'source', '.', 'cd', 'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'rosmsg', 'roscore', 'cmake',
+WORDS = {'source', '.', 'cd', 'echo', 'roslaunch', 'rosrun', 'rostopic', 'rosservice', 'rosbag', 'rosparam', 'rosmsg', 'roscore', 'cmake',
          'catkin_make', 'doxygen', 'git', 'apt', 'apt-get', 'sudo', 'dpkg-buildpackage', 'vcs', 'rosdep', 'clang-format',
          'qemu-x86_64-static', 'analyze_bag', 'check_step', 'make_scene_bag', 'replay_step', 'run_queries'}
 # Words that are programs too, but stand on the pages as what they mean in English or in a file.
@@ -86,7 +88,7 @@ def excuse(command):
 
 def synopsis(command):
     """Whether it shows what can be given instead of being something to type."""
-    return bool(re.search(r'\[--?\w|\bDIR\.\.\.|…|\b(IN|OUT|SCENE|FRAME_0)\b', command))
+    return bool(re.search(r'\[--?\w|\bDIR\b|…|\b(IN|OUT|SCENE|FRAME_0)\b', command))
 
 
 class CommandsTest(unittest.TestCase):
@@ -106,10 +108,18 @@ class CommandsTest(unittest.TestCase):
         sourced = re.search(r'^ +(source build/\S+)', (CHECKOUT / 'README.md').read_text(), re.M)
         cls.source = sourced.group(1) if sourced else 'false'
         cls.start('roscore -p %d' % port)
-        # The bag of the pages' stories.
-        ran = cls.shell('rosrun deformable_ccd make_scene_bag config/scenes/table_edge.yaml last_week.bag --frames 20')
+        # The bag of the pages' stories: the demo's cloth as a tracker would send it, 20 x 30 points row by row.
+        scene = yaml.safe_load((CHECKOUT / 'config/scenes/table_edge.yaml').read_text())
+        scene['bodies'][0]['topic'] = scene['monitor']['bodies']['cloth']['topic'] = '/tracker/cloth'
+        scene['bodies'][0]['sheet'].update(rows=20, cols=30)
+        (cls.home / 'tracked.yaml').write_text(yaml.safe_dump(scene))
+        ran = cls.shell('rosrun deformable_ccd make_scene_bag tracked.yaml last_week.bag --output point_cloud_grid')
         if ran.returncode != 0:
             raise RuntimeError(ran.stderr)
+        # Files that a page shows under a name, to be saved as that.
+        for page in PAGES:
+            for name, block in re.findall(r'As\s`([\w.]+)`:\n\n```\w*\n(.*?)```', page.read_text(), re.S):
+                (cls.home / name).write_text(block)
         wait_for(lambda: cls.shell('rostopic list').returncode == 0, 30, 'the master')
         cls.monitor = None
 
@@ -204,6 +214,21 @@ class CommandsTest(unittest.TestCase):
         said = self.runs(once, 90)
         self.assertTrue(said.strip() or not answers)
 
+    def record(self, command):
+        """Ctrl-C ends it. The bag of the pages' stories is another one from then on."""
+        self.with_a_monitor()
+        bag = self.home / re.search(r'-O (\S+)', command).group(1)
+        kept = bag.rename(bag.with_suffix('.kept'))
+        process = self.start(command)
+        try:
+            wait_for(lambda: bag.with_suffix('.bag.active').exists(), 30, 'the recording')
+            time.sleep(3 * SLOW)
+        finally:
+            stop(process)
+        topics = yaml.safe_load(self.runs('rosbag info -y -k topics ' + bag.name))
+        kept.rename(bag)
+        self.assertLessEqual({'/tracker/cloth', '/octomap_binary'}, {entry['topic'] for entry in topics})
+
     def recorded_step(self):
         self.with_a_monitor()
         said = self.runs('rosservice call /collision_monitor/record_step')
@@ -219,8 +244,9 @@ class CommandsTest(unittest.TestCase):
             elif value in PLACEHOLDERS:
                 word = kind + ':' + PLACEHOLDERS[value]
             words.append(word)
-        self.runs(' '.join(map(shlex.quote, words)))
+        said = self.runs(' '.join(map(shlex.quote, words)))
         if '--report' in words:
+            self.assertRegex(said, '(?m)^First contact ', 'frames without an answer only')
             self.assertTrue((self.home / words[words.index('--report') + 1] / 'report.html').stat().st_size > 1000)
 
     def hold_against_help(self, command):
@@ -236,6 +262,11 @@ class CommandsTest(unittest.TestCase):
             return self.hold_against_help(command)
         if words[0] == 'source':
             return self.runs(command)
+        if words[0] == 'echo':
+            self.runs(command)
+            return self.assertTrue((self.home / words[-1]).read_text())
+        if words[:2] == ['rosbag', 'record']:
+            return self.record(command)
         if words[:2] == ['rosrun', 'nodelet'] or (words[0] == 'roslaunch' and 'demo' not in words[2] and 'replay' not in words[2]):
             return self.run_monitor(command)
         if words[:3] == ['rosrun', 'deformable_ccd', 'collision_monitor_node']:
@@ -270,9 +301,10 @@ class CommandsTest(unittest.TestCase):
     def test_every_command_runs(self):
         found = [c for c in commands() if not excuse(c)]
         self.assertGreater(len(found), 12, 'the search found too little to mean anything')
-        # Those that ask a monitor come last, so that it is started once.
-        last = ('rostopic', 'rosservice', 'rosrun dynamic_reconfigure', 'rosrun deformable_ccd stop', 'rosrun deformable_ccd replay')
-        for command in sorted(found, key=lambda c: c.startswith(last)):
+        # First what writes files for others; those that ask a monitor come last, so that it is started once.
+        first = ('echo', 'source')
+        last = ('rosbag record', 'rostopic', 'rosservice', 'rosrun dynamic_reconfigure', 'rosrun deformable_ccd stop', 'rosrun deformable_ccd replay')
+        for command in sorted(found, key=lambda c: (not c.startswith(first), c.startswith(last))):
             started = time.monotonic()
             with self.subTest(command):
                 self.one(command)

@@ -5,6 +5,7 @@ import unittest
 from checkout import CHECKOUT
 
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
+ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
 ROS = CHECKOUT / 'src/ros'
 READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|section)\(\s*"(\w+)"')
 # What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
@@ -33,26 +34,37 @@ def read_parameters():
     return found - ENTRY_FIELDS
 
 
-def expand(text):
-    """`a/{b, c}` as a/b and a/c."""
-    family = re.fullmatch(r'([\w/]+/)\{(.*)\}', text)
-    return [family.group(1) + name.strip() for name in family.group(2).split(',')] if family else [text]
+def names_of(line):
+    """The parameters of a row, `a/b`, `c` as a/b and a/c; none of a line that is no such row."""
+    found, prefix = [], ''
+    for name in re.findall(r'`([^`]+)`', line.split('|')[1] if line.startswith('| `') else ''):
+        prefix = name[:name.rindex('/') + 1] if '/' in name else prefix
+        found.append(name if '/' in name else prefix + name)
+    return found
+
+
+def numbers_of_bodies():
+    """The parameters of a body that the code reads as a number with a fraction."""
+    source = (ROS / 'monitor_config.cpp').read_text()
+    found = set()
+    for name, body in functions(source[:source.index('void readSeparationPair(')]):
+        found |= {SECTIONS.get(name, '') + parameter for parameter in re.findall(r'\.number\(\s*"(\w+)"', body)}
+    return found
 
 
 def page_parameters():
     table = PAGE[PAGE.index('## Parameters'):]
-    found = set()
-    for line in table[:table.index('Per body')].splitlines():
-        if not line.startswith('| `'):
-            continue
-        prefix = ''
-        for name in re.findall(r'`([^`]+)`', line.split('|')[1]):
-            prefix = name[:name.rindex('/') + 1] if '/' in name else prefix
-            found.add(name if '/' in name else prefix + name)
-    paragraph = table[table.index('Per body'):]
-    for code in re.findall(r'`([^`]+)`', paragraph[paragraph.index(':'):paragraph.index('\n\n')]):
-        found.update(expand(code))
-    return found
+    return {name for line in table[:table.index('**A whole example')].splitlines() for name in names_of(line)}
+
+
+def body_parameters():
+    """Of each row of the table of per-body parameters: the names, and the units, one for all names or one for each."""
+    table = PAGE[PAGE.index('Per body, as'):PAGE.index('**A whole example')]
+    for line in table.splitlines():
+        names = names_of(line)
+        if names:
+            units = line.split(' | ')[2].strip().split(', ')
+            yield from zip(names, units if len(units) > 1 else units * len(names))
 
 
 class InterfaceTest(unittest.TestCase):
@@ -61,8 +73,18 @@ class InterfaceTest(unittest.TestCase):
         self.assertGreater(len(code), 50, 'the search found too little to mean anything')
         sections = {name[:-1] for name in SECTIONS.values()} | {'marker', 'effects', 'bodies', 'live'}
         explained = {'unknown_box'}  # in the row of unknown_space
-        self.assertEqual(code - sections - explained, {name for name in page if not name.startswith('effects/')} -
-                         {'stream', 'static'})
+        self.assertEqual(code - sections - explained, {name for name in page if not name.startswith('effects/')})
+
+    def test_units_of_a_bodys_parameters(self):
+        """Metres where a name says so; what the code reads as a real number, and only that, has metres or metres per unit.
+
+        InterfacePage in test/unit/ros/parameters_test.cpp holds the defaults, through the node's own reader."""
+        units = dict(body_parameters())
+        self.assertGreater(len(units), 20, 'the search found too little to mean anything')
+        self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
+        numbers = numbers_of_bodies()
+        self.assertEqual(numbers, {'minimum_separation_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale'})
+        self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):
         source = (CHECKOUT / 'src/detector/effect_plan.cpp').read_text()
@@ -112,9 +134,36 @@ class InterfaceTest(unittest.TestCase):
         self.assertLessEqual(names, read_parameters() | {'effects', 'markers'})
 
 
+class GlossaryTest(unittest.TestCase):
+    PAGES = [page for page in ALL_PAGES if page.stem != 'glossary']
+
+    def setUp(self):
+        rows = re.findall(r'(?m)^\| \*\*(.+?)\*\* \| (.+) \|$', (CHECKOUT / 'doc/glossary.md').read_text())
+        self.words = [word for word, _ in rows]
+        self.lines = dict(rows)
+
+    def test_words_stand_once_and_in_order(self):
+        self.assertEqual(self.words, sorted(set(self.words), key=str.lower))
+        wanted = {'step', 'frame', 'record', 'cluster', 'TOC', 'initial', 'undecided', 'start state', 'rung', 'tier'}
+        self.assertEqual(wanted - set(self.words), set())
+
+    def test_words_are_those_of_the_pages(self):
+        text = re.sub(r'[\s_-]+', ' ', ' '.join(page.read_text() for page in self.PAGES)).lower()
+        spoken = [part.replace('-', ' ').lower() for word in self.words for part in word.split(', ')]
+        self.assertEqual([word for word in spoken if word not in text], [])
+
+    def test_references_have_a_line_of_their_own(self):
+        known = {part for word in self.words for part in word.split(', ')}
+        for word, line in self.lines.items():
+            for reference in re.findall(r'(?<!\*)\*([^*]+)\*(?!\*)', line):
+                forms = {reference, re.sub("('s|s)$", '', reference), re.sub('es$', 'e', reference)}
+                with self.subTest('%s: %s' % (word, reference)):
+                    self.assertTrue(forms & known)
+
+
 class LinksTest(unittest.TestCase):
     def test_no_link_is_dead(self):
-        pages = [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md'))
+        pages = ALL_PAGES
         count = 0
         for page in pages:
             for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text()):
@@ -133,7 +182,7 @@ class LinksTest(unittest.TestCase):
 
     def test_files_that_pages_name_exist(self):
         """`src/…`, `test/…` and the like, in the pages' code words."""
-        for page in [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md')):
+        for page in ALL_PAGES:
             for name in re.findall(r'`((?:src|test|include|config|launch|examples|scripts|doc|benchmark|msg|cmake)/[\w./-]*)`',
                                    page.read_text()):
                 with self.subTest('%s: %s' % (page.name, name)):

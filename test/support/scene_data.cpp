@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
+#include <functional>
+#include <regex>
 #include <sstream>
 #include <stdexcept>
 
@@ -56,6 +58,23 @@ T decode(const char* bytes, bool big_endian) {
   return value;
 }
 
+/// Hands each line of a gzipped text to `read`, but for comments and empty ones; `read` says whether it is `expected`.
+void forEachLine(const std::string& path, const std::string& expected, const std::function<bool(std::istream&)>& read) {
+  gzFile file = gzopen(path.c_str(), "rb");
+  if (file == nullptr) fail(path, "cannot be opened");
+  char line[256];
+  std::size_t number = 0;
+  bool good = true;
+  while (good && gzgets(file, line, sizeof line) != nullptr) {
+    ++number;
+    if (line[0] == '#' || line[0] == '\n') continue;
+    std::istringstream words(line);
+    good = read(words);
+  }
+  gzclose(file);
+  if (!good) fail(path, "line " + std::to_string(number) + " is not " + expected);
+}
+
 }  // namespace
 
 PlyMesh readPly(const std::string& path) {
@@ -80,25 +99,28 @@ PlyMesh readPly(const std::string& path) {
 }
 
 std::vector<TruthPair> readTruthPairs(const std::string& path) {
-  gzFile file = gzopen(path.c_str(), "rb");
-  if (file == nullptr) fail(path, "cannot be opened");
   std::vector<TruthPair> pairs;
-  char line[256];
-  std::size_t number = 0;
-  bool good = true;
-  while (good && gzgets(file, line, sizeof line) != nullptr) {
-    ++number;
-    if (line[0] == '#' || line[0] == '\n') continue;
-    std::istringstream words(line);
+  forEachLine(path, "four indices and a verdict", [&](std::istream& words) {
     TruthPair pair{};
     for (Index& index : pair.pair) words >> index;
     words >> pair.contact;
-    good = !words.fail();
     pairs.push_back(pair);
-  }
-  gzclose(file);
-  if (!good) fail(path, "line " + std::to_string(number) + " is not four indices and a verdict");
+    return !words.fail();
+  });
   return pairs;
+}
+
+std::vector<TruthTime> readTruthTimes(const std::string& path) {
+  std::vector<TruthTime> times;
+  forEachLine(path, "four indices and a time from 0 to 1 in decimal digits", [&](std::istream& words) {
+    TruthTime time{};
+    for (Index& index : time.pair) words >> index;
+    words >> time.decimal;
+    times.push_back(time);
+    static const std::regex WITHIN_THE_STEP("0(\\.[0-9]+)?|1(\\.0+)?");
+    return !words.fail() && std::regex_match(time.decimal, WITHIN_THE_STEP);
+  });
+  return times;
 }
 
 SceneData readScene(const std::string& name) {

@@ -28,6 +28,15 @@ struct TruthPair {
 /// Reads vf.txt.gz or ee.txt.gz. Throws std::runtime_error naming the file (and the line).
 std::vector<TruthPair> readTruthPairs(const std::string& path);
 
+/// A pair in contact and its time of contact, found symbolically by others.
+struct TruthTime {
+  Quad pair;            ///< as in PairBatch
+  std::string decimal;  ///< share of the step, 0 to 1, in decimal digits without an exponent
+};
+
+/// Reads toc_vf.txt.gz. Throws std::runtime_error naming the file (and the line).
+std::vector<TruthTime> readTruthTimes(const std::string& path);
+
 struct SceneData {
   std::vector<VertexMotion> vertices;
   std::vector<Face> faces;

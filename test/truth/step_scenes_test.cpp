@@ -3,6 +3,8 @@
 #include <hwy/aligned_allocator.h>
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <map>
 #include <numeric>
 #include <set>
@@ -12,6 +14,7 @@
 #include "io/query_file.h"
 #include "simd/cluster_kernels.h"
 #include "simd/fused_filter.h"
+#include "support/algebraic.h"
 #include "support/data.h"
 #include "support/scene_data.h"
 #include "support/step_support.h"
@@ -142,6 +145,111 @@ INSTANTIATE_TEST_SUITE_P(Truth, StepScenes, testing::Values("cloth-ball", "n-bod
   name.erase(std::remove(name.begin(), name.end(), '-'), name.end());
   return name;
 });
+
+// --- times of contact that others found symbolically -----------------------------------------------------------------
+
+/// What `decimal` stands for, exactly: digits, or digits, a point and digits.
+Rational rationalOf(const std::string& decimal) {
+  const std::size_t point = std::min(decimal.find('.'), decimal.size());
+  std::string digits = decimal.substr(0, point);
+  const std::string fraction = decimal.substr(std::min(point + 1, decimal.size()));
+  digits += fraction;
+  digits.erase(0, std::min(digits.find_first_not_of('0'), digits.size() - 1));  // a leading zero would mean octal
+  return Rational(Integer(digits), pow(Integer(10), static_cast<unsigned>(fraction.size())));
+}
+
+/// The cells that hold given times, and how many of the contacts found lie in theirs.
+class ContactTimes {
+ public:
+  explicit ContactTimes(const std::vector<TruthTime>& times) {
+    for (const TruthTime& time : times) {
+      const Rational t = rationalOf(time.decimal);
+      const Integer finest = numerator(t) * (Integer(1) << FINEST) / denominator(t);  // not negative: rounded down
+      finest_[canonical(PairKind::VERTEX_FACE, time.pair)] = static_cast<std::int64_t>(finest);
+    }
+  }
+  std::size_t size() const { return finest_.size(); }
+
+  struct Tally {
+    std::size_t compared = 0;  ///< contacts whose time is known
+    std::size_t in_cell = 0;   ///< of those, the ones whose interval is the cell of 2^-bits that holds it
+    std::size_t beside = 0;    ///< the ones whose interval is that of a neighbouring cell
+  };
+  Tally compare(const std::vector<core::Contact>& contacts, int bits) const {
+    Tally tally;
+    const double width = std::ldexp(1.0, -bits);
+    for (const core::Contact& contact : contacts) {
+      const auto known = finest_.find(canonical(contact.kind, contact.vertex));
+      if (known == finest_.end()) continue;
+      ++tally.compared;
+      const auto isCell = [&](std::int64_t cell) {
+        const double lower = static_cast<double>(cell) * width;  // exact: at most 52 bits
+        return contact.toc_lower == lower && contact.toc_upper == std::min(1.0, lower + width);
+      };
+      const std::int64_t cell = known->second >> (FINEST - bits);
+      tally.in_cell += isCell(cell);
+      tally.beside += isCell(cell - 1) || isCell(cell + 1);
+    }
+    return tally;
+  }
+
+ private:
+  static constexpr int FINEST = 52;
+  std::map<Pair, std::int64_t> finest_;  // the time in units of 2^-FINEST, rounded down
+};
+
+TEST(StepTimes, ExactCellsHoldAllTimesThatWereFoundSymbolically) {
+  DEFORMABLE_CCD_REQUIRE_DATA();
+  const std::string path = dataDir() + "/scenes/n-body/toc_vf.txt.gz";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no times of contact: there is no " << path;
+  constexpr std::size_t KNOWN = 9459;  // what the data set says that it holds
+  const std::vector<TruthTime> list = readTruthTimes(path);
+  const ContactTimes times(list);
+  ASSERT_EQ(list.size(), KNOWN);
+  ASSERT_EQ(times.size(), KNOWN) << "a pair stands twice in the list";
+
+  const Scene scene("n-body");
+  for (const TruthTime& time : list) {
+    ASSERT_EQ(scene.contacts.count(canonical(PairKind::VERTEX_FACE, time.pair)), 1u) << "no contact by vf.txt.gz";
+  }
+  std::size_t comparisons = 0;
+  forEachSimdTarget([&](const std::string& target) {
+    for (const int bits : {10, 32, 52}) {
+      DetectorOptions options;
+      options.accuracy.toc_bits = bits;
+      options.check_start_state = false;
+      const StepResult result = scene.run(options);
+      const ContactTimes::Tally tally = times.compare(result.contacts, bits);
+      EXPECT_EQ(tally.compared, KNOWN) << target << ", " << bits << " bits";
+      EXPECT_EQ(tally.in_cell, KNOWN) << target << ", " << bits << " bits; one cell off: " << tally.beside;
+      comparisons += tally.compared;
+    }
+  });
+  std::cout << KNOWN << " times, " << comparisons << " comparisons\n";
+}
+
+// That a cell is held against the time, digit for digit, and not against something coarser.
+TEST(StepTimes, ATimeOutsideOfItsCellIsSeen) {
+  core::Contact contact;
+  contact.vertex = {7, 1, 2, 3};
+  const auto inCell = [&](const std::string& decimal, double lower, int bits) {
+    contact.toc_lower = lower;
+    contact.toc_upper = std::min(1.0, lower + std::ldexp(1.0, -bits));
+    const ContactTimes::Tally tally = ContactTimes({{{7, 3, 1, 2}, decimal}}).compare({contact}, bits);
+    EXPECT_EQ(tally.compared, 1u);
+    return tally.in_cell == 1;
+  };
+  EXPECT_TRUE(inCell("0.5", 0.5, 52));
+  EXPECT_FALSE(inCell("0.4999999999999999999999999999999999999999999999999", 0.5, 52));
+  EXPECT_TRUE(inCell("0.4999999999999999999999999999999999999999999999999", 0.5 - 0x1p-52, 52));
+  EXPECT_TRUE(inCell("0.0009765624999999999999999999999999999999999999999", 0, 10));
+  EXPECT_FALSE(inCell("0.0009765625", 0, 10)) << "the upper end is not in the cell";
+  EXPECT_TRUE(inCell("0.0", 0, 32));
+  EXPECT_TRUE(inCell("1", 1, 32));
+  EXPECT_FALSE(inCell("1.0", 1 - 0x1p-32, 32));
+  contact.vertex = {8, 1, 2, 3};
+  EXPECT_EQ(ContactTimes({{{7, 3, 1, 2}, "0.5"}}).compare({contact}, 52).compared, 0u);
+}
 
 // --- the filters of the step on single pairs -------------------------------------------------------------------------
 
