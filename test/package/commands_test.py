@@ -57,7 +57,7 @@ def program_of(text):
     if not words:
         return None
     first = words[0]
-    if first in WORDS or re.match(r'(scripts|build|examples)/\S+$', first):
+    if first in WORDS or re.match(r'(scripts|build|examples)/[\w/]+$', first):
         return first
     known = re.fullmatch(r'[a-z][\w.+-]*', first) and first not in PROSE and shutil.which(first)
     return first if known else None
@@ -161,12 +161,18 @@ class CommandsTest(unittest.TestCase):
             'cdcpd': ('cloud', '/cdcpd/output', 20, 20, 'world'), 'trackdlo': ('cloud', '/trackdlo/results_pc', 1, 40, 'world'),
             'fabric_simulator': ('markers', '/fabric_markers', 8, 8, 'world'),
             'octomap_server': ('grid', '/mesh', 10, 10, 'map')}.get(preset and preset.group(1), ('grid', '/mesh', 10, 10, 'world'))
+        children = []
+        if 'params' in given:
+            bodies = yaml.safe_load((self.home / given['params']).read_text())['bodies']
+            tracked = next(body for body in bodies.values() if 'topic' in body)
+            given.update(tracked['topology'], mesh=tracked['topic'])
+            children = [body['rigid']['frame'] for body in bodies.values() if 'rigid' in body]
         if 'rows' in given:
             kind, rows, cols = 'cloud', given['rows'], given['cols']
         elif given.get('topology') == 'polyline':
             kind, rows, cols = 'cloud', 1, 40
-        return '/usr/bin/env python3 %s %s %s %s %s %s' % (TRACKER, kind, given.get('mesh', topic), rows, cols,
-                                                           given.get('fixed_frame', frame))
+        return ' '.join(map(str, ['/usr/bin/env python3', TRACKER, kind, given.get('mesh', topic), rows, cols,
+                                  given.get('fixed_frame', frame), *children]))
 
     def answers(self, monitor):
         """Waits until a monitor has answered a step."""
@@ -232,7 +238,7 @@ class CommandsTest(unittest.TestCase):
     def recorded_step(self):
         self.with_a_monitor()
         said = self.runs('rosservice call /collision_monitor/record_step')
-        return re.search(r'\S+\.step', said).group(0)
+        return re.search(r'[^\s",]+\.step', said).group(0)
 
     def run_tool(self, command):
         """With values for what the page leaves to the reader."""

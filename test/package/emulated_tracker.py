@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
 """A tracker that is not there: publishes a waving cloth at 30 Hz, as the trackers of launch/presets send theirs.
 
-usage: emulated_tracker.py cloud|grid|markers TOPIC ROWS COLS FRAME
+usage: emulated_tracker.py cloud|grid|markers TOPIC ROWS COLS FRAME [RIGID_FRAME...]
   cloud    PointCloud2 of height 1, row by row    grid  an organised PointCloud2    markers  a TRIANGLE_LIST in a MarkerArray
+Each RIGID_FRAME is sent on /tf, as a child of FRAME.
 """
 import math
 import struct
 import sys
 
 import rospy
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, TransformStamped
 from sensor_msgs.msg import PointCloud2, PointField
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 
@@ -35,15 +37,24 @@ def markers(rows, cols, t):
     return marker
 
 
+def pose(frame, child, stamp):
+    transform = TransformStamped(child_frame_id=child)
+    transform.header.stamp, transform.header.frame_id = stamp, frame
+    transform.transform.rotation.w, transform.transform.translation.z = 1.0, 3.0
+    return transform
+
+
 def main():
     kind, topic, rows, cols, frame = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5]
     rospy.init_node('emulated_tracker', anonymous=True, disable_signals=True)
     publisher = rospy.Publisher(topic, MarkerArray if kind == 'markers' else PointCloud2, queue_size=3)
+    poses = rospy.Publisher('/tf', TFMessage, queue_size=3)
     while not rospy.is_shutdown():
         now = rospy.Time.now()
         message = markers(rows, cols, now.to_sec()) if kind == 'markers' else cloud(rows, cols, now.to_sec(), kind == 'grid')
         message.header.stamp, message.header.frame_id = now, frame
         publisher.publish(MarkerArray([message]) if kind == 'markers' else message)
+        poses.publish([pose(frame, child, now) for child in sys.argv[6:]])
         rospy.sleep(1 / 30)
 
 
