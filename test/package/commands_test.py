@@ -70,7 +70,7 @@ class CommandsTest(unittest.TestCase):
         cls.start(['roscore', '-p', str(cls.port)])
         # The bag of the pages' stories, and a monitor that works on it.
         subprocess.run(['make_scene_bag', str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(cls.home / 'last_week.bag'),
-                        '--frames', '20'], env=cls.environment, check=True, capture_output=True)
+                        '--frames', '45'], env=cls.environment, check=True, capture_output=True)
         wait_for(lambda: cls.run_command('rostopic list').returncode == 0, 30, 'the master')
 
     @classmethod
