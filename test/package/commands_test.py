@@ -3,6 +3,7 @@
 Commands are taken from code blocks and from inline code that begins with one of the words below. Each is run, or its options
 are held against the tool's own help, or it is in NOT_RUN with the reason. A command that is none of these fails the test.
 """
+import json
 import os
 import pathlib
 import re
@@ -146,6 +147,8 @@ class CommandsTest(unittest.TestCase):
         for command in sorted(found, key=lambda c: c.startswith(last)):
             with self.subTest(command):
                 self.one(command)
+        # The bag of the stories holds contacts, or none of this would mean much.
+        self.assertIn('First contact', json.loads((self.home / 'report/report.json').read_text())['headline'])
 
     def test_scripts_know_the_options(self):
         for command in commands():
