@@ -21,9 +21,10 @@ case $share in "$INSTALLED"/*) ;; *) echo "found in $share"; exit 1 ;; esac
 for tool in make_scene_bag analyze_bag check_step run_queries replay_step; do
   rosrun deformable_ccd $tool --help >/dev/null
 done
-rosrun deformable_ccd make_scene_bag "$share/config/scenes/table_edge.yaml" scene.bag --frames 15 --quiet
+rosrun deformable_ccd make_scene_bag "$share/config/scenes/table_edge.yaml" scene.bag --frames 45 --quiet
 rosrun deformable_ccd analyze_bag scene.bag --report report --quiet --no-accuracy-table
 [ -s report/report.html ]
+grep -q '"headline": *"First contact' report/report.json
 rosmsg show deformable_ccd/ContactArray >/dev/null
 python3 -c 'from deformable_ccd.msg import ContactArray, TimeToContact'
 [ -e "$share/examples/stop_the_arm.py" ] && [ -e "$share/config/rviz/monitor.rviz" ]

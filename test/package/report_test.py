@@ -16,7 +16,7 @@ class ReportPageTest(unittest.TestCase):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder, True)
         scene, bag = CHECKOUT / 'config/scenes/table_edge.yaml', self.folder / 'scene.bag'
-        for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', '30', '--quiet'],
+        for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', '80', '--quiet'],
                         [TOOLS / 'analyze_bag', bag, '--report', self.folder, '--quiet']):
             ran = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
             self.assertEqual(ran.returncode, 0, ran.stderr)

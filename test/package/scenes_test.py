@@ -1,4 +1,6 @@
 """Every scene of config/scenes, recorded and analysed by the tools: the facts that the scene states must come out."""
+import collections
+import copy
 import csv
 import json
 import os
@@ -11,6 +13,7 @@ import unittest
 import yaml
 
 from checkout import CHECKOUT, TOOLS
+from scene_story import StoryContact, StoryStep, broken_facts, lines, tell, what_met
 
 OBSTACLE = 'octomap'
 
@@ -20,41 +23,42 @@ def run(*command):
 
 
 def analyse(scene, folder):
-    """Records and analyses a scene; the rows of contacts.csv, and report.json."""
+    """Records and analyses a scene; its steps, and report.json."""
     bag, config = folder / (scene.stem + '.bag'), folder / (scene.stem + '.yaml')
     recorded = run(TOOLS / 'make_scene_bag', scene, bag, '--monitor-config', config, '--quiet')
     assert recorded.returncode == 0, recorded.stderr
     report = folder / scene.stem
     analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet', '--no-accuracy-table')
     assert analysed.returncode == 0, analysed.stderr
-    with open(report / 'contacts.csv', newline='') as stream:
-        return list(csv.DictReader(stream)), json.loads((report / 'report.json').read_text())
+    return steps_of(report), json.loads((report / 'report.json').read_text())
 
 
-def first_s(rows, belongs):
-    times = [float(r['time_s']) for r in rows if r['initial'] == '0' and belongs(r['body_0'], r['body_1'])]
-    return min(times) if times else None
+def rows_of(path):
+    with open(path, newline='') as stream:
+        return list(csv.DictReader(stream))
+
+
+def steps_of(report):
+    """The rows of a report as the steps of a story."""
+    contacts, rows = collections.defaultdict(list), rows_of(report / 'steps.csv')
+    for c in rows_of(report / 'contacts.csv'):
+        what = what_met(*(None if c[body] == OBSTACLE else c[body] for body in ('body_0', 'body_1')))
+        contacts[c['step']].append(StoryContact(float(c['time_s']), c['initial'] == '1', what))
+    steps, first_ns = [], int(rows[0]['stamp_ns'])
+    for row in rows:
+        if row['status'] == 'FIRST_FRAME':
+            continue
+        found, start_clear = contacts[row['step']], row['answered'] == '1' and row['start_state'] == 'CLEAR'
+        assert len(found) == int(row['contacts']), row
+        steps.append(StoryStep(1e-9 * (int(row['start_ns']) - first_ns), 1e-9 * (int(row['stamp_ns']) - first_ns), start_clear,
+                               start_clear and not found, found))
+    return steps
 
 
 class SceneFactsTest(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(dir=CHECKOUT / 'build'))
         self.addCleanup(shutil.rmtree, self.folder)
-
-    def check(self, scene, rows, what, expected):
-        belongs = {
-            'octomap': lambda a, b: OBSTACLE in (a, b),
-            'self': lambda a, b: a == b,
-            'body': lambda a, b: expected != 'none' and {a, b} == set(expected['names']),
-        }[what]
-        first = first_s(rows, belongs)
-        if expected == 'none':
-            self.assertIsNone(first, '%s: %s' % (scene.stem, what))
-            return
-        low, high = expected['first_contact_s']
-        self.assertIsNotNone(first, '%s: no contact (%s)' % (scene.stem, what))
-        self.assertTrue(low <= first <= high, '%s: first contact (%s) at %g s, expected from %g to %g' % (
-            scene.stem, what, first, low, high))
 
     def check_effects(self, monitor, report):
         """What runs is what the scene lists, each with its reason; what does not run has counted nothing."""
@@ -82,12 +86,45 @@ class SceneFactsTest(unittest.TestCase):
         self.assertGreaterEqual(len(scenes), 6)
         for scene in scenes:
             with self.subTest(scene=scene.stem):
-                rows, report = analyse(scene, self.folder)
+                steps, report = analyse(scene, self.folder)
                 text = yaml.safe_load(scene.read_text())
                 self.assertTrue(text['expect'])
-                for what, expected in text['expect'].items():
-                    self.check(scene, rows, what, expected)
+                self.assertEqual(broken_facts(text['expect'], steps), [])
                 self.check_effects(text['monitor'], report)
+
+    def test_the_demo_tells_its_story_and_wrong_facts_of_it_are_told(self):
+        """Clear, contact with the table, with itself, clear again; and each kind of fact fails once it is wrong."""
+        scene = CHECKOUT / 'config/scenes/table_edge.yaml'
+        steps, _ = analyse(scene, self.folder)
+        expect = yaml.safe_load(scene.read_text())['expect']
+        told = [line[11:] for line in lines(tell(steps))]
+        self.assertEqual(told, ['clear of everything until then', 'first contact with the octomap',
+                                'first contact of a body with itself', 'last contact', 'clear again since then'])
+        for clear in (steps[:20], steps[-20:]):
+            self.assertEqual({(s.clear, len(s.contacts)) for s in clear}, {(True, 0)}, 'the first and the last frames')
+        self.assertEqual(len(steps), sum(s['answered'] == '1' for s in rows_of(self.folder / 'table_edge/steps.csv')))
+        wrong = [
+            ('octomap', 'none', 'octomap: a contact at'),
+            ('octomap', {'first_contact_s': [0.1, 0.8]}, 'octomap: first contact at'),
+            ('octomap', {'first_contact_s': [0.85, 1.1], 'contacts_at_least': 10**6}, 'octomap: .* expected at least 1000000'),
+            ('self', {'first_contact_s': [2.2, 2.4]}, 'self: first contact at'),
+            ('body', {'names': ['cloth', 'finger'], 'first_contact_s': [0, 4]}, 'body: no contact'),
+            ('clear', {'until_s': 1.0}, 'clear: the step from .* is not clear, expected until 1 s'),
+            ('clear', {'again_s': 2.5}, 'clear: again from'),
+            ('clear', {'share_at_least': 0.9}, 'expected at least 90 %'),
+        ]
+        for name, fact, message in wrong:
+            with self.subTest(name=name, fact=fact):
+                facts = copy.deepcopy(expect)
+                facts[name] = fact
+                broken = broken_facts(facts, steps)
+                self.assertEqual(len(broken), 1, broken)
+                self.assertRegex(broken[0], message)
+        # A step that starts where surfaces cross, though nothing was found to meet before.
+        crossing = [s._replace(start_clear=False, clear=False) if i == 10 else s for i, s in enumerate(steps)]
+        self.assertRegex(' '.join(broken_facts({'clear': {'until_s': 0.2}}, crossing)), 'and the first contact comes at')
+        self.assertRegex(' '.join(broken_facts({'clear': {'again_s': 2.8}}, steps[:70])), 'again never')
+        self.assertEqual(broken_facts(expect, []), ['no step was answered'])
 
 
 class MakeSceneBagTest(unittest.TestCase):

@@ -4,6 +4,8 @@
 #include <numeric>
 #include <sstream>
 
+#include "scene/physics/expectations.h"
+
 namespace deformable_ccd::scene {
 namespace {
 
@@ -223,6 +225,7 @@ SceneSpec readScene(const YAML::Node& root, const std::string& name) {
   if (auto obstacle = map.optionalMap("obstacle")) spec.obstacle = readObstacle(*obstacle, spec.fixed_frame);
   for (YamlMap& body : map.list("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
   checkMonitor(map, spec);
+  if (std::optional<YamlMap> expect = map.optionalMap("expect")) checkExpectations(*expect, spec);
   spec.monitor_yaml = map.raw("monitor");
   spec.expect_yaml = map.raw("expect");
   map.finish();

@@ -102,6 +102,18 @@ std::vector<int> YamlMap::integers(const std::string& key, int min, int max) {
   return result;
 }
 
+std::vector<std::string> YamlMap::texts(const std::string& key, std::size_t count) {
+  const std::string what = "a list of " + std::to_string(count) + " texts, such as [cloth, finger]";
+  const YAML::Node node = required(key, what);
+  if (!node.IsSequence() || node.size() != count) fail(key, "write " + what);
+  std::vector<std::string> result;
+  for (const YAML::Node& item : node) {
+    if (!item.IsScalar()) fail(key, "write " + what);
+    result.push_back(item.Scalar());
+  }
+  return result;
+}
+
 std::size_t YamlMap::choice(const std::string& key, const std::vector<std::string>& choices, std::size_t fallback) {
   if (!has(key)) return fallback;
   std::string all;

@@ -36,6 +36,8 @@ class YamlMap {
   /// The first `count` numbers of the list, which must hold exactly that many; the rest of the result is 0.
   Vec3 numbers(const std::string& key, int count, double min, double max);
   std::vector<int> integers(const std::string& key, int min, int max);
+  /// A list of exactly `count` texts.
+  std::vector<std::string> texts(const std::string& key, std::size_t count);
   /// One of the choices; its place among them.
   std::size_t choice(const std::string& key, const std::vector<std::string>& choices, std::size_t fallback);
   YamlMap map(const std::string& key);

@@ -105,6 +105,49 @@ TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
             std::string::npos);
 }
 
+TEST(SceneFile, WhatItExpectsIsReadStrictly) {
+  // Five frames at 30 Hz: the last one comes after 0.133 s.
+  const std::string scene = std::string(GOOD) +
+                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
+                            "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n";
+  const auto with = [&](const std::string& expect) { return errorOf(scene, "bodies:", "expect:\n" + expect + "bodies:"); };
+  const auto expectTold = [&](const std::string& expect, const std::string& part) {
+    const std::string error = with(expect);
+    EXPECT_NE(error.find(part), std::string::npos) << expect << error;
+  };
+  EXPECT_EQ(with("  octomap: {first_contact_s: [0.05, 0.1], contacts_at_least: 3}\n  self: none\n"
+                 "  body: {names: [sheet, finger], first_contact_s: [0.05, 0.05]}\n"
+                 "  clear: {until_s: 0.05, again_s: 0.1, share_at_least: 0.5}\n"),
+            "accepted");
+  EXPECT_EQ(with("  clear: {share_at_least: 1}\n"), "accepted");
+
+  expectTold("  selv: none\n", "s.yaml:7: expect.selv: is not a key here; known are body, clear, octomap, self");
+  expectTold("  {}\n", "expect: write at least one fact");
+  expectTold("  self: never\n", "s.yaml:7: expect.self: write `key: value` lines here");
+  expectTold("  self: {}\n", "expect.self.first_contact_s: is missing");
+  expectTold("  self: {first_contact_s: 0.1}\n", "expect.self.first_contact_s: write a list of 2 numbers");
+  expectTold("  self: {first_contact_s: [0.1, 0.05]}\n", "expect.self.first_contact_s: write the earliest time first");
+  expectTold("  self: {first_contact_s: [0.1, 0.2]}\n", "expect.self.first_contact_s: write a number from 0 to 0.133");
+  expectTold("  self: {first_contact_s: [0, 0.1], contacts_at_least: 0}\n", "contacts_at_least: write a number from 1");
+  expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect.self.least: is not a key here");
+  expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect.body.names: is missing");
+  expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
+  expectTold("  body: {names: [sheet, [finger]], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
+  expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n", "the scene has no body 'thumb'");
+  expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "write two different names");
+  expectTold("  clear: {until_s: 0.2}\n", "expect.clear.until_s: write a number from 0 to 0.133");
+  expectTold("  clear: {until_s: 0.1, again_s: 0.05}\n", "expect.clear.again_s: write a number from 0.1 to 0.133");
+  expectTold("  clear: {share_at_least: 2}\n", "expect.clear.share_at_least: write a number from 0 to 1");
+  expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {until_s: 0.06}\n",
+             "expect.clear.until_s: contradicts first_contact_s: [0.05, 0.1]; write no later time than its first");
+  expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {again_s: 0.09}\n",
+             "expect.clear.again_s: contradicts first_contact_s: [0.05, 0.1]; write no earlier time than its last");
+  EXPECT_NE(errorOf(GOOD, "bodies:", "expect: {octomap: {first_contact_s: [0, 0.1]}}\nbodies:")
+                .find("expect.octomap: the scene has no obstacle; remove this line"),
+            std::string::npos);
+  EXPECT_EQ(errorOf(GOOD, "bodies:", "expect: {octomap: none}\nbodies:"), "accepted");
+}
+
 TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
   EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
   EXPECT_THROW(readSceneFile("no/such/scene.yaml"), SceneFileError);

@@ -145,6 +145,29 @@ TEST(Simulation, RigidBodiesMoveAlongTheirKeys) {
   EXPECT_NEAR(Eigen::AngleAxisd(simulation.rigidPose(0).linear()).angle(), 0.5, 1e-9);
 }
 
+TEST(Simulation, TheDemosClothStartsAboveTheTableLiesOnItFoldedAndEndsLiftedOff) {
+  const SceneSpec spec = readSceneFile(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/table_edge.yaml");
+  ASSERT_TRUE(spec.obstacle.has_value());
+  const double top = spec.obstacle->solids.at(0).box.max[2];
+  Simulation simulation(spec, 1);
+  EXPECT_GT(lowest(simulation.observe(0)), top + 0.15);
+  const int folded = 72, lifted = 105;  // 2.4 s: the right hand is over the left side; 3.5 s: it is up
+  for (int frame = 1; frame < spec.frames; ++frame) {
+    simulation.step();
+    const Positions cloth = simulation.observe(0);
+    if (frame >= lifted) {
+      EXPECT_GT(lowest(cloth), top + 0.1) << "frame " << frame;
+    }
+    if (frame != folded) continue;
+    EXPECT_NEAR(lowest(cloth), top + spec.bodies[0].thickness_m, 0.003);
+    for (const Vec3& p : cloth) EXPECT_LT(p[2], top + 0.1) << "it lies flat";
+    // The two sides that the hands held, 50 cm apart at the start, are over each other.
+    const Shape& sheet = spec.bodies[0].shape;
+    const Vec3 across = cloth[sheet.cols - 1] - cloth[0];
+    EXPECT_LT(across.norm(), 0.1);
+  }
+}
+
 TEST(Shapes, FacesCoverTheGridOnce) {
   Shape sheet;
   sheet.rows = 4;
