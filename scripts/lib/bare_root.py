@@ -96,6 +96,8 @@ class BareRoot:
         else:
             raise CannotMake('mmdebstrap made no root of %s: %s' % (self.release, said))
         shutil.copy('/etc/resolv.conf', self.folder / 'etc/resolv.conf')
+        # Every installer and every container runtime writes it; mmdebstrap does not.
+        (self.folder / 'etc/hosts').write_text('127.0.0.1 localhost\n::1 localhost ip6-localhost\n')
         for path in pathlib.Path('/etc/apt/apt.conf.d').glob('*'):
             if 'proxy' in path.read_text(errors='replace').lower():
                 shutil.copy(path, self.folder / 'etc/apt/apt.conf.d')
