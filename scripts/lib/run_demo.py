@@ -82,8 +82,8 @@ def story_steps(arrays, start):
             contacts.append(scene_story.StoryContact(c.time_of_contact.to_sec() - start, c.initial,
                                                      scene_story.what_met(*bodies)))
         start_clear = array.answered and array.start_state == ContactArray.CLEAR
-        steps.append(scene_story.StoryStep(array.start.to_sec() - start, array.header.stamp.to_sec() - start, start_clear,
-                                           start_clear and not contacts, contacts))
+        steps.append(scene_story.StoryStep(array.start.to_sec() - start, array.header.stamp.to_sec() - start,
+                                           start_clear, start_clear and not contacts, contacts))
     return steps
 
 

@@ -1,4 +1,4 @@
-"""What happened in a scene, from its steps: clear, first contacts, clear again; and which facts of its page did not hold."""
+"""What happened in a scene, by its steps: first contacts, when it was clear; and what of its page does not hold."""
 import collections
 
 OCTOMAP, SELF = 'octomap', 'self'
@@ -83,7 +83,8 @@ def broken_clear(expected, steps, story):
         if early:
             broken.append('clear: the step from %.4f s is not clear, expected until %g s' % (early[0].start_s, until_s))
         elif first is not None and not until <= first <= next(s.end_s for s in steps if s.end_s > until):
-            broken.append('clear: ends at %.4f s, and the first contact comes at %.4f s, not in the step after' % (until, first))
+            broken.append('clear: ends at %.4f s, and the first contact comes at %.4f s, not in the step after' % (
+                until, first))
     if again_s is not None:
         since = story.clear_since_s
         if since is None or since > again_s:

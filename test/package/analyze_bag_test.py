@@ -217,7 +217,8 @@ class AnalyzeBagTest(unittest.TestCase):
         listed = sum(len(array.contacts) for array in by_topic[OWN + 'contacts'])
         self.assertEqual(listed, (self.plain / 'contacts.csv').read_text().count('\n') - 1)
         # The last frame with contacts of both kinds: those that the step began with, and new ones.
-        both = [i for i, array in enumerate(by_topic[OWN + 'contacts']) if len({c.initial for c in array.contacts}) == 2]
+        initial = [{c.initial for c in array.contacts} for array in by_topic[OWN + 'contacts']]
+        both = [i for i, kinds in enumerate(initial) if len(kinds) == 2]
         drawn = by_topic[OWN + 'markers'][both[-1]].markers
         self.assertEqual(drawn[0].action, drawn[0].DELETEALL)
         points = {marker.ns: len(marker.points) for marker in drawn[1:]}

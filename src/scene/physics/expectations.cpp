@@ -51,7 +51,9 @@ void checkClear(YamlMap map, const std::vector<Window>& contacts, const SceneSpe
     std::ostringstream what;
     what << "contradicts first_contact_s: [" << window.low_s << ", " << window.high_s << "]; write ";
     if (until_s > window.low_s) map.fail("until_s", what.str() + "no later time than its first");
-    if (map.has("again_s") && again_s < window.high_s) map.fail("again_s", what.str() + "no earlier time than its last");
+    if (map.has("again_s") && again_s < window.high_s) {
+      map.fail("again_s", what.str() + "no earlier time than its last");
+    }
   }
   map.finish();
 }

@@ -1,5 +1,5 @@
-// The `expect` block of a scene file: facts about the scene that tests and the demo hold the monitor to. The recorder itself has
-// no use for them, but says at once what is wrong with them.
+// The `expect` block of a scene file: facts about the scene that tests and the demo hold the monitor to. The recorder
+// itself has no use for them, but says at once what is wrong with them.
 #pragma once
 
 #include "scene/physics/scene_spec.h"
@@ -7,8 +7,8 @@
 
 namespace deformable_ccd::scene {
 
-/// Throws SceneFileError on what it does not understand, and on facts that contradict the scene (a contact after its end, with a
-/// body that is not there) or each other (a contact while all is clear).
+/// Throws SceneFileError on what it does not understand, and on facts that contradict the scene (a contact after its
+/// end, with a body that is not there) or each other (a contact while all is clear).
 void checkExpectations(YamlMap map, const SceneSpec& spec);
 
 }  // namespace deformable_ccd::scene

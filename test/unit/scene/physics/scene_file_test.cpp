@@ -132,7 +132,7 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
   expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect.self.least: is not a key here");
   expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect.body.names: is missing");
   expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
-  expectTold("  body: {names: [sheet, [finger]], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
+  expectTold("  body: {names: [sheet, [a]], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
   expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n", "the scene has no body 'thumb'");
   expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "write two different names");
   expectTold("  clear: {until_s: 0.2}\n", "expect.clear.until_s: write a number from 0 to 0.133");
