@@ -34,15 +34,9 @@ find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
 add_library(deformable_ccd_decoders STATIC
-<<<<<<< HEAD
   src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp src/ros/map_decode.cpp src/ros/mesh_decoder.cpp
   src/ros/mesh_file.cpp src/ros/mesh_views.cpp src/ros/obj_file.cpp src/ros/stl_file.cpp src/ros/typed_mesh.cpp
-  src/scene/physics/scene_file.cpp src/scene/physics/yaml_map.cpp)
-=======
-  src/ros/mesh_decoder.cpp src/ros/mesh_views.cpp src/ros/map_decode.cpp src/ros/mesh_file.cpp src/ros/obj_file.cpp src/ros/stl_file.cpp
-  src/ros/typed_mesh.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
   src/scene/physics/expectations.cpp src/scene/physics/scene_file.cpp src/scene/physics/yaml_map.cpp)
->>>>>>> scene
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
