@@ -114,6 +114,7 @@ class CommandsTest(unittest.TestCase):
         scene = yaml.safe_load((CHECKOUT / 'config/scenes/table_edge.yaml').read_text())
         scene['bodies'][0]['topic'] = scene['monitor']['bodies']['cloth']['topic'] = '/tracker/cloth'
         scene['bodies'][0]['sheet'].update(rows=20, cols=30)
+        scene['bodies'][0]['grippers'][-1]['col'] = 29
         (cls.home / 'tracked.yaml').write_text(yaml.safe_dump(scene))
         ran = cls.shell('rosrun deformable_ccd make_scene_bag tracked.yaml last_week.bag --output point_cloud_grid')
         if ran.returncode != 0:
