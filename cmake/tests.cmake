@@ -35,7 +35,7 @@ target_include_directories(deformable_ccd_test_support PUBLIC src test)
 # The truth data lie beside the checkout, not beside a workspace's links.
 target_compile_definitions(deformable_ccd_test_support PUBLIC DEFORMABLE_CCD_SOURCE_DIR="${TRUE_SOURCE_DIR}")
 target_link_libraries(deformable_ccd_test_support PUBLIC
-  deformable_ccd_oracle deformable_ccd GTest::gtest ZLIB::ZLIB TBB::tbb nlohmann_json::nlohmann_json ${HWY_LIBRARY}
+  deformable_ccd_oracle deformable_ccd GTest::gtest ZLIB::ZLIB TBB::tbb nlohmann_json::nlohmann_json deformable_ccd_hwy
   ${GMP_LIBRARY})
 if(TARGET deformable_ccd_scene)
   target_link_libraries(deformable_ccd_test_support PUBLIC deformable_ccd_scene)
