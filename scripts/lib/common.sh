@@ -32,16 +32,15 @@ use_workspace() {
   set -u
 }
 
-# Runs a command that takes minutes with its output in the file LOG, and says how far it is: `count LOG` prints "N of M".
+# Runs a command that takes minutes and writes to the file LOG, and says how far it is: `COUNT_FUNCTION LOG` prints "N of M".
 # On a terminal one line changes in place, elsewhere there is a line every 20 s.
 # usage: with_progress WHAT LOG COUNT_FUNCTION COMMAND...
 with_progress() {
   local what=$1 log=$2 count=$3 started=$SECONDS shown=$SECONDS far pid status=0
   shift 3
-  mkdir -p "$(dirname "$log")"
   # A process group of its own, so that Ctrl-C ends all of it: a shell's background jobs ignore that signal.
   set -m
-  "$@" >"$log" 2>&1 </dev/null &
+  "$@" </dev/null &
   pid=$!
   set +m
   trap 'kill -TERM -- "-$pid" 2>/dev/null; echo; fail "stopped; run it again, it goes on where it was"' INT TERM
@@ -64,3 +63,14 @@ with_progress() {
 
 # How far a ninja build is, from its log.
 ninja_steps() { sed -n 's/^\[\([0-9]*\)\/\([0-9]*\)\].*/\1 of \2 steps/p' "$1" | tail -n 1; }
+
+# How far the last installation in apt's log is.
+apt_steps() {
+  awk '/ newly installed, / { for (i = 2; i <= NF; ++i) if ($i == "newly") all = $(i - 1); got = unpacked = ready = 0 }
+    /^Get:/ { ++got } /^Unpacking / { ++unpacked } /^Setting up / { ++ready }
+    END {
+      if (all && ready) print ready " of " all " packages set up"
+      else if (all && unpacked) print unpacked " of " all " packages unpacked"
+      else if (all && got) print got " of " all " packages downloaded"
+    }' "$1"
+}

@@ -15,7 +15,7 @@ from checkout import CHECKOUT
 
 # What scripts/setup may call of a minimal system.
 PROGRAMS = ['awk', 'basename', 'bash', 'cat', 'chown', 'cmake', 'cut', 'df', 'dirname', 'env', 'find', 'grep', 'head',
-            'mkdir', 'mv', 'ninja', 'nproc', 'realpath', 'rm', 'sed', 'sh', 'sort', 'tail', 'tar', 'touch', 'tr']
+            'mkdir', 'mv', 'ninja', 'nproc', 'realpath', 'rm', 'sed', 'sh', 'sleep', 'sort', 'tail', 'tar', 'touch', 'tr']
 FAKES = {
     # Every package is installed but those in $MISSING.
     'dpkg-query': 'for last; do :; done; case " $MISSING " in *" $last "*) exit 1 ;; esac; echo -n installed',
