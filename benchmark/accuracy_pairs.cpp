@@ -2,8 +2,8 @@
 // same run. Pairs: hard queries (DIR...) and what the filters leave of real steps (--scene FRAME_0 FRAME_1).
 //
 // Time: whole batches, several repeats; best and median nanoseconds per pair. Truth: for queries the truth column; for
-// survivors the exact rung at 52 bits, which the tests hold against an oracle of their own and against the scenes' truth.
-// The error of a TOC is that to the exact rung's 2^-52 cell.
+// survivors the exact rung at 52 bits, which the tests hold against an oracle of their own and against the scenes'
+// truth. The error of a TOC is that to the exact rung's 2^-52 cell.
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
 #include <CLI/CLI.hpp>
@@ -28,10 +28,10 @@ namespace {
 struct PairSet {
   std::string source;
   PairKind kind = PairKind::VERTEX_FACE;
-  std::vector<VertexMotion> own_vertices;        // queries bring their own
-  const VertexMotion* vertices = nullptr;        // else the scene's
+  std::vector<VertexMotion> own_vertices;  // queries bring their own
+  const VertexMotion* vertices = nullptr;  // else the scene's
   std::vector<Quad> pairs;
-  std::vector<ElementaryResult> truth;           // exact, 52 bits
+  std::vector<ElementaryResult> truth;  // exact, 52 bits
   PairBatch batch() const {
     PairBatch b;
     b.kind = kind;
@@ -61,10 +61,10 @@ void runFcl(const PairBatch& b, ElementaryResult* out) {
     V point;
     const auto x = [&](int p, int t) { return at(b, i, p, t); };
     const bool hit = b.kind == PairKind::VERTEX_FACE
-                         ? Intersect::intersect_VF_filtered(x(1, 0), x(2, 0), x(3, 0), x(0, 0), x(1, 1), x(2, 1), x(3, 1),
-                                                            x(0, 1), &toc, &point)
-                         : Intersect::intersect_EE_filtered(x(0, 0), x(1, 0), x(2, 0), x(3, 0), x(0, 1), x(1, 1), x(2, 1),
-                                                            x(3, 1), &toc, &point);
+                         ? Intersect::intersect_VF_filtered(x(1, 0), x(2, 0), x(3, 0), x(0, 0), x(1, 1), x(2, 1),
+                                                            x(3, 1), x(0, 1), &toc, &point)
+                         : Intersect::intersect_EE_filtered(x(0, 0), x(1, 0), x(2, 0), x(3, 0), x(0, 1), x(1, 1),
+                                                            x(2, 1), x(3, 1), &toc, &point);
     out[i].verdict = hit ? Verdict::CONTACT : Verdict::NO_CONTACT;
     out[i].toc_lower = out[i].toc_upper = toc;
   }

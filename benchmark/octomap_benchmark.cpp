@@ -179,8 +179,12 @@ nlohmann::json measureBuild(int repeat) {
     times.push_back(watch.milliseconds());
     if (surface->leafCount() != leaves.size()) throw std::runtime_error("the surface lost leaves");
   }
-  return {{"case", "surface of a map, built on its own thread"}, {"triangles", 0},   {"voxels", leaves.size()},
-          {"contacts", 0},                                       {"required_ms", 20.0}, {"ms", spread(times)}};
+  return {{"case", "surface of a map, built on its own thread"},
+          {"triangles", 0},
+          {"voxels", leaves.size()},
+          {"contacts", 0},
+          {"required_ms", 20.0},
+          {"ms", spread(times)}};
 }
 
 nlohmann::json measure(int repeat) {

@@ -25,11 +25,11 @@ std::size_t fclElementary(PairKind kind, const VertexMotion* vertices, const Qua
     }
     bool hit;
     if (kind == PairKind::VERTEX_FACE) {  // FCL names the face first
-      hit = (filtered ? Fcl::intersect_VF_filtered : Fcl::intersect_VF)(
-          x[0][1], x[0][2], x[0][3], x[0][0], x[1][1], x[1][2], x[1][3], x[1][0], &toc, &point, true);
+      hit = (filtered ? Fcl::intersect_VF_filtered : Fcl::intersect_VF)(x[0][1], x[0][2], x[0][3], x[0][0], x[1][1],
+                                                                        x[1][2], x[1][3], x[1][0], &toc, &point, true);
     } else {
-      hit = (filtered ? Fcl::intersect_EE_filtered : Fcl::intersect_EE)(
-          x[0][0], x[0][1], x[0][2], x[0][3], x[1][0], x[1][1], x[1][2], x[1][3], &toc, &point, true);
+      hit = (filtered ? Fcl::intersect_EE_filtered : Fcl::intersect_EE)(x[0][0], x[0][1], x[0][2], x[0][3], x[1][0],
+                                                                        x[1][1], x[1][2], x[1][3], &toc, &point, true);
     }
     contacts += hit ? 1 : 0;
   }

@@ -1,5 +1,6 @@
 // FCL's elementary tests, as the elementary test of every combination of filters: the cubic of Provot 1997, solved in
-// floating point, which is what the paper's comparison has in this place. Not exact (it misses contacts), and only timed.
+// floating point, which is what the paper's comparison has in this place. Not exact (it misses contacts), and only
+// timed.
 #pragma once
 
 #include <cstddef>

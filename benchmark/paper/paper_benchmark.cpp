@@ -163,7 +163,8 @@ int main(int argc, char** argv) {
   using namespace deformable_ccd::benchmarks;
   Arguments a;
   CLI::App app("Measures the paper's combinations of filters on one scene.");
-  app.add_option("scene", a.scene.name, "cloth-ball, n-body (real); clothball, nbody, clothbone, dragon, lion")->required();
+  app.add_option("scene", a.scene.name, "cloth-ball, n-body (real); clothball, nbody, clothbone, dragon, lion")
+      ->required();
   app.add_option("--out", a.out, "JSON file to write")->required();
   app.add_option("--self", a.scene.self, "pairs within a body, too (default true)");
   app.add_option("--bounds", a.bounds, "bounds of triangles")->check(CLI::IsMember({"dop16", "dop18"}));
@@ -171,7 +172,9 @@ int main(int argc, char** argv) {
   app.add_option("--first-frame", a.scene.first_frame, "of a generated sequence");
   app.add_option("--triangles", a.scene.options.triangles, "of a generated scene; 0: the paper's number");
   app.add_option("--seed", a.scene.options.seed, "of a generated scene");
-  app.add_option("--fractions", a.fractions, "parts that each step is cut into")->delimiter(',')->check(CLI::PositiveNumber);
+  app.add_option("--fractions", a.fractions, "parts that each step is cut into")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
   app.add_option("--repeat", a.repeat, "repetitions of each step")->check(CLI::PositiveNumber);
   app.add_option("--elementary-every", a.elementary_every, "time the elementary test on every n-th chunk; 0: never");
   CLI11_PARSE(app, argc, argv);

@@ -32,12 +32,12 @@ inline namespace core {
 /// One contact. VF: body[0] owns the vertex, body[1] the face. EE: the edge that sorts first is first
 /// (body, then the edge's vertex indices); within an edge the smaller index is first.
 struct Contact {
-  double toc_lower = 0;  ///< [0,1] of the step
-  double toc_upper = 1;  ///< [0,1] of the step
+  double toc_lower = 0;                                                 ///< [0,1] of the step
+  double toc_upper = 1;                                                 ///< [0,1] of the step
   std::array<Index, 4> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< body-local; unused ones NO_INDEX
   std::array<std::uint16_t, 2> body{0, 0};  ///< index into the bodies; OBSTACLE_BODY for the octomap
-  VoxelKey voxel;                ///< octomap pairs: the occupied voxel (its smallest key when a pruned leaf)
-  std::uint32_t voxel_size = 0;  ///< octomap pairs: edge length of the occupied leaf in finest voxels
+  VoxelKey voxel;                           ///< octomap pairs: the occupied voxel (its smallest key when a pruned leaf)
+  std::uint32_t voxel_size = 0;             ///< octomap pairs: edge length of the occupied leaf in finest voxels
   PairKind kind = PairKind::VERTEX_FACE;
   Certainty certainty = Certainty::CERTAIN;
   bool initial = false;  ///< in contact or inside at t=0
@@ -54,10 +54,10 @@ inline bool canonicalLess(const core::Contact& a, const core::Contact& b) {
 
 /// Where and how the features touch at toc_lower, in double (rounded; for display and control, not for decisions).
 struct ContactGeometry {
-  Vec3 point = Vec3::Zero();    ///< [m] midpoint of the closest points
-  Vec3 normal = Vec3::UnitZ();  ///< unit, from the second feature towards the first
+  Vec3 point = Vec3::Zero();                  ///< [m] midpoint of the closest points
+  Vec3 normal = Vec3::UnitZ();                ///< unit, from the second feature towards the first
   std::array<double, 4> weights{0, 0, 0, 0};  ///< VF: 1, then the face's barycentric; EE: along each edge
-  double approach_speed = 0;    ///< [m per step] > 0 when closing
+  double approach_speed = 0;                  ///< [m per step] > 0 when closing
 };
 
 /// Geometry of a mesh-mesh contact from its four vertices' motion (order of Contact::vertex).

@@ -59,8 +59,8 @@ struct StepStats {
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
   std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
-  std::uint64_t left_out_listed = 0;  ///< pairs closer than the separation in the reference frame
-  std::uint64_t left_out_met = 0;     ///< of those, the ones that came to the elementary test, without a separation
+  std::uint64_t left_out_listed = 0;                   ///< pairs closer than the separation in the reference frame
+  std::uint64_t left_out_met = 0;  ///< of those, the ones that came to the elementary test, without a separation
   const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
   StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
   const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
@@ -80,7 +80,8 @@ struct StartIntersection {
   std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};
 };
 
-/// The paper's own hierarchy is not among them: it lives in broad_phase/triangle_candidates.h, for benchmarks and tests.
+/// The paper's own hierarchy is not among them: it lives in broad_phase/triangle_candidates.h, for benchmarks and
+/// tests.
 enum class BroadPhase : std::uint8_t { CLUSTERED = 0, BRUTE_FORCE = 1 };
 
 struct DetectorOptions {
@@ -90,10 +91,11 @@ struct DetectorOptions {
   double step_budget_ms = 0;      ///< 0: none
   bool earliest_only = false;     ///< only contacts that may be the first; with `exact` those in the earliest TOC cell
   bool check_start_state = true;  ///< run the static tests when the step needs them
-  /// Bodies that move bit for bit as in the step before keep their bounds (no answer changes). Off: to time a step again
-  /// and again.
+  /// Bodies that move bit for bit as in the step before keep their bounds (no answer changes). Off: to time a step
+  /// again and again.
   bool keep_bounds = true;
-  bool unfolded_test = true;      ///< leave out the self-collision of surfaces that certainly do not fold (no answer changes)
+  /// Leave out the self-collision of surfaces that certainly do not fold (no answer changes).
+  bool unfolded_test = true;
 };
 
 /// Where a body was when it was known to be fit: its features that are closer there than the minimum separation are
@@ -109,8 +111,9 @@ struct SeparationFrom {
   double separation_m = 0;
 };
 
-/// A pair of features of one body from which the separation is left out, because it is closer in the reference frame (with
-/// uncertainty radii: while it is closer there than its present separation). It is still tested for contact without one.
+/// A pair of features of one body from which the separation is left out, because it is closer in the reference frame
+/// (with uncertainty radii: while it is closer there than its present separation). It is still tested for contact
+/// without one.
 struct LeftOutPair {
   PairKind kind = PairKind::VERTEX_FACE;
   std::uint16_t body = 0;
@@ -124,9 +127,9 @@ struct BodySetup {
   bool self_collision = true;
   bool against_bodies = true;
   bool against_obstacle = true;
-  double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
-  std::vector<std::uint8_t> vertex_active;  ///< empty: all; 0: the vertex and every feature on it is left out
-  std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
+  double minimum_separation_m = 0;                  ///< [m]; a pair uses the larger of its two bodies'
+  std::vector<std::uint8_t> vertex_active;          ///< empty: all; 0: the vertex and every feature on it is left out
+  std::vector<SeparationFrom> separations;          ///< named by either of the two bodies
   std::shared_ptr<const ReferenceFrame> reference;  ///< null: no pair is left out
   bool rigid = false;                               ///< for the statistics
 };
@@ -135,8 +138,8 @@ struct BodySetup {
 struct BodyMotion {
   const Positions* t0 = nullptr;
   const Positions* t1 = nullptr;
-  /// Uncertainty radius per vertex during the whole step [m], finite and 0 or more; null: none. A pair's separation grows
-  /// by the largest radius of each of its two features. Needs accuracy conservative or screen.
+  /// Uncertainty radius per vertex during the whole step [m], finite and 0 or more; null: none. A pair's separation
+  /// grows by the largest radius of each of its two features. Needs accuracy conservative or screen.
   const std::vector<double>* radius_m = nullptr;
 };
 
@@ -145,11 +148,12 @@ class Detector;
 /// One step of all bodies, in the order of setBodies.
 struct MotionStep {
   std::vector<BodyMotion> bodies;
-  std::shared_ptr<const VoxelSurface> obstacle;                         ///< null: none
-  Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();     ///< held for the whole step
+  std::shared_ptr<const VoxelSurface> obstacle;                      ///< null: none
+  Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< held for the whole step
   bool continues = false;  ///< t0 is the t1 of the previous run(), so the start state can be carried over
   double spent_ms = 0;     ///< of step_budget_ms, by earlier parts of the same step
-  /// Parts of the same step that follow: the search of the start state leaves them as much time as this part's pairs took.
+  /// Parts of the same step that follow: the search of the start state leaves them as much time as this part's pairs
+  /// took.
   std::size_t parts_after = 0;
   /// Another detector, whose last step ended at this t0: what it knows of its end is the start state, without a search.
   /// Nothing is carried over to a step after this one.
@@ -162,7 +166,7 @@ struct StepResult {
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
   bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
-  bool complete = true;  ///< of the contacts; false: the budget ran out
+  bool complete = true;              ///< of the contacts; false: the budget ran out
   /// complete == false: nothing that was left out can touch before this; otherwise infinity.
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   core::StepStats stats;

@@ -1,4 +1,5 @@
-// Which effects a scene calls for, and one sentence why. Derived before the first step and again when the scene changes.
+// Which effects a scene calls for, and one sentence why. Derived before the first step and again when the scene
+// changes.
 #pragma once
 
 #include <cstdint>
@@ -20,16 +21,16 @@ struct EffectBody {
   bool rigid = false;
   bool self_collision = true;  ///< as the body's own parameter says
   bool topology_known = false;
-  bool has_faces = true;       ///< once the topology is known
-  std::string noise;           ///< where its uncertainty radii come from, in words; empty: it has none
+  bool has_faces = true;  ///< once the topology is known
+  std::string noise;      ///< where its uncertainty radii come from, in words; empty: it has none
 };
 
 /// What the plan is derived from.
 struct EffectScene {
   std::vector<EffectBody> bodies;
-  std::string map_source;      ///< a topic or file, for the sentence
-  bool map_seen = false;       ///< a file is named, somebody publishes the topic, or a map has come
-  double minimum_separation_m = 0;  ///< the largest that is named
+  std::string map_source;            ///< a topic or file, for the sentence
+  bool map_seen = false;             ///< a file is named, somebody publishes the topic, or a map has come
+  double minimum_separation_m = 0;   ///< the largest that is named
   std::uint64_t left_out_pairs = 0;  ///< closer than that in the reference frame
   double look_ahead_s = 0;
   bool unknown_space_counts = false;  ///< unknown_space is not `free`

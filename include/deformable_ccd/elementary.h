@@ -13,11 +13,11 @@ namespace deformable_ccd {
 
 /// Kinds of feature pairs. The last three are mesh feature against occupied octomap space.
 enum class PairKind : std::uint8_t {
-  VERTEX_FACE = 0,       ///< indices: vertex, then the face's three
-  EDGE_EDGE = 1,         ///< indices: ea0 ea1 eb0 eb1
-  VERTEX_VOXEL_FACE = 2, ///< indices: vertex
-  EDGE_VOXEL_EDGE = 3,   ///< indices: the edge's two
-  FACE_VOXEL_CORNER = 4  ///< indices: the face's three
+  VERTEX_FACE = 0,        ///< indices: vertex, then the face's three
+  EDGE_EDGE = 1,          ///< indices: ea0 ea1 eb0 eb1
+  VERTEX_VOXEL_FACE = 2,  ///< indices: vertex
+  EDGE_VOXEL_EDGE = 3,    ///< indices: the edge's two
+  FACE_VOXEL_CORNER = 4   ///< indices: the face's three
 };
 
 /// Rungs of the accuracy ladder, cheapest first.
@@ -25,9 +25,9 @@ enum class Accuracy : std::uint8_t { SCREEN = 0, FAST = 1, CONSERVATIVE = 2, EXA
 
 struct AccuracyOptions {
   Accuracy rung = Accuracy::EXACT;
-  double tolerance_m = 1e-6;   ///< conservative: > 0; false positives only where the features come this close [m]
-  int toc_bits = 32;           ///< exact: TOC cell is 2^-toc_bits of the step; 10 to 52
-  int max_subdivisions = 4096; ///< conservative: cap per pair, then undecided
+  double tolerance_m = 1e-6;    ///< conservative: > 0; false positives only where the features come this close [m]
+  int toc_bits = 32;            ///< exact: TOC cell is 2^-toc_bits of the step; 10 to 52
+  int max_subdivisions = 4096;  ///< conservative: cap per pair, then undecided
 };
 
 /// Two features over one step, coordinates exact: x[time][point][axis], times t=0 and t=1.
@@ -39,7 +39,15 @@ struct PairMotion {
 enum class Verdict : std::uint8_t { NO_CONTACT = 0, CONTACT = 1, UNDECIDED = 2 };
 
 /// Which tier settled the pair (doc/algorithm.md). Purely informative.
-enum class Tier : std::uint8_t { COINCIDENCE = 0, DOUBLE_BATCH, BERNSTEIN, DOUBLE_DOUBLE, FIXED_INTEGER, BIG_INTEGER, COUNT };
+enum class Tier : std::uint8_t {
+  COINCIDENCE = 0,
+  DOUBLE_BATCH,
+  BERNSTEIN,
+  DOUBLE_DOUBLE,
+  FIXED_INTEGER,
+  BIG_INTEGER,
+  COUNT
+};
 
 /// toc_lower <= TOC; all in units of the step, [0,1].
 /// exact, CONTACT: TOC lies in [toc_lower, toc_upper), toc_lower = k 2^-bits and toc_upper = (k+1) 2^-bits;

@@ -1,5 +1,5 @@
-// What a map knows: which voxels it has seen, occupied or free. For scenes in which the unknown counts as an obstacle, or
-// in which its share of the swept volume is reported.
+// What a map knows: which voxels it has seen, occupied or free. For scenes in which the unknown counts as an obstacle,
+// or in which its share of the swept volume is reported.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,9 @@ struct SweptSpace {
   std::uint64_t unknown = 0;  ///< of those, the ones that the map does not know
   bool complete = true;       ///< false: the sweep was larger than the limit, and only a part of it was counted
   /// Of what was counted, which is all only where it is complete.
-  double unknownFraction() const { return voxels == 0 ? 0.0 : static_cast<double>(unknown) / static_cast<double>(voxels); }
+  double unknownFraction() const {
+    return voxels == 0 ? 0.0 : static_cast<double>(unknown) / static_cast<double>(voxels);
+  }
 };
 
 /// Immutable once built; safe from several threads.
@@ -33,12 +35,12 @@ class KnownSpace {
   double resolution() const;  ///< [m]
   std::size_t memoryBytes() const;
 
-  /// Is every voxel known whose closed box meets the closed region [m, map frame]? What lies outside of the map's range is
-  /// not known; an empty region is.
+  /// Is every voxel known whose closed box meets the closed region [m, map frame]? What lies outside of the map's range
+  /// is not known; an empty region is.
   bool isKnown(const Box& region_m) const;
 
-  /// The unknown voxels whose closed box meets the crop region, as few cubes: with a map's occupied leaves they make the
-  /// surface for which the unknown is occupied. Throws std::length_error naming the limit when there are more, and
+  /// The unknown voxels whose closed box meets the crop region, as few cubes: with a map's occupied leaves they make
+  /// the surface for which the unknown is occupied. Throws std::length_error naming the limit when there are more, and
   /// std::invalid_argument for a crop box that is not finite.
   std::vector<OccupiedLeaf> unknownLeaves(const Box& crop_m, std::size_t max_leaves = 2'000'000) const;
 

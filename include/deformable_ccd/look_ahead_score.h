@@ -11,14 +11,14 @@
 
 namespace deformable_ccd {
 
-/// What is compared is when a vertex first touches another body, its own, or the map, as vertex or through an edge or face
-/// of it: which of many neighbouring features it meets first is chance, when it arrives is not.
+/// What is compared is when a vertex first touches another body, its own, or the map, as vertex or through an edge or
+/// face of it: which of many neighbouring features it meets first is chance, when it arrives is not.
 struct LookAheadSummary {
-  std::size_t compared = 0;        ///< predictions that came true within their horizon (each prediction of each vertex)
-  std::size_t not_observed = 0;    ///< predicted, and not in contact when the horizon was over
-  std::size_t not_predicted = 0;   ///< came into contact unannounced
-  double median_error_s = 0;       ///< of |predicted - observed| [s]; 0 without any
-  double p95_error_s = 0;          ///< [s]
+  std::size_t compared = 0;       ///< predictions that came true within their horizon (each prediction of each vertex)
+  std::size_t not_observed = 0;   ///< predicted, and not in contact when the horizon was over
+  std::size_t not_predicted = 0;  ///< came into contact unannounced
+  double median_error_s = 0;      ///< of |predicted - observed| [s]; 0 without any
+  double p95_error_s = 0;         ///< [s]
   double median_signed_error_s = 0;  ///< [s] above 0: predicted too late
 };
 
@@ -28,8 +28,8 @@ constexpr std::size_t LOOK_AHEAD_SAMPLES = 1000;
 /// What a prediction cost, for the statistics of the step that it begins after.
 StageStats lookAheadStats(const StepOutcome& prediction);
 
-/// Feed it every outcome in order, and after an outcome the prediction that begins at its end, if there is one. Memory grows
-/// with the vertices times the steps in a horizon, and with max_samples.
+/// Feed it every outcome in order, and after an outcome the prediction that begins at its end, if there is one. Memory
+/// grows with the vertices times the steps in a horizon, and with max_samples.
 class LookAheadScore {
  public:
   /// max_samples: errors that are kept, the newest ones; 0: all.

@@ -54,9 +54,9 @@ struct MeshFrame {
 };
 
 struct MeshStoreOptions {
-  double max_step_s = 0.5;         ///< a longer pause is a gap; > 0
-  double max_vertex_step_m = 0.5;  ///< a vertex that moves further is a teleport; 0: never
-  std::size_t capacity = 1024;     ///< frames kept at most; at least 2
+  double max_step_s = 0.5;             ///< a longer pause is a gap; > 0
+  double max_vertex_step_m = 0.5;      ///< a vertex that moves further is a teleport; 0: never
+  std::size_t capacity = 1024;         ///< frames kept at most; at least 2
   std::size_t max_vertices = 1 << 21;  ///< in the frames kept (50 MB), where they are more than 64
 };
 
@@ -103,8 +103,8 @@ class MeshStore {
   /// Rigid bodies: the pose at a stamp for which lookup is READY.
   Eigen::Isometry3d poseAt(StampNs stamp_ns) const;
 
-  /// The largest uncertainty radius of each vertex over the frames that stamps in [from, to] (lookup READY) lie between;
-  /// empty when none of them has any.
+  /// The largest uncertainty radius of each vertex over the frames that stamps in [from, to] (lookup READY) lie
+  /// between; empty when none of them has any.
   void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
 
   /// How many frames lie between two stamps, neither included.

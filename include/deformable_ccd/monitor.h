@@ -29,7 +29,7 @@ struct MonitorBody {
   bool against_bodies = true;
   bool against_obstacle = true;
   double minimum_separation_m = 0;
-  std::vector<Index> vertex_mask;  ///< vertices that are left out, with every feature on them (grasped ones)
+  std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
   std::vector<SeparationFrom> separations;  ///< see BodySetup
 };
 
@@ -38,19 +38,19 @@ struct StepInput;  // detector/step_runner.h
 struct MonitorOptions {
   DetectorOptions detector;
   MeshStoreOptions store;
-  double sync_timeout_s = 0.1;     ///< how long a step waits for the other bodies' frames
-  std::size_t clock_body = 0;      ///< a step ends at each of its frames
-  std::size_t max_waiting = 64;    ///< steps that may wait for other bodies; the oldest gives way
-  std::size_t max_contacts = 10000;     ///< per outcome; the earliest are kept, status TRUNCATED
-  bool suppress_initial = false;        ///< leave initial obstacle contacts out of the list (they still count)
-  std::vector<Box> exclude_boxes;       ///< [m], fixed frame: voxels with their centre inside count as free
-  bool obstacle_expected = false;       ///< without a map the status is NO_MAP
+  double sync_timeout_s = 0.1;       ///< how long a step waits for the other bodies' frames
+  std::size_t clock_body = 0;        ///< a step ends at each of its frames
+  std::size_t max_waiting = 64;      ///< steps that may wait for other bodies; the oldest gives way
+  std::size_t max_contacts = 10000;  ///< per outcome; the earliest are kept, status TRUNCATED
+  bool suppress_initial = false;     ///< leave initial obstacle contacts out of the list (they still count)
+  std::vector<Box> exclude_boxes;    ///< [m], fixed frame: voxels with their centre inside count as free
+  bool obstacle_expected = false;    ///< without a map the status is NO_MAP
   /// With obstacle_expected, a map older than this at the end of the step is no map; 0: never. (Where none is expected,
   /// leaving a map out would go unsaid: it is used whatever its age.)
   double octomap_timeout_s = 0;
-  double rigid_tolerance_m = 1e-3;      ///< a step is split until straight paths are this close to a rotation's arc
+  double rigid_tolerance_m = 1e-3;  ///< a step is split until straight paths are this close to a rotation's arc
   std::size_t max_substeps = 64;
-  double look_ahead_s = 0;              ///< horizon of predictions; 0: none
+  double look_ahead_s = 0;  ///< horizon of predictions; 0: none
 };
 
 /// The map of a step. None yet: surface null. Valid and empty: a surface without leaves.
@@ -58,7 +58,7 @@ struct MonitorMap {
   std::shared_ptr<const VoxelSurface> surface;
   StampNs stamp_ns = 0;
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< at the map's stamp, held for the whole step
-  std::string problem;  ///< why there is none, for the reason of NO_MAP
+  std::string problem;                                               ///< why there is none, for the reason of NO_MAP
 };
 
 /// Every frame received ends in exactly one place: received = sum(by_status) + waiting.
@@ -102,7 +102,8 @@ struct StepOutcome {
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
   core::StepStats stats;
-  double unknown_fraction = 0;  ///< [1] of the swept voxels, those not known to the map, which fills it in; NaN: too many to count
+  double unknown_fraction =
+      0;  ///< [1] of the swept voxels, those not known to the map, which fills it in; NaN: too many to count
   std::size_t substeps = 0;
   bool clear = false;  ///< doc/interface.md, ~clear
 
@@ -119,11 +120,12 @@ struct StepOutcome {
   double duration_s() const { return static_cast<double>(stamp_ns - start_ns) * 1e-9; }
 };
 
-/// Point, normal, weights and approach speed [m per step] of one of the outcome's contacts, any kind, in the fixed frame.
+/// Point, normal, weights and approach speed [m per step] of one of the outcome's contacts, any kind, in the fixed
+/// frame.
 ContactGeometry contactGeometry(const StepOutcome& outcome, const core::Contact& contact);
 
-/// Where one of the contact's vertices is at its toc_lower [m], fixed frame; i counts Contact::vertex. Of a rigid body that
-/// turns, on the path that was tested: the chord of that part of the step.
+/// Where one of the contact's vertices is at its toc_lower [m], fixed frame; i counts Contact::vertex. Of a rigid body
+/// that turns, on the path that was tested: the chord of that part of the step.
 Vec3 vertexAtContact(const StepOutcome& outcome, const core::Contact& contact, int i);
 
 /// All that a step's answer follows from, before it is computed. One entry a body; valid until the step ends.

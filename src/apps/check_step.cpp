@@ -35,7 +35,8 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
       ->capture_default_str();
   app.add_option("--broad-phase", a.broad_phase, "clustered or brute_force")
-      ->check(CLI::IsMember({"clustered", "brute_force"}))->capture_default_str();
+      ->check(CLI::IsMember({"clustered", "brute_force"}))
+      ->capture_default_str();
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
   app.add_option("--repeat", a.repeat, "run the step this often for the times")
@@ -141,7 +142,10 @@ void print(const std::string& accuracy, const Run& run, bool header) {
   const double earliest = run.result.earliestToc();
   std::cout << std::left << std::setw(14) << accuracy << std::right << std::setw(10) << run.result.contacts.size()
             << std::setw(11) << run.result.stats.undecided << std::setw(14);
-  if (earliest <= 1) std::cout << earliest; else std::cout << "none";
+  if (earliest <= 1)
+    std::cout << earliest;
+  else
+    std::cout << "none";
   std::cout << std::fixed << std::setprecision(2) << std::setw(11) << run.times.at("total").best() << std::setw(11)
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
@@ -164,7 +168,10 @@ int checkStep(const Arguments& a) {
     const Run run = runStep(a, rungs[i], topology, m0.positions, m1.positions);
     print(rungs[i], run, i == 0);
     const nlohmann::json j = statsJson(a, rungs[i], run);
-    if (rungs.size() == 1) all = j; else all[rungs[i]] = j;
+    if (rungs.size() == 1)
+      all = j;
+    else
+      all[rungs[i]] = j;
     // With all rungs the file holds the last and most accurate one's.
     if (!a.contacts.empty() && i + 1 == rungs.size()) writeContacts(a.contacts, run.result);
   }

@@ -1,5 +1,5 @@
-// The node. Exit status 1 when a parameter is wrong, with one line that says which; 0 after SIGINT and SIGTERM, when the
-// step that runs is finished.
+// The node. Exit status 1 when a parameter is wrong, with one line that says which; 0 after SIGINT and SIGTERM, when
+// the step that runs is finished.
 #include <csignal>
 #include <exception>
 

@@ -34,9 +34,9 @@ class ScreenTest : public ElementaryTest {
     for (std::size_t i = 0; i < batch.count; ++i) {
       const double bound = linearTocBound(batch.kind, batch.vertices, batch.pairs[i], 0);
       std::uint32_t kept;
-      const bool separated = bound > 1 || simd::fusedFilter(batch.vertices->t0, batch.pairs[i].data(), 1,
-                                                            batch.kind == PairKind::EDGE_EDGE,
-                                                            simd::FusedPlanes::ALL, &kept) == 0;
+      const bool separated =
+          bound > 1 || simd::fusedFilter(batch.vertices->t0, batch.pairs[i].data(), 1,
+                                         batch.kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, &kept) == 0;
       results[i] = ElementaryResult{};
       results[i].toc_lower = std::min(bound, 1.0);
       if (separated) results[i].verdict = Verdict::NO_CONTACT;
@@ -174,9 +174,9 @@ std::vector<Rung> makeRungs(const std::string& accuracy, const AccuracyOptions& 
   return rungs;
 }
 
-constexpr const char* COLUMNS[] = {"family",    "kind",    "rung",      "queries",   "contacts",
-                                   "false_negatives", "false_positives", "undecided", "mean_ns",
-                                   "median_ns", "p99_ns",  "max_ns",    "max_toc_error"};
+constexpr const char* COLUMNS[] = {
+    "family",    "kind",    "rung",      "queries", "contacts", "false_negatives", "false_positives",
+    "undecided", "mean_ns", "median_ns", "p99_ns",  "max_ns",   "max_toc_error"};
 
 std::string formatted(const char* format, double value) {
   char text[64];
@@ -265,10 +265,11 @@ int runQueries(const std::vector<std::string>& dirs, const std::string& accuracy
 }  // namespace deformable_ccd
 
 int main(int argc, char** argv) {
-  CLI::App app{"Runs hard queries: wrong answers, time per query and error of the time of contact for each rung.\n"
-               "DIR holds FAMILY/{vertex-face,edge-edge}/*.csv, or is one such family. 'contacts' are the true ones;\n"
-               "max_toc_error is in steps, against exact arithmetic. Exit status: 0 every promise kept, 1 one broken\n"
-               "or a truth column wrong (listed on stderr), 2 bad input."};
+  CLI::App app{
+      "Runs hard queries: wrong answers, time per query and error of the time of contact for each rung.\n"
+      "DIR holds FAMILY/{vertex-face,edge-edge}/*.csv, or is one such family. 'contacts' are the true ones;\n"
+      "max_toc_error is in steps, against exact arithmetic. Exit status: 0 every promise kept, 1 one broken\n"
+      "or a truth column wrong (listed on stderr), 2 bad input."};
   std::vector<std::string> dirs;
   std::string accuracy = "all", format = "table";
   deformable_ccd::AccuracyOptions options;

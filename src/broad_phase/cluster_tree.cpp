@@ -104,7 +104,8 @@ void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* m
                               std::size_t last_group) {
   const std::vector<Index>& features = masked_.empty() ? features_ : masked_;
   simd::buildLeaves(records, features.data() + first_group * GROUP * arity_, arity_, (last_group - first_group) * GROUP,
-                    margin16, levels_[0].soa.data() + first_group * SOA_SIZE, levels_[0].aos.data() + first_group * AOS_SIZE);
+                    margin16, levels_[0].soa.data() + first_group * SOA_SIZE,
+                    levels_[0].aos.data() + first_group * AOS_SIZE);
 }
 
 void ClusterTree::refitUpper() {

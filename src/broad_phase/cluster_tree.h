@@ -48,7 +48,8 @@ class ClusterTree {
   void mask(const std::uint8_t* active);
 
   /// Recomputes all bounds from the vertices' records. margin16: see simd::buildLeaves.
-  void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group, std::size_t last_group);
+  void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+                   std::size_t last_group);
   void refitUpper();
 
   std::size_t featureCount() const { return feature_count_; }

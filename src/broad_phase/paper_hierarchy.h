@@ -1,6 +1,6 @@
-// The paper's hierarchy: a two-level tree of SIMD 16-DOPs over triangles (Section 6). The lower level is one binary tree
-// for each connected part of each body, built once and refitted every step; the upper level is a tree over the parts'
-// roots, built anew every step, since parts move relative to each other.
+// The paper's hierarchy: a two-level tree of SIMD 16-DOPs over triangles (Section 6). The lower level is one binary
+// tree for each connected part of each body, built once and refitted every step; the upper level is a tree over the
+// parts' roots, built anew every step, since parts move relative to each other.
 #pragma once
 
 #include <array>
@@ -21,9 +21,9 @@ struct alignas(64) Dop16 {
 
 class PaperHierarchy {
  public:
-  /// Splits the leaves of each part at medians of their centroids, along the longest axis. Returns the order in which the
-  /// leaves are stored: leaf i of the tree is leaf order[i] of the input. part: one number a leaf, 0 .. part_count-1,
-  /// every part has a leaf.
+  /// Splits the leaves of each part at medians of their centroids, along the longest axis. Returns the order in which
+  /// the leaves are stored: leaf i of the tree is leaf order[i] of the input. part: one number a leaf, 0 ..
+  /// part_count-1, every part has a leaf.
   std::vector<Index> build(const std::vector<std::array<float, 3>>& centroids, const std::vector<Index>& part);
 
   /// The bounds of the leaves, to be filled before update().

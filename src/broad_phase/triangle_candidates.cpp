@@ -151,8 +151,7 @@ bool TriangleCandidates::wanted(std::uint32_t a, std::uint32_t b) const {
     const Body &body_a = bodies_[body_of_[a]], &body_b = bodies_[body_of_[b]];
     if (body_of_[a] == body_of_[b] ? !body_a.self : !(body_a.against && body_b.against)) return false;
   }
-  return !use_difference_ ||
-         (difference_lo_[a] <= difference_hi_[b] && difference_lo_[b] <= difference_hi_[a]);
+  return !use_difference_ || (difference_lo_[a] <= difference_hi_[b] && difference_lo_[b] <= difference_hi_[a]);
 }
 
 void TriangleCandidates::expandVertexFace(const Primitive& owner, const Primitive& face) {

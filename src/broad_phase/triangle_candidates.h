@@ -69,12 +69,12 @@ class TriangleCandidates {
   void deactivate(const std::uint8_t* active);
 
   PaperHierarchy hierarchy_;
-  std::vector<Primitive> primitives_;         // in the order of the tree
-  std::vector<std::uint8_t> all_features_;    // Primitive::features with every vertex active
-  std::vector<Index> body_of_;                // of a primitive
+  std::vector<Primitive> primitives_;       // in the order of the tree
+  std::vector<std::uint8_t> all_features_;  // Primitive::features with every vertex active
+  std::vector<Index> body_of_;              // of a primitive
   std::vector<Body> bodies_;
   std::vector<std::uint8_t> part_self_;
-  std::vector<std::uint32_t> leaf_vertices_;  // 3 a leaf, as dopRefitLeaves wants them
+  std::vector<std::uint32_t> leaf_vertices_;           // 3 a leaf, as dopRefitLeaves wants them
   std::vector<double> difference_lo_, difference_hi_;  // swept x - z of a primitive, DOP18 alone
   bool use_difference_ = false;
   bool all_wanted_ = true;

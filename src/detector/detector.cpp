@@ -10,8 +10,8 @@
 namespace deformable_ccd {
 namespace {
 
-constexpr std::size_t CONTACT_PIECE = 16384;    // contacts in a unit of writing them out
-constexpr std::size_t PIECE = 256;              // groups or vertices x 16 in a unit of refitting
+constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
+constexpr std::size_t PIECE = 256;            // groups or vertices x 16 in a unit of refitting
 
 std::uint64_t pairsIn(const ObstacleStats& stats) {
   return stats.vertex_pairs_in + stats.edge_pairs_in + stats.corner_pairs_in;
@@ -47,12 +47,14 @@ void keepEarliest(bool cells, std::vector<core::Contact>& contacts) {
 }  // namespace
 
 const char* toString(Stage stage) {
-  static const char* const NAMES[] = {"record", "bounds", "broad_phase", "planar", "elementary", "obstacle", "start_state", "sort"};
+  static const char* const NAMES[] = {"record",     "bounds",   "broad_phase", "planar",
+                                      "elementary", "obstacle", "start_state", "sort"};
   return NAMES[static_cast<std::size_t>(stage)];
 }
 const char* toString(Effect effect) {
-  static const char* const NAMES[] = {"self_collision", "body_body",          "obstacle",      "start_state", "rigid_bodies",
-                                      "unknown_space",  "minimum_separation", "tracker_noise", "look_ahead"};
+  static const char* const NAMES[] = {"self_collision",     "body_body",     "obstacle",
+                                      "start_state",        "rigid_bodies",  "unknown_space",
+                                      "minimum_separation", "tracker_noise", "look_ahead"};
   return NAMES[static_cast<std::size_t>(effect)];
 }
 const char* toString(StartState state) {
@@ -126,8 +128,8 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   if (options.accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options.accuracy.tolerance_m;
   if (options.step_budget_ms > 0) {
     const double left_ms = std::max(0.0, options.step_budget_ms - step.spent_ms);
-    context.deadline = begin + std::chrono::duration_cast<Clock::duration>(
-                                   std::chrono::duration<double, std::milli>(left_ms));
+    context.deadline =
+        begin + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::milli>(left_ms));
   }
   for (PairWorker& w : workers) w.beginStep();
   findPairs(context);
@@ -138,7 +140,8 @@ const StepResult& Detector::Impl::run(const MotionStep& step) {
   if (step.obstacle && scene.meetsObstacle()) runObstacle(step, context);
   rememberApart(all_pairs && !options.earliest_only && options.accuracy.rung != Accuracy::FAST);
   if (options.earliest_only) keepEarliest(options.accuracy.rung == Accuracy::EXACT, result.contacts);
-  runStartState(step, begin, all_pairs, context);  // after the contacts: of a budget too small for both they are asked for first
+  runStartState(step, begin, all_pairs,
+                context);  // after the contacts: of a budget too small for both they are asked for first
   stats.total_ms = msSince(begin);
   finished = true;
   return result;
@@ -213,10 +216,10 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
     const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
     const Positions& t0 = inMapFrame(step.map_from_fixed, *step.bodies[b].t0, map_t0);
     const Positions& t1 = inMapFrame(step.map_from_fixed, *step.bodies[b].t1, map_t1);
-    const bool whole = obstacle_tests[b]->run(
-        *step.obstacle, *body.setup.topology, t0, t1, active, static_cast<std::uint16_t>(b), result.contacts, total,
-        body.uncertain ? step.bodies[b].radius_m->data() : nullptr,
-        context.deadline == Clock::time_point::max() ? nullptr : &context.deadline);
+    const bool whole =
+        obstacle_tests[b]->run(*step.obstacle, *body.setup.topology, t0, t1, active, static_cast<std::uint16_t>(b),
+                               result.contacts, total, body.uncertain ? step.bodies[b].radius_m->data() : nullptr,
+                               context.deadline == Clock::time_point::max() ? nullptr : &context.deadline);
     if (!whole) {
       result.complete = false;
       result.unchecked_toc_lower = 0;
@@ -229,7 +232,8 @@ void Detector::Impl::runObstacle(const MotionStep& step, const StepContext& cont
   }
   // Each body's are in order; of several bodies, kinds come first.
   const auto first = result.contacts.begin() + static_cast<std::ptrdiff_t>(before);
-  if (!std::is_sorted(first, result.contacts.end(), canonicalLess)) std::sort(first, result.contacts.end(), canonicalLess);
+  if (!std::is_sorted(first, result.contacts.end(), canonicalLess))
+    std::sort(first, result.contacts.end(), canonicalLess);
   result.stats[Stage::OBSTACLE] = {pairsIn(total), result.contacts.size() - before, msSince(start)};
   result.stats[Effect::OBSTACLE] = result.stats[Stage::OBSTACLE];
   for (std::size_t i = before; i < result.contacts.size(); ++i) {
@@ -281,10 +285,10 @@ void Detector::Impl::runStartState(const MotionStep& step, Clock::time_point beg
   if (known) {
     start_state.skip();
   } else {
-    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about the
-    // end of the step.
-    const bool complete = all_pairs && !options.earliest_only && stats.unchecked_vertices == 0 &&
-                          options.accuracy.rung != Accuracy::FAST;
+    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about
+    // the end of the step.
+    const bool complete =
+        all_pairs && !options.earliest_only && stats.unchecked_vertices == 0 && options.accuracy.rung != Accuracy::FAST;
     start_state.remember(scene, result.contacts, complete);
   }
   stats[Stage::START_STATE].ms += msSince(start);

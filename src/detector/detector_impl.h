@@ -25,7 +25,9 @@
 
 namespace deformable_ccd {
 
-inline FeatureKind firstKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
+inline FeatureKind firstKind(PairKind k) {
+  return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE;
+}
 inline FeatureKind secondKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
 
 struct Detector::Impl {
@@ -73,7 +75,7 @@ struct Detector::Impl {
   HitOrder order;
   StartStateTest start_state;
   std::vector<UnfoldedTest> unfolded;
-  std::vector<std::uint8_t> apart;  // per body: at the end of the last step it certainly did not touch itself
+  std::vector<std::uint8_t> apart;        // per body: at the end of the last step it certainly did not touch itself
   std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at in this step
   std::vector<std::unique_ptr<ObstacleTest>> obstacle_tests;
   Positions map_t0, map_t1;
@@ -96,11 +98,11 @@ void Detector::Impl::parallel(std::size_t n, std::size_t piece, const Body& body
   };
   ForkJoin::fork();
   arena->execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, piece),
-                      [&](const tbb::blocked_range<std::size_t>& r) DEFORMABLE_CCD_COPIED_BY_TBB {
-                        ForkJoin::piece(in_mode, r.begin(), r.end());
-                      },
-                      tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, n, piece),
+        [&](const tbb::blocked_range<std::size_t>& r)
+            DEFORMABLE_CCD_COPIED_BY_TBB { ForkJoin::piece(in_mode, r.begin(), r.end()); },
+        tbb::simple_partitioner());
   });
   ForkJoin::join();
 }

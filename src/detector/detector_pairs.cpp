@@ -103,7 +103,8 @@ void Detector::Impl::findPairs(const StepContext& context) {
   if (n > 1) {
     scene.overlappingBodies(false, body_pairs, scratch);
     for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
-      const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]), b = static_cast<std::uint16_t>(body_pairs[p + 1]);
+      const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]),
+                          b = static_cast<std::uint16_t>(body_pairs[p + 1]);
       if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
       ++result.stats.body_pairs;
       addTasks(PairKind::VERTEX_FACE, a, b, context);

@@ -39,8 +39,9 @@ Finding selfCollision(const EffectScene& scene) {
     if (body.topology_known && !body.has_faces) rope += (rope.empty() ? "" : ", ") + body.name;
   }
   if (can.empty()) {
-    return {false, !all_rigid, all_rigid ? (scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid")
-                                         : "it is switched off for every body that deforms"};
+    return {false, !all_rigid,
+            all_rigid ? (scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid")
+                      : "it is switched off for every body that deforms"};
   }
   can += deforming == 1 ? " deforms" : " deform";
   return {true, true, can + (rope.empty() ? "" : "; of " + rope + " only edges, a polyline has no faces")};
@@ -62,7 +63,8 @@ Finding startState(const EffectScene& scene) {
 }
 
 Finding rigidBodies(const EffectScene& scene) {
-  const auto count = std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const EffectBody& b) { return b.rigid; });
+  const auto count =
+      std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const EffectBody& b) { return b.rigid; });
   if (count == 0) return {false, false, "no body is rigid; give one under bodies/NAME/rigid"};
   return {true, true, std::to_string(count) + (count == 1 ? " body moves" : " bodies move") + " by tf"};
 }
@@ -111,12 +113,16 @@ Finding find(const std::string& name, const EffectScene& scene) {
 
 EffectDecision decide(const std::string& name, EffectSetting setting, const Finding& finding) {
   switch (setting) {
-    case EffectSetting::OFF: return {name, setting, false, "switched off by effects/" + name};
-    case EffectSetting::AUTO: return {name, setting, finding.wanted, finding.reason};
-    case EffectSetting::ON: break;
+    case EffectSetting::OFF:
+      return {name, setting, false, "switched off by effects/" + name};
+    case EffectSetting::AUTO:
+      return {name, setting, finding.wanted, finding.reason};
+    case EffectSetting::ON:
+      break;
   }
   if (!finding.possible) {
-    throw std::invalid_argument("effects/" + name + " is on, but " + finding.reason + "; or write effects/" + name + ": auto");
+    throw std::invalid_argument("effects/" + name + " is on, but " + finding.reason + "; or write effects/" + name +
+                                ": auto");
   }
   return {name, setting, true, finding.wanted ? finding.reason : "switched on by effects/" + name};
 }
@@ -128,8 +134,8 @@ const char* toString(EffectSetting setting) {
 }
 
 const std::vector<std::string>& effectNames() {
-  static const std::vector<std::string> NAMES = {"self_collision", "body_body",     "octomap",
-                                                 "start_state",    "rigid_bodies",  "unknown_space",
+  static const std::vector<std::string> NAMES = {"self_collision",     "body_body",     "octomap",
+                                                 "start_state",        "rigid_bodies",  "unknown_space",
                                                  "minimum_separation", "tracker_noise", "look_ahead"};
   return NAMES;
 }
@@ -141,9 +147,9 @@ EffectPlan::EffectPlan(const EffectScene& scene, const std::map<std::string, Eff
         decide(name, setting == settings.end() ? EffectSetting::AUTO : setting->second, find(name, scene)));
   }
   if (running("octomap")) {
-    decisions_.push_back(ropesOnly(scene)
-                             ? EffectDecision{"octomap_corner_face", EffectSetting::AUTO, false, "a polyline has no faces"}
-                             : EffectDecision{"octomap_corner_face", EffectSetting::AUTO, true, "a body has faces"});
+    decisions_.push_back(
+        ropesOnly(scene) ? EffectDecision{"octomap_corner_face", EffectSetting::AUTO, false, "a polyline has no faces"}
+                         : EffectDecision{"octomap_corner_face", EffectSetting::AUTO, true, "a body has faces"});
   }
 }
 

@@ -1,5 +1,5 @@
-// What ThreadSanitizer is told of a parallel loop. TBB, which is built without it, starts the pieces and waits for them, so
-// that it would call each use of a piece's results a race. Races between pieces stay what they are.
+// What ThreadSanitizer is told of a parallel loop. TBB, which is built without it, starts the pieces and waits for
+// them, so that it would call each use of a piece's results a race. Races between pieces stay what they are.
 #pragma once
 
 #include <cstddef>

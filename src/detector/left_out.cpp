@@ -26,7 +26,6 @@ double restDistance(PairKind kind, const std::array<Vec3, 4>& x) {
   return distance;
 }
 
-
 void LeftOutOfBody::set(PairKind kind, const std::vector<LeftOutKey>& keys, Index first_rank, std::size_t count) {
   Table& table = tables_[static_cast<int>(kind)];
   table.first_rank = first_rank;

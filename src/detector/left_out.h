@@ -11,8 +11,8 @@
 
 namespace deformable_ccd {
 
-/// A pair of features by their ranks, the first one's << 32 | the second one's, and how far they are apart in the reference
-/// frame [m].
+/// A pair of features by their ranks, the first one's << 32 | the second one's, and how far they are apart in the
+/// reference frame [m].
 struct LeftOutKey {
   std::uint64_t key;
   double distance_m;
@@ -26,8 +26,8 @@ class LeftOutOfBody {
   void set(PairKind kind, const std::vector<LeftOutKey>& keys, Index first_rank, std::size_t count);
   bool empty() const { return tables_[0].partners.empty() && tables_[1].partners.empty(); }
 
-  /// The pair's distance in the reference frame, infinity when it is not listed. One search among the few partners of the
-  /// first feature.
+  /// The pair's distance in the reference frame, infinity when it is not listed. One search among the few partners of
+  /// the first feature.
   double distance(PairKind kind, std::uint64_t key) const {
     const Table& table = tables_[static_cast<int>(kind)];
     if (table.partners.empty()) return std::numeric_limits<double>::infinity();

@@ -30,9 +30,9 @@ LookAheadScore::LookAheadScore(double horizon_s, std::size_t max_samples)
 
 void LookAheadScore::vertexTimes(const StepOutcome& outcome, Times& first, std::set<Key>* touching) {
   for (const core::Contact& contact : outcome.contacts) {
-    const std::size_t own = contact.body[1] == OBSTACLE_BODY                  ? contact.vertex.size()
-                            : contact.kind == PairKind::VERTEX_FACE           ? 1
-                                                                              : 2;
+    const std::size_t own = contact.body[1] == OBSTACLE_BODY        ? contact.vertex.size()
+                            : contact.kind == PairKind::VERTEX_FACE ? 1
+                                                                    : 2;
     for (std::size_t i = 0; i < contact.vertex.size() && contact.vertex[i] != NO_INDEX; ++i) {
       const std::size_t side = i < own ? 0 : 1;
       const Key key = keyOf(contact.body[side], contact.body[1 - side], contact.vertex[i]);
@@ -81,8 +81,8 @@ void LookAheadScore::observe(const StepOutcome& outcome) {
   vertexTimes(outcome, first, &touching);
   for (const auto& [key, toc] : first) {
     if (touching_.count(key)) continue;
-    const double observed_ns =
-        static_cast<double>(outcome.start_ns - origin_ns_) + toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns);
+    const double observed_ns = static_cast<double>(outcome.start_ns - origin_ns_) +
+                               toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns);
     const auto waiting = pending_.find(key);
     if (waiting == pending_.end()) {
       not_predicted_ += had_predictions;

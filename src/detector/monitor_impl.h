@@ -52,8 +52,7 @@ struct Monitor::Impl {
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
 
-  Impl(const MonitorOptions& o, std::vector<MonitorBody> b)
-      : options(o), bodies(std::move(b)), runner(o.detector) {
+  Impl(const MonitorOptions& o, std::vector<MonitorBody> b) : options(o), bodies(std::move(b)), runner(o.detector) {
     stores.assign(bodies.size(), MeshStore(options.store));
     counters.resize(bodies.size());
     input.resize(bodies.size());

@@ -35,8 +35,8 @@ Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, b
   const Lookup at_t1 = store.lookup(step.to->stamp_ns, &runs[body]);
   if (at_t1 == Lookup::NOT_YET) {
     if (!timed_out) return Ready::WAIT;
-    drop(step, StepStatus::NO_BODY, name + (store.empty() ? "has not been received yet"
-                                                          : "has no frame at or after the end of the step"));
+    drop(step, StepStatus::NO_BODY,
+         name + (store.empty() ? "has not been received yet" : "has no frame at or after the end of the step"));
     return Ready::NEVER;
   }
   const Lookup at_t0 = store.lookup(step.from->stamp_ns, &run_t0);
@@ -57,8 +57,8 @@ Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
   return all;
 }
 
-/// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the other.
-/// What was seen of it in between must not be contradicted in silence.
+/// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the
+/// other. What was seen of it in between must not be contradicted in silence.
 void Monitor::Impl::lookBetween(std::size_t body, StampNs from_ns, StampNs to_ns) {
   const std::size_t frames = stores[body].framesWithin(from_ns, to_ns);
   if (frames == 0) return;

@@ -75,7 +75,8 @@ StepOutcome Monitor::predict() {
   outcome.reason.clear();
   outcome.start_ns = m.last_end_ns;
   outcome.stamp_ns = m.last_end_ns + static_cast<StampNs>(std::llround(m.options.look_ahead_s * 1e9));
-  m.runOn(m.side(m.options.detector.step_budget_ms), m.side_input, m.usableMap(m.last_end_ns), false, outcome, &m.runner);
+  m.runOn(m.side(m.options.detector.step_budget_ms), m.side_input, m.usableMap(m.last_end_ns), false, outcome,
+          &m.runner);
   return outcome;
 }
 

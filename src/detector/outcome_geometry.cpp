@@ -104,7 +104,9 @@ std::uint16_t bodyOf(const core::Contact& contact, int i) {
 ContactGeometry obstacleGeometry(const StepOutcome& outcome, const core::Contact& contact) {
   const Part part(outcome, contact);
   Feature feature;
-  const int points = contact.kind == PairKind::VERTEX_VOXEL_FACE ? 1 : contact.kind == PairKind::EDGE_VOXEL_EDGE ? 2 : 3;
+  const int points = contact.kind == PairKind::VERTEX_VOXEL_FACE ? 1
+                     : contact.kind == PairKind::EDGE_VOXEL_EDGE ? 2
+                                                                 : 3;
   for (int i = 0; i < points; ++i) {
     const Vec3 from = outcome.map_from_fixed * part.from(contact.body[0], contact.vertex[i]);
     const Vec3 to = outcome.map_from_fixed * part.to(contact.body[0], contact.vertex[i]);

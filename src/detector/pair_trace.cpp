@@ -69,14 +69,16 @@ class Tracer {
       for (std::size_t i = 0; i < f.size; ++i) {
         const Index v = question_.vertex[f.first + i];
         if (v >= input.t0[f.body].size()) {
-          throw std::invalid_argument("body '" + bodies_[f.body].name + "' has no vertex " + std::to_string(v) + "; it has " +
-                                      std::to_string(input.t0[f.body].size()));
+          throw std::invalid_argument("body '" + bodies_[f.body].name + "' has no vertex " + std::to_string(v) +
+                                      "; it has " + std::to_string(input.t0[f.body].size()));
         }
       }
     }
   }
 
-  void say(const std::string& stage, Says says, const std::string& text) { lines_.push_back({part_, stage, says, text}); }
+  void say(const std::string& stage, Says says, const std::string& text) {
+    lines_.push_back({part_, stage, says, text});
+  }
 
   void tracePart(const StepInput& input, const std::vector<Positions>& t0, const std::vector<Positions>& t1) {
     const ScopedFloatMode mode;
@@ -111,7 +113,8 @@ class Tracer {
     std::sort(wanted.begin(), wanted.end());
     for (f.slot = 0; f.slot < tree.featureCount(); ++f.slot) {
       std::array<Index, 3> found{NO_INDEX, NO_INDEX, NO_INDEX};
-      for (std::size_t i = 0; i < f.size; ++i) found[i] = body.slot_vertex[tree.feature(f.slot)[i] - body.internal_begin];
+      for (std::size_t i = 0; i < f.size; ++i)
+        found[i] = body.slot_vertex[tree.feature(f.slot)[i] - body.internal_begin];
       std::sort(found.begin(), found.end());
       if (found == wanted) return;
     }
@@ -124,14 +127,16 @@ class Tracer {
     const bool self = features_[0].body == features_[1].body;
     std::string why;
     if (self && !a.setup.self_collision) why = "self-collision of '" + a.setup.name + "' is off";
-    if (!self && (!a.setup.against_bodies || !b.setup.against_bodies)) why = "against_bodies of one of the bodies is off";
+    if (!self && (!a.setup.against_bodies || !b.setup.against_bodies))
+      why = "against_bodies of one of the bodies is off";
     for (const Feature& f : features_) {
       if (scene.bodies()[f.body].holds(f.kind, f.slot)) continue;
       why = "a vertex of '" + bodies_[f.body].name + "' is masked, or its position is not finite: not checked";
     }
     for (std::size_t i = 0; self && i < features_[0].size; ++i) {
       for (std::size_t j = features_[1].first; j < 4; ++j) {
-        if (question_.vertex[i] == question_.vertex[j]) why = "the features share vertex " + std::to_string(question_.vertex[i]);
+        if (question_.vertex[i] == question_.vertex[j])
+          why = "the features share vertex " + std::to_string(question_.vertex[i]);
       }
     }
     say("rules", why.empty() ? Says::KEPT : Says::REJECTED, why.empty() ? "a pair that the step asks about" : why);
@@ -148,7 +153,8 @@ class Tracer {
     }
     const bool unfolded = UnfoldedTest(body).run(body, scene.vertices());
     say("unfolded", unfolded ? Says::REJECTED : Says::KEPT,
-        unfolded ? "the whole surface certainly does not fold onto itself in this step" : "the surface may fold onto itself");
+        unfolded ? "the whole surface certainly does not fold onto itself in this step"
+                 : "the surface may fold onto itself");
   }
 
   PairMotion motion(const std::vector<Positions>& t0, const std::vector<Positions>& t1) const {
@@ -254,7 +260,8 @@ class Tracer {
         found ? "the clustered trees stream the pair" : "the bounds of the pair, or of clusters around it, stay apart");
   }
 
-  bool bodiesOverlap(const SceneArrays& scene, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const {
+  bool bodiesOverlap(const SceneArrays& scene, std::vector<std::uint32_t>& pairs,
+                     std::vector<std::uint32_t>& scratch) const {
     scene.overlappingBodies(false, pairs, scratch);
     const std::uint32_t low = static_cast<std::uint32_t>(std::min(features_[0].body, features_[1].body));
     const std::uint32_t high = static_cast<std::uint32_t>(std::max(features_[0].body, features_[1].body));
@@ -270,12 +277,14 @@ class Tracer {
     const Quad quad = internalVertices(scene);
     const auto keeps = [&](simd::FusedPlanes planes) {
       std::uint32_t kept = 0;
-      return simd::fusedFilter(scene.vertices()->t0, quad.data(), 1, question_.kind == PairKind::EDGE_EDGE, planes, &kept) == 1;
+      return simd::fusedFilter(scene.vertices()->t0, quad.data(), 1, question_.kind == PairKind::EDGE_EDGE, planes,
+                               &kept) == 1;
     };
-    if (keeps(simd::FusedPlanes::ADAPTIVE)) return say("planar", Says::KEPT, "no plane and no sign of the volume tells them apart");
-    say("planar", Says::REJECTED, keeps(simd::FusedPlanes::COORDINATE)
-                                      ? "apart in a plane made for the pair"
-                                      : "apart in a coordinate plane, or never in one plane (non-penetration)");
+    if (keeps(simd::FusedPlanes::ADAPTIVE))
+      return say("planar", Says::KEPT, "no plane and no sign of the volume tells them apart");
+    say("planar", Says::REJECTED,
+        keeps(simd::FusedPlanes::COORDINATE) ? "apart in a plane made for the pair"
+                                             : "apart in a coordinate plane, or never in one plane (non-penetration)");
   }
 
   void traceRungs(const std::vector<Positions>& t0, const std::vector<Positions>& t1) {
@@ -284,8 +293,8 @@ class Tracer {
       if (separation() > 0 && rung != Accuracy::CONSERVATIVE) continue;
       AccuracyOptions accuracy = options_.detector.accuracy;
       accuracy.rung = rung;
-      traceRung(*makeElementaryTest(accuracy), pair, std::string(toString(rung)) +
-                                                         (rung == options_.detector.accuracy.rung ? " *" : ""));
+      traceRung(*makeElementaryTest(accuracy), pair,
+                std::string(toString(rung)) + (rung == options_.detector.accuracy.rung ? " *" : ""));
     }
   }
 

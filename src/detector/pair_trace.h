@@ -15,8 +15,8 @@ struct PairQuestion {
   Quad vertex{};                            ///< body-local
 };
 
-/// What one stage says of the pair. A stage that rejects has a proof that the features stay apart; all others are asked all
-/// the same.
+/// What one stage says of the pair. A stage that rejects has a proof that the features stay apart; all others are asked
+/// all the same.
 struct TraceLine {
   enum class Says : std::uint8_t { KEPT, REJECTED, CONTACT, UNDECIDED };
   std::size_t part = 0;  ///< of the step, where it was split

@@ -8,7 +8,7 @@
 namespace deformable_ccd {
 namespace {
 
-constexpr std::size_t CHUNK = 2048;                              // pairs that stay in the first-level cache's reach
+constexpr std::size_t CHUNK = 2048;  // pairs that stay in the first-level cache's reach
 constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
@@ -261,7 +261,8 @@ void PairWorker::decide() {
     const bool certain = r.verdict == Verdict::CONTACT;
     if (!certain) {
       // As tight as the linear filter allows; dropLate() decides by the same bound.
-      const double bound = linearTocBound(task_->kind, batch.vertices, quads_[i], separationOf(i) + context_->tolerance_m);
+      const double bound =
+          linearTocBound(task_->kind, batch.vertices, quads_[i], separationOf(i) + context_->tolerance_m);
       r.toc_lower = std::max(r.toc_lower, std::min(bound, 1.0));
     }
     hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,

@@ -44,7 +44,7 @@ struct StepContext {
   std::atomic<bool> expired{false};
   bool earliest_only = false;
   const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
-  double tolerance_m = 0;  ///< the elementary test may call features this far apart a contact
+  double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   bool timeIsUp() {
     if (expired.load(std::memory_order_relaxed)) return true;

@@ -72,8 +72,8 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
       throw std::invalid_argument("setBodies: body '" + s.name + "' has a separation from body " +
                                   std::to_string(from.body) + "; there are " + std::to_string(setups.size()));
     }
-    if (s.reference && (s.reference->positions.size() != n ||
-                        (!s.reference->radius_m.empty() && s.reference->radius_m.size() != n))) {
+    if (s.reference &&
+        (s.reference->positions.size() != n || (!s.reference->radius_m.empty() && s.reference->radius_m.size() != n))) {
       throw std::invalid_argument("setBodies: body '" + s.name + "' needs " + std::to_string(n) +
                                   " positions and no or as many radii in its reference frame");
     }
@@ -110,7 +110,8 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
     body.ranks[static_cast<int>(FeatureKind::VERTEX)] = std::move(vertex_ranks);
 
     std::vector<Index> flat(2 * t.edges().size());
-    for (std::size_t e = 0; e < t.edges().size(); ++e) std::copy(t.edges()[e].begin(), t.edges()[e].end(), &flat[2 * e]);
+    for (std::size_t e = 0; e < t.edges().size(); ++e)
+      std::copy(t.edges()[e].begin(), t.edges()[e].end(), &flat[2 * e]);
     buildTree(body, FeatureKind::EDGE, flat, 2, consecutive(t.edges().size(), edge_begin), internal_of_local, rest);
 
     // Faces keep the input's vertex order; their rank is that of the index triple.
@@ -120,7 +121,8 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
     for (std::size_t r = 0; r < by_triple.size(); ++r) face_ranks[by_triple[r]] = static_cast<Index>(face_begin + r);
     face_order_.insert(face_order_.end(), by_triple.begin(), by_triple.end());
     flat.resize(3 * t.faces().size());
-    for (std::size_t f = 0; f < t.faces().size(); ++f) std::copy(t.faces()[f].begin(), t.faces()[f].end(), &flat[3 * f]);
+    for (std::size_t f = 0; f < t.faces().size(); ++f)
+      std::copy(t.faces()[f].begin(), t.faces()[f].end(), &flat[3 * f]);
     buildTree(body, FeatureKind::FACE, flat, 3, face_ranks, internal_of_local, rest);
 
     for (const ClusterTree& tree : body.trees) height_ = std::max(height_, tree.height());
@@ -213,10 +215,10 @@ void SceneArrays::overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pa
       const std::size_t used = scratch.size();
       scratch.resize(used + 2 * STEP);
       std::size_t consumed = 0;
-      const std::size_t found = simd::testGroupPairs(
-          view, view, pairs.data() + 2 * done, pairs.size() / 2 - done, true,
-          l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, t0_only, scratch.data() + used, STEP,
-          &consumed);
+      const std::size_t found =
+          simd::testGroupPairs(view, view, pairs.data() + 2 * done, pairs.size() / 2 - done, true,
+                               l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, t0_only,
+                               scratch.data() + used, STEP, &consumed);
       scratch.resize(used + 2 * found);
       done += consumed;
     }

@@ -26,10 +26,10 @@ struct SceneBody {
   std::vector<Index> ranks[3];       ///< slot -> rank: vertex_begin + local vertex, edge rank, face rank
   std::vector<std::uint8_t> active;  ///< per used vertex; what the trees are masked with
   bool masked = false;
-  bool uncertain = false;   ///< some vertex has an uncertainty radius above 0 in this step
-  bool kept = false;        ///< nothing of it changed since the last step, nor did the range of the records
-  bool recorded = false;    ///< it has been through a step since it was set
-  double reach_m = 0;       ///< how far its bounds are widened: half of the scene's largest separation of meshes
+  bool uncertain = false;  ///< some vertex has an uncertainty radius above 0 in this step
+  bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
+  bool recorded = false;   ///< it has been through a step since it was set
+  double reach_m = 0;      ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
   std::int16_t margin[16] = {};                   ///< reach_m in record units
   bool translates = false;  ///< all vertices have exactly the same displacement in this step (at rest included)
@@ -60,7 +60,8 @@ class SceneArrays {
   /// Off: every body is refitted in every step.
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
 
-  /// Records and bounds of every body that is not kept. pieces(n, f): calls f(first, last) over [0, n), in parallel or not.
+  /// Records and bounds of every body that is not kept. pieces(n, f): calls f(first, last) over [0, n), in parallel or
+  /// not.
   template <class Pieces>
   void refit(const Pieces& pieces, core::StepStats& stats) {
     for (SceneBody& body : bodies_) {
@@ -70,7 +71,8 @@ class SceneArrays {
         quantize(body.internal_begin + first, body.internal_begin + last);
       });
       for (ClusterTree& tree : body.trees) {
-        pieces(tree.level(0).groups, [&](std::size_t first, std::size_t last) { refitLeaves(body, tree, first, last); });
+        pieces(tree.level(0).groups,
+               [&](std::size_t first, std::size_t last) { refitLeaves(body, tree, first, last); });
         tree.refitUpper();
       }
     }

@@ -18,7 +18,9 @@ constexpr double PADDING = 0.5, SMALLEST_SHARE = 0.125;
 // a - b as an unevaluated sum without error (Knuth's two-sum); not finite when it overflows.
 struct ExactDifference {
   double high, low;
-  friend bool operator==(const ExactDifference& x, const ExactDifference& y) { return x.high == y.high && x.low == y.low; }
+  friend bool operator==(const ExactDifference& x, const ExactDifference& y) {
+    return x.high == y.high && x.low == y.low;
+  }
 };
 ExactDifference exactDifference(double a, double b) {
   const double high = a - b, virtual_b = a - high, virtual_a = high + virtual_b;
@@ -158,7 +160,8 @@ void SceneArrays::setRange(bool keep) {
   bool holds = keep && range_padded_;
   for (int d = 0; d < 8; ++d) {
     const double spanned = range_max_[d] - range_min_[d];
-    holds = holds && low[d] >= range_min_[d] && high[d] <= range_max_[d] && high[d] - low[d] >= SMALLEST_SHARE * spanned;
+    holds =
+        holds && low[d] >= range_min_[d] && high[d] <= range_max_[d] && high[d] - low[d] >= SMALLEST_SHARE * spanned;
   }
   if (holds) return;
   for (SceneBody& body : bodies_) body.kept = false;
@@ -176,9 +179,10 @@ void SceneArrays::setRange(bool keep) {
   }
 }
 
-/// How many record units `reach_m` is, rounded up. Both bodies of a pair are widened, each by half of the separation and
-/// by its own radii; the sum of the two margins is never less than what the pair asks for, since a margin that does not
-/// fit is UNBOUNDED. (Cut off at half the range, one alone would not reach from one end of the records to the other.)
+/// How many record units `reach_m` is, rounded up. Both bodies of a pair are widened, each by half of the separation
+/// and by its own radii; the sum of the two margins is never less than what the pair asks for, since a margin that does
+/// not fit is UNBOUNDED. (Cut off at half the range, one alone would not reach from one end of the records to the
+/// other.)
 void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const {
   if (!(reach_m > 0) && body.reach_m == 0) {
     std::fill_n(margin16, 16, std::int16_t{0});

@@ -5,7 +5,8 @@
 namespace deformable_ccd {
 namespace {
 
-// More candidates than this many an edge, and the full test is no dearer; but with a deadline it may not come to its end.
+// More candidates than this many an edge, and the full test is no dearer; but with a deadline it may not come to its
+// end.
 constexpr std::size_t CANDIDATES_PER_EDGE = 2, CANDIDATES_PER_EDGE_WITH_DEADLINE = 8;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
@@ -33,8 +34,8 @@ void StartStateTest::SlotsAtVertex::build(const SceneBody& body, FeatureKind kin
   }
 }
 
-const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& scene, bool continues, const IsOver& is_over,
-                                                          core::StepStats& stats) {
+const std::vector<StartIntersection>& StartStateTest::run(const SceneArrays& scene, bool continues,
+                                                          const IsOver& is_over, core::StepStats& stats) {
   tested_ = 0;
   has_deadline_ = static_cast<bool>(is_over);
   if (!(continues && known_)) {
@@ -151,7 +152,8 @@ void StartStateTest::search(const SceneArrays& scene, const IsOver& is_over) {
   searched_ = true;
 }
 
-/// Goes on at next_group_ of the edges' tree, by one group at the least; false: it was ended, and next_group_ says where.
+/// Goes on at next_group_ of the edges' tree, by one group at the least; false: it was ended, and next_group_ says
+/// where.
 bool StartStateTest::searchBodies(const SceneArrays& scene, const IsOver& is_over) {
   const std::uint32_t edge_body = next_bodies_[0], face_body = next_bodies_[1];
   const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
@@ -199,7 +201,8 @@ void StartStateTest::test(const SceneArrays& scene, const EdgeFace& pair) {
 void StartStateTest::remember(const SceneArrays& scene, const std::vector<core::Contact>& contacts, bool complete) {
   known_ = false;
   if (!complete) return;
-  const std::size_t limit = edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
+  const std::size_t limit =
+      edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
   for (const core::Contact& contact : contacts) {
     if (contact.kind != PairKind::VERTEX_FACE && contact.kind != PairKind::EDGE_EDGE) continue;
     touched_.push_back({contact.kind, contact.body[0], contact.body[1], contact.vertex});
@@ -240,11 +243,11 @@ void StartStateTest::addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge
   const SceneBody &a = scene.bodies()[edge_body], &b = scene.bodies()[face_body];
   const SlotsAtVertex &edges = neighbourhoods_[edge_body].edges, &faces = neighbourhoods_[face_body].faces;
   const Index at = edge[0] - a.internal_begin, other = other_edge[0] - b.internal_begin;
-  const std::uint32_t* slot = std::find_if(&edges.slots[edges.begin[at]], edges.slots.data() + edges.begin[at + 1],
-                                           [&](std::uint32_t s) {
-    const Index* e = a.tree(FeatureKind::EDGE).feature(s);
-    return (e[0] == edge[0] && e[1] == edge[1]) || (e[0] == edge[1] && e[1] == edge[0]);
-  });
+  const std::uint32_t* slot =
+      std::find_if(&edges.slots[edges.begin[at]], edges.slots.data() + edges.begin[at + 1], [&](std::uint32_t s) {
+        const Index* e = a.tree(FeatureKind::EDGE).feature(s);
+        return (e[0] == edge[0] && e[1] == edge[1]) || (e[0] == edge[1] && e[1] == edge[0]);
+      });
   for (std::uint32_t i = faces.begin[other]; i < faces.begin[other + 1]; ++i) {
     const Index* f = b.tree(FeatureKind::FACE).feature(faces.slots[i]);
     if (contains(f, other_edge[1]) && !shareVertex(edge, f)) {

@@ -92,8 +92,8 @@ class StartStateTest {
   using BodyPair = std::array<std::uint32_t, 2>;  // of the edge, of the face
 
   template <class HasMore, class Expand, class Test>
-  static bool inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore, const Expand& expand,
-                       const Test& test);
+  static bool inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore,
+                       const Expand& expand, const Test& test);
   void testCandidates(const SceneArrays& scene, const IsOver& is_over);
   void search(const SceneArrays& scene, const IsOver& is_over);
   bool searchBodies(const SceneArrays& scene, const IsOver& is_over);

@@ -40,7 +40,8 @@ bool samePair(const core::Contact& a, const core::Contact& b) {
   return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex && a.voxel == b.voxel;
 }
 
-/// The same pair in two parts of a step is one contact: it begins in the earlier part, and is certain if it is in either.
+/// The same pair in two parts of a step is one contact: it begins in the earlier part, and is certain if it is in
+/// either.
 void join(core::Contact& into, const core::Contact& later) {
   if (later.certainty != Certainty::CERTAIN || into.certainty == Certainty::CERTAIN) return;
   into.certainty = Certainty::CERTAIN;
@@ -79,9 +80,8 @@ void conclude(const MonitorOptions& options, StepOutcome& outcome) {
   auto& contacts = outcome.contacts;
   const bool touched = !contacts.empty();
   if (options.suppress_initial) {
-    const auto kept = std::remove_if(contacts.begin(), contacts.end(), [](const core::Contact& c) {
-      return c.initial && c.body[1] == OBSTACLE_BODY;
-    });
+    const auto kept = std::remove_if(contacts.begin(), contacts.end(),
+                                     [](const core::Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; });
     outcome.suppressed = static_cast<std::size_t>(contacts.end() - kept);
     contacts.erase(kept, contacts.end());
   }
@@ -106,7 +106,8 @@ void conclude(const MonitorOptions& options, StepOutcome& outcome) {
     outcome.reason = std::isfinite(outcome.unchecked_toc_lower)
                          ? "the step budget ran out; nothing that was left out touches before toc " +
                                std::to_string(outcome.unchecked_toc_lower)
-                         : "the step budget ran out before all of the start state was looked at; no pair was left out of the contacts";
+                         : "the step budget ran out before all of the start state was looked at; no pair was left out "
+                           "of the contacts";
   }
   outcome.answered = true;
   outcome.clear = outcome.status == StepStatus::OK && outcome.start_state == StartState::CLEAR && !touched;
@@ -177,8 +178,15 @@ std::vector<BodySetup> bodySetups(const StepInput& input, const std::vector<Moni
   std::vector<BodySetup> setups;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const MonitorBody& body = bodies[b];
-    BodySetup setup{body.name, input.topologies[b], body.self_collision && !body.rigid, body.against_bodies,
-                    body.against_obstacle, body.minimum_separation_m, {}, body.separations, input.references[b],
+    BodySetup setup{body.name,
+                    input.topologies[b],
+                    body.self_collision && !body.rigid,
+                    body.against_bodies,
+                    body.against_obstacle,
+                    body.minimum_separation_m,
+                    {},
+                    body.separations,
+                    input.references[b],
                     body.rigid};
     if (!body.vertex_mask.empty()) setup.vertex_active.assign(input.topologies[b]->vertexCount(), 1);
     for (const Index v : body.vertex_mask) {
@@ -279,8 +287,7 @@ bool StepRunner::runParts(const StepInput& input, const MonitorMap& map, bool co
 }
 
 void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
-                     const MonitorMap& map, bool continues, StepOutcome& outcome,
-                     StepRunner* predecessor) {
+                     const MonitorMap& map, bool continues, StepOutcome& outcome, StepRunner* predecessor) {
   if (set_topologies_ != input.topologies || set_references_ != input.references) {
     setBodies(input, bodies);
     continues = false;
@@ -305,8 +312,8 @@ void StepRunner::run(const StepInput& input, const std::vector<MonitorBody>& bod
   if (parts < wanted) {
     outcome.status = StepStatus::PARTIAL;
     outcome.clear = false;
-    outcome.reason = "a rigid body turns so far that " + std::to_string(wanted) + " parts are needed; max_substeps is " +
-                     std::to_string(parts);
+    outcome.reason = "a rigid body turns so far that " + std::to_string(wanted) +
+                     " parts are needed; max_substeps is " + std::to_string(parts);
   }
 }
 

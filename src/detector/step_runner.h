@@ -1,5 +1,5 @@
-// One step of the monitor's bodies: splits it where a rigid body turns far, runs the detector, and turns its result into
-// an outcome.
+// One step of the monitor's bodies: splits it where a rigid body turns far, runs the detector, and turns its result
+// into an outcome.
 #pragma once
 
 #include <memory>
@@ -25,8 +25,8 @@ struct StepInput {
   void resize(std::size_t bodies);
 };
 
-/// Parts that the step must be cut into so that each rigid body's straight vertex paths stay within the tolerance of its
-/// arc [m]: 1 where nothing turns. Not limited.
+/// Parts that the step must be cut into so that each rigid body's straight vertex paths stay within the tolerance of
+/// its arc [m]: 1 where nothing turns. Not limited.
 std::size_t requiredSubsteps(const StepInput& input, double tolerance_m);
 
 /// All bodies at the end of the first `part` of `parts` equal parts of the step; rigid ones along their rotation.
@@ -46,10 +46,10 @@ class StepRunner {
   const std::vector<LeftOutPair>& leftOut() const { return detector_.leftOut(); }
 
   /// Fills the outcome's result from the step. `continues`: t0 is the t1 of the last run here, nothing else changed.
-  /// predecessor: as in MotionStep; a step aside from all others, whose later parts need no start state. Throws std::invalid_argument when a body's vertex_mask does not fit its topology.
+  /// predecessor: as in MotionStep; a step aside from all others, whose later parts need no start state. Throws
+  /// std::invalid_argument when a body's vertex_mask does not fit its topology.
   void run(const StepInput& input, const std::vector<MonitorBody>& bodies, const MonitorOptions& options,
-           const MonitorMap& map, bool continues, StepOutcome& outcome,
-           StepRunner* predecessor = nullptr);
+           const MonitorMap& map, bool continues, StepOutcome& outcome, StepRunner* predecessor = nullptr);
 
  private:
   Detector detector_;

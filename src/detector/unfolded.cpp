@@ -17,9 +17,7 @@ constexpr int SWEEP_DIRECTION = 3;        // along no side of a grid whose sides
 struct DirectedEdge {
   Index low, high;
   bool forward;
-  bool operator<(const DirectedEdge& other) const {
-    return low != other.low ? low < other.low : high < other.high;
-  }
+  bool operator<(const DirectedEdge& other) const { return low != other.low ? low < other.low : high < other.high; }
   bool sameAs(const DirectedEdge& other) const { return low == other.low && high == other.high; }
 };
 
@@ -153,7 +151,7 @@ bool UnfoldedTest::turnsAt(const Planar& before, const Planar& at, const Planar&
   const double dot[3] = {px0 * qx0 + py0 * qy0, px1 * qx1 + py1 * qy1,
                          (px0 * qx1 + py0 * qy1) + (px1 * qx0 + py1 * qy0)};
   const double margin = 3 * product_error_;
-  const auto all = [margin](const double (&c)[3], double sign) {
+  const auto all = [margin](const double(&c)[3], double sign) {
     return sign * c[0] > margin && sign * c[1] > margin && sign * c[2] > margin;
   };
   return all(dot, -1) || all(cross, 1) || all(cross, -1);

@@ -48,8 +48,8 @@ class UnfoldedTest {
   std::vector<Index> loop_;     ///< used vertices of the body along its boundary; empty: no disk
   std::vector<Planar> points_;  ///< per used vertex of the body
   std::vector<Span> spans_;
-  double error_ = 0;            ///< of a projected coordinate
-  double product_error_ = 0;    ///< of a cross or dot product of two differences
+  double error_ = 0;          ///< of a projected coordinate
+  double product_error_ = 0;  ///< of a cross or dot product of two differences
 };
 
 }  // namespace deformable_ccd

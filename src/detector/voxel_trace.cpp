@@ -16,7 +16,9 @@ namespace {
 using Says = TraceLine::Says;
 
 bool holds(const OccupiedLeaf& leaf, const VoxelKey& voxel) {
-  const auto inside = [&](std::uint16_t min, std::uint16_t key) { return key >= min && key - min < static_cast<int>(leaf.size); };
+  const auto inside = [&](std::uint16_t min, std::uint16_t key) {
+    return key >= min && key - min < static_cast<int>(leaf.size);
+  };
   return inside(leaf.min.x, voxel.x) && inside(leaf.min.y, voxel.y) && inside(leaf.min.z, voxel.z);
 }
 
@@ -53,7 +55,9 @@ class VoxelTracer {
 
  private:
   const MonitorBody& body() const { return bodies_[question_.body]; }
-  void say(const std::string& stage, Says says, const std::string& text) { lines_.push_back({part_, stage, says, text}); }
+  void say(const std::string& stage, Says says, const std::string& text) {
+    lines_.push_back({part_, stage, says, text});
+  }
 
   void check() const {
     if (question_.body >= bodies_.size()) {
@@ -98,13 +102,15 @@ class VoxelTracer {
     std::string why;
     if (!body().against_obstacle) why = "against_obstacle of '" + body().name + "' is off";
     for (const Index v : question_.vertex) {
-      const bool masked = std::find(body().vertex_mask.begin(), body().vertex_mask.end(), v) != body().vertex_mask.end();
+      const bool masked =
+          std::find(body().vertex_mask.begin(), body().vertex_mask.end(), v) != body().vertex_mask.end();
       if (masked || !t0[v].allFinite() || !t1[v].allFinite()) {
         why = "vertex " + std::to_string(v) + " is masked, or its position is not finite: not checked";
       }
     }
     if (!leaf) {
-      why = leafOf(map_.surface->leaves(), question_.voxel) ? "the voxel is in one of exclude_boxes" : "the map has no occupied voxel there";
+      why = leafOf(map_.surface->leaves(), question_.voxel) ? "the voxel is in one of exclude_boxes"
+                                                            : "the map has no occupied voxel there";
     }
     std::ostringstream text;
     if (why.empty()) {
@@ -144,15 +150,16 @@ class VoxelTracer {
       const double end = voxelPlane(static_cast<std::int64_t>(key[axis]) + leaf.size, map_.surface->resolution());
       if (low - end <= reach_m && begin - high <= reach_m) continue;
       std::ostringstream text;
-      text << "apart along the map's " << "xyz"[axis] << ": the way spans " << low << " to " << high << " m, the leaf "
-           << begin << " to " << end;
+      text << "apart along the map's "
+           << "xyz"[axis] << ": the way spans " << low << " to " << high << " m, the leaf " << begin << " to " << end;
       return say("bounds", Says::REJECTED, text.str());
     }
     say("bounds", Says::KEPT, "the box of the way reaches the leaf");
   }
 
   /// The body's own test with this feature alone: its vertices and sides are tested with it, as in the step.
-  std::vector<core::Contact> contacts(Accuracy rung, const VoxelSurface& surface, const Positions& t0, const Positions& t1) const {
+  std::vector<core::Contact> contacts(Accuracy rung, const VoxelSurface& surface, const Positions& t0,
+                                      const Positions& t1) const {
     ObstacleOptions options;
     options.accuracy = options_.detector.accuracy;
     options.accuracy.rung = rung;
@@ -179,7 +186,8 @@ class VoxelTracer {
     return nullptr;
   }
 
-  void traceRung(Accuracy rung, const OccupiedLeaf& leaf, const VoxelSurface& alone, const Positions& t0, const Positions& t1) {
+  void traceRung(Accuracy rung, const OccupiedLeaf& leaf, const VoxelSurface& alone, const Positions& t0,
+                 const Positions& t1) {
     const std::string name = std::string(toString(rung)) + (rung == options_.detector.accuracy.rung ? " *" : "");
     const std::vector<core::Contact> found = contacts(rung, *surface_, t0, t1);
     std::ostringstream text;
@@ -190,7 +198,8 @@ class VoxelTracer {
       return say(name, contact->certainty == Certainty::CERTAIN ? Says::CONTACT : Says::UNDECIDED, text.str());
     }
     text << "no contact of this kind";
-    const auto of_leaf = std::find_if(found.begin(), found.end(), [&](const core::Contact& c) { return c.voxel == leaf.min; });
+    const auto of_leaf =
+        std::find_if(found.begin(), found.end(), [&](const core::Contact& c) { return c.voxel == leaf.min; });
     if (of_leaf != found.end()) {
       text << "; the leaf is met by its " << nameOf(of_leaf->kind);
       for (const Index v : of_leaf->vertex) {

@@ -1,5 +1,5 @@
-// The way of one mesh feature and one leaf of the map through a step: why is there no contact, or who found it? For people;
-// not a fast path. Pairs of mesh features: pair_trace.h.
+// The way of one mesh feature and one leaf of the map through a step: why is there no contact, or who found it? For
+// people; not a fast path. Pairs of mesh features: pair_trace.h.
 #pragma once
 
 #include "detector/pair_trace.h"

@@ -71,8 +71,8 @@ void ConservativeTest::run(const PairBatch& batch, ElementaryResult* results, Ti
     input.vertices = batch.vertices->t0;
     input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
     input.count = std::min(BLOCK, batch.count - begin);
-    const bool batched = separation == nullptr || std::find(separation, separation + input.count, 0.0) !=
-                                                      separation + input.count;
+    const bool batched =
+        separation == nullptr || std::find(separation, separation + input.count, 0.0) != separation + input.count;
     if (batched) simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
     for (std::size_t i = 0; i < input.count; ++i) {
       const Quad& quad = batch.pairs[begin + i];

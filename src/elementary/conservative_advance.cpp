@@ -38,9 +38,7 @@ struct Vec {
   double x, y, z;
 };
 Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+Vec cross(const Vec& a, const Vec& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 Vec operator+(const Vec& a, const Vec& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 Vec operator*(double s, const Vec& a) { return {s * a.x, s * a.y, s * a.z}; }
 double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -138,9 +136,8 @@ Connection betweenSegments(const Vec& u, const Vec& v, const Vec& w) {
   const bool is_inside = s >= 0 && s <= 1 && r >= 0 && r <= 1;
   const Connection crossing = inside((w - s * u) + r * v, n, w);
   if (is_inside && nn > PARALLEL * (dot(u, u) * dot(v, v))) return crossing;
-  const Connection border =
-      shorter(shorter(fromSegment(w, u), fromSegment(w + v, u)),
-              reversed(shorter(fromSegment(-1 * w, v), fromSegment(u - w, v))));
+  const Connection border = shorter(shorter(fromSegment(w, u), fromSegment(w + v, u)),
+                                    reversed(shorter(fromSegment(-1 * w, v), fromSegment(u - w, v))));
   return is_inside ? shorter(border, crossing) : border;
 }
 

@@ -10,9 +10,9 @@ namespace conservative {
 using Corners = std::array<const VertexMotion*, 4>;
 
 struct Limits {
-  double tolerance_m = 1e-6;         ///< > 0
-  double minimum_separation_m = 0;   ///< >= 0: contact means that the distance is at most this
-  int max_steps = 4096;              ///< then UNDECIDED
+  double tolerance_m = 1e-6;        ///< > 0
+  double minimum_separation_m = 0;  ///< >= 0: contact means that the distance is at most this
+  int max_steps = 4096;             ///< then UNDECIDED
 };
 
 /// Advances from t = 0 as long as the features are certainly more than the minimum separation apart.

@@ -161,7 +161,7 @@ class StackInteger {
     return result;
   }
 
-  int size_ = 0;  ///< limbs in use, negative for a negative number
+  int size_ = 0;                ///< limbs in use, negative for a negative number
   mp_limb_t limbs_[LIMBS + 1];  ///< a product's limbs as multiplied: the highest may be zero
 };
 

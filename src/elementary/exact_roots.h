@@ -161,10 +161,10 @@ class PolynomialRoots {
     return smaller == 0 ? 0 : smaller > 0 ? leading : -leading;
   }
 
-  Cubic<Z> f_;                         ///< leading coefficient > 0
-  Quadratic<Z> first_;                 ///< derivatives of f, where its degree is 3
+  Cubic<Z> f_;          ///< leading coefficient > 0
+  Quadratic<Z> first_;  ///< derivatives of f, where its degree is 3
   Polynomial<Z, 1> second_;
-  Quadratic<Z> quadratic_;             ///< what SMALLER and LARGER are roots of: f, or f' for a repeated root
+  Quadratic<Z> quadratic_;  ///< what SMALLER and LARGER are roots of: f, or f' for a repeated root
   Polynomial<Z, 1> quadratic_first_;
   int grid_bits_;
   int degree_;

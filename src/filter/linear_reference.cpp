@@ -39,8 +39,7 @@ bool linearSeparatedVf(const PaperRecord& v, const PaperRecord& f0, const PaperR
   return separated<1, 3>({&v}, {&f0, &f1, &f2});
 }
 
-bool linearSeparatedEe(const PaperRecord& ea0, const PaperRecord& ea1, const PaperRecord& eb0,
-                       const PaperRecord& eb1) {
+bool linearSeparatedEe(const PaperRecord& ea0, const PaperRecord& ea1, const PaperRecord& eb0, const PaperRecord& eb1) {
   return separated<2, 2>({&ea0, &ea1}, {&eb0, &eb1});
 }
 

@@ -1,7 +1,7 @@
 // The parallel linear filter (paper, Section 4, Equations 1 to 7), one pair at a time in plain C++.
 //
-// On a line, if every vertex of one feature is strictly on one side of every vertex of the other at t=0, and on the same
-// side at t=1, each difference of two vertices keeps its sign during the step, since it is linear in t. A point of
+// On a line, if every vertex of one feature is strictly on one side of every vertex of the other at t=0, and on the
+// same side at t=1, each difference of two vertices keeps its sign during the step, since it is linear in t. A point of
 // one feature minus a point of the other is a convex combination of such differences and keeps it, too: no contact
 // on the line, hence none in space (paper, Theorem 1).
 //

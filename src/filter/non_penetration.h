@@ -1,6 +1,6 @@
-// A rival of the paper: the non-penetration filter (Tang et al. 2010). The four points of a pair can only meet when they
-// are coplanar: when the cubic (VF: (f1-f0) x (f2-f0) . (v-f0); EE: (ea1-ea0) x (eb1-eb0) . (eb0-ea0)) has a root in
-// [0, 1]. If its four Bernstein coefficients have one strict sign there is none. A degenerate pair is coplanar at
+// A rival of the paper: the non-penetration filter (Tang et al. 2010). The four points of a pair can only meet when
+// they are coplanar: when the cubic (VF: (f1-f0) x (f2-f0) . (v-f0); EE: (ea1-ea0) x (eb1-eb0) . (eb0-ea0)) has a root
+// in [0, 1]. If its four Bernstein coefficients have one strict sign there is none. A degenerate pair is coplanar at
 // all times, its coefficients are zero, and it is kept.
 //
 // Rounding. With u the unit roundoff, m the largest |computed difference| of the pair and d a bound of the error of the

@@ -10,13 +10,20 @@ namespace deformable_ccd {
 
 const char* toString(PaperFilter filter) {
   switch (filter) {
-    case PaperFilter::PRIMITIVE_BV: return "primitive_bv";
-    case PaperFilter::LINEAR: return "linear";
-    case PaperFilter::NON_PENETRATION: return "non_penetration";
-    case PaperFilter::NON_PENETRATION_BATCHED: return "non_penetration_batched";
-    case PaperFilter::PLANAR_PAPER: return "planar_paper";
-    case PaperFilter::PLANAR_BRANCH_FREE: return "planar_branch_free";
-    case PaperFilter::COUNT: break;
+    case PaperFilter::PRIMITIVE_BV:
+      return "primitive_bv";
+    case PaperFilter::LINEAR:
+      return "linear";
+    case PaperFilter::NON_PENETRATION:
+      return "non_penetration";
+    case PaperFilter::NON_PENETRATION_BATCHED:
+      return "non_penetration_batched";
+    case PaperFilter::PLANAR_PAPER:
+      return "planar_paper";
+    case PaperFilter::PLANAR_BRANCH_FREE:
+      return "planar_branch_free";
+    case PaperFilter::COUNT:
+      break;
   }
   return "unknown";
 }
@@ -49,7 +56,8 @@ std::size_t filterPairs(PaperFilter filter, PairKind kind, const PaperRecords& r
       return vf ? simd::paperPrimitiveBvVf(r, in, count, out) : simd::paperPrimitiveBvEe(r, in, count, out);
     case PaperFilter::LINEAR:
       return vf ? simd::paperLinearVf(r, in, count, out) : simd::paperLinearEe(r, in, count, out);
-    case PaperFilter::NON_PENETRATION: return nonPenetrationScalar(kind, vertices, pairs, count, survivors);
+    case PaperFilter::NON_PENETRATION:
+      return nonPenetrationScalar(kind, vertices, pairs, count, survivors);
     case PaperFilter::NON_PENETRATION_BATCHED:
       return vf ? simd::nonPenetrationVf(r, error, in, count, out) : simd::nonPenetrationEe(r, error, in, count, out);
     case PaperFilter::PLANAR_PAPER:
@@ -57,7 +65,8 @@ std::size_t filterPairs(PaperFilter filter, PairKind kind, const PaperRecords& r
     case PaperFilter::PLANAR_BRANCH_FREE:
       return vf ? simd::branchFreePlanarVf(r, error, in, count, out)
                 : simd::branchFreePlanarEe(r, error, in, count, out);
-    case PaperFilter::COUNT: break;
+    case PaperFilter::COUNT:
+      break;
   }
   return 0;
 }
@@ -65,16 +74,20 @@ std::size_t filterPairs(PaperFilter filter, PairKind kind, const PaperRecords& r
 bool filterRejects(PaperFilter filter, PairKind kind, const PaperRecords& records, const VertexMotion* vertices,
                    const Quad& pair) {
   switch (filter) {
-    case PaperFilter::PRIMITIVE_BV: return primitiveBvSeparated(kind, records.data(), pair);
-    case PaperFilter::LINEAR: return linearSeparated(kind, records.data(), pair);
-    case PaperFilter::NON_PENETRATION: return nonPenetrationSeparated(kind, vertices, pair);
+    case PaperFilter::PRIMITIVE_BV:
+      return primitiveBvSeparated(kind, records.data(), pair);
+    case PaperFilter::LINEAR:
+      return linearSeparated(kind, records.data(), pair);
+    case PaperFilter::NON_PENETRATION:
+      return nonPenetrationSeparated(kind, vertices, pair);
     case PaperFilter::NON_PENETRATION_BATCHED:
       return nonPenetrationSeparated(kind, records.data(), pair, records.error());
     case PaperFilter::PLANAR_PAPER:
       return planarSeparated(PlanarForm::PAPER, kind, records.data(), pair, records.error());
     case PaperFilter::PLANAR_BRANCH_FREE:
       return planarSeparated(PlanarForm::BRANCH_FREE, kind, records.data(), pair, records.error());
-    case PaperFilter::COUNT: break;
+    case PaperFilter::COUNT:
+      break;
   }
   return false;
 }

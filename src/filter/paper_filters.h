@@ -21,8 +21,9 @@ enum class PaperFilter : std::uint8_t {
 };
 const char* toString(PaperFilter filter);
 
-/// Copies the pairs that the filter cannot reject to `survivors`, in order, and returns their number. `survivors` has room
-/// for `count` pairs and may be `pairs`. kind: VERTEX_FACE or EDGE_EDGE. `vertices` is read by NON_PENETRATION alone.
+/// Copies the pairs that the filter cannot reject to `survivors`, in order, and returns their number. `survivors` has
+/// room for `count` pairs and may be `pairs`. kind: VERTEX_FACE or EDGE_EDGE. `vertices` is read by NON_PENETRATION
+/// alone.
 std::size_t filterPairs(PaperFilter filter, PairKind kind, const PaperRecords& records, const VertexMotion* vertices,
                         const Quad* pairs, std::size_t count, Quad* survivors);
 

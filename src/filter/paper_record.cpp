@@ -57,9 +57,9 @@ void PaperRecords::measure(const VertexMotion* vertices, std::size_t count, cons
   exponent = std::max(exponent, -1000);
   scale_ = std::ldexp(1.0, -exponent);
   // |fl(x+y) - (x+y)| <= 2^-53 largest; |fl(p-c) - (p-c)| <= 2^-53 * 2^exponent; the scaling is exact or errs by less
-  // than 2^-1074; rounding to float errs by 2^-25 on values up to 1 (half a unit in the last place of [1/2,1] is 2^-25).
-  // In stored units the sum is at most 2^-53 largest*scale + 2^-53 + 2^-1074 + 2^-25; the factor 1 + 2^-20 covers the
-  // rounding of this very line and of `largest`, which is itself rounded.
+  // than 2^-1074; rounding to float errs by 2^-25 on values up to 1 (half a unit in the last place of [1/2,1] is
+  // 2^-25). In stored units the sum is at most 2^-53 largest*scale + 2^-53 + 2^-1074 + 2^-25; the factor 1 + 2^-20
+  // covers the rounding of this very line and of `largest`, which is itself rounded.
   const double bound = (0x1p-53 * largest * scale_ + 0x1p-53 + 0x1p-25) * (1 + 0x1p-20);
   // Beyond 1 every margin exceeds what it is compared with, so the bound may be cut there (and stays finite).
   error_ = bound < 1 ? std::nextafter(static_cast<float>(bound), 2.0f) : 1.0f;

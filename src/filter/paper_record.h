@@ -23,8 +23,14 @@ constexpr std::size_t PAPER_DIRECTIONS = 8;
 /// Coefficients of the 8 directions in the order of the record's lanes. Lane i and its successor within the same half
 /// of four span plane i: with this order the 8 planes are distinct (rotating over all 8 lanes would give XY twice).
 constexpr std::array<std::array<int, 3>, PAPER_DIRECTIONS> PAPER_DIRECTION{{
-    {1, 0, 0}, {0, 1, 0}, {0, 1, 1}, {1, 0, 1},    // X, Y, Y+Z, X+Z
-    {0, 0, 1}, {1, 1, 0}, {0, 1, -1}, {1, -1, 0},  // Z, X+Y, Y-Z, X-Y
+    {1, 0, 0},
+    {0, 1, 0},
+    {0, 1, 1},
+    {1, 0, 1},  // X, Y, Y+Z, X+Z
+    {0, 0, 1},
+    {1, 1, 0},
+    {0, 1, -1},
+    {1, -1, 0},  // Z, X+Y, Y-Z, X-Y
 }};
 /// The lane that is the second coordinate of the plane whose first coordinate is this lane.
 constexpr std::array<std::size_t, PAPER_DIRECTIONS> PAPER_ROTATED{1, 2, 3, 0, 5, 6, 7, 4};

@@ -8,9 +8,7 @@ namespace {
 
 struct PlanePoint {
   float x0, y0, x1, y1;
-  float largest() const {
-    return std::max(std::max(std::abs(x0), std::abs(y0)), std::max(std::abs(x1), std::abs(y1)));
-  }
+  float largest() const { return std::max(std::max(std::abs(x0), std::abs(y0)), std::max(std::abs(x1), std::abs(y1))); }
 };
 
 PlanePoint relative(const PaperRecord& p, const PaperRecord& origin, std::size_t k) {

@@ -1,6 +1,6 @@
-// A rival of the paper: SIMD primitive bounding volumes (Section 6; Tang et al. 2010). A pair is rejected when the swept
-// 16-DOPs of its two features, over the directions of the record, are disjoint. The bounds are minima and maxima of
-// stored values, compared strictly; the values are monotone in the exact projection, so no margin is needed.
+// A rival of the paper: SIMD primitive bounding volumes (Section 6; Tang et al. 2010). A pair is rejected when the
+// swept 16-DOPs of its two features, over the directions of the record, are disjoint. The bounds are minima and maxima
+// of stored values, compared strictly; the values are monotone in the exact projection, so no margin is needed.
 #pragma once
 
 #include "deformable_ccd/elementary.h"

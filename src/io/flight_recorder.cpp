@@ -63,8 +63,8 @@ std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options
   for (const core::Contact& c : outcome.contacts) {
     // Written so that a NaN fails.
     if (c.toc_lower >= 0 && c.toc_lower <= c.toc_upper && c.toc_upper <= 1) continue;
-    return "a contact's time is outside of the step: [" + std::to_string(c.toc_lower) + ", " + std::to_string(c.toc_upper) +
-           "]";
+    return "a contact's time is outside of the step: [" + std::to_string(c.toc_lower) + ", " +
+           std::to_string(c.toc_upper) + "]";
   }
   return {};
 }

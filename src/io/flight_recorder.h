@@ -13,7 +13,8 @@ namespace deformable_ccd {
 /// undecided though no deadline expired, or a time lies outside of the step.
 std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options);
 
-/// Memory: `steps` times the positions and contacts of a step; buffers are kept. Not thread-safe: one thread, the monitor's.
+/// Memory: `steps` times the positions and contacts of a step; buffers are kept. Not thread-safe: one thread, the
+/// monitor's.
 class FlightRecorder : public StepListener {
  public:
   static constexpr std::size_t MAX_SURPRISES = 16;  ///< files of surprises per recorder, so that no disk is filled
@@ -29,8 +30,8 @@ class FlightRecorder : public StepListener {
 
   /// Steps that are kept.
   std::size_t size() const { return count_; }
-  /// Writes all steps that are kept, oldest first; returns the files. Throws std::runtime_error naming the file and why it
-  /// cannot be written.
+  /// Writes all steps that are kept, oldest first; returns the files. Throws std::runtime_error naming the file and why
+  /// it cannot be written.
   std::vector<std::string> writeAll(const std::string& note);
   /// One sentence about a surprise since the last call, with the file that it is in; empty: none.
   std::string takeSurprise();
@@ -45,10 +46,10 @@ class FlightRecorder : public StepListener {
   RecordingImage image_;  // of the newest step without its answer, for the crash handler
 };
 
-/// From now on a crash (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT) of this process writes the step that a FlightRecorder had
-/// last into FOLDER/crash_PID.step, then goes on to what the signal did before. For programs that own their process.
-/// Nothing but async-signal-safe calls on memory that was made ready before. A path of more than 4000 bytes is refused by
-/// std::invalid_argument.
+/// From now on a crash (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT) of this process writes the step that a FlightRecorder
+/// had last into FOLDER/crash_PID.step, then goes on to what the signal did before. For programs that own their
+/// process. Nothing but async-signal-safe calls on memory that was made ready before. A path of more than 4000 bytes is
+/// refused by std::invalid_argument.
 void installCrashHandler(const std::string& folder);
 
 }  // namespace deformable_ccd

@@ -7,8 +7,9 @@
 
 namespace deformable_ccd {
 
-/// Counts in bins of equal ratio, 20 a decade, from 1 microsecond to 1000 seconds; what is outside counts in the first or the
-/// last bin. A quantile is the upper edge of its bin: at most 12.2 % too large, never too small (in the last bin: the worst).
+/// Counts in bins of equal ratio, 20 a decade, from 1 microsecond to 1000 seconds; what is outside counts in the first
+/// or the last bin. A quantile is the upper edge of its bin: at most 12.2 % too large, never too small (in the last
+/// bin: the worst).
 class LatencyHistogram {
  public:
   static constexpr int BINS_PER_DECADE = 20;

@@ -15,7 +15,9 @@ class ProgressBar {
  public:
   /// `total` steps; nothing is drawn when `enabled` is false or standard error is no terminal.
   ProgressBar(std::string label, std::size_t total, bool enabled = true)
-      : label_(std::move(label)), total_(std::max<std::size_t>(total, 1)), drawn_(enabled && isatty(STDERR_FILENO) != 0) {}
+      : label_(std::move(label)),
+        total_(std::max<std::size_t>(total, 1)),
+        drawn_(enabled && isatty(STDERR_FILENO) != 0) {}
   ~ProgressBar() {
     if (drawn_) std::fputc('\n', stderr);
   }

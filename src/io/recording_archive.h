@@ -40,7 +40,9 @@ class RecordingWriter {
   void size(std::size_t value) { number(static_cast<std::uint64_t>(value)); }
   void flag(bool value) { number(static_cast<std::uint8_t>(value)); }
   template <typename Enum>
-  void choice(Enum value, Enum) { number(static_cast<std::uint8_t>(value)); }
+  void choice(Enum value, Enum) {
+    number(static_cast<std::uint8_t>(value));
+  }
   void text(const std::string& value) {
     const std::uint32_t size = static_cast<std::uint32_t>(std::min(value.size(), MAX_RECORDED_TEXT));
     number(size);

@@ -178,17 +178,25 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
          << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ','
          << o.complete << ',' << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ','
-         << o.counts.leaving << ','
-         << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces << ',';
+         << o.counts.leaving << ',' << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces
+         << ',';
   if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
   steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
          << s[Stage::OBSTACLE].in << '\n';
   const double time_s = static_cast<double>(o.stamp_ns - origin_ns_) * 1e-9;
-  rows_.push_back({{"step", o.sequence}, {"t", time_s}, {"status", toString(o.status)}, {"reason", o.reason},
-                   {"answered", o.answered}, {"start_state", toString(o.start_state)}, {"clear", o.clear},
-                   {"contacts", o.total_contacts}, {"undecided", o.counts.undecided}, {"initial", o.counts.initial},
+  rows_.push_back({{"step", o.sequence},
+                   {"t", time_s},
+                   {"status", toString(o.status)},
+                   {"reason", o.reason},
+                   {"answered", o.answered},
+                   {"start_state", toString(o.start_state)},
+                   {"clear", o.clear},
+                   {"contacts", o.total_contacts},
+                   {"undecided", o.counts.undecided},
+                   {"initial", o.counts.initial},
                    {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
-                   {"toc_new", finiteOrNull(earliest_new)}, {"ms", s.total_ms}});
+                   {"toc_new", finiteOrNull(earliest_new)},
+                   {"ms", s.total_ms}});
   if (!o.answered) {
     ++not_answered_;
     return;
@@ -360,9 +368,15 @@ nlohmann::json Report::json() const {
   }
   j["rungs"] = nlohmann::json::array();
   for (const RungCost& r : rungs_) {
-    j["rungs"].push_back({{"rung", r.rung}, {"steps", r.steps}, {"contacts", r.contacts}, {"missed", r.missed},
-                          {"false", r.false_contacts}, {"undecided", r.undecided}, {"median_ms", r.median_ms},
-                          {"p95_ms", r.p95_ms}, {"max_toc_error", r.max_toc_error}});
+    j["rungs"].push_back({{"rung", r.rung},
+                          {"steps", r.steps},
+                          {"contacts", r.contacts},
+                          {"missed", r.missed},
+                          {"false", r.false_contacts},
+                          {"undecided", r.undecided},
+                          {"median_ms", r.median_ms},
+                          {"p95_ms", r.p95_ms},
+                          {"max_toc_error", r.max_toc_error}});
   }
   j["bodies"] = heatJson();
   return j;

@@ -43,9 +43,9 @@ class ContactLog {
   std::vector<double> ms_;
 };
 
-/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv, left_out.csv
-/// (pairs that the minimum separation leaves out, where there are any), report.json and report.html. Outcomes are added in
-/// order; nothing but their summaries is kept.
+/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv,
+/// left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json and report.html.
+/// Outcomes are added in order; nothing but their summaries is kept.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
@@ -71,9 +71,9 @@ class Report {
   struct BodyHeat {
     std::string name;
     std::shared_ptr<const Topology> topology;
-    Positions layout;                      // of the first answered step
-    std::vector<std::uint32_t> contacts;   // per vertex
-    std::vector<double> first_s;           // per vertex, first contact since the start; infinity
+    Positions layout;                     // of the first answered step
+    std::vector<std::uint32_t> contacts;  // per vertex
+    std::vector<double> first_s;          // per vertex, first contact since the start; infinity
   };
   void addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
   void writeContacts(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);

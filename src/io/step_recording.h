@@ -86,8 +86,8 @@ class RecordingImage {
   std::vector<PackedLeaf> leaves_;
 };
 
-/// Writes into a file beside it first, so that a file of this name is whole. Throws std::runtime_error naming the file and
-/// the system's reason (disk full, no permission); nothing is left behind then.
+/// Writes into a file beside it first, so that a file of this name is whole. Throws std::runtime_error naming the file
+/// and the system's reason (disk full, no permission); nothing is left behind then.
 void writeRecording(const std::string& path, const StepRecording& recording);
 
 /// Lengths are held against the bytes that are there before anything is allocated. Throws RecordingError.

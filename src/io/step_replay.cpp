@@ -110,11 +110,10 @@ std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const Re
   out.field("parts of the step", recorded.substeps, replayed.substeps);
   out.field("earliest toc", recorded.earliest_toc, replayed.earliest_toc);
   compareContacts(recorded, replayed, out);
-  const bool same = std::equal(recorded.intersections.begin(), recorded.intersections.end(),
-                               replayed.intersections.begin(), replayed.intersections.end(),
-                               [](const StartIntersection& a, const StartIntersection& b) {
-                                 return a.body == b.body && a.vertex == b.vertex;
-                               });
+  const bool same = std::equal(
+      recorded.intersections.begin(), recorded.intersections.end(), replayed.intersections.begin(),
+      replayed.intersections.end(),
+      [](const StartIntersection& a, const StartIntersection& b) { return a.body == b.body && a.vertex == b.vertex; });
   if (!same) out.add("the intersections at t=0 differ");
   return out.take();
 }
@@ -132,8 +131,10 @@ StepReplay replayStep(const StepRecording& recording, int threads) {
     for (std::size_t i = 1; i <= bodies.size(); ++i) {
       const std::size_t b = (recording.options.clock_body + i) % bodies.size();
       const RecordedBody& body = recording.bodies[b];
-      monitor.push(b, {end ? recording.stamp_ns : recording.start_ns, body.topology, end ? body.t1 : body.t0, body.rigid,
-                       end ? body.pose_t1 : body.pose_t0, body.radius_m}, 0);
+      monitor.push(b,
+                   {end ? recording.stamp_ns : recording.start_ns, body.topology, end ? body.t1 : body.t0, body.rigid,
+                    end ? body.pose_t1 : body.pose_t0, body.radius_m},
+                   0);
     }
   };
   push(false);
@@ -153,10 +154,13 @@ StepReplay replayStep(const StepRecording& recording, int threads) {
 std::string describeContact(const core::Contact& c, const std::vector<RecordedBody>& bodies) {
   std::ostringstream text;
   const auto name = [&](std::uint16_t body) {
-    return body < bodies.size() ? bodies[body].setup.name : body == OBSTACLE_BODY ? "octomap" : "body " + std::to_string(body);
+    return body < bodies.size()    ? bodies[body].setup.name
+           : body == OBSTACLE_BODY ? "octomap"
+                                   : "body " + std::to_string(body);
   };
   const std::size_t first = c.kind == PairKind::VERTEX_FACE || c.kind == PairKind::VERTEX_VOXEL_FACE ? 1
-                            : c.kind == PairKind::FACE_VOXEL_CORNER ? 3 : 2;
+                            : c.kind == PairKind::FACE_VOXEL_CORNER                                  ? 3
+                                                                                                     : 2;
   text << toString(c.kind) << ' ' << name(c.body[0]);
   for (std::size_t i = 0; i < 4; ++i) {
     if (i == first && c.body[1] != OBSTACLE_BODY) text << " | " << name(c.body[1]);

@@ -15,8 +15,8 @@ struct StepReplay {
 };
 
 /// Computes the step with the recorded options, but without a deadline and on `threads` workers: neither may change an
-/// answer. A step that ran out of its budget was answered in part: then what it reported as certain must be there again.
-/// Throws std::invalid_argument when the options or bodies of the recording are not possible.
+/// answer. A step that ran out of its budget was answered in part: then what it reported as certain must be there
+/// again. Throws std::invalid_argument when the options or bodies of the recording are not possible.
 StepReplay replayStep(const StepRecording& recording, int threads = 1);
 
 /// Bits that differ between two answers, one sentence each, ten at most.

@@ -31,8 +31,8 @@ struct Primitive {
 /// face of the topology is owned exactly once. `vertex_offset` is added to every index.
 std::vector<Primitive> ownedPrimitives(const Topology& topology, Index vertex_offset = 0);
 
-/// Connected parts: primitives that share a vertex are in one part. Returns one part number a primitive, numbered from 0
-/// in the order of each part's first primitive.
+/// Connected parts: primitives that share a vertex are in one part. Returns one part number a primitive, numbered from
+/// 0 in the order of each part's first primitive.
 std::vector<Index> connectedParts(const std::vector<Primitive>& primitives);
 
 }  // namespace deformable_ccd

@@ -35,9 +35,9 @@ double fraction(StampNs a, StampNs b, StampNs at) { return static_cast<double>(a
 
 const char* toString(StepStatus status) {
   static constexpr const char* NAMES[] = {
-      "OK",        "FIRST_FRAME", "TOPOLOGY_CHANGED", "GAP",       "TIME_JUMP", "NO_TRANSFORM", "NO_MAP",
-      "NO_BODY",   "PARTIAL",     "DEADLINE",         "TRUNCATED", "DUPLICATE", "TELEPORT",     "VERTEX_COUNT",
-      "BAD_MESSAGE", "QUEUE_FULL", "DISABLED",        "RESET",     "INTERNAL_ERROR"};
+      "OK",          "FIRST_FRAME", "TOPOLOGY_CHANGED", "GAP",       "TIME_JUMP",     "NO_TRANSFORM", "NO_MAP",
+      "NO_BODY",     "PARTIAL",     "DEADLINE",         "TRUNCATED", "DUPLICATE",     "TELEPORT",     "VERTEX_COUNT",
+      "BAD_MESSAGE", "QUEUE_FULL",  "DISABLED",         "RESET",     "INTERNAL_ERROR"};
   static_assert(sizeof(NAMES) / sizeof(NAMES[0]) == static_cast<std::size_t>(StepStatus::COUNT));
   return status < StepStatus::COUNT ? NAMES[static_cast<std::size_t>(status)] : "?";
 }
@@ -117,7 +117,8 @@ StepStatus MeshStore::push(MeshFrame frame) {
   } else if (frame.topology != newest().topology) {
     frame.topology = newest().topology;  // equal; one object a run, so that pointers tell runs apart
   }
-  // A fast stream of few vertices may run far ahead of a clock body that comes late; large meshes may not fill the memory.
+  // A fast stream of few vertices may run far ahead of a clock body that comes late; large meshes may not fill the
+  // memory.
   constexpr std::size_t ALWAYS_KEPT = 64;
   vertices_ += frame.positions.size();
   while (frames_.size() >= options_.capacity || (frames_.size() >= ALWAYS_KEPT && vertices_ > options_.max_vertices)) {

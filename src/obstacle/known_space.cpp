@@ -85,8 +85,8 @@ void uniteBlocks(std::vector<TouchedBlock>& blocks) {
   blocks.resize(kept);
 }
 
-/// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to twice
-/// the limit is held before they are united, so that this comes seldom.
+/// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to
+/// twice the limit is held before they are united, so that this comes seldom.
 bool addBlocks(const KeyBox& keys, std::size_t limit, std::vector<TouchedBlock>& blocks) {
   std::size_t count = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -133,7 +133,8 @@ struct KnownSpace::Impl {
   VoxelTree tree;
 };
 
-std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m, const std::vector<OccupiedLeaf>& known_leaves) {
+std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
+                                                    const std::vector<OccupiedLeaf>& known_leaves) {
   if (!(resolution_m >= 1e-290 && resolution_m <= 1e290)) {
     throw std::invalid_argument("resolution_m is " + std::to_string(resolution_m) +
                                 ", which is not a length from 1e-290 to 1e290 m");

@@ -12,9 +12,9 @@ namespace deformable_ccd {
 
 /// What a pair becomes when it is in contact: the parts of the contact that do not depend on the test.
 struct ObstaclePair {
-  Contact contact;         ///< all but times and certainty
-  double outward[3];       ///< direction out of the leaf at its feature, any length
-  bool started_inside;     ///< the mesh feature touched the obstacle at t=0
+  Contact contact;      ///< all but times and certainty
+  double outward[3];    ///< direction out of the leaf at its feature, any length
+  bool started_inside;  ///< the mesh feature touched the obstacle at t=0
 };
 
 /// Collects pairs of one elementary kind and appends what the rung finds to a vector of contacts. Reuses its memory.

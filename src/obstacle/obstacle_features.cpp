@@ -129,10 +129,10 @@ void ObstacleTest::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vect
             [&leaves](std::uint32_t a, std::uint32_t b) { return leaves[a].min < leaves[b].min; });
 }
 
-/// A feature that lies in an axis plane and moves along that axis alone (level cloth that is let fall, a level plate that
-/// is lowered): it meets the target, a leaf's edge or corner as a flat box, where it meets the target's shadow, at the
-/// first time at which it is at the target's height. Settled exactly here, since such scenes are full of contacts on
-/// borders, which are slow to decide in general. False where the feature moves otherwise.
+/// A feature that lies in an axis plane and moves along that axis alone (level cloth that is let fall, a level plate
+/// that is lowered): it meets the target, a leaf's edge or corner as a flat box, where it meets the target's shadow, at
+/// the first time at which it is at the target's height. Settled exactly here, since such scenes are full of contacts
+/// on borders, which are slow to decide in general. False where the feature moves otherwise.
 template <class Feature>
 bool ObstacleTest::Impl::settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points,
                                     std::uint32_t leaf, const LeafBox& target, const double* outward,
@@ -360,8 +360,8 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
       if (start == TriangleStart::INTERIOR) addInitial(run, PairKind::FACE_VOXEL_CORNER, face, leaf, face_contacts);
       if (start != TriangleStart::APART) return;
     }
-    ObstaclePair pair{contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf),
-                      {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
+    ObstaclePair pair{
+        contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf), {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
     std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
     const LeafBox target{{corner[0], corner[1], corner[2]}, {corner[0], corner[1], corner[2]}};
     if (settleFall(run, PairKind::FACE_VOXEL_CORNER, face, points, leaf, target, pair.outward, separation_m, inside,

@@ -1,5 +1,5 @@
-// One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for each
-// face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
+// One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for
+// each face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -50,8 +50,8 @@ bool ObstacleTest::Impl::reachesSurface(const Run& run) const {
   return true;
 }
 
-/// A face reaches as far as its most uncertain vertex asks for, and is found by the keys of all its vertices: each takes
-/// the reach of its features.
+/// A face reaches as far as its most uncertain vertex asks for, and is found by the keys of all its vertices: each
+/// takes the reach of its features.
 void ObstacleTest::Impl::prepareReaches(const Run& run) {
   reaches.assign(run.radius_m ? std::max<std::size_t>(run.topology->vertexCount(), 1) : 1,
                  reachOf(options.minimum_separation_m));

@@ -13,14 +13,15 @@
 
 namespace deformable_ccd {
 
-/// What is known of a vertex. The NEAR bits are set by the faces (of a polyline: edges) at it: of what their keys reach.
+/// What is known of a vertex. The NEAR bits are set by the faces (of a polyline: edges) at it: of what their keys
+/// reach.
 enum VertexState : std::uint8_t {
   ACTIVE = 1,
   MOVES = 2,
-  NEAR = 4,        ///< some leaf, during the step
-  NEAR_EDGE = 8,   ///< a convex edge, during the step
-  NEAR_START = 16, ///< some leaf, at t=0
-  INSIDE = 32      ///< it touches a leaf at t=0
+  NEAR = 4,         ///< some leaf, during the step
+  NEAR_EDGE = 8,    ///< a convex edge, during the step
+  NEAR_START = 16,  ///< some leaf, at t=0
+  INSIDE = 32       ///< it touches a leaf at t=0
 };
 
 struct MovingBounds;

@@ -1,6 +1,6 @@
-// Separating axes (Gottschalk et al. 1996) with exact signs. Two convex polytopes that are apart are separated by a plane
-// parallel to a face of one or to an edge of each, and one such plane contains the face or the edges of the mesh's side,
-// so for each product of a mesh edge with a box axis only the side away from the triangle needs a look.
+// Separating axes (Gottschalk et al. 1996) with exact signs. Two convex polytopes that are apart are separated by a
+// plane parallel to a face of one or to an edge of each, and one such plane contains the face or the edges of the
+// mesh's side, so for each product of a mesh edge with a box axis only the side away from the triangle needs a look.
 #include "obstacle/start_contact.h"
 
 #include <algorithm>

@@ -58,7 +58,8 @@ bool triangleMissesPoint(const VertexMotion& p, const VertexMotion& q, const Ver
     const PlanarPath u = seenFrom(p, point, b, c), v = seenFrom(q, point, b, c), w = seenFrom(r, point, b, c);
     const double largest = std::max(magnitude(u), std::max(magnitude(v), magnitude(w)));
     if (!(largest > SMALLEST && largest < LARGEST)) continue;
-    // A point of a closed triangle, degenerate or not, is never strictly left of one side and strictly right of another.
+    // A point of a closed triangle, degenerate or not, is never strictly left of one side and strictly right of
+    // another.
     const double margin = sideMargin(largest);
     const int sides[3] = {side(u, v, margin), side(v, w, margin), side(w, u, margin)};
     if (std::max(sides[0], std::max(sides[1], sides[2])) > 0 && std::min(sides[0], std::min(sides[1], sides[2])) < 0) {

@@ -8,11 +8,11 @@ namespace deformable_ccd {
 
 struct OctomapHeader {
   bool present = false;
-  bool binary = false;       ///< .bt
+  bool binary = false;  ///< .bt
   std::string id;
-  double resolution = 0;     ///< [m], as printed: about six digits
-  bool empty = false;        ///< it says "size 0": no data follow
-  std::size_t length = 0;    ///< bytes up to the data
+  double resolution = 0;   ///< [m], as printed: about six digits
+  bool empty = false;      ///< it says "size 0": no data follow
+  std::size_t length = 0;  ///< bytes up to the data
 };
 
 /// Not present where the data do not begin like one. Throws OctomapError for a header that is cut off or lacks a field.

@@ -68,7 +68,8 @@ void addSwapped(const DecodedMesh& mesh, const MeshInputConfig& config, std::ost
 
 std::string adviceFor(StepStatus status, const std::string& reason, const std::string& map_source) {
   // A map or a body is missing because it cannot be placed, because it was refused, or because none came.
-  if ((status == StepStatus::NO_MAP || status == StepStatus::NO_BODY) && reason.compare(0, 12, "no transform") == 0) status = StepStatus::NO_TRANSFORM;
+  if ((status == StepStatus::NO_MAP || status == StepStatus::NO_BODY) && reason.compare(0, 12, "no transform") == 0)
+    status = StepStatus::NO_TRANSFORM;
   switch (status) {
     case StepStatus::NO_TRANSFORM:
       return "publish it on /tf or /tf_static for these stamps (see rosrun tf tf_echo), "

@@ -50,7 +50,8 @@ StampNs stampOf(const std::string& datatype, const std::vector<std::uint8_t>& by
   try {
     WireReader reader(bytes.data(), bytes.size());
     // A header comes first; that of an array is its first marker's.
-    if (datatype == ros::message_traits::datatype<visualization_msgs::MarkerArray>() && reader.readCount("markers", 1) == 0) {
+    if (datatype == ros::message_traits::datatype<visualization_msgs::MarkerArray>() &&
+        reader.readCount("markers", 1) == 0) {
       return 0;
     }
     reader.read<std::uint32_t>("seq");
@@ -61,12 +62,14 @@ StampNs stampOf(const std::string& datatype, const std::vector<std::uint8_t>& by
   }
 }
 
-/// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the meshes
-/// have gone back, too.
+/// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the
+/// meshes have gone back, too.
 class TransformWindow {
  public:
   TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
-      : feed_(feed), view_(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"})), next_(view_.begin()) {
+      : feed_(feed),
+        view_(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"})),
+        next_(view_.begin()) {
     rosbag::View statics(bag, rosbag::TopicQuery("/tf_static"));
     for (const rosbag::MessageInstance& m : statics) {
       if (const auto tf = m.instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);

@@ -25,18 +25,18 @@ struct BagReplayOptions {
 struct BagReplaySummary {
   std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
   std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0;
-  std::vector<std::string> complaints;   ///< refused messages, each kind once
+  std::vector<std::string> complaints;  ///< refused messages, each kind once
   FrameCounters frames;
-  EffectPlan effects;                    ///< at the end
-  std::vector<LeftOutPair> left_out;     ///< at the end
+  EffectPlan effects;                          ///< at the end
+  std::vector<LeftOutPair> left_out;           ///< at the end
   std::optional<LookAheadSummary> look_ahead;  ///< where look_ahead_s is above 0
   double duration_s = 0;
 };
 
 class BagReplay {
  public:
-  /// Called for each outcome, in order; `at` is the bag time of the message that led to it, `so_far` counts messages up to
-  /// that one.
+  /// Called for each outcome, in order; `at` is the bag time of the message that led to it, `so_far` counts messages up
+  /// to that one.
   using Sink =
       std::function<void(const StepOutcome&, MonitorPipeline&, const BagReplaySummary& so_far, const ros::Time& at)>;
   /// Called for each message of the bag, in order, before its outcomes.
@@ -55,8 +55,8 @@ class BagReplay {
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that
   /// was recorded after the first frame (latched ones are, often) is known from the start.
-  /// `predictions` gets, where there is a look-ahead, that of each step after the step itself; of a step without an answer
-  /// the step again.
+  /// `predictions` gets, where there is a look-ahead, that of each step after the step itself; of a step without an
+  /// answer the step again.
   BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr);
 
  private:

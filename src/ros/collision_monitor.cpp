@@ -67,7 +67,7 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
     maps->countRefused();
     queue.command([this, size = message->size()] {
       log.complain(config.bodies.size(), "map size",
-               "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
+                   "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
       LoadedMap refused;
       refused.problem = "the octomap is larger than max_map_mb";
       pipeline.setMap(std::move(refused), steadyNs());
@@ -102,8 +102,8 @@ void CollisionMonitor::Impl::subscribe() {
   if (!config.octomap_file.empty()) {
     maps->submitFile(config.octomap_file);
   } else {
-    map_subscriber = input.subscribe<ShapeShifter>(config.octomap_topic, 2,
-                                                   [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
+    map_subscriber =
+        input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
   }
 }
 
@@ -154,7 +154,8 @@ void CollisionMonitor::Impl::advertiseServices() {
       });
 }
 
-// --- start and stop ---------------------------------------------------------------------------------------------------
+// --- start and stop
+// ---------------------------------------------------------------------------------------------------
 
 void CollisionMonitor::Impl::start() {
   subscribe();

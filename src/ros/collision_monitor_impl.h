@@ -1,5 +1,6 @@
-// The node's inside. Three threads: callbacks of topics hand over to queues, services wait for the worker's answer, and the
-// worker alone touches the pipeline and publishes. collision_monitor.cpp holds the first two, monitor_worker.cpp the third.
+// The node's inside. Three threads: callbacks of topics hand over to queues, services wait for the worker's answer, and
+// the worker alone touches the pipeline and publishes. collision_monitor.cpp holds the first two, monitor_worker.cpp
+// the third.
 #pragma once
 
 #include "ros/outputs.h"
@@ -64,7 +65,7 @@ struct CollisionMonitor::Impl {
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
   std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
-  StampNs newest_ns = 0;  // stamp of the last outcome; the worker's
+  StampNs newest_ns = 0;                // stamp of the last outcome; the worker's
   std::uint64_t steps_unpublished = 0;  // the worker's, too
 
   Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle);

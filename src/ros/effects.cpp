@@ -11,7 +11,8 @@ std::string noiseOf(const MeshInputConfig& input) {
   std::ostringstream text;
   if (input.noise_radius_m > 0) text << input.noise_radius_m << " m";
   if (!input.noise_field.empty()) {
-    text << (input.noise_radius_m > 0 ? " + " : "") << input.noise_scale << " x point field '" << input.noise_field << "'";
+    text << (input.noise_radius_m > 0 ? " + " : "") << input.noise_scale << " x point field '" << input.noise_field
+         << "'";
   }
   return text.str();
 }
@@ -47,8 +48,8 @@ void EffectTracker::apply(Monitor& monitor, bool map_seen) {
     plan_ = EffectPlan(scene_, settings_);
   }
   const bool expected = mapExpected(), start_state = plan_.running("start_state");
-  if (monitor.options().obstacle_expected == expected &&
-      monitor.options().detector.check_start_state == start_state) return;
+  if (monitor.options().obstacle_expected == expected && monitor.options().detector.check_start_state == start_state)
+    return;
   MonitorOptions options = monitor.options();
   options.obstacle_expected = expected;
   options.detector.check_start_state = start_state;

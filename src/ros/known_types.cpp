@@ -26,13 +26,13 @@ bool is(const std::string& datatype, const std::string& md5, std::string& proble
 
 std::string meshTypeProblem(const std::string& datatype, const std::string& md5) {
   std::string problem;
-  const bool known = is<MeshStamped>(datatype, md5, problem) || is<sensor_msgs::PointCloud2>(datatype, md5, problem) ||
-                     is<pcl_msgs::PolygonMesh>(datatype, md5, problem) ||
-                     is<visualization_msgs::Marker>(datatype, md5, problem) ||
-                     is<visualization_msgs::MarkerArray>(datatype, md5, problem) ||
-                     is<shape_msgs::Mesh>(datatype, md5, problem);
+  const bool known =
+      is<MeshStamped>(datatype, md5, problem) || is<sensor_msgs::PointCloud2>(datatype, md5, problem) ||
+      is<pcl_msgs::PolygonMesh>(datatype, md5, problem) || is<visualization_msgs::Marker>(datatype, md5, problem) ||
+      is<visualization_msgs::MarkerArray>(datatype, md5, problem) || is<shape_msgs::Mesh>(datatype, md5, problem);
   if (known) return problem;
-  return "type " + datatype + " is not a mesh; publish deformable_ccd/MeshStamped, sensor_msgs/PointCloud2, "
+  return "type " + datatype +
+         " is not a mesh; publish deformable_ccd/MeshStamped, sensor_msgs/PointCloud2, "
          "pcl_msgs/PolygonMesh, visualization_msgs/Marker or MarkerArray, or shape_msgs/Mesh";
 }
 

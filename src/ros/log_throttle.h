@@ -18,7 +18,8 @@ class LogThrottle {
       ++entry.held;
       return {};
     }
-    const std::string more = entry.held ? " (and " + std::to_string(entry.held) + " times more since the last line)" : "";
+    const std::string more =
+        entry.held ? " (and " + std::to_string(entry.held) + " times more since the last line)" : "";
     entry = {now_ns, 0, true};
     return text + more;
   }

@@ -115,8 +115,7 @@ void addVoxel(const StepOutcome& outcome, const core::Contact& contact, const st
   const geometry_msgs::Point centre =
       point(voxelMin(contact.voxel, resolution) + Vec3::Constant(0.5 * contact.voxel_size * resolution));
   // Contacts come sorted by feature, so one voxel comes many times; once is enough where it is next to itself.
-  auto& points =
-      voxelList(outcome, frame, "voxels", contact.voxel_size, 1, color(0.9, 0.4, 0.1, 0.5), by_size).points;
+  auto& points = voxelList(outcome, frame, "voxels", contact.voxel_size, 1, color(0.9, 0.4, 0.1, 0.5), by_size).points;
   if (points.empty() || points.back().x != centre.x || points.back().y != centre.y || points.back().z != centre.z) {
     points.push_back(centre);
   }
@@ -152,8 +151,10 @@ void addMeshes(const StepOutcome& outcome, const std::vector<MonitorBody>& bodie
       const std_msgs::ColorRGBA rgba = shaded(at[feature[0]], at[feature[1]], at[feature.back()]);
       marker.colors.insert(marker.colors.end(), 3, rgba);
     };
-    if (rope) std::for_each(topology.edges().begin(), topology.edges().end(), add);
-    else std::for_each(topology.faces().begin(), topology.faces().end(), add);
+    if (rope)
+      std::for_each(topology.edges().begin(), topology.edges().end(), add);
+    else
+      std::for_each(topology.faces().begin(), topology.faces().end(), add);
     if (!marker.points.empty()) out.markers.push_back(std::move(marker));
   }
 }

@@ -9,8 +9,9 @@
 
 namespace deformable_ccd {
 
-/// First a DELETEALL, then a few list markers: contacts (points coloured by TOC, red early to yellow late), normals, faces,
-/// voxels (one list per size of leaf), initial contacts apart, and the meshes and the map around them if asked for.
+/// First a DELETEALL, then a few list markers: contacts (points coloured by TOC, red early to yellow late), normals,
+/// faces, voxels (one list per size of leaf), initial contacts apart, and the meshes and the map around them if asked
+/// for.
 visualization_msgs::MarkerArray toMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
                                           const MarkerConfig& config, const std::string& frame);
 

@@ -73,12 +73,10 @@ Eigen::Affine3d markerTransform(const MarkerView& marker) {
 }  // namespace
 
 const std::vector<MeshType>& meshTypes() {
-  static const std::vector<MeshType> TYPES = {{"mesh_stamped", "deformable_ccd/MeshStamped"},
-                                              {"point_cloud2", "sensor_msgs/PointCloud2"},
-                                              {"polygon_mesh", "pcl_msgs/PolygonMesh"},
-                                              {"marker", "visualization_msgs/Marker"},
-                                              {"marker_array", "visualization_msgs/MarkerArray"},
-                                              {"shape_mesh", "shape_msgs/Mesh"}};
+  static const std::vector<MeshType> TYPES = {
+      {"mesh_stamped", "deformable_ccd/MeshStamped"},     {"point_cloud2", "sensor_msgs/PointCloud2"},
+      {"polygon_mesh", "pcl_msgs/PolygonMesh"},           {"marker", "visualization_msgs/Marker"},
+      {"marker_array", "visualization_msgs/MarkerArray"}, {"shape_mesh", "shape_msgs/Mesh"}};
   return TYPES;
 }
 
@@ -119,14 +117,17 @@ DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t*
 
 DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
   return guarded(datatypeOf(message), [&](const std::string&) {
-    return std::visit([this](const auto& typed) {
-      using Message = std::remove_const_t<std::remove_reference_t<decltype(*typed)>>;
-      if constexpr (std::is_same_v<Message, sensor_msgs::PointCloud2> || std::is_same_v<Message, pcl_msgs::PolygonMesh>) {
-        return decodeView(viewOf(*typed, config_.noise_field));
-      } else {
-        return decodeView(viewOf(*typed));
-      }
-    }, message);
+    return std::visit(
+        [this](const auto& typed) {
+          using Message = std::remove_const_t<std::remove_reference_t<decltype(*typed)>>;
+          if constexpr (std::is_same_v<Message, sensor_msgs::PointCloud2> ||
+                        std::is_same_v<Message, pcl_msgs::PolygonMesh>) {
+            return decodeView(viewOf(*typed, config_.noise_field));
+          } else {
+            return decodeView(viewOf(*typed));
+          }
+        },
+        message);
   });
 }
 
@@ -211,8 +212,9 @@ DecodedMesh MeshDecoder::decodeCloud(const CloudView& cloud) {
     refuse("a PointCloud2 has no triangles; set topology/source to grid (with rows, cols), polyline or file");
   }
   if (config_.source == TopologySource::AUTO && !organised && !config_.rows && !config_.cols) {
-    refuse("an unorganised PointCloud2 has no topology; set topology/rows and topology/cols for a grid, or "
-           "topology/source to polyline or file");
+    refuse(
+        "an unorganised PointCloud2 has no topology; set topology/rows and topology/cols for a grid, or "
+        "topology/source to polyline or file");
   }
   mesh.topology = fixedTopology(cloud.size(), cloud.height, cloud.width);
   mesh.positions.resize(cloud.size());

@@ -18,16 +18,17 @@ enum class TopologySource : std::uint8_t { AUTO, MESSAGE, GRID, POLYLINE, FILE, 
 
 /// How a body's messages are to be read.
 struct MeshInputConfig {
-  std::string type = "auto";      ///< auto, or one of meshTypes()' short names
-  std::string frame_id;           ///< used when the message has none; required for shape_msgs/Mesh
+  std::string type = "auto";  ///< auto, or one of meshTypes()' short names
+  std::string frame_id;       ///< used when the message has none; required for shape_msgs/Mesh
   TopologySource source = TopologySource::AUTO;
   std::size_t rows = 0, cols = 0;  ///< grid; both 0: not given
   std::shared_ptr<const Topology> file_topology;
-  bool weld = true;                ///< triangle soup: corners with equal coordinates are one vertex
+  bool weld = true;  ///< triangle soup: corners with equal coordinates are one vertex
   std::optional<std::string> marker_namespace;
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
-  /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is named.
+  /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is
+  /// named.
   std::string noise_field;
   double noise_scale = 1, noise_radius_m = 0;
 };
@@ -71,9 +72,9 @@ class MeshDecoder {
  private:
   MeshInputConfig config_;
   std::vector<Face> last_faces_;
-  std::shared_ptr<const Topology> topology_;       // of the last message
-  std::vector<Index> weld_;                        // soup corner to vertex
-  std::vector<Index> representative_;              // vertex to one of its corners
+  std::shared_ptr<const Topology> topology_;  // of the last message
+  std::vector<Index> weld_;                   // soup corner to vertex
+  std::vector<Index> representative_;         // vertex to one of its corners
 
   template <typename Read>
   DecodedMesh guarded(const std::string& datatype, Read read);

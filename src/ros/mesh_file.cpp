@@ -63,9 +63,9 @@ Positions positionsOf(const pcl::PCLPointCloud2& cloud, const std::string& path)
   return positions;
 }
 
-/// PCL allocates what a PLY header claims before it reads on, and ends the program on headers of shapes that it does not
-/// expect. So a header is read here first, strictly: known words and types only, lists in faces only, no element without
-/// properties, and no more elements than the file has bytes.
+/// PCL allocates what a PLY header claims before it reads on, and ends the program on headers of shapes that it does
+/// not expect. So a header is read here first, strictly: known words and types only, lists in faces only, no element
+/// without properties, and no more elements than the file has bytes.
 class PlyHeaderCheck {
  public:
   explicit PlyHeaderCheck(const std::string& path) : path_(path) {}
@@ -102,7 +102,8 @@ class PlyHeaderCheck {
       return true;
     }
     if (word == "format") {
-      if (!(words >> name) || (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian")) fail("names no format");
+      if (!(words >> name) || (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian"))
+        fail("names no format");
       return false;
     }
     if (word == "property") {
@@ -145,7 +146,7 @@ class PlyHeaderCheck {
   }
 
   static bool isInteger(const std::string& type) {
-    static const char* const NAMES[] = {"char", "uchar", "short", "ushort", "int", "uint",
+    static const char* const NAMES[] = {"char", "uchar", "short", "ushort", "int",   "uint",
                                         "int8", "uint8", "int16", "uint16", "int32", "uint32"};
     return std::find(std::begin(NAMES), std::end(NAMES), type) != std::end(NAMES);
   }

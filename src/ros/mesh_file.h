@@ -14,8 +14,8 @@ struct MeshFileError : std::runtime_error {
 };
 
 struct MeshFile {
-  Positions positions;       ///< [m], in the file's frame; float or double coordinates are taken exactly
-  std::vector<Face> faces;   ///< polygons with more than three corners as fans
+  Positions positions;      ///< [m], in the file's frame; float or double coordinates are taken exactly
+  std::vector<Face> faces;  ///< polygons with more than three corners as fans
 };
 
 /// Throws MeshFileError naming the file and what is wrong with it.

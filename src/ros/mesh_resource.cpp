@@ -38,9 +38,9 @@ MeshResource loadMeshResource(const std::string& address, double scale) {
   try {
     MeshFile mesh = endsWith(path, ".stl") ? loadStlFile(path) : loadMeshFile(path);
     for (Vec3& p : mesh.positions) p *= scale;
-    mesh.faces.erase(std::remove_if(mesh.faces.begin(), mesh.faces.end(), [](const Face& f) {
-      return f[0] == f[1] || f[1] == f[2] || f[0] == f[2];
-    }), mesh.faces.end());
+    mesh.faces.erase(std::remove_if(mesh.faces.begin(), mesh.faces.end(),
+                                    [](const Face& f) { return f[0] == f[1] || f[1] == f[2] || f[0] == f[2]; }),
+                     mesh.faces.end());
     resource.topology = std::make_shared<const Topology>(Topology::fromTriangles(mesh.positions.size(), mesh.faces));
     resource.positions = std::move(mesh.positions);
   } catch (const MeshFileError& error) {

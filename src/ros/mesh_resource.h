@@ -13,8 +13,8 @@ struct MeshResource {
   Positions positions;  ///< [m], after scaling
 };
 
-/// PLY, OBJ or STL. STL's triangles are welded by exact coordinates. Throws std::invalid_argument naming the file and what
-/// is wrong with it, or the package that is not found.
+/// PLY, OBJ or STL. STL's triangles are welded by exact coordinates. Throws std::invalid_argument naming the file and
+/// what is wrong with it, or the package that is not found.
 MeshResource loadMeshResource(const std::string& address, double scale);
 
 }  // namespace deformable_ccd

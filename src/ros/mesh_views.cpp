@@ -80,8 +80,7 @@ void checkStrides(const CloudView& cloud, std::size_t bytes) {
 }
 
 double CloudView::value(std::size_t i, const Coordinate& field) const {
-  const std::uint8_t* at =
-      data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step + field.offset;
+  const std::uint8_t* at = data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step + field.offset;
   if (field.is_double) {
     double value;
     std::memcpy(&value, at, 8);

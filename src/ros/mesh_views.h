@@ -41,7 +41,8 @@ struct CloudView {
 /// extra_field: name of a further FLOAT32 or FLOAT64 field that the cloud must have; empty: none.
 CloudView readCloud(WireReader& wire, const std::string& extra_field = {});
 
-/// Looks for the fields x, y and z of a cloud, and a further one if it is named, one after the other. Throws WireError for a type that is no coordinate.
+/// Looks for the fields x, y and z of a cloud, and a further one if it is named, one after the other. Throws WireError
+/// for a type that is no coordinate.
 class CloudFieldFinder {
  public:
   explicit CloudFieldFinder(const std::string& extra_field) : extra_field_(extra_field) {}
@@ -59,10 +60,10 @@ void checkStrides(const CloudView& cloud, std::size_t bytes);
 /// Triangles by index: MeshStamped, shape_msgs/Mesh, pcl_msgs/PolygonMesh.
 struct IndexedView {
   std::optional<HeaderView> header;
-  std::optional<CloudView> cloud;                       ///< PolygonMesh: the vertices
-  WireSpan<std::array<double, 3>> points;               ///< otherwise
-  WireSpan<std::array<std::uint32_t, 3>> triangles;     ///< otherwise
-  std::vector<WireSpan<std::uint32_t>> polygons;        ///< PolygonMesh
+  std::optional<CloudView> cloud;                    ///< PolygonMesh: the vertices
+  WireSpan<std::array<double, 3>> points;            ///< otherwise
+  WireSpan<std::array<std::uint32_t, 3>> triangles;  ///< otherwise
+  std::vector<WireSpan<std::uint32_t>> polygons;     ///< PolygonMesh
   std::size_t size() const { return cloud ? cloud->size() : points.size; }
 };
 IndexedView readMeshStamped(WireReader& wire);

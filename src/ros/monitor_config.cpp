@@ -14,8 +14,8 @@ constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
 
 TopologySource topologySource(ParameterReader& section) {
-  const std::string text = section.choice(
-      "source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld"});
+  const std::string text =
+      section.choice("source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld"});
   if (text == "message") return TopologySource::MESSAGE;
   if (text == "grid") return TopologySource::GRID;
   if (text == "polyline") return TopologySource::POLYLINE;
@@ -32,10 +32,13 @@ void readTopology(ParameterReader section, BodyConfig& body) {
   body.topology_file = section.get("file", std::string());
   section.finish();
   if ((input.rows == 0) != (input.cols == 0)) section.fail("rows", "and cols go together: set both or neither");
-  if (input.rows == 1 || input.cols == 1) section.fail("rows", "and cols must be 2 or more; for a rope set source to polyline");
+  if (input.rows == 1 || input.cols == 1)
+    section.fail("rows", "and cols must be 2 or more; for a rope set source to polyline");
   if (input.source == TopologySource::AUTO && !body.topology_file.empty()) input.source = TopologySource::FILE;
-  if (input.source == TopologySource::FILE && body.topology_file.empty()) section.fail("file", "is needed for source 'file'");
-  if (input.source == TopologySource::POLYLINE && input.rows) section.fail("rows", "has no meaning for a polyline; remove rows and cols");
+  if (input.source == TopologySource::FILE && body.topology_file.empty())
+    section.fail("file", "is needed for source 'file'");
+  if (input.source == TopologySource::POLYLINE && input.rows)
+    section.fail("rows", "has no meaning for a polyline; remove rows and cols");
 }
 
 void readRigid(ParameterReader section, BodyConfig& body) {
@@ -59,7 +62,8 @@ void readUncertainty(ParameterReader section, BodyConfig& body) {
   const bool scaled = section.has("scale");
   input.noise_scale = section.number("scale", 1.0, 0, 1e6);
   section.finish();
-  if (scaled && input.noise_field.empty()) section.fail("scale", "has no meaning without field; write radius_m instead");
+  if (scaled && input.noise_field.empty())
+    section.fail("scale", "has no meaning without field; write radius_m instead");
   if (!input.noise_field.empty() && body.isRigid()) {
     section.fail("field", "has no meaning for a rigid body, which sends no points; write radius_m instead");
   }
@@ -103,8 +107,8 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
 /// Two bodies, in either order, of an entry of minimum_separation_pairs.
 using NamedPair = std::pair<std::uint16_t, std::uint16_t>;
 
-/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map. `before`
-/// are the pairs of the entries before it.
+/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
+/// `before` are the pairs of the entries before it.
 void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vector<NamedPair>& before) {
   const std::string octomap = "octomap";
   std::vector<std::string> known{octomap};
@@ -224,7 +228,8 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   for (XmlRpcValue& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);
     const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
-    if (box.empty()) reader.fail("exclude_boxes", "holds a box whose min exceeds its max; write [x0, y0, z0, x1, y1, z1]");
+    if (box.empty())
+      reader.fail("exclude_boxes", "holds a box whose min exceeds its max; write [x0, y0, z0, x1, y1, z1]");
     monitor.exclude_boxes.push_back(box);
   }
   monitor.rigid_tolerance_m = reader.number("rigid_tolerance_m", monitor.rigid_tolerance_m, 1e-9, LARGE);
@@ -232,8 +237,8 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.look_ahead_s = reader.number("look_ahead_s", 0.0, 0, 3600);
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.queue_size = static_cast<std::size_t>(reader.integer("queue_size", 8, 1, 100000));
-  config.queue_policy =
-      reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST : QueuePolicy::OLDEST;
+  config.queue_policy = reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST
+                                                                                                  : QueuePolicy::OLDEST;
   config.simd_target = reader.get("simd_target", std::string("auto"));
   config.record_steps = static_cast<std::size_t>(reader.integer("record_steps", 1, 0, 10000));
   config.record_folder = reader.get("record_folder", std::string());
@@ -246,16 +251,18 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 4096)) << 20;
   config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
   const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
-  config.unknown_space = unknown == "free" ? UnknownSpace::FREE
-                         : unknown == "occupied" ? UnknownSpace::OCCUPIED : UnknownSpace::REPORT;
+  config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
+                         : unknown == "occupied" ? UnknownSpace::OCCUPIED
+                                                 : UnknownSpace::REPORT;
   XmlRpcValue box = reader.raw("unknown_box");
   if (box.valid()) {
     const auto n = reader.numbers(box, "unknown_box", 6);
     config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
   }
   if (config.unknown_space == UnknownSpace::OCCUPIED && config.unknown_box.empty()) {
-    reader.fail("unknown_box", "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
-                               "the workspace within which the unknown is an obstacle");
+    reader.fail("unknown_box",
+                "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
+                "the workspace within which the unknown is an obstacle");
   }
 }
 
@@ -357,9 +364,8 @@ bool MonitorConfig::holdsDistance() const {
 std::uint64_t MonitorConfig::hash() const {
   std::ostringstream text;
   text << std::setprecision(17) << given_hash;
-  for (const double value :
-       {monitor.detector.step_budget_ms, monitor.store.max_step_s, monitor.store.max_vertex_step_m,
-        markers.point_size_m, markers.normal_length_m, markers.obstacle_m}) {
+  for (const double value : {monitor.detector.step_budget_ms, monitor.store.max_step_s, monitor.store.max_vertex_step_m,
+                             markers.point_size_m, markers.normal_length_m, markers.obstacle_m}) {
     text << ' ' << value;
   }
   text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.max_contacts << ' '

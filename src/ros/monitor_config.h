@@ -1,5 +1,5 @@
-// Every parameter of the monitor, read and checked once. The node reads it from the parameter server, analyze_bag from a
-// YAML file; both see the same names, defaults and errors. doc/interface.md is the table for people.
+// Every parameter of the monitor, read and checked once. The node reads it from the parameter server, analyze_bag from
+// a YAML file; both see the same names, defaults and errors. doc/interface.md is the table for people.
 #pragma once
 
 #include <map>
@@ -68,8 +68,8 @@ struct MonitorConfig {
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
 
-/// The same tree from YAML, typed as rosparam would; `name` stands for the text in messages. Throws ParameterError naming
-/// it and the line.
+/// The same tree from YAML, typed as rosparam would; `name` stands for the text in messages. Throws ParameterError
+/// naming it and the line.
 XmlRpc::XmlRpcValue parseYaml(const std::string& text, const std::string& name);
 XmlRpc::XmlRpcValue readYaml(const std::string& file);  ///< a whole file
 

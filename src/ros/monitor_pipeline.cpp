@@ -145,8 +145,8 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    MeshFrame frame{
-        stamp_ns, rigid_[b]->topology, rigid_[b]->rest, true, Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
+    MeshFrame frame{stamp_ns, rigid_[b]->topology,           rigid_[b]->rest,
+                    true,     Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
     if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) {
       return false;
     }
@@ -212,9 +212,9 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
     }
     waiting.reason = reason;
     // There is no use in waiting for a static body that has waited in vain itself.
-    const bool timed_out =
-        finishing_ || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept) ||
-        static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
+    const bool timed_out = finishing_ || waiting.kept ||
+                           (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept) ||
+                           static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
     if (!timed_out) return false;
     if (isStatic(body)) {
       keep(body);
@@ -228,8 +228,10 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
     return true;
   }
   transform(fixed_from_mesh, done.mesh.positions);
-  monitor_->push(body, {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
-                        Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m)}, now_ns);
+  monitor_->push(body,
+                 {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
+                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m)},
+                 now_ns);
   if (is_clock) arrivals_.push_back(done.arrival_ns);
   placed_[body] = isStatic(body);
   return true;

@@ -1,5 +1,5 @@
-// From messages to outcomes: decoding, waiting for tf, the fixed frame, the map's pose, rigid bodies, and the monitor. The
-// node drives it with a steady clock, analyze_bag with the bag's; there is no other difference between the two.
+// From messages to outcomes: decoding, waiting for tf, the fixed frame, the map's pose, rigid bodies, and the monitor.
+// The node drives it with a steady clock, analyze_bag with the bag's; there is no other difference between the two.
 #pragma once
 
 #include <deque>
@@ -39,8 +39,8 @@ class MonitorPipeline {
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file.
   MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms);
 
-  /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain and
-  /// gives way to the next.
+  /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
+  /// and gives way to the next.
   bool idle(std::size_t body) const { return !waiting_[body] || waiting_[body]->kept; }
   /// Counts, decodes and keeps one message of an idle body.
   void take(std::size_t body, const RawMessage& message);
@@ -55,8 +55,8 @@ class MonitorPipeline {
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of next().
   void finish();
-  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was learnt:
-  /// the map and static bodies are placed in it. After RESET triangle soups are welded anew.
+  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was
+  /// learnt: the map and static bodies are placed in it. After RESET triangle soups are welded anew.
   void reset(StepStatus status);
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
   StepOutcome checkNow();
@@ -70,8 +70,8 @@ class MonitorPipeline {
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
   std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
-  /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a static
-  /// body's frame that waits on it is said once.
+  /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
+  /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
   /// What looks like a mistake in the body's messages, though they are valid (advice.h); empty: nothing does.
   const std::string& hint(std::size_t body) const { return hints_[body]; }

@@ -7,8 +7,8 @@
 namespace deformable_ccd {
 namespace {
 
-using topic_tools::ShapeShifter;
 using std::chrono::microseconds;
+using topic_tools::ShapeShifter;
 
 // While something waits for tf or another body the worker looks again this often; else it sleeps until it is woken, and
 // this long at most, for diagnostics.
@@ -53,8 +53,9 @@ void CollisionMonitor::Impl::accountDropped() {
     if (dropped[b] == 0) continue;
     pipeline.monitor().countReceived(b, dropped[b]);
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
-    log.complain(b, "queue", std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
-                             adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
+    log.complain(b, "queue",
+                 std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
+                     adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
   }
 }
 

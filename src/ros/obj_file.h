@@ -7,8 +7,8 @@
 
 namespace deformable_ccd {
 
-/// `v` and `f` lines, faces with indices from 1 or backwards from the newest vertex; all else is skipped. Polygons become
-/// fans. Throws MeshFileError naming the file, the line and what is wrong with it.
+/// `v` and `f` lines, faces with indices from 1 or backwards from the newest vertex; all else is skipped. Polygons
+/// become fans. Throws MeshFileError naming the file, the line and what is wrong with it.
 MeshFile loadObjFile(const std::string& path);
 
 }  // namespace deformable_ccd

@@ -231,7 +231,8 @@ ContactArray toContactArray(const StepOutcome& outcome, const std::vector<Monito
   return out;
 }
 
-FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame) {
+FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                            const std::string& frame) {
   FirstContact out;
   out.header = header(outcome.stamp_ns, frame);
   out.status = static_cast<std::uint8_t>(outcome.status);

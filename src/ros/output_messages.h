@@ -30,8 +30,10 @@ struct StatsContext {
   std::uint64_t parameter_hash = 0;
 };
 
-ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
-FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
+ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                            const std::string& frame);
+FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                            const std::string& frame);
 /// The message of the package, not core::StepStats.
 StepStats_<std::allocator<void>> toStepStats(const StepOutcome& outcome, const StatsContext& context,
                                              const std::string& frame);

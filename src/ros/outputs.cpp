@@ -37,8 +37,8 @@ void Outputs::publishResult(const StepOutcome& outcome, const std::vector<Monito
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
 }
 
-void Outputs::publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
-                             const std::string& frame) {
+void Outputs::publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                             const MarkerConfig& markers, const std::string& frame) {
   if (markers_.getNumSubscribers() > 0 && !frame.empty()) {
     ++markers_built_;
     markers_.publish(toMarkers(outcome, bodies, markers, frame));

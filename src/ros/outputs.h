@@ -1,4 +1,5 @@
-// The node's topics. A message is built only when somebody listens; latched ones always, since they are for later comers.
+// The node's topics. A message is built only when somebody listens; latched ones always, since they are for later
+// comers.
 #pragma once
 
 #include "ros/output_messages.h"

@@ -28,13 +28,20 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
 
 const char* typeName(XmlRpcValue& value) {
   switch (value.getType()) {
-    case XmlRpcValue::TypeBoolean: return "a boolean";
-    case XmlRpcValue::TypeInt: return "an integer";
-    case XmlRpcValue::TypeDouble: return "a number";
-    case XmlRpcValue::TypeString: return "a string";
-    case XmlRpcValue::TypeArray: return "a list";
-    case XmlRpcValue::TypeStruct: return "a section";
-    default: return "of a type that is not used here";
+    case XmlRpcValue::TypeBoolean:
+      return "a boolean";
+    case XmlRpcValue::TypeInt:
+      return "an integer";
+    case XmlRpcValue::TypeDouble:
+      return "a number";
+    case XmlRpcValue::TypeString:
+      return "a string";
+    case XmlRpcValue::TypeArray:
+      return "a list";
+    case XmlRpcValue::TypeStruct:
+      return "a section";
+    default:
+      return "of a type that is not used here";
   }
 }
 
@@ -129,8 +136,10 @@ std::string ParameterReader::choice(const std::string& name, const std::string& 
   XmlRpcValue value = raw(name);
   if (!value.valid()) return fallback;
   std::string text;
-  if (value.getType() == XmlRpcValue::TypeBoolean) text = static_cast<bool>(value) ? "on" : "off";
-  else text = get(name, fallback);
+  if (value.getType() == XmlRpcValue::TypeBoolean)
+    text = static_cast<bool>(value) ? "on" : "off";
+  else
+    text = get(name, fallback);
   if (std::find(choices.begin(), choices.end(), text) != choices.end()) return text;
   std::string all;
   for (const std::string& one : choices) all += (all.empty() ? "" : ", ") + one;
@@ -143,9 +152,12 @@ std::vector<double> ParameterReader::numbers(XmlRpcValue& list, const std::strin
   }
   std::vector<double> result;
   for (int i = 0; i < list.size(); ++i) {
-    if (list[i].getType() == XmlRpcValue::TypeDouble) result.push_back(static_cast<double>(list[i]));
-    else if (list[i].getType() == XmlRpcValue::TypeInt) result.push_back(static_cast<int>(list[i]));
-    else fail(name, std::string("holds ") + typeName(list[i]) + " where a number is needed");
+    if (list[i].getType() == XmlRpcValue::TypeDouble)
+      result.push_back(static_cast<double>(list[i]));
+    else if (list[i].getType() == XmlRpcValue::TypeInt)
+      result.push_back(static_cast<int>(list[i]));
+    else
+      fail(name, std::string("holds ") + typeName(list[i]) + " where a number is needed");
     if (!std::isfinite(result.back())) fail(name, "holds a number that is not finite");
   }
   return result;

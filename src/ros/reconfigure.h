@@ -1,5 +1,5 @@
-// dynamic_reconfigure, kept to one file, for its headers are large. Its server writes what it holds back to the parameter
-// server in types of its own, so it lives under ~live, apart from the parameters proper.
+// dynamic_reconfigure, kept to one file, for its headers are large. Its server writes what it holds back to the
+// parameter server in types of its own, so it lives under ~live, apart from the parameters proper.
 #pragma once
 
 #include <functional>

@@ -35,7 +35,8 @@ bool StepRecorder::record(std::string& message) {
   }
   try {
     message.clear();
-    for (const std::string& file : recorder_->writeAll("asked for by record_step")) message += (message.empty() ? "" : "\n") + file;
+    for (const std::string& file : recorder_->writeAll("asked for by record_step"))
+      message += (message.empty() ? "" : "\n") + file;
     return true;
   } catch (const std::runtime_error& error) {
     message = error.what();

@@ -1,4 +1,5 @@
-// The node's flight recorder: parameters record_steps and record_folder, the service ~record_step, and what the log says.
+// The node's flight recorder: parameters record_steps and record_folder, the service ~record_step, and what the log
+// says.
 #pragma once
 
 #include <memory>
@@ -14,7 +15,8 @@ class StepRecorder {
   /// Listens to the monitor unless record_steps is 0. The monitor must not run any more when this ends.
   StepRecorder(const MonitorConfig& config, Monitor& monitor);
 
-  /// Writes the steps that are kept. True with the files' names in the message, false with the reason why there are none.
+  /// Writes the steps that are kept. True with the files' names in the message, false with the reason why there are
+  /// none.
   bool record(std::string& message);
   /// One sentence for the log about an answer that contradicts its own promises; empty: none.
   std::string takeSurprise();

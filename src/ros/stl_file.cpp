@@ -47,8 +47,8 @@ MeshFile loadStlFile(const std::string& path) {
   std::uint32_t triangles = 0;
   if (bytes.size() >= HEADER_BYTES + 4) std::memcpy(&triangles, bytes.data() + HEADER_BYTES, 4);
   // Binary files may begin with "solid" too; only the size tells for certain.
-  const bool binary = bytes.size() >= HEADER_BYTES + 4 &&
-                      bytes.size() == HEADER_BYTES + 4 + std::size_t{triangles} * TRIANGLE_BYTES;
+  const bool binary =
+      bytes.size() >= HEADER_BYTES + 4 && bytes.size() == HEADER_BYTES + 4 + std::size_t{triangles} * TRIANGLE_BYTES;
   if (!binary && bytes.compare(0, 5, "solid") != 0) {
     throw MeshFileError(path + ": neither an ASCII STL nor a binary one of the size that it states");
   }

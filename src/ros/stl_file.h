@@ -7,8 +7,8 @@
 
 namespace deformable_ccd {
 
-/// Corners with equal coordinates become one vertex, triangles without area are left out. Throws MeshFileError naming the
-/// file and what is wrong with it.
+/// Corners with equal coordinates become one vertex, triangles without area are left out. Throws MeshFileError naming
+/// the file and what is wrong with it.
 MeshFile loadStlFile(const std::string& path);
 
 }  // namespace deformable_ccd

@@ -9,8 +9,7 @@ namespace deformable_ccd {
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
   const auto known = newest_.find(transform.child_frame_id);
-  return known != newest_.end() &&
-         static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second - JUMP_BACK_NS;
+  return known != newest_.end() && static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second - JUMP_BACK_NS;
 }
 
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {

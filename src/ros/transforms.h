@@ -14,8 +14,8 @@ namespace deformable_ccd {
 /// Broadcasters of one tree are late against each other by less than this; a loop goes back by more.
 constexpr StampNs JUMP_BACK_NS = 1000000000;
 
-/// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of the
-/// end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
+/// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
+/// the end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
 class TransformFeed {
  public:
   explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}

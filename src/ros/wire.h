@@ -1,5 +1,5 @@
-// Checked reading of serialised ROS messages in place: nothing is copied and nothing is allocated before every length has
-// been held against the bytes that are really there. A generated deserialiser resizes first and looks later.
+// Checked reading of serialised ROS messages in place: nothing is copied and nothing is allocated before every length
+// has been held against the bytes that are really there. A generated deserialiser resizes first and looks later.
 #pragma once
 
 #include <cstddef>

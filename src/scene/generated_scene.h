@@ -30,8 +30,8 @@ GeneratedKind generatedKindFromString(const std::string& text);
 struct GeneratedBody {
   std::string name;
   Topology topology;
-  Index vertex_offset = 0;     ///< of its vertex 0 in positions()
-  bool deforms = true;         ///< false: rigid or at rest, so that it cannot meet itself
+  Index vertex_offset = 0;  ///< of its vertex 0 in positions()
+  bool deforms = true;      ///< false: rigid or at rest, so that it cannot meet itself
 };
 
 struct GeneratedOptions {

@@ -24,9 +24,7 @@ void exactBatch(const BatchInput& input, const BatchOutput& output) {
   HWY_DYNAMIC_DISPATCH(exactBatchOn)(input, output);
 }
 
-void fastBatch(const BatchInput& input, const BatchOutput& output) {
-  HWY_DYNAMIC_DISPATCH(fastBatchOn)(input, output);
-}
+void fastBatch(const BatchInput& input, const BatchOutput& output) { HWY_DYNAMIC_DISPATCH(fastBatchOn)(input, output); }
 
 const char* batchTargetName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
 

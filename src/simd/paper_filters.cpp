@@ -2,8 +2,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/paper_filters.cpp"
-#include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -30,14 +30,14 @@ HWY_INLINE void prefetchRecords(const float* HWY_RESTRICT records, const uint32_
 
 // Keeps the pairs for which `separated` is false. Written without a branch on the outcome, which is unpredictable.
 template <class Separated>
-HWY_INLINE size_t keepPairs(const float* HWY_RESTRICT records, const uint32_t* pairs, size_t count,
-                            uint32_t* survivors, const Separated& separated) {
+HWY_INLINE size_t keepPairs(const float* HWY_RESTRICT records, const uint32_t* pairs, size_t count, uint32_t* survivors,
+                            const Separated& separated) {
   size_t kept = 0;
   for (size_t i = 0; i < count; ++i) {
     prefetchRecords(records, pairs, i, count);
     const uint32_t v0 = pairs[4 * i], v1 = pairs[4 * i + 1], v2 = pairs[4 * i + 2], v3 = pairs[4 * i + 3];
-    const bool reject = separated(records + RECORD * v0, records + RECORD * v1, records + RECORD * v2,
-                                  records + RECORD * v3);
+    const bool reject =
+        separated(records + RECORD * v0, records + RECORD * v1, records + RECORD * v2, records + RECORD * v3);
     uint32_t* out = survivors + 4 * kept;  // kept <= i, so writing in place never overtakes the reading
     out[0] = v0;
     out[1] = v1;
@@ -48,7 +48,8 @@ HWY_INLINE size_t keepPairs(const float* HWY_RESTRICT records, const uint32_t* p
   return kept;
 }
 
-// --- linear filter (paper, Section 4) and primitive bounding volumes --------------------------------------------------
+// --- linear filter (paper, Section 4) and primitive bounding volumes
+// --------------------------------------------------
 
 template <bool VF>
 HWY_INLINE void sideBounds(const D d, const float* p0, const float* p1, const float* p2, const float* p3, V& first_lo,
@@ -101,23 +102,28 @@ HWY_INLINE bool boundsSeparated(const float* p0, const float* p1, const float* p
 }
 
 size_t LinearVf(const float* records, const uint32_t* pairs, size_t count, uint32_t* survivors) {
-  return keepPairs(records, pairs, count, survivors, [](const float* a, const float* b, const float* c, const float* e)
-                   HWY_ATTR { return linearSeparated<true>(a, b, c, e); });
+  return keepPairs(records, pairs, count, survivors,
+                   [](const float* a, const float* b, const float* c, const float* e)
+                       HWY_ATTR { return linearSeparated<true>(a, b, c, e); });
 }
 size_t LinearEe(const float* records, const uint32_t* pairs, size_t count, uint32_t* survivors) {
-  return keepPairs(records, pairs, count, survivors, [](const float* a, const float* b, const float* c, const float* e)
-                   HWY_ATTR { return linearSeparated<false>(a, b, c, e); });
+  return keepPairs(records, pairs, count, survivors,
+                   [](const float* a, const float* b, const float* c, const float* e)
+                       HWY_ATTR { return linearSeparated<false>(a, b, c, e); });
 }
 size_t PrimitiveBvVf(const float* records, const uint32_t* pairs, size_t count, uint32_t* survivors) {
-  return keepPairs(records, pairs, count, survivors, [](const float* a, const float* b, const float* c, const float* e)
-                   HWY_ATTR { return boundsSeparated<true>(a, b, c, e); });
+  return keepPairs(records, pairs, count, survivors,
+                   [](const float* a, const float* b, const float* c, const float* e)
+                       HWY_ATTR { return boundsSeparated<true>(a, b, c, e); });
 }
 size_t PrimitiveBvEe(const float* records, const uint32_t* pairs, size_t count, uint32_t* survivors) {
-  return keepPairs(records, pairs, count, survivors, [](const float* a, const float* b, const float* c, const float* e)
-                   HWY_ATTR { return boundsSeparated<false>(a, b, c, e); });
+  return keepPairs(records, pairs, count, survivors,
+                   [](const float* a, const float* b, const float* c, const float* e)
+                       HWY_ATTR { return boundsSeparated<false>(a, b, c, e); });
 }
 
-// --- planar filter (paper, Section 5) ---------------------------------------------------------------------------------
+// --- planar filter (paper, Section 5)
+// ---------------------------------------------------------------------------------
 
 // The lanes rotated by one within each half of four: the second coordinates of the planes. `p` is the record at `lane`.
 HWY_INLINE V rotatedDifference(const D d, const V difference, const float* p, const float* origin, size_t lane) {
@@ -161,8 +167,7 @@ HWY_INLINE V largest(const PlanePoint& p) {
 HWY_INLINE Quadratic cross(const PlanePoint& p, const PlanePoint& q) {
   Quadratic r;
   r.c0 = hn::Sub(hn::Mul(p.x0, q.y0), hn::Mul(p.y0, q.x0));
-  r.c1 = hn::Add(hn::Sub(hn::Mul(p.x0, q.y1), hn::Mul(p.y0, q.x1)),
-                 hn::Sub(hn::Mul(p.x1, q.y0), hn::Mul(p.y1, q.x0)));
+  r.c1 = hn::Add(hn::Sub(hn::Mul(p.x0, q.y1), hn::Mul(p.y0, q.x1)), hn::Sub(hn::Mul(p.x1, q.y0), hn::Mul(p.y1, q.x0)));
   r.c2 = hn::Sub(hn::Mul(p.x1, q.y1), hn::Mul(p.y1, q.x1));
   return r;
 }
@@ -242,12 +247,10 @@ HWY_INLINE M algorithm2(const D d, const Quadratics& q) {
   const V zero = hn::Zero(d);
   const M first = hn::Or(hn::And(hn::Gt(q.ab.c0, zero), hn::Gt(q.total.c0, zero)),
                          hn::And(hn::Lt(q.ab.c0, zero), hn::Lt(q.total.c0, zero)));
-  const M separated_first =
-      hn::Or(hn::And(strictlyPositive(q.ab, q.margin), strictlyPositive(q.total, q.margin)),
-             hn::And(strictlyNegative(q.ab, q.margin), strictlyNegative(q.total, q.margin)));
-  const M separated_second =
-      hn::Or(hn::And(strictlyPositive(q.bc, q.margin), strictlyNegative(q.ca, q.margin)),
-             hn::And(strictlyNegative(q.bc, q.margin), strictlyPositive(q.ca, q.margin)));
+  const M separated_first = hn::Or(hn::And(strictlyPositive(q.ab, q.margin), strictlyPositive(q.total, q.margin)),
+                                   hn::And(strictlyNegative(q.ab, q.margin), strictlyNegative(q.total, q.margin)));
+  const M separated_second = hn::Or(hn::And(strictlyPositive(q.bc, q.margin), strictlyNegative(q.ca, q.margin)),
+                                    hn::And(strictlyNegative(q.bc, q.margin), strictlyPositive(q.ca, q.margin)));
   return hn::Or(hn::And(first, separated_first), hn::AndNot(first, separated_second));
 }
 
@@ -272,20 +275,19 @@ size_t PaperPlanarEe(const float* records, float error, const uint32_t* pairs, s
                    [error](const float* a, const float* b, const float* c, const float* e)
                        HWY_ATTR { return paperFormSeparated<false>(a, b, c, e, error); });
 }
-size_t BranchFreePlanarVf(const float* records, float error, const uint32_t* pairs, size_t count,
-                          uint32_t* survivors) {
+size_t BranchFreePlanarVf(const float* records, float error, const uint32_t* pairs, size_t count, uint32_t* survivors) {
   return keepPairs(records, pairs, count, survivors,
                    [error](const float* a, const float* b, const float* c, const float* e)
                        HWY_ATTR { return branchFreeSeparated<true>(a, b, c, e, error); });
 }
-size_t BranchFreePlanarEe(const float* records, float error, const uint32_t* pairs, size_t count,
-                          uint32_t* survivors) {
+size_t BranchFreePlanarEe(const float* records, float error, const uint32_t* pairs, size_t count, uint32_t* survivors) {
   return keepPairs(records, pairs, count, survivors,
                    [error](const float* a, const float* b, const float* c, const float* e)
                        HWY_ATTR { return branchFreeSeparated<false>(a, b, c, e, error); });
 }
 
-// --- non-penetration filter, batched ----------------------------------------------------------------------------------
+// --- non-penetration filter, batched
+// ----------------------------------------------------------------------------------
 
 constexpr size_t BATCH = 8;
 // Lanes of x, y, z at t=0, then at t=1.

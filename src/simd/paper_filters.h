@@ -4,9 +4,9 @@
 // records: 16 floats a vertex, 64-byte aligned: 8 lanes at t=0, 8 lanes at t=1 (filter/paper_record.h has their order).
 // pairs: 4 vertex indices a pair, VF: v f0 f1 f2, EE: ea0 ea1 eb0 eb1.
 // Every function copies the pairs that it cannot reject to `survivors`, in order, and returns their number. `survivors`
-// has room for `count` pairs and may be `pairs` itself. `error` bounds the rounding of the records (PaperRecords::error).
-// The proofs of the margins are in filter/planar_reference.h and filter/non_penetration.h, beside the plain references
-// that these kernels equal bit for bit.
+// has room for `count` pairs and may be `pairs` itself. `error` bounds the rounding of the records
+// (PaperRecords::error). The proofs of the margins are in filter/planar_reference.h and filter/non_penetration.h,
+// beside the plain references that these kernels equal bit for bit.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,10 @@
 namespace deformable_ccd {
 namespace simd {
 
-std::size_t paperLinearVf(const float* records, const std::uint32_t* pairs, std::size_t count, std::uint32_t* survivors);
-std::size_t paperLinearEe(const float* records, const std::uint32_t* pairs, std::size_t count, std::uint32_t* survivors);
+std::size_t paperLinearVf(const float* records, const std::uint32_t* pairs, std::size_t count,
+                          std::uint32_t* survivors);
+std::size_t paperLinearEe(const float* records, const std::uint32_t* pairs, std::size_t count,
+                          std::uint32_t* survivors);
 
 std::size_t paperPrimitiveBvVf(const float* records, const std::uint32_t* pairs, std::size_t count,
                                std::uint32_t* survivors);

@@ -1,9 +1,9 @@
 // Kernels of the hierarchy of 16-DOPs over the paper's records: refit, merge, overlap. Raw arrays only.
 //
-// A 16-DOP is 16 floats, 64-byte aligned: 8 smallest values, then 8 largest, in the lanes' order of the record. An empty
-// one has smallest > largest in every lane and overlaps nothing.
-// Nodes 0 .. leaf_count-1 are leaves (primitives); node leaf_count + i is inner with children[2i] and children[2i+1].
-// Bounds are minima and maxima of stored values, which are monotone in the exact projections: no margin.
+// A 16-DOP is 16 floats, 64-byte aligned: 8 smallest values, then 8 largest, in the lanes' order of the record. An
+// empty one has smallest > largest in every lane and overlaps nothing. Nodes 0 .. leaf_count-1 are leaves (primitives);
+// node leaf_count + i is inner with children[2i] and children[2i+1]. Bounds are minima and maxima of stored values,
+// which are monotone in the exact projections: no margin.
 #pragma once
 
 #include <cstddef>

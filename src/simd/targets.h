@@ -7,9 +7,9 @@
 namespace deformable_ccd {
 namespace simd {
 
-std::vector<std::string> usableTargets();          ///< compiled in and supported here, best first
+std::vector<std::string> usableTargets();  ///< compiled in and supported here, best first
 std::string activeTarget();
-bool restrictTo(const std::string& name);          ///< false when the name is not usable here; "" removes the restriction
+bool restrictTo(const std::string& name);  ///< false when the name is not usable here; "" removes the restriction
 
 }  // namespace simd
 }  // namespace deformable_ccd

@@ -1,5 +1,5 @@
-// Any bytes as a pair: every rung against the oracle and on every SIMD target, and exact against itself in another order of
-// the vertices.
+// Any bytes as a pair: every rung against the oracle and on every SIMD target, and exact against itself in another
+// order of the vertices.
 //
 // The first byte chooses how the rest is read: a seed of the generators of hard pairs; coordinates of few bits, one or
 // two bytes each, between which coincidences are likely; or doubles as they are. Missing bytes are zeros.
@@ -130,7 +130,8 @@ void pair(const std::uint8_t* data, std::size_t size) {
     const std::string broken = test::brokenPromise(rung.options, query, toc, result);
     if (!broken.empty()) report(query, rung, broken);
     test::forEachSimdTarget([&](const std::string& target) {
-      if (!test::sameAnswer(test::testQuery(*rung.test, query), result)) report(query, rung, "another answer on " + target);
+      if (!test::sameAnswer(test::testQuery(*rung.test, query), result))
+        report(query, rung, "another answer on " + target);
     });
     if (rung.options.rung != Accuracy::EXACT) continue;
     if (!test::sameAnswer(test::testQuery(*rung.test, other), result)) {

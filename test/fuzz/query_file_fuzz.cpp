@@ -26,11 +26,10 @@ void query_file(const std::uint8_t* data, std::size_t size) {
   std::stringstream copy;
   deformable_ccd::writeQueries(copy, queries);
   const std::vector<Query> again = deformable_ccd::readQueries(copy, kind, "copy");
-  const bool equal = std::equal(queries.begin(), queries.end(), again.begin(), again.end(),
-                                [](const Query& a, const Query& b) {
-                                  return a.contact == b.contact &&
-                                         std::memcmp(a.motion.x, b.motion.x, sizeof a.motion.x) == 0;
-                                });
+  const bool equal =
+      std::equal(queries.begin(), queries.end(), again.begin(), again.end(), [](const Query& a, const Query& b) {
+        return a.contact == b.contact && std::memcmp(a.motion.x, b.motion.x, sizeof a.motion.x) == 0;
+      });
   if (!equal) throw std::logic_error("written and read again, the queries differ");
 }
 

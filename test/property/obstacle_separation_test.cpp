@@ -79,8 +79,8 @@ double pointToBoxes(const ObstacleScene& scene, const Vec3& point) {
   return distance;
 }
 
-// The uncertainty of a point on an edge lies between those of its ends: no point may come closer than its own unseen, and
-// no contact of the edge is farther than its most uncertain end asks for.
+// The uncertainty of a point on an edge lies between those of its ends: no point may come closer than its own unseen,
+// and no contact of the edge is farther than its most uncertain end asks for.
 TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
   std::mt19937_64 random(12);
   const int scenes = test::longRun() ? 20000 : 400;
@@ -122,7 +122,8 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
         const double distance = pointToBoxes(scene, (1 - on_edge) * from + on_edge * to);
         if (distance > options.minimum_separation_m + radius_there - 1e-9) continue;
         close = true;
-        ASSERT_LE(earliest, t) << "distance " << distance << ", radius " << radius_there << "\n" << test::describe(scene);
+        ASSERT_LE(earliest, t) << "distance " << distance << ", radius " << radius_there << "\n"
+                               << test::describe(scene);
       }
       ++(close ? within : sure_apart);
     }

@@ -1,6 +1,6 @@
 // Hard pairs by the million: every elementary test, on every SIMD target, in batches, against the oracle.
-// DEFORMABLE_CCD_LONG=1 runs 1e7 of them; the seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file that
-// run_queries replays; the single-pair tests beside this one shrink it.
+// DEFORMABLE_CCD_LONG=1 runs 1e7 of them; the seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file
+// that run_queries replays; the single-pair tests beside this one shrink it.
 #include <gtest/gtest.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -30,11 +30,11 @@ constexpr std::size_t BLOCK = 10000, CHUNK = 250;
 template <class Body>
 void inChunks(const Body& body) {
   ForkJoin::fork();
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK),
-                    [&](const tbb::blocked_range<std::size_t>& range) DEFORMABLE_CCD_COPIED_BY_TBB {
-                      ForkJoin::piece(body, range.begin(), range.end());
-                    },
-                    tbb::simple_partitioner());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK),
+      [&](const tbb::blocked_range<std::size_t>& range)
+          DEFORMABLE_CCD_COPIED_BY_TBB { ForkJoin::piece(body, range.begin(), range.end()); },
+      tbb::simple_partitioner());
   ForkJoin::join();
 }
 

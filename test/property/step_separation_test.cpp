@@ -1,5 +1,6 @@
-// Whole steps with a minimum separation and tracker noise, against the exact distance: nothing that comes closer than the
-// pair's separation is missed or late, and nothing is called a contact that stays farther than it plus the tolerance.
+// Whole steps with a minimum separation and tracker noise, against the exact distance: nothing that comes closer than
+// the pair's separation is missed or late, and nothing is called a contact that stays farther than it plus the
+// tolerance.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -146,7 +147,8 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
     });
     if (HasFatalFailure()) return;
   }
-  std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within << " of them with noise\n";
+  std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within
+            << " of them with noise\n";
   EXPECT_GT(within, pairs / 100);
   EXPECT_GT(noisy_within, within / 10);
 }

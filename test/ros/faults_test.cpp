@@ -91,7 +91,8 @@ TEST_F(Recording, TfThatStopsAndComesBack) {
   }
   EXPECT_TRUE(waitUntil([&] { return !clear.last().data; }));
   tf.publish(transformAt(100.6, "camera", {0, 0, 0}));
-  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.4, "camera")).status, ContactArray::OK) << "from the last good frame on";
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.4, "camera")).status, ContactArray::OK)
+      << "from the last good frame on";
   EXPECT_EQ(send(publisher, meshStamped(mesh, 100.5, "camera")).status, ContactArray::OK);
   expectAddsUp();
 }
@@ -104,7 +105,8 @@ TEST_F(Recording, ClockThatJumpsBothWays) {
   for (const double jump_s : {-500.0, 3600.0, -0.05, 1e6}) {
     stamp_s += 0.1 + jump_s;
     const ContactArray jumped = send(publisher, meshStamped(tipAbove(1), stamp_s));
-    EXPECT_EQ(jumped.status, jump_s < 0 && jump_s + 0.1 <= 0.05 ? ContactArray::TIME_JUMP : ContactArray::GAP) << jump_s;
+    EXPECT_EQ(jumped.status, jump_s < 0 && jump_s + 0.1 <= 0.05 ? ContactArray::TIME_JUMP : ContactArray::GAP)
+        << jump_s;
     EXPECT_FALSE(jumped.answered);
     EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, ContactArray::OK) << jump_s;
   }

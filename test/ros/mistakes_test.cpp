@@ -73,7 +73,8 @@ octomap_msgs::Octomap mapIn(const std::string& frame) {
   map.binary = true;
   map.id = "OcTree";
   map.resolution = 0.1;
-  map.data = buildOctomap(0.1, Box{{0, 0, 0}, {0.2, 0.2, 0.2}}, [](const Vec3&) { return true; }, true);
+  map.data = buildOctomap(
+      0.1, Box{{0, 0, 0}, {0.2, 0.2, 0.2}}, [](const Vec3&) { return true; }, true);
   return map;
 }
 
@@ -164,7 +165,8 @@ TEST_F(Mistake, AnotherMeshEveryFrame) {
   Tracker tracker;
   bool more = false;
   const auto publisher = advertiseAndWait<MeshStamped>(node, "/remeshed/mesh");
-  expectTold("/remeshed", "TOPOLOGY_CHANGED: the mesh has 6 vertices and ",  // 1 or 2 faces in turn; one line in some seconds
+  expectTold("/remeshed",
+             "TOPOLOGY_CHANGED: the mesh has 6 vertices and ",  // 1 or 2 faces in turn; one line in some seconds
              "use a tracker, or give topology/file", [&] {
                Mesh mesh = tipAbove(1);
                if ((more = !more)) mesh.faces.pop_back();

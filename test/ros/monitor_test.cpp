@@ -330,7 +330,8 @@ TEST_F(Plain, EffectsSayWhy) {
     }
     if (effect.name == "octomap") {
       EXPECT_FALSE(effect.running);
-      EXPECT_EQ(effect.reason, "nobody publishes /plain/octomap and no octomap_file is given") << "where it was looked for";
+      EXPECT_EQ(effect.reason, "nobody publishes /plain/octomap and no octomap_file is given")
+          << "where it was looked for";
     }
   }
 }

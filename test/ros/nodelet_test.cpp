@@ -1,5 +1,4 @@
 // The monitor beside a publisher in the same process: what that publishes is neither serialised nor copied.
-#include <boost/make_shared.hpp>
 #include <deformable_ccd/ContactArray.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
@@ -7,6 +6,7 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <std_srvs/Trigger.h>
+#include <boost/make_shared.hpp>
 
 #include <random>
 

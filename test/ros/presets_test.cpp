@@ -30,8 +30,8 @@ octomap_msgs::Octomap tableMap(const std::function<bool(const Vec3&)>& more = []
   map.binary = true;
   map.id = "OcTree";
   map.resolution = 0.05;
-  map.data = buildOctomap(0.05, Box{{-1, -1, -0.2}, {1, 1, 1}},
-                          [&](const Vec3& c) { return c.z() < TABLE_M || more(c); }, true);
+  map.data = buildOctomap(
+      0.05, Box{{-1, -1, -0.2}, {1, 1, 1}}, [&](const Vec3& c) { return c.z() < TABLE_M || more(c); }, true);
   return map;
 }
 
@@ -167,9 +167,7 @@ TEST_F(Trackdlo, RopeOf45Points) {
   table.header.frame_id = "camera_color_optical_frame";
   map.publish(table);
   const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/trackdlo/results_pc");
-  drop(0.1, -0.02, [&](double z) {
-    publisher.publish(pclCloud(grid(1, 45, 0.01, z), "camera_color_optical_frame"));
-  });
+  drop(0.1, -0.02, [&](double z) { publisher.publish(pclCloud(grid(1, 45, 0.01, z), "camera_color_optical_frame")); });
   EXPECT_TRUE(rest.contacts.empty());
   expectTouched();
 }

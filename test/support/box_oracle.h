@@ -19,8 +19,8 @@ struct ObstacleScene {
   Positions t0, t1;
 };
 
-/// The lower end of the earliest TOC cell of a face (or, for a polyline, an edge) of the mesh against every leaf, interior
-/// ones too, by `exact`; 0 where it meets one at t=0; nothing where it never does.
+/// The lower end of the earliest TOC cell of a face (or, for a polyline, an edge) of the mesh against every leaf,
+/// interior ones too, by `exact`; 0 where it meets one at t=0; nothing where it never does.
 std::optional<double> earliestAgainstBoxes(const ObstacleScene& scene, const std::vector<Index>& feature, int toc_bits);
 
 /// The same from an obstacle test's contacts: the earliest of those of the feature's vertices, edges and face.

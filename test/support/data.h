@@ -19,9 +19,9 @@ std::string dataDirHint();
 }  // namespace deformable_ccd
 
 /// Skips the running test, with the reason printed, where the data is absent. Use it in the body of a test.
-#define DEFORMABLE_CCD_REQUIRE_DATA()                                                             \
-  do {                                                                                            \
-    if (::deformable_ccd::test::dataDir().empty()) {                                              \
-      GTEST_SKIP() << "no test data: " << ::deformable_ccd::test::dataDirHint();                  \
-    }                                                                                             \
+#define DEFORMABLE_CCD_REQUIRE_DATA()                                            \
+  do {                                                                           \
+    if (::deformable_ccd::test::dataDir().empty()) {                             \
+      GTEST_SKIP() << "no test data: " << ::deformable_ccd::test::dataDirHint(); \
+    }                                                                            \
   } while (false)

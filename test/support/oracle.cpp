@@ -11,9 +11,7 @@ namespace {
 
 using PolynomialVector = std::array<Polynomial, 3>;
 
-Polynomial dot(const PolynomialVector& a, const PolynomialVector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+Polynomial dot(const PolynomialVector& a, const PolynomialVector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 PolynomialVector cross(const PolynomialVector& a, const PolynomialVector& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -117,7 +115,8 @@ class MovingHull {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       for (std::size_t j = i + 1; j < points_.size(); ++j) {
         sides_.emplace_back(points_[i], points_[j]);
-        for (std::size_t k = j + 1; k < points_.size(); ++k) triangles_.emplace_back(points_[i], points_[j], points_[k]);
+        for (std::size_t k = j + 1; k < points_.size(); ++k)
+          triangles_.emplace_back(points_[i], points_[j], points_[k]);
       }
     }
   }

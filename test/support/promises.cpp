@@ -19,9 +19,7 @@ std::string outOfRange(const ElementaryResult& result) {
 std::optional<double> witnessOfContact(const Query& query, double d) {
   constexpr int SAMPLES = 64, HALVINGS = 40;
   constexpr double ROUNDING = 1e-9;  // the search is in doubles; the exact distance judges its result
-  const auto near = [&](double t) {
-    return approximateDistanceAt(query.kind, query.motion, t) <= d * (1 - ROUNDING);
-  };
+  const auto near = [&](double t) { return approximateDistanceAt(query.kind, query.motion, t) <= d * (1 - ROUNDING); };
   for (int i = 0; i <= SAMPLES; ++i) {
     double after = static_cast<double>(i) / SAMPLES;
     if (!near(after)) continue;

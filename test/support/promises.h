@@ -1,4 +1,5 @@
-// What each rung promises (doc/algorithm.md, "The elementary test"), judged against the oracle with no tolerance of its own.
+// What each rung promises (doc/algorithm.md, "The elementary test"), judged against the oracle with no tolerance of its
+// own.
 #pragma once
 
 #include <optional>

@@ -32,8 +32,9 @@ std::string judgeStart(const StepResult& result, const std::vector<StartIntersec
   }
   const bool same = std::equal(result.intersections.begin(), result.intersections.end(), truth.begin(), truth.end(),
                                [](const auto& x, const auto& y) { return x == y; });
-  return same ? "" : std::to_string(result.intersections.size()) + " intersections listed, " +
-                         std::to_string(truth.size()) + " in truth, or in another order";
+  return same ? ""
+              : std::to_string(result.intersections.size()) + " intersections listed, " + std::to_string(truth.size()) +
+                    " in truth, or in another order";
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 namespace deformable_ccd {
 namespace test {
 
-/// Runs the step with the exact rung, clustered and by brute force, on every SIMD target, and compares contacts, cells of
-/// time and start state with the truth. What is wrong, in words; empty where nothing is.
+/// Runs the step with the exact rung, clustered and by brute force, on every SIMD target, and compares contacts, cells
+/// of time and start state with the truth. What is wrong, in words; empty where nothing is.
 std::string judgeStep(const TestStep& step);
 
 /// Runs the steps one after the other, each continuing the one before, with a detector that carries the start state

@@ -5,8 +5,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include <boost/make_shared.hpp>
 #include <rosbag/bag.h>
+#include <boost/make_shared.hpp>
 
 #include "apps/make_scene_bag/messages.h"
 #include "io/progress_bar.h"

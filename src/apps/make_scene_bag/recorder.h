@@ -9,9 +9,9 @@
 namespace deformable_ccd {
 
 struct RecorderOptions {
-  int frames = 0;                   ///< 0: the scene's own number
+  int frames = 0;  ///< 0: the scene's own number
   std::uint64_t seed = 1;
-  std::string output;               ///< message type of every body; empty: the scene's own
+  std::string output;  ///< message type of every body; empty: the scene's own
   bool full_octomap = false;
   std::string monitor_config_path;  ///< empty: not written
   bool quiet = false;

@@ -35,7 +35,8 @@ Positions startPositions(const Shape& shape) {
   Positions positions;
   positions.reserve(static_cast<std::size_t>(shape.rows) * shape.cols);
   for (int row = 0; row < shape.rows; ++row) {
-    for (int col = 0; col < shape.cols; ++col) positions.push_back(shape.center_m + turn * localVertex(shape, row, col));
+    for (int col = 0; col < shape.cols; ++col)
+      positions.push_back(shape.center_m + turn * localVertex(shape, row, col));
   }
   return positions;
 }

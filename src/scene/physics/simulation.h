@@ -12,7 +12,8 @@ namespace deformable_ccd::scene {
 
 class Simulation {
  public:
-  /// Constructs the bodies and only the effects that the scene names. Equal scene and seed give equal motion, bit for bit.
+  /// Constructs the bodies and only the effects that the scene names. Equal scene and seed give equal motion, bit for
+  /// bit.
   Simulation(const SceneSpec& spec, std::uint64_t seed);
   ~Simulation();
 

@@ -112,9 +112,7 @@ std::size_t YamlMap::choice(const std::string& key, const std::vector<std::strin
   fail(key, "write one of " + all);
 }
 
-YamlMap YamlMap::map(const std::string& key) {
-  return YamlMap(required(key, "a map"), file_, path_ + key + ".");
-}
+YamlMap YamlMap::map(const std::string& key) { return YamlMap(required(key, "a map"), file_, path_ + key + "."); }
 
 std::optional<YamlMap> YamlMap::optionalMap(const std::string& key) {
   if (!has(key)) return std::nullopt;

@@ -51,7 +51,8 @@ void mesh_file(const std::uint8_t* data, std::size_t size) {
       }
     }
   } catch (const MeshFileError& error) {
-    if (std::string(error.what()).find(file.path()) == std::string::npos) throw std::logic_error("an error without the file");
+    if (std::string(error.what()).find(file.path()) == std::string::npos)
+      throw std::logic_error("an error without the file");
   }
 }
 

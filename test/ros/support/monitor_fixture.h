@@ -30,9 +30,10 @@ inline octomap_msgs::Octomap blockBelowZero(bool binary, double stamp_s = 1) {
   map.binary = binary;
   map.id = "OcTree";
   map.resolution = 0.1;
-  map.data = buildOctomap(0.1, Box{{0, 0, -0.2}, {0.5, 0.4, 0}}, [](const Vec3& c) {
-    return c.x() > 0 && c.x() < 0.5 && c.y() > 0 && c.y() < 0.4 && c.z() > -0.2 && c.z() < 0;
-  }, binary);
+  map.data = buildOctomap(
+      0.1, Box{{0, 0, -0.2}, {0.5, 0.4, 0}},
+      [](const Vec3& c) { return c.x() > 0 && c.x() < 0.5 && c.y() > 0 && c.y() < 0.4 && c.z() > -0.2 && c.z() < 0; },
+      binary);
   return map;
 }
 

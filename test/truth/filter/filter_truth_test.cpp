@@ -17,12 +17,9 @@
 namespace deformable_ccd {
 namespace {
 
-constexpr PaperFilter FILTERS[] = {PaperFilter::PRIMITIVE_BV,
-                                   PaperFilter::LINEAR,
-                                   PaperFilter::NON_PENETRATION,
-                                   PaperFilter::NON_PENETRATION_BATCHED,
-                                   PaperFilter::PLANAR_PAPER,
-                                   PaperFilter::PLANAR_BRANCH_FREE};
+constexpr PaperFilter FILTERS[] = {PaperFilter::PRIMITIVE_BV,    PaperFilter::LINEAR,
+                                   PaperFilter::NON_PENETRATION, PaperFilter::NON_PENETRATION_BATCHED,
+                                   PaperFilter::PLANAR_PAPER,    PaperFilter::PLANAR_BRANCH_FREE};
 
 /// One name per pair whatever the order of its vertices.
 Quad canonical(PairKind kind, Quad q) {
@@ -140,8 +137,8 @@ TEST_P(SceneTruth, NoTrueContactIsCulled) {
     EXPECT_GT(contacts.size(), 9000u);
     for (PaperFilter filter : FILTERS) {
       std::vector<Quad> kept(contacts.size());
-      kept.resize(filterPairs(filter, kind, records, scene.vertices.data(), contacts.data(), contacts.size(),
-                              kept.data()));
+      kept.resize(
+          filterPairs(filter, kind, records, scene.vertices.data(), contacts.data(), contacts.size(), kept.data()));
       std::vector<Quad> lost;
       std::set_difference(contacts.begin(), contacts.end(), kept.begin(), kept.end(), std::back_inserter(lost));
       EXPECT_EQ(lost.size(), 0u) << toString(filter) << ", first " << toString(kind) << ' ' << name(lost[0]);
@@ -170,8 +167,8 @@ TEST_P(SceneTruth, CandidatesHoldEveryContactOnceAndAreAsManyAsStated) {
     }
     if (bounds != SweptBounds::DOP18) continue;
     EXPECT_EQ(sink.candidates, figures.candidates_dop18);
-    const double culled = 1 - static_cast<double>(sink.kept - truth.contacts()) /
-                                  static_cast<double>(sink.candidates - truth.contacts());
+    const double culled =
+        1 - static_cast<double>(sink.kept - truth.contacts()) / static_cast<double>(sink.candidates - truth.contacts());
     EXPECT_GE(culled, figures.culled_of_false);
     const double ceiling = 1 - static_cast<double>(truth.contacts()) / static_cast<double>(sink.candidates);
     std::cout << figures.name << ": linear + planar cull " << 100 * culled << " % of the false candidates; ceiling "

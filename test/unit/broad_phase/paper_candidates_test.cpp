@@ -108,8 +108,7 @@ Candidates allFeaturePairs(const World& w) {
   return all;
 }
 
-Candidates run(const World& w, TrianglePairs method, double separation_m = 0,
-               SweptBounds bounds = SweptBounds::DOP16) {
+Candidates run(const World& w, TrianglePairs method, double separation_m = 0, SweptBounds bounds = SweptBounds::DOP16) {
   TriangleCandidates broad_phase;
   broad_phase.setBodies(w.bodies, w.vertices.data());
   PaperRecords records;
@@ -131,7 +130,8 @@ void expectComplete(const World& w, const Candidates& found) {
   const auto check = [&](PairKind kind, const std::vector<Quad>& got, const std::vector<Quad>& allowed) {
     EXPECT_EQ(std::adjacent_find(got.begin(), got.end()), got.end()) << "a pair occurs twice";
     for (const Quad& q : got) {
-      EXPECT_TRUE(std::binary_search(allowed.begin(), allowed.end(), q)) << toString(kind) << ' ' << name(q) << "is no pair";
+      EXPECT_TRUE(std::binary_search(allowed.begin(), allowed.end(), q))
+          << toString(kind) << ' ' << name(q) << "is no pair";
     }
     std::size_t required = 0;
     for (const Quad& q : allowed) {

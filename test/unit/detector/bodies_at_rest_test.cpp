@@ -125,7 +125,8 @@ TEST(BodiesApart, AreNotPaired) {
     setups[b].name = std::to_string(b);
     setups[b].topology = topology;
     // Bodies 0 and 1 overlap, all others are far from each other.
-    for (int i = 0; i < 16; ++i) x[b].emplace_back(i % 4 + (b < 2 ? 0.0 : 10.0 * static_cast<double>(b)), i / 4, 0.1 * b);
+    for (int i = 0; i < 16; ++i)
+      x[b].emplace_back(i % 4 + (b < 2 ? 0.0 : 10.0 * static_cast<double>(b)), i / 4, 0.1 * b);
   }
   for (const Positions& p : x) {
     at.push_back(&p);

@@ -48,7 +48,7 @@ TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
 // The brackets of `conservative` are as wide as the way to them was short: a contact found at once ends at 1, and is
 // the first all the same.
 TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
-  TestStep step = crossing();  // body 1 meets body 0 at 0.5, in a narrow bracket
+  TestStep step = crossing();      // body 1 meets body 0 at 0.5, in a narrow bracket
   StepBody near = step.bodies[0];  // too close to body 0 from the start: the bracket is [0, 1]
   for (Positions* x : {&near.t0, &near.t1}) {
     for (Vec3& p : *x) p.z() -= 0.05;
@@ -150,9 +150,8 @@ TEST(DetectorLimits, ABudgetCutsInTheMiddleOfTheContacts) {
   for (options.step_budget_ms = 0.02; !complete && options.step_budget_ms < 1e5; options.step_budget_ms *= 1.1) {
     const StepResult part = runOnce(step, options);
     complete = part.complete;
-    const auto certain = std::count_if(part.contacts.begin(), part.contacts.end(), [](const core::Contact& c) {
-      return c.certainty == Certainty::CERTAIN;
-    });
+    const auto certain = std::count_if(part.contacts.begin(), part.contacts.end(),
+                                       [](const core::Contact& c) { return c.certainty == Certainty::CERTAIN; });
     in_the_middle += certain > 0 && static_cast<std::size_t>(certain) < full.contacts.size();
   }
   EXPECT_TRUE(complete);

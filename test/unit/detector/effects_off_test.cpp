@@ -1,5 +1,5 @@
-// An effect that is off costs nothing: not one allocation more than in a scene that knows nothing of it, and zeros in its
-// statistics. Switched on, the same scene allocates and counts.
+// An effect that is off costs nothing: not one allocation more than in a scene that knows nothing of it, and zeros in
+// its statistics. Switched on, the same scene allocates and counts.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -19,7 +19,8 @@ void* operator new(std::size_t size) {
   if (void* p = std::malloc(size ? size : 1)) return p;
   throw std::bad_alloc();
 }
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {  // std::stable_sort's; AddressSanitizer has its own
+void* operator new(std::size_t size,
+                   const std::nothrow_t&) noexcept {  // std::stable_sort's; AddressSanitizer has its own
   ++allocations;
   return std::malloc(size ? size : 1);
 }
@@ -54,7 +55,8 @@ Cost costOf(const Scene& scene) {
     frame.stamp_ns = 1000000 * (k + 1);
     frame.topology = topology;
     for (int i = 0; i < 64; ++i) {
-      frame.positions.emplace_back(0.05 * ((i * 37) % 11), 0.05 * ((i * 29) % 13), 0.05 * ((i * 23) % 7) - 0.01 * k * (i % 3));
+      frame.positions.emplace_back(0.05 * ((i * 37) % 11), 0.05 * ((i * 29) % 13),
+                                   0.05 * ((i * 23) % 7) - 0.01 * k * (i % 3));
     }
     frame.radius_m = scene.radius_m;
     if (scene.second) {
@@ -81,7 +83,8 @@ Cost costOf(const Scene& scene) {
     if (scene.second) monitor.push(1, std::move(others[k]), 0);
     monitor.push(0, std::move(frames[k]), 0);
     cost.ok = monitor.next(0, outcome) && cost.ok;
-    if (scene.predicts && outcome.answered) outcome.stats[Effect::LOOK_AHEAD].in = monitor.predict().stats.vf_candidates;
+    if (scene.predicts && outcome.answered)
+      outcome.stats[Effect::LOOK_AHEAD].in = monitor.predict().stats.vf_candidates;
   }
   cost.allocations = allocations - before;
   cost.stats = outcome.stats;
@@ -119,7 +122,8 @@ std::vector<Case> cases() {
       {Effect::BODY_BODY, [](Scene& s) { s.second = true; }, [](Scene& s) { s.body.against_bodies = true; }},
       {Effect::RIGID_BODIES, [](Scene& s) { s.second = s.body.against_bodies = true; },
        [](Scene& s) { s.second_is_rigid = true; }},
-      {Effect::START_STATE, [](Scene& s) { s.body.self_collision = true; }, [](Scene& s) { s.options.detector.check_start_state = true; }},
+      {Effect::START_STATE, [](Scene& s) { s.body.self_collision = true; },
+       [](Scene& s) { s.options.detector.check_start_state = true; }},
       {Effect::LOOK_AHEAD, [](Scene& s) { s.body.self_collision = true; },
        [](Scene& s) {
          s.options.look_ahead_s = 0.1;

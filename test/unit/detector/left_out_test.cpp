@@ -197,8 +197,8 @@ struct MonitoredFelt {
 
   StepOutcome feed(double gap, std::vector<double> radius_m = {}) {
     stamp_ns += 100000000;
-    monitor.push(0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), std::move(radius_m)},
-                 0);
+    monitor.push(
+        0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), std::move(radius_m)}, 0);
     StepOutcome outcome;
     EXPECT_TRUE(monitor.next(0, outcome));
     return outcome;

@@ -75,7 +75,8 @@ TEST(LookAheadScore, KeepsTheNewestSamplesOnly) {
     score.observe(step(1000 * k * MS, (1000 * k + 100) * MS));
     score.predict(step((1000 * k + 100) * MS, (1000 * k + 1100) * MS, {touch(7, 0.2)}));  // 200 ms later
     // Observed later by 10 ms more each time.
-    score.observe(step((1000 * k + 100) * MS, (1000 * k + 900) * MS, {touch(7, 0.25 + 0.0125 * static_cast<double>(k))}));
+    score.observe(
+        step((1000 * k + 100) * MS, (1000 * k + 900) * MS, {touch(7, 0.25 + 0.0125 * static_cast<double>(k))}));
   }
   EXPECT_EQ(score.summary().compared, 3u);
   EXPECT_NEAR(score.summary().median_error_s, 0.08, 1e-9) << "of 70, 80, 90 ms";

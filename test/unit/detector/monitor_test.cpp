@@ -19,9 +19,11 @@ std::shared_ptr<const Topology> twoTriangles() {
   return topology;
 }
 MeshFrame pair(StampNs stamp_ns, double tip_z) {
-  return {stamp_ns, twoTriangles(),
+  return {stamp_ns,
+          twoTriangles(),
           {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, tip_z}, {0.5, 0, tip_z + 1}, {-0.5, 0, tip_z + 1}},
-          false, Eigen::Isometry3d::Identity()};
+          false,
+          Eigen::Isometry3d::Identity()};
 }
 
 std::shared_ptr<const Topology> oneTriangle() {
@@ -32,7 +34,8 @@ MeshFrame floor(StampNs stamp_ns, double z) {
   return {stamp_ns, oneTriangle(), {{-1, -1, z}, {1, -1, z}, {0, 1, z}}, false, Eigen::Isometry3d::Identity()};
 }
 MeshFrame tip(StampNs stamp_ns, double z) {
-  return {stamp_ns, oneTriangle(), {{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, false, Eigen::Isometry3d::Identity()};
+  return {
+      stamp_ns, oneTriangle(), {{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, false, Eigen::Isometry3d::Identity()};
 }
 
 MonitorOptions loose() {
@@ -212,7 +215,10 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   map.map_from_fixed.translation() = Vec3(0, 0, -10);
   monitor.setMap(std::move(map));
   const auto at = [](StampNs stamp_ns, double z) {
-    return MeshFrame{stamp_ns, oneTriangle(), {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}}, false,
+    return MeshFrame{stamp_ns,
+                     oneTriangle(),
+                     {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}},
+                     false,
                      Eigen::Isometry3d::Identity()};
   };
   feed(at(0, 12));
@@ -243,7 +249,10 @@ TEST_F(OneBody, WhatLiesBehindAnExcludedVoxelIsTouched) {
   monitor.setOptions(options);
   monitor.setMap({VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 2}}), 0, Eigen::Isometry3d::Identity(), {}});
   const auto at = [](StampNs stamp_ns, double z) {
-    return MeshFrame{stamp_ns, oneTriangle(), {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}}, false,
+    return MeshFrame{stamp_ns,
+                     oneTriangle(),
+                     {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}},
+                     false,
                      Eigen::Isometry3d::Identity()};
   };
   feed(at(0, 3));

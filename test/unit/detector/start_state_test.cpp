@@ -139,8 +139,8 @@ TEST(StartState, FullTestListsWhatTheOracleLists) {
     core::StepStats stats;
     const auto expected = trueIntersections(step);
     const auto& listed = test.run(scene.arrays, false, NO_DEADLINE, stats);
-    ASSERT_TRUE(same(listed, expected))
-        << "seed " << seed << ": " << listed.size() << " listed, " << expected.size() << " in truth";
+    ASSERT_TRUE(same(listed, expected)) << "seed " << seed << ": " << listed.size() << " listed, " << expected.size()
+                                        << " in truth";
     EXPECT_EQ(stats[Stage::START_STATE].out, expected.size());
     EXPECT_EQ(stats[Effect::START_STATE].out, expected.size());
     EXPECT_GE(stats[Stage::START_STATE].in, expected.size());
@@ -240,7 +240,8 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
     for (int i = 0; i < 20; ++i) {
       int looks = draw(0, 3);
       core::StepStats stats;
-      const auto listed = test.run(scene.arrays, i > 0, [&] { return looks-- <= 0; }, stats);
+      const auto listed = test.run(
+          scene.arrays, i > 0, [&] { return looks-- <= 0; }, stats);
       const auto expected = trueIntersections(step);
       if (test.isWhole()) {
         ASSERT_TRUE(same(listed, expected)) << "seed " << seed << ", step " << i;
@@ -294,11 +295,13 @@ TEST(StartState, PartsOfASearchAreTheWhole) {
       // What was found is looked at again first, at one look at the clock for many of them.
       int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) + 1 : 0);
       core::StepStats stats;
-      listed = test.run(scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
+      listed = test.run(
+          scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
       whole = test.isWhole();
       test.remember(scene.arrays, {}, true);
     }
-    EXPECT_TRUE(same(listed, expected)) << looks_a_step << " looks a step: " << listed.size() << " of " << expected.size();
+    EXPECT_TRUE(same(listed, expected)) << looks_a_step << " looks a step: " << listed.size() << " of "
+                                        << expected.size();
     EXPECT_GT(steps, 12 / looks_a_step) << "hardly cut";
   }
 }

@@ -10,10 +10,15 @@ namespace {
 
 struct Fixture : testing::Test {
   // Two parallel triangles, apart in the direction x-z, which is not among the linear filter's: pairs get past it.
-  const Positions rest{{0, 0, 0}, {1, 0, 1}, {0, 1, 0}, {-0.0625, 0, 0.0625}, {0.9375, 0, 1.0625}, {-0.0625, 1, 0.0625}};
+  const Positions rest{{0, 0, 0},           {1, 0, 1},           {0, 1, 0}, {-0.0625, 0, 0.0625},
+                       {0.9375, 0, 1.0625}, {-0.0625, 1, 0.0625}};
   std::shared_ptr<const Topology> topology =
       std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
-  Detector detector{[] { DetectorOptions o; o.check_start_state = false; return o; }()};
+  Detector detector{[] {
+    DetectorOptions o;
+    o.check_start_state = false;
+    return o;
+  }()};
 
   void SetUp() override {
     BodySetup body;

@@ -19,14 +19,15 @@ std::shared_ptr<const Topology> oneTriangle() {
 
 /// A triangle that points down with vertex 0, at (0, 0, z).
 MeshFrame tip(StampNs stamp_ns, double z) {
-  return {stamp_ns, oneTriangle(), {{0, 0, z}, {0.1, 0, z - 1.1}, {-0.1, 0, z - 1.1}}, false,
-          Eigen::Isometry3d::Identity(), {}};
+  return {
+      stamp_ns, oneTriangle(), {{0, 0, z}, {0.1, 0, z - 1.1}, {-0.1, 0, z - 1.1}}, false, Eigen::Isometry3d::Identity(),
+      {}};
 }
 
 /// A bar of 1 m along x that has turned by `angle` about the y axis at its end: downwards first.
 MeshFrame bar(StampNs stamp_ns, double angle) {
-  MeshFrame frame{stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true,
-                  Eigen::Isometry3d::Identity(), {}};
+  MeshFrame frame{
+      stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true, Eigen::Isometry3d::Identity(), {}};
   frame.pose.linear() = Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix();
   for (Vec3& p : frame.positions) p = frame.pose * p;
   return frame;
@@ -85,7 +86,8 @@ TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
   EXPECT_NEAR(met.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
 }
 
-// The point that is shown lies on the arc, where the part's straight paths meet, not half way of the whole step's chord.
+// The point that is shown lies on the arc, where the part's straight paths meet, not half way of the whole step's
+// chord.
 TEST(TurningBody, TheGeometryIsThatOfThePart) {
   Monitor monitor(loose(), clockAndBar());
   step(monitor, tip(0, -0.9), 0);
@@ -192,8 +194,9 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
 TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
   // Pierced in its middle by the bar's long edges when the bar hangs down, and by nothing before.
   const auto sheet = [](StampNs stamp_ns) {
-    return MeshFrame{stamp_ns, oneTriangle(), {{-2, -2, -0.5}, {2, -2, -0.5}, {0, 3, -0.5}}, false,
-                     Eigen::Isometry3d::Identity(), {}};
+    return MeshFrame{
+        stamp_ns, oneTriangle(), {{-2, -2, -0.5}, {2, -2, -0.5}, {0, 3, -0.5}}, false, Eigen::Isometry3d::Identity(),
+        {}};
   };
   MonitorOptions options = loose();
   const auto last = [&](double budget_ms) {

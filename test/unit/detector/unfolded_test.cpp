@@ -94,7 +94,8 @@ TEST(Unfolded, WhatIsCertifiedHasNoContact) {
       if (kind == 0) p += wave * by;
       t1.push_back(p + motion * Vec3(unit(random), unit(random), kind == 1 ? 0.0 : unit(random)));
     }
-    const Eigen::Quaterniond turn = Eigen::Quaterniond(unit(random), unit(random), unit(random), unit(random)).normalized();
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(unit(random), unit(random), unit(random), unit(random)).normalized();
     const Vec3 shift = round % 5 ? Vec3(0, 0, 0) : Vec3(1e5, -3e5, 2e5);
     for (Positions* positions : {&t0, &t1}) {
       for (Vec3& p : *positions) p = turn * p + shift;

@@ -137,9 +137,9 @@ class SmallIntegerPair {
     }
     const unsigned family = random() % 6;
     for (int i = 0; i < 4; ++i) {
-      if (family == 0) x_[0][i][2] = x_[1][i][2] = 0;  // coplanar
+      if (family == 0) x_[0][i][2] = x_[1][i][2] = 0;                              // coplanar
       if (family == 1) x_[0][i][1] = x_[1][i][1] = x_[0][i][2] = x_[1][i][2] = 0;  // collinear
-      if (family == 2) std::copy(x_[0][i], x_[0][i] + 3, x_[1][i]);  // at rest
+      if (family == 2) std::copy(x_[0][i], x_[0][i] + 3, x_[1][i]);                // at rest
     }
     for (auto& time : x_) {
       if (family == 3) std::copy(time[2], time[2] + 3, time[3]);  // zero area, zero length

@@ -131,10 +131,9 @@ TEST(NonPenetrationMargin, ExceedsTheErrorOfEveryCoefficient) {
         s[t] = vf ? difference(t, 3, 1) : difference(t, 3, 2);
         w[t] = vf ? difference(t, 0, 1) : difference(t, 2, 0);
       }
-      const Rational exact[4] = {det(u[0], s[0], w[0]),
-                                 det(u[0], s[0], w[1]) + det(u[0], s[1], w[0]) + det(u[1], s[0], w[0]),
-                                 det(u[0], s[1], w[1]) + det(u[1], s[0], w[1]) + det(u[1], s[1], w[0]),
-                                 det(u[1], s[1], w[1])};
+      const Rational exact[4] = {
+          det(u[0], s[0], w[0]), det(u[0], s[0], w[1]) + det(u[0], s[1], w[0]) + det(u[1], s[0], w[0]),
+          det(u[0], s[1], w[1]) + det(u[1], s[0], w[1]) + det(u[1], s[1], w[0]), det(u[1], s[1], w[1])};
       const auto in_double = coplanarityCoefficients(kind, v.data(), PAIR);
       const auto in_float = coplanarityCoefficients(kind, records.data(), PAIR, records.error());
       for (int k = 0; k < 4; ++k) {
@@ -299,9 +298,8 @@ TEST(NonPenetrationFilter, DecidesOneRepresentableNumberEitherSideOfItsMargin) {
     for (PaperFilter filter : {PaperFilter::NON_PENETRATION, PaperFilter::NON_PENETRATION_BATCHED}) {
       ASSERT_FALSE(rejected(filter, kind, lifted(kind, 0.0f)));
       ASSERT_TRUE(rejected(filter, kind, lifted(kind, 0.25f)));
-      const auto [kept, apart] = threshold(0.0f, 0.25f, [&, filter = filter, kind = kind](float h) {
-        return rejected(filter, kind, lifted(kind, h));
-      });
+      const auto [kept, apart] = threshold(
+          0.0f, 0.25f, [&, filter = filter, kind = kind](float h) { return rejected(filter, kind, lifted(kind, h)); });
       EXPECT_GT(kept, 0.0f) << "no margin at all";
       EXPECT_LT(apart, filter == PaperFilter::NON_PENETRATION ? 1e-12f : 1e-3f) << "a needlessly wide margin";
     }

@@ -86,8 +86,16 @@ TEST(QueryFile, AcceptsBlanksCarriageReturnsEmptyLinesAndUnreducedFractions) {
 
 TEST(QueryFile, EveryFiniteDoubleComesBackBitForBit) {
   using Limits = std::numeric_limits<double>;
-  std::vector<double> values = {0.0, Limits::denorm_min(), -Limits::denorm_min(), Limits::min(), Limits::max(),
-                                Limits::lowest(), std::nextafter(Limits::min(), 0.0), 0.1, -1e150, 1e-150};
+  std::vector<double> values = {0.0,
+                                Limits::denorm_min(),
+                                -Limits::denorm_min(),
+                                Limits::min(),
+                                Limits::max(),
+                                Limits::lowest(),
+                                std::nextafter(Limits::min(), 0.0),
+                                0.1,
+                                -1e150,
+                                1e-150};
   std::mt19937_64 random(7);
   while (values.size() < 24 * 200) values.push_back(randomFiniteDouble(random));
   std::vector<Query> queries(200);

@@ -69,7 +69,8 @@ TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
       setSimdTarget(target);
       for (const int threads : {1, 3}) {
         const StepReplay replay = replayStep(r, threads);
-        EXPECT_TRUE(replay.differences.empty()) << toString(rung) << ' ' << target << ": " << replay.differences.front();
+        EXPECT_TRUE(replay.differences.empty())
+            << toString(rung) << ' ' << target << ": " << replay.differences.front();
         EXPECT_EQ(replay.answer.contacts.size(), r.answer.contacts.size());
       }
     }
@@ -188,7 +189,8 @@ TEST(StepRecording, LiesAreNamed) {
   r = recordScene();
   r.bodies[0].t0.resize(3);
   r.bodies[0].t1.resize(3);
-  EXPECT_NE(errorOf(recordingBytes(r)).find("body 'cloth'"), std::string::npos) << "faces name vertices that are not there";
+  EXPECT_NE(errorOf(recordingBytes(r)).find("body 'cloth'"), std::string::npos)
+      << "faces name vertices that are not there";
   r = recordScene();
   r.bodies[1].pose_t0.translation().x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(errorOf(recordingBytes(r)).find("pose"), std::string::npos);

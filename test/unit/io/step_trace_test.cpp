@@ -66,9 +66,11 @@ TEST(PairTrace, SaysWhyAPairIsRejected) {
   const Face face = r.bodies[0].topology->faces()[10];
   EXPECT_NE(first({PairKind::VERTEX_FACE, {0, 0}, {face[1], face[0], face[1], face[2]}}).text.find("share vertex"),
             std::string::npos);
-  EXPECT_NE(first({PairKind::VERTEX_FACE, {0, 0}, {0, face[0], face[1], face[2]}}).text.find("masked"), std::string::npos);
+  EXPECT_NE(first({PairKind::VERTEX_FACE, {0, 0}, {0, face[0], face[1], face[2]}}).text.find("masked"),
+            std::string::npos);
   EXPECT_NE(first({PairKind::EDGE_EDGE, {1, 1}, {0, 2, 1, 3}}).text.find("self-collision"), std::string::npos);
-  const std::vector<TraceLine> far = tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {19, 1, 2, 6}});
+  const std::vector<TraceLine> far =
+      tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {19, 1, 2, 6}});
   EXPECT_EQ(far[1].stage, "linear");
   EXPECT_EQ(far[1].says, TraceLine::Says::REJECTED);
   EXPECT_EQ(far.back().says, TraceLine::Says::REJECTED);
@@ -100,7 +102,8 @@ TEST(VoxelTrace, ContactsWithTheMapAreTheRecordedOnes) {
     EXPECT_NE(std::count(said.begin(), said.end(), TraceLine::Says::CONTACT), 0) << describeContact(c, r.bodies);
     for (const TraceLine& line : lines) {
       const bool proof = line.stage == "rules" || line.stage == "bounds";
-      EXPECT_FALSE(proof && said.size() == 1 && line.says == TraceLine::Says::REJECTED) << line.stage << ": " << line.text;
+      EXPECT_FALSE(proof && said.size() == 1 && line.says == TraceLine::Says::REJECTED)
+          << line.stage << ": " << line.text;
     }
     ++traced;
   }
@@ -111,9 +114,8 @@ TEST(VoxelTrace, SaysWhyThereIsNone) {
   StepRecording r = recordScene();
   std::vector<MonitorBody> bodies;
   const StepInput input = inputOf(r, bodies);
-  const auto contact = std::find_if(r.answer.contacts.begin(), r.answer.contacts.end(), [](const core::Contact& c) {
-    return c.kind == PairKind::EDGE_VOXEL_EDGE;
-  });
+  const auto contact = std::find_if(r.answer.contacts.begin(), r.answer.contacts.end(),
+                                    [](const core::Contact& c) { return c.kind == PairKind::EDGE_VOXEL_EDGE; });
   ASSERT_NE(contact, r.answer.contacts.end());
   const VoxelQuestion q{contact->kind, contact->body[0], {contact->vertex[0], contact->vertex[1]}, contact->voxel};
   const auto first = [&](const MonitorOptions& options, const VoxelQuestion& question) {
@@ -148,7 +150,9 @@ TEST(VoxelTrace, WhatDoesNotExistIsNamed) {
   const StepRecording r = recordScene();
   std::vector<MonitorBody> bodies;
   const StepInput input = inputOf(r, bodies);
-  const auto ask = [&](const MonitorMap& map, const VoxelQuestion& q) { return traceVoxel(input, bodies, r.options, map, q); };
+  const auto ask = [&](const MonitorMap& map, const VoxelQuestion& q) {
+    return traceVoxel(input, bodies, r.options, map, q);
+  };
   EXPECT_THROW(ask(r.map, {PairKind::VERTEX_VOXEL_FACE, 9, {0}, {}}), std::invalid_argument);
   EXPECT_THROW(ask(r.map, {PairKind::VERTEX_VOXEL_FACE, 0, {300}, {}}), std::invalid_argument);
   EXPECT_THROW(ask(r.map, {PairKind::EDGE_VOXEL_EDGE, 0, {0, 19}, {}}), std::invalid_argument) << "no such edge";
@@ -203,9 +207,12 @@ TEST(PairTrace, WhatDoesNotExistIsNamed) {
   const StepRecording r = recordScene();
   std::vector<MonitorBody> bodies;
   const StepInput input = inputOf(r, bodies);
-  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {9, 0}, {0, 1, 2, 3}}), std::invalid_argument);
-  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 300}}), std::invalid_argument);
-  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 19}}), std::invalid_argument)
+  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {9, 0}, {0, 1, 2, 3}}),
+               std::invalid_argument);
+  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 300}}),
+               std::invalid_argument);
+  EXPECT_THROW(tracePair(input, bodies, r.options, {PairKind::VERTEX_FACE, {0, 0}, {0, 1, 2, 19}}),
+               std::invalid_argument)
       << "no such face";
 }
 

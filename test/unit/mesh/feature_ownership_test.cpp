@@ -37,8 +37,7 @@ TEST(FeatureOwnership, EveryFeatureHasOneOwner) {
   expectEveryFeatureOwnedOnce(Topology::grid(5, 7), 1000);
   expectEveryFeatureOwnedOnce(Topology::polyline(12), 3);
   // An edge with three faces, two faces that share only a vertex, an unused vertex.
-  expectEveryFeatureOwnedOnce(
-      Topology::fromTriangles(9, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {4, 5, 6}, {6, 5, 8}}), 10);
+  expectEveryFeatureOwnedOnce(Topology::fromTriangles(9, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {4, 5, 6}, {6, 5, 8}}), 10);
   expectEveryFeatureOwnedOnce(Topology::fromTriangles(0, {}), 0);
 }
 

@@ -210,7 +210,8 @@ TEST(OctomapDecode, ErrorsNameTheFieldAndTheValue) {
   EXPECT_NE(errorOf({"OcTree", 0.2, true, header + "ab"}).find("0.1"), std::string::npos);
   EXPECT_NE(errorOf({"OcTree", 0.1, false, header + "ab"}).find(".bt"), std::string::npos);
   EXPECT_NE(errorOf({"ColorOcTree", 0.1, true, header + "ab"}).find("ColorOcTree"), std::string::npos);
-  EXPECT_NE(errorOf({"OcTree", 0.1, true, "# Octomap OcTree binary file\nid OcTree\n"}).find("data"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, "# Octomap OcTree binary file\nid OcTree\n"}).find("data"),
+            std::string::npos);
 }
 
 TEST(OctomapDecode, HostileStreamsAreRefusedSoon) {

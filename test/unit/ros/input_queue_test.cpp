@@ -71,7 +71,12 @@ TEST(InputQueue, ACallIsAnsweredByTheWorkerAlsoWhenItThrows) {
 TEST(InputQueue, ACallThatTimesOutIsDoneLaterAndSaysSo) {
   InputQueue queue(1, 1, QueuePolicy::NEWEST);
   bool done = false;
-  const Reply reply = queue.call([&] { done = true; return Reply{true, "done"}; }, 0.01);
+  const Reply reply = queue.call(
+      [&] {
+        done = true;
+        return Reply{true, "done"};
+      },
+      0.01);
   EXPECT_FALSE(reply.success);
   EXPECT_NE(reply.message.find("will be done"), std::string::npos) << reply.message;
   EXPECT_FALSE(done);

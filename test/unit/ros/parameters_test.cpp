@@ -84,7 +84,10 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
       {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
        "separation: write accuracy: conservative",
-       [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["minimum_separation_m"] = 0.01; }},
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["minimum_separation_m"] = 0.01;
+       }},
       {"~bodies/cloth/minimum_separation_m asks for a minimum separation: write accuracy: conservative",
        [](XmlRpcValue& t) {
          t["accuracy"] = "exact";
@@ -96,7 +99,10 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
          t["minimum_separation_pairs"][0] = separationPair("mesh", "octomap", 0.01);
        }},
       {"~uncertainty asks for an uncertainty radius: write accuracy: conservative",
-       [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["uncertainty"]["radius_m"] = 0.01; }},
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["uncertainty"]["radius_m"] = 0.01;
+       }},
       {"~minimum_separation_m is -0.1, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
       {"~minimum_separation_m is nan, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = NAN; }},
       {"~minimum_separation_m is inf, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = INFINITY; }},

@@ -1,4 +1,5 @@
-// The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and files.
+// The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and
+// files.
 #include "ros/monitor_pipeline.h"
 
 #include <geometry_msgs/TransformStamped.h>
@@ -84,8 +85,7 @@ struct Driven {
   EffectTracker effects;
   StepOutcome outcome;
 
-  explicit Driven(const XmlRpcValue& tree)
-      : config(readConfig(tree)), pipeline(config, transforms), effects(config) {}
+  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms), effects(config) {}
 
   void giveMap(double stamp_s) {
     LoadedMap loaded = decodeMapMessage(map(stamp_s), config);
@@ -292,7 +292,8 @@ struct Tabled : Driven {
     return tree;
   }
   void take(std::size_t body, double stamp_s, float z, std::int64_t now_ns) {
-    pipeline.take(body, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
+    pipeline.take(body,
+                  {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
   }
   const FrameCounters& tables() const { return pipeline.monitor().counters(TABLE); }
   static constexpr std::size_t CLOTH = 0, TABLE = 1;
@@ -441,9 +442,10 @@ std::string errorOf(const XmlRpcValue& tree) {
 TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
   const std::string text_file = ::testing::TempDir() + "no_mesh.stl", ply = ::testing::TempDir() + "square.ply";
   std::ofstream(text_file) << "this is no mesh\n";
-  std::ofstream(ply) << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-                        "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
-                        "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n";
+  std::ofstream(ply)
+      << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+         "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n";
   const auto rigid = [](const std::string& file) {
     XmlRpcValue tree;
     tree["bodies"]["cloth"]["topic"] = "cloth";
@@ -454,7 +456,8 @@ TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
   const auto names = [](const std::string& error, const std::string& part) {
     EXPECT_NE(error.find(part), std::string::npos) << part << ": " << error;
   };
-  for (const std::string& file : {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
+  for (const std::string& file :
+       {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
     const std::string error = errorOf(rigid(file));
     names(error, "rigid/mesh of body 'finger'");
     names(error, file);

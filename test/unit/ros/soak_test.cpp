@@ -1,6 +1,6 @@
-// Many frames through all of the node but the network: bytes in, decoder, pipeline, monitor, flight recorder, messages out.
-// Memory stays flat, counters add up, and the same step gives the same bytes however long the monitor has run.
-// 1e3 frames; 1e5 with DEFORMABLE_CCD_LONG=1.
+// Many frames through all of the node but the network: bytes in, decoder, pipeline, monitor, flight recorder, messages
+// out. Memory stays flat, counters add up, and the same step gives the same bytes however long the monitor has run. 1e3
+// frames; 1e5 with DEFORMABLE_CCD_LONG=1.
 #include "ros/output_messages.h"
 
 #include <unistd.h>

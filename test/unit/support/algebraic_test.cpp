@@ -32,8 +32,9 @@ TEST(Algebraic, SignAtIrrationalRootIsExact) {
   ASSERT_EQ(roots.size(), 1u);
   EXPECT_EQ(roots[0].signOf(Polynomial({-1, 0, 2}) * linear(1, 3)), 0);
   EXPECT_EQ(roots[0].signOf(Polynomial({-1, 0, 0, 0, 4})), 0);
-  EXPECT_EQ(roots[0].signOf(Polynomial({Integer("-1000000000000000000000000000001"), 0,
-                                        Integer("2000000000000000000000000000000")})), -1);
+  EXPECT_EQ(roots[0].signOf(Polynomial(
+                {Integer("-1000000000000000000000000000001"), 0, Integer("2000000000000000000000000000000")})),
+            -1);
 }
 
 TEST(Algebraic, OrdersNeighboursThatDoublesCannotTell) {
