@@ -15,14 +15,14 @@
 #include <string>
 #include <vector>
 
-#include "broad_phase/cluster_pairs.h"
-#include "deformable_ccd/elementary.h"
-#include "detector/scene_arrays.h"
-#include "io/query_file.h"
+#include "culling/cluster_pairs.h"
+#include "culling/scene_arrays.h"
+#include "dccd/elementary.h"
+#include "oracle/query_file.h"
 #include "simd/fused_filter.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 struct PairSet {
@@ -42,7 +42,7 @@ struct PairSet {
   }
 };
 
-struct Rung {
+struct TimedRung {
   std::string name;
   std::function<void(const PairBatch&, ElementaryResult*)> run;
 };
@@ -70,16 +70,16 @@ void runFcl(const PairBatch& b, ElementaryResult* out) {
   }
 }
 
-Rung library(const std::string& name, const AccuracyOptions& options) {
-  const std::shared_ptr<const ElementaryTest> test = makeElementaryTest(options);
+TimedRung library(const std::string& name, const AccuracyOptions& options) {
+  const std::shared_ptr<const Rung> test = makeRung(options);
   return {name, [test](const PairBatch& b, ElementaryResult* out) {
             TierCounters counters;
             test->run(b, out, counters);
           }};
 }
 
-std::vector<Rung> rungs() {
-  std::vector<Rung> list;
+std::vector<TimedRung> rungs() {
+  std::vector<TimedRung> list;
   AccuracyOptions o;
   o.rung = Accuracy::FAST;
   list.push_back(library("fast", o));
@@ -157,7 +157,7 @@ void addSurvivors(const std::string& name, SceneArrays& scene, std::vector<PairS
   }
 }
 
-void measure(const PairSet& set, const Rung& rung, int repeats) {
+void measure(const PairSet& set, const TimedRung& rung, int repeats) {
   std::vector<ElementaryResult> out(set.pairs.size());
   std::vector<double> ns;
   for (int r = 0; r < repeats; ++r) {
@@ -210,30 +210,30 @@ int run(int argc, char** argv) {
     scenes.back()->setBodies({body}, {&m0.vertices});
     MotionStep step;
     step.bodies = {{&m0.vertices, &m1.vertices}};
-    core::StepStats stats;
+    StepStats stats;
     scenes.back()->record(step, stats);
     scenes.back()->refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
     addSurvivors(frames[i], *scenes.back(), sets);
   }
   AccuracyOptions finest;
   finest.toc_bits = 52;
-  const std::unique_ptr<ElementaryTest> exact = makeElementaryTest(finest);
+  const std::unique_ptr<Rung> exact = makeRung(finest);
   std::printf("source,kind,rung,pairs,contacts,missed,false_contacts,undecided,best_ns,median_ns,max_toc_error\n");
   for (PairSet& set : sets) {
     TierCounters counters;
     set.truth.resize(set.pairs.size());
     exact->run(set.batch(), set.truth.data(), counters);
-    for (const Rung& rung : rungs()) measure(set, rung, repeats);
+    for (const TimedRung& rung : rungs()) measure(set, rung, repeats);
   }
   return 0;
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   try {
-    return deformable_ccd::run(argc, argv);
+    return dccd::run(argc, argv);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "accuracy_pairs: %s\n", e.what());
     return 1;

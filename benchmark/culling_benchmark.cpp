@@ -8,12 +8,12 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "deformable_ccd/detector.h"
+#include "dccd/detector.h"
 #include "support/data.h"
 #include "support/scene_data.h"
 #include "support/timing.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -80,11 +80,11 @@ nlohmann::json measure(const Case& c, int repeat) {
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
-  using namespace deformable_ccd;
-  using namespace deformable_ccd::benchmarks;
+  using namespace dccd;
+  using namespace dccd::benchmarks;
   std::string out;
   int repeat = 25;
   CLI::App app("Times the step with and without the culling of surfaces that do not fold.");

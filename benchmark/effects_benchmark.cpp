@@ -6,13 +6,13 @@
 #include <fstream>
 #include <iostream>
 
-#include "deformable_ccd/effect_plan.h"
-#include "deformable_ccd/monitor.h"
+#include "dccd/effect_plan.h"
+#include "dccd/monitor.h"
 #include "scene/physics/scene_file.h"
 #include "scene/physics/simulation.h"
 #include "support/timing.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -207,7 +207,7 @@ nlohmann::json measureRope(int repeat) {
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   std::string out, scene = std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/flag_in_wind.yaml";
@@ -218,9 +218,9 @@ int main(int argc, char** argv) {
   app.add_option("--rounds", rounds, "interleaved rounds over the scene")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
-    nlohmann::json result{{"machine", deformable_ccd::benchmarks::machine()},
-                          {"flag", deformable_ccd::benchmarks::measureFlag(scene, rounds)},
-                          {"rope", deformable_ccd::benchmarks::measureRope(40 * rounds)}};
+    nlohmann::json result{{"machine", dccd::benchmarks::machine()},
+                          {"flag", dccd::benchmarks::measureFlag(scene, rounds)},
+                          {"rope", dccd::benchmarks::measureRope(40 * rounds)}};
     std::cerr << result["flag"].dump() << '\n' << result["rope"].dump() << '\n';
     std::ofstream(out) << result.dump(1) << '\n';
   } catch (const std::exception& e) {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "broad_phase/triangle_candidates.h"
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "paper/triangle_candidates.h"
 #include "scene/generated_scene.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 
 /// Bodies of a scene, whose topologies are kept here.
@@ -48,4 +48,4 @@ Step subStep(const Step& step, std::size_t k, std::size_t n);
 std::vector<VertexMotion> vertexMotions(const Positions& t0, const Positions& t1);
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 
 nlohmann::json spread(std::vector<double> values) {
@@ -66,4 +66,4 @@ nlohmann::json machine() {
 }
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

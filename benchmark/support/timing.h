@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 
 class Stopwatch {
@@ -35,4 +35,4 @@ nlohmann::json machine();
 double calibrationMs();
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,5 +1,5 @@
 // analyze_bag IN.bag [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a master.
-#include "ros/output_messages.h"
+#include "output/output_messages.h"
 
 #include <rosbag/bag.h>
 #include <std_msgs/Bool.h>
@@ -10,15 +10,15 @@
 #include <memory>
 #include <sstream>
 
-#include "deformable_ccd/simd_target.h"
-#include "io/report.h"
-#include "ros/bag_replay.h"
-#include "ros/known_types.h"
-#include "ros/markers.h"
+#include "dccd/simd_target.h"
+#include "input/known_types.h"
+#include "node/bag_replay.h"
+#include "output/markers.h"
+#include "report/report.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh;

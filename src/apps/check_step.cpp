@@ -7,13 +7,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "deformable_ccd/detector.h"
-#include "deformable_ccd/simd_target.h"
-#include "ros/mesh_file.h"
+#include "dccd/detector.h"
+#include "dccd/simd_target.h"
+#include "input/mesh_file.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 struct Arguments {
   std::string frame_0, frame_1, contacts, stats;
@@ -53,7 +53,7 @@ void writeContacts(const std::string& path, const StepResult& result) {
   std::ofstream out(path);
   out << "kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty\n" << std::setprecision(17);
   // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
-  for (const core::Contact& c : result.contacts) {
+  for (const Contact& c : result.contacts) {
     out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
     for (Index v : c.vertex) out << ',' << v;
     out << ',' << c.toc_lower << ',' << c.toc_upper << ','

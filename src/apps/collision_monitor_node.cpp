@@ -5,7 +5,7 @@
 
 #include <ros/ros.h>
 
-#include "ros/collision_monitor.h"
+#include "node/collision_monitor.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "collision_monitor");
@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
-    deformable_ccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
+    dccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
     monitor.installCrashHandler();
     ros::spin();
   } catch (const std::exception& error) {

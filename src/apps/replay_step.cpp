@@ -5,13 +5,13 @@
 #include <iostream>
 #include <sstream>
 
-#include "deformable_ccd/simd_target.h"
-#include "detector/voxel_trace.h"
-#include "io/step_replay.h"
+#include "dccd/simd_target.h"
+#include "record/step_replay.h"
+#include "record/voxel_trace.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 struct Arguments {
   std::string file, simd = "auto";
@@ -140,7 +140,7 @@ void show(const RecordedAnswer& answer, const StepRecording& recording, std::siz
             << toString(answer.start_state) << '\n'
             << std::setprecision(17);
   for (std::size_t i = 0; i < std::min(most, answer.contacts.size()); ++i) {
-    const core::Contact& c = answer.contacts[i];
+    const Contact& c = answer.contacts[i];
     std::cout << "  " << describeContact(c, recording.bodies) << "  toc [" << c.toc_lower << ", " << c.toc_upper << "]"
               << (c.certainty == Certainty::UNDECIDED ? " undecided" : "") << (c.initial ? " initial" : "")
               << (c.leaving ? " leaving" : "") << '\n';

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 #include "elementary/exact_roots.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 /// A pair's coordinates as integers: mantissa * 2^shift, all below 2^bits in magnitude. The common factor, a power of
@@ -215,4 +215,4 @@ class Decision {
 };
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 /// An unevaluated sum.
@@ -54,4 +54,4 @@ class CoplanarityCubic {
 std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits);
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-namespace deformable_ccd {
+namespace dccd {
 
 static_assert(GMP_NUMB_BITS == 64, "limbs of 64 bits without nails");
 
@@ -230,4 +230,4 @@ class BigInteger {
   mpz_t value_;
 };
 
-}  // namespace deformable_ccd
+}  // namespace dccd

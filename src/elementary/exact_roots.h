@@ -6,7 +6,7 @@
 
 #include "elementary/exact_algebra.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 template <class Z>
@@ -174,4 +174,4 @@ class PolynomialRoots {
 };
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr std::size_t MAX_VISITS = std::size_t{1} << 24;
@@ -80,4 +80,4 @@ RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double re
   return splitter.take();
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

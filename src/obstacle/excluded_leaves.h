@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct RemainingLeaves {
   std::vector<OccupiedLeaf> leaves;
@@ -20,4 +20,4 @@ struct RemainingLeaves {
 RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double resolution_m,
                               const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

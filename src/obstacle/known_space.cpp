@@ -1,4 +1,4 @@
-#include "deformable_ccd/known_space.h"
+#include "dccd/known_space.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,10 @@
 #include <string>
 #include <utility>
 
+#include "dccd/tolerances.h"
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Coverage = VoxelTree::Coverage;
@@ -135,7 +136,7 @@ struct KnownSpace::Impl {
 
 std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
                                                     const std::vector<OccupiedLeaf>& known_leaves) {
-  if (!(resolution_m >= 1e-290 && resolution_m <= 1e290)) {
+  if (!(resolution_m >= tolerance::SMALLEST_RESOLUTION_M && resolution_m <= tolerance::LARGEST_RESOLUTION_M)) {
     throw std::invalid_argument("resolution_m is " + std::to_string(resolution_m) +
                                 ", which is not a length from 1e-290 to 1e290 m");
   }
@@ -212,4 +213,4 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   return swept;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,7 +7,7 @@
 
 #include "obstacle/axis_predicates.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// Where a rectangle lies relative to the line through p0 and p1 in the plane of two axes.
@@ -93,4 +93,4 @@ TriangleStart triangleMeetsBox(const double* p0, const double* p1, const double*
   return planeMeetsBox(p0, p1, p2, box) ? TriangleStart::INTERIOR : TriangleStart::APART;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Coverage = VoxelTree::Coverage;
@@ -191,4 +191,4 @@ std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
   return masks;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 #include "obstacle/voxel_bits.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// A closed range of voxel keys, each within 0 to 65535.
 struct KeyBox {
@@ -293,4 +293,4 @@ inline bool VoxelTree::reachesLeaf(const KeyBox& box) const {
   return visitNodes(box, Any());
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,7 +7,7 @@
 
 #include <octomap/OcTree.h>
 
-namespace deformable_ccd {
+namespace dccd {
 
 std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
                                       const std::function<bool(const Vec3& center_m)>& occupied, bool binary) {
@@ -47,4 +47,4 @@ std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
   return std::vector<std::int8_t>(bytes.begin(), bytes.end());
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -2,7 +2,7 @@
 // end of truncated data and takes the sizes that a message claims on trust. Layouts:
 // OccupancyOcTreeBase::readBinaryNode (two bits a child) and OcTreeBaseImpl::readNodesRecurs (value, child bits); tests
 // compare with liboctomap's own.
-#include "deformable_ccd/octomap_decode.h"
+#include "dccd/octomap_decode.h"
 
 #include <cmath>
 #include <cstring>
@@ -11,7 +11,7 @@
 
 #include "octomap/octomap_header.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr int MAX_DEPTH = 16;
@@ -219,4 +219,4 @@ DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& lim
   }
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

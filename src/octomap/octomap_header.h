@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct OctomapHeader {
   bool present = false;
@@ -18,4 +18,4 @@ struct OctomapHeader {
 /// Not present where the data do not begin like one. Throws OctomapError for a header that is cut off or lacks a field.
 OctomapHeader parseOctomapHeader(const char* data, std::size_t size);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

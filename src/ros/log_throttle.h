@@ -5,7 +5,7 @@
 #include <string>
 #include <unordered_map>
 
-namespace deformable_ccd {
+namespace dccd {
 
 class LogThrottle {
  public:
@@ -34,4 +34,4 @@ class LogThrottle {
   std::unordered_map<std::string, Entry> entries_;
 };
 
-}  // namespace deformable_ccd
+}  // namespace dccd

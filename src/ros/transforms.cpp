@@ -5,7 +5,7 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <tf2/exceptions.h>
 
-namespace deformable_ccd {
+namespace dccd {
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
   const auto known = newest_.find(transform.child_frame_id);
@@ -59,4 +59,4 @@ void transform(const Eigen::Isometry3d& target_from_source, Positions& positions
   for (Vec3& p : positions) p = target_from_source * p;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

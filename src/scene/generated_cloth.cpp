@@ -9,7 +9,7 @@
 #include "scene/generated_scene.h"
 #include "scene/generated_shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 namespace {
 
@@ -274,4 +274,4 @@ std::unique_ptr<GeneratedSequence> generateClothBone(const GeneratedOptions& opt
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

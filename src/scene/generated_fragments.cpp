@@ -7,7 +7,7 @@
 #include "scene/generated_scene.h"
 #include "scene/generated_shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 namespace {
 
@@ -223,4 +223,4 @@ std::unique_ptr<GeneratedSequence> generateLion(const GeneratedOptions& options)
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

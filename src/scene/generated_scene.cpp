@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 const char* toString(GeneratedKind kind) {
@@ -80,4 +80,4 @@ std::unique_ptr<GeneratedSequence> generateSequence(GeneratedKind kind, const Ge
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/topology.h"
-#include "deformable_ccd/types.h"
+#include "dccd/topology.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 enum class GeneratedKind : std::uint8_t {
@@ -82,4 +82,4 @@ std::unique_ptr<GeneratedSequence> generateDragon(const GeneratedOptions& option
 std::unique_ptr<GeneratedSequence> generateLion(const GeneratedOptions& options);
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 TriangleShape sheet(std::size_t cells, double side_m) {
@@ -104,4 +104,4 @@ TriangleShape revolution(std::size_t rings, std::size_t segments, double half_le
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,9 +4,9 @@
 #include <functional>
 #include <vector>
 
-#include "deformable_ccd/types.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 struct TriangleShape {
@@ -26,4 +26,4 @@ TriangleShape revolution(std::size_t rings, std::size_t segments, double half_le
                          const std::function<double(double)>& radius_m);
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

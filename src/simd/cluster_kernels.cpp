@@ -10,7 +10,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -293,11 +293,11 @@ size_t TestGroupPairsT0(const GroupsView& a, const GroupsView& b, const uint32_t
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 HWY_EXPORT(ProjectionBounds);
 HWY_EXPORT(Quantize);
@@ -329,5 +329,5 @@ std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::
 }
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

@@ -18,7 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 constexpr std::size_t GROUP = 16;          ///< nodes in a group
@@ -65,4 +65,4 @@ std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::
                            std::size_t capacity, std::size_t* consumed);
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

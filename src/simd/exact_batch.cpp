@@ -13,7 +13,7 @@
 #include "simd/exact_batch-inl.h"
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 HWY_EXPORT(exactBatchOn);
@@ -29,5 +29,5 @@ void fastBatch(const BatchInput& input, const BatchOutput& output) { HWY_DYNAMIC
 const char* batchTargetName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 enum class BatchKind : std::uint8_t { VERTEX_FACE = 0, EDGE_EDGE = 1 };
@@ -52,4 +52,4 @@ void fastBatch(const BatchInput& input, const BatchOutput& output);
 const char* batchTargetName();
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,6 +1,6 @@
 // First stage of the batched elementary test: see exact_batch-inl.h, which includes this.
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
@@ -136,5 +136,5 @@ HWY_INLINE void rejectVector(BatchScratch& scratch, std::size_t i, std::size_t f
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

@@ -1,6 +1,6 @@
 // Second stage of the batched elementary test: see exact_batch-inl.h, which includes this.
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
@@ -333,5 +333,5 @@ HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, RootBlock& hard, c
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 constexpr std::size_t BATCH_BLOCK = 64;
@@ -80,4 +80,4 @@ struct BatchScratch {
 };
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,11 +1,11 @@
 // Third stage of the batched elementary test: see exact_batch-inl.h, which includes this.
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
 constexpr int MAX_INTERVALS = 48;  ///< looked at per pair
-constexpr double SMALLEST_INTERVAL = 0x1p-12;
+constexpr double SMALLEST_INTERVAL = tolerance::BATCH_SMALLEST_INTERVAL;
 
 /// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4,
 /// where f would stay uncertain at every level.
@@ -130,5 +130,5 @@ void subdivideAll(RootBlock& hard, double cells, const BatchOutput& out) {
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

@@ -1,12 +1,14 @@
 #include "simd/fused_filter.h"
 
+#include "dccd/tolerances.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/fused_filter.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -14,9 +16,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::CappedTag<float, 16>;
 using VF = hn::Vec<DF>;
 constexpr size_t MAX_LANES = 16;
-constexpr float UNIT = 1.0f / 16777216.0f;         // 2^-24
-constexpr float UNDERFLOW_MARGIN = 7.888609e-31f;  // 2^-100
-constexpr float LARGEST_M = 1073741824.0f;         // 2^30
+constexpr float UNIT = tolerance::FUSED_UNIT, UNDERFLOW_MARGIN = tolerance::FUSED_UNDERFLOW,
+                LARGEST_M = tolerance::FUSED_LARGEST_M;
 
 struct Vec3V {
   VF x, y, z;
@@ -199,11 +200,11 @@ size_t FusedFilterEe(const double* vertices, const uint32_t* quads, size_t count
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 HWY_EXPORT(FusedFilterVf);
 HWY_EXPORT(FusedFilterEe);
@@ -213,5 +214,5 @@ std::size_t fusedFilter(const double* vertices, const std::uint32_t* quads, std:
                    : HWY_DYNAMIC_DISPATCH(FusedFilterVf)(vertices, quads, count, planes, kept);
 }
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

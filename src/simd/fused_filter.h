@@ -37,7 +37,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 /// Which certificates to try; ALL_PLANES for the step, the others for measuring what each buys.
@@ -53,4 +53,4 @@ std::size_t fusedFilter(const double* vertices, const std::uint32_t* quads, std:
                         FusedPlanes planes, std::uint32_t* kept);
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 std::vector<std::string> usableTargets();  ///< compiled in and supported here, best first
@@ -12,4 +12,4 @@ std::string activeTarget();
 bool restrictTo(const std::string& name);  ///< false when the name is not usable here; "" removes the restriction
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,12 +3,12 @@
 #include <stdexcept>
 
 #include "fuzz/fuzz_target.h"
-#include "io/step_recording.h"
-#include "io/step_replay.h"
+#include "record/step_recording.h"
+#include "record/step_replay.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 bool isSmall(const StepRecording& recording) {
   std::size_t vertices = 0;

@@ -5,7 +5,6 @@ import unittest
 from checkout import CHECKOUT
 
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
-ROS = CHECKOUT / 'src/ros'
 READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|section)\(\s*"(\w+)"')
 # What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
@@ -24,7 +23,7 @@ def functions(text):
 def read_parameters():
     """Every parameter that the code asks for, bodies' own without their bodies/NAME/."""
     found = set()
-    for name, body in functions((ROS / 'monitor_config.cpp').read_text()):
+    for name, body in functions((CHECKOUT / 'src/config/monitor_config.cpp').read_text()):
         for reader, parameter in READ.findall(body):
             prefix = 'marker/' if reader == 'marker' else SECTIONS.get(name, '')
             found.add(prefix + parameter)
@@ -65,19 +64,19 @@ class InterfaceTest(unittest.TestCase):
                          {'stream', 'static'})
 
     def test_effects(self):
-        source = (CHECKOUT / 'src/detector/effect_plan.cpp').read_text()
+        source = (CHECKOUT / 'src/step/effect_plan.cpp').read_text()
         names = re.findall(r'"(\w+)"', re.search(r'NAMES = \{([^}]*)\}', source).group(1))
         row = next(line for line in PAGE.splitlines() if line.startswith('| `effects/NAME`'))
         self.assertEqual(sorted(re.findall(r'`(\w+)`', row.split('NAME:')[1])), sorted(names))
 
     def test_topics(self):
-        code = set(re.findall(r'advertise<.*>\("(\w+)"', (ROS / 'outputs.cpp').read_text()))
+        code = set(re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src/output/outputs.cpp').read_text()))
         table = PAGE[PAGE.index('## What comes out'):PAGE.index('**How to read a contact.**')]
         rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
         self.assertEqual(code, {name for row in rows for name in re.findall(r'`~(\w+)`', row)})
 
     def test_services(self):
-        source = (ROS / 'collision_monitor.cpp').read_text()
+        source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()
         source = source[source.index('::advertiseServices()'):]
         code = set(re.findall(r'advertise\("(\w+)"', source)) | set(re.findall(r'\(\s*"(\w+)", ', source[:3000])) & {'enable'}
         section = PAGE[PAGE.index('## Services'):PAGE.index('## Parameters')]
@@ -92,7 +91,7 @@ class InterfaceTest(unittest.TestCase):
 
     def test_live_limits(self):
         """A live set of one value sets all of them: narrower limits than the parameters' would clamp the others."""
-        source = (ROS / 'monitor_config.cpp').read_text()
+        source = (CHECKOUT / 'src/config/monitor_config.cpp').read_text()
         limits = {}
         for name, least, most in re.findall(
                 r'\.(?:number|integer)\(\s*"(\w+)", [^;]*?, ([-\w.]+), ([\w.]+)\)', source):
@@ -134,7 +133,7 @@ class LinksTest(unittest.TestCase):
     def test_files_that_pages_name_exist(self):
         """`src/…`, `test/…` and the like, in the pages' code words."""
         for page in [CHECKOUT / 'README.md'] + sorted((CHECKOUT / 'doc').glob('*.md')):
-            for name in re.findall(r'`((?:src|test|include|config|launch|examples|scripts|doc|benchmark|msg|cmake)/[\w./-]*)`',
+            for name in re.findall(r'`((?:src|paper|oracle|test|include|config|launch|examples|scripts|doc|benchmark|msg|cmake)/[\w./-]*)`',
                                    page.read_text()):
                 with self.subTest('%s: %s' % (page.name, name)):
                     self.assertTrue((CHECKOUT / name).exists())

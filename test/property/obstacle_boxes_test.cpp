@@ -9,7 +9,7 @@
 #include "support/box_oracle.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::ObstacleScene;
@@ -119,7 +119,7 @@ ObstacleScene drawScene(bool polyline) {
 }
 
 std::vector<Contact> contactsOf(const ObstacleScene& scene, const ObstacleOptions& options) {
-  ObstacleTest test(options);
+  ObstacleCheck test(options);
   std::vector<Contact> contacts;
   ObstacleStats stats;
   test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 3,
@@ -195,4 +195,4 @@ TEST(ObstacleBoxes, PolylinesAgreeWithTheGeneralTests) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -8,7 +8,7 @@
 #include "support/box_oracle.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::ObstacleScene;
@@ -39,7 +39,7 @@ TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
   for (int i = 0; i < scenes; ++i) {
     const ObstacleScene scene = randomScene(random);
     options.minimum_separation_m = (random() % 4 + 1) * 0.004;
-    ObstacleTest test(options);
+    ObstacleCheck test(options);
     std::vector<Contact> contacts;
     ObstacleStats stats;
     test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
@@ -93,7 +93,7 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
     options.minimum_separation_m = random() % 2 ? 0.0 : 0.006;
     std::vector<double> radius(3, 0.0);
     radius[random() % 3] = 0.005 * static_cast<double>(1 + random() % 8);
-    ObstacleTest test(options);
+    ObstacleCheck test(options);
     std::vector<Contact> contacts;
     ObstacleStats stats;
     test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
@@ -134,4 +134,4 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

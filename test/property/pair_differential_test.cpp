@@ -12,15 +12,15 @@
 #include <mutex>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
-#include "detector/fork_join.h"
+#include "dccd/elementary.h"
+#include "oracle/oracle.h"
+#include "oracle/promises.h"
+#include "step/fork_join.h"
 #include "support/generators.h"
-#include "support/oracle.h"
-#include "support/promises.h"
 #include "support/query_property.h"
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -107,7 +107,7 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
         for (std::size_t r = 0; r < rungs.size(); ++r) {
           const AccuracyOptions& options = rungs[r];
           TierCounters counters;
-          makeElementaryTest(options)->run(block.batch(begin, end), results.data(), counters);
+          makeRung(options)->run(block.batch(begin, end), results.data(), counters);
           for (std::size_t i = begin; i != end; ++i) {
             const ElementaryResult& result = results[i - begin];
             std::string wrong;
@@ -135,4 +135,4 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

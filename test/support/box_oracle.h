@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
-#include "deformable_ccd/topology.h"
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/elementary.h"
+#include "dccd/topology.h"
+#include "dccd/voxel_surface.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// A moving mesh beside voxels, in the map's frame.
@@ -33,4 +33,4 @@ double distanceToBoxes(const ObstacleScene& scene, double t);
 std::string describe(const ObstacleScene& scene);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

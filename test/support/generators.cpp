@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -464,4 +464,4 @@ std::vector<Query> simplerQueries(const Query& query) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

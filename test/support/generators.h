@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "io/query_file.h"
+#include "oracle/query_file.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// What makes a pair hard.
@@ -65,4 +65,4 @@ Query timeReversed(const Query& query);
 bool scaledExactly(const Query& query, int exponent, Query& scaled);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 namespace {
@@ -127,4 +127,4 @@ std::vector<std::uint8_t> recordingBytes(const StepRecording& recording) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

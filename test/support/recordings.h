@@ -1,9 +1,9 @@
 // Steps recorded from a running monitor, small enough for files in the project.
 #pragma once
 
-#include "io/step_recording.h"
+#include "record/step_recording.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// A monitor of a falling 4 x 5 grid, a rigid finger that turns beneath it (so the step is split), a rope at rest and a
@@ -31,4 +31,4 @@ StepRecording recordScene(const MonitorOptions& options = {}, bool with_map = tr
 std::vector<std::uint8_t> recordingBytes(const StepRecording& recording);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

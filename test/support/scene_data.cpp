@@ -10,7 +10,7 @@
 
 #include "support/data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -119,4 +119,4 @@ SceneData readScene(const std::string& name) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

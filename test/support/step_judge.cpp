@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
-std::string judgeContacts(const std::vector<core::Contact>& found, std::vector<TrueContact>& truth, int toc_bits) {
-  const auto before = [](const core::Contact& a, const core::Contact& b) {
+std::string judgeContacts(const std::vector<Contact>& found, std::vector<TrueContact>& truth, int toc_bits) {
+  const auto before = [](const Contact& a, const Contact& b) {
     return std::tie(a.kind, a.body, a.vertex) < std::tie(b.kind, b.body, b.vertex);
   };
   for (std::size_t i = 0; i < std::max(found.size(), truth.size()); ++i) {
@@ -86,4 +86,4 @@ std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,7 +6,7 @@
 
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// Runs the step with the exact rung, clustered and by brute force, on every SIMD target, and compares contacts, cells
@@ -19,4 +19,4 @@ std::string judgeStep(const TestStep& step);
 std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests, int& full_tests);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,7 +6,7 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct RecorderOptions {
   int frames = 0;  ///< 0: the scene's own number
@@ -21,4 +21,4 @@ struct RecorderOptions {
 /// Throws rosbag::BagException when the bag cannot be written, std::runtime_error on a scene that cannot be published.
 std::string recordScene(const scene::SceneSpec& spec, const std::string& bag_path, const RecorderOptions& options);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

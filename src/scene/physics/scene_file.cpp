@@ -4,7 +4,7 @@
 #include <numeric>
 #include <sstream>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
@@ -255,4 +255,4 @@ SceneSpec readSceneFile(const std::string& path) {
   return parseScene(text.str(), path);
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/types.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 /// A rows x cols grid of vertices. A tube closes its columns around its axis; a rope is a grid of one row.
 struct Shape {
@@ -119,4 +119,4 @@ struct SceneSpec {
   std::string expect_yaml;   ///< the scene's `expect` block: facts that tests hold the monitor to
 };
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

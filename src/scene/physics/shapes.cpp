@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 Eigen::Quaterniond rotation(const Vec3& rotation_rad) {
@@ -102,4 +102,4 @@ Box bounds(const Solid& solid) {
   return box;
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -12,7 +12,7 @@
 
 #include "scene/physics/shapes.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 static_assert(sizeof(btScalar) == sizeof(double), "scenes are recorded with Bullet in double precision");
@@ -285,4 +285,4 @@ Eigen::Isometry3d Simulation::rigidPose(std::size_t rigid_body) const {
 
 const std::vector<std::string>& Simulation::effects() const { return impl_->effects; }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -8,7 +8,7 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 class Simulation {
  public:
@@ -34,4 +34,4 @@ class Simulation {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

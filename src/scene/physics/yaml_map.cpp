@@ -4,7 +4,7 @@
 #include <sstream>
 #include <utility>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 YamlMap::YamlMap(const YAML::Node& node, std::string file, std::string path)
     : node_(node), file_(std::move(file)), path_(std::move(path)) {
@@ -152,4 +152,4 @@ void YamlMap::finish() const {
   }
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

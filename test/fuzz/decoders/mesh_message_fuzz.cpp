@@ -6,11 +6,11 @@
 #include <string>
 
 #include "fuzz/fuzz_target.h"
-#include "ros/mesh_decoder.h"
+#include "input/mesh_decoder.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 MeshInputConfig configOf(std::uint8_t byte) {
   static const TopologySource SOURCES[] = {TopologySource::AUTO, TopologySource::MESSAGE, TopologySource::GRID,

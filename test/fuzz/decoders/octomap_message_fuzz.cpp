@@ -3,14 +3,14 @@
 #include <stdexcept>
 #include <string>
 
-#include "deformable_ccd/octomap_decode.h"
+#include "dccd/octomap_decode.h"
 #include "fuzz/fuzz_target.h"
+#include "node/map_loader.h"
 #include "octomap/octomap_header.h"
-#include "ros/map_loader.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 /// The decoder alone, with what a message's other fields may say.
 void stream(const std::uint8_t* data, std::size_t size) {

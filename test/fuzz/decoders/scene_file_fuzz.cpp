@@ -8,7 +8,7 @@
 namespace {
 
 void scene_file(const std::uint8_t* data, std::size_t size) {
-  using namespace deformable_ccd::scene;
+  using namespace dccd::scene;
   try {
     parseScene(std::string(data, data + size), "input");
   } catch (const SceneFileError& error) {

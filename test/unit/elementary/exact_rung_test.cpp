@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 #include "support/generators.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 std::string refusal(const AccuracyOptions& options) {
   try {
-    makeElementaryTest(options);
+    makeRung(options);
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
@@ -68,7 +68,7 @@ TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
   ElementaryResult result;
   TierCounters counters;
   try {
-    makeElementaryTest({})->run(batch, &result, counters);
+    makeRung({})->run(batch, &result, counters);
     FAIL() << "accepted";
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("conservative"), std::string::npos);
@@ -77,7 +77,7 @@ TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
 
 TEST(ExactRung, ManyPairsAtOnceAreTheSameAsOneByOne) {
   test::RandomSource random(41);
-  const auto test = makeElementaryTest({});
+  const auto test = makeRung({});
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     std::vector<VertexMotion> vertices;
     std::vector<Quad> pairs;
@@ -261,7 +261,7 @@ std::vector<KnownCase> knownCases() {
 }
 
 TEST(ExactRung, CasesKnownByHand) {
-  const auto test = makeElementaryTest({});
+  const auto test = makeRung({});
   for (const KnownCase& known : knownCases()) {
     const ElementaryResult result = testPair(*test, known.kind, known.motion);
     ASSERT_EQ(result.verdict, known.contact ? Verdict::CONTACT : Verdict::NO_CONTACT) << known.name;
@@ -272,4 +272,4 @@ TEST(ExactRung, CasesKnownByHand) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

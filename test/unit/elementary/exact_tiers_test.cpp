@@ -12,23 +12,23 @@
 
 #include "elementary/exact_tiers.h"
 #include "elementary/rungs.h"
-#include "io/query_file.h"
+#include "oracle/oracle.h"
+#include "oracle/query_file.h"
 #include "support/data.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::Hardness;
 
 constexpr Tier COMPLETE_TIERS[] = {Tier::FIXED_INTEGER, Tier::BIG_INTEGER};
 
-std::unique_ptr<ElementaryTest> exactTest(int toc_bits = 32) {
+std::unique_ptr<Rung> exactTest(int toc_bits = 32) {
   AccuracyOptions options;
   options.toc_bits = toc_bits;
-  return makeExactTest(options);
+  return makeExactRung(options);
 }
 
 /// Verdict and cell, not the tier.
@@ -318,4 +318,4 @@ TEST(ExactTiers, RefusesKindsAndTiersItDoesNotHave) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "support/algebraic.h"
+#include "oracle/algebraic.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::Rational;
@@ -78,4 +78,4 @@ TEST(CrossingTime, CellsHoldTheTime) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

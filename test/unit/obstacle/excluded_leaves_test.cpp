@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Key = std::tuple<int, int, int>;
@@ -75,4 +75,4 @@ TEST(ExcludedLeaves, ABoxThroughAHugeLeafEndsAndHidesNothing) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,4 +1,4 @@
-#include "deformable_ccd/known_space.h"
+#include "dccd/known_space.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr double RESOLUTION = 0.05;
@@ -131,4 +131,4 @@ TEST(KnownSpace, SweptSpaceIsBoundedAndSaysSo) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,5 +1,5 @@
 // Exposed faces, edges and corners against their definition on single voxels, for leaves of all sizes.
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Cell = std::array<int, 3>;
@@ -206,4 +206,4 @@ TEST(VoxelSurface, MemoryIsProportional) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

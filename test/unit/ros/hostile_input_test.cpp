@@ -17,14 +17,14 @@
 
 #include <gtest/gtest.h>
 
-#include "deformable_ccd/octomap_decode.h"
-#include "io/step_recording.h"
-#include "ros/map_loader.h"
-#include "ros/mesh_decoder.h"
-#include "ros/mesh_file.h"
-#include "ros/stl_file.h"
+#include "dccd/octomap_decode.h"
+#include "input/mesh_decoder.h"
+#include "input/mesh_file.h"
+#include "input/stl_file.h"
+#include "node/map_loader.h"
+#include "record/step_recording.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 namespace fs = std::filesystem;
@@ -251,4 +251,4 @@ TEST_F(HostileFile, MapFilesOfAGigabyte) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,4 +1,4 @@
-#include "ros/input_queue.h"
+#include "node/input_queue.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// Receipt times of what is left of four messages in a queue for two.
@@ -99,4 +99,4 @@ TEST(InputQueue, ClosingEndsCallsAtOnce) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

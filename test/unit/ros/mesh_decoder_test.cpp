@@ -1,4 +1,4 @@
-#include "ros/mesh_decoder.h"
+#include "input/mesh_decoder.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// Serialises as ROS does, with lies where a test wants them.
@@ -242,4 +242,4 @@ TEST(MeshDecoder, PolylineFollowsTheOrderOfThePoints) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,9 +6,9 @@
 #include <functional>
 #include <set>
 
-#include "ros/monitor_config.h"
+#include "config/monitor_config.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using XmlRpc::XmlRpcValue;
@@ -246,4 +246,4 @@ TEST(Parameters, YamlReadsAsTheParameterServerWould) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,6 +1,6 @@
 // The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and
 // files.
-#include "ros/monitor_pipeline.h"
+#include "node/monitor_pipeline.h"
 
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
@@ -14,10 +14,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "ros/effects.h"
-#include "ros/map_loader.h"
+#include "node/effects.h"
+#include "node/map_loader.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using XmlRpc::XmlRpcValue;
@@ -228,13 +228,13 @@ TEST(TrackerNoise, ComesFromThePointField) {
   // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
   const StepOutcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
   ASSERT_FALSE(outcome.contacts.empty());
-  for (const core::Contact& c : outcome.contacts) {
+  for (const Contact& c : outcome.contacts) {
     EXPECT_TRUE(std::count(c.vertex.begin(), c.vertex.end(), 2u)) << "feature without the uncertain vertex";
   }
   EXPECT_LE(outcome.earliest_toc, 0.6 + 1e-6);
   EXPECT_NEAR(outcome.earliest_toc, 0.6, 1e-3);
   EXPECT_GT(outcome.stats[Effect::TRACKER_NOISE].out, 0u);
-  for (const core::Contact& c : outcome.contacts) {
+  for (const Contact& c : outcome.contacts) {
     EXPECT_EQ(c.body[1], OBSTACLE_BODY) << "neighbours on the mesh are no contacts, however uncertain";
   }
   EXPECT_GT(noisy.pipeline.monitor().leftOut().size(), 0u);
@@ -475,4 +475,4 @@ TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 const char* const GOOD = R"(name: drop
@@ -135,4 +135,4 @@ TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -11,7 +11,7 @@
 #include "scene/physics/scene_file.h"
 #include "scene/physics/shapes.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 SceneSpec bareScene() {
@@ -175,4 +175,4 @@ TEST(Shapes, ATorusHasAHole) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene
