@@ -2,8 +2,8 @@
 // same run. Pairs: hard queries (DIR...) and what the filters leave of real steps (--scene FRAME_0 FRAME_1).
 //
 // Time: whole batches, several repeats; best and median nanoseconds per pair. Truth: for queries the truth column; for
-// survivors the exact rung at 52 bits, which the tests hold against an oracle of their own and against the scenes' truth.
-// The error of a TOC is that to the exact rung's 2^-52 cell.
+// survivors the exact rung at 52 bits, which the tests hold against an oracle of their own and against the scenes'
+// truth. The error of a TOC is that to the exact rung's 2^-52 cell.
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
 #include <CLI/CLI.hpp>
@@ -15,23 +15,23 @@
 #include <string>
 #include <vector>
 
-#include "broad_phase/cluster_pairs.h"
-#include "deformable_ccd/elementary.h"
-#include "detector/scene_arrays.h"
-#include "io/query_file.h"
+#include "culling/cluster_pairs.h"
+#include "culling/scene_arrays.h"
+#include "dccd/elementary.h"
+#include "oracle/query_file.h"
 #include "simd/fused_filter.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 struct PairSet {
   std::string source;
   PairKind kind = PairKind::VERTEX_FACE;
-  std::vector<VertexMotion> own_vertices;        // queries bring their own
-  const VertexMotion* vertices = nullptr;        // else the scene's
+  std::vector<VertexMotion> own_vertices;  // queries bring their own
+  const VertexMotion* vertices = nullptr;  // else the scene's
   std::vector<Quad> pairs;
-  std::vector<ElementaryResult> truth;           // exact, 52 bits
+  std::vector<ElementaryResult> truth;  // exact, 52 bits
   PairBatch batch() const {
     PairBatch b;
     b.kind = kind;
@@ -42,7 +42,7 @@ struct PairSet {
   }
 };
 
-struct Rung {
+struct TimedRung {
   std::string name;
   std::function<void(const PairBatch&, ElementaryResult*)> run;
 };
@@ -61,25 +61,25 @@ void runFcl(const PairBatch& b, ElementaryResult* out) {
     V point;
     const auto x = [&](int p, int t) { return at(b, i, p, t); };
     const bool hit = b.kind == PairKind::VERTEX_FACE
-                         ? Intersect::intersect_VF_filtered(x(1, 0), x(2, 0), x(3, 0), x(0, 0), x(1, 1), x(2, 1), x(3, 1),
-                                                            x(0, 1), &toc, &point)
-                         : Intersect::intersect_EE_filtered(x(0, 0), x(1, 0), x(2, 0), x(3, 0), x(0, 1), x(1, 1), x(2, 1),
-                                                            x(3, 1), &toc, &point);
+                         ? Intersect::intersect_VF_filtered(x(1, 0), x(2, 0), x(3, 0), x(0, 0), x(1, 1), x(2, 1),
+                                                            x(3, 1), x(0, 1), &toc, &point)
+                         : Intersect::intersect_EE_filtered(x(0, 0), x(1, 0), x(2, 0), x(3, 0), x(0, 1), x(1, 1),
+                                                            x(2, 1), x(3, 1), &toc, &point);
     out[i].verdict = hit ? Verdict::CONTACT : Verdict::NO_CONTACT;
     out[i].toc_lower = out[i].toc_upper = toc;
   }
 }
 
-Rung library(const std::string& name, const AccuracyOptions& options) {
-  const std::shared_ptr<const ElementaryTest> test = makeElementaryTest(options);
+TimedRung library(const std::string& name, const AccuracyOptions& options) {
+  const std::shared_ptr<const Rung> test = makeRung(options);
   return {name, [test](const PairBatch& b, ElementaryResult* out) {
             TierCounters counters;
             test->run(b, out, counters);
           }};
 }
 
-std::vector<Rung> rungs() {
-  std::vector<Rung> list;
+std::vector<TimedRung> rungs() {
+  std::vector<TimedRung> list;
   AccuracyOptions o;
   o.rung = Accuracy::FAST;
   list.push_back(library("fast", o));
@@ -157,7 +157,7 @@ void addSurvivors(const std::string& name, SceneArrays& scene, std::vector<PairS
   }
 }
 
-void measure(const PairSet& set, const Rung& rung, int repeats) {
+void measure(const PairSet& set, const TimedRung& rung, int repeats) {
   std::vector<ElementaryResult> out(set.pairs.size());
   std::vector<double> ns;
   for (int r = 0; r < repeats; ++r) {
@@ -210,30 +210,30 @@ int run(int argc, char** argv) {
     scenes.back()->setBodies({body}, {&m0.vertices});
     MotionStep step;
     step.bodies = {{&m0.vertices, &m1.vertices}};
-    core::StepStats stats;
+    StepStats stats;
     scenes.back()->record(step, stats);
     scenes.back()->refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
     addSurvivors(frames[i], *scenes.back(), sets);
   }
   AccuracyOptions finest;
   finest.toc_bits = 52;
-  const std::unique_ptr<ElementaryTest> exact = makeElementaryTest(finest);
+  const std::unique_ptr<Rung> exact = makeRung(finest);
   std::printf("source,kind,rung,pairs,contacts,missed,false_contacts,undecided,best_ns,median_ns,max_toc_error\n");
   for (PairSet& set : sets) {
     TierCounters counters;
     set.truth.resize(set.pairs.size());
     exact->run(set.batch(), set.truth.data(), counters);
-    for (const Rung& rung : rungs()) measure(set, rung, repeats);
+    for (const TimedRung& rung : rungs()) measure(set, rung, repeats);
   }
   return 0;
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   try {
-    return deformable_ccd::run(argc, argv);
+    return dccd::run(argc, argv);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "accuracy_pairs: %s\n", e.what());
     return 1;

@@ -8,12 +8,12 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "deformable_ccd/detector.h"
+#include "dccd/detector.h"
 #include "support/data.h"
 #include "support/scene_data.h"
 #include "support/timing.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -30,7 +30,8 @@ Case wavingCloth(std::size_t side) {
   c.topology = std::make_shared<const Topology>(Topology::grid(side, side));
   for (std::size_t r = 0; r < side; ++r) {
     for (std::size_t k = 0; k < side; ++k) {
-      const double x = static_cast<double>(k) / static_cast<double>(side), y = static_cast<double>(r) / static_cast<double>(side);
+      const double x = static_cast<double>(k) / static_cast<double>(side),
+                   y = static_cast<double>(r) / static_cast<double>(side);
       const double phase = 2 * M_PI * (2 * x + y);
       c.t0.emplace_back(x, y, 0.05 * std::sin(phase));
       c.t1.emplace_back(x + 0.002, y, 0.05 * std::sin(phase + M_PI / 6));
@@ -68,18 +69,22 @@ nlohmann::json measure(const Case& c, int repeat) {
     }
     ratios.push_back(times[0].back() / times[1].back());
   }
-  return {{"case", c.name},          {"triangles", c.topology->faces().size()}, {"contacts", contacts},
-          {"certified", certified},  {"without_ms", spread(times[0])},          {"with_ms", spread(times[1])},
+  return {{"case", c.name},
+          {"triangles", c.topology->faces().size()},
+          {"contacts", contacts},
+          {"certified", certified},
+          {"without_ms", spread(times[0])},
+          {"with_ms", spread(times[1])},
           {"ratio", quartiles(ratios)}};
 }
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
-  using namespace deformable_ccd;
-  using namespace deformable_ccd::benchmarks;
+  using namespace dccd;
+  using namespace dccd::benchmarks;
   std::string out;
   int repeat = 25;
   CLI::App app("Times the step with and without the culling of surfaces that do not fold.");

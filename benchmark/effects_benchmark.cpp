@@ -1,18 +1,18 @@
-// What effects cost that a scene does not call for, and what a rope costs: the flag in the wind with every effect `auto`
-// against only self-collision, and a rope of 500 points against itself and a map of 50,000 voxels.
+// What effects cost that a scene does not call for, and what a rope costs: the flag in the wind with every effect
+// `auto` against only self-collision, and a rope of 500 points against itself and a map of 50,000 voxels.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iostream>
 
-#include "deformable_ccd/effect_plan.h"
-#include "deformable_ccd/monitor.h"
+#include "dccd/effect_plan.h"
+#include "dccd/monitor.h"
 #include "scene/physics/scene_file.h"
 #include "scene/physics/simulation.h"
 #include "support/timing.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -35,7 +35,8 @@ std::vector<OccupiedLeaf> leavesIn(const Box& box, double resolution_m) {
     for (int y = low[1]; y <= high[1]; ++y) {
       for (int z = low[2]; z <= high[2]; ++z) {
         leaves.push_back({{static_cast<std::uint16_t>(x + 32768), static_cast<std::uint16_t>(y + 32768),
-                           static_cast<std::uint16_t>(z + 32768)}, 1});
+                           static_cast<std::uint16_t>(z + 32768)},
+                          1});
       }
     }
   }
@@ -113,13 +114,16 @@ nlohmann::json medianWithInterval(std::vector<double> values) {
   const auto at = [&](double place) {
     return values[static_cast<std::size_t>(std::clamp(std::round(place), 0.0, n - 1))];
   };
-  return {{"median", at((n - 1) / 2)}, {"low", at((n - 1) / 2 - reach)}, {"high", at((n - 1) / 2 + reach)},
+  return {{"median", at((n - 1) / 2)},
+          {"low", at((n - 1) / 2 - reach)},
+          {"high", at((n - 1) / 2 + reach)},
           {"rounds", values.size()}};
 }
 
 nlohmann::json measureFlag(const std::string& scene_file, int rounds) {
   const Recorded scene = record(scene_file);
-  const std::map<std::string, EffectSetting> only_self = {{"octomap", EffectSetting::OFF}, {"start_state", EffectSetting::OFF}};
+  const std::map<std::string, EffectSetting> only_self = {{"octomap", EffectSetting::OFF},
+                                                          {"start_state", EffectSetting::OFF}};
   std::vector<double> ratios, auto_ms, self_ms;
   for (int r = 0; r < rounds + 1; ++r) {
     const auto everything = monitorFor(scene, {}), self = monitorFor(scene, only_self);
@@ -138,8 +142,9 @@ nlohmann::json measureFlag(const std::string& scene_file, int rounds) {
     auto_ms.push_back(with.ms / static_cast<double>(with.steps));
     self_ms.push_back(without.ms / static_cast<double>(without.steps));
   }
-  return {{"ratio", medianWithInterval(ratios)}, {"auto_ms", spread(auto_ms)}, {"self_only_ms", spread(self_ms)},
-          {"vertices", scene.topology->vertexCount()}, {"voxels", scene.map->leafCount()}, {"required_ratio", 1.05}};
+  return {{"ratio", medianWithInterval(ratios)}, {"auto_ms", spread(auto_ms)},
+          {"self_only_ms", spread(self_ms)},     {"vertices", scene.topology->vertexCount()},
+          {"voxels", scene.map->leafCount()},    {"required_ratio", 1.05}};
 }
 
 /// A rope in a figure of eight over an uneven floor, dragged a little in each step; it lies on itself where it crosses.
@@ -147,7 +152,8 @@ Positions ropeAt(double shift) {
   Positions x;
   for (int i = 0; i < 500; ++i) {
     const double a = 2 * M_PI * i / 499.0;
-    x.emplace_back(1.1 + 0.6 * std::sin(a) + shift, 1.1 + 0.4 * std::sin(2 * a), 0.012 + 0.006 * std::cos(a) + 0.1 * shift);
+    x.emplace_back(1.1 + 0.6 * std::sin(a) + shift, 1.1 + 0.4 * std::sin(2 * a),
+                   0.012 + 0.006 * std::cos(a) + 0.1 * shift);
   }
   return x;
 }
@@ -159,7 +165,8 @@ nlohmann::json measureRope(int repeat) {
     for (int y = 0; y < 224; ++y) {
       const int z = (x * 7 + y * 3) % 11 == 0 ? 0 : -1;
       leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y),
-                         static_cast<std::uint16_t>(32768 + z)}, 1});
+                         static_cast<std::uint16_t>(32768 + z)},
+                        1});
     }
   }
   const auto map = VoxelSurface::build(VOXEL_M, std::move(leaves));
@@ -189,7 +196,10 @@ nlohmann::json measureRope(int repeat) {
   }
   if (self_pairs == 0 || map_pairs == 0 || contacts == 0) throw std::runtime_error("the rope has nothing to do");
   const std::size_t steps = times.size();
-  return {{"ms", spread(times)}, {"points", 500}, {"voxels", map->leafCount()}, {"required_ms", 0.3},
+  return {{"ms", spread(times)},
+          {"points", 500},
+          {"voxels", map->leafCount()},
+          {"required_ms", 0.3},
           {"contacts_a_step", static_cast<double>(contacts) / static_cast<double>(steps)},
           {"self_pairs_a_step", static_cast<double>(self_pairs) / static_cast<double>(steps)},
           {"map_pairs_a_step", static_cast<double>(map_pairs) / static_cast<double>(steps)}};
@@ -197,7 +207,7 @@ nlohmann::json measureRope(int repeat) {
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   std::string out, scene = std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/flag_in_wind.yaml";
@@ -208,9 +218,9 @@ int main(int argc, char** argv) {
   app.add_option("--rounds", rounds, "interleaved rounds over the scene")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
-    nlohmann::json result{{"machine", deformable_ccd::benchmarks::machine()},
-                          {"flag", deformable_ccd::benchmarks::measureFlag(scene, rounds)},
-                          {"rope", deformable_ccd::benchmarks::measureRope(40 * rounds)}};
+    nlohmann::json result{{"machine", dccd::benchmarks::machine()},
+                          {"flag", dccd::benchmarks::measureFlag(scene, rounds)},
+                          {"rope", dccd::benchmarks::measureRope(40 * rounds)}};
     std::cerr << result["flag"].dump() << '\n' << result["rope"].dump() << '\n';
     std::ofstream(out) << result.dump(1) << '\n';
   } catch (const std::exception& e) {

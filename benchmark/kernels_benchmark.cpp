@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <random>
 
-#include "broad_phase/triangle_candidates.h"
-#include "filter/paper_filters.h"
+#include "paper/paper_filters.h"
+#include "paper/triangle_candidates.h"
 #include "simd/fused_filter.h"
 #include "support/steps.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -122,10 +122,10 @@ void registerAll() {
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
-  deformable_ccd::benchmarks::registerAll();
+  dccd::benchmarks::registerAll();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

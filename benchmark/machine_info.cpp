@@ -4,6 +4,6 @@
 #include "support/timing.h"
 
 int main() {
-  std::cout << deformable_ccd::benchmarks::machine().dump() << "\n";
+  std::cout << dccd::benchmarks::machine().dump() << "\n";
   return std::cout ? 0 : 1;
 }

@@ -8,11 +8,11 @@
 #include <random>
 #include <set>
 
-#include "deformable_ccd/detector.h"
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/detector.h"
+#include "dccd/voxel_surface.h"
 #include "support/timing.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -179,8 +179,12 @@ nlohmann::json measureBuild(int repeat) {
     times.push_back(watch.milliseconds());
     if (surface->leafCount() != leaves.size()) throw std::runtime_error("the surface lost leaves");
   }
-  return {{"case", "surface of a map, built on its own thread"}, {"triangles", 0},   {"voxels", leaves.size()},
-          {"contacts", 0},                                       {"required_ms", 20.0}, {"ms", spread(times)}};
+  return {{"case", "surface of a map, built on its own thread"},
+          {"triangles", 0},
+          {"voxels", leaves.size()},
+          {"contacts", 0},
+          {"required_ms", 20.0},
+          {"ms", spread(times)}};
 }
 
 nlohmann::json measure(int repeat) {
@@ -220,7 +224,7 @@ nlohmann::json measure(int repeat) {
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   std::string out;
@@ -230,7 +234,7 @@ int main(int argc, char** argv) {
   app.add_option("--repeat", repeat, "runs of each case")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
-    std::ofstream(out) << deformable_ccd::benchmarks::measure(repeat).dump(1) << '\n';
+    std::ofstream(out) << dccd::benchmarks::measure(repeat).dump(1) << '\n';
   } catch (const std::exception& e) {
     std::cerr << "octomap_benchmark: " << e.what() << '\n';
     return 1;

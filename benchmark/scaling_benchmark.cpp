@@ -6,11 +6,11 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "deformable_ccd/detector.h"
+#include "dccd/detector.h"
 #include "scene/generated_scene.h"
 #include "support/timing.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -89,10 +89,10 @@ nlohmann::json measure(const Frames& frames, int threads, int repeat, std::vecto
 
 }  // namespace
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
-  using namespace deformable_ccd::benchmarks;
+  using namespace dccd::benchmarks;
   std::string out, kind = "lion";
   std::vector<std::size_t> sizes{10000, 40000, 160000, 640000, 1600000};
   std::vector<int> threads{1, 2};
@@ -110,7 +110,7 @@ int main(int argc, char** argv) {
     nlohmann::json result{{"scene", kind}, {"machine", machine()}};
     for (std::size_t size : sizes) {
       const auto frames = generate(kind, size, frame);
-      std::vector<deformable_ccd::Contact> reference;
+      std::vector<dccd::Contact> reference;
       for (int n : threads) {
         result["runs"].push_back(measure(frames, n, repeat, reference));
         std::cerr << result["runs"].back().dump() << '\n';

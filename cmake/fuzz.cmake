@@ -7,7 +7,7 @@ file(GLOB DECODER_FUZZ_SOURCES CONFIGURE_DEPENDS test/fuzz/decoders/*_fuzz.cpp)
 
 if(NOT DEFORMABLE_CCD_FUZZ)
   if(DEFORMABLE_CCD_CORE_ONLY)
-    add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES})
+    add_gtest_suite(fuzz_tests SOURCES ${FUZZ_SOURCES} LIBRARIES deformable_ccd_archive)
   else()
     if(NOT TARGET deformable_ccd_physics)
       list(FILTER DECODER_FUZZ_SOURCES EXCLUDE REGEX "scene_file")
@@ -34,13 +34,13 @@ find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
 add_library(deformable_ccd_decoders STATIC
-  src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp src/ros/map_decode.cpp src/ros/mesh_decoder.cpp
-  src/ros/mesh_file.cpp src/ros/mesh_views.cpp src/ros/obj_file.cpp src/ros/stl_file.cpp src/ros/typed_mesh.cpp
+  src/input/mesh_decoder.cpp src/input/mesh_views.cpp src/input/mesh_file.cpp src/input/obj_file.cpp
+  src/input/stl_file.cpp src/input/typed_mesh.cpp src/node/map_decode.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
   src/scene/physics/expectations.cpp src/scene/physics/scene_file.cpp src/scene/physics/yaml_map.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
-  deformable_ccd yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY})
+  deformable_ccd_archive yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
 add_custom_target(fuzzers)
@@ -48,7 +48,7 @@ foreach(source ${FUZZ_SOURCES} ${DECODER_FUZZ_SOURCES})
   get_filename_component(name ${source} NAME_WE)
   add_executable(${name} ${source})
   target_compile_definitions(${name} PRIVATE DEFORMABLE_CCD_FUZZER)
-  target_link_libraries(${name} PRIVATE deformable_ccd_test_support)
+  target_link_libraries(${name} PRIVATE deformable_ccd_test_support deformable_ccd_archive)
   if(source IN_LIST DECODER_FUZZ_SOURCES)
     target_link_libraries(${name} PRIVATE deformable_ccd_decoders)
     target_include_directories(${name} SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES})

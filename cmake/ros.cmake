@@ -7,11 +7,13 @@ if(OCTOMAP_SOURCES)
   target_include_directories(deformable_ccd_octomap PUBLIC include PRIVATE src)
   target_include_directories(deformable_ccd_octomap SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
   target_link_libraries(deformable_ccd_octomap PUBLIC deformable_ccd ${OCTOMAP_LIBRARIES})
+  set_target_properties(deformable_ccd_octomap PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${API_VERSION})
   list(APPEND ROS_LINK_LIBRARIES deformable_ccd_octomap)
 endif()
 
-# --- the node's class, conversions, markers ----------------------------------------------------------------------------
-file(GLOB ROS_SOURCES CONFIGURE_DEPENDS src/ros/*.cpp)
+# --- the node: what comes in, its options, what goes out, and the class that holds them ---------------------------------
+file(GLOB ROS_SOURCES CONFIGURE_DEPENDS
+  src/ros/*.cpp src/input/*.cpp src/config/*.cpp src/output/*.cpp src/node/*.cpp)
 list(APPEND ROS_LINK_LIBRARIES deformable_ccd ${catkin_LIBRARIES} yaml-cpp)
 if(ROS_SOURCES)
   add_library(deformable_ccd_ros SHARED ${ROS_SOURCES})
@@ -20,7 +22,8 @@ if(ROS_SOURCES)
   target_include_directories(deformable_ccd_ros SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
   # The headers that nearly every file of this library reads, compiled once.
   target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> <map> <string> <vector>)
-  target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb nlohmann_json::nlohmann_json)
+  set_target_properties(deformable_ccd_ros PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${API_VERSION})
+  target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb PRIVATE deformable_ccd_report)
   # PCL's headers are the slowest to read: only for the files that use them. The compiler's own folders must not come
   # with them, since their order matters to it.
   list(REMOVE_ITEM PCL_INCLUDE_DIRS ${CMAKE_CXX_IMPLICIT_INCLUDE_DIRECTORIES})
@@ -56,7 +59,7 @@ foreach(source ${APP_SOURCES})
   if(app STREQUAL "make_scene_bag")
     target_link_libraries(${app} deformable_ccd_physics ${ROS_LINK_LIBRARIES} CLI11::CLI11)
   else()
-    target_link_libraries(${app} ${ROS_LINK_LIBRARIES} CLI11::CLI11 nlohmann_json::nlohmann_json)
+    target_link_libraries(${app} deformable_ccd_report ${ROS_LINK_LIBRARIES} CLI11::CLI11 nlohmann_json::nlohmann_json)
   endif()
   list(APPEND TOOL_TARGETS ${app})
 endforeach()

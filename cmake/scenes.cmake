@@ -1,10 +1,10 @@
-# Scenes with known contacts (src/scene/*.cpp: no dependency but the core), and the physics that records moving ones
+# Scenes with known contacts (src/scene/*.cpp: no dependency but the core's headers), and the physics that records moving ones
 # (src/scene/physics: Bullet soft bodies in double precision, never part of the node).
 file(GLOB SCENE_SOURCES CONFIGURE_DEPENDS src/scene/*.cpp)
 if(SCENE_SOURCES)
   add_library(deformable_ccd_scene STATIC ${SCENE_SOURCES})
   target_include_directories(deformable_ccd_scene PUBLIC src)
-  target_link_libraries(deformable_ccd_scene PUBLIC deformable_ccd)
+  target_link_libraries(deformable_ccd_scene PUBLIC deformable_ccd_headers)
 endif()
 
 file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)
@@ -28,7 +28,7 @@ if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURC
     target_include_directories(deformable_ccd_physics PUBLIC src)
     # Bullet's headers raise warnings of their own under -Wextra.
     target_include_directories(deformable_ccd_physics SYSTEM PRIVATE ${BULLET_DOUBLE_INCLUDE_DIRS})
-    target_link_libraries(deformable_ccd_physics PUBLIC deformable_ccd PRIVATE PkgConfig::BULLET_DOUBLE yaml-cpp)
+    target_link_libraries(deformable_ccd_physics PUBLIC deformable_ccd_headers PRIVATE PkgConfig::BULLET_DOUBLE yaml-cpp)
   else()
     message(STATUS "No Bullet in double precision: make_scene_bag is left out")
   endif()

@@ -29,14 +29,12 @@ endif()
 enable_testing()
 
 file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS test/support/*.cpp)
-list(REMOVE_ITEM SUPPORT_SOURCES ${ORACLE_SOURCES})
 add_library(deformable_ccd_test_support STATIC EXCLUDE_FROM_ALL ${SUPPORT_SOURCES})
 target_include_directories(deformable_ccd_test_support PUBLIC src test)
 # The truth data lie beside the checkout, not beside a workspace's links.
 target_compile_definitions(deformable_ccd_test_support PUBLIC DEFORMABLE_CCD_SOURCE_DIR="${TRUE_SOURCE_DIR}")
 target_link_libraries(deformable_ccd_test_support PUBLIC
-  deformable_ccd_oracle deformable_ccd GTest::gtest ZLIB::ZLIB TBB::tbb nlohmann_json::nlohmann_json deformable_ccd_hwy
-  ${GMP_LIBRARY})
+  deformable_ccd_oracle deformable_ccd_headers GTest::gtest ZLIB::ZLIB TBB::tbb deformable_ccd_hwy ${GMP_LIBRARY})
 if(TARGET deformable_ccd_scene)
   target_link_libraries(deformable_ccd_test_support PUBLIC deformable_ccd_scene)
 endif()
@@ -44,7 +42,7 @@ if(rapidcheck_FOUND)
   target_link_libraries(deformable_ccd_test_support PUBLIC rapidcheck)
 endif()
 
-# Adds the gtest binary NAME from the given files, linked with the core and LIBRARIES.
+# Adds the gtest binary NAME from the given files, linked with LIBRARIES: the core's archive, or a library on the core.
 function(add_gtest_suite name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
   if(NOT arg_SOURCES)
@@ -65,7 +63,7 @@ endfunction()
 
 # scripts/test reads this list: a suite that is on it but was not built counts as failed.
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "")
-set(PARTS_BEYOND_CORE octomap physics ros)
+set(PARTS_BEYOND_CORE octomap physics report ros)
 foreach(suite unit property truth)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS test/${suite}/*.cpp)
   foreach(part ${PARTS_BEYOND_CORE})
@@ -74,8 +72,13 @@ foreach(suite unit property truth)
     list(FILTER sources EXCLUDE REGEX "/test/${suite}/(scene/)?${part}/")
     list(APPEND ${part}_SOURCES ${part_sources})
   endforeach()
-  add_gtest_suite(${suite}_tests SOURCES ${sources})
+  add_gtest_suite(${suite}_tests SOURCES ${sources} LIBRARIES deformable_ccd_archive)
 endforeach()
+file(GLOB PAPER_TESTS CONFIGURE_DEPENDS paper/test/*.cpp)
+add_gtest_suite(paper_tests SOURCES ${PAPER_TESTS} LIBRARIES deformable_ccd_paper deformable_ccd_archive)
+if(TARGET deformable_ccd_report)
+  add_gtest_suite(report_tests SOURCES ${report_SOURCES} LIBRARIES deformable_ccd_report deformable_ccd)
+endif()
 
 if(DEFORMABLE_CCD_CORE_ONLY)
   return()
@@ -83,7 +86,7 @@ endif()
 add_gtest_suite(octomap_tests SOURCES ${octomap_SOURCES} LIBRARIES deformable_ccd_octomap)
 add_gtest_suite(ros_tests SOURCES ${ros_SOURCES} LIBRARIES deformable_ccd_ros)
 if(TARGET deformable_ccd_physics)
-  add_gtest_suite(physics_tests SOURCES ${physics_SOURCES} LIBRARIES deformable_ccd_physics)
+  add_gtest_suite(physics_tests SOURCES ${physics_SOURCES} LIBRARIES deformable_ccd_physics deformable_ccd)
 endif()
 
 if(CATKIN_ENABLE_TESTING)

@@ -1,21 +1,43 @@
-# Tools that need the core alone. Every other file in src/apps is built by ros.cmake.
-find_package(CLI11 REQUIRED)
-find_package(nlohmann_json REQUIRED)
+# Tools that need the core alone, and the report. Every other file in src/apps is built by ros.cmake.
+# The libraries need neither of the two; without them a core-only build has no tools and no report.
+if(DEFORMABLE_CCD_CORE_ONLY)
+  find_package(CLI11 QUIET)
+  find_package(nlohmann_json QUIET)
+else()
+  find_package(CLI11 REQUIRED)
+  find_package(nlohmann_json REQUIRED)
+endif()
 
 # The exact oracle: judges the rungs in the tests and in the tools that report errors. The libraries never link it.
-set(ORACLE_SOURCES test/support/algebraic.cpp test/support/exact_distance.cpp test/support/oracle.cpp
-  test/support/promises.cpp)
-list(TRANSFORM ORACLE_SOURCES PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
-add_library(deformable_ccd_oracle STATIC ${ORACLE_SOURCES})
-target_include_directories(deformable_ccd_oracle PUBLIC src test)
-target_link_libraries(deformable_ccd_oracle PUBLIC deformable_ccd ${GMP_LIBRARY})
+file(GLOB ORACLE_SOURCES CONFIGURE_DEPENDS oracle/*.cpp)
+add_library(deformable_ccd_oracle STATIC EXCLUDE_FROM_ALL ${ORACLE_SOURCES})
+target_include_directories(deformable_ccd_oracle PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+target_link_libraries(deformable_ccd_oracle PUBLIC deformable_ccd_headers ${GMP_LIBRARY})
 
+# The report of a run: JSON, CSV, and a page whose markup, style and script are files of their own kind.
+if(nlohmann_json_FOUND)
+  set(PAGE_PARTS page.html page.css page.js)
+  foreach(part ${PAGE_PARTS})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/report/${part})
+    string(MAKE_C_IDENTIFIER ${part} variable)
+    file(READ src/report/${part} ${variable})
+  endforeach()
+  configure_file(src/report/page_parts.h.in ${CMAKE_CURRENT_BINARY_DIR}/report/page_parts.h @ONLY)
+  file(GLOB REPORT_SOURCES CONFIGURE_DEPENDS src/report/*.cpp)
+  add_library(deformable_ccd_report STATIC EXCLUDE_FROM_ALL ${REPORT_SOURCES})
+  target_include_directories(deformable_ccd_report PUBLIC src PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/report)
+  target_link_libraries(deformable_ccd_report PUBLIC deformable_ccd_headers nlohmann_json::nlohmann_json)
+endif()
+
+# run_queries shows filters and bounds that the library hides, and so takes the archive.
 set(CORE_TOOLS run_queries replay_step)
-foreach(tool ${CORE_TOOLS})
-  if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/src/apps/${tool}.cpp")
+set(run_queries_LIBRARIES deformable_ccd_oracle deformable_ccd_archive)
+set(replay_step_LIBRARIES deformable_ccd)
+if(CLI11_FOUND)
+  foreach(tool ${CORE_TOOLS})
     add_executable(${tool} src/apps/${tool}.cpp)
     target_include_directories(${tool} PRIVATE src)
-    target_link_libraries(${tool} deformable_ccd_oracle deformable_ccd CLI11::CLI11 nlohmann_json::nlohmann_json)
+    target_link_libraries(${tool} ${${tool}_LIBRARIES} CLI11::CLI11)
     list(APPEND TOOL_TARGETS ${tool})
-  endif()
-endforeach()
+  endforeach()
+endif()

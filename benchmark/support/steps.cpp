@@ -2,11 +2,11 @@
 
 #include <stdexcept>
 
-#include "mesh/feature_ownership.h"
+#include "paper/feature_ownership.h"
 #include "support/data.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 namespace {
 
@@ -128,4 +128,4 @@ Step subStep(const Step& step, std::size_t k, std::size_t n) {
 }
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

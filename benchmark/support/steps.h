@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "broad_phase/triangle_candidates.h"
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "paper/triangle_candidates.h"
 #include "scene/generated_scene.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 
 /// Bodies of a scene, whose topologies are kept here.
@@ -30,16 +30,15 @@ struct Step {
 };
 
 struct SceneRequest {
-  std::string name;         ///< cloth-ball or n-body (real), or the name of a generated kind
-  bool self = true;         ///< pairs within a body, too; where false, the parts of a real scene are bodies
-  std::size_t steps = 16;   ///< of a generated sequence, spread over it evenly; 0 means all
+  std::string name;             ///< cloth-ball or n-body (real), or the name of a generated kind
+  bool self = true;             ///< pairs within a body, too; where false, the parts of a real scene are bodies
+  std::size_t steps = 16;       ///< of a generated sequence, spread over it evenly; 0 means all
   std::size_t first_frame = 0;  ///< of a generated sequence
   scene::GeneratedOptions options;
 };
 
 /// Calls setUp once with the bodies and a step that guides them, then visit for each step.
-void forEachStep(const SceneRequest& request,
-                 const std::function<void(const SceneBodies&, const Step&)>& set_up,
+void forEachStep(const SceneRequest& request, const std::function<void(const SceneBodies&, const Step&)>& set_up,
                  const std::function<void(const Step&)>& visit);
 
 /// Part k of n of a step: the motion from k/n to (k+1)/n. Truth is that of the whole step and does not carry over.
@@ -49,4 +48,4 @@ Step subStep(const Step& step, std::size_t k, std::size_t n);
 std::vector<VertexMotion> vertexMotions(const Positions& t0, const Positions& t1);
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

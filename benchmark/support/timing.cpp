@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 
 nlohmann::json spread(std::vector<double> values) {
@@ -21,7 +21,9 @@ nlohmann::json spread(std::vector<double> values) {
 
 nlohmann::json quartiles(std::vector<double> values) {
   std::sort(values.begin(), values.end());
-  const auto at = [&](double share) { return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))]; };
+  const auto at = [&](double share) {
+    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+  };
   return {{"median", at(0.5)}, {"quartile_1", at(0.25)}, {"quartile_3", at(0.75)}, {"runs", values.size()}};
 }
 
@@ -64,4 +66,4 @@ nlohmann::json machine() {
 }
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace benchmarks {
 
 class Stopwatch {
@@ -30,9 +30,9 @@ std::size_t residentBytes();
 /// What a time depends on: processor, SIMD target, compiler, and the time of a fixed arithmetic kernel in this process.
 nlohmann::json machine();
 
-/// Milliseconds of a fixed scalar kernel (a chain of multiplications and additions): tells a slow or busy machine from a
-/// slow program.
+/// Milliseconds of a fixed scalar kernel (a chain of multiplications and additions): tells a slow or busy machine from
+/// a slow program.
 double calibrationMs();
 
 }  // namespace benchmarks
-}  // namespace deformable_ccd
+}  // namespace dccd

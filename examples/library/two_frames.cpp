@@ -2,9 +2,9 @@
 #include <cstdio>
 #include <memory>
 
-#include <deformable_ccd/detector.h>
+#include <dccd/detector.h>
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 int main() {
   // A strip of cloth, 2 x 6 points, whose last points fold over and through its first ones.

@@ -1,5 +1,5 @@
 // analyze_bag IN.bag [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a master.
-#include "ros/output_messages.h"
+#include "output/output_messages.h"
 
 #include <rosbag/bag.h>
 #include <std_msgs/Bool.h>
@@ -10,15 +10,15 @@
 #include <memory>
 #include <sstream>
 
-#include "deformable_ccd/simd_target.h"
-#include "io/report.h"
-#include "ros/bag_replay.h"
-#include "ros/known_types.h"
-#include "ros/markers.h"
+#include "dccd/simd_target.h"
+#include "input/known_types.h"
+#include "node/bag_replay.h"
+#include "output/markers.h"
+#include "report/report.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh;
@@ -45,7 +45,8 @@ MonitorConfig configure(const Arguments& a) {
   return readConfig(tree, a.params.empty() ? "--" : a.params + ": ");
 }
 
-// The input's messages with the results between them, as the node would have published them to subscribers of all topics.
+// The input's messages with the results between them, as the node would have published them to subscribers of all
+// topics.
 class ResultBag {
  public:
   ResultBag(const std::string& path, const MonitorConfig& config)
@@ -58,7 +59,8 @@ class ResultBag {
     if (m.getTopic().compare(0, own.size(), own) == 0) return;
     bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
   }
-  void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
+  void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far,
+           const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
     StatsContext context;
     context.frames = pipeline.monitor().total();
@@ -86,7 +88,8 @@ class ResultBag {
     const std::string& frame = pipeline.fixedFrame();
     const double horizon_s = pipeline.config().monitor.look_ahead_s;
     look_ahead_.predict(prediction);
-    bag_.write("/collision_monitor/predicted_contacts", at, toContactArray(prediction, pipeline.monitor().bodies(), frame));
+    bag_.write("/collision_monitor/predicted_contacts", at,
+               toContactArray(prediction, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/time_to_contact", at, toTimeToContact(prediction, horizon_s, frame));
   }
 
@@ -138,7 +141,8 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
   const LookAheadSummary& s = *summary.look_ahead;
   std::ostringstream text;
   text << "look-ahead: " << s.compared << " predictions came true, median error " << s.median_error_s << " s, 95 % "
-       << s.p95_error_s << " s; " << s.not_observed << " not observed, " << s.not_predicted << " contacts not predicted\n";
+       << s.p95_error_s << " s; " << s.not_observed << " not observed, " << s.not_predicted
+       << " contacts not predicted\n";
   return text.str();
 }
 
@@ -158,7 +162,9 @@ int analyze(const Arguments& a) {
         frame = pipeline.fixedFrame();
         if (out) out->add(outcome, pipeline, so_far, at);
       },
-      [&](const rosbag::MessageInstance& m) { if (out) out->copy(m); },
+      [&](const rosbag::MessageInstance& m) {
+        if (out) out->copy(m);
+      },
       [&](const StepOutcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
@@ -207,7 +213,8 @@ int main(int argc, char** argv) {
   app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
   app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact");
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
-  app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")->check(CLI::PositiveNumber);
+  app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
+      ->check(CLI::PositiveNumber);
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
   app.add_flag("--quiet", a.quiet, "no progress");
   CLI11_PARSE(app, argc, argv);

@@ -7,13 +7,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "deformable_ccd/detector.h"
-#include "deformable_ccd/simd_target.h"
-#include "ros/mesh_file.h"
+#include "dccd/detector.h"
+#include "dccd/simd_target.h"
+#include "input/mesh_file.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 struct Arguments {
   std::string frame_0, frame_1, contacts, stats;
@@ -35,7 +35,8 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
       ->capture_default_str();
   app.add_option("--broad-phase", a.broad_phase, "clustered or brute_force")
-      ->check(CLI::IsMember({"clustered", "brute_force"}))->capture_default_str();
+      ->check(CLI::IsMember({"clustered", "brute_force"}))
+      ->capture_default_str();
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
   app.add_option("--repeat", a.repeat, "run the step this often for the times")
@@ -52,7 +53,7 @@ void writeContacts(const std::string& path, const StepResult& result) {
   std::ofstream out(path);
   out << "kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty\n" << std::setprecision(17);
   // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
-  for (const core::Contact& c : result.contacts) {
+  for (const Contact& c : result.contacts) {
     out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
     for (Index v : c.vertex) out << ',' << v;
     out << ',' << c.toc_lower << ',' << c.toc_upper << ','
@@ -141,7 +142,10 @@ void print(const std::string& accuracy, const Run& run, bool header) {
   const double earliest = run.result.earliestToc();
   std::cout << std::left << std::setw(14) << accuracy << std::right << std::setw(10) << run.result.contacts.size()
             << std::setw(11) << run.result.stats.undecided << std::setw(14);
-  if (earliest <= 1) std::cout << earliest; else std::cout << "none";
+  if (earliest <= 1)
+    std::cout << earliest;
+  else
+    std::cout << "none";
   std::cout << std::fixed << std::setprecision(2) << std::setw(11) << run.times.at("total").best() << std::setw(11)
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
@@ -164,7 +168,10 @@ int checkStep(const Arguments& a) {
     const Run run = runStep(a, rungs[i], topology, m0.positions, m1.positions);
     print(rungs[i], run, i == 0);
     const nlohmann::json j = statsJson(a, rungs[i], run);
-    if (rungs.size() == 1) all = j; else all[rungs[i]] = j;
+    if (rungs.size() == 1)
+      all = j;
+    else
+      all[rungs[i]] = j;
     // With all rungs the file holds the last and most accurate one's.
     if (!a.contacts.empty() && i + 1 == rungs.size()) writeContacts(a.contacts, run.result);
   }

@@ -1,11 +1,11 @@
-// The node. Exit status 1 when a parameter is wrong, with one line that says which; 0 after SIGINT and SIGTERM, when the
-// step that runs is finished.
+// The node. Exit status 1 when a parameter is wrong, with one line that says which; 0 after SIGINT and SIGTERM, when
+// the step that runs is finished.
 #include <csignal>
 #include <exception>
 
 #include <ros/ros.h>
 
-#include "ros/collision_monitor.h"
+#include "node/collision_monitor.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "collision_monitor");
@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
-    deformable_ccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
+    dccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
     monitor.installCrashHandler();
     ros::spin();
   } catch (const std::exception& error) {

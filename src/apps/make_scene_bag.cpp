@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf. The same seed gives the same bag.");
   std::string scene_path, bag_path;
-  deformable_ccd::RecorderOptions options;
+  dccd::RecorderOptions options;
   app.add_option("scene", scene_path, "Scene file")->required();
   app.add_option("bag", bag_path, "Bag to write")->required();
   app.add_option("--frames", options.frames, "Frames to record instead of the scene's own number")
@@ -28,9 +28,9 @@ int main(int argc, char** argv) {
   app.add_flag("--quiet", options.quiet, "No progress bar");
   CLI11_PARSE(app, argc, argv);
   try {
-    const deformable_ccd::scene::SceneSpec spec = deformable_ccd::scene::readSceneFile(scene_path);
-    deformable_ccd::checkMonitorBlock(spec, scene_path);
-    std::cout << deformable_ccd::recordScene(spec, bag_path, options);
+    const dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    dccd::checkMonitorBlock(spec, scene_path);
+    std::cout << dccd::recordScene(spec, bag_path, options);
   } catch (const std::exception& error) {
     std::cerr << "make_scene_bag: " << error.what() << "\n";
     return 1;

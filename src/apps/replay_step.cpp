@@ -5,13 +5,13 @@
 #include <iostream>
 #include <sstream>
 
-#include "deformable_ccd/simd_target.h"
-#include "detector/voxel_trace.h"
-#include "io/step_replay.h"
+#include "dccd/simd_target.h"
+#include "record/step_replay.h"
+#include "record/voxel_trace.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 struct Arguments {
   std::string file, simd = "auto";
@@ -23,12 +23,15 @@ struct Arguments {
 Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
   app.add_option("FILE", a.file, "a file that ~record_step, a surprise or the crash handler wrote")->required();
-  app.add_option("--pair", a.pairs,
-                 "the pair's way through the stages: VF:v,a,b,c (vertex, face), EE:a,b,c,d (two edges), or with the map "
-                 "VX:v,x,y,z, EX:a,b,x,y,z, FX:a,b,c,x,y,z (vertex, edge or face, and the key of a voxel)");
-  app.add_option("--bodies", a.bodies, "the features' bodies for --pair, by name, one for both; default: the first body")
+  app.add_option(
+      "--pair", a.pairs,
+      "the pair's way through the stages: VF:v,a,b,c (vertex, face), EE:a,b,c,d (two edges), or with the map "
+      "VX:v,x,y,z, EX:a,b,x,y,z, FX:a,b,c,x,y,z (vertex, edge or face, and the key of a voxel)");
+  app.add_option("--bodies", a.bodies,
+                 "the features' bodies for --pair, by name, one for both; default: the first body")
       ->expected(1, 2);
-  app.add_option("--threads", a.threads, "worker threads; the answer does not depend on them")->check(CLI::Range(1, 256))
+  app.add_option("--threads", a.threads, "worker threads; the answer does not depend on them")
+      ->check(CLI::Range(1, 256))
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto; the answer does not depend on it")->capture_default_str();
   app.add_option("--show", a.show, "contacts to list")->capture_default_str();
@@ -44,7 +47,8 @@ std::vector<std::uint32_t> numbersOf(const std::string& text, std::size_t count)
     std::int64_t number = -1;
     char comma = ',';
     if ((!numbers.empty() && !(in >> comma)) || comma != ',' || !(in >> number) || number < 0 || number >= NO_INDEX) {
-      throw std::invalid_argument("--pair " + text + ": " + std::to_string(count) + " numbers are needed, separated by commas");
+      throw std::invalid_argument("--pair " + text + ": " + std::to_string(count) +
+                                  " numbers are needed, separated by commas");
     }
     numbers.push_back(static_cast<std::uint32_t>(number));
   }
@@ -75,17 +79,20 @@ std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, cons
   }
   const std::size_t vertices = kind == "VX:" ? 1 : kind == "EX:" ? 2 : kind == "FX:" ? 3 : 0;
   if (vertices == 0) {
-    throw std::invalid_argument("--pair " + text + ": write VF:v,a,b,c, EE:a,b,c,d, VX:v,x,y,z, EX:a,b,x,y,z or FX:a,b,c,x,y,z");
+    throw std::invalid_argument("--pair " + text +
+                                ": write VF:v,a,b,c, EE:a,b,c,d, VX:v,x,y,z, EX:a,b,x,y,z or FX:a,b,c,x,y,z");
   }
   static const PairKind KINDS[] = {PairKind::VERTEX_VOXEL_FACE, PairKind::EDGE_VOXEL_EDGE, PairKind::FACE_VOXEL_CORNER};
   std::vector<std::uint32_t> numbers = numbersOf(text, vertices + 3);
   const std::uint32_t* key = numbers.data() + vertices;
-  if (*std::max_element(key, key + 3) > 65535) throw std::invalid_argument("--pair " + text + ": a voxel's key is at most 65535");
+  if (*std::max_element(key, key + 3) > 65535)
+    throw std::invalid_argument("--pair " + text + ": a voxel's key is at most 65535");
   VoxelQuestion q;
   q.kind = KINDS[vertices - 1];
   q.body = bodyOf(a, 0, recording);
   q.vertex.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(vertices));
-  q.voxel = {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]), static_cast<std::uint16_t>(key[2])};
+  q.voxel = {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]),
+             static_cast<std::uint16_t>(key[2])};
   return traceVoxel(input, bodies, recording.options, recording.map, q);
 }
 
@@ -110,27 +117,30 @@ void trace(const Arguments& a, const StepRecording& recording) {
     std::size_t part = 0;
     for (const TraceLine& line : traceOf(text, a, recording, input, bodies)) {
       if (line.part != part) std::cout << "  part " << (part = line.part) + 1 << " of the step\n";
-      std::cout << "  " << std::left << std::setw(15) << line.stage << std::setw(10) << toString(line.says) << line.text << '\n';
+      std::cout << "  " << std::left << std::setw(15) << line.stage << std::setw(10) << toString(line.says) << line.text
+                << '\n';
     }
   }
 }
 
 void describe(const StepRecording& r) {
-  std::cout << std::fixed << std::setprecision(9) << "step " << r.sequence << " from " << static_cast<double>(r.start_ns) * 1e-9
-            << " s to " << static_cast<double>(r.stamp_ns) * 1e-9 << " s, accuracy "
-            << toString(r.options.detector.accuracy.rung) << "; " << r.note << '\n' << std::defaultfloat;
+  std::cout << std::fixed << std::setprecision(9) << "step " << r.sequence << " from "
+            << static_cast<double>(r.start_ns) * 1e-9 << " s to " << static_cast<double>(r.stamp_ns) * 1e-9
+            << " s, accuracy " << toString(r.options.detector.accuracy.rung) << "; " << r.note << '\n'
+            << std::defaultfloat;
   for (const RecordedBody& body : r.bodies) {
-    std::cout << "  body '" << body.setup.name << "': " << body.t0.size() << " vertices, " << body.topology->faces().size()
-              << " faces\n";
+    std::cout << "  body '" << body.setup.name << "': " << body.t0.size() << " vertices, "
+              << body.topology->faces().size() << " faces\n";
   }
   if (r.map.surface) std::cout << "  map: " << r.map.surface->leafCount() << " occupied leaves\n";
 }
 
 void show(const RecordedAnswer& answer, const StepRecording& recording, std::size_t most) {
   std::cout << "replayed: " << toString(answer.status) << ", " << answer.contacts.size() << " contacts, start state "
-            << toString(answer.start_state) << '\n' << std::setprecision(17);
+            << toString(answer.start_state) << '\n'
+            << std::setprecision(17);
   for (std::size_t i = 0; i < std::min(most, answer.contacts.size()); ++i) {
-    const core::Contact& c = answer.contacts[i];
+    const Contact& c = answer.contacts[i];
     std::cout << "  " << describeContact(c, recording.bodies) << "  toc [" << c.toc_lower << ", " << c.toc_upper << "]"
               << (c.certainty == Certainty::UNDECIDED ? " undecided" : "") << (c.initial ? " initial" : "")
               << (c.leaving ? " leaving" : "") << '\n';
@@ -152,8 +162,9 @@ int replay(const Arguments& a) {
   }
   for (const std::string& line : result.differences) std::cout << "differs: " << line << '\n';
   if (!result.differences.empty()) return 1;
-  std::cout << (recording.answer.complete ? "the same as recorded, bit for bit\n"
-                                          : "the recorded step ran out of its budget; what it was certain of is confirmed\n");
+  std::cout << (recording.answer.complete
+                    ? "the same as recorded, bit for bit\n"
+                    : "the recorded step ran out of its budget; what it was certain of is confirmed\n");
   return 0;
 }
 

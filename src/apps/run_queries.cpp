@@ -15,28 +15,28 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
-#include "detector/toc_bound.h"
-#include "io/query_file.h"
+#include "dccd/elementary.h"
+#include "oracle/oracle.h"
+#include "oracle/promises.h"
+#include "oracle/query_file.h"
+#include "projection/toc_bound.h"
 #include "simd/fused_filter.h"
-#include "support/oracle.h"
-#include "support/promises.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 /// The filters alone, as the step runs them: what they cannot reject is undecided, with the linear filter's bound.
-class ScreenTest : public ElementaryTest {
+class ScreenRung : public Rung {
  public:
   void run(const PairBatch& batch, ElementaryResult* results, TierCounters&) const override {
     for (std::size_t i = 0; i < batch.count; ++i) {
       const double bound = linearTocBound(batch.kind, batch.vertices, batch.pairs[i], 0);
       std::uint32_t kept;
-      const bool separated = bound > 1 || simd::fusedFilter(batch.vertices->t0, batch.pairs[i].data(), 1,
-                                                            batch.kind == PairKind::EDGE_EDGE,
-                                                            simd::FusedPlanes::ALL, &kept) == 0;
+      const bool separated =
+          bound > 1 || simd::fusedFilter(batch.vertices->t0, batch.pairs[i].data(), 1,
+                                         batch.kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, &kept) == 0;
       results[i] = ElementaryResult{};
       results[i].toc_lower = std::min(bound, 1.0);
       if (separated) results[i].verdict = Verdict::NO_CONTACT;
@@ -62,9 +62,9 @@ struct Row {
   }
 };
 
-struct Rung {
+struct JudgedRung {
   AccuracyOptions options;
-  std::unique_ptr<ElementaryTest> test;
+  std::unique_ptr<Rung> test;
 };
 
 /// A query in the form that the rungs take.
@@ -84,14 +84,14 @@ struct Pair {
   }
 };
 
-double nanosecondsOf(const ElementaryTest& test, const Pair& pair, int calls, ElementaryResult& result) {
+double nanosecondsOf(const Rung& test, const Pair& pair, int calls, ElementaryResult& result) {
   TierCounters counters;
   const Clock::time_point begin = Clock::now();
   for (int i = 0; i < calls; ++i) test.run(pair.batch, &result, counters);
   return std::chrono::duration<double, std::nano>(Clock::now() - begin).count() / calls;
 }
 
-double bestNanoseconds(const ElementaryTest& test, const Pair& pair, ElementaryResult& result) {
+double bestNanoseconds(const Rung& test, const Pair& pair, ElementaryResult& result) {
   constexpr int REPEATS = 5;
   constexpr double SAMPLE_NS = 1000;
   const double once = nanosecondsOf(test, pair, 1, result);
@@ -117,7 +117,7 @@ using RowKey = std::pair<std::string, PairKind>;
 /// Runs all rungs on all queries below the folders, collecting complaints on stderr.
 class Runner {
  public:
-  explicit Runner(const std::vector<Rung>& rungs) : rungs_(rungs) {}
+  explicit Runner(const std::vector<JudgedRung>& rungs) : rungs_(rungs) {}
 
   void runFolder(const std::string& dir) {
     const std::vector<QueryFileEntry> files = findQueryFiles(dir);
@@ -152,31 +152,31 @@ class Runner {
     }
   }
 
-  const std::vector<Rung>& rungs_;
+  const std::vector<JudgedRung>& rungs_;
   std::map<RowKey, std::vector<Row>> rows_;
   std::size_t complaints_ = 0;
 };
 
-std::vector<Rung> makeRungs(const std::string& accuracy, const AccuracyOptions& options) {
-  std::vector<Rung> rungs;
+std::vector<JudgedRung> makeRungs(const std::string& accuracy, const AccuracyOptions& options) {
+  std::vector<JudgedRung> rungs;
   for (const Accuracy each : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
     if (accuracy != "all" && accuracyFromString(accuracy.c_str()) != each) continue;
-    Rung rung;
+    JudgedRung rung;
     rung.options = options;
     rung.options.rung = each;
     if (each == Accuracy::SCREEN) {
-      rung.test = std::make_unique<ScreenTest>();
+      rung.test = std::make_unique<ScreenRung>();
     } else {
-      rung.test = makeElementaryTest(rung.options);
+      rung.test = makeRung(rung.options);
     }
     rungs.push_back(std::move(rung));
   }
   return rungs;
 }
 
-constexpr const char* COLUMNS[] = {"family",    "kind",    "rung",      "queries",   "contacts",
-                                   "false_negatives", "false_positives", "undecided", "mean_ns",
-                                   "median_ns", "p99_ns",  "max_ns",    "max_toc_error"};
+constexpr const char* COLUMNS[] = {
+    "family",    "kind",    "rung",      "queries", "contacts", "false_negatives", "false_positives",
+    "undecided", "mean_ns", "median_ns", "p99_ns",  "max_ns",   "max_toc_error"};
 
 std::string formatted(const char* format, double value) {
   char text[64];
@@ -185,7 +185,7 @@ std::string formatted(const char* format, double value) {
 }
 
 /// The cells of a row. Sorts the row's times.
-std::vector<std::string> cellsOf(const std::string& family, const std::string& kind, const Rung& rung, Row row) {
+std::vector<std::string> cellsOf(const std::string& family, const std::string& kind, const JudgedRung& rung, Row row) {
   std::sort(row.nanoseconds.begin(), row.nanoseconds.end());
   const auto quantile = [&](double q) {
     return row.nanoseconds[std::min(row.nanoseconds.size() - 1, static_cast<std::size_t>(q * row.queries))];
@@ -205,7 +205,7 @@ std::vector<std::string> cellsOf(const std::string& family, const std::string& k
 using Cells = std::vector<std::vector<std::string>>;
 
 /// A row per family, kind and rung; for the table also one over everything per rung.
-Cells makeCells(const std::vector<Rung>& rungs, const std::map<RowKey, std::vector<Row>>& rows, bool with_total) {
+Cells makeCells(const std::vector<JudgedRung>& rungs, const std::map<RowKey, std::vector<Row>>& rows, bool with_total) {
   Cells cells = {{std::begin(COLUMNS), std::end(COLUMNS)}};
   std::vector<Row> total(rungs.size());
   for (const auto& [key, per_rung] : rows) {
@@ -252,7 +252,7 @@ void printTable(const Cells& cells) {
 
 int runQueries(const std::vector<std::string>& dirs, const std::string& accuracy, const AccuracyOptions& options,
                bool as_csv) {
-  const std::vector<Rung> rungs = makeRungs(accuracy, options);
+  const std::vector<JudgedRung> rungs = makeRungs(accuracy, options);
   Runner runner(rungs);
   for (const std::string& dir : dirs) runner.runFolder(dir);
   const Cells cells = makeCells(rungs, runner.rows(), !as_csv);
@@ -262,16 +262,17 @@ int runQueries(const std::vector<std::string>& dirs, const std::string& accuracy
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
-  CLI::App app{"Runs hard queries: wrong answers, time per query and error of the time of contact for each rung.\n"
-               "DIR holds FAMILY/{vertex-face,edge-edge}/*.csv, or is one such family. 'contacts' are the true ones;\n"
-               "max_toc_error is in steps, against exact arithmetic. Exit status: 0 every promise kept, 1 one broken\n"
-               "or a truth column wrong (listed on stderr), 2 bad input."};
+  CLI::App app{
+      "Runs hard queries: wrong answers, time per query and error of the time of contact for each rung.\n"
+      "DIR holds FAMILY/{vertex-face,edge-edge}/*.csv, or is one such family. 'contacts' are the true ones;\n"
+      "max_toc_error is in steps, against exact arithmetic. Exit status: 0 every promise kept, 1 one broken\n"
+      "or a truth column wrong (listed on stderr), 2 bad input."};
   std::vector<std::string> dirs;
   std::string accuracy = "all", format = "table";
-  deformable_ccd::AccuracyOptions options;
+  dccd::AccuracyOptions options;
   app.add_option("DIR", dirs, "folders of query files")->required();
   app.add_option("--accuracy", accuracy, "rung")
       ->check(CLI::IsMember({"screen", "fast", "conservative", "exact", "all"}))
@@ -282,7 +283,7 @@ int main(int argc, char** argv) {
   app.add_option("--max-subdivisions", options.max_subdivisions, "conservative: cap per pair")->capture_default_str();
   try {
     app.parse(argc, argv);
-    return deformable_ccd::runQueries(dirs, accuracy, options, format == "csv");
+    return dccd::runQueries(dirs, accuracy, options, format == "csv");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {

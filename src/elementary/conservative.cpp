@@ -10,7 +10,7 @@
 #include "elementary/rungs.h"
 #include "simd/exact_batch.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched test lie on the stack at once
@@ -22,9 +22,9 @@ struct BlockOutput {
   double lo[BLOCK], hi[BLOCK];
 };
 
-class ConservativeTest : public ElementaryTest {
+class ConservativeRung : public Rung {
  public:
-  explicit ConservativeTest(const AccuracyOptions& options) : options_(options) {}
+  explicit ConservativeRung(const AccuracyOptions& options) : options_(options) {}
   void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const override;
 
  private:
@@ -36,7 +36,7 @@ class ConservativeTest : public ElementaryTest {
 
 /// What the batched test's answer is worth: NO as it stands, YES when the bracket of the TOC is so narrow that at its
 /// lower end the features are within the tolerance, UNDECIDED otherwise.
-ElementaryResult ConservativeTest::fromBatch(PairKind kind, const conservative::Corners& corners,
+ElementaryResult ConservativeRung::fromBatch(PairKind kind, const conservative::Corners& corners,
                                              const BlockOutput& output, std::size_t i) const {
   ElementaryResult result;
   result.tier = Tier::DOUBLE_BATCH;
@@ -56,7 +56,7 @@ ElementaryResult ConservativeTest::fromBatch(PairKind kind, const conservative::
   return result;
 }
 
-void ConservativeTest::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("conservative test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");
@@ -71,8 +71,8 @@ void ConservativeTest::run(const PairBatch& batch, ElementaryResult* results, Ti
     input.vertices = batch.vertices->t0;
     input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
     input.count = std::min(BLOCK, batch.count - begin);
-    const bool batched = separation == nullptr || std::find(separation, separation + input.count, 0.0) !=
-                                                      separation + input.count;
+    const bool batched =
+        separation == nullptr || std::find(separation, separation + input.count, 0.0) != separation + input.count;
     if (batched) simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
     for (std::size_t i = 0; i < input.count; ++i) {
       const Quad& quad = batch.pairs[begin + i];
@@ -91,8 +91,8 @@ void ConservativeTest::run(const PairBatch& batch, ElementaryResult* results, Ti
 
 }  // namespace
 
-std::unique_ptr<ElementaryTest> makeConservativeTest(const AccuracyOptions& options) {
-  return std::make_unique<ConservativeTest>(options);
+std::unique_ptr<Rung> makeConservativeRung(const AccuracyOptions& options) {
+  return std::make_unique<ConservativeRung>(options);
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

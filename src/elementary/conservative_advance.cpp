@@ -23,24 +23,21 @@
 #include <algorithm>
 #include <cmath>
 
-namespace deformable_ccd {
+#include "dccd/tolerances.h"
+
+namespace dccd {
 namespace conservative {
 namespace {
 
-constexpr double EPS = 0x1p-53;
-constexpr double SEPARATION_ERROR = 6.5 * EPS;
-constexpr double LENGTH_ERROR = 8 * EPS;
-constexpr double POINT_ERROR = 64 * EPS;
-constexpr double SMALLEST = 1e-140;
-constexpr double LARGEST = 1e70;  ///< products of four lengths stay finite
+constexpr double SMALLEST = tolerance::ADVANCE_SMALLEST_M, LARGEST = tolerance::ADVANCE_LARGEST_M;
+constexpr double SEPARATION_ERROR = tolerance::ADVANCE_SEPARATION, LENGTH_ERROR = tolerance::ADVANCE_LENGTH,
+                 POINT_ERROR = tolerance::ADVANCE_POINT;
 
 struct Vec {
   double x, y, z;
 };
 Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+Vec cross(const Vec& a, const Vec& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 Vec operator+(const Vec& a, const Vec& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 Vec operator*(double s, const Vec& a) { return {s * a.x, s * a.y, s * a.z}; }
 double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -116,7 +113,7 @@ Connection inside(const Vec& vector, const Vec& normal, const Vec& w) {
 }
 
 /// Cross products of vectors at less than this angle squared are mostly rounding error.
-constexpr double PARALLEL = 1e-22;
+using tolerance::ADVANCE_PARALLEL;
 
 /// From the triangle 0, u, v to the point w.
 Connection fromTriangle(const Vec& u, const Vec& v, const Vec& w) {
@@ -124,7 +121,7 @@ Connection fromTriangle(const Vec& u, const Vec& v, const Vec& w) {
   const double nn = dot(n, n), beta = dot(cross(w, v), n) / nn, gamma = dot(cross(u, w), n) / nn;
   const bool is_inside = beta >= 0 && gamma >= 0 && beta + gamma <= 1;
   const Connection face = inside((w - beta * u) - gamma * v, n, w);
-  if (is_inside && nn > PARALLEL * (dot(u, u) * dot(v, v))) return face;
+  if (is_inside && nn > ADVANCE_PARALLEL * (dot(u, u) * dot(v, v))) return face;
   const Connection border = shorter(shorter(fromSegment(w, u), fromSegment(w, v)), fromSegment(w - u, v - u));
   return is_inside ? shorter(border, face) : border;
 }
@@ -137,10 +134,9 @@ Connection betweenSegments(const Vec& u, const Vec& v, const Vec& w) {
   const double nn = dot(n, n), s = dot(cross(w, v), n) / nn, r = dot(cross(w, u), n) / nn;
   const bool is_inside = s >= 0 && s <= 1 && r >= 0 && r <= 1;
   const Connection crossing = inside((w - s * u) + r * v, n, w);
-  if (is_inside && nn > PARALLEL * (dot(u, u) * dot(v, v))) return crossing;
-  const Connection border =
-      shorter(shorter(fromSegment(w, u), fromSegment(w + v, u)),
-              reversed(shorter(fromSegment(-1 * w, v), fromSegment(u - w, v))));
+  if (is_inside && nn > ADVANCE_PARALLEL * (dot(u, u) * dot(v, v))) return crossing;
+  const Connection border = shorter(shorter(fromSegment(w, u), fromSegment(w + v, u)),
+                                    reversed(shorter(fromSegment(-1 * w, v), fromSegment(u - w, v))));
   return is_inside ? shorter(border, crossing) : border;
 }
 
@@ -226,4 +222,4 @@ double closingSpeed(PairKind kind, const Corners& corners) {
 }
 
 }  // namespace conservative
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,18 +1,19 @@
 // Conservative advancement with certified rounding: the work of the rung `conservative`.
 #pragma once
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "dccd/tolerances.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace conservative {
 
 /// The four points of a pair over the step, in the order of Quad.
 using Corners = std::array<const VertexMotion*, 4>;
 
 struct Limits {
-  double tolerance_m = 1e-6;         ///< > 0
-  double minimum_separation_m = 0;   ///< >= 0: contact means that the distance is at most this
-  int max_steps = 4096;              ///< then UNDECIDED
+  double tolerance_m = tolerance::CONTACT_M;  ///< > 0
+  double minimum_separation_m = 0;            ///< >= 0: contact means that the distance is at most this
+  int max_steps = 4096;                       ///< then UNDECIDED
 };
 
 /// Advances from t = 0 as long as the features are certainly more than the minimum separation apart.
@@ -26,4 +27,4 @@ ElementaryResult advance(PairKind kind, const Corners& corners, const Limits& li
 double closingSpeed(PairKind kind, const Corners& corners);
 
 }  // namespace conservative
-}  // namespace deformable_ccd
+}  // namespace dccd

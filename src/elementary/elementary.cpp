@@ -1,4 +1,4 @@
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 
 #include <cmath>
 #include <cstring>
@@ -7,7 +7,7 @@
 
 #include "elementary/rungs.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("accuracy options: " + what); }
@@ -26,22 +26,22 @@ void validate(const AccuracyOptions& options) {
 
 }  // namespace
 
-std::unique_ptr<ElementaryTest> makeElementaryTest(const AccuracyOptions& options) {
+std::unique_ptr<Rung> makeRung(const AccuracyOptions& options) {
   validate(options);
   switch (options.rung) {
     case Accuracy::FAST:
-      return makeFastTest(options);
+      return makeFastRung(options);
     case Accuracy::CONSERVATIVE:
-      return makeConservativeTest(options);
+      return makeConservativeRung(options);
     case Accuracy::EXACT:
-      return makeExactTest(options);
+      return makeExactRung(options);
     case Accuracy::SCREEN:
       refuse("rung screen has no elementary test, its answer is the filters'");
   }
   refuse("rung " + std::to_string(static_cast<int>(options.rung)) + " does not exist");
 }
 
-ElementaryResult testPair(const ElementaryTest& test, PairKind kind, const PairMotion& pair) {
+ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pair) {
   VertexMotion vertices[4] = {};
   for (int i = 0; i < 4; ++i) {
     std::memcpy(vertices[i].t0, pair.x[0][i], sizeof pair.x[0][i]);
@@ -116,4 +116,4 @@ Accuracy accuracyFromString(const char* text) {
   throw std::invalid_argument("accuracy: \"" + std::string(text) + "\" is none of screen, fast, conservative, exact");
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

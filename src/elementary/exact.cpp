@@ -11,7 +11,7 @@
 #include "elementary/rungs.h"
 #include "simd/exact_batch.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 PairMotion gather(const VertexMotion* vertices, const Quad& quad) {
@@ -55,7 +55,7 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
 
 }  // namespace
 
-void ExactTest::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("exact test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");
@@ -90,8 +90,8 @@ void ExactTest::run(const PairBatch& batch, ElementaryResult* results, TierCount
   }
 }
 
-std::unique_ptr<ElementaryTest> makeExactTest(const AccuracyOptions& options) {
-  return std::make_unique<ExactTest>(options.toc_bits);
+std::unique_ptr<Rung> makeExactRung(const AccuracyOptions& options) {
+  return std::make_unique<ExactRung>(options.toc_bits);
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -14,7 +14,7 @@
 
 #include "elementary/exact_integer.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 /// c[0] + c[1] t + ... + c[D] t^D.
@@ -189,4 +189,4 @@ int compareBySigns(RootLabel label, int value, First first, Second second) {
 }
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

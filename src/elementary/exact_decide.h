@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 #include "elementary/exact_roots.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 /// A pair's coordinates as integers: mantissa * 2^shift, all below 2^bits in magnitude. The common factor, a power of
@@ -98,8 +98,8 @@ class Decision {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
     Quadratic<Z> result;
     result.c[0] = u.start[i] * v.start[j] - u.start[j] * v.start[i];
-    result.c[1] = (u.start[i] * v.change[j] + u.change[i] * v.start[j]) -
-                  (u.start[j] * v.change[i] + u.change[j] * v.start[i]);
+    result.c[1] =
+        (u.start[i] * v.change[j] + u.change[i] * v.start[j]) - (u.start[j] * v.change[i] + u.change[j] * v.start[i]);
     result.c[2] = u.change[i] * v.change[j] - u.change[j] * v.change[i];
     return result;
   }
@@ -215,4 +215,4 @@ class Decision {
 };
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

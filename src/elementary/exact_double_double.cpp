@@ -23,7 +23,9 @@
 #include <cmath>
 #include <limits>
 
-namespace deformable_ccd {
+#include "dccd/tolerances.h"
+
+namespace dccd {
 namespace exact {
 namespace {
 
@@ -81,7 +83,7 @@ Factor minor(const Factor& a, const Factor& b, const Factor& c, const Factor& d)
 CoplanarityCubic::CoplanarityCubic(PairKind kind, const PairMotion& pair) {
   static constexpr int ENDS[2][3][2] = {{{1, 2}, {1, 3}, {1, 0}}, {{0, 1}, {2, 3}, {0, 2}}};  // from, to
   const auto& ends = ENDS[kind == PairKind::VERTEX_FACE ? 0 : 1];
-  constexpr double SMALLEST = 0x1p-300, LARGEST = 0x1p300;
+  constexpr double SMALLEST = tolerance::CUBIC_SMALLEST_M3, LARGEST = tolerance::CUBIC_LARGEST_M3;
   double volume = 1;
   bool in_range = true;
   for (int i = 0; i < 3; ++i) {
@@ -174,7 +176,7 @@ struct Tangent {
 
 std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits) {
   constexpr int MOST_STEPS = 16;  // Newton's; from the batched tier's brackets one or two suffice
-  constexpr double GRID = 0x1p-52;
+  constexpr double GRID = tolerance::TIME_GRID;
   const double cells = std::ldexp(1.0, toc_bits), width = 1 / cells;
   auto low = static_cast<std::int64_t>(lo * cells);  // exact, like all products with cells and width
   auto high = static_cast<std::int64_t>(std::ceil(hi * cells));
@@ -209,4 +211,4 @@ std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc
 }
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 /// An unevaluated sum.
@@ -43,7 +43,7 @@ class CoplanarityCubic {
 
   DoubleDouble difference_[2][3][3];  // at t = 0 and 1; u, v, w; axis
   double size_[3];
-  double error_;                      // infinite where the differences are too large or too small for the bound
+  double error_;  // infinite where the differences are too large or too small for the bound
   double rough_error_;
   double slope_error_;
   double most_curvature_;
@@ -54,4 +54,4 @@ class CoplanarityCubic {
 std::int64_t cellOfRoot(const CoplanarityCubic& f, double lo, double hi, int toc_bits);
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-namespace deformable_ccd {
+namespace dccd {
 
 static_assert(GMP_NUMB_BITS == 64, "limbs of 64 bits without nails");
 
@@ -161,7 +161,7 @@ class StackInteger {
     return result;
   }
 
-  int size_ = 0;  ///< limbs in use, negative for a negative number
+  int size_ = 0;                ///< limbs in use, negative for a negative number
   mp_limb_t limbs_[LIMBS + 1];  ///< a product's limbs as multiplied: the highest may be zero
 };
 
@@ -230,4 +230,4 @@ class BigInteger {
   mpz_t value_;
 };
 
-}  // namespace deformable_ccd
+}  // namespace dccd

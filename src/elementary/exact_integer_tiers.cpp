@@ -3,7 +3,7 @@
 #include "elementary/exact_decide.h"
 #include "elementary/exact_tiers.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 static_assert(workingBits(FIXED_INTEGER_MAX_BITS) <= StackInteger<FIXED_INTEGER_LIMBS>::CAPACITY_BITS,
@@ -62,4 +62,4 @@ ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int 
 }
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

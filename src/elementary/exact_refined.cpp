@@ -12,15 +12,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dccd/tolerances.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 namespace {
 
-constexpr double LEAST_ZONE = 0x1p-40;  ///< half the width around an extremum, see setExtrema()
-constexpr int HALVINGS = 6;             ///< of a piece on which f' is uncertain
+constexpr double LEAST_ZONE = tolerance::EXTREMUM_ZONE;  ///< half the width around an extremum, see setExtrema()
+constexpr int HALVINGS = 6;                              ///< of a piece on which f' is uncertain
 
 enum class Outcome { FREE, CONTACT, UNCERTAIN };
 
@@ -136,7 +137,7 @@ class RefinedDecision {
     for (int i = 0; i < 3; ++i) {
       for (int k = 0; k < 3; ++k) x[i][k] = f_.difference(0, i, k) * (1 - m) + f_.difference(1, i, k) * m;
     }
-    constexpr double RELATIVE = 48 * 0x1p-53;
+    constexpr double RELATIVE = tolerance::INSIDE_MINOR;
     const double error_n = RELATIVE * f_.size(0) * f_.size(1), error_b = RELATIVE * f_.size(1) * f_.size(2);
     const double error_c = RELATIVE * f_.size(0) * f_.size(2);
     for (int k = 0; k < 3; ++k) {
@@ -182,4 +183,4 @@ ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int
 }
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

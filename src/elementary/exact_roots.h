@@ -6,7 +6,7 @@
 
 #include "elementary/exact_algebra.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 template <class Z>
@@ -161,10 +161,10 @@ class PolynomialRoots {
     return smaller == 0 ? 0 : smaller > 0 ? leading : -leading;
   }
 
-  Cubic<Z> f_;                         ///< leading coefficient > 0
-  Quadratic<Z> first_;                 ///< derivatives of f, where its degree is 3
+  Cubic<Z> f_;          ///< leading coefficient > 0
+  Quadratic<Z> first_;  ///< derivatives of f, where its degree is 3
   Polynomial<Z, 1> second_;
-  Quadratic<Z> quadratic_;             ///< what SMALLER and LARGER are roots of: f, or f' for a repeated root
+  Quadratic<Z> quadratic_;  ///< what SMALLER and LARGER are roots of: f, or f' for a repeated root
   Polynomial<Z, 1> quadratic_first_;
   int grid_bits_;
   int degree_;
@@ -174,4 +174,4 @@ class PolynomialRoots {
 };
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -11,7 +11,7 @@
 
 #include "elementary/exact_tiers.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 namespace {
 
@@ -78,4 +78,4 @@ ElementaryResult decideBySubdivision(PairKind kind, const PairMotion& pair) {
 }
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

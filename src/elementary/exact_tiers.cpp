@@ -7,7 +7,7 @@
 
 #include "simd/exact_batch.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier) {
@@ -87,4 +87,4 @@ ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair
 }
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 
 /// Bits per coordinate, after scaling the pair to integers, up to which the fixed-width integers are wide enough.
@@ -37,4 +37,4 @@ ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int 
 ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair, int toc_bits);
 
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,17 +7,17 @@
 #include "elementary/rungs.h"
 #include "simd/exact_batch.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs lie on the stack at once
 
-class FastTest : public ElementaryTest {
+class FastRung : public Rung {
  public:
   void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const override;
 };
 
-void FastTest::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+void FastRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("fast test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");
@@ -51,6 +51,6 @@ void FastTest::run(const PairBatch& batch, ElementaryResult* results, TierCounte
 
 }  // namespace
 
-std::unique_ptr<ElementaryTest> makeFastTest(const AccuracyOptions&) { return std::make_unique<FastTest>(); }
+std::unique_ptr<Rung> makeFastRung(const AccuracyOptions&) { return std::make_unique<FastRung>(); }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,14 +1,14 @@
-// The rungs that makeElementaryTest() chooses between. Options are validated there, once for all of them.
+// The rungs that makeRung() chooses between. Options are validated there, once for all of them.
 #pragma once
 
 #include <memory>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
-std::unique_ptr<ElementaryTest> makeFastTest(const AccuracyOptions& options);
-std::unique_ptr<ElementaryTest> makeConservativeTest(const AccuracyOptions& options);
-std::unique_ptr<ElementaryTest> makeExactTest(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeFastRung(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeConservativeRung(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeExactRung(const AccuracyOptions& options);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

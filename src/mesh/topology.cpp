@@ -1,9 +1,9 @@
-#include "deformable_ccd/topology.h"
+#include "dccd/topology.h"
 
 #include <algorithm>
 #include <numeric>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 std::string faceText(std::size_t i, const Face& f) {
@@ -106,4 +106,4 @@ void Topology::finish() {
   }
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,9 @@
 
 #include <gmp.h>
 
-namespace deformable_ccd {
+#include "dccd/tolerances.h"
+
+namespace dccd {
 namespace {
 
 /// A rational number; doubles convert exactly.
@@ -38,9 +40,8 @@ class Rational {
 };
 
 /// Products of differences above this and below its inverse neither overflow nor lose bits to underflow.
-constexpr double TINY = 0x1p-300, LARGE = 0x1p300;
-/// 2^-53, the largest relative error of one rounded operation.
-constexpr double HALF_ULP = 0x1p-53;
+constexpr double TINY = tolerance::PREDICATE_SMALLEST, LARGE = tolerance::PREDICATE_LARGEST;
+using tolerance::HALF_ULP, tolerance::PREDICATE_LARGEST_M, tolerance::PREDICATE_SMALLEST_M;
 
 /// Whether the rounded difference a - b has no error; a and b of moderate size.
 bool differenceIsExact(double a, double b, double difference) {
@@ -60,7 +61,9 @@ double productError(double a, double b, double product) {
 }
 
 /// Products of two such differences neither overflow nor lose bits to underflow, nor do their errors.
-bool isModerate(double difference) { return std::abs(difference) > 0x1p-140 && std::abs(difference) < 0x1p140; }
+bool isModerate(double difference) {
+  return std::abs(difference) > PREDICATE_SMALLEST_M && std::abs(difference) < PREDICATE_LARGEST_M;
+}
 
 int signOf(double value) { return (value > 0) - (value < 0); }
 
@@ -94,7 +97,7 @@ int orientation2d(double p0x, double p0y, double p1x, double p1y, double qx, dou
   const double largest = std::max(std::max(std::abs(ex), std::abs(ey)), std::max(std::abs(dx), std::abs(dy)));
   const auto moderate = [](double product) { return product == 0 || std::abs(product) > TINY; };
   const bool zero_left = ex == 0 || dy == 0, zero_right = ey == 0 || dx == 0;
-  if (largest < 0x1p140 && (zero_left || moderate(left)) && (zero_right || moderate(right)) &&
+  if (largest < PREDICATE_LARGEST_M && (zero_left || moderate(left)) && (zero_right || moderate(right)) &&
       (left != 0 || zero_left) && (right != 0 || zero_right)) {
     if (zero_left && zero_right) return 0;
     if (differenceIsExact(p1x, p0x, ex) && differenceIsExact(p1y, p0y, ey) && differenceIsExact(qx, p0x, dx) &&
@@ -169,8 +172,8 @@ std::int64_t timeCell(const CrossingTime& time, int bits) {
   // A guess is a few cells off at most. Where the differences are exact, so is this comparison of numerator * 2^bits
   // with k * denominator; that settles times on the grid, such as one half.
   const double n = time.plane - time.from, d = time.to - time.from;
-  if (time.certain && std::abs(n) > TINY && std::abs(d) < 0x1p140 && differenceIsExact(time.plane, time.from, n) &&
-      differenceIsExact(time.to, time.from, d)) {
+  if (time.certain && std::abs(n) > TINY && std::abs(d) < PREDICATE_LARGEST_M &&
+      differenceIsExact(time.plane, time.from, n) && differenceIsExact(time.to, time.from, d)) {
     const double target = std::abs(n) * scale, unit = std::abs(d);
     const auto reached = [target, unit](std::int64_t k) {
       const double product = static_cast<double>(k) * unit;
@@ -191,4 +194,4 @@ std::int64_t timeCell(const CrossingTime& time, int bits) {
   return cell;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 
-namespace deformable_ccd {
+#include "dccd/tolerances.h"
+
+namespace dccd {
 
 /// Sign of (p1 - p0) x (q - p0) in the plane of two coordinates, exact: +1 where q lies left of p0 p1.
 int orientation2d(double p0x, double p0y, double p1x, double p1y, double qx, double qy);
@@ -24,7 +26,7 @@ struct CrossingTime {
 };
 
 /// Two differences and a quotient, each rounded once: 3.01 * 2^-53, and slack for comparing two of them in double.
-constexpr double CROSSING_ERROR = 8.0 / 9007199254740992.0;
+constexpr double CROSSING_ERROR = tolerance::CROSSING_TIME;
 
 /// Sign of a - b, exact.
 int compare(const CrossingTime& a, const CrossingTime& b);
@@ -38,4 +40,4 @@ inline int compareToOne(const CrossingTime& time) {
 /// floor(time * 2^bits), exact. The time must be at most 1; bits 10 to 52.
 std::int64_t timeCell(const CrossingTime& time, int bits);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr std::size_t MAX_VISITS = std::size_t{1} << 24;
@@ -31,7 +31,8 @@ class Splitter {
     // The whole cube, or for a finest voxel its centre.
     const Vec3 within = leaf.size == 1 ? Vec3(Vec3::Zero()) : reach;
     const bool inside = any([&](const Box& box) {
-      return ((centre - within).array() >= box.min.array()).all() && ((centre + within).array() <= box.max.array()).all();
+      return ((centre - within).array() >= box.min.array()).all() &&
+             ((centre + within).array() <= box.max.array()).all();
     });
     if (inside) {
       remaining_.excluded_voxels += std::uint64_t{leaf.size} * leaf.size * leaf.size;
@@ -79,4 +80,4 @@ RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double re
   return splitter.take();
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,19 +4,20 @@
 #include <cstdint>
 #include <vector>
 
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct RemainingLeaves {
   std::vector<OccupiedLeaf> leaves;
   std::uint64_t excluded_voxels = 0;  ///< finest ones
 };
 
-/// Leaves without the finest voxels whose centre lies in one of the boxes (closed, in the fixed frame [m]). A leaf that a
-/// box cuts is split. Taken out of the map, not of its contacts: what lies behind an excluded voxel is exposed by that.
-/// Bounded work: after 2^24 cubes that were looked at, leaves are kept whole, so that nothing is hidden that should not be.
+/// Leaves without the finest voxels whose centre lies in one of the boxes (closed, in the fixed frame [m]). A leaf that
+/// a box cuts is split. Taken out of the map, not of its contacts: what lies behind an excluded voxel is exposed by
+/// that. Bounded work: after 2^24 cubes that were looked at, leaves are kept whole, so that nothing is hidden that
+/// should not be.
 RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double resolution_m,
                               const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

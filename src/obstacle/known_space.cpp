@@ -1,4 +1,4 @@
-#include "deformable_ccd/known_space.h"
+#include "dccd/known_space.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,10 @@
 #include <string>
 #include <utility>
 
+#include "dccd/tolerances.h"
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Coverage = VoxelTree::Coverage;
@@ -85,8 +86,8 @@ void uniteBlocks(std::vector<TouchedBlock>& blocks) {
   blocks.resize(kept);
 }
 
-/// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to twice
-/// the limit is held before they are united, so that this comes seldom.
+/// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to
+/// twice the limit is held before they are united, so that this comes seldom.
 bool addBlocks(const KeyBox& keys, std::size_t limit, std::vector<TouchedBlock>& blocks) {
   std::size_t count = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -133,8 +134,9 @@ struct KnownSpace::Impl {
   VoxelTree tree;
 };
 
-std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m, const std::vector<OccupiedLeaf>& known_leaves) {
-  if (!(resolution_m >= 1e-290 && resolution_m <= 1e290)) {
+std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
+                                                    const std::vector<OccupiedLeaf>& known_leaves) {
+  if (!(resolution_m >= tolerance::SMALLEST_RESOLUTION_M && resolution_m <= tolerance::LARGEST_RESOLUTION_M)) {
     throw std::invalid_argument("resolution_m is " + std::to_string(resolution_m) +
                                 ", which is not a length from 1e-290 to 1e290 m");
   }
@@ -211,4 +213,4 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   return swept;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <cstring>
 
-#include "deformable_ccd/types.h"
+#include "dccd/types.h"
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// A key box in eight 16-bit lanes, keys less 32768, upper ends complemented: the union of boxes is the minimum of the
 /// lanes, one instruction on any SIMD target. Lanes 3 and 7 are unused.
@@ -45,4 +45,4 @@ inline KeyLanes pointKeys(const Vec3& p, double inverse_resolution, double reach
   return keys;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

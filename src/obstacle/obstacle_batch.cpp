@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 Vec3 at(const VertexMotion& v, double t) {
@@ -61,7 +61,7 @@ void join(Contact& into, const Contact& other) {
 
 }  // namespace
 
-ObstacleBatch::ObstacleBatch(PairKind kind, const ElementaryTest* test) : kind_(kind), test_(test) {
+ObstacleBatch::ObstacleBatch(PairKind kind, const Rung* test) : kind_(kind), test_(test) {
   quads_.resize(CHUNK);
   for (std::size_t i = 0; i < CHUNK; ++i) {
     for (std::size_t k = 0; k < 4; ++k) quads_[i][k] = static_cast<Index>(4 * i + k);
@@ -145,4 +145,4 @@ void sortAndJoin(std::vector<Contact>& contacts) {
   contacts.resize(kept);
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

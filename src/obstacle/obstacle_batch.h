@@ -4,24 +4,24 @@
 #include <cstdint>
 #include <vector>
 
-#include "deformable_ccd/contact.h"
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/contact.h"
+#include "dccd/voxel_surface.h"
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// What a pair becomes when it is in contact: the parts of the contact that do not depend on the test.
 struct ObstaclePair {
-  Contact contact;         ///< all but times and certainty
-  double outward[3];       ///< direction out of the leaf at its feature, any length
-  bool started_inside;     ///< the mesh feature touched the obstacle at t=0
+  Contact contact;      ///< all but times and certainty
+  double outward[3];    ///< direction out of the leaf at its feature, any length
+  bool started_inside;  ///< the mesh feature touched the obstacle at t=0
 };
 
 /// Collects pairs of one elementary kind and appends what the rung finds to a vector of contacts. Reuses its memory.
 class ObstacleBatch {
  public:
   /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`.
-  ObstacleBatch(PairKind kind, const ElementaryTest* test);
+  ObstacleBatch(PairKind kind, const Rung* test);
 
   /// Drops whatever an earlier run left behind.
   void clear();
@@ -38,7 +38,7 @@ class ObstacleBatch {
 
   static constexpr std::size_t CHUNK = 512;
   PairKind kind_;
-  const ElementaryTest* test_;
+  const Rung* test_;
   bool any_separation_ = false;  // of the pairs that wait
   std::vector<ObstaclePair> pairs_;
   std::vector<double> toc_bounds_;
@@ -54,4 +54,4 @@ class ObstacleBatch {
 /// it is certain when any of them is.
 void sortAndJoin(std::vector<Contact>& contacts);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

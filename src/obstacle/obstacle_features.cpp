@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "obstacle/obstacle_test_impl.h"
+#include "obstacle/obstacle_check_impl.h"
 #include "obstacle/start_contact.h"
 #include "obstacle/static_filters.h"
 #include "obstacle/vertex_path.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// The smallest box around moving points at t=0 and t=1, and over the step (swept), the last inflated by the reach.
 struct MovingBounds {
@@ -78,7 +78,7 @@ int fallAxis(const VertexMotion* points, std::size_t count) {
 
 }  // namespace
 
-Contact ObstacleTest::Impl::contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const {
+Contact ObstacleCheck::Impl::contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const {
   const OccupiedLeaf& occupied = run.surface->tree.leaves()[leaf];
   Contact contact;
   contact.kind = kind;
@@ -88,13 +88,13 @@ Contact ObstacleTest::Impl::contactOf(const Run& run, PairKind kind, std::uint32
   return contact;
 }
 
-void ObstacleTest::Impl::setInitial(Contact& contact) {
+void ObstacleCheck::Impl::setInitial(Contact& contact) {
   contact.initial = true;
   contact.toc_lower = 0;
   contact.toc_upper = options.accuracy.rung == Accuracy::EXACT ? std::ldexp(1.0, -options.accuracy.toc_bits) : 0.0;
 }
 
-void ObstacleTest::Impl::setTime(Contact& contact, const CrossingTime& time) {
+void ObstacleCheck::Impl::setTime(Contact& contact, const CrossingTime& time) {
   if (compareToOne(time) == 0) {
     contact.toc_lower = contact.toc_upper = 1;
   } else if (options.accuracy.rung == Accuracy::EXACT) {
@@ -116,27 +116,27 @@ void ObstacleTest::Impl::setTime(Contact& contact, const CrossingTime& time) {
   }
 }
 
-void ObstacleTest::Impl::findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box) {
+void ObstacleCheck::Impl::findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box) {
   near_leaves.clear();
   surface.tree.visitLeaves(box, [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
   sortLeaves(surface, near_leaves);
 }
 
-void ObstacleTest::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list) {
+void ObstacleCheck::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list) {
   if (list.size() < 2) return;
   const std::vector<OccupiedLeaf>& leaves = surface.tree.leaves();
   std::sort(list.begin(), list.end(),
             [&leaves](std::uint32_t a, std::uint32_t b) { return leaves[a].min < leaves[b].min; });
 }
 
-/// A feature that lies in an axis plane and moves along that axis alone (level cloth that is let fall, a level plate that
-/// is lowered): it meets the target, a leaf's edge or corner as a flat box, where it meets the target's shadow, at the
-/// first time at which it is at the target's height. Settled exactly here, since such scenes are full of contacts on
-/// borders, which are slow to decide in general. False where the feature moves otherwise.
+/// A feature that lies in an axis plane and moves along that axis alone (level cloth that is let fall, a level plate
+/// that is lowered): it meets the target, a leaf's edge or corner as a flat box, where it meets the target's shadow, at
+/// the first time at which it is at the target's height. Settled exactly here, since such scenes are full of contacts
+/// on borders, which are slow to decide in general. False where the feature moves otherwise.
 template <class Feature>
-bool ObstacleTest::Impl::settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points,
-                                    std::uint32_t leaf, const LeafBox& target, const double* outward,
-                                    double separation_m, bool inside, std::vector<Contact>& contacts) {
+bool ObstacleCheck::Impl::settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points,
+                                     std::uint32_t leaf, const LeafBox& target, const double* outward,
+                                     double separation_m, bool inside, std::vector<Contact>& contacts) {
   const int axis = separation_m > 0 ? -1 : fallAxis(points, feature.size());
   if (axis < 0) return false;
   const double from = points[0].t0[axis], to = points[0].t1[axis];
@@ -157,7 +157,7 @@ bool ObstacleTest::Impl::settleFall(const Run& run, PairKind kind, const Feature
   return true;
 }
 
-void ObstacleTest::Impl::runVertices(const Run& run) {
+void ObstacleCheck::Impl::runVertices(const Run& run) {
   vertex_contacts.clear();
   const double resolution = run.surface->resolution_m;
   for (const Index v : run.topology->usedVertices()) {
@@ -189,7 +189,7 @@ void ObstacleTest::Impl::runVertices(const Run& run) {
   }
 }
 
-void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
+void ObstacleCheck::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   const FaceHit hit =
       firstFaceHit((*run.t0)[vertex].data(), (*run.t1)[vertex].data(), box, run.surface->features[leaf] & FACE_MASK);
@@ -201,7 +201,7 @@ void ObstacleTest::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t 
   vertex_contacts.push_back(contact);
 }
 
-void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
+void ObstacleCheck::Impl::vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   VertexMotion points[4] = {motionOf(run, vertex), {}, {}, {}};
   const double separation_m = separationOf(run, std::array<Index, 1>{vertex}), reach = reachOf(separation_m);
@@ -227,7 +227,7 @@ void ObstacleTest::Impl::vertexSeparation(const Run& run, Index vertex, std::uin
   }
 }
 
-void ObstacleTest::Impl::runEdges(const Run& run) {
+void ObstacleCheck::Impl::runEdges(const Run& run) {
   edge_contacts.clear();
   for (const Edge& edge : run.topology->edges()) {
     const std::uint8_t both = state[edge[0]] & state[edge[1]], either = state[edge[0]] | state[edge[1]];
@@ -249,7 +249,7 @@ void ObstacleTest::Impl::runEdges(const Run& run) {
   }
 }
 
-bool ObstacleTest::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
+bool ObstacleCheck::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
   findLeaves(*run.surface, unite(start_keys, edge).box());
   bool inside = false;
   for (const std::uint32_t leaf : near_leaves) {
@@ -261,8 +261,8 @@ bool ObstacleTest::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
   return inside;
 }
 
-void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points,
-                                   const MovingBounds& moving, double separation_m, std::uint32_t leaf, bool inside) {
+void ObstacleCheck::Impl::edgePairs(const Run& run, const Edge& edge, const VertexMotion* points,
+                                    const MovingBounds& moving, double separation_m, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   bool near[3][2];
   for (int axis = 0; axis < 3; ++axis) {
@@ -304,7 +304,7 @@ void ObstacleTest::Impl::edgePairs(const Run& run, const Edge& edge, const Verte
   }
 }
 
-void ObstacleTest::Impl::runFaces(const Run& run) {
+void ObstacleCheck::Impl::runFaces(const Run& run) {
   face_contacts.clear();
   for (const NearFace& near : near_faces) {
     if (isLate(run)) return;
@@ -325,7 +325,7 @@ void ObstacleTest::Impl::runFaces(const Run& run) {
   }
 }
 
-bool ObstacleTest::Impl::faceStartsInside(const Run& run, const Face& face) {
+bool ObstacleCheck::Impl::faceStartsInside(const Run& run, const Face& face) {
   findLeaves(*run.surface, unite(start_keys, face).box());
   const double *p0 = (*run.t0)[face[0]].data(), *p1 = (*run.t0)[face[1]].data(), *p2 = (*run.t0)[face[2]].data();
   std::size_t pierced = 0;
@@ -341,8 +341,9 @@ bool ObstacleTest::Impl::faceStartsInside(const Run& run, const Face& face) {
   return pierced > 0;
 }
 
-void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points,
-                                     const MovingBounds& moving, double separation_m, std::uint32_t leaf, bool inside) {
+void ObstacleCheck::Impl::cornerPairs(const Run& run, const Face& face, const VertexMotion* points,
+                                      const MovingBounds& moving, double separation_m, std::uint32_t leaf,
+                                      bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   bool near[3][2];
   for (int axis = 0; axis < 3; ++axis) {
@@ -360,8 +361,8 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
       if (start == TriangleStart::INTERIOR) addInitial(run, PairKind::FACE_VOXEL_CORNER, face, leaf, face_contacts);
       if (start != TriangleStart::APART) return;
     }
-    ObstaclePair pair{contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf),
-                      {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
+    ObstaclePair pair{
+        contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf), {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
     std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
     const LeafBox target{{corner[0], corner[1], corner[2]}, {corner[0], corner[1], corner[2]}};
     if (settleFall(run, PairKind::FACE_VOXEL_CORNER, face, points, leaf, target, pair.outward, separation_m, inside,
@@ -373,4 +374,4 @@ void ObstacleTest::Impl::cornerPairs(const Run& run, const Face& face, const Ver
   }
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,13 +1,13 @@
-// Separating axes (Gottschalk et al. 1996) with exact signs. Two convex polytopes that are apart are separated by a plane
-// parallel to a face of one or to an edge of each, and one such plane contains the face or the edges of the mesh's side,
-// so for each product of a mesh edge with a box axis only the side away from the triangle needs a look.
+// Separating axes (Gottschalk et al. 1996) with exact signs. Two convex polytopes that are apart are separated by a
+// plane parallel to a face of one or to an edge of each, and one such plane contains the face or the edges of the
+// mesh's side, so for each product of a mesh edge with a box axis only the side away from the triangle needs a look.
 #include "obstacle/start_contact.h"
 
 #include <algorithm>
 
 #include "obstacle/axis_predicates.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// Where a rectangle lies relative to the line through p0 and p1 in the plane of two axes.
@@ -93,4 +93,4 @@ TriangleStart triangleMeetsBox(const double* p0, const double* p1, const double*
   return planeMeetsBox(p0, p1, p2, box) ? TriangleStart::INTERIOR : TriangleStart::APART;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,7 +3,7 @@
 
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 inline bool pointInBox(const double* p, const LeafBox& box) {
   return p[0] >= box.lo[0] && p[0] <= box.hi[0] && p[1] >= box.lo[1] && p[1] <= box.hi[1] && p[2] >= box.lo[2] &&
@@ -21,4 +21,4 @@ enum class TriangleStart : std::uint8_t {
 
 TriangleStart triangleMeetsBox(const double* p0, const double* p1, const double* p2, const LeafBox& box);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

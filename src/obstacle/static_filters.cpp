@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace deformable_ccd {
+#include "dccd/tolerances.h"
+
+namespace dccd {
 namespace {
 
 struct Planar {
@@ -27,11 +29,11 @@ double magnitude(const PlanarPath& path) {
 double cross(const Planar& u, const Planar& v) { return u.b * v.c - u.c * v.b; }
 
 /// Below and above this the margin might underflow or a product overflow; nothing is proved there.
-constexpr double SMALLEST = 0x1p-400, LARGEST = 0x1p400;
+constexpr double SMALLEST = tolerance::SIDE_SMALLEST_M, LARGEST = tolerance::SIDE_LARGEST_M;
 
 /// The rounding margin of side(), given M = the largest rounded difference. A difference carries one rounding, a
 /// product of two three, a cross product 2 * 3 + 2 of M^2 * 2^-53, the sum of two twice that plus 4: 20.1 in all.
-double sideMargin(double largest) { return 0x1p-48 * largest * largest; }
+double sideMargin(double largest) { return tolerance::SIDE * largest * largest; }
 
 /// +1 or -1 where the point is certainly strictly left or right of the moving segment u v during the whole step, by the
 /// strict common sign of the three Bernstein coefficients of u x v (the middle one doubled); 0 otherwise.
@@ -58,7 +60,8 @@ bool triangleMissesPoint(const VertexMotion& p, const VertexMotion& q, const Ver
     const PlanarPath u = seenFrom(p, point, b, c), v = seenFrom(q, point, b, c), w = seenFrom(r, point, b, c);
     const double largest = std::max(magnitude(u), std::max(magnitude(v), magnitude(w)));
     if (!(largest > SMALLEST && largest < LARGEST)) continue;
-    // A point of a closed triangle, degenerate or not, is never strictly left of one side and strictly right of another.
+    // A point of a closed triangle, degenerate or not, is never strictly left of one side and strictly right of
+    // another.
     const double margin = sideMargin(largest);
     const int sides[3] = {side(u, v, margin), side(v, w, margin), side(w, u, margin)};
     if (std::max(sides[0], std::max(sides[1], sides[2])) > 0 && std::min(sides[0], std::min(sides[1], sides[2])) < 0) {
@@ -74,8 +77,8 @@ double firstMeeting(const double* min, const double* max, int stride, double lo,
   const double gap_t1 = lo - max[0] > 0 ? lo - max[stride] : min[stride] - hi;
   if (gap_t1 > 0) return 2;
   // Four roundings, each at most 2^-53 relative where nothing overflows; otherwise the bound is 0.
-  const double time = gap_t0 / (gap_t0 - gap_t1) * (1 - 0x1p-50);
+  const double time = gap_t0 / (gap_t0 - gap_t1) * (1 - tolerance::SEPARATION_SUM);
   return time >= 0 && time <= 1 ? time : 0;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -2,9 +2,9 @@
 // three axis planes, where a static feature is a fixed point.
 #pragma once
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// True only if the moving segment p q certainly never meets the static line along `axis` through `point` (its
 /// coordinate on `axis` is not used).
@@ -18,4 +18,4 @@ bool triangleMissesPoint(const VertexMotion& p, const VertexMotion& q, const Ver
 /// that join them.
 double firstMeeting(const double* min, const double* max, int stride, double lo, double hi);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

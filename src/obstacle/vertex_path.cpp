@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// The crossings of one axis: the planes at which the path enters and leaves the slab, if it does within the step.
@@ -89,4 +89,4 @@ FaceHit firstFaceHit(const double* p0, const double* p1, const LeafBox& box, Fea
   return hit;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

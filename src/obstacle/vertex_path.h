@@ -5,7 +5,7 @@
 #include "obstacle/voxel_exposure.h"
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct FaceHit {
   bool hit = false;
@@ -17,4 +17,4 @@ struct FaceHit {
 /// leaf. p0 must lie outside the closed box, both points be finite.
 FaceHit firstFaceHit(const double* p0, const double* p1, const LeafBox& box, FeatureMask faces);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// Directions of a cube's faces: -x +x -y +y -z +z.
 constexpr int FACE_DIRECTIONS = 6;
@@ -103,4 +103,4 @@ inline std::uint64_t mortonCode(std::uint32_t x, std::uint32_t y, std::uint32_t 
   return spreadBits(x) | spreadBits(y) << 1 | spreadBits(z) << 2;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Coverage = VoxelTree::Coverage;
@@ -38,8 +38,8 @@ std::uint64_t blockBits(const VoxelTree& tree, std::uint32_t node, bool region_f
   return parent.full >> cell & 1 ? ~std::uint64_t{0} : 0;
 }
 
-/// Masks of the leaves of one level 0 node, given which of its cells are exposed in each direction. A leaf of two voxels
-/// a side takes the union over its cells: faces between its own cells are covered and add nothing.
+/// Masks of the leaves of one level 0 node, given which of its cells are exposed in each direction. A leaf of two
+/// voxels a side takes the union over its cells: faces between its own cells are covered and add nothing.
 void blockFeatures(const VoxelTree::Node& node, const std::array<std::uint64_t, FACE_DIRECTIONS>& exposed,
                    std::vector<FeatureMask>& masks) {
   std::uint64_t any = 0;
@@ -106,8 +106,8 @@ bool layerHasGap(const VoxelTree& tree, Cell cell, std::int32_t size, int direct
   return false;
 }
 
-/// The two cubes beside a leaf's edge, in directions db and dc: is there a place along the edge where the voxels of both
-/// that touch it are empty? `b_cell` and `c_cell` are the smallest keys of the cubes, which are `size` a side.
+/// The two cubes beside a leaf's edge, in directions db and dc: is there a place along the edge where the voxels of
+/// both that touch it are empty? `b_cell` and `c_cell` are the smallest keys of the cubes, which are `size` a side.
 bool edgeHasGap(const VoxelTree& tree, Cell b_cell, Cell c_cell, std::int32_t size, int db, int dc) {
   const Coverage b = tree.coverage(b_cell[0], b_cell[1], b_cell[2], size);
   const Coverage c = tree.coverage(c_cell[0], c_cell[1], c_cell[2], size);
@@ -191,4 +191,4 @@ std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
   return masks;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,7 +7,7 @@
 
 #include "obstacle/voxel_tree.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// Features of one leaf: bits 0-5 faces (FACE_DIRECTIONS order), 6-17 edges, 18-25 corners.
 using FeatureMask = std::uint32_t;
@@ -30,4 +30,4 @@ FeatureMask featuresOfFaces(unsigned exposed_faces);
 /// Also tells the tree which cells hold edges and corners.
 std::vector<FeatureMask> exposedFeatures(VoxelTree& tree);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,18 +1,19 @@
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <tuple>
 
+#include "dccd/tolerances.h"
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 double checkedResolution(double resolution_m) {
   // The planes up to +-32768 resolutions and the reciprocal must be finite and normal.
-  if (!(resolution_m >= 1e-290 && resolution_m <= 1e290)) {
+  if (!(resolution_m >= tolerance::SMALLEST_RESOLUTION_M && resolution_m <= tolerance::LARGEST_RESOLUTION_M)) {
     std::ostringstream text;
     text << "resolution_m is " << resolution_m << ", which is not a length from 1e-290 to 1e290 m";
     throw std::invalid_argument(text.str());
@@ -91,4 +92,4 @@ const OccupiedLeaf* VoxelSurface::leafAt(const Vec3& point_map) const {
   return found;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

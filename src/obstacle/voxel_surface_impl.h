@@ -3,11 +3,12 @@
 
 #include <vector>
 
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/tolerances.h"
+#include "dccd/voxel_surface.h"
 #include "obstacle/voxel_exposure.h"
 #include "obstacle/voxel_tree.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct VoxelSurface::Impl {
   explicit Impl(double resolution, const std::vector<OccupiedLeaf>& leaves);
@@ -42,7 +43,7 @@ inline LeafBox leafBox(const OccupiedLeaf& leaf, double resolution_m) {
 
 /// Cell coordinates are rounded outward by this many cells: |x / resolution| <= 2^15 carries an error of a few
 /// 2^-53 relative, so below 2^-35 cells; planes themselves are rounded by as much. Larger only costs candidates.
-constexpr double KEY_MARGIN = 1.0 / 1048576;
+constexpr double KEY_MARGIN = tolerance::VOXEL_KEY;
 
 /// The key of the voxel below x (side -1) or above it (side +1), rounded outward and clamped to the map's range.
 inline std::int32_t outwardKey(double x, double inverse_resolution, double side) {
@@ -50,4 +51,4 @@ inline std::int32_t outwardKey(double x, double inverse_resolution, double side)
   return static_cast<std::int32_t>(cell < 0 ? 0.0 : cell > 65535.0 ? 65535.0 : cell);
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

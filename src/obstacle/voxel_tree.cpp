@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// The level whose nodes have leaves of this size: 4^level or 2 * 4^level; the root leaf fills a root node.
@@ -200,4 +200,4 @@ void VoxelTree::setFeatureCells(int level, std::uint32_t node, std::uint64_t edg
   }
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

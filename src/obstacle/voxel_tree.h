@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 #include "obstacle/voxel_bits.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// A closed range of voxel keys, each within 0 to 65535.
 struct KeyBox {
@@ -25,11 +25,11 @@ class VoxelTree {
   static constexpr std::uint32_t NONE = 0xffffffffu;
 
   struct Node {
-    std::uint64_t full = 0;    ///< cells covered by a leaf of this node
-    std::uint64_t start = 0;   ///< first cell of each of those leaves
-    std::uint64_t child = 0;   ///< cells that are a node of the level below
-    std::uint64_t edges = 0;   ///< cells at which, or in whose node, a convex edge of their leaf may lie
-    std::uint64_t corners = 0; ///< the same of its exposed corners
+    std::uint64_t full = 0;     ///< cells covered by a leaf of this node
+    std::uint64_t start = 0;    ///< first cell of each of those leaves
+    std::uint64_t child = 0;    ///< cells that are a node of the level below
+    std::uint64_t edges = 0;    ///< cells at which, or in whose node, a convex edge of their leaf may lie
+    std::uint64_t corners = 0;  ///< the same of its exposed corners
     std::uint32_t first_leaf = 0;
     std::uint32_t first_child = 0;
     std::uint32_t leafAt(unsigned bit) const {
@@ -250,17 +250,20 @@ void VoxelTree::visitWanted(const KeyBox& box, Wanted wanted, Visit& visit) cons
 
 template <class Visit>
 void VoxelTree::visitLeaves(const KeyBox& box, Visit&& visit) const {
-  visitWanted(box, [](const Node&) { return ~std::uint64_t{0}; }, visit);
+  visitWanted(
+      box, [](const Node&) { return ~std::uint64_t{0}; }, visit);
 }
 
 template <class Visit>
 void VoxelTree::visitLeavesWithEdges(const KeyBox& box, Visit&& visit) const {
-  visitWanted(box, [](const Node& node) { return node.edges; }, visit);
+  visitWanted(
+      box, [](const Node& node) { return node.edges; }, visit);
 }
 
 template <class Visit>
 void VoxelTree::visitLeavesWithCorners(const KeyBox& box, Visit&& visit) const {
-  visitWanted(box, [](const Node& node) { return node.corners; }, visit);
+  visitWanted(
+      box, [](const Node& node) { return node.corners; }, visit);
 }
 
 inline VoxelTree::Reached VoxelTree::reached(const KeyBox& box) const {
@@ -290,4 +293,4 @@ inline bool VoxelTree::reachesLeaf(const KeyBox& box) const {
   return visitNodes(box, Any());
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

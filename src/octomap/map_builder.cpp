@@ -7,7 +7,7 @@
 
 #include <octomap/OcTree.h>
 
-namespace deformable_ccd {
+namespace dccd {
 
 std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
                                       const std::function<bool(const Vec3& center_m)>& occupied, bool binary) {
@@ -40,10 +40,11 @@ std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
     tree.toMaxLikelihood();
     tree.prune();
   }
-  const bool written = binary ? static_cast<bool>(tree.writeBinaryData(stream)) : static_cast<bool>(tree.writeData(stream));
+  const bool written =
+      binary ? static_cast<bool>(tree.writeBinaryData(stream)) : static_cast<bool>(tree.writeData(stream));
   if (!written) throw std::runtime_error("octomap: the tree could not be serialized");
   const std::string bytes = stream.str();
   return std::vector<std::int8_t>(bytes.begin(), bytes.end());
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,9 +5,9 @@
 #include <functional>
 #include <vector>
 
-#include "deformable_ccd/types.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// Serializes an OcTree whose voxels are occupied where `occupied(center)` says so, and unknown elsewhere.
 /// @param resolution_m edge of a voxel
@@ -16,4 +16,4 @@ namespace deformable_ccd {
 std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
                                       const std::function<bool(const Vec3& center_m)>& occupied, bool binary);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

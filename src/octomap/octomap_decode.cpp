@@ -1,7 +1,8 @@
 // The streams are parsed here and not by liboctomap: that builds a tree node by node, follows any depth, reads past the
-// end of truncated data and takes the sizes that a message claims on trust. Layouts: OccupancyOcTreeBase::readBinaryNode
-// (two bits a child) and OcTreeBaseImpl::readNodesRecurs (value, child bits); tests compare with liboctomap's own.
-#include "deformable_ccd/octomap_decode.h"
+// end of truncated data and takes the sizes that a message claims on trust. Layouts:
+// OccupancyOcTreeBase::readBinaryNode (two bits a child) and OcTreeBaseImpl::readNodesRecurs (value, child bits); tests
+// compare with liboctomap's own.
+#include "dccd/octomap_decode.h"
 
 #include <cmath>
 #include <cstring>
@@ -10,7 +11,7 @@
 
 #include "octomap/octomap_header.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr int MAX_DEPTH = 16;
@@ -187,7 +188,8 @@ DecodedOctomap decodeOctomap(const OctomapFields& fields, const OctomapLimits& l
                        ", but the data begin with the header of a " + (header.binary ? ".bt" : ".ot") + " file");
   }
   if (header.id != fields.id) {
-    throw OctomapError("octomap id is '" + fields.id + "', but the data's header says '" + header.id.substr(0, 80) + "'");
+    throw OctomapError("octomap id is '" + fields.id + "', but the data's header says '" + header.id.substr(0, 80) +
+                       "'");
   }
   // The header's number has six digits.
   if (!(std::abs(header.resolution - fields.resolution) <= 1e-5 * fields.resolution)) {
@@ -210,11 +212,11 @@ DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& lim
     const OctomapHeader header = parseOctomapHeader(data.data(), data.size());
     if (!header.present) throw OctomapError("the file has no header of a .bt or .ot file");
     checkResolution(header.resolution);
-    return decodeWithHeader(header, reinterpret_cast<const unsigned char*>(data.data()), data.size(),
-                            header.resolution, limits);
+    return decodeWithHeader(header, reinterpret_cast<const unsigned char*>(data.data()), data.size(), header.resolution,
+                            limits);
   } catch (const OctomapError& error) {
     throw OctomapError(path + ": " + error.what());
   }
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,9 +3,9 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "deformable_ccd/octomap_decode.h"
+#include "dccd/octomap_decode.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 const char BINARY_MARK[] = "# Octomap OcTree binary file";
@@ -71,4 +71,4 @@ OctomapHeader parseOctomapHeader(const char* data, std::size_t size) {
   throw OctomapError("octomap header: it ends before its line 'data'");
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

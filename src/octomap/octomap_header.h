@@ -4,18 +4,18 @@
 #include <cstddef>
 #include <string>
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct OctomapHeader {
   bool present = false;
-  bool binary = false;       ///< .bt
+  bool binary = false;  ///< .bt
   std::string id;
-  double resolution = 0;     ///< [m], as printed: about six digits
-  bool empty = false;        ///< it says "size 0": no data follow
-  std::size_t length = 0;    ///< bytes up to the data
+  double resolution = 0;   ///< [m], as printed: about six digits
+  bool empty = false;      ///< it says "size 0": no data follow
+  std::size_t length = 0;  ///< bytes up to the data
 };
 
 /// Not present where the data do not begin like one. Throws OctomapError for a header that is cut off or lacks a field.
 OctomapHeader parseOctomapHeader(const char* data, std::size_t size);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 #include <string>
 #include <unordered_map>
 
-namespace deformable_ccd {
+namespace dccd {
 
 class LogThrottle {
  public:
@@ -18,7 +18,8 @@ class LogThrottle {
       ++entry.held;
       return {};
     }
-    const std::string more = entry.held ? " (and " + std::to_string(entry.held) + " times more since the last line)" : "";
+    const std::string more =
+        entry.held ? " (and " + std::to_string(entry.held) + " times more since the last line)" : "";
     entry = {now_ns, 0, true};
     return text + more;
   }
@@ -33,4 +34,4 @@ class LogThrottle {
   std::unordered_map<std::string, Entry> entries_;
 };
 
-}  // namespace deformable_ccd
+}  // namespace dccd

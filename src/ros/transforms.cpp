@@ -5,12 +5,11 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <tf2/exceptions.h>
 
-namespace deformable_ccd {
+namespace dccd {
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
   const auto known = newest_.find(transform.child_frame_id);
-  return known != newest_.end() &&
-         static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second - JUMP_BACK_NS;
+  return known != newest_.end() && static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second - JUMP_BACK_NS;
 }
 
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {
@@ -60,4 +59,4 @@ void transform(const Eigen::Isometry3d& target_from_source, Positions& positions
   for (Vec3& p : positions) p = target_from_source * p;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,15 +7,15 @@
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "deformable_ccd/mesh_store.h"
+#include "dccd/mesh_store.h"
+#include "dccd/tolerances.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
-/// Broadcasters of one tree are late against each other by less than this; a loop goes back by more.
-constexpr StampNs JUMP_BACK_NS = 1000000000;
+constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
-/// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of the
-/// end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
+/// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
+/// the end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
 class TransformFeed {
  public:
   explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
@@ -37,4 +37,4 @@ bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, c
 
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 #include "scene/generated_scene.h"
 #include "scene/generated_shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 namespace {
 
@@ -135,4 +135,4 @@ std::unique_ptr<GeneratedSequence> generateNBody(const GeneratedOptions& options
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

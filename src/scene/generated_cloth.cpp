@@ -9,7 +9,7 @@
 #include "scene/generated_scene.h"
 #include "scene/generated_shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 namespace {
 
@@ -65,8 +65,8 @@ class NearVertices {
             static_cast<std::int64_t>(std::floor(p.z() / cell_m_))};
   }
   static std::size_t slot(const std::array<std::int64_t, 3>& c) {
-    const std::uint64_t h = static_cast<std::uint64_t>(c[0]) * 73856093u ^ static_cast<std::uint64_t>(c[1]) * 19349663u ^
-                            static_cast<std::uint64_t>(c[2]) * 83492791u;
+    const std::uint64_t h = static_cast<std::uint64_t>(c[0]) * 73856093u ^
+                            static_cast<std::uint64_t>(c[1]) * 19349663u ^ static_cast<std::uint64_t>(c[2]) * 83492791u;
     return static_cast<std::size_t>(h % TABLE);
   }
   std::vector<Index> next_, heads_;
@@ -212,9 +212,7 @@ class ClothBall : public ClothOnObstacle {
       outward = length > 0 ? Vec3(p / length) : Vec3::UnitZ();
       return length - RADIUS_M;
     };
-    obstacle_.velocity = [](const Vec3& p, double time_s) -> Vec3 {
-      return Vec3(0, 0, angularSpeed(time_s)).cross(p);
-    };
+    obstacle_.velocity = [](const Vec3& p, double time_s) -> Vec3 { return Vec3(0, 0, angularSpeed(time_s)).cross(p); };
     publish(Eigen::Matrix3d::Identity());
   }
 
@@ -276,4 +274,4 @@ std::unique_ptr<GeneratedSequence> generateClothBone(const GeneratedOptions& opt
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,7 +7,7 @@
 #include "scene/generated_scene.h"
 #include "scene/generated_shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 namespace {
 
@@ -153,8 +153,8 @@ class Dragon : public GeneratedSequence {
     speed_ = 4.2 / 64;
     for (Piece& p : dragon_.pieces()) {
       p.release = std::max(0.0, (p.centroid.x() + START_M - BUNNY_SIZE) / speed_);
-      p.velocity = 0.5 * speed_ * (p.centroid.normalized() + 0.6 * Vec3::UnitX()) +
-                   1.2 * dragon_.edge() * randomVector(random_);
+      p.velocity =
+          0.5 * speed_ * (p.centroid.normalized() + 0.6 * Vec3::UnitX()) + 1.2 * dragon_.edge() * randomVector(random_);
       p.spin = 0.05 * randomVector(random_);
     }
     addBody("dragon", dragon_.vertices().size(), dragon_.faces(), true);
@@ -223,4 +223,4 @@ std::unique_ptr<GeneratedSequence> generateLion(const GeneratedOptions& options)
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

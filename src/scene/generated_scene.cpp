@@ -2,17 +2,23 @@
 
 #include <stdexcept>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 const char* toString(GeneratedKind kind) {
   switch (kind) {
-    case GeneratedKind::CLOTH_BALL: return "clothball";
-    case GeneratedKind::N_BODY: return "nbody";
-    case GeneratedKind::CLOTH_BONE: return "clothbone";
-    case GeneratedKind::DRAGON: return "dragon";
-    case GeneratedKind::LION: return "lion";
-    case GeneratedKind::COUNT: break;
+    case GeneratedKind::CLOTH_BALL:
+      return "clothball";
+    case GeneratedKind::N_BODY:
+      return "nbody";
+    case GeneratedKind::CLOTH_BONE:
+      return "clothbone";
+    case GeneratedKind::DRAGON:
+      return "dragon";
+    case GeneratedKind::LION:
+      return "lion";
+    case GeneratedKind::COUNT:
+      break;
   }
   return "unknown";
 }
@@ -57,15 +63,21 @@ void GeneratedSequence::addBody(const std::string& name, std::size_t vertex_coun
 
 std::unique_ptr<GeneratedSequence> generateSequence(GeneratedKind kind, const GeneratedOptions& options) {
   switch (kind) {
-    case GeneratedKind::CLOTH_BALL: return generateClothBall(options);
-    case GeneratedKind::N_BODY: return generateNBody(options);
-    case GeneratedKind::CLOTH_BONE: return generateClothBone(options);
-    case GeneratedKind::DRAGON: return generateDragon(options);
-    case GeneratedKind::LION: return generateLion(options);
-    case GeneratedKind::COUNT: break;
+    case GeneratedKind::CLOTH_BALL:
+      return generateClothBall(options);
+    case GeneratedKind::N_BODY:
+      return generateNBody(options);
+    case GeneratedKind::CLOTH_BONE:
+      return generateClothBone(options);
+    case GeneratedKind::DRAGON:
+      return generateDragon(options);
+    case GeneratedKind::LION:
+      return generateLion(options);
+    case GeneratedKind::COUNT:
+      break;
   }
   throw std::invalid_argument("not a kind of generated scene");
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

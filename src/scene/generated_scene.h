@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/topology.h"
-#include "deformable_ccd/types.h"
+#include "dccd/topology.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 enum class GeneratedKind : std::uint8_t {
@@ -30,8 +30,8 @@ GeneratedKind generatedKindFromString(const std::string& text);
 struct GeneratedBody {
   std::string name;
   Topology topology;
-  Index vertex_offset = 0;     ///< of its vertex 0 in positions()
-  bool deforms = true;         ///< false: rigid or at rest, so that it cannot meet itself
+  Index vertex_offset = 0;  ///< of its vertex 0 in positions()
+  bool deforms = true;      ///< false: rigid or at rest, so that it cannot meet itself
 };
 
 struct GeneratedOptions {
@@ -82,4 +82,4 @@ std::unique_ptr<GeneratedSequence> generateDragon(const GeneratedOptions& option
 std::unique_ptr<GeneratedSequence> generateLion(const GeneratedOptions& options);
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 TriangleShape sheet(std::size_t cells, double side_m) {
@@ -74,7 +74,7 @@ TriangleShape cubeSphere(std::size_t cells) {
 }
 
 TriangleShape revolution(std::size_t rings, std::size_t segments, double half_length_m,
-                 const std::function<double(double)>& radius_m) {
+                         const std::function<double(double)>& radius_m) {
   TriangleShape s;
   const double pi = std::acos(-1.0);
   s.vertices.emplace_back(-half_length_m, 0.0, 0.0);
@@ -104,4 +104,4 @@ TriangleShape revolution(std::size_t rings, std::size_t segments, double half_le
 }
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

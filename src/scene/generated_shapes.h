@@ -4,9 +4,9 @@
 #include <functional>
 #include <vector>
 
-#include "deformable_ccd/types.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 
 struct TriangleShape {
@@ -23,7 +23,7 @@ TriangleShape cubeSphere(std::size_t cells);
 /// A surface of revolution about the x axis from x = -half_length to half_length, closed where radius(x) is 0 at the
 /// ends. rings >= 2 along the axis, segments >= 3 around it.
 TriangleShape revolution(std::size_t rings, std::size_t segments, double half_length_m,
-                 const std::function<double(double)>& radius_m);
+                         const std::function<double(double)>& radius_m);
 
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

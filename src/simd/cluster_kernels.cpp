@@ -5,12 +5,12 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/cluster_kernels.cpp"
-#include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -282,8 +282,8 @@ size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* 
   return static_cast<size_t>(o - out) / 2;
 }
 
-size_t TestGroupPairsBoth(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
-                          Diagonal diagonal, uint32_t* out, size_t capacity, size_t* consumed) {
+size_t TestGroupPairsBoth(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count,
+                          bool self, Diagonal diagonal, uint32_t* out, size_t capacity, size_t* consumed) {
   return TestGroupPairs<false>(a, b, group_pairs, count, self, diagonal, out, capacity, consumed);
 }
 size_t TestGroupPairsT0(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
@@ -293,11 +293,11 @@ size_t TestGroupPairsT0(const GroupsView& a, const GroupsView& b, const uint32_t
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 HWY_EXPORT(ProjectionBounds);
 HWY_EXPORT(Quantize);
@@ -319,13 +319,15 @@ void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std:
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildUpper)(child_aos, child_count, soa, aos);
 }
-std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs, std::size_t count,
-                           bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out, std::size_t capacity,
-                           std::size_t* consumed) {
-  return t0_only ? HWY_DYNAMIC_DISPATCH(TestGroupPairsT0)(a, b, group_pairs, count, self, diagonal, out, capacity, consumed)
-                 : HWY_DYNAMIC_DISPATCH(TestGroupPairsBoth)(a, b, group_pairs, count, self, diagonal, out, capacity, consumed);
+std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
+                           std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
+                           std::size_t capacity, std::size_t* consumed) {
+  return t0_only
+             ? HWY_DYNAMIC_DISPATCH(TestGroupPairsT0)(a, b, group_pairs, count, self, diagonal, out, capacity, consumed)
+             : HWY_DYNAMIC_DISPATCH(TestGroupPairsBoth)(a, b, group_pairs, count, self, diagonal, out, capacity,
+                                                        consumed);
 }
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

@@ -18,18 +18,18 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
-constexpr std::size_t GROUP = 16;         ///< nodes in a group
-constexpr std::size_t DIRECTIONS = 8;     ///< x, y, z, x+y, x+z, y+z, x-y, y-z
-constexpr std::size_t RECORD = 16;        ///< int16 of a vertex
-constexpr std::size_t SOA_SIZE = 512;     ///< int16 of a group
-constexpr std::size_t AOS_SIZE = 32;      ///< int16 of a group's bounds
-constexpr std::int16_t EMPTY_LO = 32767;  ///< larger than any record value
-constexpr std::int16_t EMPTY_HI = -32767; ///< smaller than any record value
-constexpr std::int16_t UNBOUNDED = 32767; ///< as a margin: as far as the records go, on both sides
-constexpr double RECORD_RANGE = 65528.0;  ///< record values lie in [-32764, 32764]
+constexpr std::size_t GROUP = 16;          ///< nodes in a group
+constexpr std::size_t DIRECTIONS = 8;      ///< x, y, z, x+y, x+z, y+z, x-y, y-z
+constexpr std::size_t RECORD = 16;         ///< int16 of a vertex
+constexpr std::size_t SOA_SIZE = 512;      ///< int16 of a group
+constexpr std::size_t AOS_SIZE = 32;       ///< int16 of a group's bounds
+constexpr std::int16_t EMPTY_LO = 32767;   ///< larger than any record value
+constexpr std::int16_t EMPTY_HI = -32767;  ///< smaller than any record value
+constexpr std::int16_t UNBOUNDED = 32767;  ///< as a margin: as far as the records go, on both sides
+constexpr double RECORD_RANGE = 65528.0;   ///< record values lie in [-32764, 32764]
 
 /// Smallest and largest projection per direction over both times. vertices: n x 8 doubles (x0 y0 z0 0 x1 y1 z1 0).
 /// min8 and max8 are read first, so that calls over pieces can be chained.
@@ -60,9 +60,9 @@ enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UP
 /// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs), stops before it could overflow.
 /// diagonal applies to pairs with equal indices when self is true. times: 2 tests t0 and t1, 1 tests t0 alone.
 /// Returns the number of pairs written; *consumed is the number of group pairs done.
-std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs, std::size_t count,
-                           bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out, std::size_t capacity,
-                           std::size_t* consumed);
+std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
+                           std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
+                           std::size_t capacity, std::size_t* consumed);
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

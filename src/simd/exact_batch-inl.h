@@ -11,7 +11,7 @@
 #include "simd/exact_batch_scratch.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -73,7 +73,7 @@ HWY_INLINE M hasOneRoot(V c0, V c1, V c2, V c3, V end_error, V middle_error) {
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #include "simd/exact_batch_reject-inl.h"
@@ -81,7 +81,7 @@ HWY_AFTER_NAMESPACE();
 #include "simd/exact_batch_subdivide-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
@@ -124,5 +124,5 @@ const char* targetName() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

@@ -13,7 +13,7 @@
 #include "simd/exact_batch-inl.h"
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 HWY_EXPORT(exactBatchOn);
@@ -24,12 +24,10 @@ void exactBatch(const BatchInput& input, const BatchOutput& output) {
   HWY_DYNAMIC_DISPATCH(exactBatchOn)(input, output);
 }
 
-void fastBatch(const BatchInput& input, const BatchOutput& output) {
-  HWY_DYNAMIC_DISPATCH(fastBatchOn)(input, output);
-}
+void fastBatch(const BatchInput& input, const BatchOutput& output) { HWY_DYNAMIC_DISPATCH(fastBatchOn)(input, output); }
 
 const char* batchTargetName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

@@ -8,26 +8,26 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 enum class BatchKind : std::uint8_t { VERTEX_FACE = 0, EDGE_EDGE = 1 };
 
 /// What a batch says of one pair.
 enum BatchVerdict : std::uint8_t {
-  BATCH_NO = 0,         ///< certainly no contact in [0,1]
-  BATCH_YES = 1,        ///< certainly a contact; the TOC certainly lies in cell `cell`
-  BATCH_UNDECIDED = 2,  ///< not certain either way; the other outputs mean nothing
-  BATCH_YES_BRACKET = 3 ///< certainly a contact whose TOC is the only root of f in (lo, hi); the cell is not certain
+  BATCH_NO = 0,          ///< certainly no contact in [0,1]
+  BATCH_YES = 1,         ///< certainly a contact; the TOC certainly lies in cell `cell`
+  BATCH_UNDECIDED = 2,   ///< not certain either way; the other outputs mean nothing
+  BATCH_YES_BRACKET = 3  ///< certainly a contact whose TOC is the only root of f in (lo, hi); the cell is not certain
 };
 
 /// Pairs of one kind. No pointer is written through.
 struct BatchInput {
-  const double* vertices = nullptr;            ///< 8 per vertex: x0 y0 z0 0 x1 y1 z1 0; finite; 64-byte aligned
-  const std::uint32_t (*quads)[4] = nullptr;   ///< vertex indices; VF v f0 f1 f2, EE ea0 ea1 eb0 eb1
+  const double* vertices = nullptr;           ///< 8 per vertex: x0 y0 z0 0 x1 y1 z1 0; finite; 64-byte aligned
+  const std::uint32_t (*quads)[4] = nullptr;  ///< vertex indices; VF v f0 f1 f2, EE ea0 ea1 eb0 eb1
   std::size_t count = 0;
   BatchKind kind = BatchKind::VERTEX_FACE;
-  int toc_bits = 32;                           ///< 10 to 52: cell k is [k 2^-toc_bits, (k+1) 2^-toc_bits)
+  int toc_bits = 32;  ///< 10 to 52: cell k is [k 2^-toc_bits, (k+1) 2^-toc_bits)
 };
 
 /// One entry per pair in each array; all arrays are required.
@@ -52,4 +52,4 @@ void fastBatch(const BatchInput& input, const BatchOutput& output);
 const char* batchTargetName();
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

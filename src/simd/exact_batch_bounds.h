@@ -45,17 +45,17 @@
 // overflow: everything, squares of values of f included, stays below 2^910.
 #pragma once
 
-namespace deformable_ccd {
+#include "dccd/tolerances.h"
+
+namespace dccd {
 namespace simd {
 
-constexpr double BATCH_EPS = 0x1p-53;
-constexpr double BATCH_VALUE_ERROR = 70.5 * BATCH_EPS;     ///< of f(t) and f's coefficients, times U V W
-constexpr double BATCH_VALUE_ROUNDING = 6.25 * BATCH_EPS;  ///< the same, times max |fi|
-constexpr double BATCH_MINOR_ERROR = 20.5 * BATCH_EPS;     ///< of a minor, times X Y
-constexpr double BATCH_MINOR_SLOPE = 8.125;                ///< of a minor, times h X Y
-constexpr double BATCH_SEPARATION_ERROR = 22.5 * BATCH_EPS; ///< of a minor's coefficient over [a, b], times X Y
-constexpr double BATCH_SMALLEST = 0x1p-150;                ///< guard on U, V, W
-constexpr double BATCH_LARGEST = 0x1p150;
+constexpr double BATCH_EPS = tolerance::HALF_ULP;
+constexpr double BATCH_VALUE_ERROR = tolerance::BATCH_VALUE;
+constexpr double BATCH_MINOR_ERROR = tolerance::BATCH_MINOR;
+constexpr double BATCH_SEPARATION_ERROR = tolerance::BATCH_SEPARATION;
+constexpr double BATCH_SMALLEST = tolerance::BATCH_SMALLEST_M, BATCH_LARGEST = tolerance::BATCH_LARGEST_M;
+using tolerance::BATCH_MINOR_SLOPE, tolerance::BATCH_VALUE_ROUNDING;
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

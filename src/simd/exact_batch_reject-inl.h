@@ -1,6 +1,6 @@
 // First stage of the batched elementary test: see exact_batch-inl.h, which includes this.
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
@@ -72,9 +72,8 @@ HWY_INLINE void appendPairs(const BatchPlane* m, std::size_t i, unsigned bits, s
                             V f3, V error, RootBlock& to) {
   const auto front = hn::SetTableIndices(Tag(), FRONT_TABLE.row[bits]);
   const std::size_t at = to.count;
-  const auto append = [&front, at](V v, double* plane) HWY_ATTR {
-    hn::StoreU(hn::TableLookupLanes(v, front), Tag(), plane + at);
-  };
+  const auto append = [&front, at](V v, double* plane)
+                          HWY_ATTR { hn::StoreU(hn::TableLookupLanes(v, front), Tag(), plane + at); };
   for (int k = 0; k < MOTION_PLANES; ++k) append(load(m[k], i), to.motion[k]);
   append(f0, to.coefficient[0]);
   append(f1, to.coefficient[1]);
@@ -118,12 +117,10 @@ HWY_INLINE void rejectVector(BatchScratch& scratch, std::size_t i, std::size_t f
     error_times_3 = hn::Mul(error, constant(3));
     checked &= bitsOf(hn::And(hn::And(withinGuard(size_u), withinGuard(size_v)), withinGuard(size_w)));
   }
-  const M above = hn::And(
-      hn::And(isPositive<CERTIFIED>(f0, error), isPositive<CERTIFIED>(f3, error)),
-      hn::And(isPositive<CERTIFIED>(f1, error_times_3), isPositive<CERTIFIED>(f2, error_times_3)));
-  const M below = hn::And(
-      hn::And(isNegative<CERTIFIED>(f0, error), isNegative<CERTIFIED>(f3, error)),
-      hn::And(isNegative<CERTIFIED>(f1, error_times_3), isNegative<CERTIFIED>(f2, error_times_3)));
+  const M above = hn::And(hn::And(isPositive<CERTIFIED>(f0, error), isPositive<CERTIFIED>(f3, error)),
+                          hn::And(isPositive<CERTIFIED>(f1, error_times_3), isPositive<CERTIFIED>(f2, error_times_3)));
+  const M below = hn::And(hn::And(isNegative<CERTIFIED>(f0, error), isNegative<CERTIFIED>(f3, error)),
+                          hn::And(isNegative<CERTIFIED>(f1, error_times_3), isNegative<CERTIFIED>(f2, error_times_3)));
   const M free = hn::Or(above, below);
   const unsigned left = checked & ~bitsOf(free);
   std::memset(out.verdict + first, BATCH_NO, used);
@@ -139,5 +136,5 @@ HWY_INLINE void rejectVector(BatchScratch& scratch, std::size_t i, std::size_t f
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

@@ -1,6 +1,6 @@
 // Second stage of the batched elementary test: see exact_batch-inl.h, which includes this.
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
@@ -126,9 +126,9 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int st
   V d = zero, c = zero;
   for (int step = 0; step < steps; ++step) {
     const V f = hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Add(hn::Mul(a3, x), a2), x), a1), x), f0);
-    c = hn::Add(hn::Mul(a3_times_3, x), a2);                // f''/2
-    d = hn::Add(hn::Mul(hn::Add(c, a2), x), a1);            // f'
-    const M before = hn::Gt(hn::Xor(f, flip), zero);        // the root lies beyond x
+    c = hn::Add(hn::Mul(a3_times_3, x), a2);          // f''/2
+    d = hn::Add(hn::Mul(hn::Add(c, a2), x), a1);      // f'
+    const M before = hn::Gt(hn::Xor(f, flip), zero);  // the root lies beyond x
     lo = choose(before, x, lo);
     hi = choose(before, hi, x);
     const V next = hn::Sub(x, hn::Div(hn::Mul(f, d), hn::Sub(hn::Mul(d, d), hn::Mul(f, c))));
@@ -333,5 +333,5 @@ HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, RootBlock& hard, c
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

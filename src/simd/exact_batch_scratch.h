@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 constexpr std::size_t BATCH_BLOCK = 64;
@@ -23,12 +23,12 @@ constexpr double PIECE_ROOT = 1;  ///< certainly one root, ends of opposite sign
 constexpr double PIECE_UNCERTAIN = 2;
 
 /// What is known of a pair; the first four are BatchVerdict's values.
-constexpr double ROOT_NO_CONTACT = 0;       ///< the current root is no contact, or no root is left
+constexpr double ROOT_NO_CONTACT = 0;  ///< the current root is no contact, or no root is left
 constexpr double ROOT_CONTACT = 1;
 constexpr double ROOT_UNCERTAIN = 2;
 constexpr double ROOT_CONTACT_NO_CELL = 3;
-constexpr double ROOT_NOT_BRACKETED = 4;    ///< the few fixed steps did not get close enough
-constexpr double ROOT_PENDING = 5;          ///< not refined yet
+constexpr double ROOT_NOT_BRACKETED = 4;  ///< the few fixed steps did not get close enough
+constexpr double ROOT_PENDING = 5;        ///< not refined yet
 
 /// Pairs that came in.
 struct alignas(64) MotionBlock {
@@ -74,10 +74,10 @@ inline constexpr FrontTable FRONT_TABLE;
 /// All of it: about 80 kilobytes.
 struct BatchScratch {
   MotionBlock motion;
-  RootBlock single;   ///< certainly one root in the whole step
-  SplitBlock several; ///< more than one sign change among the coefficients
-  RootBlock hard;     ///< not settled by these two; goes on to subdivision
+  RootBlock single;    ///< certainly one root in the whole step
+  SplitBlock several;  ///< more than one sign change among the coefficients
+  RootBlock hard;      ///< not settled by these two; goes on to subdivision
 };
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

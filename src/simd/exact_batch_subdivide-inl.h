@@ -1,25 +1,22 @@
 // Third stage of the batched elementary test: see exact_batch-inl.h, which includes this.
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
-constexpr int MAX_INTERVALS = 48;            ///< looked at per pair
-constexpr double SMALLEST_INTERVAL = 0x1p-12;
+constexpr int MAX_INTERVALS = 48;  ///< looked at per pair
+constexpr double SMALLEST_INTERVAL = tolerance::BATCH_SMALLEST_INTERVAL;
 
 /// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4,
 /// where f would stay uncertain at every level.
-HWY_INLINE V warp(V x) {
-  return onGrid(hn::Add(x, hn::Mul(constant(0.1376), hn::Mul(x, hn::Sub(constant(1), x)))));
-}
+HWY_INLINE V warp(V x) { return onGrid(hn::Add(x, hn::Mul(constant(0.1376), hn::Mul(x, hn::Sub(constant(1), x))))); }
 
 /// Adds to `plus` and `minus` the lanes whose quadratic with Bernstein coefficients q0, q1_times_2 / 2, q2 certainly
 /// keeps that sign over the interval.
 HWY_INLINE void keepsSign(V q0, V q1_times_2, V q2, V error, M& plus, M& minus) {
   const V twice = hn::Add(error, error), against = hn::Neg(error), twice_against = hn::Neg(twice);
   plus = hn::Or(plus, hn::And(hn::And(hn::Gt(q0, error), hn::Gt(q2, error)), hn::Gt(q1_times_2, twice)));
-  minus = hn::Or(minus,
-                 hn::And(hn::And(hn::Lt(q0, against), hn::Lt(q2, against)), hn::Lt(q1_times_2, twice_against)));
+  minus = hn::Or(minus, hn::And(hn::And(hn::Lt(q0, against), hn::Lt(q2, against)), hn::Lt(q1_times_2, twice_against)));
 }
 
 /// Lanes whose features are certainly apart at every t of an interval, whatever f does: in the projection along one
@@ -68,11 +65,11 @@ HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
     const V uq1 = load(m[U_T1 + q], i), vp0 = load(m[V_T0 + p], i), vp1 = load(m[V_T1 + p], i);
     const V vq0 = load(m[V_T0 + q], i), vq1 = load(m[V_T1 + q], i), wp0 = load(m[W_T0 + p], i);
     const V wp1 = load(m[W_T1 + p], i), wq0 = load(m[W_T0 + q], i), wq1 = load(m[W_T1 + q], i);
-    const M along = apartAlong<KIND>(lerp(up0, up1, sa, a), lerp(uq0, uq1, sa, a), lerp(vp0, vp1, sa, a),
-                                     lerp(vq0, vq1, sa, a), lerp(wp0, wp1, sa, a), lerp(wq0, wq1, sa, a),
-                                     lerp(up0, up1, sb, b), lerp(uq0, uq1, sb, b), lerp(vp0, vp1, sb, b),
-                                     lerp(vq0, vq1, sb, b), lerp(wp0, wp1, sb, b), lerp(wq0, wq1, sb, b), error_n,
-                                     error_b, error_c);
+    const M along =
+        apartAlong<KIND>(lerp(up0, up1, sa, a), lerp(uq0, uq1, sa, a), lerp(vp0, vp1, sa, a), lerp(vq0, vq1, sa, a),
+                         lerp(wp0, wp1, sa, a), lerp(wq0, wq1, sa, a), lerp(up0, up1, sb, b), lerp(uq0, uq1, sb, b),
+                         lerp(vp0, vp1, sb, b), lerp(vq0, vq1, sb, b), lerp(wp0, wp1, sb, b), lerp(wq0, wq1, sb, b),
+                         error_n, error_b, error_c);
     result = hn::Or(result, along);
   }
   return result;
@@ -133,5 +130,5 @@ void subdivideAll(RootBlock& hard, double cells, const BatchOutput& out) {
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();

@@ -1,12 +1,14 @@
 #include "simd/fused_filter.h"
 
+#include "dccd/tolerances.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/fused_filter.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -14,9 +16,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::CappedTag<float, 16>;
 using VF = hn::Vec<DF>;
 constexpr size_t MAX_LANES = 16;
-constexpr float UNIT = 1.0f / 16777216.0f;            // 2^-24
-constexpr float UNDERFLOW_MARGIN = 7.888609e-31f;     // 2^-100
-constexpr float LARGEST_M = 1073741824.0f;            // 2^30
+constexpr float UNIT = tolerance::FUSED_UNIT, UNDERFLOW_MARGIN = tolerance::FUSED_UNDERFLOW,
+                LARGEST_M = tolerance::FUSED_LARGEST_M;
 
 struct Vec3V {
   VF x, y, z;
@@ -49,11 +50,10 @@ HWY_INLINE Quadratic operator+(const Quadratic& p, const Quadratic& q) { return 
 struct Range {
   VF lo, hi;
 };
-HWY_INLINE Range rangeOf(VF a, VF b, VF c) {
-  return {hn::Min(hn::Min(a, b), c), hn::Max(hn::Max(a, b), c)};
-}
+HWY_INLINE Range rangeOf(VF a, VF b, VF c) { return {hn::Min(hn::Min(a, b), c), hn::Max(hn::Max(a, b), c)}; }
 
-// Largest lower end and smallest upper end over the four quantities: opposite strict signs when both are beyond the margin.
+// Largest lower end and smallest upper end over the four quantities: opposite strict signs when both are beyond the
+// margin.
 struct Opposite {
   VF largest_lo, smallest_hi;
   HWY_INLINE void add(const Range& r) {
@@ -135,14 +135,18 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
   const VF f_lo = hn::Min(hn::Min(f0, f1), hn::Min(f2, f3)), f_hi = hn::Max(hn::Max(f0, f1), hn::Max(f2, f3));
   auto out = hn::Or(hn::Gt(f_lo, cubic_margin), hn::Lt(f_hi, hn::Neg(cubic_margin)));
 
-  out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.x; }, margin));
-  out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.y; }, margin));
-  out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [](const Vec3V& v) { return v.z; }, margin));
+  out = hn::Or(out, opposite<EDGE_EDGE>(
+                        bc, ca, ab, T, [](const Vec3V& v) { return v.x; }, margin));
+  out = hn::Or(out, opposite<EDGE_EDGE>(
+                        bc, ca, ab, T, [](const Vec3V& v) { return v.y; }, margin));
+  out = hn::Or(out, opposite<EDGE_EDGE>(
+                        bc, ca, ab, T, [](const Vec3V& v) { return v.z; }, margin));
   if (planes != FusedPlanes::COORDINATE) {
     const auto rejects = [&](const Vec3V& n) {
       const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
       const VF plane_margin = hn::Add(hn::Mul(margin, size), tiny);
-      return opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return dot(n, v); }, plane_margin);
+      return opposite<EDGE_EDGE>(
+          bc, ca, ab, T, [&](const Vec3V& v) { return dot(n, v); }, plane_margin);
     };
     const Quadratic& N = EDGE_EDGE ? bc_ca : T;
     out = hn::Or(out, rejects(N.A + N.B + N.C));
@@ -153,11 +157,16 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
     const auto plus = [](VF a, VF b) { return hn::Add(a, b); };
     const auto minus = [](VF a, VF b) { return hn::Sub(a, b); };
     // Normals of the paper's planes Z|X+Y, X-Y|Z, Y+Z|X+Z, X+Y|Y-Z, Y-Z|X-Y (Fig. 8), up to sign.
-    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return minus(v.x, v.y); }, two));
-    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return plus(v.x, v.y); }, two));
-    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return minus(plus(v.x, v.y), v.z); }, three));
-    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return plus(minus(v.y, v.x), v.z); }, three));
-    out = hn::Or(out, opposite<EDGE_EDGE>(bc, ca, ab, T, [&](const Vec3V& v) { return plus(plus(v.x, v.y), v.z); }, three));
+    out = hn::Or(out, opposite<EDGE_EDGE>(
+                          bc, ca, ab, T, [&](const Vec3V& v) { return minus(v.x, v.y); }, two));
+    out = hn::Or(out, opposite<EDGE_EDGE>(
+                          bc, ca, ab, T, [&](const Vec3V& v) { return plus(v.x, v.y); }, two));
+    out = hn::Or(out, opposite<EDGE_EDGE>(
+                          bc, ca, ab, T, [&](const Vec3V& v) { return minus(plus(v.x, v.y), v.z); }, three));
+    out = hn::Or(out, opposite<EDGE_EDGE>(
+                          bc, ca, ab, T, [&](const Vec3V& v) { return plus(minus(v.y, v.x), v.z); }, three));
+    out = hn::Or(out, opposite<EDGE_EDGE>(
+                          bc, ca, ab, T, [&](const Vec3V& v) { return plus(plus(v.x, v.y), v.z); }, three));
   }
   return hn::And(out, hn::Le(M, hn::Set(d, LARGEST_M)));
 }
@@ -191,11 +200,11 @@ size_t FusedFilterEe(const double* vertices, const uint32_t* quads, size_t count
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 HWY_EXPORT(FusedFilterVf);
 HWY_EXPORT(FusedFilterEe);
@@ -205,5 +214,5 @@ std::size_t fusedFilter(const double* vertices, const std::uint32_t* quads, std:
                    : HWY_DYNAMIC_DISPATCH(FusedFilterVf)(vertices, quads, count, planes, kept);
 }
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

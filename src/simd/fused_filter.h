@@ -21,23 +21,23 @@
 // Non-penetration filter (Tang et al. 2010): a.(b x c) is the cubic of coplanarity; no contact when its four Bernstein
 // coefficients have one strict sign.
 //
-// Rounding margins, u = 2^-24, M = largest |coordinate difference| of the pair (float). Differences are formed in double
-// and rounded to float: relative error at most u (1 + 2^-28). To first order in u:
+// Rounding margins, u = 2^-24, M = largest |coordinate difference| of the pair (float). Differences are formed in
+// double and rounded to float: relative error at most u (1 + 2^-28). To first order in u:
 //   coefficient A or C of a cross product, two products: 2 (3u M^2) + 2u M^2 = 8u M^2, size <= 2 M^2;
 //   coefficient B, four products: 4 (3u M^2) + 8u M^2 = 20u M^2, size <= 4 M^2;
 //   T: three of B's and two sums: 60u + 8u + 12u = 80u M^2, size <= 12 M^2;
 //   n.T for a float vector n taken as exact, N = |n|_1: (80u + 3 * 12u) N M^2 = 116u N M^2;
 //   a.(b x c): a0.bcA 46u M^3, a1.bcA + a0.bcB 168u M^3.
-// The margins below are 128u M^2 (coordinate planes and the paper's other planes, N <= 3, use 128u N M^2), 128u N M^2 and
-// 192u M^3: the rest covers the terms in u^2 and the rounding of the margin itself. Underflow adds at most 2^-100 as long
-// as M <= 2^30 (each of fewer than 100 operations loses at most 2^-149 times a factor of at most 2^30 * N); pairs
-// with a larger M are kept.
+// The margins below are 128u M^2 (coordinate planes and the paper's other planes, N <= 3, use 128u N M^2), 128u N M^2
+// and 192u M^3: the rest covers the terms in u^2 and the rounding of the margin itself. Underflow adds at most 2^-100
+// as long as M <= 2^30 (each of fewer than 100 operations loses at most 2^-149 times a factor of at most 2^30 * N);
+// pairs with a larger M are kept.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
 /// Which certificates to try; ALL_PLANES for the step, the others for measuring what each buys.
@@ -53,4 +53,4 @@ std::size_t fusedFilter(const double* vertices, const std::uint32_t* quads, std:
                         FusedPlanes planes, std::uint32_t* kept);
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

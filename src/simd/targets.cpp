@@ -6,17 +6,17 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 int64_t Target() { return HWY_TARGET; }
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 HWY_EXPORT(Target);
 
@@ -43,5 +43,5 @@ bool restrictTo(const std::string& name) {
 }
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd
 #endif

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace simd {
 
-std::vector<std::string> usableTargets();          ///< compiled in and supported here, best first
+std::vector<std::string> usableTargets();  ///< compiled in and supported here, best first
 std::string activeTarget();
-bool restrictTo(const std::string& name);          ///< false when the name is not usable here; "" removes the restriction
+bool restrictTo(const std::string& name);  ///< false when the name is not usable here; "" removes the restriction
 
 }  // namespace simd
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -24,7 +24,7 @@
 #include <string>
 #include <vector>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace fuzz {
 
 /// Runs the target on every file of its corpus, in the order of their names.
@@ -46,9 +46,9 @@ inline void replayCorpus(const std::string& name, void (*target)(const std::uint
 }
 
 }  // namespace fuzz
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 #define DEFORMABLE_CCD_FUZZ_TARGET(name) \
-  TEST(FuzzCorpus, name) { ::deformable_ccd::fuzz::replayCorpus(#name, &name); }
+  TEST(FuzzCorpus, name) { ::dccd::fuzz::replayCorpus(#name, &name); }
 
 #endif

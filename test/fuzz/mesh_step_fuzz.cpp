@@ -24,7 +24,7 @@ class Bytes {
 };
 
 void mesh_step(const std::uint8_t* data, std::size_t size) {
-  using namespace deformable_ccd::test;
+  using namespace dccd::test;
   Bytes bytes(data, size);
   const Draw draw = [&bytes](int low, int high) { return bytes(low, high); };
   // Small integers and few bits: degenerate in every way, and quick for the oracle.
@@ -32,7 +32,7 @@ void mesh_step(const std::uint8_t* data, std::size_t size) {
   const TestStep step = randomStep(draw, draw(1, 12), coordinates);
   std::string wrong = judgeStep(step);
   if (!wrong.empty()) throw std::logic_error(wrong);
-  std::vector<deformable_ccd::Positions> t1;
+  std::vector<dccd::Positions> t1;
   for (const StepBody& body : step.bodies) t1.push_back(randomMotion(draw, body.t1, coordinates));
   int carried = 0, full = 0;
   wrong = judgeSequence({step, step.continued(t1)}, carried, full);

@@ -1,5 +1,5 @@
-// Any bytes as a pair: every rung against the oracle and on every SIMD target, and exact against itself in another order of
-// the vertices.
+// Any bytes as a pair: every rung against the oracle and on every SIMD target, and exact against itself in another
+// order of the vertices.
 //
 // The first byte chooses how the rest is read: a seed of the generators of hard pairs; coordinates of few bits, one or
 // two bytes each, between which coincidences are likely; or doubles as they are. Missing bytes are zeros.
@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "fuzz/fuzz_target.h"
+#include "oracle/promises.h"
 #include "support/generators.h"
-#include "support/promises.h"
 #include "support/step_support.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 using test::RandomSource;
 
 /// Takes bytes from the front.
@@ -87,17 +87,15 @@ Query decode(const std::uint8_t* data, std::size_t size) {
   return query;
 }
 
-struct Rung {
+struct FuzzedRung {
   AccuracyOptions options;
-  std::unique_ptr<ElementaryTest> test;
+  std::unique_ptr<Rung> test;
 };
 
-const std::vector<Rung>& rungs() {
-  static const std::vector<Rung> all = [] {
-    std::vector<Rung> result;
-    const auto add = [&result](const AccuracyOptions& options) {
-      result.push_back({options, makeElementaryTest(options)});
-    };
+const std::vector<FuzzedRung>& rungs() {
+  static const std::vector<FuzzedRung> all = [] {
+    std::vector<FuzzedRung> result;
+    const auto add = [&result](const AccuracyOptions& options) { result.push_back({options, makeRung(options)}); };
     AccuracyOptions options;
     for (int bits : {10, 32, 52}) {
       options.toc_bits = bits;
@@ -112,7 +110,7 @@ const std::vector<Rung>& rungs() {
   return all;
 }
 
-[[noreturn]] void report(const Query& query, const Rung& rung, const std::string& what) {
+[[noreturn]] void report(const Query& query, const FuzzedRung& rung, const std::string& what) {
   std::ostringstream text;
   text << toString(rung.options.rung) << " " << rung.options.toc_bits << " bits: " << what << "\n"
        << queryFolder(query.kind) << ":\n";
@@ -125,12 +123,13 @@ void pair(const std::uint8_t* data, std::size_t size) {
   std::optional<test::Root> toc = test::firstContact(query.kind, query.motion);
   const auto orders = test::vertexPermutations(query.kind);
   const Query other = test::permuted(query, orders[size % orders.size()]);
-  for (const Rung& rung : rungs()) {
+  for (const FuzzedRung& rung : rungs()) {
     const ElementaryResult result = test::testQuery(*rung.test, query);
     const std::string broken = test::brokenPromise(rung.options, query, toc, result);
     if (!broken.empty()) report(query, rung, broken);
     test::forEachSimdTarget([&](const std::string& target) {
-      if (!test::sameAnswer(test::testQuery(*rung.test, query), result)) report(query, rung, "another answer on " + target);
+      if (!test::sameAnswer(test::testQuery(*rung.test, query), result))
+        report(query, rung, "another answer on " + target);
     });
     if (rung.options.rung != Accuracy::EXACT) continue;
     if (!test::sameAnswer(test::testQuery(*rung.test, other), result)) {

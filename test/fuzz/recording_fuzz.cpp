@@ -8,7 +8,7 @@
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 void recording(const std::uint8_t* data, std::size_t size) {
   StepRecording read;

@@ -1,20 +1,21 @@
-// Any step that can be read from a recording is replayed, or refused by the monitor: bodies, options and maps that no node
-// would make. Its corpus is that of the recordings.
+// Any step that can be read from a recording is replayed, or refused by the monitor: bodies, options and maps that no
+// node would make. Its corpus is that of the recordings.
 #include <stdexcept>
 
 #include "fuzz/fuzz_target.h"
-#include "io/step_recording.h"
-#include "io/step_replay.h"
+#include "record/step_recording.h"
+#include "record/step_replay.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 bool isSmall(const StepRecording& recording) {
   std::size_t vertices = 0;
   for (const RecordedBody& body : recording.bodies) vertices += body.t0.size();
   const std::size_t leaves = recording.map.surface ? recording.map.surface->leafCount() : 0;
-  // The scene in the seeds has 28 vertices and few parts; `conservative` may cost max_subdivisions for each pair and part.
+  // The scene in the seeds has 28 vertices and few parts; `conservative` may cost max_subdivisions for each pair and
+  // part.
   return vertices <= 32 && leaves <= 32 && recording.options.max_substeps <= 64 &&
          recording.options.rigid_tolerance_m >= 1e-3 && recording.options.detector.accuracy.max_subdivisions <= 5000;
 }

@@ -6,7 +6,6 @@ from checkout import CHECKOUT
 
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
 ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
-ROS = CHECKOUT / 'src/ros'
 READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|section)\(\s*"(\w+)"')
 # What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
@@ -25,7 +24,7 @@ def functions(text):
 def read_parameters():
     """Every parameter that the code asks for, bodies' own without their bodies/NAME/."""
     found = set()
-    for name, body in functions((ROS / 'monitor_config.cpp').read_text()):
+    for name, body in functions((CHECKOUT / 'src/config/monitor_config.cpp').read_text()):
         for reader, parameter in READ.findall(body):
             prefix = 'marker/' if reader == 'marker' else SECTIONS.get(name, '')
             found.add(prefix + parameter)
@@ -45,7 +44,7 @@ def names_of(line):
 
 def numbers_of_bodies():
     """The parameters of a body that the code reads as a number with a fraction."""
-    source = (ROS / 'monitor_config.cpp').read_text()
+    source = (CHECKOUT / 'src/config/monitor_config.cpp').read_text()
     found = set()
     for name, body in functions(source[:source.index('void readSeparationPair(')]):
         found |= {SECTIONS.get(name, '') + parameter for parameter in re.findall(r'\.number\(\s*"(\w+)"', body)}
@@ -87,19 +86,19 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):
-        source = (CHECKOUT / 'src/detector/effect_plan.cpp').read_text()
+        source = (CHECKOUT / 'src/step/effect_plan.cpp').read_text()
         names = re.findall(r'"(\w+)"', re.search(r'NAMES = \{([^}]*)\}', source).group(1))
         row = next(line for line in PAGE.splitlines() if line.startswith('| `effects/NAME`'))
         self.assertEqual(sorted(re.findall(r'`(\w+)`', row.split('NAME:')[1])), sorted(names))
 
     def test_topics(self):
-        code = set(re.findall(r'advertise<.*>\("(\w+)"', (ROS / 'outputs.cpp').read_text()))
+        code = set(re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src/output/outputs.cpp').read_text()))
         table = PAGE[PAGE.index('## What comes out'):PAGE.index('**How to read a contact.**')]
         rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
         self.assertEqual(code, {name for row in rows for name in re.findall(r'`~(\w+)`', row)})
 
     def test_services(self):
-        source = (ROS / 'collision_monitor.cpp').read_text()
+        source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()
         source = source[source.index('::advertiseServices()'):]
         code = set(re.findall(r'advertise\("(\w+)"', source)) | set(re.findall(r'\(\s*"(\w+)", ', source[:3000])) & {'enable'}
         section = PAGE[PAGE.index('## Services'):PAGE.index('## Parameters')]
@@ -114,7 +113,7 @@ class InterfaceTest(unittest.TestCase):
 
     def test_live_limits(self):
         """A live set of one value sets all of them: narrower limits than the parameters' would clamp the others."""
-        source = (ROS / 'monitor_config.cpp').read_text()
+        source = (CHECKOUT / 'src/config/monitor_config.cpp').read_text()
         limits = {}
         for name, least, most in re.findall(
                 r'\.(?:number|integer)\(\s*"(\w+)", [^;]*?, ([-\w.]+), ([\w.]+)\)', source):
@@ -183,7 +182,7 @@ class LinksTest(unittest.TestCase):
     def test_files_that_pages_name_exist(self):
         """`src/…`, `test/…` and the like, in the pages' code words."""
         for page in ALL_PAGES:
-            for name in re.findall(r'`((?:src|test|include|config|launch|examples|scripts|doc|benchmark|msg|cmake)/[\w./-]*)`',
+            for name in re.findall(r'`((?:src|paper|oracle|test|include|config|launch|examples|scripts|doc|benchmark|msg|cmake)/[\w./-]*)`',
                                    page.read_text()):
                 with self.subTest('%s: %s' % (page.name, name)):
                     self.assertTrue((CHECKOUT / name).exists())

@@ -6,23 +6,34 @@ from checkout import CHECKOUT, code_under, tracked_files
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 
-# Folder of src/ -> the folders of src/ that it may include. The public headers (deformable_ccd/...) are open to all but
-# simd. A folder may always include itself.
-MAY_INCLUDE = {
+# Folder of src/ -> the folders of src/ that it may include. The public headers (dccd/...) are open to all but simd,
+# which takes the tolerances alone. A folder may always include itself.
+CORE = {
     'simd': set(),
     'mesh': set(),
-    'filter': {'simd'},
-    'broad_phase': {'mesh', 'filter', 'simd'},
+    'projection': {'simd'},
+    'culling': {'projection', 'simd'},
     'elementary': {'simd'},
     'obstacle': {'simd'},
-    'detector': {'mesh', 'broad_phase', 'filter', 'elementary', 'obstacle', 'simd'},
-    'io': {'mesh'},
+    'step': {'projection', 'culling', 'elementary', 'obstacle', 'simd'},
+    'stream': {'step', 'obstacle'},
+    'record': {'stream', 'step', 'culling', 'projection', 'obstacle', 'simd'},
+}
+MAY_INCLUDE = {
+    **CORE,
+    'report': set(),
     'octomap': {'obstacle'},
     'scene': set(),
-    'ros': {'octomap', 'io'},
+    'ros': set(),
+    'input': {'ros'},
+    'config': {'ros', 'input'},
+    'output': {'ros', 'input', 'config', 'report'},
+    'node': {'ros', 'input', 'config', 'output', 'octomap', 'record', 'report'},
     'apps': None,  # everything
 }
-CORE = ['simd', 'mesh', 'filter', 'broad_phase', 'elementary', 'obstacle', 'detector', 'io']
+ROS_ROOMS = ('ros', 'input', 'config', 'output', 'node', 'apps')
+# What tests and benchmarks hold the libraries against.
+OUTSIDE = ('paper/', 'oracle/', 'support/', 'test/', 'unit/')
 ROS_OR_PCL = re.compile(r'^(ros/|ros\.h|tf2|pcl|rosbag|roslib|nodelet|pluginlib|topic_tools|dynamic_reconfigure|'
                         r'diagnostic_updater|xmlrpcpp|message_filters|[a-z_]+_msgs/|std_srvs/)')
 OCTOMAP = re.compile(r'^octomap/(?!.*\.hh)')
@@ -59,18 +70,39 @@ class LayeringTest(unittest.TestCase):
 
     def test_simd_includes_nothing_of_the_package(self):
         wrong = ['%s includes %s' % (name(path), target) for path in code_under('src/simd')
-                 for _, target in includes(path) if target.startswith('deformable_ccd/')]
+                 for _, target in includes(path) if target.startswith('dccd/') and target != 'dccd/tolerances.h']
         self.assertEqual(wrong, [])
 
+    def test_public_headers_include_no_room_of_src(self):
+        wrong = ['%s includes %s' % (name(path), target) for path in code_under('include') for bracket, target in includes(path)
+                 if bracket == '"' and not target.startswith('dccd/')]
+        self.assertEqual(wrong, [])
+
+    def test_libraries_and_tools_need_neither_tests_nor_paper(self):
+        """run_queries shows how the rungs err, and so needs the oracle; nothing else does."""
+        wrong = ['%s includes %s' % (name(path), target) for path in code_under('src') for _, target in includes(path)
+                 if target.startswith(OUTSIDE) and not (path.name == 'run_queries.cpp' and target.startswith('oracle/'))]
+        self.assertEqual(wrong, [])
+
+    def test_core_handles_no_signals_and_writes_no_page(self):
+        words = re.compile(r'#include <(csignal|signal\.h|nlohmann|CLI)|<html')
+        wrong = [name(p) for folder in CORE for p in code_under('src/' + folder) if words.search(p.read_text(errors='replace'))]
+        self.assertEqual(wrong, [])
+
+    def test_production_classes_do_not_end_in_test(self):
+        found = [m for folder in ('src', 'include') for p in code_under(folder)
+                 for m in re.findall(r'^(?:class|struct) (?:DCCD_EXPORT )?(\w*Test)\b', p.read_text(), re.M)]
+        self.assertEqual(found, [])
+
     def test_core_is_free_of_ros_pcl_and_octomap(self):
-        files = code_under('include/deformable_ccd') + [p for folder in CORE for p in code_under('src/' + folder)]
+        files = code_under('include/dccd') + [p for folder in CORE for p in code_under('src/' + folder)]
         wrong = ['%s includes %s' % (name(path), target) for path in files for bracket, target in includes(path)
                  if ROS_OR_PCL.match(target) or (bracket == '<' and OCTOMAP.match(target))]
         self.assertEqual(wrong, [])
         self.assertGreater(len(files), 30)
 
-    def test_ros_and_pcl_only_under_ros_and_apps(self):
-        files = [p for p in code_under('src') if p.relative_to(CHECKOUT).parts[1] not in ('ros', 'apps')]
+    def test_ros_and_pcl_only_in_the_rooms_of_the_node(self):
+        files = [p for p in code_under('src') if p.relative_to(CHECKOUT).parts[1] not in ROS_ROOMS]
         wrong = ['%s includes %s' % (name(path), target) for path in files for _, target in includes(path)
                  if ROS_OR_PCL.match(target)]
         self.assertEqual(wrong, [])

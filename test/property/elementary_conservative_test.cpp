@@ -8,13 +8,13 @@
 #include <iostream>
 #include <memory>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "oracle/oracle.h"
+#include "oracle/promises.h"
 #include "support/generators.h"
-#include "support/oracle.h"
-#include "support/promises.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -60,8 +60,8 @@ std::uint64_t digestOf(const Query& query) {
 
 TEST(ElementaryConservative, NeverMissesNeverLateAndNearWhenItSaysSo) {
   constexpr double TOLERANCES[] = {1e-3, 1e-6, 1e-9};
-  std::vector<std::unique_ptr<ElementaryTest>> tests;
-  for (double tolerance : TOLERANCES) tests.push_back(makeElementaryTest(conservativeOptions(tolerance)));
+  std::vector<std::unique_ptr<Rung>> tests;
+  for (double tolerance : TOLERANCES) tests.push_back(makeRung(conservativeOptions(tolerance)));
   std::size_t runs = 0, undecided = 0;
   checkHardQueries("conservative-oracle", longRun() ? 1000000 : 20000, [&](const Query& query) -> std::string {
     std::optional<Root> toc = firstContact(query.kind, query.motion);
@@ -79,7 +79,7 @@ TEST(ElementaryConservative, NeverMissesNeverLateAndNearWhenItSaysSo) {
 
 TEST(ElementaryConservative, MinimumSeparation) {
   const AccuracyOptions options = conservativeOptions(1e-6);
-  const auto test = makeElementaryTest(options);
+  const auto test = makeRung(options);
   std::size_t runs = 0, undecided = 0, contacts = 0;
   checkHardQueries("conservative-separation", longRun() ? 120000 : 10000, [&](const Query& query) -> std::string {
     constexpr double FRACTIONS[] = {1e-6, 1e-3, 0.03, 0.2, 0.7};
@@ -103,7 +103,7 @@ TEST(ElementaryConservative, MinimumSeparation) {
 TEST(ElementaryConservative, TheCapOnlyLeavesMoreUndecided) {
   AccuracyOptions options = conservativeOptions(1e-9);
   options.max_subdivisions = 3;
-  const auto test = makeElementaryTest(options);
+  const auto test = makeRung(options);
   checkHardQueries("conservative-cap", longRun() ? 200000 : 5000, [&](const Query& query) -> std::string {
     std::optional<Root> toc = firstContact(query.kind, query.motion);
     const ElementaryResult result = testQuery(*test, query);
@@ -114,4 +114,4 @@ TEST(ElementaryConservative, TheCapOnlyLeavesMoreUndecided) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

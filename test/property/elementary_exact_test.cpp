@@ -5,13 +5,13 @@
 #include <memory>
 #include <sstream>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "oracle/oracle.h"
+#include "oracle/promises.h"
 #include "support/generators.h"
-#include "support/oracle.h"
-#include "support/promises.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -33,8 +33,8 @@ std::string described(const ElementaryResult& result) {
 }
 
 TEST(ElementaryExact, VerdictAndCellAreTheOracles) {
-  std::vector<std::unique_ptr<ElementaryTest>> tests;
-  for (int bits : TOC_BITS) tests.push_back(makeElementaryTest(exactOptions(bits)));
+  std::vector<std::unique_ptr<Rung>> tests;
+  for (int bits : TOC_BITS) tests.push_back(makeRung(exactOptions(bits)));
   checkHardQueries("exact-oracle", longRun() ? 1000000 : 20000, [&](const Query& query) -> std::string {
     std::optional<Root> toc = firstContact(query.kind, query.motion);
     for (std::size_t i = 0; i < tests.size(); ++i) {
@@ -47,7 +47,7 @@ TEST(ElementaryExact, VerdictAndCellAreTheOracles) {
 }
 
 TEST(ElementaryExact, NoOrderAxisOrScaleChangesTheAnswer) {
-  const auto test = makeElementaryTest(exactOptions(32));
+  const auto test = makeRung(exactOptions(32));
   const auto axes = axisPermutations();
   checkHardQueries("exact-symmetry", longRun() ? 200000 : 10000, [&](const Query& query) -> std::string {
     const ElementaryResult expected = testQuery(*test, query);
@@ -75,7 +75,7 @@ TEST(ElementaryExact, NoOrderAxisOrScaleChangesTheAnswer) {
 }
 
 TEST(ElementaryExact, TimeReversedHasTheSameVerdict) {
-  const auto test = makeElementaryTest(exactOptions(32));
+  const auto test = makeRung(exactOptions(32));
   checkHardQueries("exact-reversed", longRun() ? 1000000 : 20000, [&](const Query& query) -> std::string {
     const ElementaryResult forward = testQuery(*test, query), backward = testQuery(*test, timeReversed(query));
     if (forward.verdict == backward.verdict) return {};
@@ -85,8 +85,8 @@ TEST(ElementaryExact, TimeReversedHasTheSameVerdict) {
 
 // A coarser cell is the finer one with bits cut off: cells of all widths name one time.
 TEST(ElementaryExact, CellsOfAllWidthsContainEachOther) {
-  std::vector<std::unique_ptr<ElementaryTest>> tests;
-  for (int bits = 10; bits <= 52; ++bits) tests.push_back(makeElementaryTest(exactOptions(bits)));
+  std::vector<std::unique_ptr<Rung>> tests;
+  for (int bits = 10; bits <= 52; ++bits) tests.push_back(makeRung(exactOptions(bits)));
   checkHardQueries("exact-nested", longRun() ? 100000 : 2000, [&](const Query& query) -> std::string {
     ElementaryResult finer = testQuery(*tests.back(), query);
     for (int bits = 51; bits >= 10; --bits) {
@@ -103,7 +103,7 @@ TEST(ElementaryExact, CellsOfAllWidthsContainEachOther) {
 
 // Lanes must not disturb each other, whatever stands beside a pair and wherever in the batch it stands.
 TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
-  const auto test = makeElementaryTest(exactOptions(32));
+  const auto test = makeRung(exactOptions(32));
   RandomSource random(11);
   const int rounds = longRun() ? 2000 : 60;
   for (int round = 0; round < rounds; ++round) {
@@ -149,4 +149,4 @@ TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,12 +3,12 @@
 
 #include <iostream>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "oracle/promises.h"
 #include "support/generators.h"
-#include "support/promises.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -19,7 +19,7 @@ AccuracyOptions fastOptions() {
 }
 
 TEST(ElementaryFast, TimesAreFiniteAndWithinTheStep) {
-  const auto test = makeElementaryTest(fastOptions());
+  const auto test = makeRung(fastOptions());
   checkHardQueries("fast-range", longRun() ? 1000000 : 20000, [&](const Query& query) -> std::string {
     std::optional<Root> unused;
     return brokenPromise(fastOptions(), query, unused, testQuery(*test, query));
@@ -28,7 +28,7 @@ TEST(ElementaryFast, TimesAreFiniteAndWithinTheStep) {
 
 // Useful all the same: on pairs of ordinary size it is nearly always right.
 TEST(ElementaryFast, NearlyAlwaysRightOnOrdinaryPairs) {
-  const auto test = makeElementaryTest(fastOptions());
+  const auto test = makeRung(fastOptions());
   RandomSource random(5);
   const int pairs = longRun() ? 100000 : 4000;
   int wrong = 0;
@@ -43,4 +43,4 @@ TEST(ElementaryFast, NearlyAlwaysRightOnOrdinaryPairs) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

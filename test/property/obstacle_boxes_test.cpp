@@ -1,5 +1,5 @@
-// The obstacle test says of each mesh triangle what the general tests say of it against every voxel as a closed box: the
-// same yes or no, and the same cell of the earliest TOC.
+// The obstacle test says of each mesh triangle what the general tests say of it against every voxel as a closed box:
+// the same yes or no, and the same cell of the earliest TOC.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -9,7 +9,7 @@
 #include "support/box_oracle.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::ObstacleScene;
@@ -119,7 +119,7 @@ ObstacleScene drawScene(bool polyline) {
 }
 
 std::vector<Contact> contactsOf(const ObstacleScene& scene, const ObstacleOptions& options) {
-  ObstacleTest test(options);
+  ObstacleCheck test(options);
   std::vector<Contact> contacts;
   ObstacleStats stats;
   test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 3,
@@ -172,9 +172,9 @@ void checkScenes(const std::string& name, int scenes, bool polyline) {
   rc::detail::TestParams params;
   params.seed = 20170601;
   params.maxSuccess = scenes;
-  const auto result = rc::detail::checkTestable(
-      [&] { checkScene(drawScene(polyline), *rc::gen::element(32, 32, 10, 52), tally); },
-      rc::detail::TestMetadata(), params);
+  const auto result =
+      rc::detail::checkTestable([&] { checkScene(drawScene(polyline), *rc::gen::element(32, 32, 10, 52), tally); },
+                                rc::detail::TestMetadata(), params);
   std::ostringstream message;
   if (!result.is<rc::detail::SuccessResult>()) rc::detail::printResultMessage(result, message);
   EXPECT_TRUE(result.is<rc::detail::SuccessResult>()) << message.str();
@@ -195,4 +195,4 @@ TEST(ObstacleBoxes, PolylinesAgreeWithTheGeneralTests) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

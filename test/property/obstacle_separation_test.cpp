@@ -8,7 +8,7 @@
 #include "support/box_oracle.h"
 #include "support/query_property.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::ObstacleScene;
@@ -39,7 +39,7 @@ TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
   for (int i = 0; i < scenes; ++i) {
     const ObstacleScene scene = randomScene(random);
     options.minimum_separation_m = (random() % 4 + 1) * 0.004;
-    ObstacleTest test(options);
+    ObstacleCheck test(options);
     std::vector<Contact> contacts;
     ObstacleStats stats;
     test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
@@ -79,8 +79,8 @@ double pointToBoxes(const ObstacleScene& scene, const Vec3& point) {
   return distance;
 }
 
-// The uncertainty of a point on an edge lies between those of its ends: no point may come closer than its own unseen, and
-// no contact of the edge is farther than its most uncertain end asks for.
+// The uncertainty of a point on an edge lies between those of its ends: no point may come closer than its own unseen,
+// and no contact of the edge is farther than its most uncertain end asks for.
 TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
   std::mt19937_64 random(12);
   const int scenes = test::longRun() ? 20000 : 400;
@@ -93,7 +93,7 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
     options.minimum_separation_m = random() % 2 ? 0.0 : 0.006;
     std::vector<double> radius(3, 0.0);
     radius[random() % 3] = 0.005 * static_cast<double>(1 + random() % 8);
-    ObstacleTest test(options);
+    ObstacleCheck test(options);
     std::vector<Contact> contacts;
     ObstacleStats stats;
     test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
@@ -122,7 +122,8 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
         const double distance = pointToBoxes(scene, (1 - on_edge) * from + on_edge * to);
         if (distance > options.minimum_separation_m + radius_there - 1e-9) continue;
         close = true;
-        ASSERT_LE(earliest, t) << "distance " << distance << ", radius " << radius_there << "\n" << test::describe(scene);
+        ASSERT_LE(earliest, t) << "distance " << distance << ", radius " << radius_there << "\n"
+                               << test::describe(scene);
       }
       ++(close ? within : sure_apart);
     }
@@ -133,4 +134,4 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

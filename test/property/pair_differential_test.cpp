@@ -1,6 +1,6 @@
 // Hard pairs by the million: every elementary test, on every SIMD target, in batches, against the oracle.
-// DEFORMABLE_CCD_LONG=1 runs 1e7 of them; the seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file that
-// run_queries replays; the single-pair tests beside this one shrink it.
+// DEFORMABLE_CCD_LONG=1 runs 1e7 of them; the seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file
+// that run_queries replays; the single-pair tests beside this one shrink it.
 #include <gtest/gtest.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -12,15 +12,15 @@
 #include <mutex>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
-#include "detector/fork_join.h"
+#include "dccd/elementary.h"
+#include "oracle/oracle.h"
+#include "oracle/promises.h"
+#include "step/fork_join.h"
 #include "support/generators.h"
-#include "support/oracle.h"
-#include "support/promises.h"
 #include "support/query_property.h"
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -30,11 +30,11 @@ constexpr std::size_t BLOCK = 10000, CHUNK = 250;
 template <class Body>
 void inChunks(const Body& body) {
   ForkJoin::fork();
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK),
-                    [&](const tbb::blocked_range<std::size_t>& range) DEFORMABLE_CCD_COPIED_BY_TBB {
-                      ForkJoin::piece(body, range.begin(), range.end());
-                    },
-                    tbb::simple_partitioner());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, BLOCK, CHUNK),
+      [&](const tbb::blocked_range<std::size_t>& range)
+          DEFORMABLE_CCD_COPIED_BY_TBB { ForkJoin::piece(body, range.begin(), range.end()); },
+      tbb::simple_partitioner());
   ForkJoin::join();
 }
 
@@ -107,7 +107,7 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
         for (std::size_t r = 0; r < rungs.size(); ++r) {
           const AccuracyOptions& options = rungs[r];
           TierCounters counters;
-          makeElementaryTest(options)->run(block.batch(begin, end), results.data(), counters);
+          makeRung(options)->run(block.batch(begin, end), results.data(), counters);
           for (std::size_t i = begin; i != end; ++i) {
             const ElementaryResult& result = results[i - begin];
             std::string wrong;
@@ -135,4 +135,4 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

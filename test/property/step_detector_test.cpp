@@ -8,7 +8,7 @@
 #include "support/query_property.h"
 #include "support/step_judge.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -111,4 +111,4 @@ TEST(StepSequence, ClearWithoutContactEndsClear) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

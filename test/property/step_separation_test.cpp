@@ -1,16 +1,17 @@
-// Whole steps with a minimum separation and tracker noise, against the exact distance: nothing that comes closer than the
-// pair's separation is missed or late, and nothing is called a contact that stays farther than it plus the tolerance.
+// Whole steps with a minimum separation and tracker noise, against the exact distance: nothing that comes closer than
+// the pair's separation is missed or late, and nothing is called a contact that stays farther than it plus the
+// tolerance.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <iostream>
 #include <map>
 
-#include "support/exact_distance.h"
+#include "oracle/exact_distance.h"
 #include "support/query_property.h"
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -52,7 +53,7 @@ double radiusOf(const NoisyStep& noisy, std::uint16_t body, const Index* v, int 
   return radius;
 }
 
-double separationOf(const NoisyStep& noisy, const core::Contact& c) {
+double separationOf(const NoisyStep& noisy, const Contact& c) {
   const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
   return std::max(noisy.separation_m[c.body[0]], noisy.separation_m[c.body[1]]) +
          radiusOf(noisy, c.body[0], c.vertex.data(), first) +
@@ -90,7 +91,7 @@ void forEachPair(const TestStep& step, const Visit& visit) {
         }
       }
     }
-    core::Contact c;
+    Contact c;
     c.kind = kind;
     c.body = {static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)};
     c.vertex = v;
@@ -121,14 +122,14 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
     const NoisyStep noisy = randomNoisyStep(draw);
     const StepResult result = run(noisy, BroadPhase::CLUSTERED);
     ASSERT_EQ(difference(result.contacts, run(noisy, BroadPhase::BRUTE_FORCE).contacts), "") << "seed " << seed;
-    std::map<Key, const core::Contact*> found;
-    for (const core::Contact& c : result.contacts) {
+    std::map<Key, const Contact*> found;
+    for (const Contact& c : result.contacts) {
       found[{c.kind, c.body, c.vertex}] = &c;
       if (c.certainty != Certainty::CERTAIN) continue;
       const double reach = (separationOf(noisy, c) + TOLERANCE_M) * (1 + 1e-12);
       ASSERT_TRUE(isWithin(c.kind, motionOf(noisy.step, c), c.toc_lower, reach)) << "seed " << seed << describe(c);
     }
-    forEachPair(noisy.step, [&](const core::Contact& c) {
+    forEachPair(noisy.step, [&](const Contact& c) {
       ++pairs;
       const PairMotion motion = motionOf(noisy.step, c);
       const double separation_m = separationOf(noisy, c);
@@ -146,7 +147,8 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
     });
     if (HasFatalFailure()) return;
   }
-  std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within << " of them with noise\n";
+  std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within
+            << " of them with noise\n";
   EXPECT_GT(within, pairs / 100);
   EXPECT_GT(noisy_within, within / 10);
 }
@@ -159,11 +161,11 @@ TEST(StepSeparation, EarliestOnlyIsTheFirstOfAll) {
     const StepResult full = run(noisy, BroadPhase::CLUSTERED), first = run(noisy, BroadPhase::CLUSTERED, true);
     ASSERT_EQ(first.earliestToc(), full.earliestToc()) << "seed " << seed;
     double upper = 1;
-    for (const core::Contact& c : full.contacts) {
+    for (const Contact& c : full.contacts) {
       if (c.certainty == Certainty::CERTAIN) upper = std::min(upper, c.toc_upper);
     }
-    std::vector<core::Contact> expected;
-    for (const core::Contact& c : full.contacts) {
+    std::vector<Contact> expected;
+    for (const Contact& c : full.contacts) {
       if (c.toc_lower <= upper) expected.push_back(c);
     }
     ASSERT_EQ(difference(first.contacts, expected), "") << "seed " << seed;
@@ -181,9 +183,9 @@ TEST(StepSeparation, OtherPairsAreAsWithoutNoise) {
     const Draw draw = drawFrom(9100 + static_cast<std::uint64_t>(seed));
     NoisyStep noisy = randomNoisyStep(draw), quiet = noisy;
     for (auto& radius : quiet.radius_m) radius.clear();
-    std::map<Key, core::Contact> without;
-    for (const core::Contact& c : run(quiet, BroadPhase::CLUSTERED).contacts) without[{c.kind, c.body, c.vertex}] = c;
-    for (const core::Contact& c : run(noisy, BroadPhase::CLUSTERED).contacts) {
+    std::map<Key, Contact> without;
+    for (const Contact& c : run(quiet, BroadPhase::CLUSTERED).contacts) without[{c.kind, c.body, c.vertex}] = c;
+    for (const Contact& c : run(noisy, BroadPhase::CLUSTERED).contacts) {
       const bool uncertain = separationOf(noisy, c) > separationOf(quiet, c);
       const auto at = without.find({c.kind, c.body, c.vertex});
       if (uncertain) continue;
@@ -223,4 +225,4 @@ TEST(StepSeparation, BadRadiiAndRungsAreRefused) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

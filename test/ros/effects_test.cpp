@@ -12,15 +12,15 @@
 
 #include "ros/support/monitor_fixture.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
 constexpr std::size_t MONITORS = 4;  // in effects.test; each listens to /tf
 
-using ContactMessage = ContactArray::_contacts_type::value_type;
+using ContactMessage = deformable_ccd::ContactArray::_contacts_type::value_type;
 
-double earliest(const ContactArray& outcome) {
+double earliest(const deformable_ccd::ContactArray& outcome) {
   double toc = 2;
   for (const ContactMessage& contact : outcome.contacts) toc = std::min(toc, contact.toc_lower);
   return toc;
@@ -35,15 +35,15 @@ struct OverMap : MonitorTest {
         map(advertiseAndWait<octomap_msgs::Octomap>(node, name + "/octomap", true)) {}
 
   /// A step between two heights that has seen the map, with the stamp of its end.
-  ContactArray step(double from_z, double to_z, double end_s) {
+  deformable_ccd::ContactArray step(double from_z, double to_z, double end_s) {
     map.publish(blockBelowZero(true));
     double stamp_s = end_s - 40;
     EXPECT_TRUE(waitUntil([&] {
-      const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, from_z), stamp_s += 0.1));
-      return outcome.answered && outcome.status != ContactArray::NO_MAP;
+      const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, from_z), stamp_s += 0.1));
+      return outcome.answered && outcome.status != deformable_ccd::ContactArray::NO_MAP;
     }));
     send(mesh, cloud(gridAt(3, 4, from_z), end_s - 0.1));
-    const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, to_z), end_s));
+    const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, to_z), end_s));
     EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(end_s); }));
     return outcome;
   }
@@ -55,8 +55,8 @@ struct Filtered : OverMap {
 };
 
 TEST_F(Filtered, MaskedVerticesAndExcludedBoxesMeetNothing) {
-  const ContactArray outcome = step(0.3, -0.05, 50);
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = step(0.3, -0.05, 50);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   std::size_t vertices = 0;
   for (const ContactMessage& contact : outcome.contacts) {
     vertices += contact.kind == ContactMessage::VERTEX_VOXEL_FACE;
@@ -70,7 +70,7 @@ TEST_F(Filtered, MaskedVerticesAndExcludedBoxesMeetNothing) {
 }
 
 TEST_F(Filtered, InitialContactsAreSuppressedByChoiceAndCounted) {
-  const ContactArray outcome = step(-0.05, -0.06, 50);
+  const deformable_ccd::ContactArray outcome = step(-0.05, -0.06, 50);
   EXPECT_TRUE(outcome.contacts.empty()) << "all of it has been inside from the start";
   EXPECT_GT(stats.last().suppressed, 0u);
   EXPECT_FALSE(clear.last().data) << "suppressed is not clear";
@@ -81,8 +81,8 @@ struct Occupied : OverMap {
 };
 
 TEST_F(Occupied, TheUnknownIsAnObstacleWithinItsBox) {
-  const ContactArray outcome = step(0.8, 0.4, 50);
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = step(0.8, 0.4, 50);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   EXPECT_NEAR(earliest(outcome), 0.5, 1e-6) << "the box ends at 0.6 m";
   EXPECT_NEAR(stats.last().map_age, 49, 1e-6);
 }
@@ -91,8 +91,8 @@ TEST_F(Occupied, AnOldMapIsNoMap) {
   step(0.8, 0.7, 50);
   trigger("reset");
   send(mesh, cloud(gridAt(3, 4, 0.8), 101.5));
-  const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.7), 101.6));
-  EXPECT_EQ(outcome.status, ContactArray::NO_MAP);
+  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.7), 101.6));
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP);
   EXPECT_NE(outcome.reason.find("octomap_timeout_s"), std::string::npos) << outcome.reason;
 }
 
@@ -101,9 +101,9 @@ TEST_F(Occupied, AnOldMapIsNoMap) {
 struct Felt : MonitorTest {
   Felt() : MonitorTest("/felt") {}
   ros::Publisher felt = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/felt/felt");
-  ros::Publisher tip = advertiseAndWait<MeshStamped>(node, "/felt/tip");
+  ros::Publisher tip = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/felt/tip");
 
-  ContactArray sendBoth(double tip_z, double stamp_s) {
+  deformable_ccd::ContactArray sendBoth(double tip_z, double stamp_s) {
     const std::size_t seen = contacts.count();
     const Mesh mesh{{{0.2, 0.2, tip_z}, {0.7, 0.2, tip_z + 1}, {-0.3, 0.2, tip_z + 1}}, {{0, 1, 2}}};
     tip.publish(meshStamped(mesh, stamp_s));
@@ -114,11 +114,11 @@ struct Felt : MonitorTest {
 
 // The first case of this monitor: it has not had any frame yet.
 TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
-  Probe<EffectArray> effects(node, "/felt/effects");
+  Probe<deformable_ccd::EffectArray> effects(node, "/felt/effects");
   ASSERT_TRUE(waitUntil([&] { return effects.count() > 0; })) << "before any frame";
   const std::size_t before = effects.count();
   const auto reasonOf = [&](const std::string& name) {
-    for (const EffectState& effect : effects.last().effects) {
+    for (const deformable_ccd::EffectState& effect : effects.last().effects) {
       if (effect.name == name) return effect.reason;
     }
     return std::string();
@@ -135,8 +135,8 @@ TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
 
 TEST_F(Felt, APairOfBodiesHasItsOwnDistance) {
   sendBoth(1, 10);
-  const ContactArray outcome = sendBoth(-1, 10.1);
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = sendBoth(-1, 10.1);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   ASSERT_FALSE(outcome.contacts.empty());
   EXPECT_LE(earliest(outcome), 0.49) << "never late: 2 cm above the felt, not 12";
   EXPECT_NEAR(earliest(outcome), 0.49, 1e-4);
@@ -148,8 +148,8 @@ TEST_F(Felt, APairOfBodiesHasItsOwnDistance) {
 TEST_F(Felt, WhatIsLeftOutIsListedAndCounted) {
   sendBoth(1, 10);
   sendBoth(0.9, 10.1);
-  Probe<LeftOutPairs> left_out(node, "/felt/left_out");
-  const LeftOutPairs listed = left_out.after(0);
+  Probe<deformable_ccd::LeftOutPairs> left_out(node, "/felt/left_out");
+  const deformable_ccd::LeftOutPairs listed = left_out.after(0);
   ASSERT_FALSE(listed.pairs.empty()) << "latched";
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
   EXPECT_EQ(stats.last().left_out_listed, listed.pairs.size());
@@ -164,7 +164,7 @@ struct Turning : MonitorTest {
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
 
   /// The finger, a box of 0.5 x 0.5 x 0.8 m, turns about its vertical axis; the rope hangs straight down at (x, y).
-  ContactArray turn(double angle, double x, double y, double start_s) {
+  deformable_ccd::ContactArray turn(double angle, double x, double y, double start_s) {
     const Positions points{{x, y, -1}, {x, y, -0.5}, {x, y, 0}, {x, y, 0.5}, {x, y, 1}};
     tf2_msgs::TFMessage from = transformAt(start_s, "turning_finger", {0, 0, 0}), to = from;
     to.transforms[0].header.stamp += ros::Duration(0.1);
@@ -173,15 +173,15 @@ struct Turning : MonitorTest {
     tf.publish(from);
     tf.publish(to);
     send(rope, cloud(points, start_s));
-    const ContactArray outcome = send(rope, cloud(points, start_s + 0.1));
+    const deformable_ccd::ContactArray outcome = send(rope, cloud(points, start_s + 0.1));
     EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == to.transforms[0].header.stamp; }));
     return outcome;
   }
 };
 
 TEST_F(Turning, ALargeTurnSplitsTheStepAndTheStatisticsSaySo) {
-  const ContactArray outcome = turn(1.5, 5, 5, 20);
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = turn(1.5, 5, 5, 20);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   EXPECT_TRUE(outcome.contacts.empty());
   // Corners 0.534 m from the frame's origin: arcs of 0.123 rad stay within 1 mm of their chords.
   EXPECT_EQ(stats.last().substeps, 13u);
@@ -193,9 +193,9 @@ TEST_F(Turning, ALargeTurnSplitsTheStepAndTheStatisticsSaySo) {
 
 TEST_F(Turning, ARopeOnTheArcIsMetThoughBothEndsAreClearOfIt) {
   // A corner is 0.354 m from the axis, a side 0.25 m. The corner at 45 degrees passes the rope at 90.
-  const ContactArray outcome = turn(1.5, 0, 0.34, 40);
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
-  EXPECT_EQ(outcome.start_state, ContactArray::CLEAR);
+  const deformable_ccd::ContactArray outcome = turn(1.5, 0, 0.34, 40);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
+  EXPECT_EQ(outcome.start_state, deformable_ccd::ContactArray::CLEAR);
   bool vertex_face = false, edge_edge = false;
   for (const ContactMessage& contact : outcome.contacts) {
     vertex_face |= contact.kind == ContactMessage::VERTEX_FACE;
@@ -209,7 +209,7 @@ TEST_F(Turning, ARopeOnTheArcIsMetThoughBothEndsAreClearOfIt) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <sstream>
 
-#include "io/step_replay.h"
+#include "record/step_replay.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -17,10 +17,10 @@ struct Recording : MonitorTest {
 };
 
 TEST_F(Recording, RecordStepWritesWhatReplaysToTheSameBits) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/recording/mesh");
   send(publisher, meshStamped(tipAbove(1), 10));
   send(publisher, meshStamped(tipAbove(0.5), 10.1));
-  const ContactArray outcome = send(publisher, meshStamped(tipAbove(-3), 10.2));
+  const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(tipAbove(-3), 10.2));
   ASSERT_FALSE(outcome.contacts.empty());
   const auto written = trigger("record_step");
   ASSERT_TRUE(written.success) << written.message;
@@ -35,7 +35,7 @@ TEST_F(Recording, RecordStepWritesWhatReplaysToTheSameBits) {
     EXPECT_TRUE(replay.differences.empty()) << replay.differences.front();
   }
   const auto& message = outcome.contacts.front();
-  const core::Contact& contact = steps[1].answer.contacts.front();
+  const Contact& contact = steps[1].answer.contacts.front();
   EXPECT_EQ(message.toc_lower, contact.toc_lower);
   EXPECT_EQ(message.toc_upper, contact.toc_upper);
 }
@@ -45,68 +45,73 @@ struct Unwritable : MonitorTest {
 };
 
 TEST_F(Unwritable, ARecordingThatCannotBeWrittenIsAnAnswerNotAnEnd) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/unwritable/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/unwritable/mesh");
   const auto early = trigger("record_step");
   EXPECT_FALSE(early.success);
   EXPECT_NE(early.message.find("no step"), std::string::npos) << early.message;
   send(publisher, meshStamped(tipAbove(1), 10));
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.5), 10.1)).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.5), 10.1)).status, deformable_ccd::ContactArray::OK);
   const auto answer = trigger("record_step");
   EXPECT_FALSE(answer.success);
   EXPECT_NE(answer.message.find("cannot be written"), std::string::npos) << answer.message;
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.4), 10.2)).status, ContactArray::OK) << "and goes on";
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.4), 10.2)).status, deformable_ccd::ContactArray::OK)
+      << "and goes on";
   expectAddsUp();
 }
 
 TEST_F(Recording, AnotherPublisherWithAnotherTopology) {
   {
-    const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+    const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/recording/mesh");
     send(publisher, meshStamped(tipAbove(1), 10));
-    EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 10.1)).status, ContactArray::OK);
+    EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 10.1)).status, deformable_ccd::ContactArray::OK);
   }
   Mesh other = tipAbove(0.8);
   other.positions.push_back({5, 5, 5});
   other.faces.push_back({3, 4, 6});
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
-  const ContactArray changed = send(publisher, meshStamped(other, 10.2));
-  EXPECT_EQ(changed.status, ContactArray::TOPOLOGY_CHANGED);
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/recording/mesh");
+  const deformable_ccd::ContactArray changed = send(publisher, meshStamped(other, 10.2));
+  EXPECT_EQ(changed.status, deformable_ccd::ContactArray::TOPOLOGY_CHANGED);
   EXPECT_FALSE(changed.answered);
   EXPECT_FALSE(clear.last().data);
-  EXPECT_EQ(send(publisher, meshStamped(other, 10.3)).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(other, 10.3)).status, deformable_ccd::ContactArray::OK);
   expectAddsUp();
 }
 
 TEST_F(Recording, TfThatStopsAndComesBack) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/recording/mesh");
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
   const Mesh mesh = tipAbove(1);
   tf.publish(transformAt(100, "camera", {0, 0, 0}));
   tf.publish(transformAt(100.1, "camera", {0, 0, 0}));
   send(publisher, meshStamped(mesh, 100, "camera"));
-  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.1, "camera")).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.1, "camera")).status, deformable_ccd::ContactArray::OK);
   for (const double stamp_s : {100.2, 100.3}) {
-    const ContactArray lost = send(publisher, meshStamped(mesh, stamp_s, "camera"));
-    EXPECT_EQ(lost.status, ContactArray::NO_TRANSFORM);
+    const deformable_ccd::ContactArray lost = send(publisher, meshStamped(mesh, stamp_s, "camera"));
+    EXPECT_EQ(lost.status, deformable_ccd::ContactArray::NO_TRANSFORM);
     EXPECT_FALSE(lost.answered);
   }
   EXPECT_TRUE(waitUntil([&] { return !clear.last().data; }));
   tf.publish(transformAt(100.6, "camera", {0, 0, 0}));
-  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.4, "camera")).status, ContactArray::OK) << "from the last good frame on";
-  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.5, "camera")).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.4, "camera")).status, deformable_ccd::ContactArray::OK)
+      << "from the last good frame on";
+  EXPECT_EQ(send(publisher, meshStamped(mesh, 100.5, "camera")).status, deformable_ccd::ContactArray::OK);
   expectAddsUp();
 }
 
 TEST_F(Recording, ClockThatJumpsBothWays) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/recording/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/recording/mesh");
   double stamp_s = 1000;
   send(publisher, meshStamped(tipAbove(1), stamp_s));
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, deformable_ccd::ContactArray::OK);
   for (const double jump_s : {-500.0, 3600.0, -0.05, 1e6}) {
     stamp_s += 0.1 + jump_s;
-    const ContactArray jumped = send(publisher, meshStamped(tipAbove(1), stamp_s));
-    EXPECT_EQ(jumped.status, jump_s < 0 && jump_s + 0.1 <= 0.05 ? ContactArray::TIME_JUMP : ContactArray::GAP) << jump_s;
+    const deformable_ccd::ContactArray jumped = send(publisher, meshStamped(tipAbove(1), stamp_s));
+    EXPECT_EQ(jumped.status, jump_s < 0 && jump_s + 0.1 <= 0.05 ? deformable_ccd::ContactArray::TIME_JUMP
+                                                                : deformable_ccd::ContactArray::GAP)
+        << jump_s;
     EXPECT_FALSE(jumped.answered);
-    EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, ContactArray::OK) << jump_s;
+    EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), stamp_s + 0.1)).status, deformable_ccd::ContactArray::OK)
+        << jump_s;
   }
   expectAddsUp();
 }
@@ -116,7 +121,7 @@ struct Mapped : MonitorTest {
 };
 
 TEST_F(Mapped, AMapThatStopsAndComesBack) {
-  const auto mesh = advertiseAndWait<MeshStamped>(node, "/mapped/mesh");
+  const auto mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/mapped/mesh");
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/mapped/octomap", true);
   const auto answerAt = [&](double stamp_s) { return send(mesh, meshStamped(tipAbove(3), stamp_s)); };
   map.publish(blockBelowZero(true, 50));
@@ -124,22 +129,22 @@ TEST_F(Mapped, AMapThatStopsAndComesBack) {
   answerAt(stamp_s);
   ASSERT_TRUE(waitUntil([&] {
     stamp_s += 0.01;
-    return answerAt(stamp_s).status == ContactArray::OK;
+    return answerAt(stamp_s).status == deformable_ccd::ContactArray::OK;
   }));
   stamp_s = 51.2;
   answerAt(stamp_s);  // a gap
-  const ContactArray stale = answerAt(stamp_s += 0.1);
-  EXPECT_EQ(stale.status, ContactArray::NO_MAP);
+  const deformable_ccd::ContactArray stale = answerAt(stamp_s += 0.1);
+  EXPECT_EQ(stale.status, deformable_ccd::ContactArray::NO_MAP);
   EXPECT_NE(stale.reason.find("octomap_timeout_s"), std::string::npos) << stale.reason;
   EXPECT_FALSE(clear.last().data);
   const std::uint64_t maps = stats.last().maps_received;
   map.publish(blockBelowZero(true, 51.3));
   ASSERT_TRUE(waitUntil([&] {
     stamp_s += 0.001;
-    return answerAt(stamp_s).status == ContactArray::OK;
+    return answerAt(stamp_s).status == deformable_ccd::ContactArray::OK;
   }));
   EXPECT_EQ(stats.last().maps_received, maps + 1);
-  EXPECT_EQ(answerAt(stamp_s + 0.1).status, ContactArray::OK);
+  EXPECT_EQ(answerAt(stamp_s + 0.1).status, deformable_ccd::ContactArray::OK);
 
   // One that is larger than max_map_mb is refused unread, and counted.
   octomap_msgs::Octomap large = blockBelowZero(true, 51.4);
@@ -148,7 +153,7 @@ TEST_F(Mapped, AMapThatStopsAndComesBack) {
   map.publish(large);
   ASSERT_TRUE(waitUntil([&] {
     stamp_s += 0.001;
-    return answerAt(stamp_s).status == ContactArray::NO_MAP;
+    return answerAt(stamp_s).status == deformable_ccd::ContactArray::NO_MAP;
   }));
   EXPECT_NE(contacts.last().reason.find("max_map_mb"), std::string::npos) << contacts.last().reason;
   ASSERT_TRUE(waitUntil([&] { return stats.last().maps_refused == refused_before + 1; }));
@@ -156,7 +161,7 @@ TEST_F(Mapped, AMapThatStopsAndComesBack) {
   map.publish(blockBelowZero(true, 51.5));
   ASSERT_TRUE(waitUntil([&] {
     stamp_s += 0.001;
-    return answerAt(stamp_s).status == ContactArray::OK;
+    return answerAt(stamp_s).status == deformable_ccd::ContactArray::OK;
   }));
 
   const auto refused = trigger("record_step");
@@ -170,21 +175,22 @@ struct Masked : MonitorTest {
 };
 
 TEST_F(Masked, AStepThatFailsEndsNeitherTheNodeNorACheck) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/masked/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/masked/mesh");
   send(publisher, meshStamped(tipAbove(1), 10));
-  const ContactArray failed = send(publisher, meshStamped(tipAbove(0.9), 10.1));
-  EXPECT_EQ(failed.status, ContactArray::INTERNAL_ERROR);
+  const deformable_ccd::ContactArray failed = send(publisher, meshStamped(tipAbove(0.9), 10.1));
+  EXPECT_EQ(failed.status, deformable_ccd::ContactArray::INTERNAL_ERROR);
   EXPECT_NE(failed.reason.find("vertex 500"), std::string::npos) << failed.reason;
   const auto checked = trigger("check_now");
   EXPECT_FALSE(checked.success);
   EXPECT_NE(checked.message.find("vertex 500"), std::string::npos) << checked.message;
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.8), 10.2)).status, ContactArray::INTERNAL_ERROR) << "and goes on";
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.8), 10.2)).status, deformable_ccd::ContactArray::INTERNAL_ERROR)
+      << "and goes on";
   expectAddsUp();
 }
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

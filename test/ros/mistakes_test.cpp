@@ -11,7 +11,7 @@
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -73,13 +73,14 @@ octomap_msgs::Octomap mapIn(const std::string& frame) {
   map.binary = true;
   map.id = "OcTree";
   map.resolution = 0.1;
-  map.data = buildOctomap(0.1, Box{{0, 0, 0}, {0.2, 0.2, 0.2}}, [](const Vec3&) { return true; }, true);
+  map.data = buildOctomap(
+      0.1, Box{{0, 0, 0}, {0.2, 0.2, 0.2}}, [](const Vec3&) { return true; }, true);
   return map;
 }
 
 TEST_F(Mistake, NoTransform) {
   Tracker tracker;
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/no_transform/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/no_transform/mesh");
   expectTold("/no_transform", "no transform from 'camera' to 'world'", "publish it on /tf or /tf_static",
              [&] { publisher.publish(meshStamped(tipAbove(1), tracker.next(), "camera")); });
 }
@@ -100,7 +101,7 @@ TEST_F(Mistake, RowsAndColumnsSwapped) {
 
 TEST_F(Mistake, NoMap) {
   Tracker tracker;
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/no_map/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/no_map/mesh");
   expectTold("/no_map", "no octomap has been received yet",
              "see rostopic hz /no_map/octomap, or do without with effects/octomap: off",
              [&] { publisher.publish(meshStamped(tipAbove(1), tracker.next())); });
@@ -110,7 +111,7 @@ TEST_F(Mistake, MapInAnotherFrame) {
   Tracker tracker;
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/map_frame/octomap", true);
   map.publish(mapIn("odom"));
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/map_frame/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/map_frame/mesh");
   expectTold("/map_frame", "no transform from 'world' to the octomap's frame 'odom'", "publish it on /tf or /tf_static",
              [&] { publisher.publish(meshStamped(tipAbove(1), tracker.next())); });
 }
@@ -122,7 +123,7 @@ TEST_F(Mistake, MeshTopicNeverPublished) {
 }
 
 TEST_F(Mistake, StampsOfZero) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/no_stamp/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/no_stamp/mesh");
   expectTold("/no_stamp", "messages carry no stamp", "set header.stamp in the publisher",
              [&] { publisher.publish(meshStamped(tipAbove(1), 0)); });
 }
@@ -147,14 +148,14 @@ TEST_F(Mistake, Millimetres) {
   Tracker tracker;
   Mesh mesh = tipAbove(1);
   for (Vec3& p : mesh.positions) p *= 1000;
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/millimetres/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/millimetres/mesh");
   expectTold("/millimetres", "the mesh is 2000 m across", "are these millimetres?",
              [&] { publisher.publish(meshStamped(mesh, tracker.next())); });
 }
 
 TEST_F(Mistake, FramesTooFarApart) {
   double stamp_s = 100;
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/too_slow/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/too_slow/mesh");
   expectTold("/too_slow", "GAP: 2 s since the last frame, max_step_s is 0.5",
              "a slower publisher needs a larger max_step_s",
              [&] { publisher.publish(meshStamped(tipAbove(1), stamp_s += 2)); });
@@ -163,8 +164,9 @@ TEST_F(Mistake, FramesTooFarApart) {
 TEST_F(Mistake, AnotherMeshEveryFrame) {
   Tracker tracker;
   bool more = false;
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/remeshed/mesh");
-  expectTold("/remeshed", "TOPOLOGY_CHANGED: the mesh has 6 vertices and ",  // 1 or 2 faces in turn; one line in some seconds
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/remeshed/mesh");
+  expectTold("/remeshed",
+             "TOPOLOGY_CHANGED: the mesh has 6 vertices and ",  // 1 or 2 faces in turn; one line in some seconds
              "use a tracker, or give topology/file", [&] {
                Mesh mesh = tipAbove(1);
                if ((more = !more)) mesh.faces.pop_back();
@@ -179,7 +181,7 @@ TEST_F(NoClock, SimulatedTimeWithoutAClock) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

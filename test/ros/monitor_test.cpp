@@ -22,7 +22,7 @@
 
 #include "ros/support/monitor_fixture.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -34,8 +34,8 @@ struct Plain : MonitorTest {
   Plain() : MonitorTest("/plain") {}
 
   /// From z = 1 to z = -3 in 0.1 s: the tip meets the triangle at a quarter of the step.
-  void expectQuarter(const ContactArray& outcome) {
-    ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  void expectQuarter(const deformable_ccd::ContactArray& outcome) {
+    ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
     ASSERT_TRUE(outcome.answered);
     ASSERT_FALSE(outcome.contacts.empty());
     double earliest = 1;
@@ -47,13 +47,13 @@ struct Plain : MonitorTest {
 };
 
 TEST_F(Plain, MeshStampedKnownTime) {
-  Probe<FirstContact> first(node, "/plain/first_contact");
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
-  const ContactArray alone = send(publisher, meshStamped(tipAbove(1), 10));
-  EXPECT_EQ(alone.status, ContactArray::FIRST_FRAME);
+  Probe<deformable_ccd::FirstContact> first(node, "/plain/first_contact");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
+  const deformable_ccd::ContactArray alone = send(publisher, meshStamped(tipAbove(1), 10));
+  EXPECT_EQ(alone.status, deformable_ccd::ContactArray::FIRST_FRAME);
   EXPECT_FALSE(alone.answered);
   EXPECT_EQ(alone.header.frame_id, "world");
-  const ContactArray outcome = send(publisher, meshStamped(tipAbove(-3), 10.1));
+  const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(tipAbove(-3), 10.1));
   expectQuarter(outcome);
   EXPECT_EQ(outcome.start, ros::Time(10));
   EXPECT_EQ(outcome.header.stamp, ros::Time(10.1));
@@ -89,50 +89,52 @@ TEST_F(Plain, EveryMessageTypeSaysTheSame) {
   ros::Duration(0.2).sleep();
   {
     const auto publisher = advertiseAndWait<shape_msgs::Mesh>(node, "/plain/mesh");
-    const ContactArray outcome = send(publisher, shapeMesh(tipAbove(1)));
-    EXPECT_EQ(outcome.status, ContactArray::BAD_MESSAGE);
+    const deformable_ccd::ContactArray outcome = send(publisher, shapeMesh(tipAbove(1)));
+    EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::BAD_MESSAGE);
     EXPECT_NE(outcome.reason.find("frame_id"), std::string::npos) << outcome.reason;
   }
   ros::Duration(0.2).sleep();
   const auto publisher = advertiseAndWait<std_msgs::Bool>(node, "/plain/mesh");
-  EXPECT_EQ(send(publisher, std_msgs::Bool()).status, ContactArray::BAD_MESSAGE);
+  EXPECT_EQ(send(publisher, std_msgs::Bool()).status, deformable_ccd::ContactArray::BAD_MESSAGE);
   expectAddsUp();
 }
 
 TEST_F(Plain, SeamsAreNeverStepped) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(1), 100));
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 100)).status, ContactArray::DUPLICATE);
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(-1), 101)).status, ContactArray::GAP);
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 50)).status, ContactArray::TIME_JUMP);
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 50.1)).status, ContactArray::OK) << "recovered within two";
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 100)).status, deformable_ccd::ContactArray::DUPLICATE);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(-1), 101)).status, deformable_ccd::ContactArray::GAP);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 50)).status, deformable_ccd::ContactArray::TIME_JUMP);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 50.1)).status, deformable_ccd::ContactArray::OK)
+      << "recovered within two";
   Mesh other = tipAbove(0.8);
   other.faces.pop_back();
-  EXPECT_EQ(send(publisher, meshStamped(other, 50.2)).status, ContactArray::TOPOLOGY_CHANGED);
-  EXPECT_EQ(send(publisher, meshStamped(other, 50.3)).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.2)).status, deformable_ccd::ContactArray::TOPOLOGY_CHANGED);
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.3)).status, deformable_ccd::ContactArray::OK);
   other.positions[0].x() = 50;
-  EXPECT_EQ(send(publisher, meshStamped(other, 50.4)).status, ContactArray::TELEPORT);
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.4)).status, deformable_ccd::ContactArray::TELEPORT);
   EXPECT_EQ(stats.last().seams_gap > 0, true);
   expectAddsUp();
 }
 
 TEST_F(Plain, LoopingReplay) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   for (int loop = 0; loop < 3; ++loop) {
-    const ContactArray start = send(publisher, meshStamped(tipAbove(1), 5));
-    EXPECT_EQ(start.status, loop == 0 ? ContactArray::FIRST_FRAME : ContactArray::TIME_JUMP);
+    const deformable_ccd::ContactArray start = send(publisher, meshStamped(tipAbove(1), 5));
+    EXPECT_EQ(start.status,
+              loop == 0 ? deformable_ccd::ContactArray::FIRST_FRAME : deformable_ccd::ContactArray::TIME_JUMP);
     expectQuarter(send(publisher, meshStamped(tipAbove(-3), 5.1)));
   }
 }
 
 TEST_F(Plain, VerticesThatAreNotFinite) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   Mesh lost = tipAbove(0.9);
   lost.positions[4].y() = std::numeric_limits<double>::quiet_NaN();
   lost.positions[5].x() = std::numeric_limits<double>::infinity();
   send(publisher, meshStamped(tipAbove(1), 10));
-  const ContactArray outcome = send(publisher, meshStamped(lost, 10.1));
-  EXPECT_EQ(outcome.status, ContactArray::PARTIAL);
+  const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(lost, 10.1));
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::PARTIAL);
   EXPECT_TRUE(outcome.answered);
   EXPECT_FALSE(clear.last().data);
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
@@ -140,18 +142,18 @@ TEST_F(Plain, VerticesThatAreNotFinite) {
 }
 
 TEST_F(Plain, ClearIsTrueOnlyForACheckedStep) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(1), 10));
   EXPECT_FALSE(clear.last().data);
-  const ContactArray outcome = send(publisher, meshStamped(tipAbove(0.9), 10.1));
-  EXPECT_EQ(outcome.start_state, ContactArray::CLEAR);
+  const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(tipAbove(0.9), 10.1));
+  EXPECT_EQ(outcome.start_state, deformable_ccd::ContactArray::CLEAR);
   EXPECT_TRUE(waitUntil([&] { return clear.last().data; }));
   EXPECT_TRUE(trigger("reset").success);
   EXPECT_TRUE(waitUntil([&] { return !clear.last().data; })) << "a reset is not clear";
 }
 
 TEST_F(Plain, ZeroStampsTakeTheReceiptTime) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   const std::uint64_t before = stats.last().receipt_stamps;
   send(publisher, meshStamped(tipAbove(1), 0));
   EXPECT_GT(contacts.last().header.stamp, ros::Time(1e9));
@@ -159,20 +161,20 @@ TEST_F(Plain, ZeroStampsTakeTheReceiptTime) {
 }
 
 TEST_F(Plain, HostileMessagesAreRefused) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   Mesh far = tipAbove(1);
   far.faces.push_back({0, 1, 600});
-  const ContactArray outcome = send(publisher, meshStamped(far, 10));
-  EXPECT_EQ(outcome.status, ContactArray::BAD_MESSAGE);
+  const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(far, 10));
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::BAD_MESSAGE);
   EXPECT_NE(outcome.reason.find("600"), std::string::npos) << outcome.reason;
-  EXPECT_EQ(send(publisher, meshStamped({}, 10)).status, ContactArray::BAD_MESSAGE);
+  EXPECT_EQ(send(publisher, meshStamped({}, 10)).status, deformable_ccd::ContactArray::BAD_MESSAGE);
   send(publisher, meshStamped(tipAbove(1), 10));
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 10.1)).status, ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(0.9), 10.1)).status, deformable_ccd::ContactArray::OK);
   expectAddsUp();
 }
 
 TEST_F(Plain, MarkersAreBuiltForSubscribersOnly) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(1), 10));
   send(publisher, meshStamped(tipAbove(-3), 10.1));
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
@@ -199,7 +201,7 @@ TEST_F(Plain, MarkersAreBuiltForSubscribersOnly) {
 }
 
 TEST_F(Plain, FramesWaitForMovingTransforms) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
   Mesh mesh = tipAbove(1);
   // The camera goes up while the mesh goes down with it: in the world nothing moves, and nothing touches.
@@ -211,33 +213,33 @@ TEST_F(Plain, FramesWaitForMovingTransforms) {
   ros::Duration(0.05).sleep();
   EXPECT_EQ(contacts.count(), seen) << "its transform is not there yet";
   tf.publish(transformAt(200.1, "camera", {0, 0, 0.8}));
-  const ContactArray outcome = contacts.after(seen);
-  EXPECT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = contacts.after(seen);
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   EXPECT_TRUE(outcome.contacts.empty());
 
-  const ContactArray lost = send(publisher, meshStamped(mesh, 200.15, "nowhere"));
-  EXPECT_EQ(lost.status, ContactArray::NO_TRANSFORM);
+  const deformable_ccd::ContactArray lost = send(publisher, meshStamped(mesh, 200.15, "nowhere"));
+  EXPECT_EQ(lost.status, deformable_ccd::ContactArray::NO_TRANSFORM);
   EXPECT_NE(lost.reason.find("nowhere"), std::string::npos) << lost.reason;
   expectAddsUp();
 }
 
 TEST_F(Plain, LookAheadPredictsWhatComes) {
-  Probe<TimeToContact> ahead(node, "/plain/time_to_contact");
-  Probe<ContactArray> predicted(node, "/plain/predicted_contacts");
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  Probe<deformable_ccd::TimeToContact> ahead(node, "/plain/time_to_contact");
+  Probe<deformable_ccd::ContactArray> predicted(node, "/plain/predicted_contacts");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(2), 10));
   send(publisher, meshStamped(tipAbove(1.5), 10.1));
   const auto told = [&](double stamp_s, std::uint8_t status) {
-    TimeToContact found;
+    deformable_ccd::TimeToContact found;
     EXPECT_TRUE(waitUntil([&] {
-      for (const TimeToContact& m : ahead.all()) {
+      for (const deformable_ccd::TimeToContact& m : ahead.all()) {
         if (m.header.stamp == ros::Time(stamp_s) && m.status == status) found = m;
       }
       return found.header.stamp == ros::Time(stamp_s);
     })) << stamp_s;
     return found;
   };
-  const TimeToContact time = told(10.1, ContactArray::OK);
+  const deformable_ccd::TimeToContact time = told(10.1, deformable_ccd::ContactArray::OK);
   ASSERT_TRUE(time.answered);
   EXPECT_TRUE(time.contact);
   EXPECT_NEAR(time.seconds, 0.3, 1e-6);
@@ -245,28 +247,28 @@ TEST_F(Plain, LookAheadPredictsWhatComes) {
   EXPECT_TRUE(contacts.last().contacts.empty()) << "predictions are never mixed with what was observed";
   // Whoever hears predictions alone hears of an outage, too.
   send(publisher, meshStamped(tipAbove(1.4), 10.2, "nowhere"));
-  EXPECT_FALSE(told(10.2, ContactArray::NO_TRANSFORM).answered);
+  EXPECT_FALSE(told(10.2, deformable_ccd::ContactArray::NO_TRANSFORM).answered);
   EXPECT_TRUE(trigger("reset").success);
-  EXPECT_FALSE(told(10.2, ContactArray::RESET).answered);
+  EXPECT_FALSE(told(10.2, deformable_ccd::ContactArray::RESET).answered);
 }
 
 TEST_F(Plain, StampsAtTheEndOfTimeAreFramesLikeAnyOther) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
-  Probe<ContactArray> predictions(node, "/plain/predicted_contacts");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
+  Probe<deformable_ccd::ContactArray> predictions(node, "/plain/predicted_contacts");
   const auto sendAt = [&](std::uint32_t nsec, double z) {
-    MeshStamped message = meshStamped(tipAbove(z), 0);
+    deformable_ccd::MeshStamped message = meshStamped(tipAbove(z), 0);
     message.header.stamp = ros::Time(4294967295, nsec);
     return send(publisher, message);
   };
   sendAt(600000000, 2);
-  EXPECT_EQ(sendAt(633000000, 1.9).status, ContactArray::OK);
+  EXPECT_EQ(sendAt(633000000, 1.9).status, deformable_ccd::ContactArray::OK);
   // The prediction ends half a second later, which no message can say.
   EXPECT_TRUE(waitUntil([&] { return predictions.count() > 0 && predictions.last().answered; }));
   EXPECT_TRUE(trigger("reset").success) << "and the node is there";
 }
 
 TEST_F(Plain, Services) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   EXPECT_FALSE(trigger("check_now").success) << "nothing to check yet";
   send(publisher, meshStamped(tipAbove(0), 10));
   const auto now = trigger("check_now");
@@ -281,14 +283,14 @@ TEST_F(Plain, Services) {
   EXPECT_EQ(contacts.count(), seen);
   enable.request.data = true;
   ASSERT_TRUE(ros::service::call("/plain/enable", enable));
-  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 10.2)).status, ContactArray::FIRST_FRAME);
+  EXPECT_EQ(send(publisher, meshStamped(tipAbove(1), 10.2)).status, deformable_ccd::ContactArray::FIRST_FRAME);
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.2); }));
   EXPECT_GE(stats.last().skipped_disabled, 1u);
   expectAddsUp();
 }
 
 TEST_F(Plain, LiveChangesShowInTheParameterHashAndTouchNothingElse) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   double stamp_s = 10;
   const auto hash = [&] {
     send(publisher, meshStamped(tipAbove(1), stamp_s += 0.1));
@@ -317,20 +319,21 @@ TEST_F(Plain, LiveChangesShowInTheParameterHashAndTouchNothingElse) {
 }
 
 TEST_F(Plain, EffectsSayWhy) {
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/plain/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(1), 10));
   send(publisher, meshStamped(tipAbove(0.9), 10.1));
-  Probe<EffectArray> effects(node, "/plain/effects");
-  const EffectArray plan = effects.after(0);
+  Probe<deformable_ccd::EffectArray> effects(node, "/plain/effects");
+  const deformable_ccd::EffectArray plan = effects.after(0);
   ASSERT_FALSE(plan.effects.empty());
-  for (const EffectState& effect : plan.effects) {
+  for (const deformable_ccd::EffectState& effect : plan.effects) {
     EXPECT_FALSE(effect.reason.empty()) << effect.name;
     if (effect.name == "self_collision") {
       EXPECT_TRUE(effect.running);
     }
     if (effect.name == "octomap") {
       EXPECT_FALSE(effect.running);
-      EXPECT_EQ(effect.reason, "nobody publishes /plain/octomap and no octomap_file is given") << "where it was looked for";
+      EXPECT_EQ(effect.reason, "nobody publishes /plain/octomap and no octomap_file is given")
+          << "where it was looked for";
     }
   }
 }
@@ -364,8 +367,8 @@ struct Grid : MonitorTest {
 TEST_F(Grid, AMissingMapIsNoAnswerAboutIt) {
   // The first case of this monitor, before it has had any map.
   send(mesh, cloud(gridAt(3, 4, 0.3), 10));
-  const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.2), 10.1));
-  EXPECT_EQ(outcome.status, ContactArray::NO_MAP);
+  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.2), 10.1));
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP);
   EXPECT_TRUE(outcome.answered) << "about the mesh alone";
   EXPECT_FALSE(clear.last().data);
 }
@@ -374,9 +377,9 @@ TEST_F(Grid, OctomapBinaryAndFull) {
   for (const bool binary : {true, false}) {
     giveMap(blockBelowZero(binary));
     send(mesh, cloud(gridAt(3, 4, 0.3), 100));
-    const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, -0.1), 100.1));
-    ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
-    EXPECT_EQ(outcome.start_state, ContactArray::CLEAR);
+    const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, -0.1), 100.1));
+    ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
+    EXPECT_EQ(outcome.start_state, deformable_ccd::ContactArray::CLEAR);
     ASSERT_FALSE(outcome.contacts.empty());
     double earliest = 1;
     std::size_t vertices = 0;
@@ -423,7 +426,7 @@ TEST_F(Grid, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {
   ASSERT_TRUE(waitUntil([&] {
     send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
     for (int i = 0; i < 10; ++i) {  // so that one of these is nearly always the newest
-      EXPECT_EQ(send(mesh, cloud(gridAt(3, 4, 5), stamp_s)).status, ContactArray::DUPLICATE);
+      EXPECT_EQ(send(mesh, cloud(gridAt(3, 4, 5), stamp_s)).status, deformable_ccd::ContactArray::DUPLICATE);
     }
     return ofGrid().size() > 3;
   }));
@@ -445,17 +448,17 @@ TEST_F(Grid, MalformedMapsAreRefused) {
     send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
     return stats.last().maps_refused > refused;
   }));
-  const ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 5), stamp_s + 0.1));
-  EXPECT_EQ(outcome.status, ContactArray::NO_MAP) << "no map is better than an old one";
+  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 5), stamp_s + 0.1));
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP) << "no map is better than an old one";
   EXPECT_NE(outcome.reason.find("refused"), std::string::npos) << outcome.reason;
   giveMap(blockBelowZero(true));
-  EXPECT_EQ(contacts.last().status, ContactArray::OK);
+  EXPECT_EQ(contacts.last().status, deformable_ccd::ContactArray::OK);
 }
 
 TEST_F(Grid, VertexCountMismatch) {
   send(mesh, cloud(gridAt(3, 4, 1), 10));
-  const ContactArray outcome = send(mesh, cloud(gridAt(3, 5, 1), 10.1));
-  EXPECT_EQ(outcome.status, ContactArray::VERTEX_COUNT);
+  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 5, 1), 10.1));
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::VERTEX_COUNT);
   EXPECT_FALSE(outcome.answered);
   EXPECT_NE(outcome.reason.find("3 x 4"), std::string::npos) << outcome.reason;
   EXPECT_TRUE(send(mesh, cloud(gridAt(3, 4, 1), 10.2)).answered);
@@ -465,18 +468,18 @@ TEST_F(Grid, VertexCountMismatch) {
 TEST_F(Grid, LyingCloudsAreRefused) {
   auto lying = cloud(gridAt(3, 4, 1), 10);
   lying.width = 1u << 31;
-  EXPECT_EQ(send(mesh, lying).status, ContactArray::BAD_MESSAGE);
+  EXPECT_EQ(send(mesh, lying).status, deformable_ccd::ContactArray::BAD_MESSAGE);
   lying = cloud(gridAt(3, 4, 1), 10);
   lying.fields[2].offset = 1u << 30;
-  EXPECT_EQ(send(mesh, lying).status, ContactArray::BAD_MESSAGE);
+  EXPECT_EQ(send(mesh, lying).status, deformable_ccd::ContactArray::BAD_MESSAGE);
   lying = cloud(gridAt(3, 4, 1), 10);
   lying.fields[1].datatype = 2;
-  const ContactArray outcome = send(mesh, lying);
-  EXPECT_EQ(outcome.status, ContactArray::BAD_MESSAGE);
+  const deformable_ccd::ContactArray outcome = send(mesh, lying);
+  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::BAD_MESSAGE);
   EXPECT_NE(outcome.reason.find("'y'"), std::string::npos) << outcome.reason;
   lying = cloud(gridAt(3, 4, 1), 10);
   lying.point_step = 0;
-  EXPECT_EQ(send(mesh, lying).status, ContactArray::BAD_MESSAGE);
+  EXPECT_EQ(send(mesh, lying).status, deformable_ccd::ContactArray::BAD_MESSAGE);
   expectAddsUp();
 }
 
@@ -493,8 +496,8 @@ Mesh tipAt(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {
 
 struct Pair : MonitorTest {
   Pair() : MonitorTest("/pair") {}
-  ros::Publisher cloth = advertiseAndWait<MeshStamped>(node, "/pair/cloth");
-  ros::Publisher gripper = advertiseAndWait<MeshStamped>(node, "/pair/gripper");
+  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/cloth");
+  ros::Publisher gripper = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/gripper");
   ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
 
   void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
@@ -504,7 +507,7 @@ struct Pair : MonitorTest {
 TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
   const auto wanted = node.advertise<octomap_msgs::Octomap>("/plain/octomap", 1);
   const auto unwanted = node.advertise<octomap_msgs::Octomap>("/pair/octomap", 1);
-  const auto rigid = node.advertise<MeshStamped>("/pair/finger", 1);
+  const auto rigid = node.advertise<deformable_ccd::MeshStamped>("/pair/finger", 1);
   EXPECT_TRUE(waitUntil([&] { return wanted.getNumSubscribers() > 0; })) << "auto listens for a map";
   EXPECT_EQ(unwanted.getNumSubscribers(), 0u) << "octomap: off";
   EXPECT_EQ(rigid.getNumSubscribers(), 0u) << "a rigid body has no stream";
@@ -525,13 +528,13 @@ TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
   ros::Duration(0.05).sleep();
   EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
   gripper.publish(meshStamped(tipAt(-4), 300.3));  // 2 at 300, 0 at 300.1
-  const ContactArray outcome = contacts.after(seen);
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = contacts.after(seen);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   ASSERT_EQ(outcome.bodies.size(), 3u);
   EXPECT_FALSE(outcome.contacts.empty());
 
-  const ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
-  EXPECT_EQ(late.status, ContactArray::NO_BODY);
+  const deformable_ccd::ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
+  EXPECT_EQ(late.status, deformable_ccd::ContactArray::NO_BODY);
   EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
   expectAddsUp();
 }
@@ -543,8 +546,8 @@ TEST_F(Pair, RigidBodiesMoveByTf) {
   gripper.publish(meshStamped(tipAt(50), 400.3));
   ros::Duration(0.1).sleep();
   send(cloth, meshStamped(floorAt(0), 400));
-  const ContactArray outcome = send(cloth, meshStamped(floorAt(0), 400.2));
-  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  const deformable_ccd::ContactArray outcome = send(cloth, meshStamped(floorAt(0), 400.2));
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   ASSERT_FALSE(outcome.contacts.empty());
   double earliest = 1;
   for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
@@ -555,8 +558,8 @@ TEST_F(Pair, RigidBodiesMoveByTf) {
 
 struct Tabled : MonitorTest {
   Tabled() : MonitorTest("/tabled") {}
-  ros::Publisher cloth = advertiseAndWait<MeshStamped>(node, "/tabled/cloth");
-  ros::Publisher table = advertiseAndWait<MeshStamped>(node, "/tabled/table", true);
+  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/cloth");
+  ros::Publisher table = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/table", true);
   double stamp_s = 10;
 
   void enable(bool on) {
@@ -565,17 +568,17 @@ struct Tabled : MonitorTest {
     ASSERT_TRUE(ros::service::call("/tabled/enable", call));
   }
   /// A step of the cloth, four metres through the height 0.
-  ContactArray fall() {
+  deformable_ccd::ContactArray fall() {
     send(cloth, meshStamped(tipAt(2), stamp_s += 1));
     return send(cloth, meshStamped(tipAt(-2), stamp_s += 0.1));
   }
   bool meetsTheTable() {
-    const ContactArray step = fall();
-    return step.status == ContactArray::OK && !step.contacts.empty();
+    const deformable_ccd::ContactArray step = fall();
+    return step.status == deformable_ccd::ContactArray::OK && !step.contacts.empty();
   }
   bool isPastTheTable() {
-    const ContactArray step = fall();
-    return step.status == ContactArray::OK && step.contacts.empty();
+    const deformable_ccd::ContactArray step = fall();
+    return step.status == deformable_ccd::ContactArray::OK && step.contacts.empty();
   }
 };
 
@@ -601,7 +604,7 @@ TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

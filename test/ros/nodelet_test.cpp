@@ -1,5 +1,4 @@
 // The monitor beside a publisher in the same process: what that publishes is neither serialised nor copied.
-#include <boost/make_shared.hpp>
 #include <deformable_ccd/ContactArray.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
@@ -7,21 +6,22 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <std_srvs/Trigger.h>
+#include <boost/make_shared.hpp>
 
 #include <random>
 
-#include "ros/mesh_subscription.h"
+#include "input/mesh_subscription.h"
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
 using topic_tools::ShapeShifter;
 
-boost::shared_ptr<const MeshStamped> shared(const Mesh& mesh, double stamp_s) {
-  return boost::make_shared<const MeshStamped>(meshStamped(mesh, stamp_s));
+boost::shared_ptr<const deformable_ccd::MeshStamped> shared(const Mesh& mesh, double stamp_s) {
+  return boost::make_shared<const deformable_ccd::MeshStamped>(meshStamped(mesh, stamp_s));
 }
 
 /// A subscription on a callback queue that the test serves itself.
@@ -42,16 +42,16 @@ struct Subscription : ::testing::Test {
       return received.size() >= count;
     });
   }
-  const MeshStamped* address(std::size_t i) const {
+  const deformable_ccd::MeshStamped* address(std::size_t i) const {
     const auto* typed = std::get_if<TypedMesh>(&received[i]);
-    return typed ? std::get<MeshStamped::ConstPtr>(*typed).get() : nullptr;
+    return typed ? std::get<deformable_ccd::MeshStamped::ConstPtr>(*typed).get() : nullptr;
   }
 };
 
 TEST_F(Subscription, TheObjectItselfArrivesFromTheSameProcess) {
   const auto subscription = subscribe("/near/mesh");
-  const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/near/mesh");
-  std::vector<boost::shared_ptr<const MeshStamped>> sent;
+  const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/near/mesh");
+  std::vector<boost::shared_ptr<const deformable_ccd::MeshStamped>> sent;
   for (int i = 0; i < 5; ++i) {
     sent.push_back(shared(tipAbove(1), 10 + i));
     publisher.publish(sent.back());
@@ -64,7 +64,7 @@ TEST_F(Subscription, TheObjectItselfArrivesFromTheSameProcess) {
 
 TEST_F(Subscription, NoneIsLostOrDoubledAtTheChange) {
   const auto subscription = subscribe("/burst/mesh");
-  const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/burst/mesh");
+  const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/burst/mesh");
   constexpr int COUNT = 100;
   // Some wait already when the first is served, some come while the subscription is being changed.
   for (int i = 0; i < 10; ++i) publisher.publish(shared(tipAbove(1), 10 + i));
@@ -80,9 +80,9 @@ TEST_F(Subscription, NoneIsLostOrDoubledAtTheChange) {
   ASSERT_EQ(received.size(), static_cast<std::size_t>(COUNT));
   for (int i = 0; i < COUNT; ++i) {
     const auto* typed = std::get_if<TypedMesh>(&received[static_cast<std::size_t>(i)]);
-    const MeshStamped::ConstPtr mesh = typed
-                                           ? std::get<MeshStamped::ConstPtr>(*typed)
-                                           : std::get<ShapeShifter::ConstPtr>(received[i])->instantiate<MeshStamped>();
+    const deformable_ccd::MeshStamped::ConstPtr mesh =
+        typed ? std::get<deformable_ccd::MeshStamped::ConstPtr>(*typed)
+              : std::get<ShapeShifter::ConstPtr>(received[i])->instantiate<deformable_ccd::MeshStamped>();
     ASSERT_TRUE(mesh);
     EXPECT_EQ(mesh->header.stamp, ros::Time(10 + i)) << "in order";
   }
@@ -92,7 +92,7 @@ TEST_F(Subscription, NoneIsLostOrDoubledAtTheChange) {
 TEST_F(Subscription, OpensToAnotherTypeWhenThePublisherIsGone) {
   const auto subscription = subscribe("/change/mesh");
   {
-    const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/change/mesh");
+    const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/change/mesh");
     for (std::size_t i = 1; i <= 3; ++i) {
       publisher.publish(shared(tipAbove(1), 10.0 * static_cast<double>(i)));
       ASSERT_TRUE(serveUntil(i));
@@ -121,15 +121,16 @@ TEST(Nodelet, FindsTheSameContactsWithoutSerialising) {
   ASSERT_TRUE(loader.load("/inside", "deformable_ccd/CollisionMonitor", remappings, {}));
 
   ros::NodeHandle node;
-  Probe<ContactArray> contacts(node, "/inside/contacts");
+  Probe<deformable_ccd::ContactArray> contacts(node, "/inside/contacts");
   Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
-  const ros::Publisher publisher = advertiseAndWait<MeshStamped>(node, "/nodelet/mesh");
+  const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/nodelet/mesh");
   constexpr int FRAMES = 10;
   for (int i = 0; i < FRAMES; ++i) {
     const std::size_t seen = contacts.count();
     publisher.publish(shared(tipAbove(i % 2 ? -3 : 1), 10 + 0.1 * i));
-    const ContactArray outcome = contacts.after(seen);
-    EXPECT_EQ(outcome.status, i == 0 ? ContactArray::FIRST_FRAME : ContactArray::OK) << outcome.reason;
+    const deformable_ccd::ContactArray outcome = contacts.after(seen);
+    EXPECT_EQ(outcome.status, i == 0 ? deformable_ccd::ContactArray::FIRST_FRAME : deformable_ccd::ContactArray::OK)
+        << outcome.reason;
     if (i % 2 == 1) {
       EXPECT_FALSE(outcome.contacts.empty()) << "down through the triangle";
     }
@@ -166,7 +167,7 @@ TEST(Nodelet, UnloadingEndsCallsThatWaitForTheWorker) {
   ASSERT_TRUE(loader.load("/busy", "deformable_ccd/CollisionMonitor", {{"/mesh", "/busy/mesh"}}, {}));
   ros::NodeHandle node;
   const ros::Publisher publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/busy/mesh");
-  Probe<ContactArray> contacts(node, "/busy/contacts");
+  Probe<deformable_ccd::ContactArray> contacts(node, "/busy/contacts");
   // Far more than is done before the end, so that the worker takes no command but between two steps.
   for (int i = 0; i < FRAMES; ++i) publisher.publish(crumpled(SIDE, 10 + 0.1 * i));
   ASSERT_TRUE(waitUntil([&] { return contacts.count() >= 2; }, 60));
@@ -192,7 +193,7 @@ TEST(Nodelet, AWrongParameterIsRefusedByName) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

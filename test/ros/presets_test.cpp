@@ -13,7 +13,7 @@
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -30,8 +30,8 @@ octomap_msgs::Octomap tableMap(const std::function<bool(const Vec3&)>& more = []
   map.binary = true;
   map.id = "OcTree";
   map.resolution = 0.05;
-  map.data = buildOctomap(0.05, Box{{-1, -1, -0.2}, {1, 1, 1}},
-                          [&](const Vec3& c) { return c.z() < TABLE_M || more(c); }, true);
+  map.data = buildOctomap(
+      0.05, Box{{-1, -1, -0.2}, {1, 1, 1}}, [&](const Vec3& c) { return c.z() < TABLE_M || more(c); }, true);
   return map;
 }
 
@@ -90,8 +90,8 @@ class Preset : public ::testing::Test {
 
   /// Frames at rest until the monitor has the map and says OK, then ten that sink. Leaves the last outcome at rest and
   /// those of the fall.
-  ContactArray rest;
-  std::vector<ContactArray> fall;
+  deformable_ccd::ContactArray rest;
+  std::vector<deformable_ccd::ContactArray> fall;
   void drop(double from_z, double to_z, const std::function<void(double z)>& publish) {
     ros::WallRate rate(RATE_HZ);
     ASSERT_TRUE(waitUntil(
@@ -99,7 +99,7 @@ class Preset : public ::testing::Test {
           publish(from_z);
           rate.sleep();
           rest = contacts.last();
-          return rest.status == ContactArray::OK && rest.answered && ++steady_ > 3;
+          return rest.status == deformable_ccd::ContactArray::OK && rest.answered && ++steady_ > 3;
         },
         15))
         << static_cast<int>(rest.status) << " " << rest.reason;
@@ -112,7 +112,7 @@ class Preset : public ::testing::Test {
     ASSERT_TRUE(waitUntil([&] { return contacts.count() >= seen + FRAMES; }));
     const auto all = contacts.all();
     fall.assign(all.end() - FRAMES, all.end());
-    for (const auto& outcome : fall) EXPECT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+    for (const auto& outcome : fall) EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
   }
   /// Above the table in the first frame of the fall, and in contact with it in a later one.
   void expectTouched() {
@@ -121,14 +121,15 @@ class Preset : public ::testing::Test {
   }
   /// Steps of the fall that meet the map anew.
   std::size_t touching() const {
-    return static_cast<std::size_t>(std::count_if(fall.begin(), fall.end(), [](const ContactArray& outcome) {
-      return std::any_of(outcome.contacts.begin(), outcome.contacts.end(),
-                         [](const auto& c) { return c.body[1] == 65535 && !c.initial && !c.leaving; });
-    }));
+    return static_cast<std::size_t>(
+        std::count_if(fall.begin(), fall.end(), [](const deformable_ccd::ContactArray& outcome) {
+          return std::any_of(outcome.contacts.begin(), outcome.contacts.end(),
+                             [](const auto& c) { return c.body[1] == 65535 && !c.initial && !c.leaving; });
+        }));
   }
 
   ros::NodeHandle node;
-  Probe<ContactArray> contacts;
+  Probe<deformable_ccd::ContactArray> contacts;
 
  private:
   int steady_ = 0;
@@ -167,9 +168,7 @@ TEST_F(Trackdlo, RopeOf45Points) {
   table.header.frame_id = "camera_color_optical_frame";
   map.publish(table);
   const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/trackdlo/results_pc");
-  drop(0.1, -0.02, [&](double z) {
-    publisher.publish(pclCloud(grid(1, 45, 0.01, z), "camera_color_optical_frame"));
-  });
+  drop(0.1, -0.02, [&](double z) { publisher.publish(pclCloud(grid(1, 45, 0.01, z), "camera_color_optical_frame")); });
   EXPECT_TRUE(rest.contacts.empty());
   expectTouched();
 }
@@ -219,7 +218,7 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/octomap_binary", true);
   // The sensor saw the left half of the cloth at rest, at z = 0.31.
   map.publish(tableMap([](const Vec3& c) { return std::abs(c.z() - 0.325) < 0.03 && c.x() > -0.2 && c.x() < 0; }));
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/octomap_server/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/octomap_server/mesh");
   const auto frame = [&](double z) {
     const Positions positions = grid(5, 9, 0.05, z);
     Mesh mesh{positions, {}};
@@ -230,7 +229,7 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
         mesh.faces.push_back({a + 1, a + 10, a + 9});
       }
     }
-    MeshStamped message = meshStamped(mesh, 0, "map");
+    deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
     message.header.stamp = ros::Time::now();
     publisher.publish(message);
   };
@@ -242,7 +241,7 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

@@ -9,7 +9,7 @@
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -18,7 +18,7 @@ class PlayedMonitor {
  public:
   explicit PlayedMonitor(ros::NodeHandle& node)
       : clear_(advertiseAndWait<std_msgs::Bool>(node, "/played/clear", true, 2)),
-        prediction_(advertiseAndWait<TimeToContact>(node, "/played/time_to_contact", false, 2)) {}
+        prediction_(advertiseAndWait<deformable_ccd::TimeToContact>(node, "/played/time_to_contact", false, 2)) {}
 
   bool silent = false, clear = true, answered = true;
   double contact_in_s = std::numeric_limits<double>::infinity(), horizon_s = 1;
@@ -30,7 +30,7 @@ class PlayedMonitor {
     is_clear.data = clear;
     clear_.publish(is_clear);
     if (!predicts) return;
-    TimeToContact time;
+    deformable_ccd::TimeToContact time;
     time.answered = answered;
     time.contact = contact_in_s < horizon_s;
     time.seconds = contact_in_s;
@@ -101,7 +101,7 @@ class WithTheMonitor : public ::testing::TestWithParam<const char*> {};
 TEST_P(WithTheMonitor, StopsBeforeTheTipArrives) {
   ros::NodeHandle node;
   Probe<std_msgs::Bool> stop(node, "/" + std::string(GetParam()) + "/stop");
-  const auto publisher = advertiseAndWait<MeshStamped>(node, "/mesh");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/mesh");
   // A tip sinks towards a triangle at 0.5 m/s: it goes on while it is far, and stops before it has arrived.
   const ros::SteadyTime start = ros::SteadyTime::now();
   bool went = false;
@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(Clients, WithTheMonitor, ::testing::Values("live_cpp", 
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <cstring>
 
-#include "detector/start_state.h"
-#include "support/exact_distance.h"
+#include "oracle/exact_distance.h"
+#include "step/start_state.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -71,7 +71,7 @@ class Earliest {
   explicit Earliest(int toc_bits) {
     AccuracyOptions options;
     options.toc_bits = toc_bits;
-    test_ = makeElementaryTest(options);
+    test_ = makeRung(options);
   }
   void add(PairKind kind, const std::array<MovingPoint, 4>& points) {
     PairMotion pair;
@@ -100,7 +100,7 @@ class Earliest {
     }
     return false;
   }
-  std::unique_ptr<ElementaryTest> test_;
+  std::unique_ptr<Rung> test_;
   std::optional<double> toc_;
 };
 
@@ -202,4 +202,4 @@ std::string describe(const ObstacleScene& scene) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
-#include "deformable_ccd/topology.h"
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/elementary.h"
+#include "dccd/topology.h"
+#include "dccd/voxel_surface.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// A moving mesh beside voxels, in the map's frame.
@@ -19,8 +19,8 @@ struct ObstacleScene {
   Positions t0, t1;
 };
 
-/// The lower end of the earliest TOC cell of a face (or, for a polyline, an edge) of the mesh against every leaf, interior
-/// ones too, by `exact`; 0 where it meets one at t=0; nothing where it never does.
+/// The lower end of the earliest TOC cell of a face (or, for a polyline, an edge) of the mesh against every leaf,
+/// interior ones too, by `exact`; 0 where it meets one at t=0; nothing where it never does.
 std::optional<double> earliestAgainstBoxes(const ObstacleScene& scene, const std::vector<Index>& feature, int toc_bits);
 
 /// The same from an obstacle test's contacts: the earliest of those of the feature's vertices, edges and face.
@@ -33,4 +33,4 @@ double distanceToBoxes(const ObstacleScene& scene, double t);
 std::string describe(const ObstacleScene& scene);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

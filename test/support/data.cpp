@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -31,4 +31,4 @@ std::string dataDirHint() {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

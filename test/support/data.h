@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// The data folder: the environment variable DEFORMABLE_CCD_DATA, else ../shared/data beside the package's sources.
@@ -16,12 +16,12 @@ std::string dataDir();
 std::string dataDirHint();
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd
 
 /// Skips the running test, with the reason printed, where the data is absent. Use it in the body of a test.
-#define DEFORMABLE_CCD_REQUIRE_DATA()                                                             \
-  do {                                                                                            \
-    if (::deformable_ccd::test::dataDir().empty()) {                                              \
-      GTEST_SKIP() << "no test data: " << ::deformable_ccd::test::dataDirHint();                  \
-    }                                                                                             \
+#define DEFORMABLE_CCD_REQUIRE_DATA()                                  \
+  do {                                                                 \
+    if (::dccd::test::dataDir().empty()) {                             \
+      GTEST_SKIP() << "no test data: " << ::dccd::test::dataDirHint(); \
+    }                                                                  \
   } while (false)

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -305,24 +305,41 @@ int costOf(const Query& query) {
 
 Query drawn(RandomSource& random, PairKind kind, Hardness hardness) {
   switch (hardness) {
-    case Hardness::SMALL_GRID: return smallGrid(random, kind);
-    case Hardness::GRAZING: return grazing(random, kind, integer(random, 1, 7));
-    case Hardness::AT_THE_ENDS: return grazing(random, kind, 8 * integer(random, 0, 1));
-    case Hardness::PARALLEL: return parallel(random, kind);
-    case Hardness::COLLINEAR: return collinear(random, kind);
-    case Hardness::SLIVER: return sliver(random, kind);
-    case Hardness::TURNING: return turning(random, kind);
-    case Hardness::ONE_ULP: return oneUlp(random, kind);
-    case Hardness::HUGE_TRANSLATION: return hugeTranslation(random, kind);
-    case Hardness::COINCIDENT: return coincident(random, kind);
-    case Hardness::AT_REST: return atRest(random, kind);
-    case Hardness::COPLANAR: return coplanar(random, kind);
-    case Hardness::SUBNORMAL: return subnormal(random, kind);
-    case Hardness::MIXED_15: return mixed(random, kind, 15);
-    case Hardness::MIXED_150: return mixed(random, kind, 150);
-    case Hardness::EXTREME: return extreme(random, kind);
+    case Hardness::SMALL_GRID:
+      return smallGrid(random, kind);
+    case Hardness::GRAZING:
+      return grazing(random, kind, integer(random, 1, 7));
+    case Hardness::AT_THE_ENDS:
+      return grazing(random, kind, 8 * integer(random, 0, 1));
+    case Hardness::PARALLEL:
+      return parallel(random, kind);
+    case Hardness::COLLINEAR:
+      return collinear(random, kind);
+    case Hardness::SLIVER:
+      return sliver(random, kind);
+    case Hardness::TURNING:
+      return turning(random, kind);
+    case Hardness::ONE_ULP:
+      return oneUlp(random, kind);
+    case Hardness::HUGE_TRANSLATION:
+      return hugeTranslation(random, kind);
+    case Hardness::COINCIDENT:
+      return coincident(random, kind);
+    case Hardness::AT_REST:
+      return atRest(random, kind);
+    case Hardness::COPLANAR:
+      return coplanar(random, kind);
+    case Hardness::SUBNORMAL:
+      return subnormal(random, kind);
+    case Hardness::MIXED_15:
+      return mixed(random, kind, 15);
+    case Hardness::MIXED_150:
+      return mixed(random, kind, 150);
+    case Hardness::EXTREME:
+      return extreme(random, kind);
     case Hardness::GENERAL:
-    case Hardness::COUNT: break;
+    case Hardness::COUNT:
+      break;
   }
   return general(random, kind);
 }
@@ -337,9 +354,9 @@ Hardness drawHardness(RandomSource& random) {
 }  // namespace
 
 const char* toString(Hardness hardness) {
-  constexpr const char* NAMES[] = {"general",  "small-grid", "grazing",          "at-the-ends", "parallel", "collinear",
-                                   "sliver",   "turning",    "one-ulp",          "huge-translation", "coincident",
-                                   "at-rest",  "coplanar",   "subnormal",        "mixed-15",    "mixed-150", "extreme"};
+  constexpr const char* NAMES[] = {"general",  "small-grid", "grazing",  "at-the-ends",      "parallel",   "collinear",
+                                   "sliver",   "turning",    "one-ulp",  "huge-translation", "coincident", "at-rest",
+                                   "coplanar", "subnormal",  "mixed-15", "mixed-150",        "extreme"};
   static_assert(sizeof NAMES / sizeof *NAMES == static_cast<std::size_t>(Hardness::COUNT), "a name for each");
   return NAMES[static_cast<int>(hardness)];
 }
@@ -447,4 +464,4 @@ std::vector<Query> simplerQueries(const Query& query) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// Bytes that were allocated and not freed, large blocks with pages of their own included. 0 under a sanitizer.
@@ -20,4 +20,4 @@ inline std::size_t heapInUse() {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -9,10 +9,10 @@
 #include <optional>
 #include <sstream>
 
+#include "oracle/oracle.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// RapidCheck shows counterexamples with this.
 static void showValue(const Query& query, std::ostream& out) {
@@ -87,4 +87,4 @@ void checkHardQueries(const std::string& name, int queries, const QueryProperty&
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

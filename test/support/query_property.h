@@ -5,9 +5,9 @@
 #include <functional>
 #include <string>
 
-#include "io/query_file.h"
+#include "oracle/query_file.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// Whether the long run is asked for: the environment variable DEFORMABLE_CCD_LONG is set and not 0.
@@ -28,4 +28,4 @@ void checkHardQueries(const std::string& name, int queries, const QueryProperty&
 std::string writeReplayFile(const std::string& name, Query query);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 namespace {
@@ -69,8 +69,13 @@ RecordedScene::RecordedScene(const MonitorOptions& options, bool with_map, bool 
 void RecordedScene::push() {
   const StampNs stamp_ns = STEP_NS * ++frame_;
   const double fall = 0.16 * frame_;
-  monitor_.push(2, {stamp_ns, rope_, {{0, 0, -0.02}, {0.1, 0.3, -0.03}, {0.2, 0, -0.02}, {0.5, 0.1, -0.3}}, false,
-                    Eigen::Isometry3d::Identity()}, 0);
+  monitor_.push(2,
+                {stamp_ns,
+                 rope_,
+                 {{0, 0, -0.02}, {0.1, 0.3, -0.03}, {0.2, 0, -0.02}, {0.5, 0.1, -0.3}},
+                 false,
+                 Eigen::Isometry3d::Identity()},
+                0);
   const Positions at_rest{{-0.4, 0, 0}, {0.4, 0, 0}, {0, 0.3, 0.1}, {0, -0.3, 0.1}};
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() = Vec3(0.2, 0.15, -0.1);
@@ -83,7 +88,8 @@ void RecordedScene::push() {
     for (int c = 0; c < 5; ++c) grid.emplace_back(0.1 * c + 0.013, 0.1 * r + 0.017, 0.3 - fall + 0.01 * ((r * c) % 3));
   }
   std::vector<double> radius_m;
-  for (std::size_t i = 0; with_distances_ && i < grid.size(); ++i) radius_m.push_back(1e-3 * static_cast<double>(i % 4));
+  for (std::size_t i = 0; with_distances_ && i < grid.size(); ++i)
+    radius_m.push_back(1e-3 * static_cast<double>(i % 4));
   monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity(), radius_m}, 0);
 }
 
@@ -121,4 +127,4 @@ std::vector<std::uint8_t> recordingBytes(const StepRecording& recording) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,14 +1,15 @@
 // Steps recorded from a running monitor, small enough for files in the project.
 #pragma once
 
-#include "io/step_recording.h"
+#include "record/step_recording.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
-/// A monitor of a falling 4 x 5 grid, a rigid finger that turns beneath it (so the step is split), a rope at rest and a map
-/// of two leaves; after its first frames. Each nextFrames() moves it on by 0.1 s; the grid meets all others in time.
-/// With distances the grid keeps away from itself and, further, from the rope, and its vertices have uncertainty radii.
+/// A monitor of a falling 4 x 5 grid, a rigid finger that turns beneath it (so the step is split), a rope at rest and a
+/// map of two leaves; after its first frames. Each nextFrames() moves it on by 0.1 s; the grid meets all others in
+/// time. With distances the grid keeps away from itself and, further, from the rope, and its vertices have uncertainty
+/// radii.
 class RecordedScene {
  public:
   explicit RecordedScene(const MonitorOptions& options = {}, bool with_map = true, bool with_distances = false);
@@ -30,4 +31,4 @@ StepRecording recordScene(const MonitorOptions& options = {}, bool with_map = tr
 std::vector<std::uint8_t> recordingBytes(const StepRecording& recording);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

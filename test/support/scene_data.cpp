@@ -12,7 +12,7 @@
 
 #include "support/data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -141,4 +141,4 @@ SceneData readScene(const std::string& name) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

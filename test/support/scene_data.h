@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
-#include "deformable_ccd/types.h"
+#include "dccd/elementary.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// A triangle mesh as it stands in a binary PLY file (either byte order).
@@ -47,4 +47,4 @@ struct SceneData {
 SceneData readScene(const std::string& name);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

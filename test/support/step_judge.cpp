@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
-std::string judgeContacts(const std::vector<core::Contact>& found, std::vector<TrueContact>& truth, int toc_bits) {
-  const auto before = [](const core::Contact& a, const core::Contact& b) {
+std::string judgeContacts(const std::vector<Contact>& found, std::vector<TrueContact>& truth, int toc_bits) {
+  const auto before = [](const Contact& a, const Contact& b) {
     return std::tie(a.kind, a.body, a.vertex) < std::tie(b.kind, b.body, b.vertex);
   };
   for (std::size_t i = 0; i < std::max(found.size(), truth.size()); ++i) {
@@ -32,8 +32,9 @@ std::string judgeStart(const StepResult& result, const std::vector<StartIntersec
   }
   const bool same = std::equal(result.intersections.begin(), result.intersections.end(), truth.begin(), truth.end(),
                                [](const auto& x, const auto& y) { return x == y; });
-  return same ? "" : std::to_string(result.intersections.size()) + " intersections listed, " +
-                         std::to_string(truth.size()) + " in truth, or in another order";
+  return same ? ""
+              : std::to_string(result.intersections.size()) + " intersections listed, " + std::to_string(truth.size()) +
+                    " in truth, or in another order";
 }
 
 }  // namespace
@@ -85,4 +86,4 @@ std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

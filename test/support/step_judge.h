@@ -6,11 +6,11 @@
 
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
-/// Runs the step with the exact rung, clustered and by brute force, on every SIMD target, and compares contacts, cells of
-/// time and start state with the truth. What is wrong, in words; empty where nothing is.
+/// Runs the step with the exact rung, clustered and by brute force, on every SIMD target, and compares contacts, cells
+/// of time and start state with the truth. What is wrong, in words; empty where nothing is.
 std::string judgeStep(const TestStep& step);
 
 /// Runs the steps one after the other, each continuing the one before, with a detector that carries the start state
@@ -19,4 +19,4 @@ std::string judgeStep(const TestStep& step);
 std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests, int& full_tests);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

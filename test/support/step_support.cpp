@@ -8,7 +8,7 @@
 #include <random>
 #include <sstream>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -54,7 +54,7 @@ class TruthCollector {
   void add(PairKind kind, std::size_t body_a, const Index* a, int na, std::size_t body_b, const Index* b, int nb) {
     if (body_a == body_b && shareVertex(a, na, b, nb)) return;
     if (!isActive(step_.bodies[body_a], a, na) || !isActive(step_.bodies[body_b], b, nb)) return;
-    core::Contact contact;
+    Contact contact;
     contact.kind = kind;
     contact.body = {static_cast<std::uint16_t>(body_a), static_cast<std::uint16_t>(body_b)};
     std::copy_n(a, na, contact.vertex.begin());
@@ -234,7 +234,7 @@ TestStep randomStep(const Draw& draw, int triangles) {
   return randomStep(draw, triangles, static_cast<Coordinates>(draw(0, static_cast<int>(Coordinates::COUNT) - 1)));
 }
 
-PairMotion motionOf(const TestStep& step, const core::Contact& contact) {
+PairMotion motionOf(const TestStep& step, const Contact& contact) {
   PairMotion pair;
   const int first_count = contact.kind == PairKind::VERTEX_FACE ? 1 : 2;
   for (int i = 0; i < 4; ++i) {
@@ -341,7 +341,7 @@ void forEachSimdTarget(const std::function<void(const std::string& target)>& bod
   }
 }
 
-std::string describe(const core::Contact& c) {
+std::string describe(const Contact& c) {
   std::ostringstream out;
   out.precision(17);
   out << toString(c.kind) << " bodies " << c.body[0] << ' ' << c.body[1] << " vertices";
@@ -351,8 +351,8 @@ std::string describe(const core::Contact& c) {
   return out.str();
 }
 
-std::string difference(const std::vector<core::Contact>& x, const std::vector<core::Contact>& y) {
-  const auto same = [](const core::Contact& a, const core::Contact& b) {
+std::string difference(const std::vector<Contact>& x, const std::vector<Contact>& y) {
+  const auto same = [](const Contact& a, const Contact& b) {
     return std::memcmp(&a.toc_lower, &b.toc_lower, sizeof(double)) == 0 &&
            std::memcmp(&a.toc_upper, &b.toc_upper, sizeof(double)) == 0 && a.vertex == b.vertex && a.body == b.body &&
            a.voxel == b.voxel && a.voxel_size == b.voxel_size && a.kind == b.kind && a.certainty == b.certainty &&
@@ -362,9 +362,9 @@ std::string difference(const std::vector<core::Contact>& x, const std::vector<co
     if (!same(x[i], y[i])) return "contact " + std::to_string(i) + ": " + describe(x[i]) + " / " + describe(y[i]);
   }
   if (x.size() == y.size()) return "";
-  const core::Contact& more = x.size() > y.size() ? x[y.size()] : y[x.size()];
+  const Contact& more = x.size() > y.size() ? x[y.size()] : y[x.size()];
   return std::to_string(x.size()) + " / " + std::to_string(y.size()) + " contacts; only one has " + describe(more);
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

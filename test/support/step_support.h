@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/detector.h"
-#include "support/oracle.h"
+#include "dccd/detector.h"
+#include "oracle/oracle.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 /// An integer between the two, ends included: from a random source, or from the bytes of a fuzzer.
@@ -61,14 +61,14 @@ Positions randomMotion(const Draw& draw, const Positions& t0, Coordinates coordi
 Topology randomTopology(const Draw& draw, int triangles);
 
 struct TrueContact {
-  core::Contact contact;  ///< toc 0 to 1
+  Contact contact;  ///< toc 0 to 1
   Root toc;
 };
 /// Every pair that the setups ask for, by the oracle, in canonical order.
 std::vector<TrueContact> trueContacts(const TestStep& step);
 
 /// The motion of a contact's four vertices.
-PairMotion motionOf(const TestStep& step, const core::Contact& contact);
+PairMotion motionOf(const TestStep& step, const Contact& contact);
 
 /// Whether the segment and the triangle meet, by the oracle: a vertex on its way from one end to the other.
 bool trulyMeet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c);
@@ -87,8 +87,8 @@ TestStep crossing();
 void forEachSimdTarget(const std::function<void(const std::string& target)>& body);
 
 /// What differs, in words; empty where the contacts are the same bit for bit.
-std::string difference(const std::vector<core::Contact>& x, const std::vector<core::Contact>& y);
-std::string describe(const core::Contact& contact);
+std::string difference(const std::vector<Contact>& x, const std::vector<Contact>& y);
+std::string describe(const Contact& contact);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,11 +3,11 @@
 
 #include <iostream>
 
-#include "io/query_file.h"
+#include "oracle/oracle.h"
+#include "oracle/query_file.h"
 #include "support/data.h"
-#include "support/oracle.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -31,4 +31,4 @@ TEST(QueryOracle, AgreesWithEveryTruthColumn) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,12 +4,12 @@
 #include <iostream>
 #include <memory>
 
-#include "io/query_file.h"
+#include "oracle/promises.h"
+#include "oracle/query_file.h"
 #include "support/data.h"
-#include "support/promises.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -34,8 +34,8 @@ std::vector<AccuracyOptions> allOptions() {
 TEST(QueryRungs, EveryPromiseIsKeptOnTheQueries) {
   DEFORMABLE_CCD_REQUIRE_DATA();
   const std::vector<AccuracyOptions> all = allOptions();
-  std::vector<std::unique_ptr<ElementaryTest>> tests;
-  for (const AccuracyOptions& options : all) tests.push_back(makeElementaryTest(options));
+  std::vector<std::unique_ptr<Rung>> tests;
+  for (const AccuracyOptions& options : all) tests.push_back(makeRung(options));
   std::size_t queries = 0;
   for (const QueryFileEntry& file : findQueryFiles(dataDir() + "/ccd_queries")) {
     std::size_t index = 0;
@@ -57,7 +57,7 @@ TEST(QueryRungs, EveryPromiseIsKeptOnTheQueries) {
 }
 
 /// Runs all listed pairs of one kind in one batch.
-std::vector<ElementaryResult> runPairs(const ElementaryTest& test, PairKind kind, const SceneData& scene,
+std::vector<ElementaryResult> runPairs(const Rung& test, PairKind kind, const SceneData& scene,
                                        const std::vector<TruthPair>& pairs, TierCounters& counters) {
   std::vector<Quad> quads;
   for (const TruthPair& pair : pairs) quads.push_back(pair.pair);
@@ -78,9 +78,9 @@ TEST_P(SceneRungs, ExactIsTheTruthAndConservativeMissesNothing) {
   const SceneData scene = readScene(GetParam());
   AccuracyOptions options;
   options.rung = Accuracy::EXACT;
-  const auto exact = makeElementaryTest(options);
+  const auto exact = makeRung(options);
   options.rung = Accuracy::CONSERVATIVE;
-  const auto conservative = makeElementaryTest(options);
+  const auto conservative = makeRung(options);
   TierCounters counters, unused;
   std::size_t undecided = 0;
   for (PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
@@ -109,4 +109,4 @@ INSTANTIATE_TEST_SUITE_P(RealScenes, SceneRungs, ::testing::Values("cloth-ball",
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

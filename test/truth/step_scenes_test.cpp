@@ -10,8 +10,8 @@
 #include <set>
 #include <tuple>
 
-#include "detector/toc_bound.h"
-#include "io/query_file.h"
+#include "oracle/query_file.h"
+#include "projection/toc_bound.h"
 #include "simd/cluster_kernels.h"
 #include "simd/fused_filter.h"
 #include "support/algebraic.h"
@@ -19,7 +19,7 @@
 #include "support/scene_data.h"
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -74,7 +74,7 @@ class StepScenes : public testing::TestWithParam<const char*> {
 
 std::set<Pair> pairsOf(const StepResult& result) {
   std::set<Pair> pairs;
-  for (const core::Contact& c : result.contacts) pairs.insert(canonical(c.kind, c.vertex));
+  for (const Contact& c : result.contacts) pairs.insert(canonical(c.kind, c.vertex));
   EXPECT_EQ(pairs.size(), result.contacts.size()) << "a pair is reported twice";
   return pairs;
 }
@@ -356,4 +356,4 @@ TEST(StepFilters, CullNoTrueContactOfTheScenes) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,7 +6,7 @@
 #include "octomap/map_builder.h"
 #include "scene/physics/shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 geometry_msgs::Point toPoint(const Vec3& p) {
@@ -19,8 +19,9 @@ geometry_msgs::Point toPoint(const Vec3& p) {
 
 }  // namespace
 
-MeshStamped toMeshStamped(const std_msgs::Header& header, const Positions& positions, const std::vector<Face>& faces) {
-  MeshStamped message;
+deformable_ccd::MeshStamped toMeshStamped(const std_msgs::Header& header, const Positions& positions,
+                                          const std::vector<Face>& faces) {
+  deformable_ccd::MeshStamped message;
   message.header = header;
   for (const Vec3& p : positions) message.vertices.push_back(toPoint(p));
   message.triangles.resize(faces.size());
@@ -119,4 +120,4 @@ geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, cons
   return message;
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

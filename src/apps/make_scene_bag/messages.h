@@ -12,9 +12,10 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
-MeshStamped toMeshStamped(const std_msgs::Header& header, const Positions& positions, const std::vector<Face>& faces);
+deformable_ccd::MeshStamped toMeshStamped(const std_msgs::Header& header, const Positions& positions,
+                                          const std::vector<Face>& faces);
 /// A row-major grid, height 1 like the cloth trackers send it, coordinates in float64 as they are.
 sensor_msgs::PointCloud2 toPointCloud(const std_msgs::Header& header, const Positions& positions);
 pcl_msgs::PolygonMesh toPolygonMesh(const std_msgs::Header& header, const Positions& positions,
@@ -26,4 +27,4 @@ octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, const scene::Obs
 geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child,
                                             const Eigen::Isometry3d& pose);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -4,11 +4,11 @@
 
 #include <tf2/buffer_core.h>
 
-#include "ros/effects.h"
-#include "ros/monitor_config.h"
-#include "ros/monitor_pipeline.h"
+#include "config/monitor_config.h"
+#include "node/effects.h"
+#include "node/monitor_pipeline.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path) {
   if (spec.monitor_yaml.empty()) return;
@@ -22,4 +22,4 @@ void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_pa
   }
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

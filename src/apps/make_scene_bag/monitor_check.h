@@ -5,10 +5,10 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 /// Throws std::runtime_error naming the file, the parameter and what to write instead: what is unknown, out of range or
 /// contradicts itself, and mesh files that are missing or hold no mesh.
 void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -5,15 +5,15 @@
 #include <sstream>
 #include <stdexcept>
 
-#include <boost/make_shared.hpp>
 #include <rosbag/bag.h>
+#include <boost/make_shared.hpp>
 
 #include "apps/make_scene_bag/messages.h"
-#include "io/progress_bar.h"
+#include "report/progress_bar.h"
 #include "scene/physics/shapes.h"
 #include "scene/physics/simulation.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 // Stamps count from here, not from the day of the recording, so that equal seeds give equal bags. Not zero, since a
@@ -158,4 +158,4 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
   return summary(spec, simulation, bag_path);
 }
 
-}  // namespace deformable_ccd
+}  // namespace dccd

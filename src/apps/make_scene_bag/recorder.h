@@ -6,12 +6,12 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd {
+namespace dccd {
 
 struct RecorderOptions {
-  int frames = 0;                   ///< 0: the scene's own number
+  int frames = 0;  ///< 0: the scene's own number
   std::uint64_t seed = 1;
-  std::string output;               ///< message type of every body; empty: the scene's own
+  std::string output;  ///< message type of every body; empty: the scene's own
   bool full_octomap = false;
   std::string monitor_config_path;  ///< empty: not written
   bool quiet = false;
@@ -21,4 +21,4 @@ struct RecorderOptions {
 /// Throws rosbag::BagException when the bag cannot be written, std::runtime_error on a scene that cannot be published.
 std::string recordScene(const scene::SceneSpec& spec, const std::string& bag_path, const RecorderOptions& options);
 
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 /// When a first contact may come: seconds from the first frame.
@@ -70,4 +70,4 @@ void checkExpectations(YamlMap map, const SceneSpec& spec) {
   if (map.keys().empty()) map.fail("", "write at least one fact, such as `self: none`");
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -5,10 +5,10 @@
 #include "scene/physics/scene_spec.h"
 #include "scene/physics/yaml_map.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 /// Throws SceneFileError on what it does not understand, and on facts that contradict the scene (a contact after its
 /// end, with a body that is not there) or each other (a contact while all is clear).
 void checkExpectations(YamlMap map, const SceneSpec& spec);
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -6,7 +6,7 @@
 
 #include "scene/physics/expectations.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
@@ -53,7 +53,8 @@ Motion readMotion(YamlMap& parent) {
     key.time_s = map.number("time_s", 0.0, LARGE);
     key.offset_m = map.vector("offset_m", Vec3::Zero());
     key.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
-    if (!motion.empty() && key.time_s <= motion.back().time_s) map.fail("time_s", "write a later time than the key before");
+    if (!motion.empty() && key.time_s <= motion.back().time_s)
+      map.fail("time_s", "write a later time than the key before");
     map.finish();
     motion.push_back(key);
   }
@@ -85,12 +86,13 @@ Body readBody(YamlMap map, const std::string& fixed_frame) {
   body.name = map.text("name");
   body.topic = map.text("topic", "/" + body.name);
   body.frame = map.text("frame", fixed_frame);
-  body.output = static_cast<MeshOutput>(
-      map.choice("output", {"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}, 0));
+  body.output =
+      static_cast<MeshOutput>(map.choice("output", {"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}, 0));
   const bool sheet = map.has("sheet"), tube = map.has("tube"), rope = map.has("rope");
   if (sheet + tube + rope != 1) map.fail("", "write just one of sheet, tube, rope: the body's shape");
   body.shape = sheet ? readSheet(map.map("sheet")) : tube ? readTube(map.map("tube")) : readRope(map.map("rope"));
-  if (rope && body.output != MeshOutput::POINT_CLOUD_GRID) map.fail("output", "write point_cloud_grid: a rope has no faces");
+  if (rope && body.output != MeshOutput::POINT_CLOUD_GRID)
+    map.fail("output", "write point_cloud_grid: a rope has no faces");
   body.mass_kg = map.number("mass_kg", 1e-6, LARGE);
   body.thickness_m = map.number("thickness_m", 1e-5, 1.0, body.thickness_m);
   body.stretch_stiffness = map.number("stretch_stiffness", 0.0, 1.0, body.stretch_stiffness);
@@ -120,7 +122,8 @@ Solid readSolid(YamlMap map) {
     YamlMap inner = map.map("box");
     solid.box.min = inner.vector("min_m");
     solid.box.max = inner.vector("max_m");
-    if (!(solid.box.min.array() < solid.box.max.array()).all()) inner.fail("max_m", "write corners with min_m below max_m on every axis");
+    if (!(solid.box.min.array() < solid.box.max.array()).all())
+      inner.fail("max_m", "write corners with min_m below max_m on every axis");
     inner.finish();
   } else {
     solid.kind = Solid::Kind::RING;
@@ -153,7 +156,8 @@ Obstacle readObstacle(YamlMap map, const std::string& fixed_frame) {
 
 RigidBody readRigidBody(YamlMap map) {
   RigidBody body;
-  if (map.has("self_collision")) map.fail("self_collision", "the body is rigid and cannot meet itself; remove this line");
+  if (map.has("self_collision"))
+    map.fail("self_collision", "the body is rigid and cannot meet itself; remove this line");
   body.name = map.text("name");
   body.frame = map.text("frame", body.name);
   body.size_m = map.numbers("size_m", 3, 1e-4, 1e3);
@@ -218,7 +222,8 @@ SceneSpec readScene(const YAML::Node& root, const std::string& name) {
   for (YamlMap& body : map.list("bodies")) {
     spec.bodies.push_back(readBody(body, spec.fixed_frame));
     for (std::size_t i = 0; i + 1 < spec.bodies.size(); ++i) {
-      if (spec.bodies[i].topic == spec.bodies.back().topic) body.fail("topic", "write a topic of its own for each body");
+      if (spec.bodies[i].topic == spec.bodies.back().topic)
+        body.fail("topic", "write a topic of its own for each body");
     }
   }
   if (spec.bodies.empty()) map.fail("bodies", "write at least one body: what moves in this scene");
@@ -246,10 +251,11 @@ SceneSpec parseScene(const std::string& text, const std::string& name) {
 
 SceneSpec readSceneFile(const std::string& path) {
   std::ifstream stream(path);
-  if (!stream) throw SceneFileError(path + ": cannot be read; name a scene file, such as config/scenes/table_edge.yaml");
+  if (!stream)
+    throw SceneFileError(path + ": cannot be read; name a scene file, such as config/scenes/table_edge.yaml");
   std::ostringstream text;
   text << stream.rdbuf();
   return parseScene(text.str(), path);
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -6,7 +6,7 @@
 #include "scene/physics/scene_spec.h"
 #include "scene/physics/yaml_map.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 /// Reads a scene file. Throws SceneFileError ("FILE:LINE: key: what to write") on whatever it does not understand, and
 /// on contradictions: a gripper on a vertex that is not there, a solid without volume, two things on one topic.
@@ -15,4 +15,4 @@ SceneSpec readSceneFile(const std::string& path);
 /// The same for a text; `name` leads messages in the place of the file.
 SceneSpec parseScene(const std::string& text, const std::string& name);
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

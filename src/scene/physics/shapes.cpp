@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 Eigen::Quaterniond rotation(const Vec3& rotation_rad) {
@@ -35,7 +35,8 @@ Positions startPositions(const Shape& shape) {
   Positions positions;
   positions.reserve(static_cast<std::size_t>(shape.rows) * shape.cols);
   for (int row = 0; row < shape.rows; ++row) {
-    for (int col = 0; col < shape.cols; ++col) positions.push_back(shape.center_m + turn * localVertex(shape, row, col));
+    for (int col = 0; col < shape.cols; ++col)
+      positions.push_back(shape.center_m + turn * localVertex(shape, row, col));
   }
   return positions;
 }
@@ -101,4 +102,4 @@ Box bounds(const Solid& solid) {
   return box;
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -5,7 +5,7 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 /// Vertices of a shape at the start, row-major, in the fixed frame [m].
 Positions startPositions(const Shape& shape);
@@ -21,4 +21,4 @@ bool contains(const Solid& solid, const Vec3& point_m);
 
 Box bounds(const Solid& solid);
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -12,12 +12,13 @@
 
 #include "scene/physics/shapes.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 static_assert(sizeof(btScalar) == sizeof(double), "scenes are recorded with Bullet in double precision");
 
-// Iterations of the position solver per physics step: enough that cloth of a thousand vertices does not look like rubber.
+// Iterations of the position solver per physics step: enough that cloth of a thousand vertices does not look like
+// rubber.
 constexpr int POSITION_ITERATIONS = 12;
 // Cell size of Bullet's sampled distance field around rigid shapes, as a multiple of the thickness it must resolve.
 constexpr double SDF_CELL_PER_THICKNESS = 1.0;
@@ -99,7 +100,8 @@ void Simulation::Impl::addBody(const Body& body) {
     const Vec3 offset(noise(body.start_noise_m), noise(body.start_noise_m), noise(body.start_noise_m));
     nodes.push_back(toBullet(p + offset));
   }
-  soft.push_back(std::make_unique<btSoftBody>(&world.getWorldInfo(), static_cast<int>(nodes.size()), nodes.data(), nullptr));
+  soft.push_back(
+      std::make_unique<btSoftBody>(&world.getWorldInfo(), static_cast<int>(nodes.size()), nodes.data(), nullptr));
   btSoftBody& result = *soft.back();
   result.m_materials[0]->m_kLST = body.stretch_stiffness;
   if (body.shape.kind == Shape::Kind::ROPE) {
@@ -157,7 +159,8 @@ void Simulation::Impl::addEffects(const Body& body, btSoftBody& result) {
   }
 }
 
-btRigidBody* Simulation::Impl::addRigid(std::unique_ptr<btCollisionShape> shape, const btTransform& pose, bool kinematic) {
+btRigidBody* Simulation::Impl::addRigid(std::unique_ptr<btCollisionShape> shape, const btTransform& pose,
+                                        bool kinematic) {
   btRigidBody::btRigidBodyConstructionInfo info(0.0, nullptr, shape.get());
   info.m_startWorldTransform = pose;
   rigid.push_back(std::make_unique<btRigidBody>(info));
@@ -178,7 +181,8 @@ void Simulation::Impl::addRing(const Solid& solid, double inset_m) {
     const Vec3 out = std::cos(angle) * u + std::sin(angle) * v;
     const Vec3 tangent = std::cos(angle) * v - std::sin(angle) * u;
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitY(), tangent).toRotationMatrix();  // capsules lie along y
+    pose.linear() =
+        Eigen::Quaterniond::FromTwoVectors(Vec3::UnitY(), tangent).toRotationMatrix();  // capsules lie along y
     pose.translation() = solid.center_m + solid.radius_m * out;
     addRigid(std::make_unique<btCapsuleShape>(solid.tube_radius_m - inset_m, arc), toBullet(pose), false);
   }
@@ -232,8 +236,8 @@ Simulation::Simulation(const SceneSpec& spec, std::uint64_t seed) : impl_(std::m
   if (spec.obstacle && spec.obstacle->collides) impl.addObstacle(*impl.spec.obstacle);
   for (const RigidBody& body : impl.spec.rigid_bodies) {
     impl.effects.push_back(body.name + ": rigid body");
-    impl.moving.push_back(impl.addRigid(
-        makeBox(0.5 * body.size_m), btTransform(btQuaternion::getIdentity(), toBullet(body.start_m)), true));
+    impl.moving.push_back(impl.addRigid(makeBox(0.5 * body.size_m),
+                                        btTransform(btQuaternion::getIdentity(), toBullet(body.start_m)), true));
   }
   for (const Body& body : impl.spec.bodies) impl.addBody(body);
 }
@@ -281,4 +285,4 @@ Eigen::Isometry3d Simulation::rigidPose(std::size_t rigid_body) const {
 
 const std::vector<std::string>& Simulation::effects() const { return impl_->effects; }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -8,11 +8,12 @@
 
 #include "scene/physics/scene_spec.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 class Simulation {
  public:
-  /// Constructs the bodies and only the effects that the scene names. Equal scene and seed give equal motion, bit for bit.
+  /// Constructs the bodies and only the effects that the scene names. Equal scene and seed give equal motion, bit for
+  /// bit.
   Simulation(const SceneSpec& spec, std::uint64_t seed);
   ~Simulation();
 
@@ -33,4 +34,4 @@ class Simulation {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <utility>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 YamlMap::YamlMap(const YAML::Node& node, std::string file, std::string path)
     : node_(node), file_(std::move(file)), path_(std::move(path)) {
@@ -124,9 +124,7 @@ std::size_t YamlMap::choice(const std::string& key, const std::vector<std::strin
   fail(key, "write one of " + all);
 }
 
-YamlMap YamlMap::map(const std::string& key) {
-  return YamlMap(required(key, "a map"), file_, path_ + key + ".");
-}
+YamlMap YamlMap::map(const std::string& key) { return YamlMap(required(key, "a map"), file_, path_ + key + "."); }
 
 std::optional<YamlMap> YamlMap::optionalMap(const std::string& key) {
   if (!has(key)) return std::nullopt;
@@ -166,4 +164,4 @@ void YamlMap::finish() const {
   }
 }
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

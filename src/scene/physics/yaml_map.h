@@ -10,9 +10,9 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "deformable_ccd/types.h"
+#include "dccd/types.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 
 struct SceneFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
@@ -64,4 +64,4 @@ class YamlMap {
   std::set<std::string> known_;
 };
 
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

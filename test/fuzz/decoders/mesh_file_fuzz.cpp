@@ -6,12 +6,12 @@
 #include <string>
 
 #include "fuzz/fuzz_target.h"
-#include "ros/mesh_file.h"
-#include "ros/stl_file.h"
+#include "input/mesh_file.h"
+#include "input/stl_file.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 /// A file in memory under a name with the format's ending, as the readers ask for.
 class NamedBytes {
@@ -51,7 +51,8 @@ void mesh_file(const std::uint8_t* data, std::size_t size) {
       }
     }
   } catch (const MeshFileError& error) {
-    if (std::string(error.what()).find(file.path()) == std::string::npos) throw std::logic_error("an error without the file");
+    if (std::string(error.what()).find(file.path()) == std::string::npos)
+      throw std::logic_error("an error without the file");
   }
 }
 

@@ -1,16 +1,16 @@
-// Any bytes as messages of any accepted mesh type: refused with a message that can be read, or decoded to a mesh that holds
-// together. The first byte chooses the type, the second the configuration; the same message follows once more with other
-// coordinates, so that welded and kept topologies are met, too.
+// Any bytes as messages of any accepted mesh type: refused with a message that can be read, or decoded to a mesh that
+// holds together. The first byte chooses the type, the second the configuration; the same message follows once more
+// with other coordinates, so that welded and kept topologies are met, too.
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include "fuzz/fuzz_target.h"
-#include "ros/mesh_decoder.h"
+#include "input/mesh_decoder.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 MeshInputConfig configOf(std::uint8_t byte) {
   static const TopologySource SOURCES[] = {TopologySource::AUTO, TopologySource::MESSAGE, TopologySource::GRID,
@@ -32,7 +32,8 @@ void judge(const DecodedMesh& mesh) {
   for (const Edge& edge : mesh.topology->edges()) {
     if (edge[0] >= edge[1] || edge[1] >= mesh.positions.size()) throw std::logic_error("an edge that cannot be");
   }
-  if (!mesh.radius_m.empty() && mesh.radius_m.size() != mesh.positions.size()) throw std::logic_error("a radius too many");
+  if (!mesh.radius_m.empty() && mesh.radius_m.size() != mesh.positions.size())
+    throw std::logic_error("a radius too many");
   for (const double radius_m : mesh.radius_m) {
     if (!(radius_m >= 0 && std::isfinite(radius_m))) throw std::logic_error("an uncertainty that cannot be");
   }

@@ -1,15 +1,16 @@
-// Any bytes as an octomap_msgs/Octomap (first byte even) or as a .bt or .ot file: a surface, or a sentence why there is none.
+// Any bytes as an octomap_msgs/Octomap (first byte even) or as a .bt or .ot file: a surface, or a sentence why there is
+// none.
 #include <stdexcept>
 #include <string>
 
+#include "dccd/octomap_decode.h"
 #include "fuzz/fuzz_target.h"
+#include "node/map_loader.h"
 #include "octomap/octomap_header.h"
-#include "deformable_ccd/octomap_decode.h"
-#include "ros/map_loader.h"
 
 namespace {
 
-using namespace deformable_ccd;
+using namespace dccd;
 
 /// The decoder alone, with what a message's other fields may say.
 void stream(const std::uint8_t* data, std::size_t size) {
@@ -24,7 +25,8 @@ void stream(const std::uint8_t* data, std::size_t size) {
   limits.max_leaves = 100000;
   try {
     const DecodedOctomap map = decodeOctomap(fields, limits);
-    if (map.occupied.size() + map.free.size() > limits.max_leaves) throw std::logic_error("more leaves than max_leaves");
+    if (map.occupied.size() + map.free.size() > limits.max_leaves)
+      throw std::logic_error("more leaves than max_leaves");
     VoxelSurface::build(map.resolution_m, map.occupied);  // what is decoded can be built
   } catch (const OctomapError& error) {
     if (std::string(error.what()).empty()) throw std::logic_error("refused without a reason");

@@ -8,11 +8,12 @@
 namespace {
 
 void scene_file(const std::uint8_t* data, std::size_t size) {
-  using namespace deformable_ccd::scene;
+  using namespace dccd::scene;
   try {
     parseScene(std::string(data, data + size), "input");
   } catch (const SceneFileError& error) {
-    if (std::string(error.what()).rfind("input:", 0) != 0) throw std::logic_error(std::string("message: ") + error.what());
+    if (std::string(error.what()).rfind("input:", 0) != 0)
+      throw std::logic_error(std::string("message: ") + error.what());
   }
 }
 

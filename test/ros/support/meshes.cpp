@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 namespace {
@@ -39,8 +39,8 @@ std_msgs::Header header(double stamp_s, const std::string& frame) {
   return out;
 }
 
-MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame) {
-  MeshStamped out;
+deformable_ccd::MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame) {
+  deformable_ccd::MeshStamped out;
   out.header = header(stamp_s, frame);
   for (const Vec3& p : mesh.positions) out.vertices.push_back(point(p));
   for (const Face& face : mesh.faces) {
@@ -102,7 +102,7 @@ visualization_msgs::MarkerArray soup(const Mesh& mesh, double stamp_s, int id) {
 }
 
 shape_msgs::Mesh shapeMesh(const Mesh& mesh) {
-  const MeshStamped stamped = meshStamped(mesh, 0);
+  const deformable_ccd::MeshStamped stamped = meshStamped(mesh, 0);
   shape_msgs::Mesh out;
   out.vertices = stamped.vertices;
   out.triangles = stamped.triangles;
@@ -110,4 +110,4 @@ shape_msgs::Mesh shapeMesh(const Mesh& mesh) {
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -9,9 +9,9 @@
 #include <shape_msgs/Mesh.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include "deformable_ccd/topology.h"
+#include "dccd/topology.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 struct Mesh {
@@ -25,11 +25,11 @@ Mesh tipAbove(double z);
 Positions gridAt(std::size_t rows, std::size_t cols, double z);
 
 std_msgs::Header header(double stamp_s, const std::string& frame = "world");
-MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame = "world");
+deformable_ccd::MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame = "world");
 sensor_msgs::PointCloud2 cloud(const Positions& positions, double stamp_s, const std::string& frame = "world");
 pcl_msgs::PolygonMesh polygonMesh(const Mesh& mesh, double stamp_s);
 visualization_msgs::MarkerArray soup(const Mesh& mesh, double stamp_s, int id = 2);
 shape_msgs::Mesh shapeMesh(const Mesh& mesh);
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,7 +1,6 @@
 // A monitor of a launch file, its topics and services; maps and transforms to give it.
 #pragma once
 
-// Generated headers before the core's: see deformable_ccd/contact.h.
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/StepStats.h>
 
@@ -19,10 +18,10 @@
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
-using Stats = StepStats_<std::allocator<void>>;
+using Stats = deformable_ccd::StepStats;
 
 inline octomap_msgs::Octomap blockBelowZero(bool binary, double stamp_s = 1) {
   octomap_msgs::Octomap map;
@@ -30,9 +29,10 @@ inline octomap_msgs::Octomap blockBelowZero(bool binary, double stamp_s = 1) {
   map.binary = binary;
   map.id = "OcTree";
   map.resolution = 0.1;
-  map.data = buildOctomap(0.1, Box{{0, 0, -0.2}, {0.5, 0.4, 0}}, [](const Vec3& c) {
-    return c.x() > 0 && c.x() < 0.5 && c.y() > 0 && c.y() < 0.4 && c.z() > -0.2 && c.z() < 0;
-  }, binary);
+  map.data = buildOctomap(
+      0.1, Box{{0, 0, -0.2}, {0.5, 0.4, 0}},
+      [](const Vec3& c) { return c.x() > 0 && c.x() < 0.5 && c.y() > 0 && c.y() < 0.4 && c.z() > -0.2 && c.z() < 0; },
+      binary);
   return map;
 }
 
@@ -72,7 +72,7 @@ class MonitorTest : public ::testing::Test {
 
   /// Publishes one message and returns the outcome that it leads to.
   template <typename Message>
-  ContactArray send(const ros::Publisher& publisher, const Message& message) {
+  deformable_ccd::ContactArray send(const ros::Publisher& publisher, const Message& message) {
     const std::size_t seen = contacts.count();
     publisher.publish(message);
     return contacts.after(seen);
@@ -88,10 +88,10 @@ class MonitorTest : public ::testing::Test {
 
   std::string name_;
   ros::NodeHandle node;
-  Probe<ContactArray> contacts;
+  Probe<deformable_ccd::ContactArray> contacts;
   Probe<Stats> stats;
   Probe<std_msgs::Bool> clear;
 };
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -12,7 +12,7 @@
 
 #include <ros/ros.h>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 
 inline bool waitUntil(const std::function<bool()>& done, double seconds = 5) {
@@ -69,4 +69,4 @@ ros::Publisher advertiseAndWait(ros::NodeHandle& node, const std::string& topic,
 }
 
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

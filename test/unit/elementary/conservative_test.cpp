@@ -7,12 +7,12 @@
 #include <stdexcept>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 #include "elementary/conservative_advance.h"
-#include "support/exact_distance.h"
+#include "oracle/exact_distance.h"
 #include "support/generators.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -40,7 +40,7 @@ ElementaryResult testApart(const AccuracyOptions& options, PairKind kind, const 
   batch.minimum_separation_m = &separation_m;
   ElementaryResult result;
   TierCounters counters;
-  makeElementaryTest(options)->run(batch, &result, counters);
+  makeRung(options)->run(batch, &result, counters);
   return result;
 }
 
@@ -56,7 +56,7 @@ PairMotion crossing(double z0, double z1) {
 
 TEST(Conservative, ReportsNearTheTimeOfContact) {
   for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
-    const auto test = makeElementaryTest(optionsOf(tolerance));
+    const auto test = makeRung(optionsOf(tolerance));
     const ElementaryResult drop = testPair(*test, PairKind::VERTEX_FACE, dropping(0.25, 0.25, 0.5, -1));
     const ElementaryResult cross = testPair(*test, PairKind::EDGE_EDGE, crossing(0.5, -1));
     for (const ElementaryResult& result : {drop, cross}) {
@@ -157,7 +157,7 @@ TEST(Conservative, ASeparationOfZeroIsNoSeparation) {
       quads.push_back(quad);
       separations.push_back(i % 2 == 0 ? 0 : 1e-3);
     }
-    const auto test = makeElementaryTest(optionsOf(1e-6));
+    const auto test = makeRung(optionsOf(1e-6));
     PairBatch batch;
     batch.kind = kind;
     batch.vertices = vertices.data();
@@ -206,10 +206,10 @@ TEST(Conservative, ClosingSpeedBoundsEveryChangeOfDistance) {
 }
 
 TEST(Conservative, RefusesKindsThatItCannotTest) {
-  const auto test = makeElementaryTest(optionsOf(1e-6));
+  const auto test = makeRung(optionsOf(1e-6));
   EXPECT_THROW(testPair(*test, PairKind::VERTEX_VOXEL_FACE, dropping(0, 0, 1, 2)), std::invalid_argument);
 }
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,10 +6,10 @@
 
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
-#include "support/algebraic.h"
+#include "oracle/algebraic.h"
 #include "support/generators.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::Hardness;
@@ -108,8 +108,7 @@ TEST(ExactDoubleDouble, CellsFromTheWholeStepAreThoseOfTheIntegers) {
       const std::int64_t cell = exact::cellOfRoot(exact::CoplanarityCubic(PairKind::VERTEX_FACE, pair), 0, 1, bits);
       if (cell < 0) continue;  // exactly on a grid point
       ++found;
-      const ElementaryResult truth =
-          exact::decideWithTier(Tier::FIXED_INTEGER, PairKind::VERTEX_FACE, pair, bits);
+      const ElementaryResult truth = exact::decideWithTier(Tier::FIXED_INTEGER, PairKind::VERTEX_FACE, pair, bits);
       ASSERT_EQ(truth.verdict, Verdict::CONTACT);
       ASSERT_EQ(std::ldexp(static_cast<double>(cell), -bits), truth.toc_lower) << t << " " << bits;
     }
@@ -123,11 +122,11 @@ TEST(ExactDoubleDouble, GridPointItselfIsLeftToTheIntegers) {
   EXPECT_EQ(f.signAt(0.5), 0);
   EXPECT_EQ(exact::cellOfRoot(f, 0.25, 0.75, 32), -1);
   EXPECT_EQ(exact::cellOfRoot(f, 0.5 - 0x1p-40, 0.5 + 0x1p-40, 10), -1);
-  const ElementaryResult result = testPair(*makeElementaryTest({}), PairKind::VERTEX_FACE, pair);
+  const ElementaryResult result = testPair(*makeRung({}), PairKind::VERTEX_FACE, pair);
   EXPECT_EQ(result.verdict, Verdict::CONTACT);
   EXPECT_EQ(result.toc_lower, 0.5);
   EXPECT_EQ(result.toc_upper, 0.5 + 0x1p-32);
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

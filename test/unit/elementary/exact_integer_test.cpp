@@ -8,7 +8,7 @@
 
 #include "elementary/exact_integer.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr int LIMBS = 16;
@@ -124,4 +124,4 @@ TEST(ExactInteger, CopiesKeepTheirOwnValue) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

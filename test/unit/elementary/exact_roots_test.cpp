@@ -8,7 +8,7 @@
 
 #include "elementary/exact_roots.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace exact {
 namespace {
 
@@ -135,4 +135,4 @@ TYPED_TEST(ExactRoots, RootsTooCloseForDoubles) {
 
 }  // namespace
 }  // namespace exact
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
 #include "support/generators.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 std::string refusal(const AccuracyOptions& options) {
   try {
-    makeElementaryTest(options);
+    makeRung(options);
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
@@ -68,7 +68,7 @@ TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
   ElementaryResult result;
   TierCounters counters;
   try {
-    makeElementaryTest({})->run(batch, &result, counters);
+    makeRung({})->run(batch, &result, counters);
     FAIL() << "accepted";
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("conservative"), std::string::npos);
@@ -77,7 +77,7 @@ TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
 
 TEST(ExactRung, ManyPairsAtOnceAreTheSameAsOneByOne) {
   test::RandomSource random(41);
-  const auto test = makeElementaryTest({});
+  const auto test = makeRung({});
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     std::vector<VertexMotion> vertices;
     std::vector<Quad> pairs;
@@ -128,77 +128,140 @@ std::vector<KnownCase> knownCases() {
   const auto EE = PairKind::EDGE_EDGE;
   const double third = std::floor(0x1p32 / 3) * CELL;
   return {
-      {"vertex arrives exactly at t=1", VF,
-       {{{{0.2, 0.2, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-          {{0.2, 0.2, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}, true, 1, 1},
-      {"vertex leaves at t=0", VF,
-       {{{{0.2, 0.2, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-          {{0.2, 0.2, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}, true, 0, CELL},
-      {"through the middle at 1/3", VF,
+      {"vertex arrives exactly at t=1",
+       VF,
+       {{{{0.2, 0.2, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0.2, 0.2, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
+       true,
+       1,
+       1},
+      {"vertex leaves at t=0",
+       VF,
+       {{{{0.2, 0.2, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0.2, 0.2, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
+       true,
+       0,
+       CELL},
+      {"through the middle at 1/3",
+       VF,
        {{{{0.2, 0.2, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0.2, 0.2, -2}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
-       true, third, third + CELL},
-      {"onto a corner at 1/2", VF,
-       {{{{1, 0, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-          {{1, 0, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}, true, 0.5, 0.5 + CELL},
-      {"one ulp beside the corner", VF,
+       true,
+       third,
+       third + CELL},
+      {"onto a corner at 1/2",
+       VF,
+       {{{{1, 0, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{1, 0, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
+       true,
+       0.5,
+       0.5 + CELL},
+      {"one ulp beside the corner",
+       VF,
        {{{{1 + 0x1p-52, 0, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-          {{1 + 0x1p-52, 0, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
-       false, 0, 0},
-      {"in the face's plane, onto an edge at 1/2", VF,
+         {{1 + 0x1p-52, 0, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
+       false,
+       0,
+       0},
+      {"in the face's plane, onto an edge at 1/2",
+       VF,
        {{{{-1, 0.5, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{1, 0.5, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
-       true, 0.5, 0.5 + CELL},
-      {"in the face's plane, passing by", VF,
-       {{{{-1, 3, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{1, 3, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}, false, 0, 0},
-      {"face shrunk to a segment, met at its end at 1/2", VF,
-       {{{{2, 0, 1}, {0, 0, 0}, {1, 0, 0}, {2, 0, 0}},
-          {{2, 0, -1}, {0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}}, true, 0.5, 0.5 + CELL},
+       true,
+       0.5,
+       0.5 + CELL},
+      {"in the face's plane, passing by",
+       VF,
+       {{{{-1, 3, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{1, 3, 0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}},
+       false,
+       0,
+       0},
+      {"face shrunk to a segment, met at its end at 1/2",
+       VF,
+       {{{{2, 0, 1}, {0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{2, 0, -1}, {0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}},
+       true,
+       0.5,
+       0.5 + CELL},
       {"all four in one place at rest", VF, {}, true, 0, CELL},
-      {"face that is a point, met at 1/4", VF,
-       {{{{1, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}},
-          {{-3, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}}, true, 0.25, 0.25 + CELL},
-      {"crossing edges at 1/2", EE,
+      {"face that is a point, met at 1/4",
+       VF,
+       {{{{1, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, {{-3, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}},
+       true,
+       0.25,
+       0.25 + CELL},
+      {"crossing edges at 1/2",
+       EE,
        {{{{-1, 0, 1}, {1, 0, 1}, {0, -1, 0}, {0, 1, 0}}, {{-1, 0, -1}, {1, 0, -1}, {0, -1, 0}, {0, 1, 0}}}},
-       true, 0.5, 0.5 + CELL},
-      {"parallel edges meet along half their length at 1/2", EE,
-       {{{{0, 0, 1}, {2, 0, 1}, {1, 0, 0}, {3, 0, 0}},
-          {{0, 0, -1}, {2, 0, -1}, {1, 0, 0}, {3, 0, 0}}}}, true, 0.5, 0.5 + CELL},
-      {"collinear edges slide end to end at 1/4", EE,
-       {{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}},
-          {{4, 0, 0}, {5, 0, 0}, {2, 0, 0}, {3, 0, 0}}}}, true, 0.25, 0.25 + CELL},
-      {"parallel edges pass beside each other", EE,
-       {{{{0, 0, 1}, {1, 0, 1}, {2, 0, 0}, {3, 0, 0}}, {{0, 0, -1}, {1, 0, -1}, {2, 0, 0}, {3, 0, 0}}}}, false, 0, 0},
-      {"zero-length edge through the other's end at 1/2", EE,
-       {{{{1, 0, 1}, {1, 0, 1}, {0, 0, 0}, {1, 0, 0}},
-          {{1, 0, -1}, {1, 0, -1}, {0, 0, 0}, {1, 0, 0}}}}, true, 0.5, 0.5 + CELL},
-      {"coplanar crossing at t=0 already", EE,
-       {{{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}},
-          {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}}}}, true, 0, CELL},
-      {"at rest and apart", EE,
-       {{{{-1, 0, 1}, {1, 0, 1}, {0, -1, 0}, {0, 1, 0}}, {{-1, 0, 1}, {1, 0, 1}, {0, -1, 0}, {0, 1, 0}}}}, false, 0, 0},
+       true,
+       0.5,
+       0.5 + CELL},
+      {"parallel edges meet along half their length at 1/2",
+       EE,
+       {{{{0, 0, 1}, {2, 0, 1}, {1, 0, 0}, {3, 0, 0}}, {{0, 0, -1}, {2, 0, -1}, {1, 0, 0}, {3, 0, 0}}}},
+       true,
+       0.5,
+       0.5 + CELL},
+      {"collinear edges slide end to end at 1/4",
+       EE,
+       {{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, {{4, 0, 0}, {5, 0, 0}, {2, 0, 0}, {3, 0, 0}}}},
+       true,
+       0.25,
+       0.25 + CELL},
+      {"parallel edges pass beside each other",
+       EE,
+       {{{{0, 0, 1}, {1, 0, 1}, {2, 0, 0}, {3, 0, 0}}, {{0, 0, -1}, {1, 0, -1}, {2, 0, 0}, {3, 0, 0}}}},
+       false,
+       0,
+       0},
+      {"zero-length edge through the other's end at 1/2",
+       EE,
+       {{{{1, 0, 1}, {1, 0, 1}, {0, 0, 0}, {1, 0, 0}}, {{1, 0, -1}, {1, 0, -1}, {0, 0, 0}, {1, 0, 0}}}},
+       true,
+       0.5,
+       0.5 + CELL},
+      {"coplanar crossing at t=0 already",
+       EE,
+       {{{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}}, {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}}}},
+       true,
+       0,
+       CELL},
+      {"at rest and apart",
+       EE,
+       {{{{-1, 0, 1}, {1, 0, 1}, {0, -1, 0}, {0, 1, 0}}, {{-1, 0, 1}, {1, 0, 1}, {0, -1, 0}, {0, 1, 0}}}},
+       false,
+       0,
+       0},
       // The face's plane is z = x (1-2t) / 2, the vertex is at x = 1-2t, so that f is (1-2t)^2 times a constant.
-      {"double root at 1/2, inside the face", VF,
+      {"double root at 1/2, inside the face",
+       VF,
        {{{{1, 0, 0}, {1, -1, 0.5}, {1, 1, 0.5}, {-1, 0, -0.5}},
-          {{-1, 0, 0}, {1, -1, -0.5}, {1, 1, -0.5}, {-1, 0, 0.5}}}},
-       true, 0.5, 0.5 + CELL},
-      {"double root at 1/2, beside the face", VF,
+         {{-1, 0, 0}, {1, -1, -0.5}, {1, 1, -0.5}, {-1, 0, 0.5}}}},
+       true,
+       0.5,
+       0.5 + CELL},
+      {"double root at 1/2, beside the face",
+       VF,
        {{{{1, 5, 0}, {1, -1, 0.5}, {1, 1, 0.5}, {-1, 0, -0.5}},
-          {{-1, 5, 0}, {1, -1, -0.5}, {1, 1, -0.5}, {-1, 0, 0.5}}}},
-       false, 0, 0},
+         {{-1, 5, 0}, {1, -1, -0.5}, {1, 1, -0.5}, {-1, 0, 0.5}}}},
+       false,
+       0,
+       0},
       // z = (-3+4t) / 2 + x (1/2+2t) / 2 is the face's plane or the first edge's line, x = 3-4t the vertex or second
       // edge: f is (3-4t)(t-1/4) times a constant, and x = 2 at t = 1/4 lies beside the other feature.
-      {"the first root is no contact, the second is (face)", VF,
+      {"the first root is no contact, the second is (face)",
+       VF,
        {{{{3, 0, 0}, {1, -1, -1.25}, {1, 1, -1.25}, {-1, 0, -1.75}},
-          {{-1, 0, 0}, {1, -1, 1.75}, {1, 1, 1.75}, {-1, 0, -0.75}}}},
-       true, 0.75, 0.75 + CELL},
-      {"the first root is no contact, the second is (edge)", EE,
+         {{-1, 0, 0}, {1, -1, 1.75}, {1, 1, 1.75}, {-1, 0, -0.75}}}},
+       true,
+       0.75,
+       0.75 + CELL},
+      {"the first root is no contact, the second is (edge)",
+       EE,
        {{{{1, 0, -1.25}, {-1, 0, -1.75}, {3, -1, 0}, {3, 1, 0}},
-          {{1, 0, 1.75}, {-1, 0, -0.75}, {-1, -1, 0}, {-1, 1, 0}}}},
-       true, 0.75, 0.75 + CELL},
+         {{1, 0, 1.75}, {-1, 0, -0.75}, {-1, -1, 0}, {-1, 1, 0}}}},
+       true,
+       0.75,
+       0.75 + CELL},
   };
 }
 
 TEST(ExactRung, CasesKnownByHand) {
-  const auto test = makeElementaryTest({});
+  const auto test = makeRung({});
   for (const KnownCase& known : knownCases()) {
     const ElementaryResult result = testPair(*test, known.kind, known.motion);
     ASSERT_EQ(result.verdict, known.contact ? Verdict::CONTACT : Verdict::NO_CONTACT) << known.name;
@@ -209,4 +272,4 @@ TEST(ExactRung, CasesKnownByHand) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

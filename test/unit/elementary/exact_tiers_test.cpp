@@ -12,23 +12,23 @@
 
 #include "elementary/exact_tiers.h"
 #include "elementary/rungs.h"
-#include "io/query_file.h"
+#include "oracle/oracle.h"
+#include "oracle/query_file.h"
 #include "support/data.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::Hardness;
 
 constexpr Tier COMPLETE_TIERS[] = {Tier::FIXED_INTEGER, Tier::BIG_INTEGER};
 
-std::unique_ptr<ElementaryTest> exactTest(int toc_bits = 32) {
+std::unique_ptr<Rung> exactTest(int toc_bits = 32) {
   AccuracyOptions options;
   options.toc_bits = toc_bits;
-  return makeExactTest(options);
+  return makeExactRung(options);
 }
 
 /// Verdict and cell, not the tier.
@@ -137,9 +137,9 @@ class SmallIntegerPair {
     }
     const unsigned family = random() % 6;
     for (int i = 0; i < 4; ++i) {
-      if (family == 0) x_[0][i][2] = x_[1][i][2] = 0;  // coplanar
+      if (family == 0) x_[0][i][2] = x_[1][i][2] = 0;                              // coplanar
       if (family == 1) x_[0][i][1] = x_[1][i][1] = x_[0][i][2] = x_[1][i][2] = 0;  // collinear
-      if (family == 2) std::copy(x_[0][i], x_[0][i] + 3, x_[1][i]);  // at rest
+      if (family == 2) std::copy(x_[0][i], x_[0][i] + 3, x_[1][i]);                // at rest
     }
     for (auto& time : x_) {
       if (family == 3) std::copy(time[2], time[2] + 3, time[3]);  // zero area, zero length
@@ -318,4 +318,4 @@ TEST(ExactTiers, RefusesKindsAndTiersItDoesNotHave) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

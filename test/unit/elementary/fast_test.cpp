@@ -6,20 +6,20 @@
 #include <stdexcept>
 #include <vector>
 
-#include "deformable_ccd/elementary.h"
+#include "dccd/elementary.h"
+#include "oracle/oracle.h"
 #include "support/data.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 #include "support/scene_data.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
-std::unique_ptr<ElementaryTest> fastTest() {
+std::unique_ptr<Rung> fastTest() {
   AccuracyOptions options;
   options.rung = Accuracy::FAST;
-  return makeElementaryTest(options);
+  return makeRung(options);
 }
 
 TEST(Fast, ApproximatesTheTimeOfContact) {
@@ -87,4 +87,4 @@ TEST(Fast, RefusesWhatItCannotTest) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

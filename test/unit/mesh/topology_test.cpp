@@ -1,8 +1,8 @@
-#include "deformable_ccd/topology.h"
+#include "dccd/topology.h"
 
 #include <gtest/gtest.h>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 TEST(Topology, EdgesOfASharedSideAreUnique) {
@@ -48,4 +48,4 @@ TEST(Topology, PolylineHasNoFaces) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "support/algebraic.h"
+#include "oracle/algebraic.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using test::Rational;
@@ -29,7 +29,8 @@ class Coordinates {
     double value = std::uniform_int_distribution<int>(-6, 6)(random_) * (coin(2) ? 0.02 : 0.25);
     if (coin(3)) value = std::nextafter(value, coin(2) ? 1e9 : -1e9);
     if (coin(9)) value *= std::ldexp(1.0, std::uniform_int_distribution<int>(-600, 400)(random_));
-    if (coin(50)) value = std::numeric_limits<double>::denorm_min() * std::uniform_int_distribution<int>(-3, 3)(random_);
+    if (coin(50))
+      value = std::numeric_limits<double>::denorm_min() * std::uniform_int_distribution<int>(-3, 3)(random_);
     return value;
   }
 
@@ -77,4 +78,4 @@ TEST(CrossingTime, CellsHoldTheTime) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Key = std::tuple<int, int, int>;
@@ -17,7 +17,8 @@ std::set<Key> voxelsOf(const std::vector<OccupiedLeaf>& leaves) {
   for (const OccupiedLeaf& leaf : leaves) {
     for (std::uint32_t i = 0; i < leaf.size * leaf.size * leaf.size; ++i) {
       const bool fresh = keys.emplace(leaf.min.x + i % leaf.size, leaf.min.y + i / leaf.size % leaf.size,
-                                      leaf.min.z + i / leaf.size / leaf.size).second;
+                                      leaf.min.z + i / leaf.size / leaf.size)
+                             .second;
       EXPECT_TRUE(fresh);
     }
   }
@@ -29,12 +30,13 @@ TEST(ExcludedLeaves, ExactlyTheVoxelsWhoseCentreIsInABox) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> place(-0.4, 0.8), size(0.05, 0.6), angle(-3, 3);
   const double resolution = 0.05;
-  const std::vector<OccupiedLeaf> leaves = {{{32768, 32768, 32768}, 8}, {{32776, 32768, 32768}, 4},
-                                            {{32780, 32768, 32768}, 1}, {{32768, 32776, 32768}, 2}};
+  const std::vector<OccupiedLeaf> leaves = {
+      {{32768, 32768, 32768}, 8}, {{32776, 32768, 32768}, 4}, {{32780, 32768, 32768}, 1}, {{32768, 32776, 32768}, 2}};
   int split = 0;
   for (int i = 0; i < 300; ++i) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    if (i % 2) pose.rotate(Eigen::AngleAxisd(angle(random), Vec3(1, 2, 3).normalized())).pretranslate(Vec3(0.1, 0, -0.1));
+    if (i % 2)
+      pose.rotate(Eigen::AngleAxisd(angle(random), Vec3(1, 2, 3).normalized())).pretranslate(Vec3(0.1, 0, -0.1));
     std::vector<Box> boxes;
     for (int b = 0; b <= i % 3; ++b) {
       const Vec3 lo(place(random), place(random), place(random));
@@ -46,7 +48,8 @@ TEST(ExcludedLeaves, ExactlyTheVoxelsWhoseCentreIsInABox) {
       const auto [x, y, z] = key;
       const Vec3 centre = pose * Vec3(resolution * Vec3(x - 32767.5, y - 32767.5, z - 32767.5));
       bool in = false;
-      for (const Box& box : boxes) in |= (centre.array() >= box.min.array()).all() && (centre.array() <= box.max.array()).all();
+      for (const Box& box : boxes)
+        in |= (centre.array() >= box.min.array()).all() && (centre.array() <= box.max.array()).all();
       if (!in) expected.insert(key);
     }
     ASSERT_EQ(voxelsOf(remaining.leaves), expected) << "case " << i;
@@ -72,4 +75,4 @@ TEST(ExcludedLeaves, ABoxThroughAHugeLeafEndsAndHidesNothing) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,4 +1,4 @@
-#include "deformable_ccd/known_space.h"
+#include "dccd/known_space.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr double RESOLUTION = 0.05;
@@ -109,7 +109,8 @@ TEST(KnownSpace, TheLimitCountsABlockOnceHoweverManyFacesTouchIt) {
     t0.insert(t0.end(), {{0.11, 0.11, 0.11}, {0.39, 0.11, 0.11}, {0.11, 0.39, 0.39}});
   }
   const Topology many = Topology::fromTriangles(t0.size(), faces);
-  const SweptSpace all = space->sweptSpace(many, t0, t0, nullptr), bounded = space->sweptSpace(many, t0, t0, nullptr, 8);
+  const SweptSpace all = space->sweptSpace(many, t0, t0, nullptr),
+                   bounded = space->sweptSpace(many, t0, t0, nullptr, 8);
   EXPECT_TRUE(bounded.complete);
   EXPECT_EQ(bounded.voxels, all.voxels);
   EXPECT_EQ(bounded.unknown, 1u);
@@ -130,4 +131,4 @@ TEST(KnownSpace, SweptSpaceIsBoundedAndSaysSo) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,5 +1,5 @@
 // Exposed faces, edges and corners against their definition on single voxels, for leaves of all sizes.
-#include "deformable_ccd/voxel_surface.h"
+#include "dccd/voxel_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 #include "obstacle/voxel_surface_impl.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Cell = std::array<int, 3>;
@@ -52,8 +52,8 @@ std::set<Cell> voxelsOf(const std::vector<OccupiedLeaf>& leaves) {
   return voxels;
 }
 
-/// The definition: a face counts where the voxel beyond is empty somewhere, an edge where the two voxels beyond its faces
-/// are both empty at one place, a corner where all three are.
+/// The definition: a face counts where the voxel beyond is empty somewhere, an edge where the two voxels beyond its
+/// faces are both empty at one place, a corner where all three are.
 FeatureMask expectedFeatures(const OccupiedLeaf& leaf, const std::set<Cell>& voxels) {
   const int size = static_cast<int>(leaf.size);
   FeatureMask mask = 0;
@@ -99,7 +99,8 @@ TEST(VoxelSurface, TheQueryFindsTheLeavesOfABoxEachOnce) {
     KeyBox box;
     for (int axis = 0; axis < 3; ++axis) {
       const int reach = 1 << random() % 17;
-      const int a = std::clamp<int>(32740 + static_cast<int>(random() % 70) - static_cast<int>(random() % reach), 0, 65535);
+      const int a =
+          std::clamp<int>(32740 + static_cast<int>(random() % 70) - static_cast<int>(random() % reach), 0, 65535);
       box.lo[axis] = a;
       box.hi[axis] = std::min<int>(65535, a + static_cast<int>(random() % reach));
     }
@@ -135,7 +136,8 @@ TEST(VoxelSurface, CoverageOfCubes) {
   EXPECT_EQ(tree.coverage(32768, 0, 0, 32768), Coverage::EMPTY);
 }
 
-// A level without leaves of its own between two with some: its nodes are skipped, and their parents' children with them.
+// A level without leaves of its own between two with some: its nodes are skipped, and their parents' children with
+// them.
 TEST(VoxelSurface, CoverageBesideALargeLeafWithSmallOnesFurtherOn) {
   const VoxelTree tree({{{0, 0, 0}, 64}, {{96, 0, 0}, 1}});
   EXPECT_EQ(tree.coverage(80, 16, 16, 1), VoxelTree::Coverage::EMPTY);
@@ -204,4 +206,4 @@ TEST(VoxelSurface, MemoryIsProportional) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

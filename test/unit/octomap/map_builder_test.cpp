@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr double RESOLUTION_M = 0.1;
@@ -62,4 +62,4 @@ TEST(MapBuilder, AShapeBeyondTheKeysIsRefused) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

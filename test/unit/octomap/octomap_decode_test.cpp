@@ -1,5 +1,5 @@
 // Round trips with liboctomap's own writers, and streams that are cut, flipped or made to hurt.
-#include "deformable_ccd/octomap_decode.h"
+#include "dccd/octomap_decode.h"
 
 #include <gtest/gtest.h>
 #include <octomap/ColorOcTree.h>
@@ -15,7 +15,7 @@
 #include <sstream>
 #include <tuple>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using Leaves = std::vector<std::tuple<int, int, int, std::uint32_t>>;
@@ -210,7 +210,8 @@ TEST(OctomapDecode, ErrorsNameTheFieldAndTheValue) {
   EXPECT_NE(errorOf({"OcTree", 0.2, true, header + "ab"}).find("0.1"), std::string::npos);
   EXPECT_NE(errorOf({"OcTree", 0.1, false, header + "ab"}).find(".bt"), std::string::npos);
   EXPECT_NE(errorOf({"ColorOcTree", 0.1, true, header + "ab"}).find("ColorOcTree"), std::string::npos);
-  EXPECT_NE(errorOf({"OcTree", 0.1, true, "# Octomap OcTree binary file\nid OcTree\n"}).find("data"), std::string::npos);
+  EXPECT_NE(errorOf({"OcTree", 0.1, true, "# Octomap OcTree binary file\nid OcTree\n"}).find("data"),
+            std::string::npos);
 }
 
 TEST(OctomapDecode, HostileStreamsAreRefusedSoon) {
@@ -253,4 +254,4 @@ TEST(OctomapDecode, FilesAreReadByTheirHeader) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,5 +1,6 @@
-// Messages and files that claim more than there is, or hold more than is allowed, are refused before memory is taken for
-// them and without delay. Each is read in a process of its own, with little memory beyond what the program has already.
+// Messages and files that claim more than there is, or hold more than is allowed, are refused before memory is taken
+// for them and without delay. Each is read in a process of its own, with little memory beyond what the program has
+// already.
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -16,14 +17,14 @@
 
 #include <gtest/gtest.h>
 
-#include "deformable_ccd/octomap_decode.h"
-#include "io/step_recording.h"
-#include "ros/map_loader.h"
-#include "ros/mesh_decoder.h"
-#include "ros/mesh_file.h"
-#include "ros/stl_file.h"
+#include "dccd/octomap_decode.h"
+#include "input/mesh_decoder.h"
+#include "input/mesh_file.h"
+#include "input/stl_file.h"
+#include "node/map_loader.h"
+#include "record/step_recording.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 namespace fs = std::filesystem;
@@ -66,7 +67,8 @@ std::string refusal(const std::function<void()>& read) {
   ::close(pipe[1]);
   std::string text;
   char buffer[512];
-  for (ssize_t n = 0; (n = ::read(pipe[0], buffer, sizeof buffer)) > 0;) text.append(buffer, static_cast<std::size_t>(n));
+  for (ssize_t n = 0; (n = ::read(pipe[0], buffer, sizeof buffer)) > 0;)
+    text.append(buffer, static_cast<std::size_t>(n));
   ::close(pipe[0]);
   int status = 0;
   ::waitpid(child, &status, 0);
@@ -153,7 +155,8 @@ TEST(HostileInput, FourBillionClaimedPoints) {
   EXPECT_TRUE(mentions(refusalOf("visualization_msgs/MarkerArray", Front().count(MANY)), "4294967295"));
   EXPECT_TRUE(mentions(refusalOf("pcl_msgs/PolygonMesh", Front().header().header().count(MANY).count(MANY).count(MANY)),
                        "4294967295"));
-  EXPECT_TRUE(mentions(refusalOf("deformable_ccd/MeshStamped", Front().count(1).count(5).count(0).count(MANY)), "4294967295"))
+  EXPECT_TRUE(
+      mentions(refusalOf("deformable_ccd/MeshStamped", Front().count(1).count(5).count(0).count(MANY)), "4294967295"))
       << "a name of four gigabytes";
 }
 
@@ -189,8 +192,9 @@ TEST(HostileInput, MapsWithImpossibleNumbers) {
   using Limits = std::numeric_limits<double>;
   for (const double resolution : {0.0, -0.0, -1.0, Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(),
                                   Limits::denorm_min(), Limits::max()}) {
-    const std::string text =
-        refusal([&] { decodeOctomap({"OcTree", resolution, true, one_leaf.data(), one_leaf.size()}); });
+    const std::string text = refusal([&] {
+      decodeOctomap({"OcTree", resolution, true, one_leaf.data(), one_leaf.size()});
+    });
     EXPECT_TRUE(mentions(text, "resolution")) << resolution << ": " << text;
   }
   // As a message: four gigabytes of data claimed.
@@ -222,7 +226,8 @@ class HostileFile : public ::testing::Test {
 
 TEST_F(HostileFile, ClaimsOfFourBillionTriangles) {
   const std::string stl = write("a.stl", std::string(80, ' ') + "\xff\xff\xff\xff");
-  EXPECT_TRUE(mentions(refusal([&] { loadStlFile(stl); }), "of the size that it states")) << refusal([&] { loadStlFile(stl); });
+  EXPECT_TRUE(mentions(refusal([&] { loadStlFile(stl); }), "of the size that it states"))
+      << refusal([&] { loadStlFile(stl); });
   const std::string ply = write("a.ply",
                                 "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
                                 "property float z\nelement face 4000000000\nproperty list uchar int vertex_indices\n"
@@ -246,4 +251,4 @@ TEST_F(HostileFile, MapFilesOfAGigabyte) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

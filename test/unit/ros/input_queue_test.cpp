@@ -1,4 +1,4 @@
-#include "ros/input_queue.h"
+#include "node/input_queue.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// Receipt times of what is left of four messages in a queue for two.
@@ -71,7 +71,12 @@ TEST(InputQueue, ACallIsAnsweredByTheWorkerAlsoWhenItThrows) {
 TEST(InputQueue, ACallThatTimesOutIsDoneLaterAndSaysSo) {
   InputQueue queue(1, 1, QueuePolicy::NEWEST);
   bool done = false;
-  const Reply reply = queue.call([&] { done = true; return Reply{true, "done"}; }, 0.01);
+  const Reply reply = queue.call(
+      [&] {
+        done = true;
+        return Reply{true, "done"};
+      },
+      0.01);
   EXPECT_FALSE(reply.success);
   EXPECT_NE(reply.message.find("will be done"), std::string::npos) << reply.message;
   EXPECT_FALSE(done);
@@ -94,4 +99,4 @@ TEST(InputQueue, ClosingEndsCallsAtOnce) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

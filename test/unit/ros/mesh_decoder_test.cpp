@@ -1,4 +1,4 @@
-#include "ros/mesh_decoder.h"
+#include "input/mesh_decoder.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// Serialises as ROS does, with lies where a test wants them.
@@ -140,12 +140,21 @@ TEST(MeshDecoder, RefusesLies) {
   EXPECT_EQ(with([](CloudSpec&) {}), "") << "the honest one";
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.claimed = 4000000000u; }), "data claims 4000000000"));
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.width = 4294967295u; }), "do not fit"));
-  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.height = 4294967295u; s.row_step = 4294967295u; }), "do not fit"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) {
+                         s.height = 4294967295u;
+                         s.row_step = 4294967295u;
+                       }),
+                       "do not fit"));
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.point_step = 0; }), "point_step"));
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.offsets[1] = 4294967294u; }), "offset"));
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.datatype = 2; }), "datatype 2"));
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.big = 1; }), "is_bigendian"));
-  EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.height = 2; s.width = 2; s.row_step = 3; }), "row_step"));
+  EXPECT_TRUE(mentions(with([](CloudSpec& s) {
+                         s.height = 2;
+                         s.width = 2;
+                         s.row_step = 3;
+                       }),
+                       "row_step"));
   EXPECT_TRUE(mentions(with([](CloudSpec& s) { s.width = 3; }), "VERTEX_COUNT"));
   EXPECT_TRUE(mentions(errorOf({}, CLOUD, cloud({})), "topology/rows")) << "says what to set";
   EXPECT_TRUE(mentions(errorOf({}, MESH, mesh(SQUARE, {{0, 1, 9}})), "index 9"));
@@ -163,7 +172,8 @@ TEST(MeshDecoder, EveryTruncationIsRefused) {
     Bytes bytes;
     MeshInputConfig config;
   };
-  const Case cases[] = {{MESH, mesh(SQUARE, HALVES), {}}, {CLOUD, cloud({}), grid(2, 2)},
+  const Case cases[] = {{MESH, mesh(SQUARE, HALVES), {}},
+                        {CLOUD, cloud({}), grid(2, 2)},
                         {MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]}), {}}};
   for (const Case& one : cases) {
     EXPECT_EQ(errorOf(one.config, one.type, one.bytes), "");
@@ -232,4 +242,4 @@ TEST(MeshDecoder, PolylineFollowsTheOrderOfThePoints) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

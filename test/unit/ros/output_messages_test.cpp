@@ -1,11 +1,11 @@
 // Messages out of outcomes: what a line for people says, and what is counted.
-#include "ros/output_messages.h"
+#include "output/output_messages.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 /// A step that found nothing.
@@ -62,4 +62,4 @@ TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -10,10 +10,10 @@
 #include <set>
 #include <sstream>
 
-#include "ros/mesh_resource.h"
-#include "ros/monitor_config.h"
+#include "config/monitor_config.h"
+#include "input/mesh_resource.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using XmlRpc::XmlRpcValue;
@@ -89,7 +89,10 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
       {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
        "separation: write accuracy: conservative",
-       [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["minimum_separation_m"] = 0.01; }},
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["minimum_separation_m"] = 0.01;
+       }},
       {"~bodies/cloth/minimum_separation_m asks for a minimum separation: write accuracy: conservative",
        [](XmlRpcValue& t) {
          t["accuracy"] = "exact";
@@ -101,7 +104,10 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
          t["minimum_separation_pairs"][0] = separationPair("mesh", "octomap", 0.01);
        }},
       {"~uncertainty asks for an uncertainty radius: write accuracy: conservative",
-       [](XmlRpcValue& t) { t["accuracy"] = "exact"; t["uncertainty"]["radius_m"] = 0.01; }},
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["uncertainty"]["radius_m"] = 0.01;
+       }},
       {"~minimum_separation_m is -0.1, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
       {"~minimum_separation_m is nan, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = NAN; }},
       {"~minimum_separation_m is inf, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = INFINITY; }},
@@ -354,8 +360,10 @@ std::map<std::string, std::string> defaultsOnThePage() {
     for (std::size_t i = 0; i < std::min(names.size(), values.size()); ++i) {
       std::string name = names[i].substr(1, names[i].size() - 2);
       const std::size_t slash = name.rfind('/');
-      if (slash != std::string::npos) section = name.substr(0, slash + 1);
-      else name = section + name;
+      if (slash != std::string::npos)
+        section = name.substr(0, slash + 1);
+      else
+        name = section + name;
       EXPECT_TRUE(defaults.emplace(name, values[i]).second) << name << " stands twice";
     }
   }
@@ -374,4 +382,4 @@ TEST(InterfacePage, DefaultsOfABodyAreTheCodes) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,5 +1,6 @@
-// The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and files.
-#include "ros/monitor_pipeline.h"
+// The pipeline that the node and analyze_bag share, driven by messages as bytes: unknown space, tracker noise, and
+// files.
+#include "node/monitor_pipeline.h"
 
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
@@ -13,10 +14,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "ros/effects.h"
-#include "ros/map_loader.h"
+#include "node/effects.h"
+#include "node/map_loader.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 using XmlRpc::XmlRpcValue;
@@ -84,8 +85,7 @@ struct Driven {
   EffectTracker effects;
   StepOutcome outcome;
 
-  explicit Driven(const XmlRpcValue& tree)
-      : config(readConfig(tree)), pipeline(config, transforms), effects(config) {}
+  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms), effects(config) {}
 
   void giveMap(double stamp_s) {
     LoadedMap loaded = decodeMapMessage(map(stamp_s), config);
@@ -228,13 +228,13 @@ TEST(TrackerNoise, ComesFromThePointField) {
   // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
   const StepOutcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
   ASSERT_FALSE(outcome.contacts.empty());
-  for (const core::Contact& c : outcome.contacts) {
+  for (const Contact& c : outcome.contacts) {
     EXPECT_TRUE(std::count(c.vertex.begin(), c.vertex.end(), 2u)) << "feature without the uncertain vertex";
   }
   EXPECT_LE(outcome.earliest_toc, 0.6 + 1e-6);
   EXPECT_NEAR(outcome.earliest_toc, 0.6, 1e-3);
   EXPECT_GT(outcome.stats[Effect::TRACKER_NOISE].out, 0u);
-  for (const core::Contact& c : outcome.contacts) {
+  for (const Contact& c : outcome.contacts) {
     EXPECT_EQ(c.body[1], OBSTACLE_BODY) << "neighbours on the mesh are no contacts, however uncertain";
   }
   EXPECT_GT(noisy.pipeline.monitor().leftOut().size(), 0u);
@@ -292,7 +292,8 @@ struct Tabled : Driven {
     return tree;
   }
   void take(std::size_t body, double stamp_s, float z, std::int64_t now_ns) {
-    pipeline.take(body, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
+    pipeline.take(body,
+                  {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
   }
   const FrameCounters& tables() const { return pipeline.monitor().counters(TABLE); }
   static constexpr std::size_t CLOTH = 0, TABLE = 1;
@@ -441,9 +442,10 @@ std::string errorOf(const XmlRpcValue& tree) {
 TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
   const std::string text_file = ::testing::TempDir() + "no_mesh.stl", ply = ::testing::TempDir() + "square.ply";
   std::ofstream(text_file) << "this is no mesh\n";
-  std::ofstream(ply) << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-                        "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
-                        "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n";
+  std::ofstream(ply)
+      << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+         "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n";
   const auto rigid = [](const std::string& file) {
     XmlRpcValue tree;
     tree["bodies"]["cloth"]["topic"] = "cloth";
@@ -454,7 +456,8 @@ TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
   const auto names = [](const std::string& error, const std::string& part) {
     EXPECT_NE(error.find(part), std::string::npos) << part << ": " << error;
   };
-  for (const std::string& file : {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
+  for (const std::string& file :
+       {std::string("missing.stl"), std::string("package://no_such_package/a.obj"), text_file}) {
     const std::string error = errorOf(rigid(file));
     names(error, "rigid/mesh of body 'finger'");
     names(error, file);
@@ -472,4 +475,4 @@ TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -1,7 +1,7 @@
-// Many frames through all of the node but the network: bytes in, decoder, pipeline, monitor, flight recorder, messages out.
-// Memory stays flat, counters add up, and the same step gives the same bytes however long the monitor has run.
-// 1e3 frames; 1e5 with DEFORMABLE_CCD_LONG=1.
-#include "ros/output_messages.h"
+// Many frames through all of the node but the network: bytes in, decoder, pipeline, monitor, flight recorder, messages
+// out. Memory stays flat, counters add up, and the same step gives the same bytes however long the monitor has run. 1e3
+// frames; 1e5 with DEFORMABLE_CCD_LONG=1.
+#include "output/output_messages.h"
 
 #include <unistd.h>
 
@@ -12,13 +12,13 @@
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
 
-#include "io/flight_recorder.h"
-#include "ros/monitor_pipeline.h"
+#include "node/monitor_pipeline.h"
+#include "record/flight_recorder.h"
 #include "support/heap.h"
 #include "support/query_property.h"
 #include "support/recordings.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace {
 
 constexpr std::size_t ROWS = 8, COLS = 8;
@@ -44,7 +44,7 @@ class Stream {
     std::mt19937 fixed(second ? 2 : 1);
     std::mt19937& random = known ? fixed : random_;
     std::uniform_real_distribution<double> noise(-0.04, 0.04);
-    MeshStamped mesh;
+    deformable_ccd::MeshStamped mesh;
     stamp_ns_ += FRAME_NS;
     mesh.header.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns_));
     mesh.header.frame_id = "world";
@@ -133,4 +133,4 @@ TEST(Soak, FlatMemoryAndTheSameBytesForTheSameStep) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,7 +6,7 @@
 
 #include "scene/generated_shapes.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace scene {
 namespace {
 
@@ -96,4 +96,4 @@ TEST(GeneratedShapes, AreWhatTheySay) {
 
 }  // namespace
 }  // namespace scene
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -11,7 +11,7 @@
 
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -376,4 +376,4 @@ TEST(ClusterKernels, WidenedNodesStillMeetWhatTheyTouch) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

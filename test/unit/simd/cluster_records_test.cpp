@@ -8,7 +8,7 @@
 #include "simd/cluster_kernels.h"
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -169,4 +169,4 @@ TEST(ClusterRecords, RecordsAndBoundsAreTheSameOnEveryTarget) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -12,14 +12,14 @@
 #include <random>
 #include <vector>
 
-#include "io/query_file.h"
+#include "oracle/oracle.h"
+#include "oracle/query_file.h"
 #include "support/data.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 #include "support/scene_data.h"
-#include "unit/simd/paper_targets.h"
+#include "support/simd_targets.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -251,4 +251,4 @@ TEST(ExactBatch, NeverContradictsTheTruthOfNBody) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -9,11 +9,11 @@
 #include <numeric>
 #include <vector>
 
+#include "oracle/oracle.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 #include "support/step_support.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -268,7 +268,7 @@ PairMotion grazingPair(const Draw& draw, PairKind kind) {
 /// No pair that is rejected may touch. Judged by the exact rung; what it calls a contact the oracle must confirm.
 std::size_t expectNoContactLost(const PairList& list, const std::string& what) {
   AccuracyOptions options;
-  const auto exact = makeElementaryTest(options);
+  const auto exact = makeRung(options);
   std::vector<ElementaryResult> truth(list.size());
   std::vector<Quad> quads(list.size());
   for (std::size_t i = 0; i < quads.size(); ++i) std::copy_n(&list.quads[4 * i], 4, quads[i].begin());
@@ -402,4 +402,4 @@ TEST(FusedFilter, NothingToDo) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

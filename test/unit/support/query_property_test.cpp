@@ -6,10 +6,10 @@
 
 #include <cmath>
 
+#include "oracle/oracle.h"
 #include "support/generators.h"
-#include "support/oracle.h"
 
-namespace deformable_ccd {
+namespace dccd {
 namespace test {
 namespace {
 
@@ -65,4 +65,4 @@ TEST(Generators, SymmetriesAreGroupsOfTheRightSize) {
 
 }  // namespace
 }  // namespace test
-}  // namespace deformable_ccd
+}  // namespace dccd

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 const char* const GOOD = R"(name: drop
@@ -81,24 +81,32 @@ TEST(SceneFile, ContradictionsAreRefused) {
                     "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 1], max_m: [1, 1, 1]}}]}\nbodies:")
                 .find("min_m below max_m"),
             std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "bodies:",
-                    "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:")
-                .find("s.yaml:7: rigid_bodies[0].self_collision: the body is rigid and cannot meet itself; remove this line"),
+  EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"),
             std::string::npos);
+  EXPECT_NE(
+      errorOf(GOOD, "bodies:",
+              "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:")
+          .find("s.yaml:7: rigid_bodies[0].self_collision: the body is rigid and cannot meet itself; remove this line"),
+      std::string::npos);
 }
 
 TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
-  const auto with = [](const std::string& monitor) { return errorOf(GOOD, "bodies:", "monitor:\n" + monitor + "bodies:"); };
-  EXPECT_EQ(with("  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: 4}}\n"), "accepted");
-  EXPECT_NE(with("  minimum_separation_m: -0.01\n").find("s.yaml:7: monitor.minimum_separation_m: write a number from 0"),
+  const auto with = [](const std::string& monitor) {
+    return errorOf(GOOD, "bodies:", "monitor:\n" + monitor + "bodies:");
+  };
+  EXPECT_EQ(with("  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: 4}}\n"),
+            "accepted");
+  EXPECT_NE(
+      with("  minimum_separation_m: -0.01\n").find("s.yaml:7: monitor.minimum_separation_m: write a number from 0"),
+      std::string::npos);
+  EXPECT_NE(with("  minimum_separation_m: .nan\n").find("monitor.minimum_separation_m: write a number from 0"),
             std::string::npos);
-  EXPECT_NE(with("  minimum_separation_m: .nan\n").find("monitor.minimum_separation_m: write a number from 0"), std::string::npos);
   EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, minimum_separation_m: .inf}\n")
                 .find("s.yaml:8: monitor.bodies.cloth.minimum_separation_m: write a number from 0"),
             std::string::npos);
   EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\n")
-                .find("s.yaml:8: monitor.bodies.cloth.topology.rows: 4 x 4 = 16, but sheet has 12 points; write rows: 3, cols: 4"),
+                .find("s.yaml:8: monitor.bodies.cloth.topology.rows: 4 x 4 = 16, but sheet has 12 points; write rows: "
+                      "3, cols: 4"),
             std::string::npos);
   EXPECT_NE(with("  bodies:\n    finger: {rigid: {mesh: a.stl, frame: finger}, self_collision: true}\n")
                 .find("s.yaml:8: monitor.bodies.finger.self_collision: the body is rigid"),
@@ -110,7 +118,9 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
   const std::string scene = std::string(GOOD) +
                             "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
                             "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n";
-  const auto with = [&](const std::string& expect) { return errorOf(scene, "bodies:", "expect:\n" + expect + "bodies:"); };
+  const auto with = [&](const std::string& expect) {
+    return errorOf(scene, "bodies:", "expect:\n" + expect + "bodies:");
+  };
   const auto expectTold = [&](const std::string& expect, const std::string& part) {
     const std::string error = with(expect);
     EXPECT_NE(error.find(part), std::string::npos) << expect << error;
@@ -132,7 +142,8 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
   expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect.self.least: is not a key here");
   expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect.body.names: is missing");
   expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
-  expectTold("  body: {names: [sheet, [a]], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
+  expectTold("  body: {names: [sheet, [a]], first_contact_s: [0, 0.1]}\n",
+             "expect.body.names: write a list of 2 texts");
   expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n", "the scene has no body 'thumb'");
   expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "write two different names");
   expectTold("  clear: {until_s: 0.2}\n", "expect.clear.until_s: write a number from 0 to 0.133");
@@ -157,7 +168,8 @@ TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
 
 TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
   int scenes = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes")) {
     if (entry.path().extension() != ".yaml") continue;
     const SceneSpec spec = readSceneFile(entry.path().string());
     EXPECT_EQ(spec.name, entry.path().stem().string());
@@ -169,4 +181,4 @@ TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -1,5 +1,5 @@
-// The physics that records scenes: only the named effects, equal seeds give equal motion, and motion that can be checked by
-// hand comes out as it should.
+// The physics that records scenes: only the named effects, equal seeds give equal motion, and motion that can be
+// checked by hand comes out as it should.
 #include "scene/physics/simulation.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include "scene/physics/scene_file.h"
 #include "scene/physics/shapes.h"
 
-namespace deformable_ccd::scene {
+namespace dccd::scene {
 namespace {
 
 SceneSpec bareScene() {
@@ -64,10 +64,9 @@ TEST(Simulation, ConstructsEachNamedEffect) {
   spec.bodies[0].self_collision = SelfCollision{4};
   spec.bodies[0].friction = 0.5;
   spec.bodies[0].grippers.push_back({{0}, {}, {}});
-  const std::vector<std::string> expected = {"gravity",         "wind",
-                                             "obstacle",        "finger: rigid body",
-                                             "sheet: bending",  "sheet: self-collision",
-                                             "sheet: friction", "sheet: gripper"};
+  const std::vector<std::string> expected = {
+      "gravity",         "wind",          "obstacle", "finger: rigid body", "sheet: bending", "sheet: self-collision",
+      "sheet: friction", "sheet: gripper"};
   EXPECT_EQ(Simulation(spec, 1).effects(), expected);
 }
 
@@ -105,7 +104,8 @@ TEST(Simulation, RestsOnTheObstacleAtItsThickness) {
 TEST(Simulation, GrippedVerticesFollowTheirPathToTheLastBitAndAreLetGo) {
   SceneSpec spec = bareScene();
   spec.gravity_m_s2 = Vec3(0, 0, -9.81);
-  spec.bodies[0].grippers.push_back({{0, 4}, {{0.0, Vec3::Zero(), Vec3::Zero()}, {0.5, Vec3(0, 0, 0.2), Vec3::Zero()}}, 0.6});
+  spec.bodies[0].grippers.push_back(
+      {{0, 4}, {{0.0, Vec3::Zero(), Vec3::Zero()}, {0.5, Vec3(0, 0, 0.2), Vec3::Zero()}}, 0.6});
   Simulation simulation(spec, 1);
   const Positions start = simulation.observe(0);
   for (int i = 0; i < 15; ++i) simulation.step();
@@ -136,8 +136,11 @@ TEST(Simulation, EqualSeedsGiveEqualMotionOthersDoNot) {
 
 TEST(Simulation, RigidBodiesMoveAlongTheirKeys) {
   SceneSpec spec = bareScene();
-  spec.rigid_bodies.push_back(
-      {"finger", "finger", Vec3(0.1, 0.1, 0.1), Vec3(3, 0, 0), {{0.0, Vec3::Zero(), Vec3::Zero()}, {1.0, Vec3(0, 0, 1), Vec3(0, 0, 0.5)}}});
+  spec.rigid_bodies.push_back({"finger",
+                               "finger",
+                               Vec3(0.1, 0.1, 0.1),
+                               Vec3(3, 0, 0),
+                               {{0.0, Vec3::Zero(), Vec3::Zero()}, {1.0, Vec3(0, 0, 1), Vec3(0, 0, 0.5)}}});
   Simulation simulation(spec, 1);
   EXPECT_TRUE(simulation.rigidPose(0).translation().isApprox(Vec3(3, 0, 0)));
   for (int i = 0; i < 30; ++i) simulation.step();
@@ -195,4 +198,4 @@ TEST(Shapes, ATorusHasAHole) {
 }
 
 }  // namespace
-}  // namespace deformable_ccd::scene
+}  // namespace dccd::scene

@@ -1,0 +1,113 @@
+// The elementary test: do two moving features meet during the step, and when first? One interface for
+// every rung of the accuracy ladder (screen has no elementary test: its answer is the filters').
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "dccd/export.h"
+#include "dccd/tolerances.h"
+#include "dccd/types.h"
+
+namespace dccd {
+
+/// Kinds of feature pairs. The last three are mesh feature against occupied octomap space.
+enum class PairKind : std::uint8_t {
+  VERTEX_FACE = 0,        ///< indices: vertex, then the face's three
+  EDGE_EDGE = 1,          ///< indices: ea0 ea1 eb0 eb1
+  VERTEX_VOXEL_FACE = 2,  ///< indices: vertex
+  EDGE_VOXEL_EDGE = 3,    ///< indices: the edge's two
+  FACE_VOXEL_CORNER = 4   ///< indices: the face's three
+};
+
+/// Rungs of the accuracy ladder, cheapest first.
+enum class Accuracy : std::uint8_t { SCREEN = 0, FAST = 1, CONSERVATIVE = 2, EXACT = 3 };
+
+struct AccuracyOptions {
+  Accuracy rung = Accuracy::EXACT;
+  double tolerance_m =
+      tolerance::CONTACT_M;     ///< conservative: > 0; false positives only where the features come this close [m]
+  int toc_bits = 32;            ///< exact: TOC cell is 2^-toc_bits of the step; 10 to 52
+  int max_subdivisions = 4096;  ///< conservative: cap per pair, then undecided
+};
+
+/// Two features over one step, coordinates exact: x[time][point][axis], times t=0 and t=1.
+/// Points: VF v f0 f1 f2; EE ea0 ea1 eb0 eb1.
+struct PairMotion {
+  double x[2][4][3];
+};
+
+enum class Verdict : std::uint8_t { NO_CONTACT = 0, CONTACT = 1, UNDECIDED = 2 };
+
+/// Which tier settled the pair (doc/algorithm.md). Purely informative.
+enum class Tier : std::uint8_t {
+  COINCIDENCE = 0,
+  DOUBLE_BATCH,
+  BERNSTEIN,
+  DOUBLE_DOUBLE,
+  FIXED_INTEGER,
+  BIG_INTEGER,
+  COUNT
+};
+
+/// toc_lower <= TOC; all in units of the step, [0,1].
+/// exact, CONTACT: TOC lies in [toc_lower, toc_upper), toc_lower = k 2^-bits and toc_upper = (k+1) 2^-bits;
+/// a TOC of exactly 1 gives the cell [1, 1]. UNDECIDED: a contact, if any, is not before toc_lower; toc_upper = 1.
+struct ElementaryResult {
+  double toc_lower = 0;
+  double toc_upper = 1;
+  Verdict verdict = Verdict::UNDECIDED;
+  Tier tier = Tier::DOUBLE_BATCH;
+};
+
+/// A vertex over one step as the step's kernels want it: one cache line; the fourth lanes are zero.
+struct alignas(64) VertexMotion {
+  double t0[4];
+  double t1[4];
+};
+
+/// Indices into an array of VertexMotion: VF v f0 f1 f2; EE ea0 ea1 eb0 eb1.
+using Quad = std::array<Index, 4>;
+
+/// A chunk of pairs of one kind (VERTEX_FACE or EDGE_EDGE).
+struct PairBatch {
+  PairKind kind = PairKind::VERTEX_FACE;
+  const VertexMotion* vertices = nullptr;
+  const Quad* pairs = nullptr;
+  std::size_t count = 0;
+  const double* minimum_separation_m = nullptr;  ///< one per pair, or null for none (conservative only)
+};
+
+/// Pairs settled per tier since the counters were cleared.
+struct TierCounters {
+  std::array<std::uint64_t, static_cast<std::size_t>(Tier::COUNT)> settled{};
+  TierCounters& operator+=(const TierCounters& other) {
+    for (std::size_t i = 0; i < settled.size(); ++i) settled[i] += other.settled[i];
+    return *this;
+  }
+};
+
+/// A rung. Stateless and safe to call from several threads; one virtual call per chunk, none per pair.
+/// All coordinates must be finite (the caller leaves out unchecked vertices).
+class DCCD_EXPORT Rung {
+ public:
+  virtual ~Rung() = default;
+  virtual void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const = 0;
+};
+
+/// The rung for the options. Throws std::invalid_argument naming the option and value when one is out of range,
+/// or for SCREEN, which has no elementary test.
+DCCD_EXPORT std::unique_ptr<Rung> makeRung(const AccuracyOptions& options);
+
+/// Convenience for single pairs (tests, tools): one PairMotion through the same code as run().
+DCCD_EXPORT ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pair);
+
+DCCD_EXPORT const char* toString(PairKind kind);
+DCCD_EXPORT const char* toString(Accuracy rung);
+DCCD_EXPORT const char* toString(Tier tier);
+/// Parses "screen", "fast", "conservative", "exact". Throws std::invalid_argument naming the text.
+DCCD_EXPORT Accuracy accuracyFromString(const char* text);
+
+}  // namespace dccd

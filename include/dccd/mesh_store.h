@@ -1,0 +1,143 @@
+// The frames of one body: what a new frame is to the one before it, and where the body is between two of them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+
+#include "dccd/export.h"
+#include "dccd/tolerances.h"
+#include "dccd/topology.h"
+#include "dccd/types.h"
+
+namespace dccd {
+
+using StampNs = std::int64_t;  ///< nanoseconds; the stamp of a mesh, never the wall clock
+
+/// What became of a frame. Values are those of the ContactArray message. "Answered" ones come with a result,
+/// "seams" begin a new pair of frames, all others drop the frame.
+enum class StepStatus : std::uint8_t {
+  OK = 0,
+  FIRST_FRAME = 1,
+  TOPOLOGY_CHANGED = 2,
+  GAP = 3,
+  TIME_JUMP = 4,
+  NO_TRANSFORM = 5,
+  NO_MAP = 6,
+  NO_BODY = 7,
+  PARTIAL = 8,
+  DEADLINE = 9,
+  TRUNCATED = 10,
+  DUPLICATE = 11,
+  TELEPORT = 12,
+  VERTEX_COUNT = 13,
+  BAD_MESSAGE = 14,
+  QUEUE_FULL = 15,
+  DISABLED = 16,
+  RESET = 17,
+  INTERNAL_ERROR = 18,
+  COUNT
+};
+DCCD_EXPORT const char* toString(StepStatus status);
+DCCD_EXPORT bool isAnswered(StepStatus status);
+DCCD_EXPORT bool isSeam(StepStatus status);
+
+/// One frame, already in the fixed frame.
+struct MeshFrame {
+  StampNs stamp_ns = 0;
+  std::shared_ptr<const Topology> topology;
+  Positions positions;  ///< [m]; non-finite ones are unchecked, not refused
+  /// Rigid bodies: fixed_from_body at the stamp. Between two frames they then move along the rotation, not the chord.
+  bool rigid = false;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
+};
+
+struct MeshStoreOptions {
+  double max_step_s = tolerance::LONGEST_STEP_S;  ///< a longer pause is a gap; > 0
+  double max_vertex_step_m =
+      tolerance::FARTHEST_VERTEX_STEP_M;  ///< a vertex that moves further is a teleport; 0: never
+  std::size_t capacity = 1024;            ///< frames kept at most; at least 2
+  std::size_t max_vertices = 1 << 21;     ///< in the frames kept (50 MB), where they are more than 64
+};
+
+/// Where a body is at a stamp.
+enum class Lookup : std::uint8_t {
+  READY = 0,
+  NOT_YET = 1,  ///< later than the newest frame
+  TOO_OLD = 2,  ///< before the oldest frame that is kept, or across a seam
+};
+
+/// Frames of one body, oldest first, in runs without a seam. Decides on stamps alone.
+class DCCD_EXPORT MeshStore {
+ public:
+  /// Throws std::invalid_argument naming the option that is out of range.
+  explicit MeshStore(const MeshStoreOptions& options);
+
+  /// OK: continues the frame before. A seam: kept, and begins a new run. DUPLICATE, VERTEX_COUNT: not kept.
+  StepStatus push(MeshFrame frame);
+
+  void clear();
+  void setOptions(const MeshStoreOptions& options);
+  const MeshStoreOptions& options() const { return options_; }
+
+  bool empty() const { return frames_.empty(); }
+  std::size_t size() const { return frames_.size(); }
+  const MeshFrame& newest() const { return *frames_.back().frame; }
+  std::shared_ptr<const MeshFrame> newestShared() const { return frames_.back().frame; }
+  /// The frame before the newest in the same run, or null.
+  std::shared_ptr<const MeshFrame> previous() const;
+
+  /// Whether the body is known at the stamp; the run it is in counts up with every seam.
+  Lookup lookup(StampNs stamp_ns, std::uint64_t* run = nullptr) const;
+
+  /// Why the run that the newest frame is in began (FIRST_FRAME, GAP, ...).
+  StepStatus runReason() const { return run_reason_; }
+
+  /// The frame at or next after a stamp for which lookup is READY: its topology is that of the whole run. (The newest
+  /// frame may be in a later one.)
+  const MeshFrame& frameAtOrAfter(StampNs stamp_ns) const { return *frames_[firstAtOrAfter(stamp_ns)].frame; }
+
+  /// Position at a stamp for which lookup is READY: a frame's own positions, bit for bit, or interpolated between two.
+  /// The rounded doubles are the truth from there on (doc/algorithm.md, "The question").
+  void positionsAt(StampNs stamp_ns, Positions& out) const;
+  /// Rigid bodies: the pose at a stamp for which lookup is READY.
+  Eigen::Isometry3d poseAt(StampNs stamp_ns) const;
+
+  /// The largest uncertainty radius of each vertex over the frames that stamps in [from, to] (lookup READY) lie
+  /// between; empty when none of them has any.
+  void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
+
+  /// How many frames lie between two stamps, neither included.
+  std::size_t framesWithin(StampNs from_ns, StampNs to_ns) const;
+  /// How far these frames are from the path that a step between the stamps takes, straight from t0 to t1 or, of a rigid
+  /// body, along the shorter arc between the poses there [m]; both stamps READY, in one run.
+  double offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const;
+
+  /// Forgets what is not needed for stamps at or after this one.
+  void forgetBefore(StampNs stamp_ns);
+
+ private:
+  struct Kept {
+    std::shared_ptr<const MeshFrame> frame;
+    std::uint64_t run = 0;
+  };
+  MeshStoreOptions options_;
+  std::deque<Kept> frames_;
+  std::uint64_t run_ = 0;
+  StepStatus run_reason_ = StepStatus::FIRST_FRAME;
+  std::size_t vertices_ = 0;  ///< in all frames kept
+
+  StepStatus classify(const MeshFrame& frame) const;
+  void forgetOldest();
+  std::size_t firstAtOrAfter(StampNs stamp_ns) const;
+};
+
+/// Positions between two arrays of equal size, u in [0,1]; the ends are reproduced bit for bit.
+DCCD_EXPORT void interpolate(const Positions& a, const Positions& b, double u, Positions& out);
+/// Pose between two: translation along the line, rotation along the shorter arc. u outside [0,1] extrapolates.
+DCCD_EXPORT Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double u);
+
+}  // namespace dccd

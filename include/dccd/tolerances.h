@@ -1,0 +1,100 @@
+// Every tolerance of the package: its unit, its reason, and what changes with it. Derivations stand beside the code
+// that they are about; the value stands here. Sizes of buffers and units of work change no answer and are not here.
+//
+// A *margin* covers rounding: larger is safe and sends more pairs to a dearer stage, smaller loses contacts. A *guard*
+// bounds the numbers for which a margin holds: outside, exact arithmetic decides; narrower guards cost time, wider ones
+// certainty. A *default* is the user's to change (doc/interface.md).
+#pragma once
+
+namespace dccd {
+namespace tolerance {
+
+constexpr double HALF_ULP = 0x1p-53;  ///< [1] the largest relative error of one rounded operation on doubles
+
+// --- defaults --------------------------------------------------------------------------------------------------------
+/// [m] `conservative`: a contact may be reported where features come this close. Smaller: fewer false ones, more steps.
+constexpr double CONTACT_M = 1e-6;
+/// [m] Straight paths of a step's parts stay this close to a rigid body's arc. Smaller: more parts, each a whole step.
+constexpr double RIGID_PATH_M = 1e-3;
+/// [s] A longer pause between two frames is a gap: what moved in it is not known to be straight.
+constexpr double LONGEST_STEP_S = 0.5;
+/// [m] A vertex that moves further in a step is a teleport, no motion: trackers lose a mesh and find it elsewhere.
+constexpr double FARTHEST_VERTEX_STEP_M = 0.5;
+/// [m] Edge lengths of voxels that a map may have: their planes' coordinates, up to 2^16 of them, neither overflow nor
+/// vanish. Wider: such a map is no longer refused, and answers about it may be wrong.
+constexpr double SMALLEST_RESOLUTION_M = 1e-290, LARGEST_RESOLUTION_M = 1e290;
+
+// --- projections and bounds ------------------------------------------------------------------------------------------
+constexpr double SQRT2_UP = 1.4142135623730952;  ///< [1] length of the diagonal directions, rounded up
+/// [1] Margin of a bound on the time of contact, for its few roundings. Larger: bounds are earlier, nothing else.
+constexpr double TOC_BOUND = 8 * 0x1p-52;
+/// [1] Margin of a distance in record units, more than its five roundings.
+constexpr double RECORD_REACH = 1.0000002;
+/// [1] Of the scene's extent: how much wider the records' range is on either side where a body rests, so that others
+/// may move within it. Larger: resting bodies are kept longer, all bounds are coarser.
+constexpr double RECORD_PADDING = 0.5;
+/// [1] Of the records' range: what the scene must fill. Smaller: bodies are kept longer, all bounds are coarser.
+constexpr double RECORD_SHARE = 0.125;
+/// [1] Margin of a separation that is a sum of several, which must not come out too small.
+constexpr double SEPARATION_SUM = 0x1p-50;
+
+// --- filters ---------------------------------------------------------------------------------------------------------
+// Planar filter (simd/fused_filter.cpp), in float on differences.
+constexpr float FUSED_UNIT = 1.0f / 16777216.0f;  ///< [1] 2^-24, half an ulp of float: what its margins are made of
+constexpr float FUSED_UNDERFLOW = 7.888609e-31f;  ///< [m^2, m^3] 2^-100, more than all that underflows in a test
+constexpr float FUSED_LARGEST_M = 1073741824.0f;  ///< [m] guard, 2^30: cubes of differences stay finite
+// No fold (culling/unfolded.cpp).
+constexpr double UNFOLDED_COORDINATE = 0x1p-51;  ///< [1] margin of a projected coordinate, of the largest one
+constexpr double UNFOLDED_SMALLEST_NORMAL = 1e-200, UNFOLDED_LARGEST_NORMAL = 1e200;  ///< [m^2] guard
+constexpr double UNFOLDED_SMALLEST_M = 1e-100, UNFOLDED_LARGEST_M = 1e100;            ///< [m] guard
+// Start state (step/segment_triangle.cpp), in double.
+constexpr double SEGMENT_UNDERFLOW = 0x1p-1000;  ///< [m^3] margin: fewer than 100 operations that underflow
+constexpr double SEGMENT_LARGEST_M = 0x1p30;     ///< [m] guard: keeps the underflow below that margin
+
+// --- elementary tests ------------------------------------------------------------------------------------------------
+// Batched exact test (simd/exact_batch_bounds.h). Margins, each rounded up by more than 0.5 %.
+constexpr double BATCH_VALUE = 70.5 * HALF_ULP;           ///< [1] of f(t) and f's coefficients, times U V W
+constexpr double BATCH_VALUE_ROUNDING = 6.25 * HALF_ULP;  ///< [1] the same, times max |fi|
+constexpr double BATCH_MINOR = 20.5 * HALF_ULP;           ///< [1] of a minor, times X Y
+constexpr double BATCH_MINOR_SLOPE = 8.125;               ///< [1] of a minor, times h X Y
+constexpr double BATCH_SEPARATION = 22.5 * HALF_ULP;      ///< [1] of a minor's coefficient over [a, b], times X Y
+constexpr double BATCH_SMALLEST_M = 0x1p-150, BATCH_LARGEST_M = 0x1p150;  ///< [m] guard on U, V, W
+/// [step] Subdivision ends here and leaves the pair to the next tier. Smaller: fewer pairs there, more steps here.
+constexpr double BATCH_SMALLEST_INTERVAL = 0x1p-12;
+// Tiers in double and in pairs of doubles (elementary/exact_refined.cpp, exact_double_double.cpp).
+/// [step] Half the least width around an extremum of f on which its sign is not asked for.
+constexpr double EXTREMUM_ZONE = 0x1p-40;
+constexpr double INSIDE_MINOR = 48 * HALF_ULP;                              ///< [1] margin of a minor, times its sizes
+constexpr double CUBIC_SMALLEST_M3 = 0x1p-300, CUBIC_LARGEST_M3 = 0x1p300;  ///< [m^3] guard on the coefficients
+constexpr double TIME_GRID = 0x1p-52;  ///< [step] times are multiples of it, so that 1 - t is exact
+// Conservative advancement (elementary/conservative_advance.cpp).
+constexpr double ADVANCE_SEPARATION = 6.5 * HALF_ULP;  ///< [1] margin of n.w, times |n|_1 M
+constexpr double ADVANCE_LENGTH = 8 * HALF_ULP;        ///< [1] margin of |n|, relative
+constexpr double ADVANCE_POINT = 64 * HALF_ULP;        ///< [1] margin of the vector between two points, times M
+constexpr double ADVANCE_SMALLEST_M = 1e-140;          ///< [m] guard: products of lengths do not vanish
+constexpr double ADVANCE_LARGEST_M = 1e70;             ///< [m] guard: products of four lengths stay finite
+/// [1] Squared sine of an angle below which a cross product is mostly rounding. Larger: shorter steps there.
+constexpr double ADVANCE_PARALLEL = 1e-22;
+
+// --- maps ------------------------------------------------------------------------------------------------------------
+/// [voxel] Cell coordinates are rounded outward by this: their error is below 2^-35. Larger: more candidates.
+constexpr double VOXEL_KEY = 1.0 / 1048576;
+/// [1] Margin of a crossing time: two differences and a quotient, 3.01 half ulps, and slack for comparing two of them.
+constexpr double CROSSING_TIME = 8 * 0x1p-53;
+constexpr double PREDICATE_SMALLEST = 0x1p-300, PREDICATE_LARGEST = 0x1p300;      ///< [m^2] guard on products
+constexpr double PREDICATE_SMALLEST_M = 0x1p-140, PREDICATE_LARGEST_M = 0x1p140;  ///< [m] guard on differences
+constexpr double SIDE = 0x1p-48;  ///< [1] margin of a side, times M^2: 20.1 half ulps
+constexpr double SIDE_SMALLEST_M = 0x1p-400, SIDE_LARGEST_M = 0x1p400;  ///< [m] guard
+constexpr double MAP_REACH = 0x1p-40;  ///< [1] margin of the boxes that find candidates within a separation
+
+// --- streams and advice ----------------------------------------------------------------------------------------------
+/// [ns] tf stamps that go back further begin a recording anew: broadcasters of one tree are late by less.
+constexpr long long TF_JUMP_BACK_NS = 1000000000;
+/// [m] A larger mesh draws the advice that it may be in millimetres; no answer depends on it.
+constexpr double LARGEST_PLAUSIBLE_M = 50;
+/// [1] A grid whose neighbours are this much nearer with rows and columns swapped draws advice; crumpled cloth does not
+/// reach it.
+constexpr double SWAPPED_GRID_RATIO = 0.6;
+
+}  // namespace tolerance
+}  // namespace dccd

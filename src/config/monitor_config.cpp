@@ -1,0 +1,395 @@
+#include "config/monitor_config.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+
+namespace dccd {
+
+using XmlRpc::XmlRpcValue;
+
+namespace {
+
+constexpr double LARGE = 1e9;
+constexpr int MANY = 1000000000;
+
+TopologySource topologySource(ParameterReader& section) {
+  const std::string text =
+      section.choice("source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld"});
+  if (text == "message") return TopologySource::MESSAGE;
+  if (text == "grid") return TopologySource::GRID;
+  if (text == "polyline") return TopologySource::POLYLINE;
+  if (text == "file") return TopologySource::FILE;
+  if (text == "first_frame_weld") return TopologySource::FIRST_FRAME_WELD;
+  return TopologySource::AUTO;
+}
+
+void readTopology(ParameterReader section, BodyConfig& body) {
+  MeshInputConfig& input = body.input;
+  input.source = topologySource(section);
+  input.rows = static_cast<std::size_t>(section.integer("rows", 0, 0, 100000));
+  input.cols = static_cast<std::size_t>(section.integer("cols", 0, 0, 100000));
+  body.topology_file = section.get("file", std::string());
+  section.finish();
+  if ((input.rows == 0) != (input.cols == 0)) section.fail("rows", "and cols go together: set both or neither");
+  if (input.rows == 1 || input.cols == 1)
+    section.fail("rows", "and cols must be 2 or more; for a rope set source to polyline");
+  if (input.source == TopologySource::AUTO && !body.topology_file.empty()) input.source = TopologySource::FILE;
+  if (input.source == TopologySource::FILE && body.topology_file.empty())
+    section.fail("file", "is needed for source 'file'");
+  if (input.source == TopologySource::POLYLINE && input.rows)
+    section.fail("rows", "has no meaning for a polyline; remove rows and cols");
+}
+
+void readRigid(ParameterReader section, BodyConfig& body) {
+  body.mesh_file = section.get("mesh", std::string());
+  body.tf_frame = section.get("frame", std::string());
+  body.mesh_scale = section.number("scale", 1.0, 1e-6, 1e6);
+  section.finish();
+  if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY) or a package:// path");
+  if (body.tf_frame.empty()) section.fail("frame", "is needed: the tf frame that carries the mesh");
+  body.body.rigid = true;
+}
+
+double separationOf(ParameterReader& reader, double fallback) {
+  return reader.number("minimum_separation_m", fallback, 0, LARGE);
+}
+
+void readUncertainty(ParameterReader section, BodyConfig& body) {
+  MeshInputConfig& input = body.input;
+  input.noise_radius_m = section.number("radius_m", 0.0, 0, LARGE);
+  input.noise_field = section.get("field", std::string());
+  const bool scaled = section.has("scale");
+  input.noise_scale = section.number("scale", 1.0, 0, 1e6);
+  section.finish();
+  if (scaled && input.noise_field.empty())
+    section.fail("scale", "has no meaning without field; write radius_m instead");
+  if (!input.noise_field.empty() && body.isRigid()) {
+    section.fail("field", "has no meaning for a rigid body, which sends no points; write radius_m instead");
+  }
+}
+
+BodyConfig readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic) {
+  BodyConfig body;
+  body.body.name = name;
+  body.topic = reader.get("topic", default_topic);
+  std::vector<std::string> types{"auto"};
+  for (const MeshType& type : meshTypes()) types.push_back(type.name);
+  body.input.type = reader.choice("type", "auto", types);
+  body.input.frame_id = reader.get("frame_id", std::string());
+  body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
+  body.input.max_vertices = static_cast<std::size_t>(reader.integer("max_vertices", 1000000, 1, MANY));
+  readTopology(reader.section("topology"), body);
+  if (reader.has("marker")) {
+    ParameterReader marker = reader.section("marker");
+    if (marker.has("namespace")) body.input.marker_namespace = marker.get("namespace", std::string());
+    if (marker.has("id")) body.input.marker_id = marker.integer("id", 0, -2147483647, 2147483647);
+    marker.finish();
+  }
+  if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
+  body.body.vertex_mask = reader.indices("vertex_mask");
+  if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
+  readUncertainty(reader.section("uncertainty"), body);
+  return body;
+}
+
+void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyConfig& body) {
+  const bool self_asked = reader.has("self_collision");
+  body.body.self_collision = reader.get("self_collision", !body.body.rigid);
+  if (body.body.rigid && self_asked && body.body.self_collision) {
+    reader.fail("self_collision", "is true, but the body is rigid and cannot meet itself; remove it");
+  }
+  body.body.against_bodies = reader.get("against_bodies", true);
+  body.body.against_obstacle = reader.get("against_obstacle", true);
+  body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
+}
+
+/// Two bodies, in either order, of an entry of minimum_separation_pairs.
+using NamedPair = std::pair<std::uint16_t, std::uint16_t>;
+
+/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
+/// `before` are the pairs of the entries before it.
+void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vector<NamedPair>& before) {
+  const std::string octomap = "octomap";
+  std::vector<std::string> known{octomap};
+  for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
+  std::vector<std::uint16_t> pair;
+  for (XmlRpcValue& name : entry.list("between")) {
+    const std::string text = name.getType() == XmlRpcValue::TypeString ? static_cast<std::string>(name) : std::string();
+    const auto at = std::find(known.begin(), known.end(), text);
+    if (at == known.end()) {
+      entry.fail("between", "names '" + text + "', which is no body and not octomap; nearest is '" +
+                                nearestName(text, known) + "'");
+    }
+    pair.push_back(at == known.begin() ? OBSTACLE_BODY : static_cast<std::uint16_t>(at - known.begin() - 1));
+  }
+  if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
+  if (pair[0] == OBSTACLE_BODY) std::swap(pair[0], pair[1]);
+  if (pair[0] == OBSTACLE_BODY) entry.fail("between", "names octomap twice; name a body and octomap");
+  const NamedPair named = std::minmax(pair[0], pair[1]);
+  const auto twice = std::find(before.begin(), before.end(), named);
+  if (twice != before.end()) {
+    const auto nameOf = [&](std::uint16_t body) { return body == OBSTACLE_BODY ? octomap : known[body + 1u]; };
+    entry.fail("between", "names " + nameOf(pair[0]) + " and " + nameOf(pair[1]) + ", as minimum_separation_pairs[" +
+                              std::to_string(twice - before.begin()) + "] does; remove one of the two");
+  }
+  before.push_back(named);
+  if (!entry.has("separation_m")) entry.fail("separation_m", "is needed");
+  const double separation_m = entry.number("separation_m", 0.0, 0, LARGE);
+  entry.finish();
+  config.bodies[pair[0]].body.separations.push_back({pair[1], separation_m});
+}
+
+void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
+  std::vector<NamedPair> before;
+  for (XmlRpcValue& entry : reader.list("minimum_separation_pairs")) {
+    const std::string path = reader.path() + "minimum_separation_pairs[" + std::to_string(before.size()) + "]/";
+    readSeparationPair({entry, path}, config, before);
+  }
+}
+
+void readBodies(ParameterReader& reader, MonitorConfig& config) {
+  const std::string clock = reader.get("clock_body", std::string());
+  const std::string default_topic = reader.get("default_topic", std::string("mesh"));  // no contradiction to bodies
+  if (!reader.has("bodies")) {
+    BodyConfig body = readBody(reader, "mesh", default_topic);
+    if (body.isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
+    readBodyEffects(reader, config, body);
+    config.bodies.push_back(std::move(body));
+  } else {
+    ParameterReader section = reader.section("bodies");
+    for (const std::string& name : section.names()) {
+      ParameterReader one = section.section(name);
+      BodyConfig body = readBody(one, name, name);
+      readBodyEffects(one, config, body);
+      one.finish();
+      config.bodies.push_back(std::move(body));
+    }
+    if (config.bodies.empty()) reader.fail("bodies", "is empty");
+  }
+  const auto has_clock = [&](const BodyConfig& body) {
+    return !body.isRigid() && body.body.motion == BodyMotionKind::STREAM && (clock.empty() || clock == body.body.name);
+  };
+  const auto found = std::find_if(config.bodies.begin(), config.bodies.end(), has_clock);
+  if (found == config.bodies.end()) {
+    reader.fail("clock_body", clock.empty() ? "cannot be chosen: no body is a stream of meshes"
+                                            : "is '" + clock + "', which is not a body with a stream of meshes");
+  }
+  config.monitor.clock_body = static_cast<std::size_t>(found - config.bodies.begin());
+}
+
+void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
+  DetectorOptions& detector = config.monitor.detector;
+  const std::string rung = reader.choice("accuracy", "exact", {"screen", "fast", "conservative", "exact"});
+  detector.accuracy.rung = accuracyFromString(rung.c_str());
+  detector.accuracy.tolerance_m = reader.number("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
+  detector.accuracy.toc_bits = reader.integer("toc_bits", detector.accuracy.toc_bits, 10, 52);
+  detector.accuracy.max_subdivisions = reader.integer("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
+  detector.num_threads = reader.integer("num_threads", detector.num_threads, 1, 256);
+  detector.step_budget_ms = reader.number("step_budget_ms", 0.0, 0, LARGE);
+  config.minimum_separation_m = separationOf(reader, 0.0);
+}
+
+/// Which parameter asks for a distance, and how to do without; empty when none does.
+std::string distanceAskedBy(const std::string& path, const MonitorConfig& config, bool listed) {
+  const auto distance = [](const std::string& name, const std::string& what) {
+    return "parameter " + name + " asks for " + what + ": write accuracy: conservative, or set it to 0";
+  };
+  if (config.minimum_separation_m > 0) return distance(path + "minimum_separation_m", "a minimum separation");
+  for (const BodyConfig& body : config.bodies) {
+    const std::string own = listed ? path + "bodies/" + body.body.name + "/" : path;
+    if (body.body.minimum_separation_m > 0) return distance(own + "minimum_separation_m", "a minimum separation");
+    for (const SeparationFrom& from : body.body.separations) {
+      if (from.separation_m > 0) return distance(path + "minimum_separation_pairs", "a minimum separation");
+    }
+    if (body.isUncertain()) return distance(own + "uncertainty", "an uncertainty radius");
+  }
+  return "";
+}
+
+/// Only conservative and screen hold a distance. Without a choice by the user it is conservative.
+void settleAccuracy(ParameterReader& reader, MonitorConfig& config) {
+  Accuracy& rung = config.monitor.detector.accuracy.rung;
+  if (!config.holdsDistance() || rung == Accuracy::CONSERVATIVE || rung == Accuracy::SCREEN) return;
+  if (reader.has("accuracy")) {
+    reader.fail("accuracy", std::string("is '") + toString(rung) + "', which cannot hold a distance above 0; " +
+                                distanceAskedBy(reader.path(), config, reader.has("bodies")));
+  }
+  rung = Accuracy::CONSERVATIVE;
+}
+
+void readThresholds(ParameterReader& reader, MonitorConfig& config) {
+  MonitorOptions& monitor = config.monitor;
+  monitor.store.max_step_s = reader.number("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
+  monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
+  monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
+  monitor.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
+  monitor.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
+  for (XmlRpcValue& item : reader.list("exclude_boxes")) {
+    const auto n = reader.numbers(item, "exclude_boxes", 6);
+    const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (box.empty())
+      reader.fail("exclude_boxes", "holds a box whose min exceeds its max; write [x0, y0, z0, x1, y1, z1]");
+    monitor.exclude_boxes.push_back(box);
+  }
+  monitor.rigid_tolerance_m = reader.number("rigid_tolerance_m", monitor.rigid_tolerance_m, 1e-9, LARGE);
+  monitor.max_substeps = static_cast<std::size_t>(reader.integer("max_substeps", 64, 1, 100000));
+  monitor.look_ahead_s = reader.number("look_ahead_s", 0.0, 0, 3600);
+  config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
+  config.queue_size = static_cast<std::size_t>(reader.integer("queue_size", 8, 1, 100000));
+  config.queue_policy = reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST
+                                                                                                  : QueuePolicy::OLDEST;
+  config.simd_target = reader.get("simd_target", std::string("auto"));
+  config.record_steps = static_cast<std::size_t>(reader.integer("record_steps", 1, 0, 10000));
+  config.record_folder = reader.get("record_folder", std::string());
+}
+
+void readMap(ParameterReader& reader, MonitorConfig& config) {
+  config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
+  config.octomap_file = reader.get("octomap_file", std::string());
+  config.octomap_frame = reader.get("octomap_frame", std::string());
+  config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 4096)) << 20;
+  config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
+  const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
+  config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
+                         : unknown == "occupied" ? UnknownSpace::OCCUPIED
+                                                 : UnknownSpace::REPORT;
+  XmlRpcValue box = reader.raw("unknown_box");
+  if (box.valid()) {
+    const auto n = reader.numbers(box, "unknown_box", 6);
+    config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+  }
+  if (config.unknown_space == UnknownSpace::OCCUPIED && config.unknown_box.empty()) {
+    reader.fail("unknown_box",
+                "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
+                "the workspace within which the unknown is an obstacle");
+  }
+}
+
+void readEffects(ParameterReader section, MonitorConfig& config) {
+  for (const std::string& name : effectNames()) {
+    const std::string text = section.choice(name, "auto", {"auto", "on", "off"});
+    config.effects[name] = text == "on" ? EffectSetting::ON : text == "off" ? EffectSetting::OFF : EffectSetting::AUTO;
+  }
+  section.finish();
+}
+
+void readMarkers(ParameterReader section, MarkerConfig& markers) {
+  markers.point_size_m = section.number("point_size_m", markers.point_size_m, 1e-6, LARGE);
+  markers.normal_length_m = section.number("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
+  markers.line_width_m = section.number("line_width_m", markers.line_width_m, 1e-6, LARGE);
+  markers.max_contacts = section.integer("max_contacts", markers.max_contacts, 1, MANY);
+  markers.mesh = section.get("mesh", markers.mesh);
+  markers.obstacle_m = section.number("obstacle_m", markers.obstacle_m, 0, LARGE);
+  section.finish();
+}
+
+/// Their files are not read, their frames not asked for.
+void removeRigidBodies(MonitorConfig& config) {
+  const std::string clock = config.bodies[config.monitor.clock_body].body.name;
+  std::vector<std::uint16_t> moved_to;  // new indices, for what names bodies by theirs
+  std::vector<BodyConfig> kept;
+  for (BodyConfig& body : config.bodies) {
+    moved_to.push_back(body.isRigid() ? OBSTACLE_BODY : static_cast<std::uint16_t>(kept.size()));
+    if (!body.isRigid()) kept.push_back(std::move(body));
+  }
+  config.bodies = std::move(kept);
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (config.bodies[b].body.name == clock) config.monitor.clock_body = b;
+    std::vector<SeparationFrom> separations;
+    for (const SeparationFrom& from : config.bodies[b].body.separations) {
+      const bool map = from.body == OBSTACLE_BODY;
+      if (!map && moved_to[from.body] == OBSTACLE_BODY) continue;
+      separations.push_back({map ? OBSTACLE_BODY : moved_to[from.body], from.separation_m});
+    }
+    config.bodies[b].body.separations = std::move(separations);
+  }
+}
+
+/// What is switched off is off everywhere: no later stage asks again.
+void applyEffects(MonitorConfig& config) {
+  const auto off = [&](const char* name) { return config.effects[name] == EffectSetting::OFF; };
+  if (off("rigid_bodies")) removeRigidBodies(config);
+  if (off("minimum_separation")) config.minimum_separation_m = 0;
+  for (BodyConfig& body : config.bodies) {
+    if (off("self_collision")) body.body.self_collision = false;
+    if (off("body_body")) body.body.against_bodies = false;
+    if (off("octomap")) body.body.against_obstacle = false;
+    if (off("minimum_separation")) {
+      body.body.minimum_separation_m = 0;
+      body.body.separations.clear();
+    }
+    if (off("tracker_noise")) {
+      body.input.noise_field.clear();
+      body.input.noise_radius_m = 0;
+    }
+  }
+  if (off("start_state")) config.monitor.detector.check_start_state = false;
+  if (off("look_ahead")) config.monitor.look_ahead_s = 0;
+  if (off("unknown_space")) config.unknown_space = UnknownSpace::FREE;
+}
+
+/// The parameters proper as text. What dynamic_reconfigure writes back under ~live is not what was given.
+std::string givenText(XmlRpcValue tree) {
+  if (!tree.valid() || tree.getType() != XmlRpcValue::TypeStruct) return {};
+  std::string text;
+  for (auto& member : tree) {
+    if (member.first != "live") text += member.first + member.second.toXml();
+  }
+  return text;
+}
+
+std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every machine
+  std::uint64_t hash = 1469598103934665603ull;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return hash;
+}
+
+}  // namespace
+
+double MonitorConfig::largestSeparation() const {
+  double largest = 0;
+  for (const BodyConfig& body : bodies) {
+    largest = std::max(largest, body.body.minimum_separation_m);
+    for (const SeparationFrom& from : body.body.separations) largest = std::max(largest, from.separation_m);
+  }
+  return largest;
+}
+
+bool MonitorConfig::holdsDistance() const {
+  return largestSeparation() > 0 ||
+         std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.isUncertain(); });
+}
+
+std::uint64_t MonitorConfig::hash() const {
+  std::ostringstream text;
+  text << std::setprecision(17) << given_hash;
+  for (const double value : {monitor.detector.step_budget_ms, monitor.store.max_step_s, monitor.store.max_vertex_step_m,
+                             markers.point_size_m, markers.normal_length_m, markers.obstacle_m}) {
+    text << ' ' << value;
+  }
+  text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.max_contacts << ' '
+       << monitor.suppress_initial << ' ' << markers.mesh;
+  return hashOf(text.str());
+}
+
+MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
+  ParameterReader reader(tree, path);
+  MonitorConfig config;
+  config.fixed_frame = reader.get("fixed_frame", std::string());
+  readAccuracy(reader, config);
+  readThresholds(reader, config);
+  readMap(reader, config);
+  readEffects(reader.section("effects"), config);
+  readMarkers(reader.section("markers"), config.markers);
+  readBodies(reader, config);
+  readSeparationPairs(reader, config);
+  reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
+  reader.finish();
+  applyEffects(config);
+  settleAccuracy(reader, config);
+  config.given_hash = hashOf(givenText(tree));
+  return config;
+}
+
+}  // namespace dccd

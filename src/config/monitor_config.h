@@ -1,0 +1,76 @@
+// Every parameter of the monitor, read and checked once. The node reads it from the parameter server, analyze_bag from
+// a YAML file; both see the same names, defaults and errors. doc/interface.md is the table for people.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <xmlrpcpp/XmlRpcValue.h>
+
+#include "config/parameter_reader.h"
+#include "dccd/effect_plan.h"
+#include "dccd/monitor.h"
+#include "input/mesh_decoder.h"
+
+namespace dccd {
+
+enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
+enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
+struct BodyConfig {
+  MonitorBody body;
+  std::string topic;  ///< streams and static meshes
+  MeshInputConfig input;
+  std::string topology_file;
+  // Rigid bodies: no topic, but a mesh file that a tf frame carries.
+  std::string mesh_file;
+  std::string tf_frame;
+  double mesh_scale = 1;
+  bool isRigid() const { return body.rigid; }
+  bool isUncertain() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
+};
+
+struct MarkerConfig {
+  double point_size_m = 0.01;
+  double normal_length_m = 0.05;
+  double line_width_m = 0.002;
+  int max_contacts = 2000;
+  bool mesh = false;      ///< republish the bodies as markers
+  double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
+};
+
+struct MonitorConfig {
+  std::string fixed_frame;  ///< empty: the frame of the clock body's first message
+  std::vector<BodyConfig> bodies;
+  MonitorOptions monitor;
+  std::map<std::string, EffectSetting> effects;
+  double minimum_separation_m = 0;  ///< of bodies that name none
+  UnknownSpace unknown_space = UnknownSpace::FREE;
+  Box unknown_box;  ///< [m], map frame: where the unknown is occupied
+  std::string octomap_topic = "octomap", octomap_file, octomap_frame;
+  std::size_t max_map_bytes = std::size_t{512} << 20;
+  double transform_timeout_s = 0.2;
+  std::size_t queue_size = 8;
+  QueuePolicy queue_policy = QueuePolicy::NEWEST;
+  std::string simd_target = "auto";
+  std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
+  std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
+  MarkerConfig markers;
+  std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
+  /// The largest separation that is asked for, of meshes or from the map [m].
+  double largestSeparation() const;
+  /// A separation or an uncertainty is asked for, so that only conservative and screen will do.
+  bool holdsDistance() const;
+  /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
+  std::uint64_t hash() const;
+};
+
+/// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
+MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
+
+/// The same tree from YAML, typed as rosparam would; `name` stands for the text in messages. Throws ParameterError
+/// naming it and the line.
+XmlRpc::XmlRpcValue parseYaml(const std::string& text, const std::string& name);
+XmlRpc::XmlRpcValue readYaml(const std::string& file);  ///< a whole file
+
+}  // namespace dccd

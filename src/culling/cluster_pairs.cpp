@@ -1,0 +1,51 @@
+#include "culling/cluster_pairs.h"
+
+#include <algorithm>
+
+namespace dccd {
+
+void superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) {
+  pairs.assign({0, 0});
+  for (std::size_t l = trees.a->height() - 1; l > 1; --l) {
+    scratch.clear();
+    std::size_t done = 0;
+    const std::size_t count = pairs.size() / 2;
+    while (done < count) {
+      constexpr std::size_t STEP = 16 * simd::GROUP * simd::GROUP;
+      const std::size_t used = scratch.size();
+      scratch.resize(used + 2 * STEP);
+      std::size_t consumed = 0;
+      const std::size_t found = simd::testGroupPairs(
+          trees.a->level(l).view(), trees.b->level(l).view(), pairs.data() + 2 * done, count - done, trees.self,
+          simd::Diagonal::UPPER_WITH_DIAGONAL, trees.t0_only, scratch.data() + used, STEP, &consumed);
+      scratch.resize(used + 2 * found);
+      done += consumed;
+    }
+    std::swap(pairs, scratch);
+  }
+}
+
+double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_t b) {
+  const std::int16_t* x = trees.a->level(1).aos.data() + std::size_t{a} * simd::AOS_SIZE;
+  const std::int16_t* y = trees.b->level(1).aos.data() + std::size_t{b} * simd::AOS_SIZE;
+  // Gap of real projections in record units: values are truncated to a unit, and the scaling's rounding is far below
+  // another one. The ends of moving intervals are bounded by straight lines between the bounds at t0 and t1.
+  const auto firstMeeting = [](int gap0, int gap1) {
+    gap0 -= 2;
+    gap1 -= 2;
+    if (gap0 <= 0) return 0.0;
+    if (gap1 > 0) return 1.0;
+    return static_cast<double>(gap0) / (gap0 - gap1) * (1 - 1e-15);
+  };
+  double latest = 0;
+  for (int d = 0; d < 8; ++d) {
+    const int HI = simd::RECORD;
+    latest = std::max(latest, firstMeeting(x[d] - y[HI + d], x[8 + d] - y[HI + 8 + d]));
+    latest = std::max(latest, firstMeeting(y[d] - x[HI + d], y[8 + d] - x[HI + 8 + d]));
+  }
+  return latest;
+}
+
+ClusterPairStream::ClusterPairStream() : clusters_(2 * CLUSTER_PAIRS), slots_(2 * CHUNK) {}
+
+}  // namespace dccd

@@ -1,0 +1,64 @@
+// Walks two cluster trees side by side and streams the feature pairs that the linear filter keeps.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "culling/cluster_tree.h"
+
+namespace dccd {
+
+/// Two trees of the same height to be paired. self: both are the same tree, and each pair of slots is wanted once.
+struct TreePair {
+  const ClusterTree* a = nullptr;
+  const ClusterTree* b = nullptr;
+  bool self = false;
+  bool t0_only = false;  ///< test the state at t0 instead of the whole step
+};
+
+/// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads.
+void superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch);
+
+/// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
+/// overlap (to two record units) in all 8 directions at t=0. 1 when they never meet during the step.
+double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_t b);
+
+/// Streams the surviving slot pairs of superclusters in chunks. One per worker; keeps its buffers.
+class ClusterPairStream {
+ public:
+  static constexpr std::size_t CHUNK = 2048;  ///< slot pairs at most in a call of the sink
+
+  ClusterPairStream();
+
+  /// pairs: `count` pairs of level-1 groups. sink(const uint32_t* slot_pairs, size_t count) is called once per chunk.
+  template <class Sink>
+  void run(const TreePair& trees, const std::uint32_t* pairs, std::size_t count, Sink&& sink) {
+    std::size_t done = 0;
+    while (done < count) {
+      std::size_t consumed = 0;
+      const std::size_t clusters = simd::testGroupPairs(
+          trees.a->level(1).view(), trees.b->level(1).view(), pairs + 2 * done, count - done, trees.self,
+          simd::Diagonal::UPPER_WITH_DIAGONAL, trees.t0_only, clusters_.data(), CLUSTER_PAIRS, &consumed);
+      done += consumed;
+      std::size_t leaf_done = 0;
+      while (leaf_done < clusters) {
+        const std::size_t found = simd::testGroupPairs(
+            trees.a->level(0).view(), trees.b->level(0).view(), clusters_.data() + 2 * leaf_done, clusters - leaf_done,
+            trees.self, simd::Diagonal::STRICT_UPPER, trees.t0_only, slots_.data(), CHUNK, &consumed);
+        leaf_done += consumed;
+        cluster_pairs_tested_ += consumed;
+        if (found) sink(slots_.data(), found);
+      }
+    }
+  }
+
+  std::uint64_t clusterPairsTested() const { return cluster_pairs_tested_; }
+  void clearCounters() { cluster_pairs_tested_ = 0; }
+
+ private:
+  static constexpr std::size_t CLUSTER_PAIRS = 1024;
+  std::vector<std::uint32_t> clusters_, slots_;
+  std::uint64_t cluster_pairs_tested_ = 0;
+};
+
+}  // namespace dccd

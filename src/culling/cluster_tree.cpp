@@ -1,0 +1,117 @@
+#include "culling/cluster_tree.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace dccd {
+namespace {
+
+using simd::AOS_SIZE;
+using simd::GROUP;
+using simd::SOA_SIZE;
+
+std::size_t roundUp(std::size_t n) { return (n + GROUP - 1) / GROUP * GROUP; }
+
+// Sorts [first, last) so that every multiple of 16^k is a median cut.
+void splitSpatially(const std::vector<Vec3>& centres, Index* first, Index* last) {
+  const std::size_t n = static_cast<std::size_t>(last - first);
+  if (n <= GROUP) return;
+  std::size_t piece = GROUP;
+  while (piece * GROUP < n) piece *= GROUP;
+  // n > piece, so there are at least two pieces and the cut lies inside.
+  const std::size_t pieces = (n + piece - 1) / piece;
+  const std::size_t cut = pieces / 2 * piece;
+  Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  for (const Index* i = first; i != last; ++i) {
+    lo = lo.cwiseMin(centres[*i]);
+    hi = hi.cwiseMax(centres[*i]);
+  }
+  Eigen::Index axis = 0;
+  (hi - lo).maxCoeff(&axis);
+  std::nth_element(first, first + cut, last, [&](Index a, Index b) {
+    const double x = centres[a][axis], y = centres[b][axis];
+    return x != y ? x < y : a < b;  // ties by index: the order must not depend on the library's algorithm
+  });
+  splitSpatially(centres, first, first + cut);
+  splitSpatially(centres, first + cut, last);
+}
+
+}  // namespace
+
+std::vector<Index> spatialOrder(const std::vector<Vec3>& centres) {
+  // Positions that are not finite have no place; zero serves as well as any.
+  std::vector<Vec3> finite = centres;
+  for (Vec3& c : finite) {
+    if (!c.allFinite()) c.setZero();
+  }
+  std::vector<Index> order(centres.size());
+  std::iota(order.begin(), order.end(), 0);
+  splitSpatially(finite, order.data(), order.data() + order.size());
+  return order;
+}
+
+void AlignedRecords::resize(std::size_t n) {
+  if (n <= capacity_) return;
+  data_ = hwy::AllocateAligned<std::int16_t>(n);
+  if (!data_) throw std::bad_alloc();
+  capacity_ = n;
+}
+
+void ClusterTree::build(std::vector<Index> features, std::size_t arity) {
+  arity_ = arity;
+  feature_count_ = features.size() / arity;
+  features_ = std::move(features);
+  features_.resize(std::max(roundUp(feature_count_), GROUP) * arity, NO_INDEX);
+  features_.shrink_to_fit();
+  masked_.clear();
+  levels_.clear();
+  std::size_t groups = features_.size() / arity / GROUP;
+  for (;;) {
+    Level level;
+    level.groups = groups;
+    level.soa.resize(groups * SOA_SIZE);
+    level.aos.resize(groups * AOS_SIZE);
+    levels_.push_back(std::move(level));
+    if (groups == 1) break;
+    groups = roundUp(groups) / GROUP;
+  }
+}
+
+void ClusterTree::raise(std::size_t height) {
+  while (levels_.size() < height) {
+    Level level;
+    level.groups = 1;
+    level.soa.resize(SOA_SIZE);
+    level.aos.resize(AOS_SIZE);
+    levels_.push_back(std::move(level));
+  }
+}
+
+void ClusterTree::mask(const std::uint8_t* active) {
+  if (!active) {
+    masked_.clear();
+    return;
+  }
+  masked_ = features_;
+  for (std::size_t f = 0; f < feature_count_; ++f) {
+    for (std::size_t k = 0; k < arity_; ++k) {
+      if (!active[features_[f * arity_ + k]]) masked_[f * arity_] = NO_INDEX;
+    }
+  }
+}
+
+void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+                              std::size_t last_group) {
+  const std::vector<Index>& features = masked_.empty() ? features_ : masked_;
+  simd::buildLeaves(records, features.data() + first_group * GROUP * arity_, arity_, (last_group - first_group) * GROUP,
+                    margin16, levels_[0].soa.data() + first_group * SOA_SIZE,
+                    levels_[0].aos.data() + first_group * AOS_SIZE);
+}
+
+void ClusterTree::refitUpper() {
+  for (std::size_t l = 1; l < levels_.size(); ++l) {
+    simd::buildUpper(levels_[l - 1].aos.data(), levels_[l - 1].groups, levels_[l].soa.data(), levels_[l].aos.data());
+  }
+}
+
+}  // namespace dccd

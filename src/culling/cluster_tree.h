@@ -1,0 +1,70 @@
+// Features of one kind of one body, in clusters of 16 and clusters of clusters (16-ary), refitted every step.
+// The bounds of every level are 16-DOPs of both ends of the step: per direction the smallest and largest projection at
+// t0 and at t1, which is tighter than a DOP of the swept volume (two slabs that only pass each other stay apart).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <hwy/aligned_allocator.h>
+
+#include "dccd/types.h"
+#include "simd/cluster_kernels.h"
+
+namespace dccd {
+
+/// Order in which items near each other in space come near each other in memory, so that every aligned run of 16^k
+/// items is compact: recursive median splits of the longest side, at multiples of 16^k. Deterministic.
+std::vector<Index> spatialOrder(const std::vector<Vec3>& centres);
+
+/// int16 arrays aligned for vector loads; grows only.
+class AlignedRecords {
+ public:
+  void resize(std::size_t n);
+  std::int16_t* data() { return data_.get(); }
+  const std::int16_t* data() const { return data_.get(); }
+
+ private:
+  hwy::AlignedFreeUniquePtr<std::int16_t[]> data_;
+  std::size_t capacity_ = 0;
+};
+
+class ClusterTree {
+ public:
+  struct Level {
+    std::size_t groups = 0;
+    AlignedRecords soa, aos;
+    simd::GroupsView view() const { return {soa.data(), aos.data()}; }
+  };
+
+  /// features: vertex indices, `arity` each, in the order given by spatialOrder. Slots are feature positions, filled up
+  /// with empty ones to a multiple of 16.
+  void build(std::vector<Index> features, std::size_t arity);
+
+  /// Gives the tree at least `height` levels (single groups on top), so that two trees can be walked in step.
+  void raise(std::size_t height);
+
+  /// Leaves out the features for which any vertex has active[vertex] == 0. Null: none.
+  void mask(const std::uint8_t* active);
+
+  /// Recomputes all bounds from the vertices' records. margin16: see simd::buildLeaves.
+  void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+                   std::size_t last_group);
+  void refitUpper();
+
+  std::size_t featureCount() const { return feature_count_; }
+  std::size_t arity() const { return arity_; }
+  std::size_t height() const { return levels_.size(); }
+  const Level& level(std::size_t l) const { return levels_[l]; }
+  /// Vertex indices of the feature in a slot; only slots below featureCount() hold one.
+  const Index* feature(std::size_t slot) const { return features_.data() + slot * arity_; }
+
+ private:
+  std::size_t feature_count_ = 0;
+  std::size_t arity_ = 1;
+  std::vector<Index> features_;  // slots x arity, empty ones NO_INDEX
+  std::vector<Index> masked_;    // the same with left-out ones NO_INDEX; empty when nothing is left out
+  std::vector<Level> levels_;
+};
+
+}  // namespace dccd

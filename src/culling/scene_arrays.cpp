@@ -1,0 +1,245 @@
+#include "culling/scene_arrays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+namespace dccd {
+namespace {
+
+Vec3 centre(const Positions& x, const Index* v, std::size_t n) {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t i = 0; i < n; ++i) sum += x[v[i]];
+  return sum / static_cast<double>(n);
+}
+
+// Features of one kind in spatial order; `local` holds n x arity body-local vertices.
+void buildTree(SceneBody& body, FeatureKind kind, const std::vector<Index>& local, std::size_t arity,
+               const std::vector<Index>& rank_of_feature, const std::vector<Index>& internal_of_local,
+               const Positions& rest) {
+  const std::size_t n = local.size() / arity;
+  std::vector<Vec3> centres(n);
+  for (std::size_t f = 0; f < n; ++f) centres[f] = centre(rest, local.data() + f * arity, arity);
+  const std::vector<Index> order = spatialOrder(centres);
+  std::vector<Index> features(n * arity), ranks(n);
+  for (std::size_t slot = 0; slot < n; ++slot) {
+    for (std::size_t k = 0; k < arity; ++k) {
+      features[slot * arity + k] = internal_of_local[local[order[slot] * arity + k]];
+    }
+    ranks[slot] = rank_of_feature[order[slot]];
+  }
+  body.trees[static_cast<int>(kind)].build(std::move(features), arity);
+  body.ranks[static_cast<int>(kind)] = std::move(ranks);
+}
+
+std::vector<Index> consecutive(std::size_t n, Index first) {
+  std::vector<Index> v(n);
+  std::iota(v.begin(), v.end(), first);
+  return v;
+}
+
+}  // namespace
+
+void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<const Positions*>& rest_positions) {
+  if (setups.size() != rest_positions.size()) {
+    throw std::invalid_argument("setBodies: " + std::to_string(setups.size()) + " bodies but " +
+                                std::to_string(rest_positions.size()) + " rest positions");
+  }
+  if (setups.size() >= OBSTACLE_BODY) {
+    throw std::invalid_argument("setBodies: " + std::to_string(setups.size()) + " bodies; at most 65534 are possible");
+  }
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    const BodySetup& s = setups[b];
+    if (!s.topology) throw std::invalid_argument("setBodies: body '" + s.name + "' has no topology");
+    const std::size_t n = s.topology->vertexCount();
+    if (!rest_positions[b] || rest_positions[b]->size() != n) {
+      throw std::invalid_argument("setBodies: body '" + s.name + "' needs " + std::to_string(n) + " rest positions");
+    }
+    if (!s.vertex_active.empty() && s.vertex_active.size() != n) {
+      throw std::invalid_argument("setBodies: body '" + s.name + "' has " + std::to_string(s.vertex_active.size()) +
+                                  " activity flags for " + std::to_string(n) + " vertices");
+    }
+    const auto check_separation = [&](double separation_m) {
+      if (separation_m >= 0 && std::isfinite(separation_m)) return;
+      throw std::invalid_argument("setBodies: body '" + s.name + "' has minimum_separation_m = " +
+                                  std::to_string(separation_m) + "; it must be finite and not negative");
+    };
+    check_separation(s.minimum_separation_m);
+    for (const SeparationFrom& from : s.separations) {
+      check_separation(from.separation_m);
+      if (from.body < setups.size() || from.body == OBSTACLE_BODY) continue;
+      throw std::invalid_argument("setBodies: body '" + s.name + "' has a separation from body " +
+                                  std::to_string(from.body) + "; there are " + std::to_string(setups.size()));
+    }
+    if (s.reference &&
+        (s.reference->positions.size() != n || (!s.reference->radius_m.empty() && s.reference->radius_m.size() != n))) {
+      throw std::invalid_argument("setBodies: body '" + s.name + "' needs " + std::to_string(n) +
+                                  " positions and no or as many radii in its reference frame");
+    }
+  }
+  bodies_.clear();
+  bodies_.resize(setups.size());
+  face_order_.clear();
+  vertex_count_ = 0;
+  height_ = 2;
+  largest_separation_ = 0;
+  Index vertex_begin = 0, edge_begin = 0, face_begin = 0;
+  for (std::size_t b = 0; b < setups.size(); ++b) {
+    SceneBody& body = bodies_[b];
+    body.setup = std::move(setups[b]);
+    const Topology& t = *body.setup.topology;
+    const Positions& rest = *rest_positions[b];
+    body.vertex_begin = vertex_begin;
+    body.edge_begin = edge_begin;
+    body.face_begin = face_begin;
+    body.internal_begin = static_cast<Index>(vertex_count_);
+    const std::vector<Index>& used = t.usedVertices();
+    std::vector<Vec3> centres(used.size());
+    for (std::size_t i = 0; i < used.size(); ++i) centres[i] = rest[used[i]];
+    const std::vector<Index> order = spatialOrder(centres);
+    body.slot_vertex.resize(used.size());
+    std::vector<Index> internal_of_local(t.vertexCount(), NO_INDEX), vertex_ranks(used.size());
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      body.slot_vertex[i] = used[order[i]];
+      internal_of_local[used[order[i]]] = static_cast<Index>(vertex_count_ + i);
+      vertex_ranks[i] = vertex_begin + used[order[i]];
+    }
+    body.active.assign(used.size(), 1);
+    body.trees[static_cast<int>(FeatureKind::VERTEX)].build(consecutive(used.size(), body.internal_begin), 1);
+    body.ranks[static_cast<int>(FeatureKind::VERTEX)] = std::move(vertex_ranks);
+
+    std::vector<Index> flat(2 * t.edges().size());
+    for (std::size_t e = 0; e < t.edges().size(); ++e)
+      std::copy(t.edges()[e].begin(), t.edges()[e].end(), &flat[2 * e]);
+    buildTree(body, FeatureKind::EDGE, flat, 2, consecutive(t.edges().size(), edge_begin), internal_of_local, rest);
+
+    // Faces keep the input's vertex order; their rank is that of the index triple.
+    std::vector<Index> by_triple = consecutive(t.faces().size(), 0);
+    std::sort(by_triple.begin(), by_triple.end(), [&](Index x, Index y) { return t.faces()[x] < t.faces()[y]; });
+    std::vector<Index> face_ranks(t.faces().size());
+    for (std::size_t r = 0; r < by_triple.size(); ++r) face_ranks[by_triple[r]] = static_cast<Index>(face_begin + r);
+    face_order_.insert(face_order_.end(), by_triple.begin(), by_triple.end());
+    flat.resize(3 * t.faces().size());
+    for (std::size_t f = 0; f < t.faces().size(); ++f)
+      std::copy(t.faces()[f].begin(), t.faces()[f].end(), &flat[3 * f]);
+    buildTree(body, FeatureKind::FACE, flat, 3, face_ranks, internal_of_local, rest);
+
+    for (const ClusterTree& tree : body.trees) height_ = std::max(height_, tree.height());
+    vertex_count_ += used.size();
+    vertex_begin += static_cast<Index>(t.vertexCount());
+    edge_begin += static_cast<Index>(t.edges().size());
+    face_begin += static_cast<Index>(t.faces().size());
+  }
+  for (SceneBody& body : bodies_) {
+    for (ClusterTree& tree : body.trees) tree.raise(height_);
+  }
+  range_padded_ = uncertain_ = bounds_valid_ = false;
+  radii_.clear();
+  setReaches();
+  if (vertex_count_ > vertex_capacity_) {
+    vertices_ = hwy::AllocateAligned<VertexMotion>(vertex_count_);
+    if (!vertices_) throw std::bad_alloc();
+    vertex_capacity_ = vertex_count_;
+  }
+  records_.resize(std::max<std::size_t>(vertex_count_, 1) * simd::RECORD);
+  body_levels_.clear();
+  body_bounds_.resize(std::max<std::size_t>(bodies_.size(), 1) * simd::AOS_SIZE);
+  std::size_t groups = bodies_.size();
+  do {
+    groups = (groups + simd::GROUP - 1) / simd::GROUP;
+    groups = std::max<std::size_t>(groups, 1);
+    ClusterTree::Level level;
+    level.groups = groups;
+    level.soa.resize(groups * simd::SOA_SIZE);
+    level.aos.resize(groups * simd::AOS_SIZE);
+    body_levels_.push_back(std::move(level));
+  } while (groups > 1);
+}
+
+void SceneArrays::setReaches() {
+  double between_meshes = 0, from_map = 0;
+  for (const SceneBody& body : bodies_) {
+    between_meshes = std::max(between_meshes, body.setup.minimum_separation_m);
+    for (const SeparationFrom& from : body.setup.separations) {
+      double& largest = from.body == OBSTACLE_BODY ? from_map : between_meshes;
+      largest = std::max(largest, from.separation_m);
+    }
+  }
+  for (SceneBody& body : bodies_) body.reach_m = 0.5 * between_meshes;
+  largest_separation_ = std::max(between_meshes, from_map);
+}
+
+double SceneArrays::separation(std::size_t a, std::size_t b) const {
+  for (const SeparationFrom& from : bodies_[a].setup.separations) {
+    if (from.body == b) return from.separation_m;
+  }
+  if (b == OBSTACLE_BODY) return bodies_[a].setup.minimum_separation_m;
+  for (const SeparationFrom& from : bodies_[b].setup.separations) {
+    if (from.body == a) return from.separation_m;
+  }
+  return std::max(bodies_[a].setup.minimum_separation_m, bodies_[b].setup.minimum_separation_m);
+}
+
+void SceneArrays::refitBodies() {
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    // All three trees: a feature is widened by the largest radius of its vertices, which may lie in another group of
+    // vertices than the feature's outermost one. An empty tree's bounds are neutral.
+    std::int16_t* bounds = body_bounds_.data() + b * simd::AOS_SIZE;
+    std::fill_n(bounds, simd::RECORD, simd::EMPTY_LO);
+    std::fill_n(bounds + simd::RECORD, simd::RECORD, simd::EMPTY_HI);
+    for (const ClusterTree& tree : bodies_[b].trees) {
+      const std::int16_t* top = tree.level(height_ - 1).aos.data();
+      for (std::size_t k = 0; k < simd::RECORD; ++k) {
+        bounds[k] = std::min(bounds[k], top[k]);
+        bounds[simd::RECORD + k] = std::max(bounds[simd::RECORD + k], top[simd::RECORD + k]);
+      }
+    }
+  }
+  simd::buildUpper(body_bounds_.data(), bodies_.size(), body_levels_[0].soa.data(), body_levels_[0].aos.data());
+  for (std::size_t l = 1; l < body_levels_.size(); ++l) {
+    simd::buildUpper(body_levels_[l - 1].aos.data(), body_levels_[l - 1].groups, body_levels_[l].soa.data(),
+                     body_levels_[l].aos.data());
+  }
+}
+
+void SceneArrays::overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs,
+                                    std::vector<std::uint32_t>& scratch) const {
+  pairs.assign({0, 0});
+  for (std::size_t l = body_levels_.size(); l-- > 0;) {
+    const simd::GroupsView view = body_levels_[l].view();
+    scratch.clear();
+    std::size_t done = 0;
+    while (done < pairs.size() / 2) {
+      constexpr std::size_t STEP = 4096;
+      const std::size_t used = scratch.size();
+      scratch.resize(used + 2 * STEP);
+      std::size_t consumed = 0;
+      const std::size_t found =
+          simd::testGroupPairs(view, view, pairs.data() + 2 * done, pairs.size() / 2 - done, true,
+                               l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, t0_only,
+                               scratch.data() + used, STEP, &consumed);
+      scratch.resize(used + 2 * found);
+      done += consumed;
+    }
+    std::swap(pairs, scratch);
+  }
+  for (std::size_t p = 0; p < pairs.size(); p += 2) {
+    if (pairs[p] > pairs[p + 1]) std::swap(pairs[p], pairs[p + 1]);
+  }
+}
+
+void SceneArrays::featureVertices(FeatureKind kind, std::size_t body_index, Index rank, Index* out) const {
+  const SceneBody& body = bodies_[body_index];
+  if (kind == FeatureKind::VERTEX) {
+    *out = rank - body.vertex_begin;
+  } else if (kind == FeatureKind::EDGE) {
+    const Edge& e = body.setup.topology->edges()[rank - body.edge_begin];
+    std::copy(e.begin(), e.end(), out);
+  } else {
+    const Face& face = body.setup.topology->faces()[face_order_[rank]];
+    std::copy(face.begin(), face.end(), out);
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,133 @@
+// All bodies of a scene in the arrays that the kernels want: vertices renumbered in spatial order, cluster trees per
+// body, and the ranks that give contacts their canonical order.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include <hwy/aligned_allocator.h>
+
+#include "culling/cluster_tree.h"
+#include "dccd/detector.h"
+
+namespace dccd {
+
+enum class FeatureKind : std::uint8_t { VERTEX = 0, EDGE = 1, FACE = 2 };
+
+/// One body: where its elements are in the scene's arrays.
+struct SceneBody {
+  BodySetup setup;
+  Index vertex_begin = 0;  ///< of the input numbering; vertices of all bodies follow each other
+  Index edge_begin = 0, face_begin = 0;
+  std::vector<Index> slot_vertex;    ///< internal vertex - internal_begin -> local vertex
+  Index internal_begin = 0;          ///< internal numbering holds the used vertices only
+  ClusterTree trees[3];              ///< by FeatureKind, over internal vertices
+  std::vector<Index> ranks[3];       ///< slot -> rank: vertex_begin + local vertex, edge rank, face rank
+  std::vector<std::uint8_t> active;  ///< per used vertex; what the trees are masked with
+  bool masked = false;
+  bool uncertain = false;  ///< some vertex has an uncertainty radius above 0 in this step
+  bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
+  bool recorded = false;   ///< it has been through a step since it was set
+  double reach_m = 0;      ///< how far its bounds are widened: half of the scene's largest separation of meshes
+  double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
+  std::int16_t margin[16] = {};                   ///< reach_m in record units
+  bool translates = false;  ///< all vertices have exactly the same displacement in this step (at rest included)
+
+  const ClusterTree& tree(FeatureKind k) const { return trees[static_cast<int>(k)]; }
+  const std::vector<Index>& rank(FeatureKind k) const { return ranks[static_cast<int>(k)]; }
+  /// Every vertex of the feature in the slot is active.
+  bool holds(FeatureKind k, std::size_t slot) const {
+    if (!masked) return true;
+    const ClusterTree& t = tree(k);
+    for (std::size_t i = 0; i < t.arity(); ++i) {
+      if (!active[t.feature(slot)[i] - internal_begin]) return false;
+    }
+    return true;
+  }
+  std::size_t usedCount() const { return slot_vertex.size(); }
+};
+
+class SceneArrays {
+ public:
+  /// Throws std::invalid_argument naming the body when positions and topology do not fit.
+  void setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions);
+
+  /// Copies the positions, leaves out what is not finite or not active, and sets the record scale.
+  /// Throws std::invalid_argument naming the body when a frame has the wrong number of vertices.
+  void record(const MotionStep& step, StepStats& stats);
+
+  /// Off: every body is refitted in every step.
+  void setKeepBounds(bool keep) { keep_bounds_ = keep; }
+
+  /// Records and bounds of every body that is not kept. pieces(n, f): calls f(first, last) over [0, n), in parallel or
+  /// not.
+  template <class Pieces>
+  void refit(const Pieces& pieces, StepStats& stats) {
+    for (SceneBody& body : bodies_) {
+      ++(body.kept ? stats.bodies_kept : stats.bodies_refitted);
+      if (body.kept) continue;
+      pieces(body.usedCount(), [&](std::size_t first, std::size_t last) {
+        quantize(body.internal_begin + first, body.internal_begin + last);
+      });
+      for (ClusterTree& tree : body.trees) {
+        pieces(tree.level(0).groups,
+               [&](std::size_t first, std::size_t last) { refitLeaves(body, tree, first, last); });
+        tree.refitUpper();
+      }
+    }
+    refitBodies();
+    bounds_valid_ = true;
+  }
+
+  const std::vector<SceneBody>& bodies() const { return bodies_; }
+  const VertexMotion* vertices() const { return vertices_.get(); }
+  std::size_t vertexCount() const { return vertex_count_; }
+  /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
+  void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
+  std::size_t height() const { return height_; }
+  /// Largest separation that any setup names, from meshes or the map [m].
+  double largestSeparation() const { return largest_separation_; }
+  /// Separation of two bodies, of a body from itself, or of a body from the map (OBSTACLE_BODY) [m].
+  double separation(std::size_t a, std::size_t b) const;
+  /// Some body is to be tested against the map.
+  bool meetsObstacle() const {
+    return std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& b) { return b.setup.against_obstacle; });
+  }
+  /// Some vertex of some body has an uncertainty radius in this step.
+  bool uncertain() const { return uncertain_; }
+  /// Uncertainty radii of internal vertices [m]; only while uncertain().
+  const double* radii() const { return radii_.data(); }
+
+  /// The body-local vertices (1, 2 or 3) of the feature with the rank, in the input's order.
+  void featureVertices(FeatureKind kind, std::size_t body, Index rank, Index* out) const;
+
+ private:
+  void setReaches();
+  void recordBody(SceneBody& body, const BodyMotion& motion, bool bounds_valid, StepStats& stats);
+  bool recordRadii(SceneBody& body, const BodyMotion& motion);
+  void setRange(bool keep);
+  void setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const;
+  void quantize(std::size_t first, std::size_t last);
+  void refitLeaves(const SceneBody& body, ClusterTree& tree, std::size_t first, std::size_t last) const;
+  void refitBodies();
+
+  std::vector<SceneBody> bodies_;
+  std::vector<Index> face_order_;  // face rank -> face of the input (all bodies)
+  hwy::AlignedFreeUniquePtr<VertexMotion[]> vertices_;
+  AlignedRecords records_;
+  std::size_t vertex_count_ = 0, vertex_capacity_ = 0;
+  std::size_t height_ = 2;
+  double range_min_[8] = {}, range_max_[8] = {};  // what the records span
+  double low_[8] = {}, scale_[8] = {};
+  bool range_padded_ = false;
+  bool keep_bounds_ = true;
+  bool bounds_valid_ = false;  // trees and records are those of the vertices
+  double largest_separation_ = 0;
+  bool uncertain_ = false;
+  std::vector<double> radii_;
+  std::vector<ClusterTree::Level> body_levels_;  // bounds of the bodies, as a tree whose features they are
+  AlignedRecords body_bounds_;
+};
+
+}  // namespace dccd

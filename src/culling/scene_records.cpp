@@ -1,0 +1,225 @@
+// A step's positions into the scene's arrays: vertices, the range of their records, and the bounds of what has moved.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "culling/scene_arrays.h"
+#include "dccd/tolerances.h"
+
+namespace dccd {
+namespace {
+
+// Where a body rests: how much wider the records' range is on either side than the scene, so that others may move, and
+// how much of it the scene must fill, since the wider the range, the coarser the bounds (of 65,528 values a direction).
+constexpr double PADDING = tolerance::RECORD_PADDING, SMALLEST_SHARE = tolerance::RECORD_SHARE;
+
+// a - b as an unevaluated sum without error (Knuth's two-sum); not finite when it overflows.
+struct ExactDifference {
+  double high, low;
+  friend bool operator==(const ExactDifference& x, const ExactDifference& y) {
+    return x.high == y.high && x.low == y.low;
+  }
+};
+ExactDifference exactDifference(double a, double b) {
+  const double high = a - b, virtual_b = a - high, virtual_a = high + virtual_b;
+  return {high, (a - virtual_a) + (virtual_b - b)};
+}
+
+bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
+  for (std::size_t i = 1; i < n; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(exactDifference(vertices[i].t1[axis], vertices[i].t0[axis]) ==
+            exactDifference(vertices[0].t1[axis], vertices[0].t0[axis]))) {
+        return false;
+      }
+    }
+  }
+  return n > 0;
+}
+
+}  // namespace
+
+bool SceneArrays::recordRadii(SceneBody& body, const BodyMotion& motion) {
+  body.uncertain = false;
+  if (!motion.radius_m) return false;
+  const std::vector<double>& radius = *motion.radius_m;
+  if (radius.size() != body.setup.topology->vertexCount()) {
+    throw std::invalid_argument("body '" + body.setup.name + "' needs " +
+                                std::to_string(body.setup.topology->vertexCount()) + " uncertainty radii, got " +
+                                std::to_string(radius.size()));
+  }
+  radii_.resize(vertex_count_, 0);
+  for (std::size_t i = 0; i < body.usedCount(); ++i) {
+    const double r = radius[body.slot_vertex[i]];
+    if (!(r >= 0) || !std::isfinite(r)) {
+      throw std::invalid_argument("body '" + body.setup.name + "' has uncertainty radius " + std::to_string(r) +
+                                  " at vertex " + std::to_string(body.slot_vertex[i]) +
+                                  "; it must be finite and not negative");
+    }
+    radii_[body.internal_begin + i] = r;
+    body.uncertain |= r > 0;
+  }
+  return body.uncertain;
+}
+
+void SceneArrays::recordBody(SceneBody& body, const BodyMotion& motion, bool bounds_valid, StepStats& stats) {
+  const std::size_t n = body.setup.topology->vertexCount();
+  if (!motion.t0 || !motion.t1 || motion.t0->size() != n || motion.t1->size() != n) {
+    throw std::invalid_argument("body '" + body.setup.name + "' needs " + std::to_string(n) +
+                                " positions at t0 and t1, got " + std::to_string(motion.t0 ? motion.t0->size() : 0) +
+                                " and " + std::to_string(motion.t1 ? motion.t1->size() : 0));
+  }
+  const Vec3* x0 = motion.t0->data();
+  const Vec3* x1 = motion.t1->data();
+  // What moves differs at its first vertex already, so that the comparison costs nothing there.
+  bool changed = false, masked = false, same = bounds_valid && body.recorded && !body.masked;
+  std::uint64_t unchecked = 0;
+  VertexMotion* out = vertices_.get() + body.internal_begin;
+  std::size_t first_active = body.usedCount();
+  for (std::size_t i = 0; i < body.usedCount(); ++i) {
+    const Index v = body.slot_vertex[i];
+    const Vec3 &p = x0[v], &q = x1[v];
+    const VertexMotion moved = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
+    same = same && std::memcmp(&out[i], &moved, sizeof moved) == 0;
+    out[i] = moved;
+    // A sum of finite terms times zero is zero; anything else is not (and is looked at more closely).
+    const double probe = (p[0] * 0 + p[1] * 0 + p[2] * 0) + (q[0] * 0 + q[1] * 0 + q[2] * 0);
+    const bool finite = probe == 0;
+    unchecked += !finite;
+    const bool active = finite && (body.setup.vertex_active.empty() || body.setup.vertex_active[v]);
+    changed |= body.active[i] != static_cast<std::uint8_t>(active);
+    body.active[i] = active;
+    masked |= !active;
+    if (active && first_active == body.usedCount()) first_active = i;
+  }
+  if (masked) {
+    // What is left out must not widen the range of the records: it takes an active vertex's place.
+    for (std::size_t i = 0; i < body.usedCount(); ++i) {
+      if (!body.active[i]) out[i] = first_active < body.usedCount() ? out[first_active] : VertexMotion{};
+    }
+  }
+  body.kept = same && !masked && !body.uncertain;
+  body.recorded = !body.uncertain;  // radii widen the bounds, and may be others in the next step
+  if (!body.kept) body.translates = !masked && sameDisplacement(out, body.usedCount());
+  stats.unchecked_vertices += unchecked;
+  if (changed || masked != body.masked) {
+    // The mask is indexed by internal vertex number.
+    const std::uint8_t* flags = masked ? body.active.data() - body.internal_begin : nullptr;
+    for (ClusterTree& tree : body.trees) tree.mask(flags);
+    body.masked = masked;
+  }
+  if (unchecked) {
+    for (const Face& f : body.setup.topology->faces()) {
+      const auto bad = [&](Index v) { return !x0[v].allFinite() || !x1[v].allFinite(); };
+      stats.unchecked_faces += bad(f[0]) || bad(f[1]) || bad(f[2]);
+    }
+  }
+  if (body.kept) return;
+  std::fill_n(body.bounds_min, 8, std::numeric_limits<double>::infinity());
+  std::fill_n(body.bounds_max, 8, -std::numeric_limits<double>::infinity());
+  if (first_active < body.usedCount()) {
+    simd::projectionBounds(out->t0, body.usedCount(), body.bounds_min, body.bounds_max);
+  }
+}
+
+void SceneArrays::record(const MotionStep& step, StepStats& stats) {
+  if (step.bodies.size() != bodies_.size()) {
+    throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the detector " +
+                                std::to_string(bodies_.size()));
+  }
+  uncertain_ = false;
+  std::fill(radii_.begin(), radii_.end(), 0.0);
+  bool any_kept = false;
+  const bool valid = bounds_valid_ && keep_bounds_;
+  bounds_valid_ = false;  // until refit(), also when a body is refused on the way
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    uncertain_ |= recordRadii(bodies_[b], step.bodies[b]);
+    recordBody(bodies_[b], step.bodies[b], valid, stats);
+    any_kept |= bodies_[b].kept;
+  }
+  setRange(any_kept);
+  for (SceneBody& body : bodies_) {
+    if (!body.kept) setMargin(body, body.reach_m, body.margin);
+  }
+}
+
+/// What the records span. Where some body rests, the range is wider than needed and stays for as long as it holds the
+/// scene, since with another range that body's records would be other ones.
+void SceneArrays::setRange(bool keep) {
+  double low[8], high[8];
+  std::fill_n(low, 8, std::numeric_limits<double>::infinity());
+  std::fill_n(high, 8, -std::numeric_limits<double>::infinity());
+  for (const SceneBody& body : bodies_) {
+    for (int d = 0; d < 8; ++d) {
+      low[d] = std::min(low[d], body.bounds_min[d]);
+      high[d] = std::max(high[d], body.bounds_max[d]);
+    }
+  }
+  bool holds = keep && range_padded_;
+  for (int d = 0; d < 8; ++d) {
+    const double spanned = range_max_[d] - range_min_[d];
+    holds =
+        holds && low[d] >= range_min_[d] && high[d] <= range_max_[d] && high[d] - low[d] >= SMALLEST_SHARE * spanned;
+  }
+  if (holds) return;
+  for (SceneBody& body : bodies_) body.kept = false;
+  range_padded_ = keep;
+  for (int d = 0; d < 8; ++d) {
+    // Half ranges: a difference of finite doubles can overflow. The scale only has to be positive and finite.
+    const double pad = keep ? PADDING * (high[d] - low[d]) : 0;
+    range_min_[d] = low[d] - pad;
+    range_max_[d] = high[d] + pad;
+    const double range = range_max_[d] / 2 - range_min_[d] / 2;
+    const bool usable =
+        range > 0 && std::isfinite(range_min_[d]) && std::isfinite(range_max_[d]) && std::isfinite(2 * range);
+    low_[d] = usable ? range_min_[d] : 0;
+    scale_[d] = usable ? std::min(simd::RECORD_RANGE / 2 / range, 1e300) : 0;
+  }
+}
+
+/// How many record units `reach_m` is, rounded up. Both bodies of a pair are widened, each by half of the separation
+/// and by its own radii; the sum of the two margins is never less than what the pair asks for, since a margin that does
+/// not fit is UNBOUNDED. (Cut off at half the range, one alone would not reach from one end of the records to the
+/// other.)
+void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const {
+  if (!(reach_m > 0) && body.reach_m == 0) {
+    std::fill_n(margin16, 16, std::int16_t{0});
+    return;
+  }
+  for (int k = 0; k < 16; ++k) {
+    const int d = k % 8;
+    const double length = d < 3 ? 1.0 : tolerance::SQRT2_UP;
+    // A unit for the truncation of both values, and the rounding of both sums; enough where one side alone is widened.
+    const double rounding = std::ldexp(std::max(std::abs(range_min_[d]), std::abs(range_max_[d])), -51) * scale_[d];
+    const double units = std::ceil(tolerance::RECORD_REACH * reach_m * length * scale_[d] + rounding) + 1;
+    margin16[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min<double>(units, simd::UNBOUNDED) : 0);
+  }
+}
+
+void SceneArrays::quantize(std::size_t first, std::size_t last) {
+  if (first == last) return;  // a body without edges has no vertices here, and a scene of such no array
+  simd::quantize(vertices_[first].t0, last - first, low_, scale_, records_.data() + first * simd::RECORD);
+}
+
+void SceneArrays::refitLeaves(const SceneBody& body, ClusterTree& tree, std::size_t first, std::size_t last) const {
+  if (!body.uncertain) {
+    tree.refitLeaves(records_.data(), body.reach_m > 0 ? body.margin : nullptr, first, last);
+    return;
+  }
+  // Only groups with an uncertain vertex are widened further, by the largest radius in them.
+  std::int16_t margin[16];
+  for (std::size_t group = first; group < last; ++group) {
+    const std::size_t end = std::min((group + 1) * simd::GROUP, tree.featureCount()) * tree.arity();
+    double radius = 0;
+    for (std::size_t i = group * simd::GROUP * tree.arity(); i < end; ++i) {
+      radius = std::max(radius, radii_[tree.feature(0)[i]]);
+    }
+    setMargin(body, body.reach_m + radius, margin);
+    tree.refitLeaves(records_.data(), margin, group, group + 1);
+  }
+}
+
+}  // namespace dccd

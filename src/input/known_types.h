@@ -1,0 +1,20 @@
+// Whether a connection's type is the one whose layout the readers know: name and md5.
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace dccd {
+
+/// Empty when messages of this type can be read; else one sentence.
+std::string meshTypeProblem(const std::string& datatype, const std::string& md5);
+std::string mapTypeProblem(const std::string& datatype, const std::string& md5);
+
+/// Where a monitor publishes unless it is renamed, and analyze_bag.
+constexpr const char* MONITOR_NAMESPACE = "/collision_monitor";
+
+/// Whether the topic carries what a monitor shows, which is of a mesh type, too: `markers` beside a monitor's
+/// `contacts`, or under a monitor's usual name. `types`: datatype of each topic that there is.
+bool isMonitorsMarkers(const std::string& topic, const std::map<std::string, std::string>& types);
+
+}  // namespace dccd

@@ -1,0 +1,347 @@
+#include "input/mesh_decoder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+namespace dccd {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& text) { throw MeshError(StepStatus::BAD_MESSAGE, text); }
+
+std::vector<Face> triangulated(const IndexedView& mesh, std::size_t points) {
+  std::vector<Face> faces;
+  const auto add = [&](Index a, Index b, Index c) {
+    for (const Index v : {a, b, c}) {
+      if (v >= points) {
+        refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
+      }
+    }
+    if (a != b && b != c && a != c) faces.push_back({a, b, c});  // one without area touches nothing of its own
+  };
+  faces.reserve(mesh.triangles.size);
+  for (std::size_t i = 0; i < mesh.triangles.size; ++i) {
+    const auto t = mesh.triangles[i];
+    add(t[0], t[1], t[2]);
+  }
+  for (const auto& polygon : mesh.polygons) {
+    for (std::size_t k = 2; k < polygon.size; ++k) add(polygon[0], polygon[k - 1], polygon[k]);
+  }
+  return faces;
+}
+
+/// Bits of a corner's coordinates; zeros of either sign are the same place.
+struct CornerKey {
+  std::uint64_t bits[3];
+  Index group;
+  bool operator==(const CornerKey& o) const {
+    return bits[0] == o.bits[0] && bits[1] == o.bits[1] && bits[2] == o.bits[2] && group == o.group;
+  }
+};
+struct CornerHash {
+  std::size_t operator()(const CornerKey& key) const {
+    std::uint64_t h = key.group;
+    for (const std::uint64_t b : key.bits) h = (h ^ b) * 0x9e3779b97f4a7c15ull, h ^= h >> 29;
+    return static_cast<std::size_t>(h);
+  }
+};
+CornerKey cornerKey(const Vec3& p, Index group) {
+  CornerKey key{{0, 0, 0}, group};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double value = p[axis] == 0 ? 0.0 : p[axis];
+    std::memcpy(&key.bits[axis], &value, 8);
+  }
+  return key;
+}
+
+Eigen::Affine3d markerTransform(const MarkerView& marker) {
+  for (const double value : marker.pose) {
+    if (!std::isfinite(value)) refuse("pose is not finite");
+  }
+  const Eigen::Quaterniond q(marker.pose[6], marker.pose[3], marker.pose[4], marker.pose[5]);
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  // Publishers that leave the quaternion at zero mean none, and RViz shows it so.
+  if (q.norm() > 0) transform.linear() = q.normalized().toRotationMatrix();
+  transform.translation() = Vec3(marker.pose[0], marker.pose[1], marker.pose[2]);
+  const Vec3 scale(marker.scale[0], marker.scale[1], marker.scale[2]);
+  if (!scale.allFinite()) refuse("scale is not finite");
+  if ((scale.array() != 0).all()) transform.linear() = transform.linear() * scale.asDiagonal();
+  return transform;
+}
+
+}  // namespace
+
+const std::vector<MeshType>& meshTypes() {
+  static const std::vector<MeshType> TYPES = {
+      {"mesh_stamped", "deformable_ccd/MeshStamped"},     {"point_cloud2", "sensor_msgs/PointCloud2"},
+      {"polygon_mesh", "pcl_msgs/PolygonMesh"},           {"marker", "visualization_msgs/Marker"},
+      {"marker_array", "visualization_msgs/MarkerArray"}, {"shape_mesh", "shape_msgs/Mesh"}};
+  return TYPES;
+}
+
+MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)) {}
+
+template <typename Read>
+DecodedMesh MeshDecoder::guarded(const std::string& datatype, Read read) {
+  const auto& types = meshTypes();
+  const auto type = std::find_if(types.begin(), types.end(), [&](const MeshType& t) { return datatype == t.datatype; });
+  if (type == types.end()) {
+    refuse("type " + datatype +
+           " is not a mesh; accepted are MeshStamped, PointCloud2, PolygonMesh, Marker, MarkerArray, "
+           "shape_msgs/Mesh");
+  }
+  if (config_.type != "auto" && config_.type != type->name) {
+    refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
+  }
+  try {
+    return read(std::string(type->name));
+  } catch (const WireError& error) {
+    refuse(datatype + ": " + error.what());
+  } catch (const TopologyError& error) {
+    refuse(datatype + ": " + error.what());
+  }
+}
+
+DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
+  WireReader wire(data, size);
+  return guarded(datatype, [&](const std::string& name) {
+    if (name == "mesh_stamped") return decodeIndexed(readMeshStamped(wire));
+    if (name == "point_cloud2") return decodeCloud(readCloud(wire, config_.noise_field));
+    if (name == "polygon_mesh") return decodeIndexed(readPolygonMesh(wire, config_.noise_field));
+    if (name == "shape_mesh") return decodeIndexed(readShapeMesh(wire));
+    if (name == "marker") return decodeMarkers({readMarker(wire)});
+    return decodeMarkers(readMarkerArray(wire));
+  });
+}
+
+DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
+  return guarded(datatypeOf(message), [&](const std::string&) {
+    return std::visit(
+        [this](const auto& typed) {
+          using Message = std::remove_const_t<std::remove_reference_t<decltype(*typed)>>;
+          if constexpr (std::is_same_v<Message, sensor_msgs::PointCloud2> ||
+                        std::is_same_v<Message, pcl_msgs::PolygonMesh>) {
+            return decodeView(viewOf(*typed, config_.noise_field));
+          } else {
+            return decodeView(viewOf(*typed));
+          }
+        },
+        message);
+  });
+}
+
+void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh) const {
+  const bool from_field = !config_.noise_field.empty();
+  if (from_field && !cloud) {
+    refuse("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
+           "'; send a PointCloud2, or write uncertainty/radius_m");
+  }
+  if (!from_field && !(config_.noise_radius_m > 0)) return;
+  mesh.radius_m.assign(mesh.positions.size(), config_.noise_radius_m);
+  if (!from_field) return;
+  for (std::size_t i = 0; i < mesh.radius_m.size(); ++i) {
+    if (!mesh.positions[i].allFinite()) continue;  // unchecked anyway, and trackers leave everything of it open
+    const double value = cloud->extraValue(i);
+    if (!(value >= 0) || !std::isfinite(config_.noise_scale * value)) {
+      refuse("field '" + config_.noise_field + "' of point " + std::to_string(i) + " is " + std::to_string(value) +
+             "; an uncertainty is finite and not negative");
+    }
+    mesh.radius_m[i] += config_.noise_scale * value;
+  }
+}
+
+void MeshDecoder::checkCount(std::size_t count) const {
+  if (count > config_.max_vertices) {
+    refuse(std::to_string(count) + " vertices are more than max_vertices " + std::to_string(config_.max_vertices));
+  }
+  if (count == 0) refuse("there are no vertices");
+}
+
+void MeshDecoder::start(const HeaderView& header, DecodedMesh& mesh) const {
+  mesh.stamp_ns = header.stamp_ns;
+  mesh.frame_id = header.frame_id.empty() ? config_.frame_id : std::string(header.frame_id);
+  if (!mesh.frame_id.empty() && mesh.frame_id[0] == '/') mesh.frame_id.erase(0, 1);  // tf2 has no leading slashes
+  if (mesh.frame_id.empty()) refuse("the message names no frame; set parameter frame_id");
+}
+
+std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, std::size_t grid_rows,
+                                                           std::size_t grid_cols) {
+  const auto mismatch = [&](const std::string& what) {
+    throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(points) + " points, but " + what);
+  };
+  if (config_.source == TopologySource::FILE) {
+    if (config_.file_topology->vertexCount() != points) {
+      mismatch("the topology file has " + std::to_string(config_.file_topology->vertexCount()) + " vertices");
+    }
+    return config_.file_topology;
+  }
+  if (config_.source == TopologySource::POLYLINE) {
+    if (points < 2) mismatch("a polyline needs 2");
+    if (!topology_ || topology_->vertexCount() != points) {
+      topology_ = std::make_shared<const Topology>(Topology::polyline(points));
+    }
+    return topology_;
+  }
+  const std::size_t rows = config_.rows ? config_.rows : grid_rows, cols = config_.cols ? config_.cols : grid_cols;
+  if (rows * cols != points) {
+    mismatch("topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
+             std::to_string(rows * cols));
+  }
+  if (!topology_ || last_faces_.size() != 1 ||
+      last_faces_[0] != Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}) {
+    topology_ = std::make_shared<const Topology>(Topology::grid(rows, cols));
+    last_faces_ = {Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}};  // stands for the grid's shape
+  }
+  return topology_;
+}
+
+std::shared_ptr<const Topology> MeshDecoder::fromFaces(std::size_t points, std::vector<Face> faces) {
+  if (topology_ && topology_->vertexCount() == points && faces == last_faces_) return topology_;
+  topology_ = std::make_shared<const Topology>(Topology::fromTriangles(points, faces));
+  last_faces_ = std::move(faces);
+  return topology_;
+}
+
+DecodedMesh MeshDecoder::decodeCloud(const CloudView& cloud) {
+  DecodedMesh mesh;
+  start(cloud.header, mesh);
+  checkCount(cloud.size());
+  const bool organised = cloud.height > 1;
+  if (config_.source == TopologySource::MESSAGE || config_.source == TopologySource::FIRST_FRAME_WELD) {
+    refuse("a PointCloud2 has no triangles; set topology/source to grid (with rows, cols), polyline or file");
+  }
+  if (config_.source == TopologySource::AUTO && !organised && !config_.rows && !config_.cols) {
+    refuse(
+        "an unorganised PointCloud2 has no topology; set topology/rows and topology/cols for a grid, or "
+        "topology/source to polyline or file");
+  }
+  mesh.topology = fixedTopology(cloud.size(), cloud.height, cloud.width);
+  mesh.positions.resize(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
+  addRadii(&cloud, mesh);
+  return mesh;
+}
+
+DecodedMesh MeshDecoder::decodeIndexed(const IndexedView& view) {
+  DecodedMesh mesh;
+  start(view.header ? *view.header : HeaderView{}, mesh);
+  const std::size_t count = view.size();
+  checkCount(count);
+  const bool carries_faces = view.triangles.size > 0 || !view.polygons.empty();
+  if (config_.source == TopologySource::FIRST_FRAME_WELD) {
+    refuse("topology/source first_frame_weld is for triangle lists; this message has indices");
+  }
+  if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
+    if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
+    mesh.topology = fromFaces(count, triangulated(view, count));
+  } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
+    // A publisher may send the triangles once and vertices ever after.
+    if (!topology_) refuse("the message has no triangles and no topology is known yet");
+    if (topology_->vertexCount() != count) {
+      throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) +
+                                                    " vertices without triangles, but the last topology has " +
+                                                    std::to_string(topology_->vertexCount()));
+    }
+    mesh.topology = topology_;
+  } else {
+    mesh.topology = fixedTopology(count, 0, 0);
+  }
+  mesh.positions.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (view.cloud) {
+      mesh.positions[i] = view.cloud->point(i);
+    } else {
+      const auto p = view.points[i];
+      mesh.positions[i] = Vec3(p[0], p[1], p[2]);
+    }
+  }
+  addRadii(view.cloud ? &*view.cloud : nullptr, mesh);
+  return mesh;
+}
+
+DecodedMesh MeshDecoder::decodeMarkers(const std::vector<MarkerView>& markers) {
+  std::string seen;
+  for (const MarkerView& marker : markers) {
+    const bool wanted = (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
+                        (!config_.marker_id || marker.id == *config_.marker_id);
+    if (wanted && marker.type == MARKER_TRIANGLE_LIST && marker.action == MARKER_ADD) return decodeSoup(marker);
+    if (seen.size() < 200) {
+      seen += " ('" + std::string(marker.ns.substr(0, 32)) + "', " + std::to_string(marker.id) + ", type " +
+              std::to_string(marker.type) + ")";
+    }
+  }
+  refuse("no TRIANGLE_LIST marker with the wanted namespace and id; there are (namespace, id, type):" +
+         (seen.empty() ? " none" : seen));
+}
+
+bool MeshDecoder::weldHolds(const Positions& corners) const {
+  for (std::size_t c = 0; c < corners.size(); ++c) {
+    if (!(cornerKey(corners[c], 0) == cornerKey(corners[representative_[weld_[c]]], 0))) return false;
+  }
+  return true;
+}
+
+void MeshDecoder::forgetWeld() {
+  weld_.clear();
+  representative_.clear();
+}
+
+std::size_t MeshDecoder::weldAnew(const Positions& corners, bool refine) {
+  // Refining splits groups and never joins any: what touches now for the first time is contact, not mesh.
+  std::unordered_map<CornerKey, Index, CornerHash> groups;
+  groups.reserve(corners.size());
+  std::vector<Index> weld(corners.size());
+  std::vector<std::size_t> pieces(refine ? representative_.size() : 0, 0);  // of each vertex
+  representative_.clear();
+  for (std::size_t c = 0; c < corners.size(); ++c) {
+    const auto [it, fresh] =
+        groups.try_emplace(cornerKey(corners[c], refine ? weld_[c] : 0), static_cast<Index>(representative_.size()));
+    if (fresh) representative_.push_back(static_cast<Index>(c));
+    if (fresh && refine) ++pieces[weld_[c]];
+    weld[c] = it->second;
+  }
+  weld_ = std::move(weld);
+  const auto apart = [](std::size_t count) { return count > 1; };
+  return static_cast<std::size_t>(std::count_if(pieces.begin(), pieces.end(), apart));
+}
+
+DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
+  DecodedMesh mesh;
+  start(marker.header, mesh);
+  const std::size_t count = marker.points.size;
+  checkCount(count);
+  if (count % 3 != 0) refuse("a TRIANGLE_LIST of " + std::to_string(count) + " points, which is not a multiple of 3");
+  const Eigen::Affine3d transform = markerTransform(marker);
+  Positions corners(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto p = marker.points[i];
+    corners[i] = Vec3(p[0], p[1], p[2]);
+  }
+  const bool known = weld_.size() == count;
+  const bool welds = config_.weld && config_.source != TopologySource::FILE;
+  if (!welds && !known) {
+    weld_.resize(count);
+    for (std::size_t c = 0; c < count; ++c) weld_[c] = static_cast<Index>(c);
+    representative_ = weld_;
+  } else if (welds && !(known && weldHolds(corners))) {
+    mesh.weld_changes = weldAnew(corners, known);
+  }
+  if (config_.source == TopologySource::FILE) {
+    mesh.topology = fixedTopology(count, 0, 0);
+  } else {
+    std::vector<Face> faces;
+    faces.reserve(count / 3);
+    for (std::size_t c = 0; c < count; c += 3) {
+      const Face face{weld_[c], weld_[c + 1], weld_[c + 2]};
+      if (face[0] != face[1] && face[1] != face[2] && face[0] != face[2]) faces.push_back(face);
+    }
+    mesh.topology = fromFaces(representative_.size(), std::move(faces));
+  }
+  mesh.positions.resize(representative_.size());
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.positions[v] = transform * corners[representative_[v]];
+  addRadii(nullptr, mesh);
+  return mesh;
+}
+
+}  // namespace dccd

@@ -1,0 +1,99 @@
+// One body's messages, as bytes of any accepted type, to positions and topology in the message's own frame.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "dccd/mesh_store.h"
+#include "input/mesh_views.h"
+#include "input/typed_mesh.h"
+
+namespace dccd {
+
+enum class TopologySource : std::uint8_t { AUTO, MESSAGE, GRID, POLYLINE, FILE, FIRST_FRAME_WELD };
+
+/// How a body's messages are to be read.
+struct MeshInputConfig {
+  std::string type = "auto";  ///< auto, or one of meshTypes()' short names
+  std::string frame_id;       ///< used when the message has none; required for shape_msgs/Mesh
+  TopologySource source = TopologySource::AUTO;
+  std::size_t rows = 0, cols = 0;  ///< grid; both 0: not given
+  std::shared_ptr<const Topology> file_topology;
+  bool weld = true;  ///< triangle soup: corners with equal coordinates are one vertex
+  std::optional<std::string> marker_namespace;
+  std::optional<int> marker_id;
+  std::size_t max_vertices = 1000000;
+  /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is
+  /// named.
+  std::string noise_field;
+  double noise_scale = 1, noise_radius_m = 0;
+};
+
+/// Why a message is refused; BAD_MESSAGE or VERTEX_COUNT. The text names the field and the value.
+struct MeshError : std::runtime_error {
+  MeshError(StepStatus why, const std::string& text) : std::runtime_error(text), status(why) {}
+  StepStatus status;
+};
+
+struct DecodedMesh {
+  StampNs stamp_ns = 0;  ///< 0: the message has none
+  std::string frame_id;
+  std::shared_ptr<const Topology> topology;
+  Positions positions;
+  std::vector<double> radius_m;  ///< uncertainty per vertex; empty: none
+  std::size_t weld_changes = 0;  ///< welded vertices whose corners came apart
+};
+
+/// An accepted message type: its name in parameters and in ROS.
+struct MeshType {
+  const char* name;
+  const char* datatype;
+};
+/// auto is not among them.
+const std::vector<MeshType>& meshTypes();
+
+/// Keeps the topology from message to message, so that an unchanged one is one object. Not thread-safe.
+class MeshDecoder {
+ public:
+  explicit MeshDecoder(MeshInputConfig config);
+
+  /// `datatype` as in the connection header, for example "sensor_msgs/PointCloud2". Throws MeshError; after one the
+  /// decoder is as before.
+  DecodedMesh decode(const std::string& datatype, const std::uint8_t* data, std::size_t size);
+  /// The same of a message that was never serialised.
+  DecodedMesh decode(const TypedMesh& message);
+  /// The next triangle soup is welded as a first one.
+  void forgetWeld();
+
+ private:
+  MeshInputConfig config_;
+  std::vector<Face> last_faces_;
+  std::shared_ptr<const Topology> topology_;  // of the last message
+  std::vector<Index> weld_;                   // soup corner to vertex
+  std::vector<Index> representative_;         // vertex to one of its corners
+
+  template <typename Read>
+  DecodedMesh guarded(const std::string& datatype, Read read);
+  DecodedMesh decodeView(const CloudView& cloud) { return decodeCloud(cloud); }
+  DecodedMesh decodeView(const IndexedView& mesh) { return decodeIndexed(mesh); }
+  DecodedMesh decodeView(const MarkerView& marker) { return decodeMarkers({marker}); }
+  DecodedMesh decodeView(const std::vector<MarkerView>& markers) { return decodeMarkers(markers); }
+  DecodedMesh decodeCloud(const CloudView& cloud);
+  DecodedMesh decodeIndexed(const IndexedView& mesh);
+  DecodedMesh decodeMarkers(const std::vector<MarkerView>& markers);
+  DecodedMesh decodeSoup(const MarkerView& marker);
+  void checkCount(std::size_t count) const;
+  void start(const HeaderView& header, DecodedMesh& mesh) const;
+  void addRadii(const CloudView* cloud, DecodedMesh& mesh) const;
+  std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
+  std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
+  bool weldHolds(const Positions& corners) const;
+  /// Returns how many vertices came apart, which they do only where it refines.
+  std::size_t weldAnew(const Positions& corners, bool refine);
+};
+
+}  // namespace dccd

@@ -1,0 +1,171 @@
+#include "input/mesh_views.h"
+
+namespace dccd {
+
+HeaderView readHeader(WireReader& wire) {
+  wire.skip(4, "header.seq");
+  const auto seconds = wire.read<std::uint32_t>("header.stamp");
+  const auto nanoseconds = wire.read<std::uint32_t>("header.stamp");
+  if (nanoseconds >= 1000000000u) throw WireError("header.stamp has " + std::to_string(nanoseconds) + " nanoseconds");
+  HeaderView header;
+  header.stamp_ns = static_cast<StampNs>(seconds) * 1000000000 + nanoseconds;
+  header.frame_id = wire.readString("header.frame_id");
+  return header;
+}
+
+namespace {
+
+constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
+
+CloudView::Coordinate fieldOf(std::string_view name, std::size_t offset, std::uint8_t datatype) {
+  if (datatype != FLOAT32 && datatype != FLOAT64) {
+    throw WireError("field '" + std::string(name) + "' has datatype " + std::to_string(datatype) +
+                    "; FLOAT32 (7) or FLOAT64 (8) is needed");
+  }
+  return {offset, datatype == FLOAT64};
+}
+
+void readFields(WireReader& wire, const std::string& extra_field, CloudView& cloud) {
+  CloudFieldFinder finder(extra_field);
+  const std::size_t count = wire.readCount("fields", 4 + 4 + 1 + 4);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string_view name = wire.readString("fields.name");
+    const std::size_t offset = wire.read<std::uint32_t>("fields.offset");
+    const auto datatype = wire.read<std::uint8_t>("fields.datatype");
+    wire.skip(4, "fields.count");
+    finder.add(name, offset, datatype, cloud);
+  }
+  finder.finish(cloud);
+}
+
+}  // namespace
+
+void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud) {
+  if (!extra_field_.empty() && name == extra_field_) cloud.extra = fieldOf(name, offset, datatype);
+  if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') return;
+  const auto axis = static_cast<std::size_t>(name[0] - 'x');
+  cloud.xyz[axis] = fieldOf(name, offset, datatype);
+  found_[axis] = true;
+}
+
+void CloudFieldFinder::finish(const CloudView& cloud) const {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!found_[axis]) throw WireError(std::string("there is no field '") + static_cast<char>('x' + axis) + "'");
+  }
+  if (!extra_field_.empty() && !cloud.extra) {
+    throw WireError("there is no field '" + extra_field_ + "', which parameter uncertainty/field names");
+  }
+}
+
+void checkStrides(const CloudView& cloud, std::size_t bytes) {
+  for (const CloudView::Coordinate& coordinate :
+       {cloud.xyz[0], cloud.xyz[1], cloud.xyz[2], cloud.extra.value_or(cloud.xyz[0])}) {
+    if (coordinate.offset + (coordinate.is_double ? 8 : 4) > cloud.point_step) {
+      throw WireError("a coordinate's offset " + std::to_string(coordinate.offset) + " reaches past point_step " +
+                      std::to_string(cloud.point_step));
+    }
+  }
+  if (cloud.size() == 0) return;
+  // All factors are 32 bits wide, so that the products fit; a single row need not state its stride.
+  const std::uint64_t row = static_cast<std::uint64_t>(cloud.width) * cloud.point_step;
+  if (cloud.height > 1 && cloud.row_step < row) {
+    throw WireError("row_step " + std::to_string(cloud.row_step) + " is less than width x point_step " +
+                    std::to_string(row));
+  }
+  const std::uint64_t stride = cloud.row_step;
+  if (row > bytes || (cloud.height - 1) > (bytes - row) / (stride ? stride : 1)) {
+    throw WireError(std::to_string(cloud.height) + " x " + std::to_string(cloud.width) + " points of " +
+                    std::to_string(cloud.point_step) + " bytes do not fit into data of " + std::to_string(bytes));
+  }
+}
+
+double CloudView::value(std::size_t i, const Coordinate& field) const {
+  const std::uint8_t* at = data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step + field.offset;
+  if (field.is_double) {
+    double value;
+    std::memcpy(&value, at, 8);
+    return value;
+  }
+  float value;
+  std::memcpy(&value, at, 4);
+  return static_cast<double>(value);
+}
+
+Vec3 CloudView::point(std::size_t i) const { return {value(i, xyz[0]), value(i, xyz[1]), value(i, xyz[2])}; }
+
+CloudView readCloud(WireReader& wire, const std::string& extra_field) {
+  CloudView cloud;
+  cloud.header = readHeader(wire);
+  cloud.height = wire.read<std::uint32_t>("height");
+  cloud.width = wire.read<std::uint32_t>("width");
+  readFields(wire, extra_field, cloud);
+  if (wire.read<std::uint8_t>("is_bigendian")) throw WireError("is_bigendian is set; send little-endian clouds");
+  cloud.point_step = wire.read<std::uint32_t>("point_step");
+  cloud.row_step = wire.read<std::uint32_t>("row_step");
+  const WireSpan<std::uint8_t> data = wire.readArray<std::uint8_t>("data");
+  wire.skip(1, "is_dense");
+  cloud.data = data.data;
+  checkStrides(cloud, data.size);
+  return cloud;
+}
+
+IndexedView readMeshStamped(WireReader& wire) {
+  IndexedView mesh;
+  mesh.header = readHeader(wire);
+  mesh.points = wire.readArray<std::array<double, 3>>("vertices");
+  mesh.triangles = wire.readArray<std::array<std::uint32_t, 3>>("triangles");
+  return mesh;
+}
+
+IndexedView readShapeMesh(WireReader& wire) {
+  IndexedView mesh;
+  mesh.triangles = wire.readArray<std::array<std::uint32_t, 3>>("triangles");
+  mesh.points = wire.readArray<std::array<double, 3>>("vertices");
+  return mesh;
+}
+
+void fillHeader(IndexedView& mesh) {
+  if (mesh.header->stamp_ns == 0) mesh.header->stamp_ns = mesh.cloud->header.stamp_ns;
+  if (mesh.header->frame_id.empty()) mesh.header->frame_id = mesh.cloud->header.frame_id;
+}
+
+IndexedView readPolygonMesh(WireReader& wire, const std::string& extra_field) {
+  IndexedView mesh;
+  mesh.header = readHeader(wire);
+  mesh.cloud = readCloud(wire, extra_field);
+  fillHeader(mesh);
+  const std::size_t count = wire.readCount("polygons", 4);
+  mesh.polygons.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) mesh.polygons.push_back(wire.readArray<std::uint32_t>("polygons.vertices"));
+  return mesh;
+}
+
+MarkerView readMarker(WireReader& wire) {
+  MarkerView marker;
+  marker.header = readHeader(wire);
+  marker.ns = wire.readString("ns");
+  marker.id = wire.read<std::int32_t>("id");
+  marker.type = wire.read<std::int32_t>("type");
+  marker.action = wire.read<std::int32_t>("action");
+  for (double& value : marker.pose) value = wire.read<double>("pose");
+  for (double& value : marker.scale) value = wire.read<double>("scale");
+  wire.skip(4 * 4 + 8 + 1, "color, lifetime, frame_locked");
+  marker.points = wire.readArray<std::array<double, 3>>("points");
+  wire.readArray<std::array<float, 4>>("colors");
+  wire.readString("text");
+  wire.readString("mesh_resource");
+  wire.skip(1, "mesh_use_embedded_materials");
+  return marker;
+}
+
+std::vector<MarkerView> readMarkerArray(WireReader& wire) {
+  // The smallest marker on the wire: all strings and arrays empty.
+  constexpr std::size_t MIN_MARKER_BYTES = 16 + 4 + 12 + 56 + 24 + 25 + 4 + 4 + 4 + 4 + 1;
+  const std::size_t count = wire.readCount("markers", MIN_MARKER_BYTES);
+  std::vector<MarkerView> markers;
+  markers.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) markers.push_back(readMarker(wire));
+  return markers;
+}
+
+}  // namespace dccd

@@ -1,0 +1,89 @@
+// What the accepted message types say about a mesh, as views into the message's bytes (wire.h).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dccd/mesh_store.h"
+#include "input/wire.h"
+
+namespace dccd {
+
+struct HeaderView {
+  StampNs stamp_ns = 0;
+  std::string_view frame_id;
+};
+
+/// std_msgs/Header. Throws WireError, also for a stamp with too many nanoseconds.
+HeaderView readHeader(WireReader& wire);
+
+/// sensor_msgs/PointCloud2. Fields are located by name and datatype; strides are held against the data.
+struct CloudView {
+  HeaderView header;
+  std::size_t height = 0, width = 0, point_step = 0, row_step = 0;
+  const std::uint8_t* data = nullptr;
+  struct Coordinate {
+    std::size_t offset = 0;
+    bool is_double = false;
+  };
+  std::array<Coordinate, 3> xyz;
+  std::optional<Coordinate> extra;  ///< the further field that was asked for
+  std::size_t size() const { return height * width; }
+  Vec3 point(std::size_t i) const;
+  /// Value of the further field; only where there is one.
+  double extraValue(std::size_t i) const { return value(i, *extra); }
+  double value(std::size_t i, const Coordinate& field) const;
+};
+/// extra_field: name of a further FLOAT32 or FLOAT64 field that the cloud must have; empty: none.
+CloudView readCloud(WireReader& wire, const std::string& extra_field = {});
+
+/// Looks for the fields x, y and z of a cloud, and a further one if it is named, one after the other. Throws WireError
+/// for a type that is no coordinate.
+class CloudFieldFinder {
+ public:
+  explicit CloudFieldFinder(const std::string& extra_field) : extra_field_(extra_field) {}
+  void add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud);
+  /// Throws WireError naming the field that is not there.
+  void finish(const CloudView& cloud) const;
+
+ private:
+  const std::string& extra_field_;
+  std::array<bool, 3> found_{};
+};
+/// Throws WireError unless every coordinate of every point lies within `bytes` of data.
+void checkStrides(const CloudView& cloud, std::size_t bytes);
+
+/// Triangles by index: MeshStamped, shape_msgs/Mesh, pcl_msgs/PolygonMesh.
+struct IndexedView {
+  std::optional<HeaderView> header;
+  std::optional<CloudView> cloud;                    ///< PolygonMesh: the vertices
+  WireSpan<std::array<double, 3>> points;            ///< otherwise
+  WireSpan<std::array<std::uint32_t, 3>> triangles;  ///< otherwise
+  std::vector<WireSpan<std::uint32_t>> polygons;     ///< PolygonMesh
+  std::size_t size() const { return cloud ? cloud->size() : points.size; }
+};
+IndexedView readMeshStamped(WireReader& wire);
+IndexedView readShapeMesh(WireReader& wire);
+IndexedView readPolygonMesh(WireReader& wire, const std::string& extra_field = {});
+/// PolygonMesh: where the mesh's own header says nothing, its cloud's counts.
+void fillHeader(IndexedView& mesh);
+
+/// One visualization_msgs/Marker.
+struct MarkerView {
+  HeaderView header;
+  std::string_view ns;
+  std::int32_t id = 0, type = 0, action = 0;
+  std::array<double, 7> pose{};  ///< position x y z, quaternion x y z w
+  std::array<double, 3> scale{};
+  WireSpan<std::array<double, 3>> points;
+};
+constexpr std::int32_t MARKER_TRIANGLE_LIST = 11;
+constexpr std::int32_t MARKER_ADD = 0;
+MarkerView readMarker(WireReader& wire);
+std::vector<MarkerView> readMarkerArray(WireReader& wire);
+
+}  // namespace dccd

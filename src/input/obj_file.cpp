@@ -1,0 +1,95 @@
+#include "input/obj_file.h"
+
+#include <cstdlib>
+#include <fstream>
+
+namespace dccd {
+
+namespace {
+
+bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+class ObjReader {
+ public:
+  explicit ObjReader(const std::string& path) : path_(path) {}
+
+  MeshFile read(std::istream& in) {
+    for (std::string line; std::getline(in, line);) {
+      ++line_;
+      if (line.size() < 2 || !isBlank(line[1])) continue;
+      if (line[0] == 'v') readVertex(line);
+      if (line[0] == 'f') readFace(line);
+    }
+    // Faces may name vertices that come after them.
+    for (const Face& face : mesh_.faces) {
+      for (const Index v : face) {
+        if (v >= mesh_.positions.size()) {
+          throw MeshFileError(path_ + ": a face names vertex " + std::to_string(std::size_t{v} + 1) + " of " +
+                              std::to_string(mesh_.positions.size()));
+        }
+      }
+    }
+    if (mesh_.positions.empty()) throw MeshFileError(path_ + ": no vertices");
+    return std::move(mesh_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw MeshFileError(path_ + ":" + std::to_string(line_) + ": " + what);
+  }
+
+  void readVertex(const std::string& line) {
+    Vec3 p;
+    const char* at = line.c_str() + 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      char* end = nullptr;
+      p[axis] = std::strtod(at, &end);
+      if (end == at) fail("a vertex needs three numbers");
+      at = end;
+    }
+    mesh_.positions.push_back(p);
+  }
+
+  void readFace(const std::string& line) {
+    Index first = 0, previous = 0;
+    std::size_t corners = 0;
+    const char* at = line.c_str() + 1;
+    while (true) {
+      while (isBlank(*at)) ++at;
+      if (*at == '\0') break;
+      char* end = nullptr;
+      const long long number = std::strtoll(at, &end, 10);
+      if (end == at || number == 0) fail("a corner of a face is no vertex's number");
+      const Index v = index(number);
+      // Texture and normal of the corner.
+      for (at = end; *at != '\0' && !isBlank(*at); ++at) {
+      }
+      if (corners == 0) first = v;
+      if (corners >= 2) mesh_.faces.push_back({first, previous, v});
+      previous = v;
+      ++corners;
+    }
+    if (corners < 3) fail("a face needs three corners");
+  }
+
+  Index index(long long number) const {
+    const long long count = static_cast<long long>(mesh_.positions.size());
+    const long long v = number > 0 ? number - 1 : count + number;
+    if (v < 0 || v >= NO_INDEX) fail("a face names vertex " + std::to_string(number));
+    return static_cast<Index>(v);
+  }
+
+  const std::string& path_;
+  std::size_t line_ = 0;
+  MeshFile mesh_;
+};
+
+}  // namespace
+
+MeshFile loadObjFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw MeshFileError(path + ": cannot be opened");
+  return ObjReader(path).read(file);
+}
+
+}  // namespace dccd

@@ -1,0 +1,20 @@
+// Why nothing arrives, as far as the master and the clock can tell.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace dccd {
+
+/// One topic that is waited for.
+struct AwaitedTopic {
+  std::string name;              ///< resolved
+  std::uint32_t publishers = 0;  ///< connected
+};
+
+/// A sentence about the clock or about topics from which no message has come, with what to do; empty when all is well.
+/// Asks the master what there is instead, so call it rarely and never in a callback.
+std::string silenceHint(const std::vector<AwaitedTopic>& silent);
+
+}  // namespace dccd

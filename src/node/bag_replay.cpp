@@ -1,0 +1,292 @@
+#include "output/output_messages.h"
+
+#include "node/bag_replay.h"
+
+#include <map>
+#include <optional>
+#include <set>
+
+#include <rosbag/view.h>
+#include <shape_msgs/Mesh.h>
+#include <tf2_msgs/TFMessage.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "input/known_types.h"
+#include "input/wire.h"
+#include "node/effects.h"
+#include "report/progress_bar.h"
+#include "ros/transforms.h"
+
+namespace dccd {
+namespace {
+
+// Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
+const ros::Duration TF_AHEAD(10.0);
+const ros::Duration TF_KEPT(60.0);
+// Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
+const ros::Duration SEAM(1.0);
+
+std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
+
+std::vector<std::uint8_t> bytesOf(const rosbag::MessageInstance& message) {
+  std::vector<std::uint8_t> bytes(message.size());
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  message.write(stream);
+  return bytes;
+}
+
+/// As the node takes it: without a stamp of its own the map is of the time at which it came.
+LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config) {
+  LoadedMap map;
+  map.problem = mapTypeProblem(message.getDataType(), message.getMD5Sum());
+  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config);
+  if (map.stamp_ns == 0) map.stamp_ns = static_cast<StampNs>(message.getTime().toNSec());
+  return map;
+}
+
+/// Of a serialised message of a mesh type; 0: none.
+StampNs stampOf(const std::string& datatype, const std::vector<std::uint8_t>& bytes) {
+  if (datatype == ros::message_traits::datatype<shape_msgs::Mesh>()) return 0;
+  try {
+    WireReader reader(bytes.data(), bytes.size());
+    // A header comes first; that of an array is its first marker's.
+    if (datatype == ros::message_traits::datatype<visualization_msgs::MarkerArray>() &&
+        reader.readCount("markers", 1) == 0) {
+      return 0;
+    }
+    reader.read<std::uint32_t>("seq");
+    const auto seconds = reader.read<std::uint32_t>("secs");
+    return StampNs{seconds} * 1000000000 + reader.read<std::uint32_t>("nsecs");
+  } catch (const WireError&) {
+    return 0;  // the decoder will say what is wrong
+  }
+}
+
+/// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the
+/// meshes have gone back, too.
+class TransformWindow {
+ public:
+  TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
+      : feed_(feed),
+        view_(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"})),
+        next_(view_.begin()) {
+    rosbag::View statics(bag, rosbag::TopicQuery("/tf_static"));
+    for (const rosbag::MessageInstance& m : statics) {
+      if (const auto tf = m.instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);
+    }
+  }
+
+  /// A mesh with this stamp (0: none) is the next message of the bag.
+  void meshComes(std::size_t body, StampNs stamp_ns, const ros::Time& at) {
+    if (stamp_ns == 0) return;
+    const auto [newest, first] = newest_mesh_.try_emplace(body, stamp_ns);
+    if (!first && stamp_ns < newest->second - JUMP_BACK_NS) {
+      meshes_went_back_ = at;
+      newest_mesh_.clear();
+      newest_mesh_[body] = stamp_ns;
+    } else {
+      newest->second = std::max(newest->second, stamp_ns);
+    }
+  }
+
+  void feedUntil(const ros::Time& at) {
+    for (; next_ != view_.end() && next_->getTime() <= at + TF_AHEAD; ++next_) {
+      const bool is_static = next_->getTopic() == "/tf_static";
+      if (!waiting_) waiting_ = next_->instantiate<tf2_msgs::TFMessage>();
+      // Where the meshes never go back, its turn comes all the same.
+      const ros::Time recorded = next_->getTime();
+      const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);
+      if (waiting_ && feed_.clears(*waiting_, is_static) && !due) return;
+      if (waiting_) feed_.add(*waiting_, is_static);
+      waiting_.reset();
+    }
+  }
+
+ private:
+  TransformFeed& feed_;
+  rosbag::View view_;
+  rosbag::View::iterator next_;
+  tf2_msgs::TFMessage::ConstPtr waiting_;  // the message at next_, where it was read already
+  std::map<std::size_t, StampNs> newest_mesh_;
+  std::optional<ros::Time> meshes_went_back_;
+};
+
+}  // namespace
+
+struct BagReplay::Run {
+  const Sink& sink;
+  const Sink& predictions;
+  rosbag::Bag bag;
+  tf2::BufferCore transforms{TF_KEPT + TF_AHEAD};
+  TransformFeed feed{transforms};
+  MonitorPipeline pipeline;
+  EffectTracker effects;
+  std::optional<LookAheadScore> look_ahead;
+  std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one MarkerArray
+  BagReplaySummary summary;
+  std::set<std::string> complained;
+
+  Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
+      : sink(to), predictions(predictions_to), bag(r.path_), pipeline(r.config_, transforms), effects(r.config_) {
+    if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
+    for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
+      const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
+      summary.mesh_topics.push_back(topic);
+      if (!topic.empty()) bodies_of_topic[topic].push_back(b);
+    }
+  }
+
+  /// The prediction that follows from an answered outcome, whose statistics get its cost.
+  std::optional<StepOutcome> predict(StepOutcome& outcome) {
+    if (!look_ahead) return std::nullopt;
+    look_ahead->observe(outcome);
+    if (!outcome.answered) return std::nullopt;
+    std::optional<StepOutcome> prediction = pipeline.monitor().predict();
+    look_ahead->predict(*prediction);
+    outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(*prediction);
+    return prediction;
+  }
+
+  void complain(const std::string& text) {
+    if (complained.insert(text).second) summary.complaints.push_back(text);
+  }
+
+  void setMap(LoadedMap map, std::int64_t now_ns) {
+    ++summary.maps;
+    if (!map.surface) {
+      ++summary.maps_refused;
+      complain("octomap refused: " + map.problem);
+      map.problem = "the octomap was refused: " + map.problem;
+    }
+    pipeline.setMap(std::move(map), now_ns);
+  }
+
+  void drain(const ros::Time& at) {
+    StepOutcome outcome;
+    while (pipeline.next(static_cast<std::int64_t>(at.toNSec()), outcome)) {
+      effects.learn(outcome, pipeline.monitor());
+      const std::optional<StepOutcome> prediction = predict(outcome);
+      sink(outcome, pipeline, summary, at);
+      if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
+      effects.apply(pipeline.monitor(), summary.maps > 0);
+    }
+    for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {
+      const std::string complaint = pipeline.takeComplaint(b);
+      if (!complaint.empty()) complain(summary.mesh_topics[b] + ": " + complaint);
+    }
+  }
+
+  void mesh(std::size_t body, const rosbag::MessageInstance& message, std::vector<std::uint8_t> bytes) {
+    const ros::Time at = message.getTime();
+    const std::int64_t now_ns = static_cast<std::int64_t>(at.toNSec());
+    ++summary.mesh_messages;
+    const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
+    drain(at);  // what waited for other bodies until now gives up first
+    if (problem.empty()) {
+      pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns});
+    } else {
+      pipeline.refuse(body, now_ns, now_ns, problem);
+    }
+    if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
+    drain(at);
+  }
+};
+
+BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options)
+    : path_(bag), config_(std::move(config)), options_(std::move(options)) {
+  // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
+  config_.transform_timeout_s = 0;
+  if (!options_.octomap_file.empty()) config_.octomap_file = options_.octomap_file;
+  rosbag::Bag file(path_);
+  rosbag::View view(file);
+  std::set<std::string> topics;
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) topics.insert(c->topic);
+  bool found = false;
+  std::string wanted, present;
+  for (const BodyConfig& body : config_.bodies) {
+    if (body.isRigid()) continue;
+    found |= topics.count(absolute(body.topic)) > 0;
+    wanted += (wanted.empty() ? "" : ", ") + absolute(body.topic);
+  }
+  for (const std::string& t : topics) present += (present.empty() ? "" : ", ") + t;
+  if (!found) {
+    throw std::runtime_error(path_ + ": no topic " + wanted + "; the bag has " +
+                             (present.empty() ? "no messages" : present));
+  }
+}
+
+BagReplay::~BagReplay() = default;
+
+std::string BagReplay::firstMeshTopic(const std::string& bag) {
+  rosbag::Bag file(bag);
+  rosbag::View view(file);
+  std::map<std::string, std::string> types;
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) {
+    if (meshTypeProblem(c->datatype, c->md5sum).empty() && !isMonitorsMarkers(c->topic, types)) return c->topic;
+  }
+  return "";
+}
+
+std::string BagReplay::firstMapTopic(const std::string& bag) {
+  rosbag::Bag file(bag);
+  rosbag::View view(file);
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) {
+    if (mapTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
+  }
+  return "";
+}
+
+BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
+  Run run(*this, sink, predictions);
+  const std::string map_topic = absolute(config_.octomap_topic);
+  const bool bag_maps = config_.octomap_file.empty() && run.effects.mayUseMap();
+
+  rosbag::View all(run.bag);
+  if (all.size() == 0) return run.summary;
+  run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
+  if (!config_.octomap_file.empty() && run.effects.mayUseMap()) {
+    run.setMap(loadMapFile(config_.octomap_file, config_), 0);
+  }
+
+  rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
+  ros::Time first_map;
+  if (bag_maps && maps.size() > 0) {
+    const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
+    const rosbag::MessageInstance& first = *at_first;
+    first_map = first.getTime();
+    run.setMap(readMap(first, config_), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
+  }
+  run.effects.apply(run.pipeline.monitor(), run.summary.maps > 0);
+
+  TransformWindow transforms(run.bag, run.feed);
+  ProgressBar progress(path_, all.size(), options_.show_progress);
+  ros::Time at = all.getBeginTime();
+  for (const rosbag::MessageInstance& m : all) {
+    at = m.getTime();
+    if (messages) messages(m);
+    const auto bodies = run.bodies_of_topic.find(m.getTopic());
+    const bool is_mesh = bodies != run.bodies_of_topic.end();
+    std::vector<std::uint8_t> bytes;
+    if (is_mesh) {
+      bytes = bytesOf(m);
+      for (const std::size_t body : bodies->second) transforms.meshComes(body, stampOf(m.getDataType(), bytes), at);
+    }
+    transforms.feedUntil(at);
+    if (is_mesh) {
+      for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
+    } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
+      run.setMap(readMap(m, config_), static_cast<std::int64_t>(at.toNSec()));
+    }
+    progress.advance();
+  }
+  run.pipeline.finish();
+  run.drain(at);
+  run.summary.frames = run.pipeline.monitor().total();
+  run.summary.effects = run.effects.plan();
+  run.summary.left_out = run.pipeline.monitor().leftOut();
+  if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();
+  return run.summary;
+}
+
+}  // namespace dccd

@@ -1,0 +1,69 @@
+// A bag through the monitor without a master: the same pipeline as the node's, driven by the bag's clock, nothing
+// dropped.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <ros/time.h>
+#include <rosbag/bag.h>
+
+#include "dccd/look_ahead_score.h"
+#include "node/map_loader.h"
+#include "node/monitor_pipeline.h"
+
+namespace dccd {
+
+struct BagReplayOptions {
+  std::string octomap_file;  ///< instead of the bag's maps; empty: none
+  bool show_progress = false;
+};
+
+/// What a replay met besides outcomes.
+struct BagReplaySummary {
+  std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
+  std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0;
+  std::vector<std::string> complaints;  ///< refused messages, each kind once
+  FrameCounters frames;
+  EffectPlan effects;                          ///< at the end
+  std::vector<LeftOutPair> left_out;           ///< at the end
+  std::optional<LookAheadSummary> look_ahead;  ///< where look_ahead_s is above 0
+  double duration_s = 0;
+};
+
+class BagReplay {
+ public:
+  /// Called for each outcome, in order; `at` is the bag time of the message that led to it, `so_far` counts messages up
+  /// to that one.
+  using Sink =
+      std::function<void(const StepOutcome&, MonitorPipeline&, const BagReplaySummary& so_far, const ros::Time& at)>;
+  /// Called for each message of the bag, in order, before its outcomes.
+  using MessageSink = std::function<void(const rosbag::MessageInstance&)>;
+
+  /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.
+  BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
+  ~BagReplay();
+
+  /// The first topic of the bag that carries meshes and is no monitor's own, for configurations that name none. Empty:
+  /// none.
+  static std::string firstMeshTopic(const std::string& bag);
+  /// The first topic of the bag that carries octomaps. Empty: none.
+  static std::string firstMapTopic(const std::string& bag);
+
+  /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
+  /// across a loop's end before the meshes have come to it, too; a map that
+  /// was recorded after the first frame (latched ones are, often) is known from the start.
+  /// `predictions` gets, where there is a look-ahead, that of each step after the step itself; of a step without an
+  /// answer the step again.
+  BagReplaySummary run(const Sink& sink, const MessageSink& messages = nullptr, const Sink& predictions = nullptr);
+
+ private:
+  struct Run;
+  std::string path_;
+  MonitorConfig config_;
+  BagReplayOptions options_;
+};
+
+}  // namespace dccd

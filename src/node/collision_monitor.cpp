@@ -1,0 +1,195 @@
+#include "node/collision_monitor_impl.h"
+
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "dccd/simd_target.h"
+#include "input/known_types.h"
+
+namespace dccd {
+namespace {
+
+using topic_tools::ShapeShifter;
+
+constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
+constexpr double SERVICE_TIMEOUT_S = 10;
+const ros::WallDuration RENEWAL(0.05);
+
+MonitorConfig configOf(const ros::NodeHandle& private_node) {
+  XmlRpc::XmlRpcValue tree;
+  private_node.getParam(private_node.getNamespace(), tree);
+  MonitorConfig config = readConfig(tree);
+  setSimdTarget(config.simd_target);
+  return config;
+}
+
+}  // namespace
+
+CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle)
+    : node(node_handle),
+      private_node(private_handle),
+      config(configOf(private_handle)),
+      pipeline(config, transforms),
+      recorder(config, pipeline.monitor()),
+      outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
+      queue(config.bodies.size(), config.queue_size, config.queue_policy),
+      diagnostics(private_node.getNamespace(), node),
+      log(node, private_node.getNamespace(), config),
+      effects(config, log.mapSource()),
+      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
+
+// --- input thread ----------------------------------------------------------------------------------------------------
+
+void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
+  const std::int64_t now_ns = steadyNs();
+  frames_handed_over += std::holds_alternative<TypedMesh>(message);
+  // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
+  if (!enabled && !pipeline.isStatic(body)) {
+    queue.command([this, body] {
+      pipeline.monitor().countReceived(body);
+      pipeline.monitor().countDropped(body, StepStatus::DISABLED);
+    });
+    return;
+  }
+  queue.push(body, {std::move(message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns});
+}
+
+void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
+  map_publisher_seen = true;
+  const std::string problem = mapTypeProblem(message->getDataType(), message->getMD5Sum());
+  if (!problem.empty()) {
+    maps->countRefused();
+    queue.command([this, problem] { log.complain(config.bodies.size(), "map type", problem); });
+    return;
+  }
+  if (message->size() > config.max_map_bytes) {
+    maps->countRefused();
+    queue.command([this, size = message->size()] {
+      log.complain(config.bodies.size(), "map size",
+                   "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
+      LoadedMap refused;
+      refused.problem = "the octomap is larger than max_map_mb";
+      pipeline.setMap(std::move(refused), steadyNs());
+    });
+    return;
+  }
+  maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
+}
+
+void CollisionMonitor::Impl::subscribe() {
+  ros::NodeHandle input(node);
+  input.setCallbackQueue(&input_callbacks);
+  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  mesh_subscriptions.resize(config.bodies.size());
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (config.bodies[b].isRigid()) continue;
+    mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
+        input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
+  }
+  renewal = input.createSteadyTimer(RENEWAL, [this](const ros::SteadyTimerEvent&) {
+    for (const auto& subscription : mesh_subscriptions) {
+      if (subscription) subscription->renew();
+    }
+  });
+  tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
+      "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
+      ros::VoidConstPtr(), hints);
+  tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
+      "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, true); });
+  if (!effects.mayUseMap()) return;
+  maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
+  if (!config.octomap_file.empty()) {
+    maps->submitFile(config.octomap_file);
+  } else {
+    map_subscriber =
+        input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
+  }
+}
+
+// --- service thread --------------------------------------------------------------------------------------------------
+
+void CollisionMonitor::Impl::advertiseServices() {
+  using Trigger = std_srvs::Trigger;
+  using SetBool = std_srvs::SetBool;
+  ros::NodeHandle service(private_node);
+  service.setCallbackQueue(&service_callbacks);
+  const auto advertise = [&](const char* name, const std::function<Reply()>& run) {
+    services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
+        name, [this, run](Trigger::Request&, Trigger::Response& response) {
+          const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+          response.success = reply.success;
+          response.message = reply.message;
+          return true;
+        }));
+  };
+  advertise("reset", [this] {
+    resetNow(StepStatus::RESET);
+    return Reply{true, "frames forgotten; the next one is a first frame"};
+  });
+  advertise("check_now", [this] {
+    const StepOutcome outcome = pipeline.checkNow();
+    return Reply{outcome.answered, describe(outcome)};
+  });
+  advertise("record_step", [this] {
+    Reply reply;
+    reply.success = recorder.record(reply.message);
+    return reply;
+  });
+  services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
+      "enable", [this](SetBool::Request& request, SetBool::Response& response) {
+        enabled = request.data;
+        const auto run = [this, on = request.data] {
+          resetNow(StepStatus::DISABLED);
+          return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
+        };
+        const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+        response.success = reply.success;
+        response.message = reply.message;
+        return true;
+      }));
+  reconfigure = std::make_unique<Reconfigure>(
+      service, config, [this](const MonitorOptions& options, const MarkerConfig& markers) {
+        queue.command([this, options, markers] { reconfigureNow(options, markers); });
+      });
+}
+
+// --- start and stop
+// ---------------------------------------------------------------------------------------------------
+
+void CollisionMonitor::Impl::start() {
+  subscribe();
+  advertiseServices();
+  worker = std::thread([this] { work(); });
+  input_spinner.start();
+  service_spinner.start();
+}
+
+void CollisionMonitor::Impl::stop() {
+  stopping = true;
+  renewal.stop();
+  input_spinner.stop();
+  queue.wake();
+  if (worker.joinable()) worker.join();
+  queue.close();  // before the service thread is waited for: it may itself wait for a command
+  service_spinner.stop();
+  reconfigure.reset();
+  maps.reset();
+}
+
+CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
+    : impl_(std::make_unique<Impl>(node, private_node)) {
+  impl_->start();
+}
+
+CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
+
+void CollisionMonitor::installCrashHandler() {
+  try {
+    impl_->recorder.installCrashHandler();
+  } catch (const std::runtime_error& error) {
+    ROS_WARN_STREAM("a crash will not be recorded: " << error.what());
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,28 @@
+// The node's class: the same object as a node (collision_monitor_node) and as a nodelet.
+#pragma once
+
+#include <memory>
+
+#include <ros/node_handle.h>
+
+namespace dccd {
+
+class CollisionMonitor {
+ public:
+  /// Reads the parameters under `private_node`, subscribes, advertises and starts its own threads: callbacks never wait
+  /// for a step. Throws ParameterError or std::invalid_argument with one sentence that names the parameter.
+  CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
+  /// Stops in mid-stream: the step that runs is finished, nothing is published after.
+  ~CollisionMonitor();
+  CollisionMonitor(const CollisionMonitor&) = delete;
+  CollisionMonitor& operator=(const CollisionMonitor&) = delete;
+
+  /// For the program that owns its process: a crash writes the last step (doc/troubleshooting.md).
+  void installCrashHandler();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dccd

@@ -1,0 +1,103 @@
+// The node's inside. Three threads: callbacks of topics hand over to queues, services wait for the worker's answer, and
+// the worker alone touches the pipeline and publishes. collision_monitor.cpp holds the first two, monitor_worker.cpp
+// the third.
+#pragma once
+
+#include "output/outputs.h"
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <ros/spinner.h>
+#include <tf2/buffer_core.h>
+#include <topic_tools/shape_shifter.h>
+
+#include "node/collision_monitor.h"
+#include "node/effects.h"
+#include "node/input_queue.h"
+#include "node/map_loader.h"
+#include "node/monitor_log.h"
+#include "node/monitor_pipeline.h"
+#include "node/reconfigure.h"
+#include "node/step_recorder.h"
+#include "output/diagnostics.h"
+#include "ros/transforms.h"
+
+namespace dccd {
+
+inline std::int64_t steadyNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+inline std::vector<std::uint8_t> bytesOf(const topic_tools::ShapeShifter& message) {
+  std::vector<std::uint8_t> bytes(message.size());
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  message.write(stream);
+  return bytes;
+}
+
+struct CollisionMonitor::Impl {
+  ros::NodeHandle node, private_node;
+  MonitorConfig config;
+  tf2::BufferCore transforms;
+  TransformFeed feed{transforms};
+  MonitorPipeline pipeline;
+  StepRecorder recorder;
+  Outputs outputs;
+  InputQueue queue;
+  Diagnostics diagnostics;
+  MonitorLog log;
+  EffectTracker effects;
+  LookAheadScore look_ahead;
+  std::unique_ptr<MapLoader> maps;
+
+  ros::CallbackQueue input_callbacks, service_callbacks;
+  ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
+  std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
+  ros::SteadyTimer renewal;
+  ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
+  std::vector<ros::ServiceServer> services;
+  std::unique_ptr<Reconfigure> reconfigure;
+  std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
+  std::atomic<std::uint64_t> frames_handed_over{0};
+  std::thread worker;
+  StampNs newest_ns = 0;                // stamp of the last outcome; the worker's
+  std::uint64_t steps_unpublished = 0;  // the worker's, too
+
+  Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle);
+
+  void start();
+  void stop();
+
+  // Input thread.
+  void subscribe();
+  void onMesh(std::size_t body, MeshMessage message);
+  void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
+
+  // Service thread.
+  void advertiseServices();
+
+  // Worker.
+  void work();
+  void run(const std::function<void()>& command);
+  void takeMaps();
+  void takeMessage(std::size_t body, const QueuedMessage& queued);
+  void takeMessages();
+  void tellComplaints();
+  void publish(StepOutcome& outcome);
+  void publishAll(StepOutcome& outcome);
+  void predict(StepOutcome& outcome);
+  void publishPrediction(const StepOutcome& prediction);
+  void publishEffects(const ros::Time& stamp);
+  void accountDropped();
+  void lookIntoSilence();
+  void reconfigureNow(MonitorOptions options, const MarkerConfig& markers);
+  void resetNow(StepStatus status);
+  StatsContext statsContext() const;
+};
+
+}  // namespace dccd

@@ -1,0 +1,103 @@
+#include "node/effects.h"
+
+#include <algorithm>
+#include <sstream>
+
+namespace dccd {
+
+namespace {
+
+std::string noiseOf(const MeshInputConfig& input) {
+  std::ostringstream text;
+  if (input.noise_radius_m > 0) text << input.noise_radius_m << " m";
+  if (!input.noise_field.empty()) {
+    text << (input.noise_radius_m > 0 ? " + " : "") << input.noise_scale << " x point field '" << input.noise_field
+         << "'";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map_source) : settings_(config.effects) {
+  for (const BodyConfig& body : config.bodies) {
+    EffectBody one;
+    one.name = body.body.name;
+    one.rigid = body.isRigid();
+    one.self_collision = body.body.self_collision;
+    if (body.isUncertain()) one.noise = noiseOf(body.input);
+    scene_.bodies.push_back(one);
+  }
+  scene_.minimum_separation_m = config.largestSeparation();
+  scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
+  if (!map_source.empty()) scene_.map_source = map_source;
+  scene_.map_seen = !config.octomap_file.empty();
+  scene_.look_ahead_s = config.monitor.look_ahead_s;
+  scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
+  plan_ = EffectPlan(scene_, settings_);
+}
+
+bool EffectTracker::mayUseMap() const {
+  const auto setting = settings_.find("octomap");
+  return setting == settings_.end() || setting->second != EffectSetting::OFF;
+}
+
+void EffectTracker::apply(Monitor& monitor, bool map_seen) {
+  if (map_seen && !scene_.map_seen) {
+    scene_.map_seen = true;
+    plan_ = EffectPlan(scene_, settings_);
+  }
+  const bool expected = mapExpected(), start_state = plan_.running("start_state");
+  if (monitor.options().obstacle_expected == expected && monitor.options().detector.check_start_state == start_state)
+    return;
+  MonitorOptions options = monitor.options();
+  options.obstacle_expected = expected;
+  options.detector.check_start_state = start_state;
+  monitor.setOptions(options);
+}
+
+void EffectTracker::learn(const StepOutcome& outcome, const Monitor& monitor) {
+  if (!outcome.answered || !outcome.topologies) return;
+  bool changed = scene_.left_out_pairs != monitor.leftOut().size();
+  scene_.left_out_pairs = monitor.leftOut().size();
+  for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+    const bool has_faces = (*outcome.topologies)[b]->hasFaces();
+    changed = changed || !scene_.bodies[b].topology_known || scene_.bodies[b].has_faces != has_faces;
+    scene_.bodies[b].topology_known = true;
+    scene_.bodies[b].has_faces = has_faces;
+  }
+  if (changed) plan_ = EffectPlan(scene_, settings_);
+}
+
+bool EffectTracker::takeNewPlan() {
+  if (plan_ == told_) return false;
+  told_ = plan_;
+  return true;
+}
+
+bool EffectTracker::takeNewLeftOut(const Monitor& monitor) {
+  const auto same = [](const LeftOutPair& a, const LeftOutPair& b) {
+    return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex;
+  };
+  const std::vector<LeftOutPair>& now = monitor.leftOut();
+  if (std::equal(now.begin(), now.end(), told_left_out_.begin(), told_left_out_.end(), same)) return false;
+  told_left_out_ = now;
+  return true;
+}
+
+deformable_ccd::EffectArray EffectTracker::message(const ros::Time& stamp, const std::string& frame) const {
+  deformable_ccd::EffectArray out;
+  out.header.stamp = stamp;
+  out.header.frame_id = frame;
+  for (const EffectDecision& decision : plan_.decisions()) {
+    deformable_ccd::EffectState state;
+    state.name = decision.name;
+    state.setting = toString(decision.setting);
+    state.running = decision.running;
+    state.reason = decision.reason;
+    out.effects.push_back(state);
+  }
+  return out;
+}
+
+}  // namespace dccd

@@ -1,0 +1,42 @@
+// The effect plan of a running monitor: renewed only when the scene changes, applied between steps.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <deformable_ccd/EffectArray.h>
+
+#include "config/monitor_config.h"
+
+namespace dccd {
+
+class EffectTracker {
+ public:
+  /// Throws std::invalid_argument when an effect is asked for that the scene cannot have.
+  /// `map_source`: the octomap's resolved topic or its file; empty: as the configuration calls it.
+  explicit EffectTracker(const MonitorConfig& config, const std::string& map_source = {});
+
+  /// False: the octomap is switched off, nothing is subscribed to for it.
+  bool mayUseMap() const;
+  bool mapExpected() const { return plan_.running("octomap"); }
+  /// Brings the monitor's options in line with the plan.
+  void apply(Monitor& monitor, bool map_seen);
+  /// Learns topologies and what is left out from the outcome.
+  void learn(const StepOutcome& outcome, const Monitor& monitor);
+  /// True when the plan has changed since the last call, or at the first one.
+  bool takeNewPlan();
+  /// True when the pairs that are left out have changed since the last call; not at first, while there are none.
+  bool takeNewLeftOut(const Monitor& monitor);
+
+  const EffectPlan& plan() const { return plan_; }
+  std::vector<std::string> lines() const { return plan_.lines(); }
+  deformable_ccd::EffectArray message(const ros::Time& stamp, const std::string& frame) const;
+
+ private:
+  EffectScene scene_;
+  std::map<std::string, EffectSetting> settings_;
+  EffectPlan plan_, told_;
+  std::vector<LeftOutPair> told_left_out_;
+};
+
+}  // namespace dccd

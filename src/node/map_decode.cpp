@@ -1,0 +1,71 @@
+// octomap_msgs/Octomap as bytes, and map files, to surfaces.
+#include <exception>
+
+#include "dccd/known_space.h"
+#include "dccd/octomap_decode.h"
+#include "input/mesh_views.h"
+#include "input/wire.h"
+#include "node/map_loader.h"
+
+namespace dccd {
+
+namespace {
+
+OctomapLimits limitsOf(const MonitorConfig& config) {
+  OctomapLimits limits;
+  limits.max_bytes = config.max_map_bytes;
+  return limits;
+}
+
+void build(DecodedOctomap decoded, const MonitorConfig& config, LoadedMap& map) {
+  std::vector<OccupiedLeaf> known;
+  if (config.unknown_space != UnknownSpace::FREE) {
+    known = decoded.occupied;
+    known.insert(known.end(), decoded.free.begin(), decoded.free.end());
+    map.known = KnownSpace::build(decoded.resolution_m, known);
+  }
+  if (config.unknown_space == UnknownSpace::OCCUPIED) {
+    const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box);
+    decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
+  }
+  map.surface = VoxelSurface::build(decoded.resolution_m, std::move(decoded.occupied));
+}
+
+}  // namespace
+
+LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config) {
+  LoadedMap map;
+  try {
+    WireReader wire(bytes.data(), bytes.size());
+    const HeaderView header = readHeader(wire);
+    map.stamp_ns = header.stamp_ns;
+    map.frame_id = header.frame_id.empty() ? config.octomap_frame : std::string(header.frame_id);
+    if (!map.frame_id.empty() && map.frame_id[0] == '/') map.frame_id.erase(0, 1);
+    OctomapFields fields;
+    fields.binary = wire.read<std::uint8_t>("binary") != 0;
+    fields.id = std::string(wire.readString("id"));
+    fields.resolution = wire.read<double>("resolution");
+    const WireSpan<std::uint8_t> data = wire.readArray<std::uint8_t>("data");
+    fields.data = data.data;
+    fields.size = data.size;
+    build(decodeOctomap(fields, limitsOf(config)), config, map);
+  } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
+    map.surface = nullptr;
+    map.problem = error.what();
+  }
+  return map;
+}
+
+LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config) {
+  LoadedMap map;
+  map.frame_id = config.octomap_frame;
+  try {
+    build(readOctomapFile(file, limitsOf(config)), config, map);
+  } catch (const std::exception& error) {
+    map.surface = nullptr;
+    map.problem = error.what();
+  }
+  return map;
+}
+
+}  // namespace dccd

@@ -1,0 +1,66 @@
+#include "node/map_loader.h"
+
+#include <utility>
+
+namespace dccd {
+
+MapLoader::MapLoader(const MonitorConfig& config, std::function<void()> ready)
+    : config_(config), ready_(std::move(ready)), thread_([this] { loop(); }) {}
+
+MapLoader::~MapLoader() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void MapLoader::put(Job job) {
+  ++received_;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    job_ = std::move(job);
+  }
+  changed_.notify_one();
+}
+
+void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns) { put({std::move(bytes), {}, receipt_ns}); }
+
+void MapLoader::submitFile(const std::string& file) { put({{}, file, 0}); }
+
+void MapLoader::countRefused() {
+  ++received_;
+  ++refused_;
+}
+
+bool MapLoader::take(LoadedMap& map) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!done_) return false;
+  map = std::move(*done_);
+  done_.reset();
+  return true;
+}
+
+void MapLoader::loop() {
+  while (true) {
+    Job job;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      changed_.wait(lock, [this] { return stopping_ || job_; });
+      if (stopping_) return;
+      job = std::move(*job_);
+      job_.reset();
+    }
+    LoadedMap map = job.file.empty() ? decodeMapMessage(job.bytes, config_) : loadMapFile(job.file, config_);
+    if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
+    if (!map.surface) ++refused_;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      done_ = std::move(map);
+    }
+    ready_();
+  }
+}
+
+}  // namespace dccd

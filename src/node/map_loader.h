@@ -1,0 +1,63 @@
+// Octomaps are decoded and their surface is built on a thread of its own; the worker swaps the finished one in between
+// steps. Of several that wait, only the newest is worth decoding.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "node/monitor_pipeline.h"
+
+namespace dccd {
+
+/// A serialised octomap_msgs/Octomap to a map; never throws: what is wrong is in LoadedMap::problem.
+LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config);
+/// A .bt or .ot file. Never throws.
+LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config);
+
+class MapLoader {
+ public:
+  /// `ready` is called from the loader's thread when a map can be taken.
+  MapLoader(const MonitorConfig& config, std::function<void()> ready);
+  ~MapLoader();
+  MapLoader(const MapLoader&) = delete;
+  MapLoader& operator=(const MapLoader&) = delete;
+
+  /// A serialised octomap_msgs/Octomap; replaces one that still waits. From any thread.
+  void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns);
+  void submitFile(const std::string& file);
+  /// Counts a message that was refused before it was worth handing over. From any thread.
+  void countRefused();
+  /// The newest finished map, once.
+  bool take(LoadedMap& map);
+
+  std::uint64_t received() const { return received_; }
+  std::uint64_t refused() const { return refused_; }
+
+ private:
+  struct Job {
+    std::vector<std::uint8_t> bytes;
+    std::string file;
+    StampNs receipt_ns = 0;
+  };
+  const MonitorConfig config_;
+  std::function<void()> ready_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<Job> job_;
+  std::optional<LoadedMap> done_;
+  bool stopping_ = false;
+  std::atomic<std::uint64_t> received_{0}, refused_{0};
+  std::thread thread_;
+
+  void put(Job job);
+  void loop();
+};
+
+}  // namespace dccd

@@ -1,0 +1,67 @@
+#include "node/monitor_log.h"
+
+#include <chrono>
+
+#include <ros/console.h>
+
+#include "output/advice.h"
+
+namespace dccd {
+
+namespace {
+
+// A publisher that has not been heard for so long after the start may not be there.
+constexpr std::int64_t PATIENCE_NS = 3000000000;
+
+std::int64_t steadyNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config)
+    : node_(node), name_(name), config_(config) {}
+
+std::string MonitorLog::mapSource() const {
+  return config_.octomap_file.empty() ? node_.resolveName(config_.octomap_topic) : config_.octomap_file;
+}
+
+void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
+  const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();
+  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + text, steadyNs());
+  if (!line.empty()) ROS_WARN_STREAM(line);
+}
+
+void MonitorLog::tell(const StepOutcome& outcome) {
+  if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
+  const std::string advice = adviceFor(outcome.status, outcome.reason, mapSource());
+  const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
+                           (advice.empty() ? "" : "; " + advice);
+  if (outcome.status != StepStatus::TIME_JUMP) {
+    return complain(config_.monitor.clock_body, toString(outcome.status), text);
+  }
+  // A replay that loops is no reason to warn.
+  const std::string topic = topicOf(config_.monitor.clock_body);
+  const std::string line = throttle_.line(topic + " TIME_JUMP", topic + ": " + text, steadyNs());
+  if (!line.empty()) ROS_INFO_STREAM(line);
+}
+
+bool MonitorLog::isSilenceDue(std::int64_t now_ns) {
+  if (asked_ns_ == 0) asked_ns_ = now_ns;
+  if (now_ns - asked_ns_ < PATIENCE_NS) return false;
+  asked_ns_ = now_ns;
+  return true;
+}
+
+void MonitorLog::hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline) {
+  std::string text = silenceHint(silent);
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
+    if (pipeline.hint(b).empty()) continue;
+    text += (text.empty() ? "" : "; ") + topicOf(b) + ": " + pipeline.hint(b);
+  }
+  if (!text.empty() && text != hint_) ROS_WARN_STREAM(name_ << ": " << text);
+  hint_ = std::move(text);
+}
+
+}  // namespace dccd

@@ -1,0 +1,46 @@
+// What the node says to people: throttled lines, each with what to do, and the hints that diagnostics repeat.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+
+#include "config/monitor_config.h"
+#include "dccd/monitor.h"
+#include "input/silence.h"
+#include "node/monitor_pipeline.h"
+#include "ros/log_throttle.h"
+
+namespace dccd {
+
+class MonitorLog {
+ public:
+  MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config);
+
+  /// One line per kind and period, led by the body's topic, or by the map's when there is no such body.
+  void complain(std::size_t body, const std::string& kind, const std::string& text);
+  /// An outcome that is not OK: status, reason, and what to do.
+  void tell(const StepOutcome& outcome);
+  /// Whether it is time to look into silence again: rarely, and not at once.
+  bool isSilenceDue(std::int64_t now_ns);
+  /// Logs a hint when it is another one than before.
+  void hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline);
+  /// What looks like a mistake now; empty: nothing does.
+  const std::string& hint() const { return hint_; }
+
+  std::string topicOf(std::size_t body) const { return node_.resolveName(config_.bodies[body].topic); }
+  /// The octomap's resolved topic, or its file.
+  std::string mapSource() const;
+
+ private:
+  ros::NodeHandle node_;
+  std::string name_;
+  const MonitorConfig& config_;
+  LogThrottle throttle_{5};
+  std::int64_t asked_ns_ = 0;
+  std::string hint_;
+};
+
+}  // namespace dccd

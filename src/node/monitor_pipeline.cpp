@@ -1,0 +1,335 @@
+#include "node/monitor_pipeline.h"
+
+#include <chrono>
+#include <limits>
+#include <utility>
+
+#include "input/mesh_resource.h"
+#include "output/advice.h"
+#include "ros/transforms.h"
+
+namespace dccd {
+
+namespace {
+
+std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
+  std::vector<MonitorBody> bodies;
+  for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
+  return bodies;
+}
+
+MeshResource loadFile(const BodyConfig& body, const std::string& parameter, const std::string& file, double scale) {
+  try {
+    return loadMeshResource(file, scale);
+  } catch (const std::invalid_argument& error) {
+    throw ParameterError("parameter " + parameter + " of body '" + body.body.name + "': " + error.what() +
+                         "; write the path of an STL, OBJ or PLY mesh, or package://NAME/PATH");
+  }
+}
+
+void checkGrid(const BodyConfig& body) {
+  const std::size_t rows = body.input.rows, cols = body.input.cols, points = body.input.file_topology->vertexCount();
+  if (rows == 0 || rows * cols == points) return;
+  throw ParameterError("parameter topology/rows of body '" + body.body.name + "': " + std::to_string(rows) + " x " +
+                       std::to_string(cols) + " = " + std::to_string(rows * cols) + ", but " + body.topology_file +
+                       " has " + std::to_string(points) + " points; remove rows and cols, or file");
+}
+
+}  // namespace
+
+MonitorPipeline::MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms)
+    : config_(config), transforms_(transforms), fixed_frame_(config.fixed_frame) {
+  loadFiles();
+  monitor_ = std::make_unique<Monitor>(config_.monitor, monitorBodies(config_));
+  for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
+  waiting_.resize(config_.bodies.size());
+  placed_.resize(config_.bodies.size());
+  complaints_.resize(config_.bodies.size());
+  hints_.resize(config_.bodies.size());
+  hinted_.resize(config_.bodies.size());
+}
+
+void MonitorPipeline::loadFiles() {
+  rigid_.resize(config_.bodies.size());
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
+    BodyConfig& body = config_.bodies[b];
+    if (!body.topology_file.empty()) {
+      body.input.file_topology = loadFile(body, "topology/file", body.topology_file, 1).topology;
+      checkGrid(body);
+    }
+    if (!body.isRigid()) continue;
+    MeshResource mesh = loadFile(body, "rigid/mesh", body.mesh_file, body.mesh_scale);
+    rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
+    if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
+  }
+}
+
+void MonitorPipeline::measureUnknown(StepOutcome& outcome) const {
+  if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return;
+  const auto start = std::chrono::steady_clock::now();
+  SweptSpace sum;
+  Positions map_t0, map_t1;
+  std::vector<std::uint8_t> active;
+  for (std::size_t b = 0; b < outcome.topologies->size(); ++b) {
+    const MonitorBody& body = monitor_->bodies()[b];
+    if (!body.against_obstacle) continue;
+    const Topology& topology = *(*outcome.topologies)[b];
+    active.assign(topology.vertexCount(), 1);
+    for (const Index v : body.vertex_mask) active[v] = 0;
+    map_t0 = (*outcome.positions_t0)[b];
+    map_t1 = (*outcome.positions_t1)[b];
+    transform(outcome.map_from_fixed, map_t0);
+    transform(outcome.map_from_fixed, map_t1);
+    const SweptSpace one = known_->sweptSpace(topology, map_t0, map_t1, active.data());
+    sum.voxels += one.voxels;
+    sum.unknown += one.unknown;
+    sum.complete = sum.complete && one.complete;
+  }
+  // Of a sweep too large to be counted there is no share: that of a part may be anything.
+  outcome.unknown_fraction = sum.complete ? sum.unknownFraction() : std::numeric_limits<double>::quiet_NaN();
+  const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
+  outcome.stats[Effect::UNKNOWN_SPACE] = {sum.voxels, sum.unknown, spent.count()};
+}
+
+void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
+                           const std::string& reason) {
+  monitor_->skip(body, status, stamp_ns, reason);
+  complaints_[body] = "refused: " + reason;
+  if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
+}
+
+template <typename Decode>
+void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode) {
+  finishing_ = false;
+  Waiting waiting;
+  waiting.arrival_ns = arrival_ns;
+  try {
+    waiting.mesh = decode(decoders_[body]);
+  } catch (const MeshError& error) {
+    monitor_->countReceived(body);
+    return skip(body, error.status, receipt_ns, arrival_ns, error.what());
+  }
+  if (hinted_[body] != waiting.mesh.topology) {
+    hinted_[body] = waiting.mesh.topology;
+    hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
+  }
+  const bool unstamped = waiting.mesh.stamp_ns == 0;
+  if (unstamped) waiting.mesh.stamp_ns = receipt_ns;
+  monitor_->countReceived(body, 1, unstamped);
+  weld_changes_ += waiting.mesh.weld_changes;
+  if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
+  if (waiting_[body]) {  // one that was kept; steps have waited for its transform, and need not do so once more
+    monitor_->countDropped(body, StepStatus::NO_TRANSFORM);
+    waiting.kept = true;
+    waiting.reason = std::move(waiting_[body]->reason);
+  }
+  waiting_[body] = std::move(waiting);
+}
+
+void MonitorPipeline::take(std::size_t body, const RawMessage& message) {
+  takeDecoded(body, message.receipt_ns, message.arrival_ns, [&](MeshDecoder& decoder) {
+    return decoder.decode(message.datatype, message.bytes.data(), message.bytes.size());
+  });
+}
+
+void MonitorPipeline::take(std::size_t body, const TypedMesh& message, StampNs receipt_ns, std::int64_t arrival_ns) {
+  takeDecoded(body, receipt_ns, arrival_ns, [&](MeshDecoder& decoder) { return decoder.decode(message); });
+}
+
+void MonitorPipeline::refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason) {
+  monitor_->countReceived(body);
+  skip(body, StepStatus::BAD_MESSAGE, receipt_ns, arrival_ns, reason);
+}
+
+bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
+  std::vector<std::pair<std::size_t, MeshFrame>> frames;
+  for (std::size_t b = 0; b < rigid_.size(); ++b) {
+    if (!rigid_[b]) continue;
+    MeshFrame frame{stamp_ns, rigid_[b]->topology,           rigid_[b]->rest,
+                    true,     Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
+    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) {
+      return false;
+    }
+    transform(frame.pose, frame.positions);
+    frames.emplace_back(b, std::move(frame));
+  }
+  for (auto& frame : frames) {
+    monitor_->countReceived(frame.first);
+    monitor_->push(frame.first, std::move(frame.second), now_ns);
+  }
+  return true;
+}
+
+void MonitorPipeline::keep(std::size_t body) {
+  Waiting& waiting = *waiting_[body];
+  waiting.kept = true;
+  // Before the clock body's first message there may be no fixed frame, and nothing is wrong.
+  if (fixed_frame_.empty() || waiting.told) return;
+  waiting.told = true;
+  complaints_[body] = "waits: " + waiting.reason;
+}
+
+std::string MonitorPipeline::missing(std::size_t body) const {
+  return waiting_[body]->reason + "; body '" + config_.bodies[body].body.name + "' waits for it";
+}
+
+void MonitorPipeline::nameMissing(StepOutcome& outcome) const {
+  if (outcome.status != StepStatus::NO_BODY) return;
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (!waiting_[b] || !waiting_[b]->kept) continue;
+    outcome.reason = missing(b);
+    return;
+  }
+}
+
+std::size_t MonitorPipeline::misplaced() const {
+  std::size_t b = 0;
+  while (b < waiting_.size() && !(waiting_[b] && placed_[b])) ++b;
+  return b;
+}
+
+bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason) {
+  const std::size_t body = misplaced();
+  if (body == waiting_.size()) return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, reason);
+  problem = StepStatus::NO_BODY;
+  reason = missing(body);
+  return false;
+}
+
+bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
+  Waiting& waiting = *waiting_[body];
+  std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
+  StepStatus problem = StepStatus::NO_TRANSFORM;
+  Eigen::Isometry3d fixed_from_mesh;
+  const bool is_clock = body == config_.monitor.clock_body;
+  const bool placed = !fixed_frame_.empty() &&
+                      lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id, waiting.mesh.stamp_ns,
+                                      fixed_from_mesh, reason) &&
+                      (!is_clock || placeOthers(now_ns, problem, reason));
+  if (!placed) {
+    if (problem == StepStatus::NO_TRANSFORM) {
+      reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
+    }
+    waiting.reason = reason;
+    // There is no use in waiting for a static body that has waited in vain itself.
+    const bool timed_out = finishing_ || waiting.kept ||
+                           (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept) ||
+                           static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
+    if (!timed_out) return false;
+    if (isStatic(body)) {
+      keep(body);
+      return false;
+    }
+  }
+  Waiting done = std::move(waiting);
+  waiting_[body].reset();
+  if (!placed) {
+    skip(body, problem, done.mesh.stamp_ns, done.arrival_ns, reason);
+    return true;
+  }
+  transform(fixed_from_mesh, done.mesh.positions);
+  monitor_->push(body,
+                 {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
+                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m)},
+                 now_ns);
+  if (is_clock) arrivals_.push_back(done.arrival_ns);
+  placed_[body] = isStatic(body);
+  return true;
+}
+
+void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
+  unplaced_map_ = std::move(map);
+  unplaced_since_ns_ = now_ns;
+}
+
+void MonitorPipeline::placeMap(std::int64_t now_ns) {
+  if (!unplaced_map_) return;
+  if (!unplaced_map_->surface) {
+    // Refused: what was there before is out of date, and no map is better than a wrong one.
+    monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
+    unplaced_map_.reset();
+    known_.reset();
+    return;
+  }
+  if (fixed_frame_.empty()) return;
+  const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
+  MonitorMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
+  std::string reason;
+  if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
+    monitor_->setMap(std::move(map));
+    known_ = unplaced_map_->known;
+    unplaced_map_.reset();
+  } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
+    // It is tried again at every call: a map comes rarely, and its transform may come late.
+    if (monitor_->map().problem.empty()) {
+      monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(),
+                        "no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason});
+    }
+  }
+}
+
+bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
+  placeMap(now_ns);
+  // Static bodies first: the clock body's frame is a step, which is to find them where they are.
+  for (const bool statics : {true, false}) {
+    for (std::size_t b = 0; b < waiting_.size(); ++b) {
+      if (waiting_[b] && isStatic(b) == statics) place(b, now_ns);
+    }
+  }
+  if (finishing_) giveUp();
+  if (!monitor_->next(now_ns, outcome)) return false;
+  nameMissing(outcome);
+  measureUnknown(outcome);
+  outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
+  if (!arrivals_.empty()) arrivals_.pop_front();
+  return true;
+}
+
+bool MonitorPipeline::waiting() const {
+  if (unplaced_map_ || monitor_->waiting()) return true;
+  for (const auto& one : waiting_) {
+    if (one) return true;
+  }
+  return false;
+}
+
+void MonitorPipeline::finish() { finishing_ = true; }
+
+void MonitorPipeline::giveUp() {
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (!waiting_[b]) continue;
+    const Waiting done = std::move(*waiting_[b]);
+    waiting_[b].reset();
+    skip(b, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns, done.reason);
+  }
+  monitor_->finish();
+}
+
+void MonitorPipeline::reset(StepStatus status) {
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (!waiting_[b] || isStatic(b)) continue;
+    monitor_->countDropped(b, status);
+    waiting_[b].reset();
+  }
+  monitor_->reset(status);
+  if (status == StepStatus::RESET) {
+    for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
+  }
+  arrivals_.clear();
+}
+
+StepOutcome MonitorPipeline::checkNow() {
+  StepOutcome outcome;
+  if (const std::size_t body = misplaced(); body < waiting_.size()) {
+    outcome.status = StepStatus::NO_BODY;
+    outcome.reason = missing(body);
+    return outcome;
+  }
+  outcome = monitor_->checkNow();
+  nameMissing(outcome);
+  return outcome;
+}
+
+std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }
+
+}  // namespace dccd

@@ -1,0 +1,134 @@
+// From messages to outcomes: decoding, waiting for tf, the fixed frame, the map's pose, rigid bodies, and the monitor.
+// The node drives it with a steady clock, analyze_bag with the bag's; there is no other difference between the two.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <tf2/buffer_core.h>
+
+#include "config/monitor_config.h"
+#include "dccd/known_space.h"
+#include "dccd/monitor.h"
+#include "input/mesh_decoder.h"
+
+namespace dccd {
+
+/// One serialised message as it came.
+struct RawMessage {
+  std::string datatype;
+  std::vector<std::uint8_t> bytes;
+  StampNs receipt_ns = 0;       ///< stamp for messages without one
+  std::int64_t arrival_ns = 0;  ///< on the clock that drives the pipeline
+};
+
+/// A decoded map in its own frame.
+struct LoadedMap {
+  std::shared_ptr<const VoxelSurface> surface;  ///< null: `problem` says why
+  std::shared_ptr<const KnownSpace> known;      ///< when unknown_space is not free
+  std::string frame_id;                         ///< empty: the fixed frame
+  StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
+  std::string problem;
+};
+
+class MonitorPipeline {
+ public:
+  /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file.
+  MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms);
+
+  /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
+  /// and gives way to the next.
+  bool idle(std::size_t body) const { return !waiting_[body] || waiting_[body]->kept; }
+  /// Counts, decodes and keeps one message of an idle body.
+  void take(std::size_t body, const RawMessage& message);
+  /// The same of a message that a publisher in this process handed over.
+  void take(std::size_t body, const TypedMesh& message, StampNs receipt_ns, std::int64_t arrival_ns);
+  /// Counts a message that is refused unread; the clock body's yield an outcome.
+  void refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason);
+  void setMap(LoadedMap map, std::int64_t now_ns);
+  /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
+  bool next(std::int64_t now_ns, StepOutcome& outcome);
+  /// Something waits for tf or for other bodies, so that next() is worth calling again without new input.
+  bool waiting() const;
+  /// End of input: whatever still waits is given up at the next call of next().
+  void finish();
+  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was
+  /// learnt: the map and static bodies are placed in it. After RESET triangle soups are welded anew.
+  void reset(StepStatus status);
+  /// Monitor::checkNow(), with the reason why a static body has no place yet.
+  StepOutcome checkNow();
+
+  /// The body's newest frame holds at all times. Safe to call from any thread.
+  bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
+  Monitor& monitor() { return *monitor_; }
+  const Monitor& monitor() const { return *monitor_; }
+  const MonitorConfig& config() const { return config_; }
+  const std::string& fixedFrame() const { return fixed_frame_; }
+  std::uint64_t weldChanges() const { return weld_changes_; }
+  /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
+  std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
+  /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
+  /// static body's frame that waits on it is said once.
+  std::string takeComplaint(std::size_t body);
+  /// What looks like a mistake in the body's messages, though they are valid (advice.h); empty: nothing does.
+  const std::string& hint(std::size_t body) const { return hints_[body]; }
+
+ private:
+  struct Waiting {
+    DecodedMesh mesh;
+    std::int64_t arrival_ns = 0;
+    bool kept = false;   // past transform_timeout_s: a static body sends its only frame once
+    bool told = false;   // the complaint about it has been set
+    std::string reason;  // why it has no place yet
+  };
+  struct RigidMesh {
+    std::shared_ptr<const Topology> topology;
+    Positions rest;
+    std::vector<double> radius_m;
+  };
+  MonitorConfig config_;
+  tf2::BufferCore& transforms_;
+  std::unique_ptr<Monitor> monitor_;
+  std::vector<MeshDecoder> decoders_;
+  std::vector<std::optional<Waiting>> waiting_;
+  std::vector<bool> placed_;  // a static body of which the monitor has a frame
+  std::vector<std::optional<RigidMesh>> rigid_;
+  std::vector<std::string> complaints_, hints_;
+  std::vector<std::shared_ptr<const Topology>> hinted_;  // the topology that the hint is about
+  std::optional<LoadedMap> unplaced_map_;
+  std::shared_ptr<const KnownSpace> known_;  // of the map in use
+  std::int64_t unplaced_since_ns_ = 0;
+  std::deque<std::int64_t> arrivals_;  // of the clock body's frames inside the monitor
+  std::int64_t outcome_arrival_ns_ = 0;
+  std::string fixed_frame_;
+  std::uint64_t weld_changes_ = 0;
+  bool finishing_ = false;
+
+  void loadFiles();
+  template <typename Decode>
+  void takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode);
+  void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
+  /// unknown_space: report. How much of what the step swept the map does not know.
+  void measureUnknown(StepOutcome& outcome) const;
+  /// A static body's frame waits on.
+  void keep(std::size_t body);
+  /// The end has come for what still waits.
+  void giveUp();
+  /// The static body that the monitor has where it is no more, since its newer frame waits; none: bodies' number.
+  std::size_t misplaced() const;
+  /// Why the body, whose frame waits, has no place.
+  std::string missing(std::size_t body) const;
+  /// Says of an outcome without a body whether it waits for its transform.
+  void nameMissing(StepOutcome& outcome) const;
+  /// False: still waits.
+  bool place(std::size_t body, std::int64_t now_ns);
+  /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
+  bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
+  bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
+  void placeMap(std::int64_t now_ns);
+};
+
+}  // namespace dccd

@@ -1,0 +1,219 @@
+// The worker's thread: messages into the pipeline, outcomes out of it.
+#include "node/collision_monitor_impl.h"
+
+#include "input/known_types.h"
+#include "output/advice.h"
+
+namespace dccd {
+namespace {
+
+using std::chrono::microseconds;
+using topic_tools::ShapeShifter;
+
+// While something waits for tf or another body the worker looks again this often; else it sleeps until it is woken, and
+// this long at most, for diagnostics.
+constexpr microseconds POLL{2000}, SLEEP{100000};
+
+}  // namespace
+
+void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const MarkerConfig& markers) {
+  config.markers = markers;
+  // What the effect plan decides stays with it.
+  options.obstacle_expected = pipeline.monitor().options().obstacle_expected;
+  options.detector.check_start_state = pipeline.monitor().options().detector.check_start_state;
+  try {
+    pipeline.monitor().setOptions(options);
+    config.monitor = options;
+  } catch (const std::invalid_argument& error) {
+    ROS_WARN_STREAM("reconfiguration refused: " << error.what());
+  }
+}
+
+void CollisionMonitor::Impl::resetNow(StepStatus status) {
+  accountDropped();
+  std::vector<bool> spared(config.bodies.size());
+  for (std::size_t b = 0; b < spared.size(); ++b) spared[b] = pipeline.isStatic(b);
+  const auto cleared = queue.clear(spared);
+  for (std::size_t b = 0; b < cleared.size(); ++b) {
+    pipeline.monitor().countReceived(b, cleared[b]);
+    pipeline.monitor().countDropped(b, status, cleared[b]);
+  }
+  pipeline.reset(status);
+  outputs.publishNotClear(pipeline.fixedFrame());
+  if (!outputs.wantsPrediction()) return;
+  StepOutcome none;
+  none.status = status;
+  none.start_ns = none.stamp_ns = newest_ns;
+  publishPrediction(none);
+}
+
+void CollisionMonitor::Impl::accountDropped() {
+  const auto dropped = queue.takeDropped();
+  for (std::size_t b = 0; b < dropped.size(); ++b) {
+    if (dropped[b] == 0) continue;
+    pipeline.monitor().countReceived(b, dropped[b]);
+    pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
+    log.complain(b, "queue",
+                 std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
+                     adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
+  }
+}
+
+void CollisionMonitor::Impl::takeMaps() {
+  LoadedMap map;
+  if (!maps || !maps->take(map)) return;
+  if (!map.surface) {
+    log.complain(config.bodies.size(), "map", "refused: " + map.problem);
+    map.problem = "the octomap was refused: " + map.problem;
+  }
+  map_publisher_seen = true;
+  pipeline.setMap(std::move(map), steadyNs());
+}
+
+void CollisionMonitor::Impl::takeMessage(std::size_t body, const QueuedMessage& queued) {
+  if (const auto* typed = std::get_if<TypedMesh>(&queued.message)) {
+    return pipeline.take(body, *typed, queued.receipt_ns, queued.arrival_ns);
+  }
+  const ShapeShifter& message = *std::get<ShapeShifter::ConstPtr>(queued.message);
+  const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
+  if (problem.empty()) {
+    pipeline.take(body, {message.getDataType(), bytesOf(message), queued.receipt_ns, queued.arrival_ns});
+  } else {
+    pipeline.refuse(body, queued.receipt_ns, queued.arrival_ns, problem);
+  }
+}
+
+void CollisionMonitor::Impl::takeMessages() {
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    QueuedMessage queued;
+    if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
+    takeMessage(b, queued);
+  }
+}
+
+void CollisionMonitor::Impl::tellComplaints() {
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    const std::string complaint = pipeline.takeComplaint(b);
+    // The clock body's come as outcomes, which are logged when they are published.
+    if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", complaint);
+  }
+}
+
+void CollisionMonitor::Impl::lookIntoSilence() {
+  if (!log.isSilenceDue(steadyNs())) return;
+  std::vector<AwaitedTopic> silent;
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
+    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
+  }
+  log.hintAt(silent, pipeline);
+}
+
+StatsContext CollisionMonitor::Impl::statsContext() const {
+  StatsContext context;
+  context.frames = pipeline.monitor().total();
+  context.weld_changes = pipeline.weldChanges();
+  if (config.monitor.look_ahead_s > 0) context.look_ahead = look_ahead.summary();
+  context.steps_unpublished = steps_unpublished;
+  context.maps_received = maps ? maps->received() : 0;
+  context.frames_handed_over = frames_handed_over;
+  context.maps_refused = maps ? maps->refused() : 0;
+  context.parameter_hash = config.hash();
+  return context;
+}
+
+/// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
+void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
+  try {
+    publishAll(outcome);
+  } catch (const std::exception& error) {
+    ++steps_unpublished;
+    log.complain(config.monitor.clock_body, "publishing",
+                 std::string("not all of a step's results could be published: ") + error.what());
+    run([this] { outputs.publishNotClear(pipeline.fixedFrame()); });
+  }
+}
+
+void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
+  const auto& bodies = pipeline.monitor().bodies();
+  const std::string& frame = pipeline.fixedFrame();
+  log.tell(outcome);
+  newest_ns = outcome.stamp_ns;
+  outputs.publishResult(outcome, bodies, frame);
+  const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
+  outputs.publishMarkers(outcome, bodies, config.markers, frame);
+  effects.learn(outcome, pipeline.monitor());
+  publishEffects(toRosTime(outcome.stamp_ns));
+  if (effects.takeNewLeftOut(pipeline.monitor())) {
+    outputs.publishLeftOut(toLeftOutPairs(pipeline.monitor().leftOut(), bodies, outcome.stamp_ns, frame));
+  }
+  predict(outcome);
+  StatsContext context = statsContext();
+  context.latency_s = latency_s;
+  outputs.publishStats(outcome, context, frame);
+  diagnostics.add(outcome, context);
+}
+
+void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
+  if (!effects.takeNewPlan()) return;
+  outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
+  for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
+}
+
+void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
+  if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
+  look_ahead.observe(outcome);
+  // Nothing to go on from, which whoever listens to predictions alone must hear, too.
+  if (!outcome.answered) return publishPrediction(outcome);
+  StepOutcome prediction;
+  try {
+    prediction = pipeline.monitor().predict();
+  } catch (const std::exception& error) {
+    prediction.status = StepStatus::INTERNAL_ERROR;
+    prediction.reason = error.what();
+    prediction.start_ns = prediction.stamp_ns = outcome.stamp_ns;
+  }
+  look_ahead.predict(prediction);
+  outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(prediction);
+  publishPrediction(prediction);
+}
+
+void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
+  const double horizon_s = config.monitor.look_ahead_s;
+  outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
+}
+
+/// Whatever a command throws, the node goes on; a service's caller has been told by then (InputQueue::call).
+void CollisionMonitor::Impl::run(const std::function<void()>& command) {
+  try {
+    command();
+  } catch (const std::exception& error) {
+    ROS_ERROR_STREAM("a command failed: " << error.what());
+  }
+}
+
+void CollisionMonitor::Impl::work() {
+  bool more = false;
+  while (!stopping) {
+    const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
+    if (stopping) return;
+    for (const auto& command : commands) run(command);
+    if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
+    effects.apply(pipeline.monitor(), map_publisher_seen);
+    publishEffects(ros::Time::now());  // the first plan comes before the first frame
+    takeMaps();
+    takeMessages();
+    accountDropped();
+    StepOutcome outcome;
+    while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
+    tellComplaints();
+    const std::string surprise = recorder.takeSurprise();
+    if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
+    more = false;
+    for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
+    lookIntoSilence();
+    diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected() ? log.mapSource() : "", log.hint());
+  }
+}
+
+}  // namespace dccd

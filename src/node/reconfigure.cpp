@@ -1,0 +1,76 @@
+#include "node/reconfigure.h"
+
+#include <boost/thread/recursive_mutex.hpp>
+
+#include <deformable_ccd/CollisionMonitorConfig.h>
+#include <dynamic_reconfigure/server.h>
+
+namespace dccd {
+
+namespace {
+
+deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {
+  deformable_ccd::CollisionMonitorConfig live = deformable_ccd::CollisionMonitorConfig::__getDefault__();
+  live.accuracy = static_cast<int>(config.monitor.detector.accuracy.rung);
+  live.step_budget_ms = config.monitor.detector.step_budget_ms;
+  live.max_step_s = config.monitor.store.max_step_s;
+  live.max_vertex_step_m = config.monitor.store.max_vertex_step_m;
+  live.max_contacts = static_cast<int>(config.monitor.max_contacts);
+  live.suppress_initial = config.monitor.suppress_initial;
+  live.marker_point_size_m = config.markers.point_size_m;
+  live.marker_normal_length_m = config.markers.normal_length_m;
+  live.marker_mesh = config.markers.mesh;
+  live.marker_obstacle_m = config.markers.obstacle_m;
+  return live;
+}
+
+}  // namespace
+
+struct Reconfigure::Impl {
+  MonitorOptions options;
+  MarkerConfig markers;
+  bool separates = false;
+  Changed changed;
+  boost::recursive_mutex mutex;  // shared with the server, which asks for it so that updateConfig cannot deadlock
+  dynamic_reconfigure::Server<deformable_ccd::CollisionMonitorConfig> server;
+
+  Impl(const ros::NodeHandle& node, const MonitorConfig& config, Changed call)
+      : options(config.monitor), markers(config.markers), changed(std::move(call)), server(mutex, node) {
+    separates = config.holdsDistance();
+    server.updateConfig(toLive(config));
+    bool first = true;  // setCallback calls at once, with what is in force already
+    server.setCallback([this, first](deformable_ccd::CollisionMonitorConfig& live, std::uint32_t) mutable {
+      if (!first) apply(live);
+      first = false;
+    });
+  }
+
+  void apply(deformable_ccd::CollisionMonitorConfig& live) {
+    Accuracy rung = static_cast<Accuracy>(live.accuracy);
+    if (separates && (rung == Accuracy::EXACT || rung == Accuracy::FAST)) {
+      rung = Accuracy::CONSERVATIVE;  // the only rungs that hold a distance are this and screen
+      live.accuracy = static_cast<int>(rung);
+    }
+    options.detector.accuracy.rung = rung;
+    options.detector.step_budget_ms = live.step_budget_ms;
+    options.store.max_step_s = live.max_step_s;
+    options.store.max_vertex_step_m = live.max_vertex_step_m;
+    options.max_contacts = static_cast<std::size_t>(live.max_contacts);
+    options.suppress_initial = live.suppress_initial;
+    markers.point_size_m = live.marker_point_size_m;
+    markers.normal_length_m = live.marker_normal_length_m;
+    markers.mesh = live.marker_mesh;
+    markers.obstacle_m = live.marker_obstacle_m;
+    changed(options, markers);
+  }
+};
+
+Reconfigure::Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Changed changed) {
+  ros::NodeHandle live(private_node, "live");
+  live.setCallbackQueue(private_node.getCallbackQueue());
+  impl_ = std::make_unique<Impl>(live, config, std::move(changed));
+}
+
+Reconfigure::~Reconfigure() = default;
+
+}  // namespace dccd

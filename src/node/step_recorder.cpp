@@ -1,0 +1,59 @@
+#include "node/step_recorder.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+
+#include "node/crash_handler.h"
+
+namespace dccd {
+
+namespace {
+
+/// As ROS itself: where its tools keep what they write.
+std::string rosHome() {
+  if (const char* home = std::getenv("ROS_HOME")) return home;
+  const char* user = std::getenv("HOME");
+  return std::string(user ? user : "/tmp") + "/.ros";
+}
+
+}  // namespace
+
+StepRecorder::StepRecorder(const MonitorConfig& config, Monitor& monitor)
+    : folder_(config.record_folder.empty() ? rosHome() + "/deformable_ccd" : config.record_folder) {
+  if (config.record_steps == 0) return;
+  recorder_ = std::make_unique<FlightRecorder>(config.record_steps, folder_, &crashImage());
+  monitor.setListener(recorder_.get());
+}
+
+bool StepRecorder::record(std::string& message) {
+  if (!recorder_) {
+    message = "nothing is recorded: record_steps is 0";
+    return false;
+  }
+  if (recorder_->size() == 0) {
+    message = "no step has been computed yet";
+    return false;
+  }
+  try {
+    message.clear();
+    for (const std::string& file : recorder_->writeAll("asked for by record_step"))
+      message += (message.empty() ? "" : "\n") + file;
+    return true;
+  } catch (const std::runtime_error& error) {
+    message = error.what();
+    return false;
+  }
+}
+
+std::string StepRecorder::takeSurprise() { return recorder_ ? recorder_->takeSurprise() : std::string(); }
+
+void StepRecorder::installCrashHandler() {
+  if (!recorder_) return;
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
+  if (error) throw std::runtime_error("record_folder " + folder_ + " cannot be made: " + error.message());
+  dccd::installCrashHandler(folder_);
+}
+
+}  // namespace dccd

@@ -1,0 +1,32 @@
+// The node's flight recorder: parameters record_steps and record_folder, the service ~record_step, and what the log
+// says.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "config/monitor_config.h"
+#include "record/flight_recorder.h"
+
+namespace dccd {
+
+class StepRecorder {
+ public:
+  /// Listens to the monitor unless record_steps is 0. The monitor must not run any more when this ends.
+  StepRecorder(const MonitorConfig& config, Monitor& monitor);
+
+  /// Writes the steps that are kept. True with the files' names in the message, false with the reason why there are
+  /// none.
+  bool record(std::string& message);
+  /// One sentence for the log about an answer that contradicts its own promises; empty: none.
+  std::string takeSurprise();
+  /// See node/crash_handler.h. Nothing where the recorder is off. Throws std::runtime_error naming the folder when it
+  /// cannot be made.
+  void installCrashHandler();
+
+ private:
+  std::string folder_;
+  std::unique_ptr<FlightRecorder> recorder_;
+};
+
+}  // namespace dccd

@@ -1,0 +1,190 @@
+// One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for
+// each face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "obstacle/obstacle_check_impl.h"
+
+namespace dccd {
+namespace {
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options) {
+  if (!(options.minimum_separation_m >= 0 && std::isfinite(options.minimum_separation_m))) {
+    throw std::invalid_argument("minimum_separation_m is " + std::to_string(options.minimum_separation_m) +
+                                ", which is not a length from 0 up");
+  }
+  const Accuracy rung = options.accuracy.rung;
+  if (options.minimum_separation_m > 0 && rung != Accuracy::CONSERVATIVE && rung != Accuracy::SCREEN) {
+    throw std::invalid_argument(std::string("minimum_separation_m above 0 cannot be had with accuracy ") +
+                                toString(rung) + "; use conservative");
+  }
+  return rung == Accuracy::SCREEN ? nullptr : makeRung(options.accuracy);
+}
+
+bool ObstacleCheck::Impl::reachesSurface(const Run& run) const {
+  Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  const std::size_t count = run.topology->vertexCount();
+  for (const Positions* positions : {run.t0, run.t1}) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double* p = (*positions)[i].data();
+      for (int axis = 0; axis < 3; ++axis) {  // a NaN fails both comparisons and changes nothing
+        lo[axis] = p[axis] < lo[axis] ? p[axis] : lo[axis];
+        hi[axis] = p[axis] > hi[axis] ? p[axis] : hi[axis];
+      }
+    }
+  }
+  const Box& bounds = run.surface->bounds;
+  const double reach = *std::max_element(reaches.begin(), reaches.end());
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(lo[axis] - reach <= bounds.max[axis] && hi[axis] + reach >= bounds.min[axis])) return false;
+  }
+  return true;
+}
+
+/// A face reaches as far as its most uncertain vertex asks for, and is found by the keys of all its vertices: each
+/// takes the reach of its features.
+void ObstacleCheck::Impl::prepareReaches(const Run& run) {
+  reaches.assign(run.radius_m ? std::max<std::size_t>(run.topology->vertexCount(), 1) : 1,
+                 reachOf(options.minimum_separation_m));
+  if (!run.radius_m) return;
+  for (const Edge& edge : run.topology->edges()) {
+    const double reach = reachOf(separationOf(run, edge));
+    for (const Index v : edge) reaches[v] = std::max(reaches[v], reach);
+  }
+}
+
+void ObstacleCheck::Impl::prepareVertices(const Run& run, const std::uint8_t* vertex_active) {
+  keys.resize(run.topology->vertexCount());
+  start_keys.resize(run.topology->vertexCount());
+  state.assign(run.topology->vertexCount(), 0);
+  for (const Index v : run.topology->usedVertices()) {
+    const Vec3 &p0 = (*run.t0)[v], &p1 = (*run.t1)[v];
+    // x - x is 0 for finite x only.
+    const double finite = (p0 - p0).sum() + (p1 - p1).sum();
+    if ((vertex_active != nullptr && vertex_active[v] == 0) || !(finite == 0)) continue;
+    start_keys[v] = pointKeys(p0, run.surface->inverse_resolution, 0);
+    const double reach = reaches[run.radius_m ? v : 0];
+    if (reach > 0) {
+      keys[v] = pointKeys(p0, run.surface->inverse_resolution, reach);
+    } else {
+      keys[v] = start_keys[v];
+    }
+    state[v] = ACTIVE;
+    // With a separation what rests may be too close; without one, what rests can only touch at t=0.
+    if (reach > 0 || p0 != p1) state[v] |= MOVES;
+    if (p0 != p1) keys[v].include(pointKeys(p1, run.surface->inverse_resolution, reach));
+  }
+}
+
+std::uint8_t ObstacleCheck::Impl::nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start,
+                                           bool& corner) const {
+  const VoxelTree::Reached reached = run.surface->tree.reached(swept.box());
+  corner = reached.corner;
+  if (!reached.leaf) return 0;
+  const bool at_start = start == swept || run.surface->tree.reachesLeaf(start.box());
+  return NEAR | (reached.edge ? NEAR_EDGE : 0) | (at_start ? NEAR_START : 0);
+}
+
+void ObstacleCheck::Impl::markNearFaces(const Run& run) {
+  near_faces.clear();
+  const std::vector<Face>& faces = run.topology->faces();
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    const Face& face = faces[f];
+    // The other features of a face with an inactive vertex are looked at themselves.
+    std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
+    if (state[face[0]] & state[face[1]] & state[face[2]] & ACTIVE) {
+      bool corner = false;
+      bits = nearBits(run, unite(keys, face), unite(start_keys, face), corner);
+      if (bits == 0) continue;
+      const bool start = (bits & NEAR_START) != 0;
+      if (corner || start) near_faces.push_back({static_cast<Index>(f), corner, start});
+    }
+    for (const Index v : face) state[v] |= bits;
+  }
+}
+
+void ObstacleCheck::Impl::markNearEdges(const Run& run) {
+  near_faces.clear();
+  for (const Edge& edge : run.topology->edges()) {
+    std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
+    bool corner = false;
+    if (state[edge[0]] & state[edge[1]] & ACTIVE) {
+      bits = nearBits(run, unite(keys, edge), unite(start_keys, edge), corner);
+    }
+    for (const Index v : edge) state[v] |= bits;
+  }
+}
+
+void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats) {
+  const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch, std::uint64_t& count) {
+    batch.flush();
+    stats.tiers += batch.tiers();
+    // Settled ones are mostly in order already, and the tested ones few.
+    std::vector<Contact>& tested = batch.contacts();
+    sortAndJoin(tested);
+    sortAndJoin(settled);
+    if (!tested.empty()) {
+      const auto middle = static_cast<std::ptrdiff_t>(settled.size());
+      settled.insert(settled.end(), tested.begin(), tested.end());
+      std::inplace_merge(settled.begin(), settled.begin() + middle, settled.end(), canonicalLess);
+      sortAndJoin(settled);
+    }
+    contacts.insert(contacts.end(), settled.begin(), settled.end());
+    count += settled.size();
+  };
+  append(vertex_contacts, vertex_batch, stats.vertex_contacts);
+  append(edge_contacts, edge_batch, stats.edge_contacts);
+  append(face_contacts, corner_batch, stats.corner_contacts);
+  for (std::size_t i = first; i < contacts.size(); ++i) {
+    stats.initial += contacts[i].initial;
+    stats.leaving += contacts[i].leaving;
+  }
+}
+
+ObstacleCheck::ObstacleCheck(const ObstacleOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+ObstacleCheck::~ObstacleCheck() = default;
+
+bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
+                        const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
+                        std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m,
+                        const std::chrono::steady_clock::time_point* deadline) {
+  const auto start = std::chrono::steady_clock::now();
+  if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
+    throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +
+                                std::to_string(map_t1.size()) + " vertices, the topology has " +
+                                std::to_string(topology.vertexCount()));
+  }
+  Impl& impl = *impl_;
+  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats, vertex_radius_m, deadline};
+  impl.late = false;
+  impl.looked_at = 0;
+  impl.prepareReaches(run);
+  if (surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
+    impl.vertex_batch.clear();
+    impl.edge_batch.clear();
+    impl.corner_batch.clear();
+    impl.prepareVertices(run, vertex_active);
+    if (topology.hasFaces()) {
+      impl.markNearFaces(run);
+    } else {
+      impl.markNearEdges(run);
+    }
+    impl.runVertices(run);
+    impl.runEdges(run);
+    impl.runFaces(run);
+    impl.collect(contacts, contacts.size(), stats);
+  }
+  stats.ms += millisecondsSince(start);
+  return !impl.late;
+}
+
+}  // namespace dccd

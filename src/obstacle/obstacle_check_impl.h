@@ -1,0 +1,143 @@
+// What one obstacle test holds and does: obstacle_test.cpp has the flow, obstacle_features.cpp the features' tests.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include "dccd/tolerances.h"
+#include "obstacle/axis_predicates.h"
+#include "obstacle/mesh_keys.h"
+#include "obstacle/obstacle_batch.h"
+
+namespace dccd {
+
+/// What is known of a vertex. The NEAR bits are set by the faces (of a polyline: edges) at it: of what their keys
+/// reach.
+enum VertexState : std::uint8_t {
+  ACTIVE = 1,
+  MOVES = 2,
+  NEAR = 4,         ///< some leaf, during the step
+  NEAR_EDGE = 8,    ///< a convex edge, during the step
+  NEAR_START = 16,  ///< some leaf, at t=0
+  INSIDE = 32       ///< it touches a leaf at t=0
+};
+
+struct MovingBounds;
+
+/// The rung of the options; null for `screen`. Throws std::invalid_argument for a separation that it cannot have.
+std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options);
+
+struct ObstacleCheck::Impl {
+  explicit Impl(const ObstacleOptions& o)
+      : options(o),
+        test(elementaryTestFor(o)),
+        vertex_batch(PairKind::VERTEX_FACE, test.get()),
+        edge_batch(PairKind::EDGE_EDGE, test.get()),
+        corner_batch(PairKind::VERTEX_FACE, test.get()) {}
+
+  /// What one run works on.
+  struct Run {
+    const VoxelSurface::Impl* surface;
+    const Topology* topology;
+    const Positions* t0;
+    const Positions* t1;
+    std::uint16_t body;
+    ObstacleStats* stats;
+    const double* radius_m = nullptr;  ///< uncertainty per vertex; null: none
+    const std::chrono::steady_clock::time_point* deadline = nullptr;
+  };
+
+  /// Distance from which on a feature of these vertices is in contact.
+  template <class Feature>
+  double separationOf(const Run& run, const Feature& feature) const {
+    double radius = 0;
+    if (run.radius_m) {
+      for (const Index v : feature) radius = std::max(radius, run.radius_m[v]);
+    }
+    // Rounded up, so that a contact at exactly the sum is none too far.
+    return radius > 0 ? (options.minimum_separation_m + radius) * (1 + tolerance::SEPARATION_SUM)
+                      : options.minimum_separation_m;
+  }
+  /// The same, as far as bounds must reach.
+  static double reachOf(double separation_m) { return separation_m * (1 + tolerance::MAP_REACH); }
+
+  /// The clock is read for one feature in 32.
+  bool isLate(const Run& run) {
+    if (!run.deadline || late) return late;
+    return late = (looked_at++ & 31) == 0 && std::chrono::steady_clock::now() >= *run.deadline;
+  }
+
+  bool reachesSurface(const Run& run) const;
+  void prepareReaches(const Run& run);
+  void prepareVertices(const Run& run, const std::uint8_t* vertex_active);
+  /// What the keys of a face or an edge reach, as NEAR bits for its vertices; corner: also a corner.
+  std::uint8_t nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start, bool& corner) const;
+  void markNearFaces(const Run& run);
+  void markNearEdges(const Run& run);
+  void runVertices(const Run& run);
+  void runEdges(const Run& run);
+  void runFaces(const Run& run);
+
+  /// These add the initial contacts of a feature none of whose own ends touches anything at t=0.
+  bool edgeStartsInside(const Run& run, const Edge& edge);
+  bool faceStartsInside(const Run& run, const Face& face);
+  template <class Feature>
+  void addInitial(const Run& run, PairKind kind, const Feature& feature, std::uint32_t leaf,
+                  std::vector<Contact>& contacts) {
+    Contact contact = contactOf(run, kind, leaf);
+    std::copy(feature.begin(), feature.end(), contact.vertex.begin());
+    setInitial(contact);
+    contacts.push_back(contact);
+  }
+  void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
+  void vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
+  void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, const MovingBounds& moving,
+                 double separation_m, std::uint32_t leaf, bool inside);
+  void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, const MovingBounds& moving,
+                   double separation_m, std::uint32_t leaf, bool inside);
+  void collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats);
+
+  Contact contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const;
+  void setInitial(Contact& contact);
+  void setTime(Contact& contact, const CrossingTime& time);
+  template <class Feature>
+  bool settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points, std::uint32_t leaf,
+                  const LeafBox& target, const double* outward, double separation_m, bool inside,
+                  std::vector<Contact>& contacts);
+  VertexMotion motionOf(const Run& run, Index vertex) const {
+    const Vec3 &a = (*run.t0)[vertex], &b = (*run.t1)[vertex];
+    return {{a.x(), a.y(), a.z(), 0}, {b.x(), b.y(), b.z(), 0}};
+  }
+  template <class Feature>
+  static KeyLanes unite(const std::vector<KeyLanes>& of, const Feature& feature) {
+    KeyLanes lanes = of[feature[0]];
+    for (std::size_t i = 1; i < feature.size(); ++i) lanes.include(of[feature[i]]);
+    return lanes;
+  }
+  /// Fills near_leaves with the leaves that a key box reaches, by key.
+  void findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box);
+  static void sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list);
+
+  ObstacleOptions options;
+  std::unique_ptr<Rung> test;
+  ObstacleBatch vertex_batch, edge_batch, corner_batch;
+  bool late = false;  ///< the deadline of this run has passed
+  std::uint32_t looked_at = 0;
+
+  std::vector<double> reaches;       ///< per vertex: the largest separation of a feature at it, rounded up; [0] for all
+  std::vector<KeyLanes> keys;        ///< over the step, as far as the reaches
+  std::vector<KeyLanes> start_keys;  ///< at t=0, touching
+  std::vector<std::uint8_t> state;   ///< VertexState bits
+  struct NearFace {
+    Index face;
+    bool corner, start;  ///< corners within reach; leaves at t=0
+  };
+  std::vector<NearFace> near_faces;
+  std::vector<std::uint32_t> near_leaves;
+  std::vector<Contact> vertex_contacts, edge_contacts, face_contacts;
+};
+
+}  // namespace dccd

@@ -1,0 +1,118 @@
+#include "output/advice.h"
+
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "dccd/tolerances.h"
+
+namespace dccd {
+
+namespace {
+
+// A mesh that a robot handles is smaller, and one in millimetres is larger, whatever it is.
+using tolerance::LARGEST_PLAUSIBLE_M;
+// A grid read with rows and columns swapped has neighbours several times as far apart; a cloth that is merely crumpled
+// or sheared does not reach this.
+constexpr double SWAPPED_RATIO = tolerance::SWAPPED_GRID_RATIO;
+
+double extentOf(const Positions& positions) {
+  Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity()), max = -min;
+  for (const Vec3& p : positions) {
+    if (!p.allFinite()) continue;
+    min = min.cwiseMin(p);
+    max = max.cwiseMax(p);
+  }
+  return (max.array() >= min.array()).all() ? (max - min).maxCoeff() : 0;
+}
+
+/// Mean distance of neighbours in a row-major grid [m]; 0 when no pair of them is finite.
+double meanSpacing(const Positions& positions, std::size_t rows, std::size_t cols) {
+  double sum = 0;
+  std::size_t count = 0;
+  const auto add = [&](std::size_t a, std::size_t b) {
+    const double length = (positions[b] - positions[a]).norm();
+    if (!std::isfinite(length)) return;
+    sum += length;
+    ++count;
+  };
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < cols; ++c) {
+      const std::size_t i = r * cols + c;
+      if (c + 1 < cols) add(i, i + 1);
+      if (r + 1 < rows) add(i, i + cols);
+    }
+  }
+  return count ? sum / static_cast<double>(count) : 0;
+}
+
+void addSize(const DecodedMesh& mesh, std::ostringstream& text) {
+  const double extent = extentOf(mesh.positions);
+  if (extent <= LARGEST_PLAUSIBLE_M) return;
+  text << "the mesh is " << extent
+       << " m across; coordinates are in metres, are these millimetres? Then scale them in the "
+       << "publisher (rigid bodies: rigid/scale)";
+}
+
+void addSwapped(const DecodedMesh& mesh, const MeshInputConfig& config, std::ostringstream& text) {
+  const bool grid = config.source == TopologySource::GRID || config.source == TopologySource::AUTO;
+  const std::size_t rows = config.rows, cols = config.cols;
+  if (!grid || rows == cols || rows * cols != mesh.positions.size()) return;
+  const double given = meanSpacing(mesh.positions, rows, cols), swapped = meanSpacing(mesh.positions, cols, rows);
+  if (!(swapped < SWAPPED_RATIO * given)) return;
+  if (text.tellp() > 0) text << "; ";
+  text << "topology/rows and topology/cols look swapped: neighbours are " << given << " m apart as " << rows << " x "
+       << cols << ", but " << swapped << " m as " << cols << " x " << rows << "; set rows: " << cols
+       << ", cols: " << rows;
+}
+
+}  // namespace
+
+std::string adviceFor(StepStatus status, const std::string& reason, const std::string& map_source) {
+  // A map or a body is missing because it cannot be placed, because it was refused, or because none came.
+  if ((status == StepStatus::NO_MAP || status == StepStatus::NO_BODY) && reason.compare(0, 12, "no transform") == 0)
+    status = StepStatus::NO_TRANSFORM;
+  switch (status) {
+    case StepStatus::NO_TRANSFORM:
+      return "publish it on /tf or /tf_static for these stamps (see rosrun tf tf_echo), "
+             "or set fixed_frame to a frame of the same tree";
+    case StepStatus::NO_MAP:
+      return "see rostopic hz " + map_source + ", or do without with effects/octomap: off";
+    case StepStatus::NO_BODY:
+      return "see rostopic hz of its topic; one that comes late needs a larger sync_timeout_s";
+    case StepStatus::GAP:
+      return "a slower publisher needs a larger max_step_s";
+    case StepStatus::TIME_JUMP:
+      return "a bag that loops does that, and the next frame makes a step again";
+    case StepStatus::TELEPORT:
+      return "if that motion is real raise max_vertex_step_m; coordinates are in metres";
+    case StepStatus::TOPOLOGY_CHANGED:
+      return "a step needs the same vertices twice: use a tracker, or give topology/file";
+    case StepStatus::DUPLICATE:
+      return "the publisher must stamp every frame anew";
+    case StepStatus::VERTEX_COUNT:
+      return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
+    case StepStatus::DEADLINE:
+      return "raise step_budget_ms or num_threads, or take a cheaper accuracy";
+    case StepStatus::TRUNCATED:
+      return "raise max_contacts to see all";
+    case StepStatus::QUEUE_FULL:
+      return "raise num_threads, or take a cheaper accuracy or fewer vertices";
+    default:
+      return {};
+  }
+}
+
+std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
+  std::ostringstream text;
+  addSize(mesh, text);
+  addSwapped(mesh, config, text);
+  if (mesh.stamp_ns == 0) {
+    text << (text.tellp() > 0 ? "; " : "")
+         << "messages carry no stamp, so that the time of receipt stands in for it, with "
+         << "all its jitter; set header.stamp in the publisher";
+  }
+  return text.str();
+}
+
+}  // namespace dccd

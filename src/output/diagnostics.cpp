@@ -1,0 +1,123 @@
+#include "output/diagnostics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <ros/time.h>
+
+#include "output/advice.h"
+
+namespace dccd {
+
+namespace {
+
+constexpr std::int64_t PERIOD_NS = 1000000000;
+
+using diagnostic_msgs::DiagnosticStatus;
+
+template <typename T>
+void put(DiagnosticStatus& status, const char* key, const T& value) {
+  std::ostringstream text;
+  text << value;
+  diagnostic_msgs::KeyValue pair;
+  pair.key = key;
+  pair.value = text.str();
+  status.values.push_back(pair);
+}
+
+}  // namespace
+
+Diagnostics::Diagnostics(const std::string& name, ros::NodeHandle& node)
+    : name_(name), publisher_(node.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10)) {}
+
+void Diagnostics::add(const StepOutcome& outcome, const StatsContext& context) {
+  ++outcomes_;
+  answers_ += outcome.answered;
+  worst_latency_s_ = std::max(worst_latency_s_, context.latency_s);
+  latency_.add(context.latency_s);
+  status_ = outcome.status;
+  reason_ = outcome.reason;
+  context_ = context;
+  if (!outcome.answered) return;
+  map_present_ = outcome.obstacle != nullptr;
+  map_reason_ = outcome.reason;
+  map_age_s_ = map_present_ ? static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9 : 0;
+}
+
+void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::string& map_topic,
+                        const std::string& hint) const {
+  const auto raise = [&](decltype(status.level) level, const std::string& text) {
+    if (level <= status.level) return;
+    status.level = level;
+    status.message = text;
+  };
+  const auto because = [&](const std::string& what) {
+    const std::string advice = adviceFor(status_, reason_, map_topic);
+    return what + toString(status_) + (reason_.empty() ? "" : ": " + reason_) + (advice.empty() ? "" : "; " + advice);
+  };
+  if (!enabled) raise(DiagnosticStatus::WARN, "disabled");
+  if (outcomes_ > 0 && answers_ == 0) raise(DiagnosticStatus::ERROR, because("no answer: "));
+  if (!map_topic.empty() && answers_ > 0 && !map_present_) {
+    raise(DiagnosticStatus::ERROR, status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_);
+  }
+  if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
+  if (context_.frames.of(StepStatus::QUEUE_FULL) > dropped_before_) {
+    raise(DiagnosticStatus::WARN, "frames are dropped, steps take longer than frames come; " +
+                                      adviceFor(StepStatus::QUEUE_FULL, {}, map_topic));
+  }
+  if (status_ != StepStatus::OK && isAnswered(status_)) raise(DiagnosticStatus::WARN, because(""));
+  if (!hint.empty()) raise(DiagnosticStatus::WARN, hint);
+}
+
+void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic,
+                                 const std::string& hint) {
+  if (now_ns - last_ns_ < PERIOD_NS) return;
+  const double seconds = last_ns_ == 0 ? 1 : static_cast<double>(now_ns - last_ns_) * 1e-9;
+  last_ns_ = now_ns;
+  DiagnosticStatus status;
+  status.name = name_ + ": steps";
+  status.level = DiagnosticStatus::OK;
+  status.message = toString(status_);
+  judge(status, enabled, map_topic, hint);
+  const std::uint64_t dropped = context_.frames.of(StepStatus::QUEUE_FULL);
+  dropped_before_ = dropped;
+  put(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
+  put(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
+  put(status, "worst latency [s]", worst_latency_s_);
+  put(status, "latency since start: median [s]", latency_.quantile(0.5));
+  put(status, "latency since start: p99 [s]", latency_.quantile(0.99));
+  put(status, "latency since start: worst [s]", latency_.worst());
+  put(status, "frames received", context_.frames.received);
+  put(status, "frames processed", context_.frames.processed());
+  put(status, "frames started anew", context_.frames.started());
+  put(status, "frames skipped", context_.frames.skipped());
+  put(status, "frames dropped", dropped);
+  put(status, "time jumps", context_.frames.of(StepStatus::TIME_JUMP));
+  put(status, "gaps", context_.frames.of(StepStatus::GAP));
+  put(status, "steps not wholly published", context_.steps_unpublished);
+  put(status, "frames handed over in process", context_.frames_handed_over);
+  put(status, "maps received", context_.maps_received);
+  put(status, "maps refused", context_.maps_refused);
+  put(status, "map age [s]", map_age_s_);
+  outcomes_ = answers_ = 0;
+  worst_latency_s_ = 0;
+  diagnostic_msgs::DiagnosticArray array;
+  array.header.stamp = ros::Time::now();
+  array.status.push_back(std::move(status));
+  publisher_.publish(array);
+}
+
+std::string describe(const StepOutcome& outcome) {
+  std::ostringstream text;
+  text << toString(outcome.status);
+  if (!outcome.reason.empty()) text << " (" << outcome.reason << ")";
+  if (!outcome.answered) return text.str();
+  text << ": " << outcome.total_contacts << " contacts, start state " << toString(outcome.start_state);
+  if (std::isfinite(outcome.earliest_toc)) text << ", earliest toc " << outcome.earliest_toc;
+  return text.str();
+}
+
+}  // namespace dccd

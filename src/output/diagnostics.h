@@ -1,0 +1,48 @@
+// /diagnostics: one status a second with rates, drops, resets, latency and the map's age.
+#pragma once
+
+#include "output/output_messages.h"
+
+#include <string>
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+
+#include "report/latency_histogram.h"
+
+namespace dccd {
+
+class Diagnostics {
+ public:
+  Diagnostics(const std::string& name, ros::NodeHandle& node);
+  void add(const StepOutcome& outcome, const StatsContext& context);
+  /// At most once a second. `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty
+  /// when none is expected.
+  void publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic, const std::string& hint);
+
+ private:
+  void judge(diagnostic_msgs::DiagnosticStatus& status, bool enabled, const std::string& map_topic,
+             const std::string& hint) const;
+
+  std::string name_;
+  ros::Publisher publisher_;
+  std::int64_t last_ns_ = 0;
+  // Since the last status.
+  std::uint64_t outcomes_ = 0, answers_ = 0, dropped_before_ = 0;
+  double worst_latency_s_ = 0;
+  LatencyHistogram latency_;  // since the start
+  // Of the newest outcome.
+  StepStatus status_ = StepStatus::FIRST_FRAME;
+  std::string reason_;
+  // Of the newest one with an answer: the others had no use for a map.
+  std::string map_reason_;
+  double map_age_s_ = 0;
+  bool map_present_ = false;
+  StatsContext context_;
+};
+
+/// One sentence for people: status, contacts, earliest time.
+std::string describe(const StepOutcome& outcome);
+
+}  // namespace dccd

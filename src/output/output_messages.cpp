@@ -1,0 +1,320 @@
+#include "output/output_messages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace dccd {
+
+namespace {
+
+using ContactMessage = deformable_ccd::Contact;
+using StatsMessage = deformable_ccd::StepStats;
+
+static_assert(static_cast<int>(StepStatus::OK) == static_cast<int>(deformable_ccd::ContactArray::OK));
+static_assert(static_cast<int>(StepStatus::GAP) == static_cast<int>(deformable_ccd::ContactArray::GAP));
+static_assert(static_cast<int>(StepStatus::NO_BODY) == static_cast<int>(deformable_ccd::ContactArray::NO_BODY));
+static_assert(static_cast<int>(StepStatus::TRUNCATED) == static_cast<int>(deformable_ccd::ContactArray::TRUNCATED));
+static_assert(static_cast<int>(StepStatus::VERTEX_COUNT) ==
+              static_cast<int>(deformable_ccd::ContactArray::VERTEX_COUNT));
+static_assert(static_cast<int>(StepStatus::INTERNAL_ERROR) ==
+              static_cast<int>(deformable_ccd::ContactArray::INTERNAL_ERROR));
+static_assert(static_cast<int>(StartState::NOT_CHECKED) == static_cast<int>(deformable_ccd::ContactArray::NOT_CHECKED));
+static_assert(static_cast<int>(PairKind::FACE_VOXEL_CORNER) == static_cast<int>(ContactMessage::FACE_VOXEL_CORNER));
+static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
+
+std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
+  std_msgs::Header out;
+  out.stamp = toRosTime(stamp_ns);
+  out.frame_id = frame;
+  return out;
+}
+
+/// Never after the true time: the sum is rounded down to a nanosecond.
+ros::Time timeOf(const StepOutcome& outcome, double toc) {
+  const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
+  return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
+}
+
+std::string nameOf(const Contact& contact, const std::vector<MonitorBody>& bodies) {
+  static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
+  static const std::size_t SIZES[][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}};
+  const std::size_t* size = SIZES[static_cast<std::size_t>(contact.kind)];
+  std::string text;
+  std::size_t next = 0;
+  for (int side = 0; side < 2; ++side) {
+    if (side == 1) text += " and ";
+    if (size[side] == 0) return text + "the map";
+    text += SIZED[size[side]];
+    for (std::size_t i = 0; i < size[side]; ++i) text += (i ? "-" : "") + std::to_string(contact.vertex[next++]);
+    text += " of " + bodies.at(contact.body[static_cast<std::size_t>(side)]).name;
+  }
+  return text;
+}
+
+/// "No contact" is said of clear steps alone; of others, what stands in the way of it.
+std::string noContact(const StepOutcome& outcome) {
+  const std::string start = std::string("starts ") + toString(outcome.start_state);
+  if (outcome.clear) return "no contact, " + start;
+  std::string text = "no contact found, but ";
+  if (outcome.status != StepStatus::OK) {
+    text += toString(outcome.status) + (outcome.reason.empty() ? "" : " (" + outcome.reason + ")") + ", ";
+  }
+  if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
+  return text + start;
+}
+
+/// A line for people; `first` is null where nothing known touches.
+std::string summaryOf(const StepOutcome& outcome, const Contact* first, const std::vector<MonitorBody>& bodies) {
+  if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
+  const std::string start = std::string(", starts ") + toString(outcome.start_state);
+  if (!std::isfinite(outcome.earliest_toc)) return noContact(outcome);
+  char when[64];
+  std::snprintf(when, sizeof when, "%.6f s into the step", outcome.earliest_toc * outcome.duration_s());
+  if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + start;
+  if (first->certainty != Certainty::CERTAIN) {
+    return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + start;
+  }
+  return std::string(first->initial ? "in contact from the start" : "contact " + std::string(when)) + ": " +
+         nameOf(*first, bodies) + start;
+}
+
+ContactMessage toMessage(const StepOutcome& outcome, const Contact& contact) {
+  const ContactGeometry geometry = contactGeometry(outcome, contact);
+  ContactMessage out;
+  out.kind = static_cast<std::uint8_t>(contact.kind);
+  out.certainty = static_cast<std::uint8_t>(contact.certainty);
+  out.initial = contact.initial;
+  out.leaving = contact.leaving;
+  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
+  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
+  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
+  out.voxel_size = contact.voxel_size;
+  out.toc_lower = contact.toc_lower;
+  out.toc_upper = contact.toc_upper;
+  out.time_of_contact = timeOf(outcome, contact.toc_lower);
+  out.point.x = geometry.point.x();
+  out.point.y = geometry.point.y();
+  out.point.z = geometry.point.z();
+  out.normal.x = geometry.normal.x();
+  out.normal.y = geometry.normal.y();
+  out.normal.z = geometry.normal.z();
+  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
+  out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
+  return out;
+}
+
+void fillFrames(const FrameCounters& frames, StatsMessage& out) {
+  out.frames_received = frames.received;
+  out.frames_processed = frames.processed();
+  out.frames_started = frames.started();
+  out.frames_skipped = frames.skipped();
+  out.skipped_duplicate = frames.of(StepStatus::DUPLICATE);
+  out.skipped_vertex_count = frames.of(StepStatus::VERTEX_COUNT);
+  out.skipped_bad_message = frames.of(StepStatus::BAD_MESSAGE);
+  out.skipped_no_transform = frames.of(StepStatus::NO_TRANSFORM);
+  out.skipped_no_body = frames.of(StepStatus::NO_BODY);
+  out.skipped_queue_full = frames.of(StepStatus::QUEUE_FULL);
+  out.skipped_disabled = frames.of(StepStatus::DISABLED);
+  out.skipped_reset = frames.of(StepStatus::RESET);
+  out.skipped_error = frames.of(StepStatus::INTERNAL_ERROR);
+  out.frames_waiting = frames.waiting();
+  out.receipt_stamps = frames.receipt_stamps;
+  out.seams_topology = frames.of(StepStatus::TOPOLOGY_CHANGED);
+  out.seams_gap = frames.of(StepStatus::GAP);
+  out.seams_time_jump = frames.of(StepStatus::TIME_JUMP);
+  out.seams_teleport = frames.of(StepStatus::TELEPORT);
+}
+
+void fillContacts(const StepOutcome& outcome, StatsMessage& out) {
+  out.contacts = static_cast<std::uint32_t>(outcome.total_contacts);
+  out.contacts_certain = static_cast<std::uint32_t>(outcome.counts.certain);
+  out.contacts_undecided = static_cast<std::uint32_t>(outcome.counts.undecided);
+  out.contacts_initial = static_cast<std::uint32_t>(outcome.counts.initial);
+  out.contacts_leaving = static_cast<std::uint32_t>(outcome.counts.leaving);
+  out.contacts_mesh = static_cast<std::uint32_t>(outcome.counts.mesh);
+  out.contacts_obstacle = static_cast<std::uint32_t>(outcome.counts.obstacle);
+  out.suppressed = static_cast<std::uint32_t>(outcome.suppressed);
+  out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
+  out.earliest_toc = outcome.earliest_toc;
+}
+
+void fillStages(const StepStats& stats, StatsMessage& out) {
+  out.total_ms = stats.total_ms;
+  out.unchecked_vertices = static_cast<std::uint32_t>(stats.unchecked_vertices);
+  out.unchecked_faces = static_cast<std::uint32_t>(stats.unchecked_faces);
+  out.vf_candidates = stats.vf_candidates;
+  out.ee_candidates = stats.ee_candidates;
+  out.broad_phase_in = stats[Stage::BROAD_PHASE].in;
+  out.broad_phase_out = stats[Stage::BROAD_PHASE].out;
+  out.planar_in = stats[Stage::PLANAR].in;
+  out.planar_out = stats[Stage::PLANAR].out;
+  out.elementary_in = stats[Stage::ELEMENTARY].in;
+  out.elementary_out = stats[Stage::ELEMENTARY].out;
+  out.record_ms = stats[Stage::RECORD].ms;
+  out.bounds_ms = stats[Stage::BOUNDS].ms;
+  out.broad_phase_ms = stats[Stage::BROAD_PHASE].ms;
+  out.planar_ms = stats[Stage::PLANAR].ms;
+  out.elementary_ms = stats[Stage::ELEMENTARY].ms;
+  out.obstacle_ms = stats[Stage::OBSTACLE].ms;
+  out.start_state_ms = stats[Stage::START_STATE].ms;
+  out.sort_ms = stats[Stage::SORT].ms;
+  out.self_collision_in = stats[Effect::SELF_COLLISION].in;
+  out.self_collision_out = stats[Effect::SELF_COLLISION].out;
+  out.self_collision_ms = stats[Effect::SELF_COLLISION].ms;
+  out.body_body_in = stats[Effect::BODY_BODY].in;
+  out.body_body_out = stats[Effect::BODY_BODY].out;
+  out.body_body_ms = stats[Effect::BODY_BODY].ms;
+  out.obstacle_in = stats[Effect::OBSTACLE].in;
+  out.obstacle_out = stats[Effect::OBSTACLE].out;
+  out.start_state_in = stats[Effect::START_STATE].in;
+  out.start_state_out = stats[Effect::START_STATE].out;
+  out.rigid_bodies_in = stats[Effect::RIGID_BODIES].in;
+  out.rigid_bodies_out = stats[Effect::RIGID_BODIES].out;
+  out.rigid_bodies_ms = stats[Effect::RIGID_BODIES].ms;
+  out.unknown_space_in = stats[Effect::UNKNOWN_SPACE].in;
+  out.unknown_space_out = stats[Effect::UNKNOWN_SPACE].out;
+  out.unknown_space_ms = stats[Effect::UNKNOWN_SPACE].ms;
+  out.minimum_separation_in = stats[Effect::MINIMUM_SEPARATION].in;
+  out.minimum_separation_out = stats[Effect::MINIMUM_SEPARATION].out;
+  out.minimum_separation_ms = stats[Effect::MINIMUM_SEPARATION].ms;
+  out.tracker_noise_in = stats[Effect::TRACKER_NOISE].in;
+  out.tracker_noise_out = stats[Effect::TRACKER_NOISE].out;
+  out.tracker_noise_ms = stats[Effect::TRACKER_NOISE].ms;
+  out.look_ahead_in = stats[Effect::LOOK_AHEAD].in;
+  out.look_ahead_out = stats[Effect::LOOK_AHEAD].out;
+  out.look_ahead_ms = stats[Effect::LOOK_AHEAD].ms;
+  out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
+  out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
+  out.body_pairs = static_cast<std::uint32_t>(stats.body_pairs);
+  out.left_out_listed = stats.left_out_listed;
+  out.left_out_met = stats.left_out_met;
+  const auto tier = [&](Tier t) { return stats.tiers.settled[static_cast<std::size_t>(t)]; };
+  out.tier_coincidence = tier(Tier::COINCIDENCE);
+  out.tier_double_batch = tier(Tier::DOUBLE_BATCH);
+  out.tier_bernstein = tier(Tier::BERNSTEIN);
+  out.tier_double_double = tier(Tier::DOUBLE_DOUBLE);
+  out.tier_fixed_integer = tier(Tier::FIXED_INTEGER);
+  out.tier_big_integer = tier(Tier::BIG_INTEGER);
+}
+
+}  // namespace
+
+ros::Time toRosTime(StampNs stamp_ns) {
+  // Beyond this ros::Time throws; a message may bring such a stamp, or one so late that a prediction leads there.
+  constexpr StampNs LAST_NS = 4294967295999999999;
+  ros::Time time;
+  time.fromNSec(static_cast<std::uint64_t>(std::clamp<StampNs>(stamp_ns, 0, LAST_NS)));
+  return time;
+}
+
+deformable_ccd::ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                                            const std::string& frame) {
+  deformable_ccd::ContactArray out;
+  out.header = header(outcome.stamp_ns, frame);
+  out.start = toRosTime(outcome.start_ns);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.reason = outcome.reason;
+  out.answered = outcome.answered;
+  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
+  out.complete = outcome.complete;
+  out.unchecked_toc_lower = outcome.unchecked_toc_lower;
+  out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
+  out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
+  for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
+  out.contacts.reserve(outcome.contacts.size());
+  for (const Contact& contact : outcome.contacts) out.contacts.push_back(toMessage(outcome, contact));
+  for (const StartIntersection& crossing : outcome.intersections) {
+    deformable_ccd::Intersection message;
+    std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
+    std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
+    out.intersections.push_back(message);
+  }
+  return out;
+}
+
+deformable_ccd::FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                                            const std::string& frame) {
+  deformable_ccd::FirstContact out;
+  out.header = header(outcome.stamp_ns, frame);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
+  out.answered = outcome.answered;
+  out.contact = std::isfinite(outcome.earliest_toc);
+  out.toc = outcome.earliest_toc;
+  out.seconds_from_start = outcome.earliest_toc;
+  const Contact* first = nullptr;
+  for (const Contact& contact : outcome.contacts) {
+    if (contact.toc_lower != outcome.earliest_toc) continue;
+    const bool certain = contact.certainty == Certainty::CERTAIN;
+    if (!first || (certain && !out.certain)) first = &contact;
+    out.certain |= certain;
+  }
+  if (out.contact) {
+    out.time_of_contact = timeOf(outcome, outcome.earliest_toc);
+    out.seconds_from_start = outcome.earliest_toc * outcome.duration_s();
+  }
+  out.summary = summaryOf(outcome, first, bodies);
+  return out;
+}
+
+StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context, const std::string& frame) {
+  StatsMessage out;
+  out.header = header(outcome.stamp_ns, frame);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
+  out.answered = outcome.answered;
+  out.complete = outcome.complete;
+  out.step = outcome.duration_s();
+  out.latency = context.latency_s;
+  out.substeps = static_cast<std::uint32_t>(outcome.substeps);
+  fillFrames(context.frames, out);
+  out.weld_changes = context.weld_changes;
+  fillContacts(outcome, out);
+  fillStages(outcome.stats, out);
+  out.map_present = outcome.obstacle != nullptr;
+  if (outcome.obstacle) {
+    out.map_leaves = outcome.obstacle->leafCount();
+    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9;
+  }
+  out.excluded_voxels = outcome.excluded_voxels;
+  out.unknown_fraction = outcome.unknown_fraction;
+  out.look_ahead_compared = static_cast<std::uint32_t>(context.look_ahead.compared);
+  out.look_ahead_median_error = context.look_ahead.median_error_s;
+  out.look_ahead_p95_error = context.look_ahead.p95_error_s;
+  out.maps_received = context.maps_received;
+  out.maps_refused = context.maps_refused;
+  out.markers_built = context.markers_built;
+  out.parameter_hash = context.parameter_hash;
+  return out;
+}
+
+deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs,
+                                            const std::vector<MonitorBody>& bodies, StampNs stamp_ns,
+                                            const std::string& frame) {
+  deformable_ccd::LeftOutPairs out;
+  out.header = header(stamp_ns, frame);
+  for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
+  out.pairs.resize(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    out.pairs[i].kind = static_cast<std::uint8_t>(pairs[i].kind);
+    out.pairs[i].body = pairs[i].body;
+    std::copy(pairs[i].vertex.begin(), pairs[i].vertex.end(), out.pairs[i].vertex.begin());
+  }
+  return out;
+}
+
+deformable_ccd::TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s,
+                                              const std::string& frame) {
+  deformable_ccd::TimeToContact out;
+  out.header = header(prediction.start_ns, frame);
+  out.status = static_cast<std::uint8_t>(prediction.status);
+  out.start_state = static_cast<std::uint8_t>(prediction.start_state);
+  out.answered = prediction.answered;
+  out.horizon = horizon_s;
+  out.contact = std::isfinite(prediction.earliest_toc);
+  out.seconds = prediction.earliest_toc * horizon_s;
+  return out;
+}
+
+}  // namespace dccd

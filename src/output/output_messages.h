@@ -1,0 +1,46 @@
+// An outcome as messages. Used by the node and by analyze_bag, so that both write the same.
+#pragma once
+
+#include <deformable_ccd/ContactArray.h>
+#include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/LeftOutPairs.h>
+#include <deformable_ccd/StepStats.h>
+#include <deformable_ccd/TimeToContact.h>
+#include <std_msgs/Header.h>
+
+#include "dccd/look_ahead_score.h"
+#include "dccd/monitor.h"
+
+namespace dccd {
+
+/// The nearest that a message can hold: 0 to 2^32 s.
+ros::Time toRosTime(StampNs stamp_ns);
+
+/// What the statistics say beyond the outcome itself.
+struct StatsContext {
+  FrameCounters frames;  ///< of all bodies
+  std::uint64_t weld_changes = 0;
+  double latency_s = 0;
+  std::uint64_t maps_received = 0, maps_refused = 0;
+  std::uint64_t steps_unpublished = 0;   ///< of which not everything was published
+  std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
+  LookAheadSummary look_ahead;
+  std::uint64_t markers_built = 0;
+  std::uint64_t parameter_hash = 0;
+};
+
+deformable_ccd::ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                                            const std::string& frame);
+deformable_ccd::FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                                            const std::string& frame);
+/// The message of the package, not StepStats.
+deformable_ccd::StepStats toStepStats(const StepOutcome& outcome, const StatsContext& context,
+                                      const std::string& frame);
+deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs,
+                                            const std::vector<MonitorBody>& bodies, StampNs stamp_ns,
+                                            const std::string& frame);
+/// From a prediction (Monitor::predict) over horizon_s.
+deformable_ccd::TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s,
+                                              const std::string& frame);
+
+}  // namespace dccd

@@ -1,0 +1,79 @@
+#include "output/outputs.h"
+
+#include <std_msgs/Bool.h>
+
+#include "output/markers.h"
+
+namespace dccd {
+
+namespace {
+
+// Deep enough for a subscriber that stalls for a second at camera rate; a slower one loses messages, not the node time.
+constexpr std::uint32_t QUEUE = 32;
+
+}  // namespace
+
+Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
+  contacts_ = node.advertise<deformable_ccd::ContactArray>("contacts", QUEUE);
+  first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", QUEUE);
+  clear_ = node.advertise<std_msgs::Bool>("clear", QUEUE, true);
+  stats_ = node.advertise<deformable_ccd::StepStats>("stats", QUEUE);
+  markers_ = node.advertise<visualization_msgs::MarkerArray>("markers", 2);
+  effects_ = node.advertise<deformable_ccd::EffectArray>("effects", 1, true);
+  if (look_ahead) {
+    predicted_ = node.advertise<deformable_ccd::ContactArray>("predicted_contacts", QUEUE);
+    time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", QUEUE);
+  }
+  if (separates) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
+  publishNotClear("");
+}
+
+void Outputs::publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                            const std::string& frame) {
+  std_msgs::Bool clear;
+  clear.data = outcome.clear;
+  clear_.publish(clear);
+  if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
+  if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
+}
+
+void Outputs::publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+                             const MarkerConfig& markers, const std::string& frame) {
+  if (markers_.getNumSubscribers() > 0 && !frame.empty()) {
+    ++markers_built_;
+    markers_.publish(toMarkers(outcome, bodies, markers, frame));
+  }
+}
+
+void Outputs::publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame) {
+  if (stats_.getNumSubscribers() == 0) return;
+  context.markers_built = markers_built_;
+  stats_.publish(toStepStats(outcome, context, frame));
+}
+
+bool Outputs::wantsPrediction() const {
+  return (predicted_ && predicted_.getNumSubscribers() > 0) ||
+         (time_to_contact_ && time_to_contact_.getNumSubscribers() > 0);
+}
+
+void Outputs::publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
+                                const std::string& frame) {
+  if (predicted_.getNumSubscribers() > 0) predicted_.publish(toContactArray(prediction, bodies, frame));
+  if (time_to_contact_.getNumSubscribers() > 0) {
+    time_to_contact_.publish(toTimeToContact(prediction, horizon_s, frame));
+  }
+}
+
+void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }
+
+void Outputs::publishLeftOut(const deformable_ccd::LeftOutPairs& pairs) {
+  if (left_out_) left_out_.publish(pairs);
+}
+
+void Outputs::publishNotClear(const std::string& frame) {
+  clear_.publish(std_msgs::Bool());
+  // Of an outcome without an answer all that is shown is that what was there before is gone.
+  if (markers_.getNumSubscribers() > 0 && !frame.empty()) markers_.publish(toMarkers({}, {}, {}, frame));
+}
+
+}  // namespace dccd

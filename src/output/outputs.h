@@ -1,0 +1,44 @@
+// The node's topics. A message is built only when somebody listens; latched ones always, since they are for later
+// comers.
+#pragma once
+
+#include "output/output_messages.h"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <deformable_ccd/EffectArray.h>
+#include <ros/node_handle.h>
+
+#include "config/monitor_config.h"
+
+namespace dccd {
+
+class Outputs {
+ public:
+  Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates);
+
+  /// What a robot waits for, before all else: clear, first contact, contacts.
+  void publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
+  void publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
+                      const std::string& frame);
+  /// After the step's prediction, which it tells of.
+  void publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame);
+  /// Whether anybody listens to predictions.
+  bool wantsPrediction() const;
+  /// Also one without an answer.
+  void publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
+                         const std::string& frame);
+  void publishEffects(const deformable_ccd::EffectArray& effects);
+  /// Latched. Only where some body separates.
+  void publishLeftOut(const deformable_ccd::LeftOutPairs& pairs);
+  /// Not clear, and nothing shown: after a reset or when disabled. An empty frame: nothing was shown yet.
+  void publishNotClear(const std::string& frame);
+
+ private:
+  ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;
+  std::uint64_t markers_built_ = 0;
+};
+
+}  // namespace dccd

@@ -1,0 +1,85 @@
+#include "record/flight_recorder.h"
+
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+namespace dccd {
+
+std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options) {
+  if (outcome.status == StepStatus::INTERNAL_ERROR) return "the step failed: " + outcome.reason;
+  if (!outcome.answered) return {};
+  const bool exact = options.detector.accuracy.rung == Accuracy::EXACT;
+  if (exact && outcome.complete && outcome.stats.undecided > 0) {
+    return "exact arithmetic left " + std::to_string(outcome.stats.undecided) + " pairs undecided";
+  }
+  for (const Contact& c : outcome.contacts) {
+    // Written so that a NaN fails.
+    if (c.toc_lower >= 0 && c.toc_lower <= c.toc_upper && c.toc_upper <= 1) continue;
+    return "a contact's time is outside of the step: [" + std::to_string(c.toc_lower) + ", " +
+           std::to_string(c.toc_upper) + "]";
+  }
+  return {};
+}
+
+FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image)
+    : ring_(steps), folder_(std::move(folder)), newest_image_(newest_image) {
+  if (steps == 0) throw std::invalid_argument("a flight recorder keeps at least 1 step");
+}
+
+FlightRecorder::~FlightRecorder() {
+  const RecordingImage* mine = &image_;
+  if (newest_image_) newest_image_->compare_exchange_strong(mine, nullptr);
+}
+
+void FlightRecorder::onStep(const StepSource& source) {
+  if (newest_image_) *newest_image_ = nullptr;
+  next_ = (next_ + 1) % ring_.size();
+  count_ = std::min(count_ + 1, ring_.size());
+  setSource(source, newest());
+  if (!newest_image_) return;
+  newest().note = "written by the crash handler";
+  image_.build(newest());
+  *newest_image_ = &image_;
+}
+
+void FlightRecorder::onOutcome(const StepOutcome& outcome) {
+  if (count_ == 0) return;
+  setAnswer(outcome, newest());  // the image points to nothing of the answer
+  const std::string surprise = surpriseIn(outcome, newest().options);
+  if (surprise.empty()) return;
+  surprise_ = "step " + std::to_string(outcome.sequence) + ": " + surprise;
+  if (surprises_ >= MAX_SURPRISES) {
+    surprise_ += "; not recorded, " + std::to_string(MAX_SURPRISES) + " were already";
+    return;
+  }
+  ++surprises_;
+  try {
+    surprise_ += "; recorded in " + write(newest(), "surprise", surprise);
+  } catch (const std::runtime_error& error) {
+    surprise_ += std::string("; not recorded: ") + error.what();
+  }
+}
+
+std::string FlightRecorder::write(StepRecording& recording, const std::string& kind, const std::string& note) {
+  std::error_code ignored;  // the file says so, too
+  std::filesystem::create_directories(folder_, ignored);
+  const std::string path = folder_ + "/" + kind + "_" + std::to_string(recording.sequence) + "_" +
+                           std::to_string(recording.stamp_ns) + ".step";
+  recording.note = note;
+  writeRecording(path, recording);
+  return path;
+}
+
+std::vector<std::string> FlightRecorder::writeAll(const std::string& note) {
+  std::vector<std::string> files;
+  for (std::size_t i = count_; i-- > 0;) {
+    StepRecording& recording = ring_[(next_ + 2 * ring_.size() - 1 - i) % ring_.size()];
+    files.push_back(write(recording, "step", note));
+  }
+  return files;
+}
+
+std::string FlightRecorder::takeSurprise() { return std::exchange(surprise_, {}); }
+
+}  // namespace dccd

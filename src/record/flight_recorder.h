@@ -1,0 +1,56 @@
+// The last steps of a monitor, kept so that they can be written when somebody asks, when an answer contradicts what was
+// promised, or when the program crashes (node/crash_handler.h).
+#pragma once
+
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "dccd/export.h"
+
+#include "record/step_recording.h"
+
+namespace dccd {
+
+/// What of an outcome contradicts the promises of its options; empty: nothing. The step failed, `exact` left a pair
+/// undecided though no deadline expired, or a time lies outside of the step.
+DCCD_EXPORT std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options);
+
+/// Memory: `steps` times the positions and contacts of a step; buffers are kept. Not thread-safe: one thread, the
+/// monitor's.
+class DCCD_EXPORT FlightRecorder : public StepListener {
+ public:
+  static constexpr std::size_t MAX_SURPRISES = 16;  ///< files of surprises per recorder, so that no disk is filled
+
+  /// Where a crash handler finds the step that is being computed; null: none.
+  using NewestImage = std::atomic<const RecordingImage*>;
+
+  /// steps >= 1. The folder is created when a file is written. newest_image: kept up to date, must outlive this.
+  FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image = nullptr);
+  ~FlightRecorder() override;
+  FlightRecorder(const FlightRecorder&) = delete;
+  FlightRecorder& operator=(const FlightRecorder&) = delete;
+
+  void onStep(const StepSource& source) override;
+  void onOutcome(const StepOutcome& outcome) override;
+
+  /// Steps that are kept.
+  std::size_t size() const { return count_; }
+  /// Writes all steps that are kept, oldest first; returns the files. Throws std::runtime_error naming the file and why
+  /// it cannot be written.
+  std::vector<std::string> writeAll(const std::string& note);
+  /// One sentence about a surprise since the last call, with the file that it is in; empty: none.
+  std::string takeSurprise();
+
+ private:
+  StepRecording& newest() { return ring_[(next_ + ring_.size() - 1) % ring_.size()]; }
+  std::string write(StepRecording& recording, const std::string& kind, const std::string& note);
+
+  std::vector<StepRecording> ring_;
+  std::size_t next_ = 0, count_ = 0, surprises_ = 0;
+  std::string folder_, surprise_;
+  NewestImage* newest_image_;
+  RecordingImage image_;  // of the newest step without its answer, for the crash handler
+};
+
+}  // namespace dccd

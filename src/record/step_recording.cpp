@@ -1,0 +1,356 @@
+#include "record/step_recording.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "record/recording_archive.h"
+
+namespace dccd {
+
+namespace {
+
+constexpr char MAGIC[8] = {'D', 'C', 'C', 'D', 'S', 'T', 'E', 'P'};
+// What hostile options could cost: parts of a step, and buffers for so many workers.
+constexpr std::size_t MAX_SUBSTEPS = 100000;
+constexpr std::size_t MAX_BODIES = 65534;
+
+enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1 };
+
+// The least bytes that one item of a list takes.
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24;
+
+template <typename Archive, typename Pose>
+void visitPose(Archive& a, Pose& pose) {
+  for (int i = 0; i < 16; ++i) {
+    a.number(pose.matrix().data()[i]);
+    if constexpr (Archive::READS) {
+      if (!std::isfinite(pose.matrix().data()[i])) a.fail("a pose is not finite");
+    }
+  }
+}
+
+template <typename Archive, typename Options>
+void visitOptions(Archive& a, Options& o) {
+  a.choice(o.detector.accuracy.rung, Accuracy::EXACT);
+  a.number(o.detector.accuracy.tolerance_m);
+  a.number(o.detector.accuracy.toc_bits);
+  a.number(o.detector.accuracy.max_subdivisions);
+  a.choice(o.detector.broad_phase, BroadPhase::BRUTE_FORCE);
+  a.number(o.detector.num_threads);
+  a.number(o.detector.step_budget_ms);
+  a.flag(o.detector.earliest_only);
+  a.flag(o.detector.check_start_state);
+  a.flag(o.detector.unfolded_test);
+  a.size(o.max_contacts);
+  a.flag(o.suppress_initial);
+  a.array(o.exclude_boxes);
+  a.flag(o.obstacle_expected);
+  a.number(o.rigid_tolerance_m);
+  a.size(o.max_substeps);
+  a.size(o.clock_body);
+  if constexpr (Archive::READS) {
+    if (o.max_substeps > MAX_SUBSTEPS) a.fail("max_substeps is " + std::to_string(o.max_substeps));
+  }
+}
+
+template <typename Archive, typename Body>
+void visitBody(Archive& a, Body& body) {
+  a.text(body.setup.name);
+  a.choice(body.setup.motion, BodyMotionKind::STATIC);
+  a.flag(body.setup.rigid);
+  a.flag(body.setup.self_collision);
+  a.flag(body.setup.against_bodies);
+  a.flag(body.setup.against_obstacle);
+  a.number(body.setup.minimum_separation_m);
+  a.array(body.setup.vertex_mask);
+  a.array(body.t0);
+  a.array(body.t1);
+  a.flag(body.rigid);
+  visitPose(a, body.pose_t0);
+  visitPose(a, body.pose_t1);
+}
+
+void visitTopology(RecordingWriter& a, const RecordedBody& body) {
+  static const std::vector<Face> NONE;
+  const bool line = body.topology && !body.topology->hasFaces() && !body.topology->edges().empty();
+  a.choice(line ? Connectivity::POLYLINE : Connectivity::TRIANGLES, Connectivity::POLYLINE);
+  a.array(body.topology ? body.topology->faces() : NONE);
+}
+
+void visitTopology(RecordingReader& a, RecordedBody& body) {
+  if (body.t0.size() != body.t1.size()) {
+    a.fail("body '" + body.setup.name + "' has " + std::to_string(body.t0.size()) + " vertices at t=0 and " +
+           std::to_string(body.t1.size()) + " at t=1");
+  }
+  Connectivity kind = Connectivity::TRIANGLES;
+  std::vector<Face> faces;
+  a.choice(kind, Connectivity::POLYLINE);
+  a.array(faces);
+  try {
+    body.topology = std::make_shared<const Topology>(kind == Connectivity::POLYLINE
+                                                         ? Topology::polyline(body.t0.size())
+                                                         : Topology::fromTriangles(body.t0.size(), faces));
+  } catch (const TopologyError& error) {
+    a.fail("body '" + body.setup.name + "': " + error.what());
+  }
+}
+
+void visitMap(RecordingWriter& a, const MonitorMap& map) {
+  a.flag(map.surface != nullptr);
+  if (map.surface) a.map(map.surface);
+}
+
+void visitMap(RecordingReader& a, MonitorMap& map) {
+  bool present = false;
+  a.flag(present);
+  if (present) a.map(map.surface);
+}
+
+template <typename Archive, typename Contact>
+void visitContact(Archive& a, Contact& c) {
+  a.choice(c.kind, PairKind::FACE_VOXEL_CORNER);
+  a.number(c.toc_lower);
+  a.number(c.toc_upper);
+  for (auto& vertex : c.vertex) a.number(vertex);
+  for (auto& body : c.body) a.number(body);
+  a.number(c.voxel.x);
+  a.number(c.voxel.y);
+  a.number(c.voxel.z);
+  a.number(c.voxel_size);
+  a.choice(c.certainty, Certainty::UNDECIDED);
+  a.flag(c.initial);
+  a.flag(c.leaving);
+}
+
+template <typename Archive, typename Answer>
+void visitAnswer(Archive& a, Answer& answer) {
+  a.flag(answer.present);
+  a.choice(answer.status, StepStatus::INTERNAL_ERROR);
+  a.text(answer.reason);
+  a.flag(answer.answered);
+  a.flag(answer.complete);
+  a.flag(answer.clear);
+  a.choice(answer.start_state, StartState::NOT_CHECKED);
+  a.number(answer.total_contacts);
+  a.number(answer.suppressed);
+  a.number(answer.excluded_voxels);
+  a.number(answer.substeps);
+  a.number(answer.unchecked_toc_lower);
+  a.number(answer.earliest_toc);
+  a.count(answer.contacts, CONTACT_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& contact : answer.contacts) visitContact(a, contact);
+  a.count(answer.intersections, INTERSECTION_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& crossing : answer.intersections) {
+    for (auto& body : crossing.body) a.number(body);
+    for (auto& vertex : crossing.vertex) a.number(vertex);
+  }
+}
+
+template <typename Archive, typename Body>
+void visitSeparations(Archive& a, Body& body) {
+  a.count(body.setup.separations, SEPARATION_BYTES, MAX_BODIES);
+  for (auto& from : body.setup.separations) {
+    a.number(from.body);
+    a.number(from.separation_m);
+  }
+  a.array(body.radius_m);
+}
+
+void visitReference(RecordingWriter& a, const RecordedBody& body) {
+  a.flag(body.reference != nullptr);
+  if (!body.reference) return;
+  a.array(body.reference->positions);
+  a.array(body.reference->radius_m);
+}
+
+void visitReference(RecordingReader& a, RecordedBody& body) {
+  const auto fits = [&](const std::vector<double>& radius) {
+    return radius.empty() || radius.size() == body.t0.size();
+  };
+  if (!fits(body.radius_m)) {
+    a.fail("body '" + body.setup.name + "' has " + std::to_string(body.radius_m.size()) + " radii");
+  }
+  bool present = false;
+  a.flag(present);
+  if (!present) return;
+  ReferenceFrame reference;
+  a.array(reference.positions);
+  a.array(reference.radius_m);
+  if (reference.positions.size() != body.t0.size() || !fits(reference.radius_m)) {
+    a.fail("the reference frame of body '" + body.setup.name + "' has " + std::to_string(reference.positions.size()) +
+           " vertices and " + std::to_string(reference.radius_m.size()) + " radii");
+  }
+  body.reference = std::make_shared<const ReferenceFrame>(std::move(reference));
+}
+
+/// What version 2 added.
+template <typename Archive, typename Recording>
+void visitDistances(Archive& a, Recording& r) {
+  for (auto& body : r.bodies) {
+    visitSeparations(a, body);
+    visitReference(a, body);
+  }
+}
+
+/// The file's fields in their order, for both directions.
+template <typename Archive, typename Recording>
+void visit(Archive& a, Recording& r) {
+  a.text(r.note);
+  a.number(r.sequence);
+  a.number(r.start_ns);
+  a.number(r.stamp_ns);
+  if constexpr (Archive::READS) {
+    if (r.start_ns < 0 || r.stamp_ns <= r.start_ns) {
+      a.fail("the step lasts from " + std::to_string(r.start_ns) + " ns to " + std::to_string(r.stamp_ns) + " ns");
+    }
+  }
+  visitOptions(a, r.options);
+  a.count(r.bodies, BODY_BYTES, MAX_BODIES);
+  for (auto& body : r.bodies) {
+    visitBody(a, body);
+    visitTopology(a, body);
+  }
+  visitMap(a, r.map);
+  a.number(r.map.stamp_ns);
+  visitPose(a, r.map.map_from_fixed);
+  a.text(r.map.problem);
+  visitAnswer(a, r.answer);
+}
+
+std::string systemText(const std::string& path) { return path + ": cannot be written: " + std::strerror(errno); }
+
+}  // namespace
+
+void setSource(const StepSource& source, StepRecording& recording) {
+  recording.sequence = source.sequence;
+  recording.start_ns = source.start_ns;
+  recording.stamp_ns = source.stamp_ns;
+  recording.options = *source.options;
+  recording.bodies.resize(source.bodies->size());
+  for (std::size_t b = 0; b < recording.bodies.size(); ++b) {
+    RecordedBody& body = recording.bodies[b];
+    body.setup = (*source.bodies)[b];
+    body.topology = (*source.topologies)[b];
+    body.t0.assign((*source.t0)[b].begin(), (*source.t0)[b].end());
+    body.t1.assign((*source.t1)[b].begin(), (*source.t1)[b].end());
+    body.rigid = (*source.rigid)[b] != 0;
+    body.pose_t0 = (*source.pose_t0)[b];
+    body.pose_t1 = (*source.pose_t1)[b];
+    body.radius_m.assign((*source.radius_m)[b].begin(), (*source.radius_m)[b].end());
+    body.reference = (*source.references)[b];
+  }
+  recording.map = *source.map;
+  RecordedAnswer& answer = recording.answer;
+  answer.present = false;
+  answer.contacts.clear();
+  answer.intersections.clear();
+}
+
+void setAnswer(const StepOutcome& outcome, StepRecording& recording) {
+  RecordedAnswer& answer = recording.answer;
+  answer.present = true;
+  answer.status = outcome.status;
+  answer.reason = outcome.reason;
+  answer.answered = outcome.answered;
+  answer.complete = outcome.complete;
+  answer.clear = outcome.clear;
+  answer.start_state = outcome.start_state;
+  answer.total_contacts = outcome.total_contacts;
+  answer.suppressed = outcome.suppressed;
+  answer.excluded_voxels = outcome.excluded_voxels;
+  answer.substeps = outcome.substeps;
+  answer.unchecked_toc_lower = outcome.unchecked_toc_lower;
+  answer.earliest_toc = outcome.earliest_toc;
+  answer.contacts.assign(outcome.contacts.begin(), outcome.contacts.end());
+  answer.intersections.assign(outcome.intersections.begin(), outcome.intersections.end());
+}
+
+void RecordingImage::build(const StepRecording& recording) {
+  heads_.clear();
+  pieces_.clear();
+  RecordingWriter writer(*this);
+  for (const char c : MAGIC) writer.number(c);
+  writer.number(RECORDING_VERSION);
+  visit(writer, recording);
+  visitDistances(writer, recording);
+}
+
+bool RecordingImage::write(int descriptor) const noexcept {
+  for (const Piece& piece : pieces_) {
+    const char* data = static_cast<const char*>(piece.data ? piece.data : heads_.data() + piece.offset);
+    std::size_t left = piece.size;
+    while (left > 0) {
+      const ssize_t written = ::write(descriptor, data, left);
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) return false;
+      data += written;
+      left -= static_cast<std::size_t>(written);
+    }
+  }
+  return true;
+}
+
+std::size_t RecordingImage::bytes() const {
+  std::size_t sum = 0;
+  for (const Piece& piece : pieces_) sum += piece.size;
+  return sum;
+}
+
+void writeRecording(const std::string& path, const StepRecording& recording) {
+  RecordingImage image;
+  image.build(recording);
+  const std::string part = path + ".part";
+  const int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (descriptor < 0) throw std::runtime_error(systemText(path));
+  bool good = image.write(descriptor);
+  int why = errno;
+  // A full disk may show up only here.
+  if (::close(descriptor) != 0 && good) {
+    good = false;
+    why = errno;
+  }
+  if (good && std::rename(part.c_str(), path.c_str()) != 0) {
+    good = false;
+    why = errno;
+  }
+  if (good) return;
+  ::unlink(part.c_str());
+  errno = why;
+  throw std::runtime_error(systemText(path));
+}
+
+StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {
+  RecordingReader reader(data, size, name);
+  char magic[sizeof MAGIC] = {};
+  if (size < sizeof magic) reader.fail("too short for a recording of a step");
+  reader.bytes(magic, sizeof magic);
+  if (std::memcmp(magic, MAGIC, sizeof magic) != 0) reader.fail("not a recording of a step");
+  std::uint32_t version = 0;
+  reader.number(version);
+  if (version < 1 || version > RECORDING_VERSION) {
+    reader.fail("version " + std::to_string(version) + " of the format; this program reads versions 1 to " +
+                std::to_string(RECORDING_VERSION));
+  }
+  StepRecording recording;
+  visit(reader, recording);
+  if (version >= 2) visitDistances(reader, recording);
+  if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
+  return recording;
+}
+
+StepRecording readRecordingFile(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw RecordingError(path + ": cannot be read");
+  const std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return readRecording(bytes.data(), bytes.size(), path);
+}
+
+}  // namespace dccd

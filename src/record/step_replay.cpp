@@ -1,0 +1,175 @@
+#include "record/step_replay.h"
+
+#include <algorithm>
+#include <cstring>
+#include <sstream>
+
+namespace dccd {
+
+namespace {
+
+constexpr std::size_t MAX_DIFFERENCES = 10;
+
+bool sameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+bool samePair(const Contact& a, const Contact& b) {
+  return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex && a.voxel == b.voxel &&
+         a.voxel_size == b.voxel_size;
+}
+
+bool sameContact(const Contact& a, const Contact& b) {
+  return samePair(a, b) && sameBits(a.toc_lower, b.toc_lower) && sameBits(a.toc_upper, b.toc_upper) &&
+         a.certainty == b.certainty && a.initial == b.initial && a.leaving == b.leaving;
+}
+
+std::string pairText(const Contact& c) {
+  std::ostringstream text;
+  text.precision(17);
+  text << toString(c.kind) << " of bodies " << c.body[0] << ", " << c.body[1] << ", vertices";
+  for (const Index v : c.vertex) {
+    if (v != NO_INDEX) text << ' ' << v;
+  }
+  if (c.body[1] == OBSTACLE_BODY) text << ", voxel " << c.voxel.x << ' ' << c.voxel.y << ' ' << c.voxel.z;
+  text << ", toc [" << c.toc_lower << ", " << c.toc_upper << "]";
+  return text.str();
+}
+
+class Differences {
+ public:
+  template <typename T>
+  void field(const char* name, const T& recorded, const T& replayed) {
+    if (recorded == replayed) return;
+    std::ostringstream text;
+    text << name << ": recorded " << recorded << ", replayed " << replayed;
+    add(text.str());
+  }
+  void field(const char* name, double recorded, double replayed) {
+    if (sameBits(recorded, replayed)) return;
+    std::ostringstream text;
+    text.precision(17);
+    text << name << ": recorded " << recorded << ", replayed " << replayed;
+    add(text.str());
+  }
+  void add(const std::string& text) {
+    if (found_.size() < MAX_DIFFERENCES) found_.push_back(text);
+  }
+  std::vector<std::string> take() { return std::move(found_); }
+
+ private:
+  std::vector<std::string> found_;
+};
+
+void compareContacts(const RecordedAnswer& recorded, const RecordedAnswer& replayed, Differences& out) {
+  out.field("number of contacts", recorded.contacts.size(), replayed.contacts.size());
+  const std::size_t n = std::min(recorded.contacts.size(), replayed.contacts.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    if (sameContact(recorded.contacts[i], replayed.contacts[i])) continue;
+    out.add("contact " + std::to_string(i) + ": recorded " + pairText(recorded.contacts[i]) + "; replayed " +
+            pairText(replayed.contacts[i]));
+  }
+}
+
+/// The recorded step ended early: what it called certain must be among the replayed contacts.
+void compareCertain(const RecordedAnswer& recorded, const RecordedAnswer& replayed, Differences& out) {
+  for (const Contact& c : recorded.contacts) {
+    if (c.certainty != Certainty::CERTAIN) continue;
+    const bool found = std::any_of(replayed.contacts.begin(), replayed.contacts.end(),
+                                   [&](const Contact& other) { return sameContact(c, other); });
+    if (!found) out.add("recorded as certain, not replayed: " + pairText(c));
+  }
+}
+
+MonitorOptions replayOptions(const StepRecording& recording, int threads) {
+  MonitorOptions options = recording.options;
+  options.detector.num_threads = threads;
+  options.detector.step_budget_ms = 0;
+  // What was decided before the step was computed is no question any more: it has its frames and its map.
+  options.store = MeshStoreOptions();
+  options.store.max_step_s = 1e12;
+  options.store.max_vertex_step_m = 0;
+  options.sync_timeout_s = 0;
+  options.octomap_timeout_s = 0;
+  options.look_ahead_s = 0;
+  return options;
+}
+
+}  // namespace
+
+std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const RecordedAnswer& replayed) {
+  Differences out;
+  if (!recorded.answered || !recorded.complete) {
+    if (recorded.answered) compareCertain(recorded, replayed, out);
+    return out.take();
+  }
+  out.field("status", std::string(toString(recorded.status)), std::string(toString(replayed.status)));
+  out.field("clear", recorded.clear, replayed.clear);
+  out.field("start state", std::string(toString(recorded.start_state)), std::string(toString(replayed.start_state)));
+  out.field("contacts before the cut to max_contacts", recorded.total_contacts, replayed.total_contacts);
+  out.field("suppressed contacts", recorded.suppressed, replayed.suppressed);
+  out.field("excluded voxels", recorded.excluded_voxels, replayed.excluded_voxels);
+  out.field("parts of the step", recorded.substeps, replayed.substeps);
+  out.field("earliest toc", recorded.earliest_toc, replayed.earliest_toc);
+  compareContacts(recorded, replayed, out);
+  const bool same = std::equal(
+      recorded.intersections.begin(), recorded.intersections.end(), replayed.intersections.begin(),
+      replayed.intersections.end(),
+      [](const StartIntersection& a, const StartIntersection& b) { return a.body == b.body && a.vertex == b.vertex; });
+  if (!same) out.add("the intersections at t=0 differ");
+  return out.take();
+}
+
+StepReplay replayStep(const StepRecording& recording, int threads) {
+  std::vector<MonitorBody> bodies;
+  for (const RecordedBody& body : recording.bodies) bodies.push_back(body.setup);
+  Monitor monitor(replayOptions(recording, threads), bodies);
+  monitor.setMap(recording.map);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    monitor.setReference(b, recording.bodies[b].topology, recording.bodies[b].reference);
+  }
+  const auto push = [&](bool end) {
+    // The clock body last, so that its step finds all others.
+    for (std::size_t i = 1; i <= bodies.size(); ++i) {
+      const std::size_t b = (recording.options.clock_body + i) % bodies.size();
+      const RecordedBody& body = recording.bodies[b];
+      monitor.push(b,
+                   {end ? recording.stamp_ns : recording.start_ns, body.topology, end ? body.t1 : body.t0, body.rigid,
+                    end ? body.pose_t1 : body.pose_t0, body.radius_m},
+                   0);
+    }
+  };
+  push(false);
+  push(true);
+  monitor.finish();
+  StepOutcome outcome;
+  monitor.next(0, outcome);  // the first frame
+  if (!monitor.next(0, outcome)) throw std::invalid_argument("the recording makes no step");
+  StepRecording replayed;
+  setAnswer(outcome, replayed);
+  StepReplay result;
+  result.answer = std::move(replayed.answer);
+  if (recording.answer.present) result.differences = compareAnswers(recording.answer, result.answer);
+  return result;
+}
+
+std::string describeContact(const Contact& c, const std::vector<RecordedBody>& bodies) {
+  std::ostringstream text;
+  const auto name = [&](std::uint16_t body) {
+    return body < bodies.size()    ? bodies[body].setup.name
+           : body == OBSTACLE_BODY ? "octomap"
+                                   : "body " + std::to_string(body);
+  };
+  const std::size_t first = c.kind == PairKind::VERTEX_FACE || c.kind == PairKind::VERTEX_VOXEL_FACE ? 1
+                            : c.kind == PairKind::FACE_VOXEL_CORNER                                  ? 3
+                                                                                                     : 2;
+  text << toString(c.kind) << ' ' << name(c.body[0]);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (i == first && c.body[1] != OBSTACLE_BODY) text << " | " << name(c.body[1]);
+    if (c.vertex[i] != NO_INDEX) text << ' ' << c.vertex[i];
+  }
+  if (c.body[1] == OBSTACLE_BODY) {
+    text << " | voxel " << c.voxel.x << ' ' << c.voxel.y << ' ' << c.voxel.z << " of " << c.voxel_size;
+  }
+  return text.str();
+}
+
+}  // namespace dccd

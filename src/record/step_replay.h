@@ -1,0 +1,30 @@
+// A recorded step once more, through the same monitor.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dccd/export.h"
+
+#include "record/step_recording.h"
+
+namespace dccd {
+
+struct StepReplay {
+  RecordedAnswer answer;
+  /// What differs from the recorded answer, one sentence each; empty: the same bit for bit, or nothing to compare with.
+  std::vector<std::string> differences;
+};
+
+/// Computes the step with the recorded options, but without a deadline and on `threads` workers: neither may change an
+/// answer. A step that ran out of its budget was answered in part: then what it reported as certain must be there
+/// again. Throws std::invalid_argument when the options or bodies of the recording are not possible.
+DCCD_EXPORT StepReplay replayStep(const StepRecording& recording, int threads = 1);
+
+/// Bits that differ between two answers, one sentence each, ten at most.
+DCCD_EXPORT std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const RecordedAnswer& replayed);
+
+/// "VF cloth 3 | table 0 1 2", with the voxel where there is one.
+DCCD_EXPORT std::string describeContact(const Contact& contact, const std::vector<RecordedBody>& bodies);
+
+}  // namespace dccd

@@ -1,0 +1,157 @@
+const NS = 'http://www.w3.org/2000/svg', W = 1040, LEFT = 62, RIGHT = 14, BOTTOM = 34, TOP = 10;
+const el = (name, attributes, parent, text) => {
+  const e = document.createElementNS(NS, name);
+  for (const k in attributes) e.setAttribute(k, attributes[k]);
+  if (text !== undefined) e.textContent = text;
+  if (parent) parent.appendChild(e);
+  return e;
+};
+const number = x => x === null || x === undefined ? '–' : Number.isInteger(x) ? x.toLocaleString('en') :
+  Math.abs(x) >= 100 ? x.toLocaleString('en', { maximumFractionDigits: 1 }) : Math.abs(x) >= 1e-3 ? x.toFixed(3) : x.toExponential(1);
+// Three digits that mean something: 0.355, 11.2, 1,120.
+const short = x => (+x.toPrecision(3)).toLocaleString('en', { maximumFractionDigits: 6 });
+const bar = share => ({ share });
+function table(id, head, rows) {
+  const t = document.getElementById(id);
+  if (!rows.length) { t.outerHTML = '<p class="note">None.</p>'; return; }
+  const wide = document.createElement('div'); wide.className = 'wide'; t.replaceWith(wide); wide.appendChild(t);
+  const text = rows[0].map((_, k) => rows.every(r => typeof r[k] === 'string'));
+  const add = (cells, tag) => {
+    const row = t.insertRow();
+    cells.forEach((cell, k) => {
+      const d = row.appendChild(document.createElement(tag));
+      if (cell !== null && typeof cell === 'object') {
+        d.className = 'bar';
+        d.appendChild(document.createElement('div')).style.width = 100 * cell.share + '%';
+      } else {
+        d.textContent = typeof cell === 'string' ? cell : number(cell);
+        if (text[k]) d.className = 'text';
+      }
+    });
+  };
+  if (head) add(head, 'th');
+  rows.forEach(r => add(r, 'td'));
+  return t;
+}
+// Round steps, so that a reader can tell the values between.
+function ticks(max, whole) {
+  const raw = max / 5, power = 10 ** Math.floor(Math.log10(raw)), lead = raw / power;
+  let step = (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10) * power;
+  if (whole) step = Math.max(1, Math.round(step));
+  const out = [];
+  for (let v = 0; v <= max * (1 + 1e-9); v += step) out.push(+v.toPrecision(10));
+  return out;
+}
+function axes(id, height, ymax, ylabel, whole) {
+  const steps = R.steps, t0 = steps.length ? steps[0].t : 0;
+  const span = Math.max((steps.length > 1 ? steps[steps.length - 1].t : t0 + 1) - t0, 1e-9);
+  const svg = el('svg', { viewBox: `0 0 ${W} ${height}` }, document.getElementById(id));
+  const slot = (W - LEFT - RIGHT) / Math.max(steps.length, 1), inner = W - LEFT - RIGHT - slot;
+  const x = t => LEFT + slot / 2 + inner * (t - t0) / span, y = v => height - BOTTOM - (height - BOTTOM - TOP) * v / ymax;
+  steps.forEach(s => { if (s.answered) return;
+    const w = Math.max(2, slot);
+    el('title', {}, el('rect', { x: x(s.t) - w / 2, y: TOP, width: w, height: height - BOTTOM - TOP, fill: '#f6c9c5' }, svg),
+      s.status + (s.reason ? ': ' + s.reason : '')); });
+  ticks(ymax, whole).forEach(v => {
+    el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
+    el('text', { x: LEFT - 6, y: y(v) + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
+  ticks(span).forEach(t => x(t0 + t) <= W - RIGHT && el('text', { x: x(t0 + t), y: height - BOTTOM + 18, 'text-anchor': 'middle', 'font-size': 12,
+    fill: '#556' }, svg, +(t0 + t).toPrecision(6) + ' s'));
+  el('text', { x: 14, y: height / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${height / 2})`,
+    'text-anchor': 'middle' }, svg, ylabel);
+  return { svg, x, y, bar: Math.max(1.5, 0.8 * slot) };
+}
+document.getElementById('headline').textContent = R.headline;
+table('facts', null, R.facts);
+{ const a = axes('contacts', 240, Math.max(1, ...R.steps.map(s => s.contacts)), 'contacts', true);
+  R.steps.forEach(s => [[s.contacts, '#2a6fb0'], [s.undecided + s.initial, '#f0a030'], [s.initial, '#9aa4b0']].forEach(([n, fill]) => {
+    const top = a.y(Math.min(n, s.contacts));
+    if (n && s.contacts) el('title', {}, el('rect', { x: a.x(s.t) - a.bar / 2, y: top, width: a.bar, height: a.y(0) - top, fill }, a.svg),
+      `step ${s.step}: ${s.contacts} contacts, ${s.undecided} undecided, ${s.initial} initial`); })); }
+{ const a = axes('toc', 180, 1, 'earliest TOC');
+  R.steps.forEach(s => [[s.toc, '#9aa4b0'], [s.toc_new, '#2a6fb0']].forEach(([toc, fill]) => {
+    if (toc === null || toc > 1) return;
+    el('title', {}, el('circle', { cx: a.x(s.t), cy: a.y(toc), r: 2.8, fill }, a.svg), `step ${s.step}: ${toc}`); })); }
+{ const a = axes('latency', 180, Math.max(1e-3, ...R.steps.map(s => s.ms)), 'ms');
+  el('polyline', { points: R.steps.filter(s => s.answered).map(s => `${a.x(s.t)},${a.y(s.ms)}`).join(' '), fill: 'none',
+    stroke: '#2a6fb0', 'stroke-width': 1.3 }, a.svg);
+  el('line', { x1: LEFT, x2: W - RIGHT, y1: a.y(R.total.median_ms), y2: a.y(R.total.median_ms), stroke: '#f0a030' }, a.svg);
+  document.getElementById('latency_note').textContent = `Median ${number(R.total.median_ms)} ms (orange line), 95 % below ` +
+    `${number(R.total.p95_ms)} ms, 99 % below ${number(R.total.p99_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
+{ const H = 160, floor = H - 34, bins = R.histogram, most = Math.max(1, ...bins.map(b => b.steps));
+  const w = (W - LEFT - RIGHT) / Math.max(bins.length, 1), every = Math.ceil(bins.length / 10);
+  const svg = el('svg', { viewBox: `0 0 ${W} ${H}` }, document.getElementById('histogram'));
+  ticks(most, true).forEach(v => { const y = floor - (floor - 10) * v / most;
+    el('line', { x1: LEFT, x2: W - RIGHT, y1: y, y2: y, stroke: '#e3e8ee' }, svg);
+    el('text', { x: LEFT - 6, y: y + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
+  el('text', { x: 14, y: floor / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${floor / 2})`,
+    'text-anchor': 'middle' }, svg, 'steps');
+  bins.forEach((b, i) => { const h = (floor - 10) * b.steps / most, upper = short(b.upper_ms) + ' ms';
+    const bar = el('rect', { x: LEFT + i * w, y: floor - h, width: Math.max(1, w - 1), height: h, fill: '#2a6fb0' }, svg);
+    el('title', {}, bar, `${b.steps} steps of up to ${upper}`);
+    if (i % every == 0 && i + 1 < bins.length) el('text', { x: LEFT + (i + 1) * w, y: floor + 18, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg, upper); }); }
+
+const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
+const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
+  return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
+const GRADIENT = 'linear-gradient(to right,' + STOPS.map(s => `rgb(${s.join(',')})`).join(',') + ')';
+// values: per vertex 0 to 1, or null for never.
+function map(parent, b, values, caption, low, high) {
+  const xs = b.xy.map(p => p[0]), ys = b.xy.map(p => p[1]);
+  const range = v => v.reduce((r, x) => [Math.min(r[0], x), Math.max(r[1], x)], [Infinity, -Infinity]);
+  const [x0, x1] = range(xs), [y0, y1] = range(ys), width = 510, s = Math.min((width - 20) / Math.max(x1 - x0, 1e-9), 490 / Math.max(y1 - y0, 1e-9));
+  const figure = parent.appendChild(document.createElement('figure')), c = figure.appendChild(document.createElement('canvas'));
+  const H = Math.max(30, s * (y1 - y0) + 20), scale = Math.max(2, window.devicePixelRatio || 1);
+  c.width = width * scale; c.height = H * scale; c.style.width = width + 'px'; c.style.height = H + 'px';
+  const g = c.getContext('2d'); g.scale(scale, scale);
+  const px = i => width / 2 + s * (xs[i] - (x0 + x1) / 2), py = i => H / 2 - s * (ys[i] - (y0 + y1) / 2);
+  const shade = vertices => { const known = vertices.map(v => values[v]).filter(v => v !== null);
+    return known.length ? colour(known.reduce((a, v) => a + v, 0) / known.length) : '#e4e8ec'; };
+  b.faces.forEach(f => { g.beginPath(); f.forEach((v, k) => k ? g.lineTo(px(v), py(v)) : g.moveTo(px(v), py(v))); g.closePath();
+    g.fillStyle = shade(f); g.fill(); g.strokeStyle = 'rgba(90,100,110,.25)'; g.lineWidth = .5; g.stroke(); });
+  (b.edges || []).forEach(e => { g.beginPath(); g.moveTo(px(e[0]), py(e[0])); g.lineTo(px(e[1]), py(e[1]));
+    g.strokeStyle = shade(e); g.lineWidth = 4; g.stroke(); });
+  const text = figure.appendChild(document.createElement('figcaption')), bar = document.createElement('span');
+  bar.className = 'scale'; bar.style.background = GRADIENT;
+  text.append(caption + ': ' + low, bar, high);
+}
+R.bodies.forEach(b => {
+  const box = document.getElementById('heat'), most = Math.max(0, ...b.count), times = b.first.filter(t => t !== null);
+  box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.xy.length} vertices, ` +
+    `${b.count.filter(c => c).length} of them in contact at some time`;
+  const row = box.appendChild(document.createElement('div')); row.className = 'maps';
+  map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), 'contacts of a vertex (logarithmic)', '1', String(most));
+  if (!times.length) return;
+  const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
+  map(row, b, b.first.map(t => t === null ? null : 1 - (t - t0) / Math.max(t1 - t0, 1e-9)), 'first contact, late to early', number(t1) + ' s', number(t0) + ' s');
+});
+const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'vertices could not be checked, or left the path',
+  DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
+const STAGE = { record: 'takes in the frames', bounds: 'boxes of what the features sweep', broad_phase: 'pairs whose boxes meet',
+  planar: 'filters in a line and a plane', elementary: 'the test of the chosen accuracy', obstacle: 'all of it against the map',
+  start_state: 'do surfaces cross at the start?', sort: 'contacts in their order' };
+const NOT_OK = R.steps.filter(s => s.status !== 'OK'), SHOWN = 500;
+table('seams', ['time [s]', 'step', 'status', 'reason'], NOT_OK.slice(0, SHOWN).map(s => [number(s.t), String(s.step), s.status, s.reason || MEANING[s.status] || ''])
+  .concat(NOT_OK.length > SHOWN ? [['', '', '…', `${NOT_OK.length - SHOWN} more in steps.csv`]] : []));
+const longest = list => Math.max(1e-12, ...list);
+{ const most = longest(R.stages.map(s => s.median_ms));
+  table('stages', ['stage', '', 'pairs in', 'pairs out', 'median ms', '', '95 % ms'], R.stages.map(s =>
+    [s.name, STAGE[s.name] || '', s.in, s.out, s.median_ms, bar(s.median_ms / most), s.p95_ms]).concat(
+    [['whole step', '', '', '', R.total.median_ms, '', R.total.p95_ms]])); }
+{ const most = longest(R.effects.map(e => e.ms || 0));
+  const t = table('effects', ['effect', 'runs', 'why', 'pairs in', 'pairs out', 'ms in all', ''], R.effects.map(e =>
+    [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)]));
+  R.effects.forEach((e, i) => { if (!e.running) t.rows[i + 1].className = 'off'; }); }
+document.getElementById('effects_note').textContent =
+  `Bounds of bodies: ${R.bounds.bodies_refitted} times computed, ${R.bounds.bodies_kept} times kept from the step before.` +
+  (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +
+    `they came up ${R.left_out.met} times.` : '') +
+  (R.unknown_fraction.max ? ` Of the swept space the map does not know ${number(100 * R.unknown_fraction.median)} % (median), at most ${number(100 * R.unknown_fraction.max)} %.` : '');
+{ const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
+  [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);
+  else document.getElementById('look_ahead').textContent = 'Off: look_ahead_s is 0.'; }
+{ const most = longest(R.rungs.map(r => r.median_ms));
+  table('rungs', ['rung', 'steps', 'contacts', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '', '95 % ms'],
+    R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, bar(r.median_ms / most), r.p95_ms])); }
+{ const tiers = Object.entries(R.tiers), most = longest(tiers.map(t => t[1]));
+  table('tiers', ['tier', 'pairs settled', ''], tiers.map(([name, n]) => [name, n, bar(n / most)])); }

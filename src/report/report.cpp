@@ -1,0 +1,399 @@
+#include "report/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+
+#include "report/flat_layout.h"
+
+namespace dccd {
+namespace {
+
+const char* const KINDS[] = {"VF", "EE", "vertex-voxel_face", "edge-voxel_edge", "face-voxel_corner"};
+const char* const KINDS_IN_WORDS[] = {"vertex against face", "edge against edge", "vertex against voxel face",
+                                      "edge against voxel edge", "face against voxel corner"};
+constexpr std::size_t LEAVING = 4;  // place of that flag in the key of a contact
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+std::string bodyName(std::uint16_t body, const std::vector<MonitorBody>& bodies) {
+  return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
+}
+
+int meshPoints(const Contact& c) {
+  return static_cast<int>(std::count_if(c.vertex.begin(), c.vertex.end(), [](Index v) { return v != NO_INDEX; }));
+}
+
+// Commas, quotes and line ends in a field are quoted (RFC 4180).
+std::string csvField(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + '"';
+}
+
+/// What stands in the way of "no contact" in a step that found none.
+std::string doubtOf(const StepOutcome& outcome) {
+  if (outcome.status != StepStatus::OK) return toString(outcome.status);
+  return outcome.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(outcome.start_state);
+}
+
+nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
+
+}  // namespace
+
+void ContactLog::add(const StepOutcome& outcome) {
+  if (!outcome.answered) return;
+  ms_.push_back(outcome.stats.total_ms);
+  auto& step = steps_[outcome.sequence];
+  for (const Contact& c : outcome.contacts) {
+    const Key key{std::uint64_t{static_cast<std::uint8_t>(c.kind)} << 32 | std::uint64_t{c.body[0]} << 16 | c.body[1],
+                  std::uint64_t{c.vertex[0]} << 32 | c.vertex[1], std::uint64_t{c.vertex[2]} << 32 | c.vertex[3],
+                  std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z,
+                  std::uint64_t{c.leaving}};
+    static_assert(std::tuple_size<Key>::value == LEAVING + 1, "the flag is the key's last word");
+    step[key] = {c.toc_lower, c.certainty == Certainty::CERTAIN};
+  }
+}
+
+// What is undecided may be on its way in or out: a rung that did not look for the time does not know.
+bool ContactLog::covers(const std::map<Key, Entry>& found, Key key) {
+  if (found.count(key) > 0) return true;
+  key[LEAVING] ^= 1;
+  const auto other = found.find(key);
+  return other != found.end() && !other->second.certain;
+}
+
+RungCost ContactLog::against(const ContactLog& exact, const std::string& rung) const {
+  RungCost cost;
+  cost.rung = rung;
+  cost.steps = steps_.size();
+  cost.median_ms = quantile(ms_, 0.5);
+  cost.p95_ms = quantile(ms_, 0.95);
+  static const std::map<Key, Entry> NONE;
+  for (const auto& [sequence, found] : steps_) {
+    const auto other = exact.steps_.find(sequence);
+    const auto& truth = other == exact.steps_.end() ? NONE : other->second;
+    cost.contacts += found.size();
+    for (const auto& [key, entry] : found) {
+      const auto match = truth.find(key);
+      cost.undecided += !entry.certain;
+      if (match == truth.end()) {
+        cost.false_contacts += entry.certain;
+      } else {
+        cost.max_toc_error = std::max(cost.max_toc_error, std::abs(match->second.toc_lower - entry.toc_lower));
+      }
+    }
+    for (const auto& [key, entry] : truth) cost.missed += !covers(found, key);
+  }
+  return cost;
+}
+
+Report::Report(const std::string& folder) : folder_(folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  const auto open = [&](std::ofstream& file, const char* name) {
+    file.open(folder_ + "/" + name);
+    if (!file) throw std::runtime_error(folder_ + "/" + name + ": cannot be written");
+    file << std::setprecision(17);
+  };
+  open(contacts_, "contacts.csv");
+  open(steps_, "steps.csv");
+  open(timing_, "timing.csv");
+  contacts_
+      << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
+         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step\n";
+  steps_
+      << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
+         "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,"
+         "elementary_pairs,obstacle_pairs\n";
+  timing_ << "step,total_ms";
+  for (std::size_t s = 0; s < stage_ms_.size(); ++s) timing_ << ',' << toString(static_cast<Stage>(s)) << "_ms";
+  timing_ << '\n';
+}
+
+void Report::writeContacts(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies) {
+  for (const Contact& c : outcome.contacts) {
+    const ContactGeometry g = contactGeometry(outcome, c);
+    contacts_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << KINDS[static_cast<int>(c.kind)] << ','
+              << csvField(bodyName(c.body[0], bodies)) << ',' << csvField(bodyName(c.body[1], bodies));
+    for (Index v : c.vertex) {
+      contacts_ << ',';
+      if (v != NO_INDEX) contacts_ << v;
+    }
+    if (c.body[1] == OBSTACLE_BODY) {
+      contacts_ << ',' << c.voxel.x << ',' << c.voxel.y << ',' << c.voxel.z << ',' << c.voxel_size;
+    } else {
+      contacts_ << ",,,,";
+    }
+    contacts_ << ',' << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << ',' << c.initial << ','
+              << c.leaving << ',' << c.toc_lower << ',' << c.toc_upper << ','
+              << static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9 + c.toc_lower * outcome.duration_s() << ','
+              << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y()
+              << ',' << g.normal.z() << ',' << g.approach_speed << '\n';
+  }
+}
+
+void Report::addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies) {
+  if (heat_.empty()) heat_.resize(bodies.size());
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    BodyHeat& heat = heat_[b];
+    const auto& topology = (*outcome.topologies)[b];
+    if (!topology || (heat.topology && heat.contacts.size() == topology->vertexCount())) continue;
+    // A body whose topology changed begins anew: its vertices are other ones.
+    heat.name = bodies[b].name;
+    heat.topology = topology;
+    heat.layout = (*outcome.positions_t0)[b];
+    heat.contacts.assign(topology->vertexCount(), 0);
+    heat.first_s.assign(topology->vertexCount(), std::numeric_limits<double>::infinity());
+  }
+  const double start_s = static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9;
+  for (const Contact& c : outcome.contacts) {
+    const int n = meshPoints(c), first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
+    for (int i = 0; i < n; ++i) {
+      const std::uint16_t body = c.body[c.body[1] == OBSTACLE_BODY || i < first ? 0 : 1];
+      if (body >= heat_.size() || c.vertex[i] >= heat_[body].contacts.size()) continue;
+      ++heat_[body].contacts[c.vertex[i]];
+      double& when = heat_[body].first_s[c.vertex[i]];
+      when = std::min(when, start_s + c.toc_lower * outcome.duration_s());
+    }
+  }
+}
+
+void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
+  if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
+  any_ = true;
+  const StepStats& s = o.stats;
+  double earliest_new = std::numeric_limits<double>::infinity();
+  for (const Contact& c : o.contacts) {
+    if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
+  }
+  steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
+         << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ','
+         << o.complete << ',' << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ','
+         << o.counts.leaving << ',' << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces
+         << ',';
+  if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
+  steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
+         << s[Stage::OBSTACLE].in << '\n';
+  const double time_s = static_cast<double>(o.stamp_ns - origin_ns_) * 1e-9;
+  rows_.push_back({{"step", o.sequence},
+                   {"t", time_s},
+                   {"status", toString(o.status)},
+                   {"reason", o.reason},
+                   {"answered", o.answered},
+                   {"start_state", toString(o.start_state)},
+                   {"clear", o.clear},
+                   {"contacts", o.total_contacts},
+                   {"undecided", o.counts.undecided},
+                   {"initial", o.counts.initial},
+                   {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
+                   {"toc_new", finiteOrNull(earliest_new)},
+                   {"ms", s.total_ms}});
+  if (!o.answered) {
+    ++not_answered_;
+    return;
+  }
+  ++answered_;
+  with_contact_ += o.total_contacts > 0;
+  clear_ += o.clear;
+  if (o.total_contacts == 0 && !o.clear) ++doubtful_[doubtOf(o)];
+  writeContacts(o, bodies);
+  addHeat(o, bodies);
+  if (first_contact_.empty() && !o.contacts.empty()) {
+    const auto first = std::min_element(o.contacts.begin(), o.contacts.end(),
+                                        [](const auto& a, const auto& b) { return a.toc_lower < b.toc_lower; });
+    first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
+    std::ostringstream text;
+    text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
+         << KINDS_IN_WORDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
+    for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
+    text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided")
+         << (first->initial ? ", initial" : "") << ")";
+    first_contact_ = text.str();
+  }
+  timing_ << o.sequence << ',' << s.total_ms;
+  for (std::size_t i = 0; i < stage_ms_.size(); ++i) {
+    timing_ << ',' << s.stages[i].ms;
+    stage_ms_[i].push_back(s.stages[i].ms);
+    stage_sum_[i].in += s.stages[i].in;
+    stage_sum_[i].out += s.stages[i].out;
+  }
+  timing_ << '\n';
+  for (std::size_t i = 0; i < effect_sum_.size(); ++i) effect_sum_[i] += s.effects[i];
+  tiers_ += s.tiers;
+  bodies_refitted_ += s.bodies_refitted;
+  bodies_kept_ += s.bodies_kept;
+  left_out_met_ += s.left_out_met;
+  if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
+  total_ms_.push_back(s.total_ms);
+  step_times_.add(s.total_ms * 1e-3);
+}
+
+std::string Report::headline() const {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(4);
+  if (!first_contact_.empty()) {
+    text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
+         << with_contact_ << " of " << answered_ << " answered steps";
+  } else if (answered_ == 0) {
+    text << "No answer: no step could be checked";
+  } else if (clear_ == 0) {
+    text << "No contact found in " << answered_ << " answered steps, but it is not ruled out";
+  } else if (clear_ < answered_) {
+    text << "No contact in " << clear_ << " of " << answered_ << " answered steps";
+  } else {
+    text << "No contact in " << answered_ << " answered steps";
+  }
+  if (!doubtful_.empty()) {
+    if (clear_ > 0 || !first_contact_.empty()) text << "; in others none was found, but it is not ruled out";
+    const char* separator = " (";
+    for (const auto& [doubt, steps] : doubtful_) {
+      text << separator << doubt << ' ' << steps;
+      separator = ", ";
+    }
+    text << ')';
+  }
+  if (not_answered_ > 0) {
+    text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";
+  }
+  text << '.';
+  return text.str();
+}
+
+nlohmann::json Report::heatJson() const {
+  nlohmann::json bodies = nlohmann::json::array();
+  for (const BodyHeat& h : heat_) {
+    if (!h.topology) continue;
+    nlohmann::json body = {{"name", h.name}, {"xy", flatLayout(h.layout)}, {"first", nlohmann::json::array()}};
+    body["count"] = h.contacts;
+    for (double f : h.first_s) body["first"].push_back(finiteOrNull(f));
+    body["faces"] = h.topology->faces();
+    if (!h.topology->hasFaces()) body["edges"] = h.topology->edges();
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
+nlohmann::json Report::effectsJson() const {
+  nlohmann::json effects = nlohmann::json::array();
+  for (const EffectDecision& d : plan_.decisions()) {
+    nlohmann::json e = {{"name", d.name}, {"running", d.running}, {"reason", d.reason}};
+    for (std::size_t i = 0; i < effect_sum_.size(); ++i) {
+      const std::string name = toString(static_cast<Effect>(i));
+      if (name != d.name && !(name == "obstacle" && d.name == "octomap")) continue;
+      e["in"] = effect_sum_[i].in;
+      e["out"] = effect_sum_[i].out;
+      e["ms"] = effect_sum_[i].ms;
+    }
+    effects.push_back(std::move(e));
+  }
+  return effects;
+}
+
+nlohmann::json Report::lookAheadJson() const {
+  if (!look_ahead_) return {};
+  return {{"horizon_s", horizon_s_},
+          {"compared", look_ahead_->compared},
+          {"not_observed", look_ahead_->not_observed},
+          {"not_predicted", look_ahead_->not_predicted},
+          {"median_error_s", look_ahead_->median_error_s},
+          {"p95_error_s", look_ahead_->p95_error_s},
+          {"median_signed_error_s", look_ahead_->median_signed_error_s}};
+}
+
+void Report::setLookAhead(const LookAheadSummary& summary, double horizon_s) {
+  look_ahead_ = summary;
+  horizon_s_ = horizon_s;
+}
+
+void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies) {
+  left_out_ = pairs.size();
+  if (pairs.empty()) return;
+  std::ofstream file(folder_ + "/left_out.csv");
+  file << "kind,body,v0,v1,v2,v3\n";
+  for (const LeftOutPair& pair : pairs) {
+    file << KINDS[static_cast<int>(pair.kind)] << ',' << csvField(bodyName(pair.body, bodies));
+    for (const Index v : pair.vertex) file << ',' << v;
+    file << '\n';
+  }
+  file.close();
+  if (!file) throw std::runtime_error(folder_ + "/left_out.csv: cannot be written");
+}
+
+nlohmann::json Report::json() const {
+  nlohmann::json j;
+  j["headline"] = headline();
+  j["facts"] = nlohmann::json::array();
+  for (const auto& [name, value] : facts_) j["facts"].push_back(nlohmann::json::array({name, value}));
+  j["steps"] = rows_;
+  j["counters"] = {{"received", counters_.received},
+                   {"processed", counters_.processed()},
+                   {"started", counters_.started()},
+                   {"skipped", counters_.skipped()},
+                   {"waiting", counters_.waiting()}};
+  for (std::size_t s = 0; s < counters_.by_status.size(); ++s) {
+    j["counters"]["by_status"][toString(static_cast<StepStatus>(s))] = counters_.by_status[s];
+  }
+  j["stages"] = nlohmann::json::array();
+  for (std::size_t s = 0; s < stage_ms_.size(); ++s) {
+    j["stages"].push_back({{"name", toString(static_cast<Stage>(s))},
+                           {"in", stage_sum_[s].in},
+                           {"out", stage_sum_[s].out},
+                           {"median_ms", quantile(stage_ms_[s], 0.5)},
+                           {"p95_ms", quantile(stage_ms_[s], 0.95)}});
+  }
+  j["total"] = {{"median_ms", quantile(total_ms_, 0.5)},
+                {"p95_ms", quantile(total_ms_, 0.95)},
+                {"p99_ms", quantile(total_ms_, 0.99)},
+                {"max_ms", quantile(total_ms_, 1)}};
+  j["histogram"] = nlohmann::json::array();
+  for (const LatencyHistogram::Bin& bin : step_times_.bins()) {
+    j["histogram"].push_back({{"upper_ms", bin.upper_s * 1e3}, {"steps", bin.count}});
+  }
+  j["effects"] = effectsJson();
+  j["bounds"] = {{"bodies_refitted", bodies_refitted_}, {"bodies_kept", bodies_kept_}};
+  j["left_out"] = {{"pairs", left_out_}, {"met", left_out_met_}};
+  j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
+  j["look_ahead"] = lookAheadJson();
+  for (std::size_t t = 0; t < tiers_.settled.size(); ++t) {
+    j["tiers"][toString(static_cast<Tier>(t))] = tiers_.settled[t];
+  }
+  j["rungs"] = nlohmann::json::array();
+  for (const RungCost& r : rungs_) {
+    j["rungs"].push_back({{"rung", r.rung},
+                          {"steps", r.steps},
+                          {"contacts", r.contacts},
+                          {"missed", r.missed},
+                          {"false", r.false_contacts},
+                          {"undecided", r.undecided},
+                          {"median_ms", r.median_ms},
+                          {"p95_ms", r.p95_ms},
+                          {"max_toc_error", r.max_toc_error}});
+  }
+  j["bodies"] = heatJson();
+  return j;
+}
+
+void Report::finish() {
+  const nlohmann::json data = json();
+  std::ofstream json_file(folder_ + "/report.json"), page(folder_ + "/report.html");
+  json_file << data.dump(1) << '\n';
+  // "</" would end the script element that carries the data.
+  std::string text = data.dump();
+  for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
+  page << reportPage(text);
+  for (std::ofstream* file : {&contacts_, &steps_, &timing_, &json_file, &page}) {
+    if (file->is_open()) file->close();
+    if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
+  }
+}
+
+}  // namespace dccd

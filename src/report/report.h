@@ -1,0 +1,115 @@
+// The report of a run: CSV and JSON for programs, one self-contained HTML page for people. Free of ROS.
+#pragma once
+
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "dccd/effect_plan.h"
+#include "dccd/look_ahead_score.h"
+#include "dccd/monitor.h"
+#include "report/latency_histogram.h"
+
+namespace dccd {
+
+/// One rung over the whole run, for the table of what accuracy costs. Missed and false are against the run with
+/// `exact`.
+struct RungCost {
+  std::string rung;
+  std::size_t steps = 0, contacts = 0, missed = 0, false_contacts = 0, undecided = 0;
+  double median_ms = 0, p95_ms = 0, max_toc_error = 0;
+};
+
+/// Contacts of each step in a comparable form, so that the runs of two rungs can be held against each other.
+class ContactLog {
+ public:
+  void add(const StepOutcome& outcome);
+  /// Missed, false and TOC error of this run against the exact one.
+  RungCost against(const ContactLog& exact, const std::string& rung) const;
+
+ private:
+  struct Entry {
+    double toc_lower;
+    bool certain;
+  };
+  using Key = std::array<std::uint64_t, 5>;
+  static bool covers(const std::map<Key, Entry>& found, Key key);
+  std::map<std::uint64_t, std::map<Key, Entry>> steps_;
+  std::vector<double> ms_;
+};
+
+/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv,
+/// left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json and report.html.
+/// Outcomes are added in order; nothing but their summaries is kept.
+class Report {
+ public:
+  /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
+  explicit Report(const std::string& folder);
+
+  void add(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
+  void setEffects(const EffectPlan& plan) { plan_ = plan; }
+  /// Writes left_out.csv. Throws std::runtime_error naming the file.
+  void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies);
+  void setLookAhead(const LookAheadSummary& summary, double horizon_s);
+  void setRungs(const std::vector<RungCost>& rungs) { rungs_ = rungs; }
+  /// Facts for the head of the page: name -> value, in the order given.
+  void setFacts(std::vector<std::pair<std::string, std::string>> facts) { facts_ = std::move(facts); }
+  void setCounters(const FrameCounters& counters) { counters_ = counters; }
+
+  /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
+  /// naming the file.
+  void finish();
+  /// One sentence: the first contact, or that there was none, or that there was no answer.
+  std::string headline() const;
+
+ private:
+  struct BodyHeat {
+    std::string name;
+    std::shared_ptr<const Topology> topology;
+    Positions layout;                     // of the first answered step
+    std::vector<std::uint32_t> contacts;  // per vertex
+    std::vector<double> first_s;          // per vertex, first contact since the start; infinity
+  };
+  void addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
+  void writeContacts(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
+  nlohmann::json heatJson() const;
+  nlohmann::json effectsJson() const;
+  nlohmann::json lookAheadJson() const;
+  nlohmann::json json() const;
+
+  std::string folder_;
+  std::ofstream contacts_, steps_, timing_;
+  StampNs origin_ns_ = 0;
+  bool any_ = false;
+  std::map<std::string, std::size_t> doubtful_;  // steps that found no contact and cannot rule it out, by the reason
+  std::size_t answered_ = 0, with_contact_ = 0, clear_ = 0, not_answered_ = 0, undecided_only_ = 0;
+  double first_contact_s_ = 0;
+  std::string first_contact_;
+  nlohmann::json rows_ = nlohmann::json::array();
+  std::vector<BodyHeat> heat_;
+  std::array<std::vector<double>, static_cast<std::size_t>(Stage::COUNT)> stage_ms_;
+  std::array<StageStats, static_cast<std::size_t>(Stage::COUNT)> stage_sum_{};
+  std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effect_sum_{};
+  TierCounters tiers_;
+  std::vector<double> total_ms_;
+  std::vector<double> unknown_fraction_;
+  std::uint64_t bodies_refitted_ = 0, bodies_kept_ = 0, left_out_met_ = 0;
+  std::size_t left_out_ = 0;
+  std::optional<LookAheadSummary> look_ahead_;
+  double horizon_s_ = 0;
+  LatencyHistogram step_times_;
+  EffectPlan plan_;
+  std::vector<RungCost> rungs_;
+  std::vector<std::pair<std::string, std::string>> facts_;
+  FrameCounters counters_;
+};
+
+/// The page with `data` (JSON) inside; opens from disk, loads nothing.
+std::string reportPage(const std::string& data);
+
+}  // namespace dccd

@@ -1,0 +1,205 @@
+// Which pairs of features a step tests: the tasks of each body and pair of bodies, and what is left out of them.
+#include <algorithm>
+
+#include "step/detector_impl.h"
+
+namespace dccd {
+namespace {
+
+constexpr std::size_t TASK_SUPERCLUSTERS = 16;  // supercluster pairs in a unit of work: about a millisecond
+
+}  // namespace
+
+void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context) {
+  const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
+  if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
+  const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
+  PairTask task{kind, a, b, a == b, 0, 0};
+  if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
+    tasks.push_back(task);
+    return;
+  }
+  const TreePair trees{&ta, &tb, same_tree, false};
+  superclusterPairs(trees, found_groups, scratch);
+  if (context.deadline != Clock::time_point::max()) {
+    // What the deadline leaves over should be what can touch last; of equal ones what was found last.
+    by_toc.clear();
+    for (std::uint32_t i = 0; 2 * i < found_groups.size(); ++i) {
+      const std::array<std::uint32_t, 2> pair{found_groups[2 * i], found_groups[2 * i + 1]};
+      by_toc.push_back({superclusterTocBound(trees, pair[0], pair[1]), i, pair});
+    }
+    std::sort(by_toc.begin(), by_toc.end());
+    for (std::size_t i = 0; i < by_toc.size(); ++i) {
+      std::copy_n(std::get<2>(by_toc[i]).begin(), 2, &found_groups[2 * i]);
+    }
+  }
+  const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
+  const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);
+  group_pairs.insert(group_pairs.end(), found_groups.begin(), found_groups.end());
+  for (std::uint32_t first = 0; first < count; first += TASK_SUPERCLUSTERS) {
+    task.first = base + first;
+    task.last = base + std::min<std::uint32_t>(count, first + TASK_SUPERCLUSTERS);
+    tasks.push_back(task);
+  }
+}
+
+// A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
+// stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
+bool Detector::Impl::staysApart(std::size_t body) const {
+  return body < apart.size() && apart[body] && scene.bodies()[body].translates && !scene.bodies()[body].uncertain;
+}
+
+void Detector::Impl::chooseSelfTests(const MotionStep& step) {
+  self_tested.assign(scene.bodies().size(), 0);
+  for (std::size_t b = 0; b < self_tested.size(); ++b) {
+    if (!scene.bodies()[b].setup.self_collision || (step.continues && staysApart(b))) continue;
+    const Clock::time_point start = Clock::now();
+    const bool unfolded = isUnfolded(b);
+    result.stats[Effect::SELF_COLLISION].ms += msSince(start);
+    result.stats.unfolded_bodies += unfolded;
+    self_tested[b] = !unfolded;
+  }
+}
+
+// A single body that cannot meet itself is tested against the obstacle alone, which has bounds of its own.
+bool Detector::Impl::needsTrees(const MotionStep& step) const {
+  return self_tested.size() > 1 || std::count(self_tested.begin(), self_tested.end(), 1) > 0 ||
+         (checksStartState(step) && !isStartKnown(step) && start_state.needsTrees(step.continues));
+}
+
+bool Detector::Impl::isUnfolded(std::size_t body) {
+  const SceneBody& b = scene.bodies()[body];
+  // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
+  if (!options.unfolded_test || options.broad_phase == BroadPhase::BRUTE_FORCE) return false;
+  return scene.separation(body, body) == 0 && !b.uncertain && !b.masked && unfolded[body].run(b, scene.vertices());
+}
+
+void Detector::Impl::rememberApart(bool certain) {
+  apart.resize(scene.bodies().size(), 0);
+  for (std::size_t b = 0; b < apart.size(); ++b) {
+    const bool tested = scene.bodies()[b].setup.self_collision;
+    // With radii that change, what is apart now may be too close without having moved.
+    apart[b] = certain && tested && !scene.bodies()[b].masked && !scene.bodies()[b].uncertain;
+  }
+  for (const Contact& c : result.contacts) {
+    if (c.body[0] == c.body[1]) apart[c.body[0]] = 0;
+  }
+}
+
+void Detector::Impl::addSelfTasks(std::size_t body, const StepContext& context) {
+  const std::uint16_t i = static_cast<std::uint16_t>(body);
+  addTasks(PairKind::VERTEX_FACE, i, i, context);
+  addTasks(PairKind::EDGE_EDGE, i, i, context);
+}
+
+void Detector::Impl::findPairs(const StepContext& context) {
+  const Clock::time_point start = Clock::now();
+  tasks.clear();
+  group_pairs.clear();
+  const std::size_t n = scene.bodies().size();
+  for (std::size_t b = 0; b < n; ++b) {
+    if (self_tested[b]) addSelfTasks(b, context);
+  }
+  if (n > 1) {
+    scene.overlappingBodies(false, body_pairs, scratch);
+    for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
+      const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]),
+                          b = static_cast<std::uint16_t>(body_pairs[p + 1]);
+      if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
+      ++result.stats.body_pairs;
+      addTasks(PairKind::VERTEX_FACE, a, b, context);
+      addTasks(PairKind::VERTEX_FACE, b, a, context);
+      addTasks(PairKind::EDGE_EDGE, a, b, context);
+    }
+  }
+  result.stats[Stage::BROAD_PHASE].ms += msSince(start);
+}
+
+bool Detector::Impl::needsReference(std::size_t b) const {
+  const BodySetup& setup = scene.bodies()[b].setup;
+  if (!setup.reference || !setup.self_collision) return false;
+  const auto& radius = setup.reference->radius_m;
+  return scene.separation(b, b) > 0 || std::any_of(radius.begin(), radius.end(), [](double r) { return r > 0; });
+}
+
+/// The pairs that a step without motion in the reference frame calls contacts: exactly those that would be contacts for
+/// as long as the body keeps its shape.
+void Detector::Impl::findLeftOut(const std::vector<const Positions*>& rest_positions) {
+  const std::size_t n = scene.bodies().size();
+  left_out.assign(n, {});
+  left_out_list.clear();
+  MotionStep step;
+  bool any = false;
+  for (std::size_t b = 0; b < n; ++b) {
+    const auto& reference = scene.bodies()[b].setup.reference;
+    const bool needs = needsReference(b);
+    any |= needs;
+    const Positions* at = needs ? &reference->positions : rest_positions[b];
+    step.bodies.push_back({at, at, needs && !reference->radius_m.empty() ? &reference->radius_m : nullptr});
+  }
+  if (!any) return;
+  const ScopedFloatMode mode;
+  result.stats = StepStats();
+  scene.record(step, result.stats);
+  scene.refit([](std::size_t count, const auto& f) { f(0, count); }, result.stats);
+  AccuracyOptions accuracy = options.accuracy;
+  accuracy.rung = Accuracy::CONSERVATIVE;
+  const std::unique_ptr<Rung> test = makeRung(accuracy);
+  StepContext context;
+  context.scene = &scene;
+  context.elementary = test.get();
+  context.tolerance_m = accuracy.tolerance_m;
+  for (PairWorker& w : workers) w.beginStep();
+  tasks.clear();
+  group_pairs.clear();
+  for (std::size_t b = 0; b < n; ++b) {
+    if (needsReference(b)) addSelfTasks(b, context);
+  }
+  runPairs(context);
+  for (std::size_t b = 0; b < n; ++b) {
+    if (!needsReference(b)) continue;
+    for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) listLeftOut(b, kind);
+  }
+}
+
+void Detector::Impl::listLeftOut(std::size_t b, PairKind kind) {
+  std::vector<LeftOutKey> keys;
+  for (const PairWorker& w : workers) {
+    for (const Hit& hit : w.hits(kind)) {
+      if ((hit.bodies >> 16) == b) keys.push_back({hit.key, 0});
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  const SceneBody& body = scene.bodies()[b];
+  const Topology& topology = *body.setup.topology;
+  const Positions& at = body.setup.reference->positions;
+  const bool vertices = kind == PairKind::VERTEX_FACE;
+  for (LeftOutKey& one : keys) {
+    LeftOutPair pair;
+    pair.kind = kind;
+    pair.body = static_cast<std::uint16_t>(b);
+    scene.featureVertices(firstKind(kind), b, static_cast<Index>(one.key >> 32), pair.vertex.data());
+    scene.featureVertices(secondKind(kind), b, static_cast<Index>(one.key), pair.vertex.data() + (vertices ? 1 : 2));
+    one.distance_m =
+        restDistance(kind, {at[pair.vertex[0]], at[pair.vertex[1]], at[pair.vertex[2]], at[pair.vertex[3]]});
+    left_out_list.push_back(pair);
+  }
+  left_out[b].set(kind, keys, vertices ? body.vertex_begin : body.edge_begin,
+                  vertices ? topology.vertexCount() : topology.edges().size());
+}
+
+void Detector::Impl::runPairs(StepContext& context) {
+  parallel(tasks.size(), 1, [&](std::size_t first, std::size_t last) {
+    PairWorker& worker = workers.local();
+    for (std::size_t t = first; t < last; ++t) {
+      if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
+        worker.runBruteForce(context, tasks[t]);
+      } else {
+        worker.run(context, tasks[t], group_pairs, tasks[t].first, tasks[t].last);
+      }
+    }
+  });
+  result.complete = !context.expired;
+}
+
+}  // namespace dccd

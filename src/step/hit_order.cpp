@@ -1,0 +1,58 @@
+#include "step/hit_order.h"
+
+#include <array>
+
+namespace dccd {
+namespace {
+constexpr int BITS = 12;
+constexpr std::size_t BUCKETS = std::size_t{1} << BITS;
+}  // namespace
+
+// Stable, so that sorting by the key first and by the bodies then sorts by both.
+void HitOrder::sortByKey(std::uint64_t differing_bits) {
+  for (int shift = 0; shift < 64; shift += BITS) {
+    const std::uint64_t digit = (BUCKETS - 1) << shift;
+    if ((differing_bits & digit) == 0) continue;
+    std::array<std::size_t, BUCKETS> next{};
+    for (const Entry& e : a_) ++next[(e.key >> shift) & (BUCKETS - 1)];
+    std::size_t sum = 0;
+    for (std::size_t& n : next) {
+      const std::size_t count = n;
+      n = sum;
+      sum += count;
+    }
+    for (const Entry& e : a_) b_[next[(e.key >> shift) & (BUCKETS - 1)]++] = e;
+    std::swap(a_, b_);
+  }
+}
+
+const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
+  a_.clear();
+  std::uint64_t key_or = 0, key_and = ~std::uint64_t{0}, bodies_or = 0, bodies_and = ~std::uint64_t{0};
+  for (const auto* part : parts) {
+    for (const Hit& h : *part) {
+      a_.push_back({h.key, &h});
+      key_or |= h.key;
+      key_and &= h.key;
+      bodies_or |= h.bodies;
+      bodies_and &= h.bodies;
+    }
+  }
+  b_.resize(a_.size());
+  // The ranks fill few of their 32 bits; side by side they need fewer digits.
+  int low_bits = 0;
+  while (low_bits < 32 && (key_or & 0xffffffffu) >> low_bits) ++low_bits;
+  const auto packed = [low_bits](std::uint64_t key) { return key >> 32 << low_bits | (key & 0xffffffffu); };
+  for (Entry& e : a_) e.key = packed(e.key);
+  sortByKey(packed(key_or) ^ packed(key_and));
+  // Ranks go through all bodies, so that the first feature's body is in order already; the second's may not be.
+  if (!a_.empty() && bodies_or != bodies_and) {
+    for (Entry& e : a_) e.key = e.hit->bodies;
+    sortByKey(bodies_or ^ bodies_and);
+  }
+  sorted_.resize(a_.size());
+  for (std::size_t i = 0; i < a_.size(); ++i) sorted_[i] = a_[i].hit;
+  return sorted_;
+}
+
+}  // namespace dccd

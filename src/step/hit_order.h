@@ -1,0 +1,27 @@
+// Hits of all workers into the canonical order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "step/pair_worker.h"
+
+namespace dccd {
+
+/// Sorts hits by bodies, then by key (radix sort on the digits in use; no two are equal in both). Keeps its buffers.
+class HitOrder {
+ public:
+  /// The result is valid until the next call; its elements point into the workers' vectors.
+  const std::vector<const Hit*>& sort(const std::vector<const std::vector<Hit>*>& parts);
+
+ private:
+  struct Entry {
+    std::uint64_t key;
+    const Hit* hit;
+  };
+  void sortByKey(std::uint64_t differing_bits);
+  std::vector<Entry> a_, b_;
+  std::vector<const Hit*> sorted_;
+};
+
+}  // namespace dccd

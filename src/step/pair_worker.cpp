@@ -1,0 +1,282 @@
+#include "step/pair_worker.h"
+
+#include <algorithm>
+
+#include "projection/toc_bound.h"
+#include "simd/fused_filter.h"
+
+namespace dccd {
+namespace {
+
+constexpr std::size_t CHUNK = 2048;  // pairs that stay in the first-level cache's reach
+constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
+FeatureKind kindA(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
+FeatureKind kindB(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
+
+}  // namespace
+
+PairWorker::PairWorker()
+    : quads_(CAPACITY),
+      slots_(CAPACITY),
+      keys_(CAPACITY),
+      kept_(CAPACITY),
+      results_(CAPACITY),
+      separations_(CAPACITY) {}
+
+void PairWorker::beginStep() {
+  for (auto& h : hits_) h.clear();
+  stats_ = StepStats();
+  unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
+}
+
+void PairWorker::addMs(double ms) {
+  stats_[effect()].ms += ms;
+  if (rigid()) stats_[Effect::RIGID_BODIES].ms += ms;
+}
+
+Clock::time_point PairWorker::lap(Stage stage, Clock::time_point start) {
+  const Clock::time_point now = Clock::now();
+  stats_[stage].ms += std::chrono::duration<double, std::milli>(now - start).count();
+  return now;
+}
+
+void PairWorker::begin(StepContext& context, const PairTask& task) {
+  context_ = &context;
+  task_ = &task;
+  a_ = &context.scene->bodies()[task.body_a];
+  b_ = &context.scene->bodies()[task.body_b];
+  rule_ = SeparationRule(*context.scene, task.body_a, task.body_b, context.tolerance_m);
+  separated_ = rule_.applies();
+  left_out_ = task.self && separated_ && context.left_out && !(*context.left_out)[task.body_a].empty()
+                  ? &(*context.left_out)[task.body_a]
+                  : nullptr;
+  count_ = 0;
+}
+
+void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
+  begin(context, task);
+  const Clock::time_point whole = Clock::now();
+  const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
+  const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(kindA(task.kind)).featureCount());
+  const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(kindB(task.kind)).featureCount());
+  std::uint32_t slots[2 * ClusterPairStream::CHUNK];
+  std::size_t n = 0;
+  for (std::uint32_t i = 0; i < na; ++i) {
+    for (std::uint32_t j = same_tree ? i + 1 : 0; j < nb; ++j) {
+      if (!a_->holds(kindA(task.kind), i) || !b_->holds(kindB(task.kind), j)) continue;
+      slots[2 * n] = i;
+      slots[2 * n + 1] = j;
+      if (++n == ClusterPairStream::CHUNK) {
+        take(slots, n);
+        n = 0;
+      }
+    }
+  }
+  take(slots, n);
+  flush();
+  addMs(msSince(whole));
+}
+
+void PairWorker::run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs,
+                     std::size_t first, std::size_t last) {
+  begin(context, task);
+  const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
+                       task.self && task.kind == PairKind::EDGE_EDGE, false};
+  const Clock::time_point whole = Clock::now();
+  Clock::time_point start = whole;
+  for (std::size_t p = first; p < last; ++p) {
+    if (context.timeIsUp()) {
+      // Nothing of these was looked at: all that is known is when their groups can meet.
+      for (; p < last; ++p) {
+        unchecked_toc_lower_ =
+            std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
+      }
+      break;
+    }
+    stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
+      start = lap(Stage::BROAD_PHASE, start);
+      take(slots, n);
+      start = Clock::now();
+    });
+  }
+  lap(Stage::BROAD_PHASE, start);
+  flush();
+  addMs(msSince(whole));
+  stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
+  stream_.clearCounters();
+}
+
+void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
+  const Clock::time_point start = Clock::now();
+  std::size_t n = count_;
+  if (task_->kind == PairKind::EDGE_EDGE) {
+    const ClusterTree &ta = a_->tree(FeatureKind::EDGE), &tb = b_->tree(FeatureKind::EDGE);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
+      const Index *ea = ta.feature(sa), *eb = tb.feature(sb);
+      const bool shared = (ea[0] == eb[0]) | (ea[0] == eb[1]) | (ea[1] == eb[0]) | (ea[1] == eb[1]);
+      quads_[n] = {ea[0], ea[1], eb[0], eb[1]};
+      slots_[n] = {sa, sb};
+      n += !shared;
+    }
+  } else {
+    const ClusterTree &ta = a_->tree(FeatureKind::VERTEX), &tb = b_->tree(FeatureKind::FACE);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
+      const Index v = *ta.feature(sa);
+      const Index* f = tb.feature(sb);
+      quads_[n] = {v, f[0], f[1], f[2]};
+      slots_[n] = {sa, sb};
+      n += !((v == f[0]) | (v == f[1]) | (v == f[2]));
+    }
+  }
+  (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
+  stats_[Stage::BROAD_PHASE].out += n - count_;
+  stats_[effect()].in += n - count_;
+  if (rigid()) stats_[Effect::RIGID_BODIES].in += n - count_;
+  count_ = n;
+  lap(Stage::BROAD_PHASE, start);
+  if (count_ >= CHUNK) flush();
+}
+
+void PairWorker::flush() {
+  if (count_ == 0) return;
+  const Clock::time_point start = Clock::now();
+  filter();
+  makeCanonical();
+  if (separated_) setSeparations();
+  if (context_->earliest_only) dropLate();
+  if (!context_->elementary || context_->timeIsUp()) {
+    keepUndecided();
+  } else {
+    decide();
+  }
+  const double ms = msSince(start);
+  if (rule_.bodies_m > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
+  if (rule_.uncertain) stats_[Effect::TRACKER_NOISE].ms += ms;
+  count_ = 0;
+}
+
+void PairWorker::filter() {
+  if (separated_) return;  // the planar filter proves "never touch", not "never closer than d"
+  const Clock::time_point start = Clock::now();
+  stats_[Stage::PLANAR].in += count_;
+  const std::size_t kept =
+      simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_, task_->kind == PairKind::EDGE_EDGE,
+                        simd::FusedPlanes::ADAPTIVE, kept_.data());
+  for (std::size_t i = 0; i < kept; ++i) {
+    quads_[i] = quads_[kept_[i]];
+    slots_[i] = slots_[kept_[i]];
+  }
+  count_ = kept;
+  stats_[Stage::PLANAR].out += kept;
+  lap(Stage::PLANAR, start);
+}
+
+// Only what the filters kept needs its ranks, and the elementary test wants the features in canonical order.
+void PairWorker::makeCanonical() {
+  const std::vector<Index>&ra = a_->rank(kindA(task_->kind)), &rb = b_->rank(kindB(task_->kind));
+  for (std::size_t i = 0; i < count_; ++i) {
+    std::uint64_t rank_a = ra[slots_[i][0]], rank_b = rb[slots_[i][1]];
+    if (task_->kind == PairKind::EDGE_EDGE && rank_b < rank_a) {
+      std::swap(rank_a, rank_b);
+      Quad& q = quads_[i];
+      q = {q[2], q[3], q[0], q[1]};
+    }
+    keys_[i] = rank_a << 32 | rank_b;
+  }
+}
+
+void PairWorker::setSeparations() {
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double apart_m = left_out_ ? left_out_->distance(task_->kind, keys_[i]) : INFINITE;
+    const PairSeparation pair = rule_.of(task_->kind, quads_[i], apart_m);
+    separations_[i] = pair.total_m;
+    stats_.left_out_met += pair.left_out;
+    stats_[Effect::MINIMUM_SEPARATION].in += rule_.bodies_m > 0 && !pair.left_out;
+    stats_[Effect::TRACKER_NOISE].in += pair.noise_m > 0;
+  }
+}
+
+void PairWorker::countOut(std::size_t i) {
+  ++stats_[effect()].out;
+  if (rigid()) ++stats_[Effect::RIGID_BODIES].out;
+  if (!separated_) return;
+  stats_[Effect::MINIMUM_SEPARATION].out += rule_.bodies_m > 0 && separations_[i] > 0;
+  stats_[Effect::TRACKER_NOISE].out += separations_[i] > rule_.bodies_m;
+}
+
+void PairWorker::dropLate() {
+  const double best = context_->best_toc_upper.load(std::memory_order_relaxed);
+  if (best >= 2) return;
+  // The answer must not depend on which pair was looked at first: only what keepEarliest() would erase is dropped. The
+  // bound is taken with the tolerance: until then the features are certainly farther than that, so that the bracket of
+  // a contact begins at the bound or later, and a cell of `exact` not before `best`, which is the end of one.
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double distance = separationOf(i) + context_->tolerance_m;
+    if (linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance) > best) continue;
+    quads_[n] = quads_[i];
+    separations_[n] = separations_[i];
+    keys_[n++] = keys_[i];
+  }
+  count_ = n;
+}
+
+void PairWorker::keepUndecided() {
+  const Clock::time_point start = Clock::now();
+  auto& hits = hits_[static_cast<int>(task_->kind)];
+  const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
+  std::size_t out = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double bound = linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separationOf(i));
+    if (bound > 1) continue;
+    countOut(i);
+    hits.push_back({keys_[i], bound, 1, bodies, Certainty::UNDECIDED});
+    ++out;
+  }
+  stats_.undecided += out;
+  lap(Stage::ELEMENTARY, start);
+}
+
+void PairWorker::decide() {
+  const Clock::time_point start = Clock::now();
+  PairBatch batch;
+  batch.kind = task_->kind;
+  batch.vertices = context_->scene->vertices();
+  batch.pairs = quads_.data();
+  batch.count = count_;
+  if (separated_) batch.minimum_separation_m = separations_.data();
+  context_->elementary->run(batch, results_.data(), stats_.tiers);
+  auto& hits = hits_[static_cast<int>(task_->kind)];
+  const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
+  const std::size_t before = hits.size();
+  for (std::size_t i = 0; i < count_; ++i) {
+    ElementaryResult& r = results_[i];
+    if (r.verdict == Verdict::NO_CONTACT) continue;
+    countOut(i);
+    const bool certain = r.verdict == Verdict::CONTACT;
+    if (!certain) {
+      // As tight as the linear filter allows; dropLate() decides by the same bound.
+      const double bound =
+          linearTocBound(task_->kind, batch.vertices, quads_[i], separationOf(i) + context_->tolerance_m);
+      r.toc_lower = std::max(r.toc_lower, std::min(bound, 1.0));
+    }
+    hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,
+                    certain ? Certainty::CERTAIN : Certainty::UNDECIDED});
+    stats_.undecided += !certain;
+    if (certain && context_->earliest_only) {
+      double best = context_->best_toc_upper.load(std::memory_order_relaxed);
+      while (r.toc_upper < best && !context_->best_toc_upper.compare_exchange_weak(best, r.toc_upper)) {
+      }
+    }
+  }
+  stats_[Stage::ELEMENTARY].in += count_;
+  stats_[Stage::ELEMENTARY].out += hits.size() - before;
+  lap(Stage::ELEMENTARY, start);
+}
+
+}  // namespace dccd

@@ -1,0 +1,106 @@
+// What one worker does with the pairs of the broad phase: drop pairs that share a vertex, planar filter, elementary
+// test, hits. All buffers are kept from step to step.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <limits>
+#include <vector>
+
+#include "culling/cluster_pairs.h"
+#include "culling/scene_arrays.h"
+#include "step/left_out.h"
+#include "step/pair_separation.h"
+
+namespace dccd {
+
+using Clock = std::chrono::steady_clock;
+inline double msSince(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// A contact (certain or undecided) by the ranks of its features; within a kind it sorts canonically by bodies, then
+/// key.
+struct Hit {
+  std::uint64_t key;  ///< rank of the first feature << 32 | rank of the second
+  double toc_lower, toc_upper;
+  std::uint32_t bodies;  ///< body of the first feature << 16 | body of the second
+  Certainty certainty;
+};
+
+/// Pairs to be streamed: features of kind a of body_a against features of kind b of body_b.
+struct PairTask {
+  PairKind kind;
+  std::uint16_t body_a, body_b;
+  bool self;
+  std::uint32_t first, last;  ///< supercluster pairs in the step's list
+};
+
+/// What all workers share during a step.
+struct StepContext {
+  const SceneArrays* scene = nullptr;
+  const Rung* elementary = nullptr;  ///< null: screen
+  Clock::time_point deadline = Clock::time_point::max();
+  std::atomic<bool> expired{false};
+  bool earliest_only = false;
+  const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
+  double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
+  std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
+  bool timeIsUp() {
+    if (expired.load(std::memory_order_relaxed)) return true;
+    if (deadline != Clock::time_point::max() && Clock::now() >= deadline) expired = true;
+    return expired.load(std::memory_order_relaxed);
+  }
+};
+
+class PairWorker {
+ public:
+  PairWorker();
+  void beginStep();
+  /// Streams supercluster pairs [first, last) of `pairs` through all stages.
+  void run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs, std::size_t first,
+           std::size_t last);
+  /// The same for every pair of features, without any bounds.
+  void runBruteForce(StepContext& context, const PairTask& task);
+
+  const std::vector<Hit>& hits(PairKind kind) const { return hits_[static_cast<int>(kind)]; }
+  const StepStats& stats() const { return stats_; }
+  double uncheckedTocLower() const { return unchecked_toc_lower_; }
+
+ private:
+  void begin(StepContext& context, const PairTask& task);
+  void take(const std::uint32_t* slots, std::size_t count);
+  void flush();
+  void filter();
+  void makeCanonical();
+  void decide();
+  void keepUndecided();
+  void dropLate();
+  Effect effect() const { return task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY; }
+  bool rigid() const { return !task_->self && (a_->setup.rigid || b_->setup.rigid); }
+  void setSeparations();
+  double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
+  void countOut(std::size_t i);
+  void addMs(double ms);
+  Clock::time_point lap(Stage stage, Clock::time_point start);
+
+  StepContext* context_ = nullptr;
+  const PairTask* task_ = nullptr;
+  const SceneBody *a_ = nullptr, *b_ = nullptr;
+  ClusterPairStream stream_;
+  std::vector<Quad> quads_;
+  std::vector<std::array<std::uint32_t, 2>> slots_;
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::uint32_t> kept_;
+  std::vector<ElementaryResult> results_;
+  std::vector<double> separations_;
+  SeparationRule rule_;     // of the task's bodies
+  bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
+  const LeftOutOfBody* left_out_ = nullptr;
+  std::size_t count_ = 0;
+  std::vector<Hit> hits_[2];
+  StepStats stats_;
+  double unchecked_toc_lower_ = std::numeric_limits<double>::infinity();  // workers may be made during a step
+};
+
+}  // namespace dccd

@@ -1,0 +1,25 @@
+#include "dccd/simd_target.h"
+
+#include <stdexcept>
+
+#include "simd/targets.h"
+
+namespace dccd {
+
+std::vector<std::string> simdTargets() {
+  const std::string in_use = simd::activeTarget();
+  const std::vector<std::string> names = simd::usableTargets();
+  simd::restrictTo(in_use == names.front() ? "" : in_use);
+  return names;
+}
+
+std::string simdTarget() { return simd::activeTarget(); }
+
+void setSimdTarget(const std::string& name) {
+  if (simd::restrictTo(name == "auto" ? "" : name)) return;
+  std::string usable = "auto";
+  for (const std::string& n : simd::usableTargets()) usable += ", " + n;
+  throw std::invalid_argument("simd_target = '" + name + "' cannot be used here; usable: " + usable);
+}
+
+}  // namespace dccd

@@ -1,0 +1,217 @@
+#include "dccd/mesh_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace dccd {
+
+namespace {
+
+void check(const MeshStoreOptions& options) {
+  if (!(options.max_step_s > 0) || !std::isfinite(options.max_step_s)) {
+    throw std::invalid_argument("max_step_s must be finite and above 0, is " + std::to_string(options.max_step_s));
+  }
+  if (!(options.max_vertex_step_m >= 0)) {
+    throw std::invalid_argument("max_vertex_step_m must be 0 (off) or more, is " +
+                                std::to_string(options.max_vertex_step_m));
+  }
+  if (options.capacity < 2) throw std::invalid_argument("capacity must be 2 or more");
+}
+
+// A vertex that is lost or found (NaN at one end) does not say anything about the others.
+bool teleports(const Positions& a, const Positions& b, double limit_m) {
+  const double limit_sq = limit_m * limit_m;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if ((b[i] - a[i]).squaredNorm() > limit_sq && a[i].allFinite() && b[i].allFinite()) return true;
+  }
+  return false;
+}
+
+double fraction(StampNs a, StampNs b, StampNs at) { return static_cast<double>(at - a) / static_cast<double>(b - a); }
+
+}  // namespace
+
+const char* toString(StepStatus status) {
+  static constexpr const char* NAMES[] = {
+      "OK",          "FIRST_FRAME", "TOPOLOGY_CHANGED", "GAP",       "TIME_JUMP",     "NO_TRANSFORM", "NO_MAP",
+      "NO_BODY",     "PARTIAL",     "DEADLINE",         "TRUNCATED", "DUPLICATE",     "TELEPORT",     "VERTEX_COUNT",
+      "BAD_MESSAGE", "QUEUE_FULL",  "DISABLED",         "RESET",     "INTERNAL_ERROR"};
+  static_assert(sizeof(NAMES) / sizeof(NAMES[0]) == static_cast<std::size_t>(StepStatus::COUNT));
+  return status < StepStatus::COUNT ? NAMES[static_cast<std::size_t>(status)] : "?";
+}
+
+bool isAnswered(StepStatus status) {
+  return status == StepStatus::OK || status == StepStatus::NO_MAP || status == StepStatus::PARTIAL ||
+         status == StepStatus::DEADLINE || status == StepStatus::TRUNCATED;
+}
+
+bool isSeam(StepStatus status) {
+  return status == StepStatus::FIRST_FRAME || status == StepStatus::TOPOLOGY_CHANGED || status == StepStatus::GAP ||
+         status == StepStatus::TIME_JUMP || status == StepStatus::TELEPORT;
+}
+
+void interpolate(const Positions& a, const Positions& b, double u, Positions& out) {
+  out.resize(a.size());
+  if (u <= 0 || u >= 1) {
+    std::copy((u <= 0 ? a : b).begin(), (u <= 0 ? a : b).end(), out.begin());
+    return;
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) out[i] = a[i] + u * (b[i] - a[i]);
+}
+
+Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double u) {
+  if (u == 0) return a;
+  if (u == 1) return b;
+  // By angle and axis, not by slerp, whose weights are not meant for u outside [0,1].
+  const Eigen::AngleAxisd turn(Eigen::Quaterniond(a.linear().transpose() * b.linear()).normalized());
+  double angle = turn.angle();
+  if (angle > M_PI) angle -= 2 * M_PI;
+  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
+  out.linear() = a.linear() * Eigen::AngleAxisd(u * angle, turn.axis()).toRotationMatrix();
+  out.translation() = a.translation() + u * (b.translation() - a.translation());
+  return out;
+}
+
+MeshStore::MeshStore(const MeshStoreOptions& options) : options_(options) { check(options); }
+
+void MeshStore::setOptions(const MeshStoreOptions& options) {
+  check(options);
+  options_ = options;
+}
+
+void MeshStore::clear() {
+  frames_.clear();
+  vertices_ = 0;
+}
+
+void MeshStore::forgetOldest() {
+  vertices_ -= frames_.front().frame->positions.size();
+  frames_.pop_front();
+}
+
+StepStatus MeshStore::classify(const MeshFrame& frame) const {
+  if (!frame.topology || frame.positions.size() != frame.topology->vertexCount()) return StepStatus::VERTEX_COUNT;
+  if (!frame.radius_m.empty() && frame.radius_m.size() != frame.positions.size()) return StepStatus::VERTEX_COUNT;
+  if (frames_.empty()) return StepStatus::FIRST_FRAME;
+  const MeshFrame& last = newest();
+  if (frame.stamp_ns == last.stamp_ns) return StepStatus::DUPLICATE;
+  if (frame.stamp_ns < last.stamp_ns) return StepStatus::TIME_JUMP;
+  if (frame.topology != last.topology && *frame.topology != *last.topology) return StepStatus::TOPOLOGY_CHANGED;
+  if (static_cast<double>(frame.stamp_ns - last.stamp_ns) * 1e-9 > options_.max_step_s) return StepStatus::GAP;
+  if (options_.max_vertex_step_m > 0 && teleports(last.positions, frame.positions, options_.max_vertex_step_m)) {
+    return StepStatus::TELEPORT;
+  }
+  return StepStatus::OK;
+}
+
+StepStatus MeshStore::push(MeshFrame frame) {
+  const StepStatus status = classify(frame);
+  if (status == StepStatus::VERTEX_COUNT || status == StepStatus::DUPLICATE) return status;
+  // Stamps must ascend within the store: after a jump back nothing older can be of use.
+  if (status == StepStatus::TIME_JUMP) clear();
+  if (status != StepStatus::OK) {
+    ++run_;
+    run_reason_ = status;
+  } else if (frame.topology != newest().topology) {
+    frame.topology = newest().topology;  // equal; one object a run, so that pointers tell runs apart
+  }
+  // A fast stream of few vertices may run far ahead of a clock body that comes late; large meshes may not fill the
+  // memory.
+  constexpr std::size_t ALWAYS_KEPT = 64;
+  vertices_ += frame.positions.size();
+  while (frames_.size() >= options_.capacity || (frames_.size() >= ALWAYS_KEPT && vertices_ > options_.max_vertices)) {
+    forgetOldest();
+  }
+  frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_});
+  return status;
+}
+
+std::shared_ptr<const MeshFrame> MeshStore::previous() const {
+  const std::size_t n = frames_.size();
+  return n >= 2 && frames_[n - 2].run == frames_[n - 1].run ? frames_[n - 2].frame : nullptr;
+}
+
+std::size_t MeshStore::firstAtOrAfter(StampNs stamp_ns) const {
+  const auto it = std::lower_bound(frames_.begin(), frames_.end(), stamp_ns,
+                                   [](const Kept& kept, StampNs at) { return kept.frame->stamp_ns < at; });
+  return static_cast<std::size_t>(it - frames_.begin());
+}
+
+Lookup MeshStore::lookup(StampNs stamp_ns, std::uint64_t* run) const {
+  const std::size_t i = firstAtOrAfter(stamp_ns);
+  if (i == frames_.size()) return Lookup::NOT_YET;
+  const bool at_frame = frames_[i].frame->stamp_ns == stamp_ns;
+  if (!at_frame && (i == 0 || frames_[i - 1].run != frames_[i].run)) return Lookup::TOO_OLD;
+  if (run) *run = frames_[i].run;
+  return Lookup::READY;
+}
+
+void MeshStore::positionsAt(StampNs stamp_ns, Positions& out) const {
+  const std::size_t i = firstAtOrAfter(stamp_ns);
+  const MeshFrame& b = *frames_[i].frame;
+  if (b.stamp_ns == stamp_ns) {
+    out.assign(b.positions.begin(), b.positions.end());
+    return;
+  }
+  const MeshFrame& a = *frames_[i - 1].frame;
+  if (b.rigid) {
+    const Eigen::Isometry3d moved = poseAt(stamp_ns) * b.pose.inverse();
+    out.resize(b.positions.size());
+    for (std::size_t v = 0; v < out.size(); ++v) out[v] = moved * b.positions[v];
+    return;
+  }
+  interpolate(a.positions, b.positions, fraction(a.stamp_ns, b.stamp_ns, stamp_ns), out);
+}
+
+Eigen::Isometry3d MeshStore::poseAt(StampNs stamp_ns) const {
+  const std::size_t i = firstAtOrAfter(stamp_ns);
+  const MeshFrame& b = *frames_[i].frame;
+  if (b.stamp_ns == stamp_ns) return b.pose;
+  const MeshFrame& a = *frames_[i - 1].frame;
+  return interpolate(a.pose, b.pose, fraction(a.stamp_ns, b.stamp_ns, stamp_ns));
+}
+
+void MeshStore::radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const {
+  out.clear();
+  std::size_t first = firstAtOrAfter(from_ns);
+  if (first > 0 && frames_[first].frame->stamp_ns != from_ns) --first;
+  const std::size_t last = std::min(firstAtOrAfter(to_ns), frames_.size() - 1);
+  for (std::size_t i = first; i <= last; ++i) {
+    const std::vector<double>& radius = frames_[i].frame->radius_m;
+    if (out.empty()) {
+      out.assign(radius.begin(), radius.end());
+    } else {
+      for (std::size_t v = 0; v < radius.size(); ++v) out[v] = std::max(out[v], radius[v]);
+    }
+  }
+}
+
+std::size_t MeshStore::framesWithin(StampNs from_ns, StampNs to_ns) const {
+  const std::size_t first = firstAtOrAfter(from_ns + 1), end = firstAtOrAfter(to_ns);
+  return end > first ? end - first : 0;
+}
+
+double MeshStore::offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const {
+  const Eigen::Isometry3d pose_t0 = poseAt(from_ns), pose_t1 = poseAt(to_ns);
+  const std::size_t end = firstAtOrAfter(to_ns);
+  double off = 0;
+  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < end; ++i) {
+    const MeshFrame& frame = *frames_[i].frame;
+    const double u = fraction(from_ns, to_ns, frame.stamp_ns);
+    const Eigen::Isometry3d moved = interpolate(pose_t0, pose_t1, u) * pose_t0.inverse();
+    for (std::size_t v = 0; v < t0.size(); ++v) {
+      const Vec3 on_path = frame.rigid ? Vec3(moved * t0[v]) : Vec3(t0[v] + u * (t1[v] - t0[v]));
+      off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared
+    }
+  }
+  return off;
+}
+
+void MeshStore::forgetBefore(StampNs stamp_ns) {
+  // The frame at or just before the stamp is still needed to interpolate, and the newest two to extrapolate.
+  while (frames_.size() > 2 && frames_[1].frame->stamp_ns <= stamp_ns) forgetOldest();
+}
+
+}  // namespace dccd

@@ -1,0 +1,251 @@
+#include "dccd/monitor.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "stream/monitor_impl.h"
+#include "stream/seam_reason.h"
+
+namespace dccd {
+
+namespace {
+
+void check(const MonitorOptions& options, std::size_t bodies) {
+  const auto require = [](bool good, const std::string& text) {
+    if (!good) throw std::invalid_argument(text);
+  };
+  require(options.clock_body < bodies, "clock_body is not one of the bodies");
+  require(options.sync_timeout_s >= 0 && std::isfinite(options.sync_timeout_s),
+          "sync_timeout_s must be finite and 0 or more, is " + std::to_string(options.sync_timeout_s));
+  require(options.max_waiting >= 1, "max_waiting must be 1 or more");
+  require(options.octomap_timeout_s >= 0, "octomap_timeout_s must be 0 (never) or more");
+  require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
+  require(options.max_substeps >= 1, "max_substeps must be 1 or more");
+  require(options.look_ahead_s >= 0 && std::isfinite(options.look_ahead_s),
+          "look_ahead_s must be finite and 0 (off) or more, is " + std::to_string(options.look_ahead_s));
+  for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
+}
+
+}  // namespace
+
+std::uint64_t FrameCounters::processed() const {
+  std::uint64_t sum = 0;
+  for (std::size_t s = 0; s < by_status.size(); ++s) sum += isAnswered(static_cast<StepStatus>(s)) ? by_status[s] : 0;
+  return sum;
+}
+
+std::uint64_t FrameCounters::started() const {
+  std::uint64_t sum = 0;
+  for (std::size_t s = 0; s < by_status.size(); ++s) sum += isSeam(static_cast<StepStatus>(s)) ? by_status[s] : 0;
+  return sum;
+}
+
+std::uint64_t FrameCounters::skipped() const {
+  std::uint64_t sum = 0;
+  for (const std::uint64_t n : by_status) sum += n;
+  return sum - processed() - started();
+}
+
+FrameCounters& FrameCounters::operator+=(const FrameCounters& other) {
+  received += other.received;
+  receipt_stamps += other.receipt_stamps;
+  for (std::size_t s = 0; s < by_status.size(); ++s) by_status[s] += other.by_status[s];
+  return *this;
+}
+
+Monitor::Monitor(const MonitorOptions& options, std::vector<MonitorBody> bodies) {
+  check(options, bodies.size());
+  if (bodies[options.clock_body].motion == BodyMotionKind::STATIC) {
+    throw std::invalid_argument("clock_body '" + bodies[options.clock_body].name + "' is static and has no clock");
+  }
+  impl_ = std::make_unique<Impl>(options, std::move(bodies));
+}
+
+Monitor::~Monitor() = default;
+
+const MonitorOptions& Monitor::options() const { return impl_->options; }
+const std::vector<MonitorBody>& Monitor::bodies() const { return impl_->bodies; }
+const MonitorMap& Monitor::map() const { return impl_->map; }
+const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->runner.leftOut(); }
+const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
+
+void Monitor::setOptions(const MonitorOptions& options) {
+  check(options, impl_->bodies.size());
+  if (options.clock_body != impl_->options.clock_body) throw std::invalid_argument("clock_body must stay");
+  // All of it or nothing: what may refuse comes first.
+  const MeshStore checked(options.store);
+  impl_->runner.setOptions(options.detector);
+  for (MeshStore& store : impl_->stores) store.setOptions(options.store);
+  impl_->side_runner.reset();
+  impl_->reduced_from = nullptr;
+  impl_->options = options;
+}
+
+void Monitor::countReceived(std::size_t body, std::uint64_t count, std::uint64_t receipt_stamps) {
+  impl_->counters.at(body).received += count;
+  impl_->counters.at(body).receipt_stamps += receipt_stamps;
+}
+
+void Monitor::countDropped(std::size_t body, StepStatus status, std::uint64_t count) {
+  impl_->counters.at(body).by_status.at(static_cast<std::size_t>(status)) += count;
+}
+
+void Monitor::setListener(StepListener* listener) { impl_->listener = listener; }
+
+FrameCounters Monitor::total() const {
+  FrameCounters sum;
+  for (const FrameCounters& counters : impl_->counters) sum += counters;
+  return sum;
+}
+
+StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns) {
+  Impl& m = *impl_;
+  const StampNs stamp_ns = frame.stamp_ns;
+  m.finishing = false;
+  if (!m.isStream(body)) {
+    // The newest frame holds at all times; an older one, or the same again, is as good as any.
+    MeshStore store(m.options.store);
+    const StepStatus status = store.push(std::move(frame));
+    m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
+    if (isSeam(status)) {
+      m.stores[body] = std::move(store);
+      m.has_last = false;
+    }
+    return status;
+  }
+  MeshStore& store = m.stores.at(body);
+  const std::shared_ptr<const MeshFrame> before = store.empty() ? nullptr : store.newestShared();
+  const StepStatus status = store.push(std::move(frame));
+  if (body == m.options.clock_body) {
+    const std::string reason = before ? seamReason(status, *before, store.newest(), m.options.store) : "";
+    m.onClockFrame(status, stamp_ns, now_ns, reason);
+  } else {
+    m.counters[body].count(status);
+  }
+  return status;
+}
+
+void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, std::string reason) {
+  const MeshStore& store = stores[options.clock_body];
+  Pending step{status, nullptr, nullptr, stamp_ns, now_ns, ++sequence, std::move(reason)};
+  if (status == StepStatus::OK) {
+    step.from = store.previous();
+    step.to = store.newestShared();
+  } else if (status == StepStatus::TIME_JUMP) {
+    // What waits for other bodies will not get it any more, and frames of theirs from the old time are of no use.
+    for (Pending& waiting : pending) {
+      if (waiting.status == StepStatus::OK) drop(waiting, StepStatus::NO_BODY, "time jumped back while waiting");
+    }
+    for (std::size_t b = 0; b < stores.size(); ++b) {
+      const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
+                         seconds(stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
+      if (stale) stores[b].clear();
+    }
+  }
+  if (pending.size() >= options.max_waiting) {
+    for (Pending& waiting : pending) {
+      if (waiting.status != StepStatus::OK) continue;
+      drop(waiting, StepStatus::NO_BODY, "more than max_waiting steps wait for other bodies");
+      break;
+    }
+  }
+  pending.push_back(std::move(step));
+}
+
+void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason) {
+  Impl& m = *impl_;
+  if (body == m.options.clock_body) {
+    m.pending.push_back({status, nullptr, nullptr, stamp_ns, 0, ++m.sequence, reason});
+  } else {
+    m.counters.at(body).count(status);
+  }
+}
+
+bool Monitor::waiting() const { return !impl_->pending.empty(); }
+
+void Monitor::finish() { impl_->finishing = true; }
+
+void Monitor::reset(StepStatus status) {
+  Impl& m = *impl_;
+  for (const auto& step : m.pending) m.counters[m.options.clock_body].count(step.to ? status : step.status);
+  m.pending.clear();
+  for (std::size_t b = 0; b < m.stores.size(); ++b) {
+    if (m.isStream(b)) m.stores[b].clear();
+  }
+  if (status == StepStatus::RESET) m.forgetReferences();
+  m.has_last = false;
+}
+
+void Monitor::Impl::runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues,
+                          StepOutcome& outcome, StepRunner* predecessor) {
+  on.run(at, bodies, options, withoutExcluded(used), continues, outcome, predecessor);
+  if (!options.obstacle_expected || used.surface) return;
+  outcome.status = StepStatus::NO_MAP;
+  outcome.reason = used.problem + "; checked without it";
+  outcome.clear = false;
+}
+
+void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
+  const bool had_last = has_last;
+  has_last = false;
+  place(step);
+  outcome.start_ns = step.from->stamp_ns;
+  const MonitorMap used = usableMap(step.to->stamp_ns);
+  // Interpolated ends repeat bit for bit as long as every body stays in its run.
+  const bool continues = had_last && last_end_ns == outcome.start_ns && last_runs == runs;
+  if (listener) {
+    listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
+                      &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &input.radius_m,
+                      &input.references, &used});
+  }
+  runOn(runner, input, used, continues, outcome);
+  if (used.surface && !options.exclude_boxes.empty()) outcome.excluded_voxels = excluded_voxels;
+  has_last = true;
+  last_end_ns = outcome.stamp_ns;
+  last_duration_s = outcome.duration_s();
+  last_runs = runs;
+}
+
+bool Monitor::next(std::int64_t now_ns, StepOutcome& outcome) {
+  Impl& m = *impl_;
+  if (m.pending.empty()) return false;
+  Impl::Pending& step = m.pending.front();
+  if (step.status == StepStatus::OK) {
+    const bool timed_out = m.finishing || Impl::seconds(step.since_ns, now_ns) >= m.options.sync_timeout_s;
+    if (m.ready(step, timed_out) == Impl::Ready::WAIT) return false;
+  }
+  outcome = StepOutcome{};
+  outcome.status = step.status;
+  outcome.reason = step.reason;
+  outcome.sequence = step.sequence;
+  outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
+  if (step.status == StepStatus::OK) {
+    try {
+      m.runStep(step, outcome);
+    } catch (const std::exception& error) {
+      const std::string what = error.what();
+      outcome = StepOutcome{};
+      outcome.status = StepStatus::INTERNAL_ERROR;
+      outcome.reason = what;
+      outcome.sequence = step.sequence;
+      outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
+    }
+    if (m.listener) m.listener->onOutcome(outcome);
+    // Not the computed answer's, which a recording replays, but about it.
+    if (outcome.answered && !m.off_path.empty()) {
+      outcome.clear = false;
+      if (outcome.status == StepStatus::OK) {
+        outcome.status = StepStatus::PARTIAL;
+        outcome.reason = m.off_path;
+      }
+    }
+  } else {
+    m.has_last = m.has_last && !isSeam(step.status);
+  }
+  m.counters[m.options.clock_body].count(outcome.status);
+  m.pending.pop_front();
+  return true;
+}
+
+}  // namespace dccd

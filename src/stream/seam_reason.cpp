@@ -1,0 +1,57 @@
+#include "stream/seam_reason.h"
+
+#include <cmath>
+#include <sstream>
+
+namespace dccd {
+
+namespace {
+
+void addFarthest(const Positions& before, const Positions& after, std::ostringstream& text) {
+  std::size_t farthest = 0;
+  double most_sq = -1;
+  for (std::size_t v = 0; v < after.size(); ++v) {
+    const double moved_sq = (after[v] - before[v]).squaredNorm();
+    if (moved_sq > most_sq) most_sq = moved_sq, farthest = v;
+  }
+  text << "vertex " << farthest << " moved " << std::sqrt(most_sq) << " m";
+}
+
+std::string sizeOf(const Topology& topology) {
+  return std::to_string(topology.vertexCount()) + " vertices and " + std::to_string(topology.faces().size()) + " faces";
+}
+
+}  // namespace
+
+std::string seamReason(StepStatus status, const MeshFrame& before, const MeshFrame& after,
+                       const MeshStoreOptions& options) {
+  std::ostringstream text;
+  const double elapsed_s = static_cast<double>(after.stamp_ns - before.stamp_ns) * 1e-9;
+  switch (status) {
+    case StepStatus::TIME_JUMP:
+      text << "the stamp is " << -elapsed_s << " s before that of the last frame";
+      break;
+    case StepStatus::GAP:
+      text << elapsed_s << " s since the last frame, max_step_s is " << options.max_step_s;
+      break;
+    case StepStatus::TELEPORT:
+      addFarthest(before.positions, after.positions, text);
+      text << " in " << elapsed_s << " s, max_vertex_step_m is " << options.max_vertex_step_m;
+      break;
+    case StepStatus::TOPOLOGY_CHANGED:
+      text << "the mesh has " << sizeOf(*after.topology) << ", the last one had " << sizeOf(*before.topology);
+      if (after.topology->vertexCount() == before.topology->vertexCount() &&
+          after.topology->faces().size() == before.topology->faces().size()) {
+        text << ", joined otherwise";
+      }
+      break;
+    case StepStatus::DUPLICATE:
+      text << "the stamp is that of the last frame";
+      break;
+    default:
+      break;
+  }
+  return text.str();
+}
+
+}  // namespace dccd

@@ -1,0 +1,165 @@
+// Normal cone and contour test: certifies only what brute force with exact tests finds free of contacts.
+#include "culling/unfolded.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "dccd/detector.h"
+
+namespace dccd {
+namespace {
+
+StepResult runStep(const Topology& topology, const Positions& t0, const Positions& t1, BroadPhase broad_phase,
+                   double separation_m = 0, const std::vector<double>* radius_m = nullptr) {
+  DetectorOptions options;
+  options.accuracy.rung = separation_m > 0 || radius_m ? Accuracy::CONSERVATIVE : Accuracy::EXACT;
+  options.broad_phase = broad_phase;
+  options.check_start_state = false;
+  Detector detector(options);
+  BodySetup body;
+  body.name = "cloth";
+  body.topology = std::make_shared<const Topology>(topology);
+  body.minimum_separation_m = separation_m;
+  detector.setBodies({body}, {&t0});
+  MotionStep step;
+  step.bodies = {{&t0, &t1, radius_m}};
+  return detector.run(step);
+}
+
+bool certified(const Topology& topology, const Positions& t0, const Positions& t1) {
+  return runStep(topology, t0, t1, BroadPhase::CLUSTERED).stats.unfolded_bodies == 1;
+}
+
+std::size_t trueContacts(const Topology& topology, const Positions& t0, const Positions& t1) {
+  return runStep(topology, t0, t1, BroadPhase::BRUTE_FORCE).contacts.size();
+}
+
+/// A strip of two rows along a curve in the plane, optionally rising.
+Positions strip(std::size_t count, double turns, double growth, double rise) {
+  Positions p;
+  for (const double inner : {0.0, 0.3}) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double s = static_cast<double>(i) / static_cast<double>(count - 1), angle = 2 * M_PI * turns * s;
+      const double radius = 1 + inner + growth * s;
+      p.emplace_back(radius * std::cos(angle), radius * std::sin(angle), rise * s);
+    }
+  }
+  return p;
+}
+
+TEST(Unfolded, WavingClothIsCertified) {
+  const Topology topology = Topology::grid(30, 40);
+  Positions t0, t1;
+  for (int r = 0; r < 30; ++r) {
+    for (int c = 0; c < 40; ++c) {
+      t0.emplace_back(0.02 * c, 0.02 * r, 0.03 * std::sin(0.3 * c + 0.2 * r));
+      t1.emplace_back(0.02 * c + 0.001, 0.02 * r, 0.03 * std::sin(0.3 * c + 0.2 * r + 0.5) - 0.01);
+    }
+  }
+  const StepResult result = runStep(topology, t0, t1, BroadPhase::CLUSTERED);
+  EXPECT_EQ(result.stats.unfolded_bodies, 1u);
+  EXPECT_EQ(result.stats[Effect::SELF_COLLISION].in, 0u);
+  EXPECT_EQ(trueContacts(topology, t0, t1), 0u);
+  EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 1e-4).stats.unfolded_bodies, 0u)
+      << "not touching is not enough with a separation";
+  std::vector<double> radius(1200, 0.0);
+  EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius).stats.unfolded_bodies, 1u)
+      << "a tracker that is sure";
+  radius[77] = 0.03;
+  const StepResult uncertain = runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius);
+  EXPECT_EQ(uncertain.stats.unfolded_bodies, 0u) << "nor with a vertex that is only known to a radius";
+  EXPECT_FALSE(uncertain.contacts.empty()) << "which reaches its neighbours";
+}
+
+TEST(Unfolded, WhatIsCertifiedHasNoContact) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int certificates = 0, touching = 0;
+  for (int round = 0; round < 1500; ++round) {
+    // A cloth of random waves; a flat strip that closes on itself; one that winds above itself.
+    const int kind = round % 3;
+    const Topology topology = kind == 0 ? Topology::grid(5, 6) : Topology::grid(2, 16);
+    Positions t0, t1;
+    if (kind == 0) {
+      for (int i = 0; i < 30; ++i) t0.emplace_back(i % 6, i / 6, 0);
+    } else {
+      const double turns = 0.8 + 0.3 * unit(random);
+      t0 = strip(16, turns, kind == 1 ? 0.2 * unit(random) : 0, kind == 1 ? 0 : 0.5 * std::abs(unit(random)));
+    }
+    const double wave = std::exp2(2 * unit(random) - 2), motion = std::exp2(2 * unit(random) - 3);
+    for (Vec3& p : t0) {
+      const Vec3 by(unit(random), unit(random), unit(random));
+      if (kind == 0) p += wave * by;
+      t1.push_back(p + motion * Vec3(unit(random), unit(random), kind == 1 ? 0.0 : unit(random)));
+    }
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(unit(random), unit(random), unit(random), unit(random)).normalized();
+    const Vec3 shift = round % 5 ? Vec3(0, 0, 0) : Vec3(1e5, -3e5, 2e5);
+    for (Positions* positions : {&t0, &t1}) {
+      for (Vec3& p : *positions) p = turn * p + shift;
+    }
+    const std::size_t contacts = trueContacts(topology, t0, t1);
+    touching += contacts > 0;
+    if (!certified(topology, t0, t1)) continue;
+    ++certificates;
+    ASSERT_EQ(contacts, 0u) << "round " << round;
+  }
+  EXPECT_GT(certificates, 150);
+  EXPECT_GT(touching, 150);
+}
+
+TEST(Unfolded, ContourKeepsASpiralFromBeingCertified) {
+  // Every normal points up, but the second turn lies above the first, and sinks onto it.
+  const Topology topology = Topology::grid(2, 60);
+  const Positions high = strip(60, 1.5, 0, 0.4), low = strip(60, 1.5, 0, 0.0);
+  EXPECT_FALSE(certified(topology, high, high));
+  EXPECT_GT(trueContacts(topology, high, low), 0u);
+  EXPECT_FALSE(certified(topology, high, low));
+  EXPECT_TRUE(certified(topology, strip(60, 0.9, 0, 0.4), strip(60, 0.9, 0, 0.0))) << "less than a turn";
+}
+
+TEST(Unfolded, OnlyDisks) {
+  const Positions square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {3, 0, 0}, {4, 0, 0}, {3, 1, 0}};
+  const auto disk = [&](const std::vector<Face>& faces) {
+    const Topology topology = Topology::fromTriangles(square.size(), faces);
+    return certified(topology, square, square);
+  };
+  EXPECT_TRUE(disk({{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_FALSE(disk({{0, 1, 2}, {0, 3, 2}})) << "opposite orientation";
+  EXPECT_FALSE(disk({{0, 1, 2}, {0, 2, 3}, {4, 5, 6}})) << "two parts";
+  EXPECT_FALSE(disk({{0, 1, 2}, {2, 4, 5}})) << "one vertex in common";
+  EXPECT_FALSE(disk({{0, 1, 2}, {0, 2, 3}, {0, 2, 4}})) << "three faces at an edge";
+
+  Positions ring = strip(12, 11.0 / 12, 0, 0);
+  std::vector<Face> faces;
+  for (Index i = 0; i < 12; ++i) {
+    const Index j = (i + 1) % 12;
+    faces.push_back({i, i + 12, j});
+    faces.push_back({j, i + 12, j + 12});
+  }
+  EXPECT_FALSE(certified(Topology::fromTriangles(24, faces), ring, ring)) << "two boundaries";
+  EXPECT_EQ(trueContacts(Topology::fromTriangles(24, faces), ring, ring), 0u);
+}
+
+TEST(Unfolded, NothingIsCertifiedOfFoldsAndDegenerateFaces) {
+  const Topology topology = Topology::grid(2, 3);
+  const Positions flat{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}, {1, 1, 0}, {2, 1, 0}};
+  EXPECT_TRUE(certified(topology, flat, flat));
+  Positions folded = flat;
+  folded[2] = folded[0] + Vec3(0, 0, 0.1);
+  folded[5] = folded[3] + Vec3(0, 0, 0.1);
+  EXPECT_FALSE(certified(topology, flat, folded));
+  Positions line = flat;
+  for (Vec3& p : line) p.y() = 0;
+  EXPECT_FALSE(certified(topology, line, line));
+  const Positions point(6, Vec3(1, 2, 3));
+  EXPECT_FALSE(certified(topology, point, point));
+  Positions huge = flat;
+  for (Vec3& p : huge) p *= 1e300;
+  EXPECT_FALSE(certified(topology, huge, huge));
+}
+
+}  // namespace
+}  // namespace dccd

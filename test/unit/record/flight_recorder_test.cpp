@@ -1,0 +1,115 @@
+#include "record/flight_recorder.h"
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "record/step_replay.h"
+#include "support/recordings.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class FlightRecorderTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "recorder_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+TEST_F(FlightRecorderTest, KeepsTheLastSteps) {
+  RecordedScene scene;
+  FlightRecorder recorder(3, folder_ / "new");
+  scene.monitor().setListener(&recorder);
+  EXPECT_TRUE(recorder.writeAll("none").empty());
+  std::vector<std::uint64_t> sequences;
+  for (int i = 0; i < 5; ++i) sequences.push_back(scene.nextFrames().sequence);
+  EXPECT_EQ(recorder.size(), 3u);
+  const std::vector<std::string> files = recorder.writeAll("why");
+  ASSERT_EQ(files.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const StepRecording r = readRecordingFile(files[i]);
+    EXPECT_EQ(r.sequence, sequences[i + 2]);
+    EXPECT_EQ(r.note, "why");
+    EXPECT_TRUE(replayStep(r).differences.empty());
+  }
+  EXPECT_TRUE(recorder.takeSurprise().empty());
+}
+
+TEST_F(FlightRecorderTest, SurprisesAreWrittenAndBounded) {
+  RecordedScene scene;
+  FlightRecorder recorder(1, folder_);
+  scene.monitor().setListener(&recorder);
+  StepOutcome outcome = scene.nextFrames();
+  outcome.status = StepStatus::INTERNAL_ERROR;
+  outcome.reason = "made up";
+  for (std::size_t i = 0; i < FlightRecorder::MAX_SURPRISES + 2; ++i) {
+    outcome.sequence = 100 + i;
+    recorder.onOutcome(outcome);
+  }
+  EXPECT_NE(recorder.takeSurprise().find("not recorded, 16 were already"), std::string::npos);
+  EXPECT_TRUE(recorder.takeSurprise().empty()) << "said once";
+  recorder.writeAll("again");
+  std::size_t files = 0;
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    ++files;
+    EXPECT_FALSE(readRecordingFile(entry.path()).note.empty());
+  }
+  EXPECT_EQ(files, 2u) << "one of the surprises, which are the same step, and one asked for";
+}
+
+TEST(Surprise, OnlyWhatContradictsThePromises) {
+  MonitorOptions options;
+  StepOutcome outcome;
+  outcome.status = StepStatus::OK;
+  outcome.answered = true;
+  EXPECT_TRUE(surpriseIn(outcome, options).empty());
+  outcome.stats.undecided = 2;
+  EXPECT_NE(surpriseIn(outcome, options).find("2 pairs undecided"), std::string::npos);
+  outcome.complete = false;
+  EXPECT_TRUE(surpriseIn(outcome, options).empty()) << "a deadline leaves pairs undecided";
+  outcome.complete = true;
+  options.detector.accuracy.rung = Accuracy::SCREEN;
+  EXPECT_TRUE(surpriseIn(outcome, options).empty()) << "screen decides nothing";
+  Contact contact;
+  contact.toc_lower = std::numeric_limits<double>::quiet_NaN();
+  outcome.contacts.push_back(contact);
+  EXPECT_NE(surpriseIn(outcome, options).find("outside of the step"), std::string::npos);
+}
+
+TEST_F(FlightRecorderTest, AStepThatFailsIsASurprise) {
+  RecordedScene scene;
+  FlightRecorder recorder(2, folder_);
+  scene.monitor().setListener(&recorder);
+  MonitorOptions options = scene.monitor().options();
+  scene.nextFrames();
+  // The mask of another mesh: found only when the step is computed.
+  MonitorBody cloth;
+  cloth.name = "cloth";
+  cloth.vertex_mask = {99};
+  Monitor failing(options, {cloth});
+  failing.setListener(&recorder);
+  const auto grid = std::make_shared<const Topology>(Topology::grid(2, 2));
+  const Positions at{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  StepOutcome outcome;
+  for (const StampNs stamp_ns : {1, 2}) {
+    failing.push(0, {stamp_ns, grid, at, false, Eigen::Isometry3d::Identity()}, 0);
+    ASSERT_TRUE(failing.next(0, outcome));
+  }
+  ASSERT_EQ(outcome.status, StepStatus::INTERNAL_ERROR);
+  const std::string surprise = recorder.takeSurprise();
+  EXPECT_NE(surprise.find("vertex 99"), std::string::npos) << surprise;
+  const StepRecording r = readRecordingFile(surprise.substr(surprise.find(folder_.string())));
+  EXPECT_NE(replayStep(r).answer.reason.find("vertex 99"), std::string::npos) << "fails again";
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,270 @@
+#include "record/step_recording.h"
+
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "dccd/simd_target.h"
+#include "record/step_replay.h"
+#include "support/recordings.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string errorOf(const std::vector<std::uint8_t>& bytes) {
+  try {
+    readRecording(bytes.data(), bytes.size(), "FILE");
+  } catch (const RecordingError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+MonitorOptions with(Accuracy rung) {
+  MonitorOptions options;
+  options.detector.accuracy.rung = rung;
+  options.obstacle_expected = true;
+  return options;
+}
+
+TEST(StepRecording, TheSceneCallsForEverything) {
+  const StepRecording r = recordScene();
+  EXPECT_EQ(r.bodies.size(), 3u);
+  EXPECT_GT(r.answer.substeps, 1u) << "the finger turns";
+  bool self_or_body = false, obstacle = false;
+  for (const Contact& c : r.answer.contacts) (c.body[1] == OBSTACLE_BODY ? obstacle : self_or_body) = true;
+  EXPECT_TRUE(self_or_body);
+  EXPECT_TRUE(obstacle);
+}
+
+TEST(StepRecording, WhatIsReadIsWhatWasWritten) {
+  const StepRecording r = recordScene();
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
+  const StepRecording again = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(recordingBytes(again), bytes);
+  EXPECT_EQ(again.bodies[2].setup.motion, BodyMotionKind::STATIC);
+  EXPECT_FALSE(again.bodies[2].topology->hasFaces()) << "the rope is a polyline";
+  EXPECT_EQ(again.bodies[2].topology->edges().size(), 3u);
+  ASSERT_TRUE(again.map.surface);
+  EXPECT_EQ(again.map.surface->leafCount(), 2u);
+  EXPECT_TRUE(compareAnswers(r.answer, again.answer).empty());
+}
+
+TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
+  const std::string before = simdTarget();
+  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+    const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(with(rung)));
+    const StepRecording r = readRecording(bytes.data(), bytes.size(), "FILE");
+    ASSERT_FALSE(r.answer.contacts.empty()) << toString(rung);
+    for (const std::string& target : simdTargets()) {
+      setSimdTarget(target);
+      for (const int threads : {1, 3}) {
+        const StepReplay replay = replayStep(r, threads);
+        EXPECT_TRUE(replay.differences.empty())
+            << toString(rung) << ' ' << target << ": " << replay.differences.front();
+        EXPECT_EQ(replay.answer.contacts.size(), r.answer.contacts.size());
+      }
+    }
+  }
+  setSimdTarget(before);
+}
+
+TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
+  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::CONSERVATIVE}) {
+    const StepRecording without = recordScene(with(rung));
+    StepRecording r = recordScene(with(rung), true, true);
+    const std::vector<std::uint8_t> bytes = recordingBytes(r);
+    r = readRecording(bytes.data(), bytes.size(), "FILE");
+    EXPECT_EQ(recordingBytes(r), bytes);
+    ASSERT_EQ(r.bodies[0].radius_m.size(), 20u);
+    EXPECT_EQ(r.bodies[0].radius_m[7], 3e-3);
+    ASSERT_TRUE(r.bodies[0].reference) << "its first frame";
+    EXPECT_NE(r.bodies[0].reference->positions, r.bodies[0].t0);
+    ASSERT_EQ(r.bodies[2].setup.separations.size(), 1u);
+    EXPECT_EQ(r.bodies[2].setup.separations[0].separation_m, 0.15);
+    EXPECT_GT(r.answer.contacts.size(), without.answer.contacts.size());
+    for (const int threads : {1, 3}) {
+      const StepReplay replay = replayStep(r, threads);
+      EXPECT_TRUE(replay.differences.empty()) << toString(rung) << ": " << replay.differences.front();
+    }
+    // Each of them matters: without it the answer is another.
+    const auto differs = [&r](const std::function<void(StepRecording&)>& change) {
+      StepRecording changed = r;
+      change(changed);
+      return !replayStep(changed).differences.empty();
+    };
+    EXPECT_TRUE(differs([](StepRecording& c) { c.bodies[0].radius_m.assign(20, 0.05); })) << toString(rung);
+    EXPECT_TRUE(differs([](StepRecording& c) { c.bodies[2].setup.separations.clear(); })) << toString(rung);
+    EXPECT_TRUE(differs([](StepRecording& c) {
+      ReferenceFrame spread = *c.bodies[0].reference;
+      for (Vec3& p : spread.positions) p *= 10;  // nothing is close in it, so nothing is left out
+      c.bodies[0].reference = std::make_shared<const ReferenceFrame>(spread);
+    })) << toString(rung);
+  }
+}
+
+TEST(StepReplay, WithoutAMapTheStatusIsTheSame) {
+  const StepRecording r = recordScene(with(Accuracy::EXACT), false);
+  EXPECT_EQ(r.answer.status, StepStatus::NO_MAP);
+  const StepReplay replay = replayStep(r);
+  EXPECT_EQ(replay.answer.status, StepStatus::NO_MAP);
+  EXPECT_TRUE(replay.differences.empty());
+}
+
+TEST(StepReplay, OneBitIsADifference) {
+  StepRecording r = recordScene();
+  ASSERT_FALSE(r.answer.contacts.empty());
+  r.answer.contacts.back().toc_lower = std::nextafter(r.answer.contacts.back().toc_lower, 2);
+  EXPECT_EQ(replayStep(r).differences.size(), 1u);
+  r.answer.contacts.pop_back();
+  EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
+  StepRecording r = recordScene();
+  r.answer.complete = false;
+  r.answer.status = StepStatus::DEADLINE;
+  r.answer.contacts.resize(1);
+  EXPECT_TRUE(replayStep(r).differences.empty()) << "the rest was left out, which is no contradiction";
+  r.answer.contacts[0].vertex[0] += 1;
+  EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+TEST(StepReplay, AStepWithoutAnAnswerIsComputed) {
+  StepRecording r = recordScene();
+  const std::size_t contacts = r.answer.contacts.size();
+  r.answer = RecordedAnswer();
+  const StepReplay replay = replayStep(r);
+  EXPECT_TRUE(replay.differences.empty());
+  EXPECT_EQ(replay.answer.contacts.size(), contacts);
+}
+
+TEST(StepRecording, EveryTruncationIsRefused) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  for (std::size_t n = 0; n < bytes.size(); n += n < 600 ? 1 : 37) {
+    const std::vector<std::uint8_t> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n));
+    EXPECT_EQ(errorOf(cut).rfind("FILE: byte ", 0), 0u) << n;
+  }
+  std::vector<std::uint8_t> more = bytes;
+  more.push_back(0);
+  EXPECT_NE(errorOf(more).find("1 bytes are left over"), std::string::npos) << errorOf(more);
+}
+
+TEST(StepRecording, AnyByteMayLie) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  std::size_t refused = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    for (const std::uint8_t value : {0xff, 0x80, 0x01}) {
+      std::vector<std::uint8_t> bad = bytes;
+      bad[i] ^= value;
+      refused += !errorOf(bad).empty();
+    }
+  }
+  EXPECT_GT(refused, 100u);
+}
+
+TEST(StepRecording, LiesAreNamed) {
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  std::vector<std::uint8_t> bad = bytes;
+  bad[0] = 'X';
+  EXPECT_NE(errorOf(bad).find("not a recording"), std::string::npos);
+  bad = bytes;
+  bad[8] = 9;
+  EXPECT_NE(errorOf(bad).find("version 9"), std::string::npos);
+  StepRecording r = recordScene();
+  r.stamp_ns = r.start_ns;
+  EXPECT_NE(errorOf(recordingBytes(r)).find("the step lasts"), std::string::npos);
+  r = recordScene();
+  r.bodies[0].t1.pop_back();
+  EXPECT_NE(errorOf(recordingBytes(r)).find("20 vertices at t=0 and 19 at t=1"), std::string::npos);
+  r = recordScene();
+  r.bodies[0].t0.resize(3);
+  r.bodies[0].t1.resize(3);
+  EXPECT_NE(errorOf(recordingBytes(r)).find("body 'cloth'"), std::string::npos)
+      << "faces name vertices that are not there";
+  r = recordScene();
+  r.bodies[1].pose_t0.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(errorOf(recordingBytes(r)).find("pose"), std::string::npos);
+}
+
+TEST(StepReplay, ImpossibleOptionsAreRefused) {
+  StepRecording r = recordScene();
+  r.options.clock_body = 7;
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  r = recordScene();
+  r.bodies.clear();
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  r = recordScene();
+  r.options.detector.accuracy.toc_bits = 99;
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+}
+
+// --- the disk --------------------------------------------------------------------------------------------------------
+
+class RecordingFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "recording_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+TEST_F(RecordingFile, IsReadAsItWasWritten) {
+  const StepRecording r = recordScene();
+  const std::string path = folder_ / "a.step";
+  writeRecording(path, r);
+  EXPECT_EQ(recordingBytes(readRecordingFile(path)), recordingBytes(r));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(RecordingFile, AFullDiskIsNamedAndNothingIsLeftBehind) {
+  // A limit on the size of files stands for the full disk: write(2) fails in the middle of the file either way.
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit little = before;
+  little.rlim_cur = 200;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &little);
+  std::string error;
+  try {
+    writeRecording(folder_ / "a.step", recordScene());
+  } catch (const std::runtime_error& e) {
+    error = e.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_NE(error.find("a.step: cannot be written: "), std::string::npos) << error;
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(RecordingFile, ADeviceWithoutSpaceIsNamedAndNothingIsLeftBehind) {
+  fs::create_symlink("/dev/full", folder_ / "a.step.part");
+  try {
+    writeRecording(folder_ / "a.step", recordScene());
+    FAIL() << "/dev/full took it";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(RecordingFile, AFolderThatIsNotThereIsNamed) {
+  EXPECT_THROW(writeRecording(folder_ / "none" / "a.step", recordScene()), std::runtime_error);
+  EXPECT_THROW(readRecordingFile(folder_ / "none.step"), RecordingError);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

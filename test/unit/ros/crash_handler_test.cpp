@@ -1,0 +1,77 @@
+#include "node/crash_handler.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "record/step_replay.h"
+#include "support/recordings.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class CrashHandlerTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "recorder_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+/// A process of its own that crashes in the middle of a step.
+class CrashInStep : public StepListener {
+ public:
+  CrashInStep(FlightRecorder& recorder, int signal) : recorder_(recorder), signal_(signal) {}
+  void onStep(const StepSource& source) override {
+    recorder_.onStep(source);
+    std::raise(signal_);
+  }
+  void onOutcome(const StepOutcome& outcome) override { recorder_.onOutcome(outcome); }
+
+ private:
+  FlightRecorder& recorder_;
+  int signal_;
+};
+
+TEST_F(CrashHandlerTest, ACrashWritesTheStep) {
+  for (const int signal : {SIGSEGV, SIGABRT, SIGFPE}) {
+    const StepRecording expected = recordScene();
+    RecordedScene scene;
+    scene.nextFrames();
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      // As in a program without a sanitizer: its handlers would end the process in their own way.
+      for (const int s : {SIGSEGV, SIGABRT, SIGFPE}) std::signal(s, SIG_DFL);
+      FlightRecorder recorder(1, folder_, &crashImage());
+      CrashInStep crash(recorder, signal);
+      installCrashHandler(folder_);
+      scene.monitor().setListener(&crash);
+      scene.nextFrames();
+      ::_exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the crash goes on to be one";
+    EXPECT_EQ(WTERMSIG(status), signal);
+    const StepRecording r = readRecordingFile(folder_ / ("crash_" + std::to_string(child) + ".step"));
+    EXPECT_FALSE(r.answer.present);
+    EXPECT_EQ(r.sequence, expected.sequence);
+    const StepReplay replay = replayStep(r);
+    EXPECT_TRUE(compareAnswers(expected.answer, replay.answer).empty());
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

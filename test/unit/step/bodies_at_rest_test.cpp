@@ -1,0 +1,151 @@
+// Bodies at rest are not refitted, bodies that are apart are not paired, and neither changes any answer.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+/// A cloth that rests (body 0) and one that is waved through it (body 1).
+struct Waved {
+  std::vector<BodySetup> setups;
+  Positions rest, moving;
+  Waved() {
+    const auto topology = std::make_shared<const Topology>(Topology::grid(9, 9));
+    for (int b = 0; b < 2; ++b) {
+      BodySetup body;
+      body.name = b ? "waved" : "resting";
+      body.topology = topology;
+      setups.push_back(body);
+    }
+    for (int i = 0; i < 81; ++i) rest.emplace_back(0.1 * (i % 9), 0.1 * (i / 9), 0.01 * ((i * 7) % 5));
+    moving = at(0);
+  }
+  Positions at(int k) const {
+    Positions x = rest;
+    for (Vec3& p : x) p += Vec3(0.03, 0.02, 0.3 * std::cos(0.7 * k) + 0.05 * std::sin(5 * p.x() + k));
+    return x;
+  }
+};
+
+TEST(BodiesAtRest, AreNotRefittedAndAnswersStayTheSame) {
+  const Waved scene;
+  Detector kept{DetectorOptions()};
+  kept.setBodies(scene.setups, {&scene.rest, &scene.moving});
+  std::uint64_t kept_bodies = 0, contacts = 0;
+  for (int k = 0; k < 20; ++k) {
+    const Positions t0 = scene.at(k), t1 = scene.at(k + 1);
+    MotionStep step;
+    step.bodies = {{&scene.rest, &scene.rest}, {&t0, &t1}};
+    const StepResult& result = kept.run(step);
+    EXPECT_EQ(result.stats.bodies_kept + result.stats.bodies_refitted, 2u);
+    kept_bodies += result.stats.bodies_kept;
+    Detector fresh{DetectorOptions()};
+    fresh.setBodies(scene.setups, {&scene.rest, &scene.moving});
+    const StepResult& expected = fresh.run(step);
+    ASSERT_EQ(difference(result.contacts, expected.contacts), "") << "step " << k;
+    EXPECT_EQ(result.intersections.size(), expected.intersections.size());
+    EXPECT_EQ(expected.stats.bodies_kept, 0u) << "a first step has nothing to keep";
+    contacts += result.contacts.size();
+  }
+  EXPECT_GT(contacts, 100u);
+  EXPECT_GE(kept_bodies, 12u) << "all but the first step and those in which the wave leaves the range";
+}
+
+TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
+  const Waved scene;
+  Detector detector{DetectorOptions()};
+  detector.setBodies(scene.setups, {&scene.rest, &scene.moving});
+  const auto run = [&](double away) {
+    Positions t0 = scene.moving, t1 = scene.at(5);
+    for (Vec3& p : t0) p.x() += away;
+    MotionStep step;
+    step.bodies = {{&scene.rest, &scene.rest}, {&t0, &t1}};
+    const StepResult result = detector.run(step);
+    Detector fresh{DetectorOptions()};
+    fresh.setBodies(scene.setups, {&scene.rest, &scene.moving});
+    EXPECT_EQ(difference(result.contacts, fresh.run(step).contacts), "") << away;
+    return result.stats.bodies_kept;
+  };
+  run(0);
+  run(0.01);
+  EXPECT_EQ(run(0.02), 1u);
+  EXPECT_EQ(run(100), 0u) << "far out of the range";
+  EXPECT_EQ(run(101), 1u);
+  EXPECT_EQ(run(0), 0u) << "far too wide a range";
+  EXPECT_EQ(run(0.01), 1u);
+}
+
+TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
+  const Waved scene;
+  Detector detector{DetectorOptions()};
+  detector.setBodies(scene.setups, {&scene.rest, &scene.moving});
+  Positions rest = scene.rest;
+  const auto run = [&](const Positions& t0, const Positions& t1) {
+    MotionStep step;
+    step.bodies = {{&t0, &t1}, {&scene.moving, &scene.moving}};
+    return detector.run(step);
+  };
+  run(rest, rest);
+  run(rest, rest);
+  EXPECT_EQ(run(rest, rest).stats.bodies_kept, 2u);
+  Positions moved = rest;
+  moved[40].z() = std::nextafter(moved[40].z(), 1.0);
+  EXPECT_EQ(run(rest, moved).stats.bodies_kept, 1u) << "one vertex by one representable number";
+  EXPECT_EQ(run(moved, moved).stats.bodies_kept, 1u);
+  EXPECT_EQ(run(moved, moved).stats.bodies_kept, 2u);
+  DetectorOptions always;
+  always.keep_bounds = false;
+  detector.setOptions(always);
+  EXPECT_EQ(run(moved, moved).stats.bodies_kept, 0u) << "by choice";
+  detector.setOptions(DetectorOptions());
+  run(moved, moved);  // chooses a range that can be kept
+  EXPECT_EQ(run(moved, moved).stats.bodies_kept, 2u);
+  Positions lost = moved;
+  lost[3].x() = std::nan("");
+  EXPECT_EQ(run(lost, lost).stats.bodies_kept, 1u);
+  EXPECT_EQ(run(lost, lost).stats.unchecked_vertices, 1u) << "and stays unchecked";
+  MotionStep wrong;
+  const Positions few(3);
+  wrong.bodies = {{&rest, &rest}, {&few, &few}};
+  EXPECT_THROW(detector.run(wrong), std::invalid_argument);
+  EXPECT_EQ(run(rest, rest).stats.bodies_kept, 0u) << "after a refused step nothing is known to be in order";
+}
+
+TEST(BodiesApart, AreNotPaired) {
+  const auto topology = std::make_shared<const Topology>(Topology::grid(4, 4));
+  std::vector<Positions> x(5);
+  std::vector<BodySetup> setups(5);
+  std::vector<const Positions*> at;
+  MotionStep step;
+  for (std::size_t b = 0; b < 5; ++b) {
+    setups[b].name = std::to_string(b);
+    setups[b].topology = topology;
+    // Bodies 0 and 1 overlap, all others are far from each other.
+    for (int i = 0; i < 16; ++i)
+      x[b].emplace_back(i % 4 + (b < 2 ? 0.0 : 10.0 * static_cast<double>(b)), i / 4, 0.1 * b);
+  }
+  for (const Positions& p : x) {
+    at.push_back(&p);
+    step.bodies.push_back({&p, &p});
+  }
+  for (Vec3& p : x[1]) p.z() = 0;
+  Detector detector{DetectorOptions()};
+  detector.setBodies(setups, at);
+  const StepResult& result = detector.run(step);
+  EXPECT_EQ(result.stats.body_pairs, 1u);
+  EXPECT_GT(result.stats[Effect::BODY_BODY].in, 0u);
+  Positions away = x[1];
+  for (Vec3& p : away) p.y() += 50;
+  step.bodies[1] = {&away, &away};
+  const StepResult& none = detector.run(step);
+  EXPECT_EQ(none.stats.body_pairs, 0u);
+  EXPECT_EQ(none.stats[Effect::BODY_BODY].in, 0u);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,321 @@
+// Answers that are cut short: earliest only, a budget of time, filters alone.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dccd/detector.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
+  const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
+  for (const Accuracy rung : {Accuracy::EXACT, Accuracy::CONSERVATIVE}) {
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      // Start apart, so that the first contact is not at 0.
+      TestStep step = crumpled(seed, 2, 9);
+      for (StepBody& body : step.bodies) body.self_collision = false;
+      for (Vec3& x : step.bodies[1].t0) x[2] += 6;
+      DetectorOptions options;
+      options.accuracy.rung = rung;
+      if (rung == Accuracy::CONSERVATIVE) options.accuracy.tolerance_m = 0.02;
+      const StepResult full = runOnce(step, options);
+      ASSERT_GT(full.contacts.size(), 10u);
+      ASSERT_GT(full.earliestToc(), 0.01);
+      options.earliest_only = true;
+      const StepResult first = runOnce(step, options);
+      ASSERT_FALSE(first.contacts.empty());
+      EXPECT_LT(first.contacts.size(), full.contacts.size());
+      EXPECT_EQ(first.earliestToc(), full.earliestToc()) << toString(rung) << ", seed " << seed;
+      EXPECT_LT(first.stats[Stage::ELEMENTARY].in, full.stats[Stage::ELEMENTARY].in) << "nothing is pruned";
+      for (const Contact& c : first.contacts) {
+        const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
+        ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
+      }
+      for (const int threads : {2, 3}) {
+        options.num_threads = threads;
+        EXPECT_EQ(difference(runOnce(step, options).contacts, first.contacts), "")
+            << toString(rung) << ", seed " << seed;
+      }
+    }
+  }
+}
+
+// The brackets of `conservative` are as wide as the way to them was short: a contact found at once ends at 1, and is
+// the first all the same.
+TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
+  TestStep step = crossing();      // body 1 meets body 0 at 0.5, in a narrow bracket
+  StepBody near = step.bodies[0];  // too close to body 0 from the start: the bracket is [0, 1]
+  for (Positions* x : {&near.t0, &near.t1}) {
+    for (Vec3& p : *x) p.z() -= 0.05;
+  }
+  step.bodies.push_back(near);
+  DetectorOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.check_start_state = false;
+  std::vector<BodySetup> setups = step.setups();
+  for (BodySetup& setup : setups) setup.self_collision = false;
+  setups[2].separations = {{0, 0.1}};
+  const auto run = [&] {
+    Detector detector(options);
+    detector.setBodies(setups, step.positions());
+    return detector.run(step.motion());
+  };
+  const StepResult full = run();
+  ASSERT_EQ(full.earliestToc(), 0);
+  const auto narrow = [](const Contact& c) { return c.toc_lower > 0.49 && c.toc_upper < 0.51; };
+  ASSERT_TRUE(std::any_of(full.contacts.begin(), full.contacts.end(), narrow)) << "nothing to take for the first";
+  options.earliest_only = true;
+  const StepResult first = run();
+  EXPECT_EQ(first.earliestToc(), 0);
+  // What begins before the narrow one ends may be the first; what begins later is not.
+  for (const Contact& c : full.contacts) {
+    const bool listed = std::any_of(first.contacts.begin(), first.contacts.end(),
+                                    [&](const Contact& f) { return difference({c}, {f}).empty(); });
+    EXPECT_EQ(listed, c.toc_lower < 0.51) << describe(c);
+  }
+}
+
+// Nothing that the budget leaves over may touch before its bound.
+TEST(DetectorLimits, BudgetKeepsItsWord) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    TestStep step = crumpled(seed, 2, 12);
+    for (Vec3& x : step.bodies[1].t0) x[2] += seed % 2 ? 0 : 8;
+    if (seed % 2 == 0) {
+      for (StepBody& body : step.bodies) body.self_collision = false;
+    }
+    DetectorOptions options;
+    const StepResult full = runOnce(step, options);
+    ASSERT_GT(full.contacts.size(), 10u);
+    for (const double budget : {1e-6, 0.5, 2.0}) {
+      options.step_budget_ms = budget;
+      const StepResult part = runOnce(step, options);
+      if (budget < 0.01) {
+        EXPECT_FALSE(part.complete);
+        EXPECT_TRUE(std::isfinite(part.unchecked_toc_lower));
+      }
+      EXPECT_EQ(part.complete, !std::isfinite(part.unchecked_toc_lower) && part.stats.undecided == 0);
+      EXPECT_LE(part.earliestToc(), full.earliestToc());
+      for (const Contact& truth : full.contacts) {
+        const auto same =
+            std::lower_bound(part.contacts.begin(), part.contacts.end(), truth, [](const Contact& a, const Contact& b) {
+              return std::tie(a.kind, a.body, a.vertex) < std::tie(b.kind, b.body, b.vertex);
+            });
+        const bool listed = same != part.contacts.end() && same->kind == truth.kind && same->body == truth.body &&
+                            same->vertex == truth.vertex;
+        if (!listed) {
+          EXPECT_LE(part.unchecked_toc_lower, truth.toc_upper) << describe(truth);
+        } else if (same->certainty == Certainty::UNDECIDED) {
+          EXPECT_LE(same->toc_lower, truth.toc_upper) << describe(truth);
+          EXPECT_EQ(same->toc_upper, 1);
+        } else {
+          EXPECT_EQ(difference({*same}, {truth}), "");
+        }
+      }
+    }
+    // The bound is as tight as the filter allows: bodies that start apart do not touch at 0.
+    if (seed % 2 == 0) {
+      options.step_budget_ms = 1e-6;
+      EXPECT_GT(runOnce(step, options).earliestToc(), 0.1);
+    }
+  }
+}
+
+// No pair comes to a test when the deadline is over before the first; what a budget saves in time: scripts/benchmark.
+TEST(DetectorLimits, BudgetEndsTheStep) {
+  const TestStep step = crumpled(3, 2, 40);
+  DetectorOptions options;
+  const StepStats full = runOnce(step, options).stats;
+  options.step_budget_ms = 1e-6;
+  const StepResult part = runOnce(step, options);
+  EXPECT_FALSE(part.complete);
+  EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
+  for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY, Stage::START_STATE}) {
+    EXPECT_GT(full[stage].in, 1000u) << toString(stage);
+    EXPECT_EQ(part.stats[stage].in, 0u) << toString(stage);
+  }
+}
+
+// Somewhere between no pair and all pairs a budget ends within the contacts.
+TEST(DetectorLimits, ABudgetCutsInTheMiddleOfTheContacts) {
+  const TestStep step = crumpled(3, 2, 40);
+  DetectorOptions options;
+  const StepResult full = runOnce(step, options);
+  std::size_t in_the_middle = 0;
+  bool complete = false;
+  for (options.step_budget_ms = 0.02; !complete && options.step_budget_ms < 1e5; options.step_budget_ms *= 1.1) {
+    const StepResult part = runOnce(step, options);
+    complete = part.complete;
+    const auto certain = std::count_if(part.contacts.begin(), part.contacts.end(),
+                                       [](const Contact& c) { return c.certainty == Certainty::CERTAIN; });
+    in_the_middle += certain > 0 && static_cast<std::size_t>(certain) < full.contacts.size();
+  }
+  EXPECT_TRUE(complete);
+  EXPECT_GT(in_the_middle, 0u);
+}
+
+// The search of the start state, dear on the first frame, takes nothing from the contacts and comes to its end in
+// later steps: while sheets move there and back, with half as much again as has been enough for the contacts alone.
+TEST(DetectorLimits, AStartStateThatTheBudgetCutsIsKnownLater) {
+  // Two sheets, the last rows of one of which dip into the other.
+  constexpr std::size_t SIZE = 120;
+  TestStep steps[2];
+  for (const double z : {0.0, 0.5}) {
+    StepBody sheet;
+    sheet.topology = Topology::grid(SIZE, SIZE);
+    for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+      const double x = static_cast<double>(i % SIZE), y = static_cast<double>(i / SIZE);
+      sheet.t0.emplace_back(x + z / 2, y + z / 3, z);
+      sheet.t1.emplace_back(x + z / 2, y + z / 3, y < SIZE - 3 ? z : -z);
+    }
+    steps[0].bodies.push_back(sheet);
+  }
+  std::vector<Positions> back;
+  for (const StepBody& body : steps[0].bodies) back.push_back(body.t0);
+  steps[1] = steps[0].continued(back);
+  DetectorOptions options;
+  const StepResult full[2] = {runOnce(steps[0], options), runOnce(steps[1], options)};
+  ASSERT_GT(full[0].contacts.size(), 10u);
+  ASSERT_GT(full[1].contacts.size(), 10u);
+  ASSERT_GT(full[1].intersections.size(), 10u);
+  std::size_t cut_before_the_end = 0;
+  // On a busy machine the first step with time for the contacts may have had it for the start state as well.
+  for (int round = 0; cut_before_the_end == 0 && round < 20; ++round) {
+    Detector detector(options);
+    detector.setBodies(steps[0].setups(), steps[0].positions());
+    options.step_budget_ms = 0.5;
+    bool known = false, was_complete = false;
+    std::size_t cut = 0;
+    for (std::size_t i = 0; !known && i < 2000; ++i) {
+      detector.setOptions(options);
+      MotionStep motion = steps[i % 2].motion();
+      motion.continues = i > 0;
+      const StepResult& part = detector.run(motion);
+      if (!part.complete) {
+        options.step_budget_ms *= 1.05;
+        cut = 0;
+        continue;
+      }
+      if (!was_complete) options.step_budget_ms *= 1.5;
+      was_complete = true;
+      EXPECT_EQ(difference(part.contacts, full[i % 2].contacts), "");
+      EXPECT_LE(part.intersections.size(), full[i % 2].intersections.size());
+      known = part.start_state_complete;
+      if (known) EXPECT_EQ(part.intersections.size(), full[i % 2].intersections.size());
+      cut += !known;
+    }
+    EXPECT_TRUE(known) << "not within 2000 steps";
+    cut_before_the_end += cut;
+  }
+  EXPECT_GT(cut_before_the_end, 0u);
+}
+
+// A step that throws leaves positions behind that nothing is known about.
+TEST(DetectorLimits, NothingIsCarriedOverAStepThatThrew) {
+  const TestStep step = crumpled(3, 2, 9);
+  const StepResult first = runOnce(step, DetectorOptions());
+  const std::uint64_t searched = first.stats[Stage::START_STATE].in;
+  ASSERT_GT(searched, 0u);
+  Detector detector{DetectorOptions()}, aside{DetectorOptions()};
+  for (Detector* d : {&detector, &aside}) d->setBodies(step.setups(), step.positions());
+  std::vector<Positions> back;
+  for (const StepBody& body : step.bodies) back.push_back(body.t0);
+  const TestStep next = step.continued(back);
+  MotionStep motion = next.motion();
+  motion.predecessor = &detector;
+  const StepResult expected = runOnce(next, DetectorOptions());
+  const auto searchedAside = [&] {
+    const StepResult& result = aside.run(motion);
+    EXPECT_EQ(result.start_state, StartState::INTERSECTING);
+    EXPECT_EQ(result.intersections.size(), expected.intersections.size());
+    return result.stats[Stage::START_STATE].in > 0;
+  };
+  EXPECT_TRUE(searchedAside()) << "no step yet";
+  detector.run(step.motion());
+  EXPECT_FALSE(searchedAside());
+  MotionStep uncertain = step.motion();
+  const std::vector<double> radius_m(step.bodies[0].t0.size(), 0.1);
+  uncertain.bodies[0].radius_m = &radius_m;
+  EXPECT_THROW(detector.run(uncertain), std::invalid_argument);
+  EXPECT_TRUE(searchedAside());
+  MotionStep again = step.motion();
+  again.continues = true;
+  EXPECT_EQ(detector.run(again).stats[Stage::START_STATE].in, searched);
+}
+
+// The map's part of a step is cut like the rest: what is listed is true, and of what is not nothing is said.
+TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
+  constexpr std::size_t SIZE = 40;
+  std::vector<OccupiedLeaf> leaves;
+  for (std::uint16_t x = 0; x < SIZE; ++x) {
+    for (std::uint16_t y = 0; y < SIZE; ++y) {
+      leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32768}, 1});
+    }
+  }
+  BodySetup cloth;
+  cloth.name = "cloth";
+  cloth.topology = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
+  cloth.self_collision = false;
+  Positions above, below;
+  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+    const double x = static_cast<double>(i % SIZE), y = static_cast<double>(i / SIZE), wave = 0.3 * std::sin(x + 2 * y);
+    above.emplace_back(0.9 * x + 0.45, 0.9 * y + 0.35, 1.5 + wave);
+    below.emplace_back(0.9 * x + 0.5, 0.9 * y + 0.3, 0.8 - wave);
+  }
+  MotionStep step;
+  step.bodies = {{&above, &below}};
+  step.obstacle = VoxelSurface::build(1.0, leaves);
+  const auto run = [&](double budget_ms) {
+    DetectorOptions options;
+    options.step_budget_ms = budget_ms;
+    Detector detector(options);
+    detector.setBodies({cloth}, {&above});
+    return detector.run(step);
+  };
+  const StepResult full = run(0);
+  EXPECT_TRUE(full.complete);
+  ASSERT_GT(full.contacts.size(), 1000u);
+  for (const double share : {1e-6, 0.1, 0.3}) {
+    const StepResult part = run(share * full.stats.total_ms);
+    // On a busy machine the whole step may have been what took long, and a share of that be enough.
+    if (share > 1e-6 && part.complete) {
+      EXPECT_EQ(difference(part.contacts, full.contacts), "");
+      continue;
+    }
+    EXPECT_FALSE(part.complete) << share;
+    EXPECT_EQ(part.unchecked_toc_lower, 0);
+    EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
+    EXPECT_LE(part.contacts.size(), full.contacts.size() - (share > 1e-6 ? 0 : 1));
+    for (const Contact& c : part.contacts) {
+      const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
+      ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
+    }
+  }
+}
+
+TEST(DetectorLimits, ScreenReportsBoundsOfItsPairs) {
+  const TestStep step = crossing();
+  DetectorOptions options;
+  const StepResult exact = runOnce(step, options);
+  options.accuracy.rung = Accuracy::SCREEN;
+  const StepResult screen = runOnce(step, options);
+  ASSERT_FALSE(exact.contacts.empty());
+  for (const Contact& c : exact.contacts) {
+    const auto same = std::find_if(screen.contacts.begin(), screen.contacts.end(), [&](const Contact& s) {
+      return s.kind == c.kind && s.body == c.body && s.vertex == c.vertex;
+    });
+    ASSERT_NE(same, screen.contacts.end());
+    EXPECT_EQ(same->certainty, Certainty::UNDECIDED);
+    EXPECT_LE(same->toc_lower, c.toc_lower);
+    EXPECT_GT(same->toc_lower, 0);
+  }
+  EXPECT_EQ(screen.stats.undecided, screen.contacts.size());
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

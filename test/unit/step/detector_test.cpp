@@ -1,0 +1,356 @@
+#include "dccd/detector.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "support/heap.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+std::string differenceOfResults(const StepResult& x, const StepResult& y) {
+  std::string text = difference(x.contacts, y.contacts);
+  if (x.start_state != y.start_state) text += " start states differ";
+  if (!std::equal(x.intersections.begin(), x.intersections.end(), y.intersections.begin(), y.intersections.end(),
+                  [](const auto& p, const auto& q) { return p == q; })) {
+    text += " intersections differ";
+  }
+  return text;
+}
+
+TEST(Detector, TheSameForAnyNumberOfThreadsAndAnyTarget) {
+  const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
+  const TestStep step = crumpled(1, 3, 14);
+  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+    DetectorOptions options;
+    options.accuracy.rung = rung;
+    const StepResult expected = runOnce(step, options);
+    ASSERT_GT(expected.contacts.size(), 1000u);
+    ASSERT_TRUE(expected.complete);
+    EXPECT_TRUE(std::is_sorted(expected.contacts.begin(), expected.contacts.end(), canonicalLess)) << toString(rung);
+    EXPECT_EQ(expected.start_state, StartState::INTERSECTING);
+    for (const int threads : {1, 2, 3}) {
+      options.num_threads = threads;
+      forEachSimdTarget([&](const std::string& target) {
+        const StepResult result = runOnce(step, options);
+        EXPECT_EQ(differenceOfResults(result, expected), "")
+            << toString(rung) << ", " << threads << " threads, " << target;
+        EXPECT_EQ(result.stats.vf_candidates, expected.stats.vf_candidates) << target;
+        EXPECT_EQ(result.stats.ee_candidates, expected.stats.ee_candidates) << target;
+        EXPECT_EQ(result.stats[Stage::PLANAR].out, expected.stats[Stage::PLANAR].out) << target;
+      });
+    }
+  }
+}
+
+TEST(Detector, BruteForceFindsTheSame) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const TestStep step = crumpled(seed, 2, 9);
+    for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+      DetectorOptions options;
+      options.accuracy.rung = rung;
+      const StepResult clustered = runOnce(step, options);
+      options.broad_phase = BroadPhase::BRUTE_FORCE;
+      const StepResult all = runOnce(step, options);
+      EXPECT_GT(clustered.contacts.size(), 100u);
+      EXPECT_LT(clustered.stats.ee_candidates * 3, all.stats.ee_candidates);
+      // Whether features that come close without touching are called a contact is up to the bounds before the test.
+      if (rung == Accuracy::EXACT) {
+        EXPECT_EQ(difference(clustered.contacts, all.contacts), "");
+      }
+      for (const Contact& c : clustered.contacts) {
+        EXPECT_TRUE(std::binary_search(all.contacts.begin(), all.contacts.end(), c, canonicalLess)) << describe(c);
+      }
+    }
+  }
+}
+
+TEST(Detector, SeveralBodiesAreThePairsOfThem) {
+  const TestStep step = crumpled(4, 3, 10);
+  const DetectorOptions options;
+  const StepResult all = runOnce(step, options);
+  std::vector<Contact> sum;
+  for (std::uint16_t a = 0; a < 3; ++a) {
+    TestStep alone;
+    alone.bodies = {step.bodies[a]};
+    for (Contact c : runOnce(alone, options).contacts) {
+      c.body = {a, a};
+      sum.push_back(c);
+    }
+    for (std::uint16_t b = static_cast<std::uint16_t>(a + 1); b < 3; ++b) {
+      TestStep pair;
+      pair.bodies = {step.bodies[a], step.bodies[b]};
+      for (StepBody& body : pair.bodies) body.self_collision = false;
+      for (Contact c : runOnce(pair, options).contacts) {
+        for (auto& body : c.body) body = body == 0 ? a : b;
+        sum.push_back(c);
+      }
+    }
+  }
+  std::sort(sum.begin(), sum.end(), canonicalLess);
+  EXPECT_EQ(difference(all.contacts, sum), "");
+  EXPECT_GT(all.stats[Effect::SELF_COLLISION].out, 0u);
+  EXPECT_GT(all.stats[Effect::BODY_BODY].out, 0u);
+  EXPECT_EQ(all.stats[Effect::SELF_COLLISION].out + all.stats[Effect::BODY_BODY].out, all.contacts.size());
+}
+
+TEST(Detector, ManyBodies) {
+  TestStep step;
+  for (int b = 0; b < 300; ++b) {
+    TestStep two = crossing();
+    for (StepBody& body : two.bodies) {
+      for (Positions* x : {&body.t0, &body.t1}) {
+        for (Vec3& p : *x) p += Vec3(10.0 * (b % 20), 10.0 * (b / 20), 0);
+      }
+      step.bodies.push_back(body);
+    }
+  }
+  const std::size_t each = runOnce(crossing(), {}).contacts.size();
+  ASSERT_GT(each, 0u);
+  const StepResult result = runOnce(step, {});
+  EXPECT_EQ(result.contacts.size(), 300 * each);
+  EXPECT_TRUE(std::is_sorted(result.contacts.begin(), result.contacts.end(), canonicalLess));
+  for (const Contact& c : result.contacts) EXPECT_EQ(c.body[0] / 2, c.body[1] / 2);
+}
+
+TEST(Detector, EffectsThatAreOffCostNothing) {
+  TestStep step = crumpled(5, 2, 8);
+  for (StepBody& body : step.bodies) body.self_collision = false;
+  StepResult result = runOnce(step, {});
+  EXPECT_EQ(result.stats[Effect::SELF_COLLISION].in, 0u);
+  EXPECT_GT(result.stats[Effect::BODY_BODY].in, 0u);
+  for (const Contact& c : result.contacts) EXPECT_NE(c.body[0], c.body[1]);
+  step.bodies[0].self_collision = true;
+  step.bodies[1].against_bodies = false;
+  result = runOnce(step, {});
+  EXPECT_GT(result.stats[Effect::SELF_COLLISION].in, 0u);
+  EXPECT_EQ(result.stats[Effect::BODY_BODY].in, 0u);
+  for (const Contact& c : result.contacts) EXPECT_EQ(c.body, (std::array<std::uint16_t, 2>{0, 0}));
+  DetectorOptions options;
+  options.check_start_state = false;
+  result = runOnce(step, options);
+  EXPECT_EQ(result.start_state, StartState::NOT_CHECKED);
+  EXPECT_EQ(result.stats[Effect::START_STATE].in, 0u);
+}
+
+TEST(Detector, VerticesThatAreNotFiniteAreLeftOutAndCounted) {
+  TestStep step = crumpled(6, 2, 9);
+  const StepResult whole = runOnce(step, {});
+  step.bodies[0].t0[10][1] = NOT_A_NUMBER;
+  step.bodies[0].t1[40][2] = HUGE_VAL;
+  step.bodies[1].t1[3][0] = -HUGE_VAL;
+  const StepResult result = runOnce(step, {});
+  EXPECT_EQ(result.stats.unchecked_vertices, 3u);
+  std::size_t faces = 0;
+  const auto isBad = [](std::size_t b, Index v) { return b == 0 ? v == 10 || v == 40 : v == 3; };
+  for (std::size_t b = 0; b < 2; ++b) {
+    for (const Face& f : step.bodies[b].topology.faces()) faces += isBad(b, f[0]) || isBad(b, f[1]) || isBad(b, f[2]);
+  }
+  EXPECT_EQ(result.stats.unchecked_faces, faces);
+  // The contacts are those of the whole mesh without the features at these vertices.
+  std::vector<Contact> expected;
+  for (const Contact& c : whole.contacts) {
+    const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
+    bool bad = false;
+    for (int i = 0; i < 4; ++i) bad |= isBad(c.body[i < first ? 0 : 1], c.vertex[i]);
+    if (!bad) expected.push_back(c);
+  }
+  ASSERT_LT(expected.size(), whole.contacts.size());
+  EXPECT_EQ(difference(result.contacts, expected), "");
+}
+
+// The same detector, with vertices that come and go: what is left out of one step must be back in the next.
+TEST(Detector, VerticesComeBack) {
+  const TestStep step = crumpled(6, 1, 9);
+  TestStep broken = step;
+  for (std::size_t v = 0; v < 30; ++v) broken.bodies[0].t1[v][0] = NOT_A_NUMBER;
+  TestStep gone = step;
+  for (Vec3& x : gone.bodies[0].t0) x[0] = NOT_A_NUMBER;
+  Detector detector{DetectorOptions()};
+  detector.setBodies(step.setups(), step.positions());
+  const StepResult expected = detector.run(step.motion());
+  const StepResult expected_broken = runOnce(broken, {});
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(difference(detector.run(broken.motion()).contacts, expected_broken.contacts), "");
+    const StepResult nothing = detector.run(gone.motion());
+    EXPECT_TRUE(nothing.contacts.empty());
+    EXPECT_EQ(nothing.stats.unchecked_vertices, 81u);
+    EXPECT_EQ(difference(detector.run(step.motion()).contacts, expected.contacts), "");
+  }
+  // Also when the first frame, which guides the order in memory, was not finite.
+  Detector other{DetectorOptions()};
+  other.setBodies(step.setups(), gone.positions());
+  EXPECT_EQ(difference(other.run(step.motion()).contacts, expected.contacts), "");
+}
+
+TEST(Detector, InactiveVerticesAreLeftOutWithTheirFeatures) {
+  TestStep step = crumpled(7, 2, 9);
+  const StepResult whole = runOnce(step, {});
+  step.bodies[0].vertex_active.assign(81, 1);
+  for (std::size_t v = 0; v < 81; v += 5) step.bodies[0].vertex_active[v] = 0;
+  const StepResult result = runOnce(step, {});
+  std::vector<Contact> expected;
+  for (const Contact& c : whole.contacts) {
+    const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
+    bool bad = false;
+    for (int i = 0; i < 4; ++i) bad |= c.body[i < first ? 0 : 1] == 0 && c.vertex[i] % 5 == 0;
+    if (!bad) expected.push_back(c);
+  }
+  ASSERT_LT(expected.size(), whole.contacts.size());
+  EXPECT_EQ(difference(result.contacts, expected), "");
+  EXPECT_EQ(result.stats.unchecked_vertices, 0u);
+}
+
+template <class Call>
+std::string refusal(const Call& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+void expectContains(const std::string& text, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << text << " does not say " << part;
+}
+
+TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
+  const TestStep step = crossing();
+  Detector detector{DetectorOptions()};
+  detector.setBodies(step.setups(), step.positions());
+  const Positions two(2, Vec3::Zero());
+  MotionStep motion = step.motion();
+  motion.bodies[1].t1 = &two;
+  expectContains(refusal([&] { detector.run(motion); }), {"body_1", "3", "2"});
+  motion = step.motion();
+  motion.bodies[0].t0 = nullptr;
+  expectContains(refusal([&] { detector.run(motion); }), {"body_0", "3", "0"});
+  motion = step.motion();
+  motion.bodies.pop_back();
+  expectContains(refusal([&] { detector.run(motion); }), {"1 bodies", "2"});
+  expectContains(refusal([&] { detector.setBodies(step.setups(), {&two, &two}); }), {"body_0", "3"});
+  expectContains(refusal([&] { detector.setBodies(step.setups(), {&two}); }), {"2 bodies", "1 "});
+  auto setups = step.setups();
+  setups[1].topology = nullptr;
+  expectContains(refusal([&] { detector.setBodies(setups, step.positions()); }), {"body_1", "topology"});
+  setups = step.setups();
+  setups[0].vertex_active = {1, 1};
+  expectContains(refusal([&] { detector.setBodies(setups, step.positions()); }), {"body_0", "2", "3"});
+  for (const double separation : {-1.0, NOT_A_NUMBER, HUGE_VAL}) {
+    setups = step.setups();
+    setups[1].minimum_separation_m = separation;
+    EXPECT_NE(refusal([&] { detector.setBodies(setups, step.positions()); }), "accepted");
+  }
+  setups[1].minimum_separation_m = 0.1;
+  expectContains(refusal([&] { detector.setBodies(setups, step.positions()); }), {"exact", "0.1", "conservative"});
+  DetectorOptions options;
+  options.num_threads = 0;
+  expectContains(refusal([&] { Detector d(options); }), {"num_threads", "0"});
+  options = DetectorOptions();
+  options.step_budget_ms = -1;
+  expectContains(refusal([&] { Detector d(options); }), {"step_budget_ms", "-1"});
+  // And goes on as if nothing had happened.
+  EXPECT_EQ(difference(detector.run(step.motion()).contacts, runOnce(step, {}).contacts), "");
+}
+
+TEST(Detector, KnownTimesOfContact) {
+  const StepResult result = runOnce(crossing(), {});
+  // The corner (1,1,1) moves down by 2 and meets the plane z = 0 half way.
+  ASSERT_EQ(result.contacts[0].kind, PairKind::VERTEX_FACE);
+  const auto corner = std::find_if(result.contacts.begin(), result.contacts.end(), [](const Contact& c) {
+    return c.kind == PairKind::VERTEX_FACE && c.body[0] == 1 && c.vertex[0] == 0;
+  });
+  ASSERT_NE(corner, result.contacts.end());
+  EXPECT_EQ(corner->vertex, (std::array<Index, 4>{0, 0, 1, 2}));
+  EXPECT_EQ(corner->toc_lower, 0.5);
+  EXPECT_EQ(corner->toc_upper, 0.5 + 0x1p-32);
+  EXPECT_EQ(result.start_state, StartState::CLEAR);
+  EXPECT_EQ(result.earliestToc(), 0.5);
+  EXPECT_EQ(result.unchecked_toc_lower, std::numeric_limits<double>::infinity());
+}
+
+// Several bodies and a map: the canonical order puts kinds before bodies.
+TEST(Detector, ContactsWithAMapAreInOrder) {
+  TestStep step = crossing();
+  for (StepBody& body : step.bodies) body.against_bodies = false;
+  MotionStep motion = step.motion();
+  std::vector<OccupiedLeaf> leaves;
+  for (std::uint16_t x = 0; x < 4; ++x)
+    leaves.push_back({VoxelKey{static_cast<std::uint16_t>(32768 + x), 32768, 32768}, 1});
+  motion.obstacle = VoxelSurface::build(1.0, leaves);
+  Detector detector{DetectorOptions()};
+  detector.setBodies(step.setups(), step.positions());
+  const StepResult& result = detector.run(motion);
+  std::set<std::uint16_t> bodies;
+  std::set<PairKind> kinds;
+  for (const Contact& c : result.contacts) {
+    EXPECT_EQ(c.body[1], OBSTACLE_BODY);
+    bodies.insert(c.body[0]);
+    kinds.insert(c.kind);
+  }
+  EXPECT_EQ(bodies.size(), 2u);
+  EXPECT_GT(kinds.size(), 1u);
+  EXPECT_TRUE(std::is_sorted(result.contacts.begin(), result.contacts.end(), canonicalLess));
+  EXPECT_EQ(result.stats[Effect::OBSTACLE].out, result.contacts.size());
+}
+
+TEST(Detector, NothingToDo) {
+  TestStep step;
+  EXPECT_TRUE(runOnce(step, {}).contacts.empty()) << "no bodies";
+  StepBody empty;
+  step.bodies = {empty, empty};
+  const StepResult result = runOnce(step, {});
+  EXPECT_TRUE(result.contacts.empty());
+  EXPECT_EQ(result.start_state, StartState::CLEAR);
+  EXPECT_EQ(result.earliestToc(), std::numeric_limits<double>::infinity());
+  StepBody loose;  // vertices without a feature
+  loose.topology = Topology::fromTriangles(5, {});
+  loose.t0 = loose.t1 = Positions(5, Vec3::Zero());
+  step.bodies = {loose, crossing().bodies[0]};
+  EXPECT_TRUE(runOnce(step, {}).contacts.empty());
+}
+
+// After warm-up a step allocates nothing that stays. The heap in use is compared after each round of the same steps.
+TEST(Detector, MemoryIsFlat) {
+  const TestStep step = crumpled(8, 2, 12);
+  const TestStep back = step.continued({step.bodies[0].t0, step.bodies[1].t0});
+  for (const int threads : {1, 2}) {
+    DetectorOptions options;
+    options.num_threads = threads;
+    Detector detector(options);
+    detector.setBodies(step.setups(), step.positions());
+    const auto round = [&] {
+      MotionStep motion = step.motion();
+      motion.continues = true;
+      detector.run(motion);
+      motion = back.motion();
+      motion.continues = true;
+      detector.run(motion);
+    };
+    for (int i = 0; i < 10; ++i) round();
+    const std::size_t before = heapInUse();
+    for (int i = 0; i < 20; ++i) round();
+    const std::size_t after = heapInUse();
+    // Which worker does which piece varies with more threads, and with it how far each one's buffers grow.
+    if (threads == 1) {
+      EXPECT_LE(after, before) << "bytes in use after and before 40 steps";
+    } else {
+      EXPECT_LE(after, before + (std::size_t{4} << 20));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,165 @@
+// An effect that is off costs nothing: not one allocation more than in a scene that knows nothing of it, and zeros in
+// its statistics. Switched on, the same scene allocates and counts.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <functional>
+#include <new>
+
+#include "dccd/monitor.h"
+
+namespace {
+std::atomic<std::uint64_t> allocations{0};
+}  // namespace
+
+// Counted for the whole test program; forms with an alignment are the library's and not used by std::vector of ours.
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size ? size : 1)) return p;
+  throw std::bad_alloc();
+}
+void* operator new(std::size_t size,
+                   const std::nothrow_t&) noexcept {  // std::stable_sort's; AddressSanitizer has its own
+  ++allocations;
+  return std::malloc(size ? size : 1);
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+
+namespace dccd {
+namespace {
+
+struct Scene {
+  MonitorOptions options;
+  MonitorBody body;
+  bool second = false;  ///< another body, turning through the first; with body's own settings
+  bool second_is_rigid = false;
+  MonitorMap map;
+  std::vector<double> radius_m;
+  bool predicts = false;
+};
+
+struct Cost {
+  std::uint64_t allocations = 0;
+  StepStats stats;
+  bool ok = true;
+};
+
+/// Set-up and five steps of a crumpled cloth.
+Cost costOf(const Scene& scene) {
+  const auto topology = std::make_shared<const Topology>(Topology::grid(8, 8));
+  std::vector<MeshFrame> frames, others;
+  for (int k = 0; k < 6; ++k) {
+    MeshFrame frame;
+    frame.stamp_ns = 1000000 * (k + 1);
+    frame.topology = topology;
+    for (int i = 0; i < 64; ++i) {
+      frame.positions.emplace_back(0.05 * ((i * 37) % 11), 0.05 * ((i * 29) % 13),
+                                   0.05 * ((i * 23) % 7) - 0.01 * k * (i % 3));
+    }
+    frame.radius_m = scene.radius_m;
+    if (scene.second) {
+      others.push_back(frame);
+      others.back().rigid = scene.second_is_rigid;
+      others.back().pose.linear() = Eigen::AngleAxisd(0.3 * k, Vec3::UnitZ()).toRotationMatrix();
+      others.back().positions = frames.empty() ? frame.positions : frames.front().positions;
+      for (Vec3& p : others.back().positions) p = others.back().pose * p;
+    }
+    frames.push_back(std::move(frame));
+  }
+  std::vector<MonitorBody> bodies{scene.body};
+  if (scene.second) {
+    bodies.push_back(scene.body);
+    bodies.back().name = "other";
+    bodies.back().rigid = scene.second_is_rigid;
+  }
+  Cost cost;
+  StepOutcome outcome;
+  const std::uint64_t before = allocations;
+  Monitor monitor(scene.options, bodies);
+  if (scene.map.surface) monitor.setMap(scene.map);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (scene.second) monitor.push(1, std::move(others[k]), 0);
+    monitor.push(0, std::move(frames[k]), 0);
+    cost.ok = monitor.next(0, outcome) && cost.ok;
+    if (scene.predicts && outcome.answered)
+      outcome.stats[Effect::LOOK_AHEAD].in = monitor.predict().stats.vf_candidates;
+  }
+  cost.allocations = allocations - before;
+  cost.stats = outcome.stats;
+  cost.ok = cost.ok && outcome.answered;
+  return cost;
+}
+
+void expectZero(const StageStats& stats, const char* what) {
+  EXPECT_EQ(stats.in, 0u) << what;
+  EXPECT_EQ(stats.out, 0u) << what;
+  EXPECT_EQ(stats.ms, 0.0) << what;
+}
+
+/// Conservative, so that every effect can be had; nothing else.
+Scene bare() {
+  Scene scene;
+  scene.options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
+  scene.options.detector.check_start_state = false;
+  scene.body.name = "cloth";
+  scene.body.self_collision = scene.body.against_bodies = scene.body.against_obstacle = false;
+  return scene;
+}
+
+struct Case {
+  Effect effect;
+  std::function<void(Scene&)> present;  ///< what the effect would work on is there, but the effect is off
+  std::function<void(Scene&)> on;
+};
+
+std::vector<Case> cases() {
+  const auto surface = VoxelSurface::build(0.05, {{{32768, 32768, 32768}, 1}, {{32770, 32770, 32768}, 2}});
+  return {
+      {Effect::SELF_COLLISION, [](Scene&) {}, [](Scene& s) { s.body.self_collision = true; }},
+      {Effect::OBSTACLE, [=](Scene& s) { s.map.surface = surface; }, [](Scene& s) { s.body.against_obstacle = true; }},
+      {Effect::BODY_BODY, [](Scene& s) { s.second = true; }, [](Scene& s) { s.body.against_bodies = true; }},
+      {Effect::RIGID_BODIES, [](Scene& s) { s.second = s.body.against_bodies = true; },
+       [](Scene& s) { s.second_is_rigid = true; }},
+      {Effect::START_STATE, [](Scene& s) { s.body.self_collision = true; },
+       [](Scene& s) { s.options.detector.check_start_state = true; }},
+      {Effect::LOOK_AHEAD, [](Scene& s) { s.body.self_collision = true; },
+       [](Scene& s) {
+         s.options.look_ahead_s = 0.1;
+         s.predicts = true;
+       }},
+      {Effect::MINIMUM_SEPARATION, [](Scene& s) { s.body.self_collision = true; },
+       [](Scene& s) { s.body.minimum_separation_m = 0.2; }},
+      {Effect::TRACKER_NOISE, [](Scene& s) { s.body.self_collision = true; },
+       [](Scene& s) { s.radius_m.assign(64, 0.1); }},
+  };
+}
+
+TEST(EffectsOff, AllocateNothingAndShowZeros) {
+  costOf(bare());  // what the library makes once
+  const Cost nothing = costOf(bare());
+  ASSERT_TRUE(nothing.ok);
+  EXPECT_EQ(costOf(bare()).allocations, nothing.allocations) << "the count is the same for the same scene";
+  for (std::size_t e = 0; e < static_cast<std::size_t>(Effect::COUNT); ++e) {
+    expectZero(nothing.stats.effects[e], toString(static_cast<Effect>(e)));
+  }
+  for (const Case& one : cases()) {
+    Scene off = bare();
+    one.present(off);
+    Scene on = off;
+    one.on(on);
+    const Cost without = costOf(off), with = costOf(on);
+    ASSERT_TRUE(without.ok && with.ok) << toString(one.effect);
+    expectZero(without.stats[one.effect], toString(one.effect));
+    EXPECT_GT(with.stats[one.effect].in, 0u) << toString(one.effect) << " can be told from off";
+    EXPECT_GT(with.allocations, without.allocations) << toString(one.effect);
+    // Where only the effect itself was left out, the scene costs what an empty one does.
+    if (one.effect == Effect::SELF_COLLISION || one.effect == Effect::OBSTACLE) {
+      EXPECT_EQ(without.allocations, nothing.allocations) << toString(one.effect);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dccd

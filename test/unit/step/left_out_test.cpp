@@ -1,0 +1,316 @@
+// What the minimum separation leaves out: a body's own features that are closer in its reference frame.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "dccd/monitor.h"
+#include "oracle/exact_distance.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr double EDGE_M = 0.01, SEPARATION_M = 0.012;
+constexpr std::size_t SIZE = 6;
+
+Positions flat(double z = 0) {
+  Positions x;
+  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+    x.emplace_back(EDGE_M * static_cast<double>(i % SIZE), EDGE_M * static_cast<double>(i / SIZE), z);
+  }
+  return x;
+}
+
+/// Two layers of one body, `gap` apart; the upper one is the second half of the vertices.
+struct Layers {
+  std::shared_ptr<const Topology> topology;
+  Positions at(double gap) const {
+    Positions x = flat(), upper = flat(gap);
+    // A little aside, so that no vertex is above another one.
+    for (Vec3& p : upper) p += Vec3(0.003, 0.002, 0);
+    x.insert(x.end(), upper.begin(), upper.end());
+    return x;
+  }
+  Layers() {
+    std::vector<Face> faces = Topology::grid(SIZE, SIZE).faces();
+    const std::size_t n = faces.size();
+    for (std::size_t f = 0; f < n; ++f) {
+      Face upper = faces[f];
+      for (Index& v : upper) v += static_cast<Index>(SIZE * SIZE);
+      faces.push_back(upper);
+    }
+    topology = std::make_shared<const Topology>(Topology::fromTriangles(2 * SIZE * SIZE, faces));
+  }
+};
+
+DetectorOptions conservative() {
+  DetectorOptions options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  return options;
+}
+
+BodySetup felt(const Layers& layers, const Positions* reference) {
+  BodySetup body;
+  body.name = "felt";
+  body.topology = layers.topology;
+  body.minimum_separation_m = SEPARATION_M;
+  if (reference) body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*reference, {}});
+  return body;
+}
+
+StepResult run(Detector& detector, const Positions& t0, const Positions& t1) {
+  MotionStep step;
+  step.bodies = {{&t0, &t1}};
+  return detector.run(step);
+}
+
+using Pair = std::pair<PairKind, std::array<Index, 4>>;
+
+/// Every pair of the body's features without a common vertex that is certainly, or not certainly not, within `bound`.
+std::set<Pair> pairsWithin(const Topology& topology, const Positions& x, double bound) {
+  std::set<Pair> found;
+  const auto add = [&](PairKind kind, const std::array<Index, 4>& v) {
+    for (int i = 0; i < 4; ++i) {
+      for (int j = i + 1; j < 4; ++j) {
+        if (v[i] == v[j]) return;
+      }
+    }
+    PairMotion pair;
+    for (auto& time : pair.x) {
+      for (int i = 0; i < 4; ++i) std::copy_n(x[v[i]].data(), 3, time[i]);
+    }
+    if (isWithin(kind, pair, 0, bound)) found.insert({kind, v});
+  };
+  for (const Index v : topology.usedVertices()) {
+    for (const Face& f : topology.faces()) add(PairKind::VERTEX_FACE, {v, f[0], f[1], f[2]});
+  }
+  for (std::size_t a = 0; a < topology.edges().size(); ++a) {
+    for (std::size_t b = a + 1; b < topology.edges().size(); ++b) {
+      const Edge &e = topology.edges()[a], &f = topology.edges()[b];
+      add(PairKind::EDGE_EDGE, {e[0], e[1], f[0], f[1]});
+    }
+  }
+  return found;
+}
+
+TEST(LeftOut, IsExactlyWhatIsCloserInTheReferenceFrame) {
+  const Layers layers;
+  const Positions apart = layers.at(0.03);
+  Detector detector(conservative());
+  detector.setBodies({felt(layers, &apart)}, {&apart});
+  std::set<Pair> listed;
+  for (const LeftOutPair& pair : detector.leftOut()) {
+    EXPECT_EQ(pair.body, 0u);
+    EXPECT_TRUE(listed.insert({pair.kind, pair.vertex}).second) << "listed twice";
+  }
+  const std::set<Pair> sure = pairsWithin(*layers.topology, apart, SEPARATION_M);
+  const std::set<Pair> possible = pairsWithin(*layers.topology, apart, SEPARATION_M + 1e-6);
+  EXPECT_GT(sure.size(), 100u);
+  for (const Pair& pair : sure) EXPECT_TRUE(listed.count(pair));
+  for (const Pair& pair : listed) EXPECT_TRUE(possible.count(pair));
+
+  const StepResult rest = run(detector, apart, apart);
+  EXPECT_TRUE(rest.contacts.empty()) << "neighbours are no contacts";
+  EXPECT_EQ(rest.stats.left_out_listed, listed.size());
+  EXPECT_GT(rest.stats.left_out_met, 0u);
+  EXPECT_EQ(rest.stats[Effect::MINIMUM_SEPARATION].out, 0u);
+
+  Detector without(conservative());
+  without.setBodies({felt(layers, nullptr)}, {&apart});
+  EXPECT_EQ(run(without, apart, apart).contacts.size(), listed.size()) << "else they would all be contacts";
+  EXPECT_TRUE(without.leftOut().empty());
+}
+
+TEST(LeftOut, LayersThatComeNearAreFoundAllTheSame) {
+  const Layers layers;
+  const Positions apart = layers.at(0.03), near = layers.at(0.01);
+  Detector detector(conservative());
+  detector.setBodies({felt(layers, &apart)}, {&apart});
+  const StepResult result = run(detector, apart, near);
+  ASSERT_FALSE(result.contacts.empty());
+  for (const Contact& c : result.contacts) {
+    const bool first_below = c.vertex[0] < SIZE * SIZE, last_below = c.vertex[3] < SIZE * SIZE;
+    EXPECT_NE(first_below, last_below) << "between the layers only";
+  }
+  EXPECT_NEAR(result.earliestToc(), (0.03 - SEPARATION_M) / 0.02, 1e-3);
+  EXPECT_GT(result.stats[Effect::MINIMUM_SEPARATION].out, 0u);
+  EXPECT_GT(result.stats[Effect::MINIMUM_SEPARATION].in, result.stats[Effect::MINIMUM_SEPARATION].out);
+}
+
+// Left out of the separation only: that its features truly meet is found without one.
+TEST(LeftOut, TrueContactIsNotLost) {
+  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
+  const Positions apart{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 0.1}, {0.25, 0.25, 1}, {0.5, 0.25, 1}};
+  Positions through = apart;
+  through[3].z() = -0.1;
+  BodySetup body;
+  body.name = "pair";
+  body.topology = topology;
+  body.minimum_separation_m = 0.2;
+  body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{apart, {}});
+  Detector detector(conservative());
+  detector.setBodies({body}, {&apart});
+  EXPECT_GT(detector.leftOut().size(), 0u);
+  EXPECT_TRUE(run(detector, apart, apart).contacts.empty());
+  const StepResult result = run(detector, apart, through);
+  ASSERT_FALSE(result.contacts.empty());
+  EXPECT_LE(result.earliestToc(), 0.5);
+  EXPECT_NEAR(result.earliestToc(), 0.5, 1e-4);
+}
+
+TEST(LeftOut, SeparationsOfPairsReplaceTheBodies) {
+  const Layers layers;
+  const Positions apart = layers.at(0.03), near = layers.at(0.01);
+  BodySetup body = felt(layers, &apart);
+  body.separations = {{0, 0.0}};  // from itself: none
+  Detector detector(conservative());
+  detector.setBodies({body}, {&apart});
+  EXPECT_TRUE(detector.leftOut().empty());
+  EXPECT_TRUE(run(detector, apart, near).contacts.empty());
+  const Positions other = layers.at(5);
+  BodySetup second = felt(layers, nullptr);
+  second.separations = {{0, 6.0}};
+  second.self_collision = body.self_collision = false;
+  detector.setBodies({body, second}, {&apart, &other});
+  MotionStep step;
+  step.bodies = {{&apart, &apart}, {&other, &other}};
+  EXPECT_FALSE(detector.run(step).contacts.empty()) << "5 m apart, 6 m asked for by the other body";
+  second.separations = {{7, 1.0}};
+  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  second.separations = {{0, -1.0}};
+  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  second.separations = {{0, std::numeric_limits<double>::quiet_NaN()}};
+  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+}
+
+/// A monitor of one body of two layers, fed with frames 0.1 s apart.
+struct MonitoredFelt {
+  Layers layers;
+  Monitor monitor;
+  StampNs stamp_ns = 0;
+
+  explicit MonitoredFelt(double separation_m) : monitor(options(), {body(separation_m)}) {}
+
+  StepOutcome feed(double gap, std::vector<double> radius_m = {}) {
+    stamp_ns += 100000000;
+    monitor.push(
+        0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), std::move(radius_m)}, 0);
+    StepOutcome outcome;
+    EXPECT_TRUE(monitor.next(0, outcome));
+    return outcome;
+  }
+  static std::vector<double> radii(double radius_m) { return std::vector<double>(2 * SIZE * SIZE, radius_m); }
+
+ private:
+  static MonitorOptions options() {
+    MonitorOptions options;
+    options.detector = conservative();
+    options.look_ahead_s = 0.1;
+    return options;
+  }
+  static MonitorBody body(double separation_m) {
+    MonitorBody body;
+    body.name = "felt";
+    body.minimum_separation_m = separation_m;
+    return body;
+  }
+};
+
+TEST(LeftOut, TheMonitorsReferenceIsTheFirstFrame) {
+  MonitoredFelt felt(SEPARATION_M);
+  Monitor& monitor = felt.monitor;
+  const auto feed = [&](double gap) { return felt.feed(gap); };
+  feed(0.03);
+  EXPECT_TRUE(feed(0.03).contacts.empty());
+  const std::size_t neighbours = monitor.leftOut().size();
+  EXPECT_GT(neighbours, 100u);
+  EXPECT_TRUE(monitor.checkNow().contacts.empty());
+  EXPECT_TRUE(monitor.predict().contacts.empty()) << "predictions leave out the same";
+  EXPECT_FALSE(feed(0.01).contacts.empty());
+  EXPECT_FALSE(feed(0.01).contacts.empty()) << "and stay contacts";
+  monitor.reset(StepStatus::TIME_JUMP);
+  feed(0.01);
+  EXPECT_FALSE(feed(0.01).contacts.empty()) << "the reference stays with the topology";
+  EXPECT_EQ(monitor.leftOut().size(), neighbours);
+  monitor.reset(StepStatus::RESET);
+  feed(0.01);
+  EXPECT_TRUE(feed(0.01).contacts.empty()) << "after ~reset the body is fit as it is";
+  EXPECT_GT(monitor.leftOut().size(), neighbours);
+}
+
+// Folded after the first frame: with the fold as the reference, the contacts in it would be left out.
+TEST(LeftOut, AQuestionChangesNoReference) {
+  const Layers layers;
+  MonitorOptions options;
+  options.detector = conservative();
+  MonitorBody felt, other;
+  felt.name = "felt";
+  felt.minimum_separation_m = SEPARATION_M;
+  other.name = "other";
+  const auto triangle = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  const Positions far{{5, 0, 0}, {6, 0, 0}, {5, 1, 0}};
+  const auto contactsWith = [&](bool questions) {
+    Monitor monitor(options, {felt, other});
+    const auto push = [&](std::size_t body, StampNs stamp_ns, const std::shared_ptr<const Topology>& topology,
+                          Positions x) {
+      monitor.push(body, {stamp_ns, topology, std::move(x), false, Eigen::Isometry3d::Identity(), {}}, 0);
+      if (questions) monitor.checkNow();
+    };
+    std::array<std::size_t, 2> contacts{};
+    StepOutcome outcome;
+    const auto step = [&](std::size_t i, StampNs stamp_ns) {
+      EXPECT_FALSE(monitor.next(0, outcome)) << "the step waits for the other body";
+      push(1, stamp_ns, triangle, far);
+      while (monitor.next(0, outcome)) contacts[i] += outcome.contacts.size();
+    };
+    push(1, 0, triangle, far);
+    push(0, 10000000, layers.topology, layers.at(0.03));
+    EXPECT_TRUE(monitor.next(0, outcome));
+    push(0, 20000000, layers.topology, layers.at(0.01));
+    step(0, 20000000);
+    push(0, 30000000, layers.topology, layers.at(0.01));
+    push(0, 40000000, triangle, far);
+    step(1, 40000000);
+    return contacts;
+  };
+  const std::array<std::size_t, 2> unasked = contactsWith(false);
+  EXPECT_GT(unasked[0], 0u);
+  EXPECT_GT(unasked[1], 0u);
+  EXPECT_EQ(contactsWith(true), unasked);
+}
+
+// Large radii list pairs that are far apart; when the radii go, they are no neighbours any more.
+TEST(LeftOut, RadiiThatGoLeaveNoPairOut) {
+  const std::vector<double> none, zero = MonitoredFelt::radii(0), large = MonitoredFelt::radii(0.012);
+  const auto contactsAfter = [](const std::vector<double>& first, const std::vector<double>& later) {
+    MonitoredFelt felt(SEPARATION_M);
+    felt.feed(0.03, first);
+    EXPECT_TRUE(felt.feed(0.03, first).contacts.empty());
+    EXPECT_TRUE(felt.feed(0.03, later).contacts.empty());
+    return felt.feed(0.01, later).contacts.size();
+  };
+  const std::size_t never = contactsAfter(none, none);
+  EXPECT_GT(never, 0u);
+  EXPECT_EQ(contactsAfter(large, none), never);
+  EXPECT_EQ(contactsAfter(large, zero), never);
+}
+
+// A tracker may know its errors only later: neighbours within them are left out from then on.
+TEST(LeftOut, RadiiMayComeAfterTheFirstFrame) {
+  MonitoredFelt felt(0);
+  const std::vector<double> radius_m = MonitoredFelt::radii(0.006);
+  felt.feed(0.03);
+  EXPECT_TRUE(felt.feed(0.03).contacts.empty());
+  EXPECT_TRUE(felt.monitor.leftOut().empty());
+  EXPECT_TRUE(felt.feed(0.03, radius_m).contacts.empty()) << "neighbours are no contacts";
+  EXPECT_GT(felt.monitor.leftOut().size(), 100u);
+  EXPECT_FALSE(felt.feed(0.01, radius_m).contacts.empty());
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

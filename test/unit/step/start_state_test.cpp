@@ -1,0 +1,311 @@
+#include "step/start_state.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+bool meet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+  return segmentMeetsTriangle(p.data(), q.data(), a.data(), b.data(), c.data());
+}
+
+TEST(SegmentTriangle, SimpleCases) {
+  const Vec3 a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
+  EXPECT_TRUE(meet({1, 1, -1}, {1, 1, 1}, a, b, c));
+  EXPECT_FALSE(meet({3, 3, -1}, {3, 3, 1}, a, b, c));
+  EXPECT_FALSE(meet({1, 1, 1}, {1, 1, 2}, a, b, c));
+  EXPECT_TRUE(meet({1, 1, 0}, {1, 1, 2}, a, b, c)) << "touches with its end";
+  EXPECT_TRUE(meet({2, 2, -1}, {2, 2, 1}, a, b, c)) << "through the border";
+  EXPECT_TRUE(meet({4, 0, -1}, {4, 0, 1}, a, b, c)) << "through a corner";
+  EXPECT_TRUE(meet({1, 1, 0}, {1, 2, 0}, a, b, c)) << "in the plane, inside";
+  EXPECT_TRUE(meet({-1, 1, 0}, {9, 1, 0}, a, b, c)) << "in the plane, across";
+  EXPECT_FALSE(meet({3, 3, 0}, {5, 1, 0}, a, b, c)) << "in the plane, outside";
+  EXPECT_TRUE(meet({-1, 0, 0}, {0, 0, 0}, a, b, c)) << "in line with a side, touching";
+  EXPECT_FALSE(meet({-2, 0, 0}, {-1, 0, 0}, a, b, c)) << "in line with a side, apart";
+}
+
+TEST(SegmentTriangle, DegenerateCases) {
+  const Vec3 o(0, 0, 0), x(4, 0, 0), mid(1, 0, 0);
+  EXPECT_TRUE(meet(mid, mid, o, o, x)) << "a point on a line";
+  EXPECT_FALSE(meet({5, 0, 0}, {5, 0, 0}, o, o, x));
+  EXPECT_TRUE(meet(o, o, o, o, o)) << "all in one place";
+  EXPECT_FALSE(meet(o, o, x, x, x));
+  EXPECT_TRUE(meet({1, -1, 0}, {1, 1, 0}, o, mid, x)) << "across a triangle without area";
+  EXPECT_FALSE(meet({1, -1, 1}, {1, 1, 1}, o, mid, x));
+  EXPECT_TRUE(meet({3, 0, 0}, {9, 0, 0}, o, mid, x)) << "along it";
+  EXPECT_FALSE(meet({5, 0, 0}, {9, 0, 0}, o, mid, x));
+}
+
+// One ulp decides, far from what doubles can tell.
+TEST(SegmentTriangle, OneUlp) {
+  const double tiny = 5e-324;
+  const Vec3 a(0, 0, 0), b(1, 0, 0), c(0, 1, 0);
+  EXPECT_TRUE(meet({0.25, 0.25, 0}, {0.25, 0.25, 1}, a, b, c));
+  EXPECT_FALSE(meet({0.25, 0.25, tiny}, {0.25, 0.25, 1}, a, b, c));
+  EXPECT_TRUE(meet({0.5, 0.5, -1}, {0.5, 0.5, 1}, a, b, c));
+  EXPECT_FALSE(meet({0.5, std::nextafter(0.5, 1), -1}, {0.5, 0.5, -tiny}, a, b, c));
+  EXPECT_FALSE(meet({0.5, std::nextafter(0.5, 1), -1}, {0.5, std::nextafter(0.5, 1), 1}, a, b, c));
+  EXPECT_TRUE(
+      meet({1e308, 1e308, -1e308}, {1e308, 1e308, 1e308}, {-1.7e308, 0, 0}, {1.7e308, 0, 0}, {1.7e308, 1.7e308, 0}));
+  EXPECT_FALSE(
+      meet({1e308, 1e308, tiny}, {1e308, 1e308, 1e308}, {-1.7e308, 0, 0}, {1.7e308, 0, 0}, {1.7e308, 1.7e308, 0}));
+}
+
+TEST(SegmentTriangle, AgreesWithTheOracle) {
+  std::size_t meeting = 0, all = 0;
+  for (int style = 0; style < static_cast<int>(Coordinates::COUNT); ++style) {
+    const Draw draw = drawFrom(40 + static_cast<std::uint64_t>(style));
+    for (int i = 0; i < 300; ++i) {
+      const Positions x = randomPositions(draw, 5, static_cast<Coordinates>(style));
+      const bool truth = trulyMeet(x[0], x[1], x[2], x[3], x[4]);
+      ASSERT_EQ(meet(x[0], x[1], x[2], x[3], x[4]), truth) << "style " << style << ", number " << i;
+      meeting += truth;
+      ++all;
+    }
+  }
+  EXPECT_GT(meeting, all / 20);
+  EXPECT_LT(meeting, all - all / 20);
+}
+
+// Touching on purpose, then rounded or moved by an ulp: the answer is at the mercy of the last bit.
+TEST(SegmentTriangle, AgreesWithTheOracleWhereItIsClose) {
+  const Draw draw = drawFrom(99);
+  std::size_t meeting = 0;
+  const int all = 2000;
+  for (int i = 0; i < all; ++i) {
+    Vec3 x[5];
+    for (Vec3& point : x) point = Vec3(draw(-9, 9), draw(-9, 9), draw(-9, 9));
+    const int s = draw(0, 8), r = draw(0, 8 - s);
+    const Vec3 at = x[2] + s / 8.0 * (x[3] - x[2]) + r / 8.0 * (x[4] - x[2]);
+    const Vec3 along = draw(0, 3) == 0 ? Vec3(x[3] - x[2]) : x[1];
+    x[0] = at - draw(0, 4) / 4.0 * along;
+    x[1] = at + draw(0, 4) / 4.0 * along;
+    if (draw(0, 1) == 0) {
+      const double f = draw(1, 1000) / 999.0, g = draw(-1000, 1000) / 777.0;
+      for (Vec3& point : x) point = Vec3(f * point[0] + g * point[1], f * point[1] - g * point[2], f * point[2] + g);
+    }
+    if (draw(0, 1) == 0) {
+      double& value = x[draw(0, 4)][draw(0, 2)];
+      value = std::nextafter(value, draw(0, 1) == 0 ? -HUGE_VAL : HUGE_VAL);
+    }
+    const bool truth = trulyMeet(x[0], x[1], x[2], x[3], x[4]);
+    ASSERT_EQ(meet(x[0], x[1], x[2], x[3], x[4]), truth) << i;
+    ASSERT_EQ(meet(x[1], x[0], x[4], x[2], x[3]), truth) << i << ", in another order";
+    meeting += truth;
+  }
+  EXPECT_GT(meeting, std::size_t{all} / 4);
+  EXPECT_LT(meeting, std::size_t{all} - std::size_t{all} / 10);
+}
+
+// --- the whole test --------------------------------------------------------------------------------------------------
+
+const StartStateSearch::IsOver NO_DEADLINE;
+
+bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(),
+                    [](const StartIntersection& a, const StartIntersection& b) { return a == b; });
+}
+
+struct Scene {
+  SceneArrays arrays;
+  explicit Scene(const TestStep& step) {
+    arrays.setBodies(step.setups(), step.positions());
+    record(step);
+  }
+  void record(const TestStep& step) {
+    StepStats stats;
+    arrays.record(step.motion(), stats);
+    arrays.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
+  }
+};
+
+TEST(StartState, FullTestListsWhatTheOracleLists) {
+  std::size_t found = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    const Draw draw = drawFrom(500 + seed);
+    TestStep step = randomStep(draw, 8);
+    if (seed % 5 == 0) {
+      StepBody& body = step.bodies[0];
+      body.t0[body.topology.edges()[0][0]] = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+    }
+    Scene scene(step);
+    StartStateSearch test;
+    StepStats stats;
+    const auto expected = trueIntersections(step);
+    const auto& listed = test.run(scene.arrays, false, NO_DEADLINE, stats);
+    ASSERT_TRUE(same(listed, expected)) << "seed " << seed << ": " << listed.size() << " listed, " << expected.size()
+                                        << " in truth";
+    EXPECT_EQ(stats[Stage::START_STATE].out, expected.size());
+    EXPECT_EQ(stats[Effect::START_STATE].out, expected.size());
+    EXPECT_GE(stats[Stage::START_STATE].in, expected.size());
+    found += expected.size();
+  }
+  EXPECT_GT(found, 200u);
+}
+
+TEST(StartState, FullTestIsTheSameOnEveryTarget) {
+  const Draw draw = drawFrom(8);
+  const TestStep step = randomStep(draw, 60, Coordinates::FEW_BITS);
+  std::vector<std::vector<StartIntersection>> lists;
+  forEachSimdTarget([&](const std::string&) {
+    Scene scene(step);
+    StartStateSearch test;
+    StepStats stats;
+    lists.push_back(test.run(scene.arrays, false, NO_DEADLINE, stats));
+  });
+  for (const auto& list : lists) EXPECT_TRUE(same(list, lists[0]));
+}
+
+// A cloth that comes down on a spike: carried over, only the surroundings of contacts are looked at.
+class FallingCloth : public testing::Test {
+ protected:
+  FallingCloth() {
+    StepBody cloth, spike;
+    cloth.topology = Topology::grid(5, 5);
+    // Tilted, so that the bounds of cloth and spike overlap while they are apart.
+    for (int i = 0; i < 25; ++i) cloth.t0.push_back(Vec3(i % 5, i / 5, 1 + 0.25 * (i % 5)));
+    spike.topology = Topology::fromTriangles(3, {{0, 1, 2}});
+    spike.t0 = {Vec3(1.7, 1.2, 1.3), Vec3(1.7, 1.2, -2), Vec3(2.7, 1.2, -2)};
+    for (StepBody* body : {&cloth, &spike}) body->t1 = body->t0;
+    for (Vec3& x : cloth.t1) x[2] = 0.25;
+    step.bodies = {cloth, spike};
+  }
+  TestStep step;
+};
+
+TEST_F(FallingCloth, CarriesOver) {
+  Scene scene(step);
+  StartStateSearch test;
+  StepStats stats;
+  EXPECT_TRUE(test.run(scene.arrays, false, NO_DEADLINE, stats).empty());
+  std::vector<Contact> contacts;
+  for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
+  ASSERT_FALSE(contacts.empty());
+  test.remember(scene.arrays, contacts, true);
+
+  const TestStep next = step.continued({step.bodies[0].t1, step.bodies[1].t1});
+  const auto expected = trueIntersections(next);
+  ASSERT_FALSE(expected.empty());
+  scene.record(next);
+  StepStats carried, full;
+  const auto listed = test.run(scene.arrays, true, NO_DEADLINE, carried);
+  EXPECT_TRUE(same(listed, expected)) << listed.size() << " listed, " << expected.size() << " in truth";
+  EXPECT_EQ(test.run(scene.arrays, false, NO_DEADLINE, full).size(), expected.size());
+  EXPECT_LE(carried[Stage::START_STATE].in, full[Stage::START_STATE].in);
+}
+
+TEST_F(FallingCloth, ForgetsWhereItMust) {
+  Scene scene(step);
+  StartStateSearch test;
+  StepStats stats;
+  const auto tested = [&](bool continues) {
+    StepStats s;
+    test.run(scene.arrays, continues, NO_DEADLINE, s);
+    return s[Stage::START_STATE].in;
+  };
+  const std::uint64_t full = tested(false);
+  ASSERT_GT(full, 0u);
+  EXPECT_EQ(tested(true), full) << "nothing was remembered";
+  test.remember(scene.arrays, {}, true);
+  EXPECT_EQ(tested(true), 0u) << "no contact, nothing to test";
+  EXPECT_EQ(tested(true), full) << "what is remembered holds for one step";
+  test.remember(scene.arrays, {}, false);
+  EXPECT_EQ(tested(true), full) << "an incomplete step";
+  test.remember(scene.arrays, {}, true);
+  test.skip();
+  EXPECT_EQ(tested(true), full) << "a step without the test";
+  test.remember(scene.arrays, {}, true);
+  test.forget();
+  EXPECT_EQ(tested(true), full) << "other bodies";
+  test.remember(scene.arrays, {}, true);
+  EXPECT_EQ(tested(false), full) << "a step that does not continue";
+}
+
+// A search that is cut goes on in the next step, while everything moves: cut at any place, it lists nothing that is
+// not there, and once it has come to the end, all that is.
+TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
+  std::size_t cuts = 0, found_later = 0, ends_known = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Draw draw = drawFrom(900 + seed);
+    TestStep step = randomStep(draw, 8);
+    Scene scene(step);
+    StartStateSearch test;
+    bool whole = false;
+    for (int i = 0; i < 20; ++i) {
+      int looks = draw(0, 3);
+      StepStats stats;
+      const auto listed = test.run(
+          scene.arrays, i > 0, [&] { return looks-- <= 0; }, stats);
+      const auto expected = trueIntersections(step);
+      if (test.isWhole()) {
+        ASSERT_TRUE(same(listed, expected)) << "seed " << seed << ", step " << i;
+        found_later += i > 0 && !whole && !expected.empty();
+        whole = true;
+      } else {
+        ++cuts;
+        for (const StartIntersection& one : listed) {
+          ASSERT_TRUE(std::any_of(expected.begin(), expected.end(), [&](const auto& x) { return x == one; })) << seed;
+        }
+      }
+      std::vector<Contact> contacts;
+      for (const TrueContact& truth : trueContacts(step)) contacts.push_back(truth.contact);
+      test.remember(scene.arrays, contacts, true);
+      std::vector<StartIntersection> at_end;
+      const bool end_known = test.knowsEnd();
+      if (end_known) EXPECT_TRUE(test.listEnd(scene.arrays, NO_DEADLINE, at_end));
+      std::vector<Positions> ends;
+      for (const StepBody& body : step.bodies) {
+        ends.push_back(body.t1);
+        for (Vec3& x : ends.back()) x += Vec3(draw(-4, 4), draw(-4, 4), draw(-4, 4)) / 8.0;
+      }
+      step = step.continued(ends);
+      if (end_known) {
+        ++ends_known;
+        ASSERT_TRUE(same(at_end, trueIntersections(step))) << "seed " << seed << ", end of step " << i;
+      }
+      scene.record(step);
+    }
+    EXPECT_TRUE(whole) << "seed " << seed;
+  }
+  EXPECT_GT(cuts, 50u);
+  EXPECT_GT(found_later, 0u);
+  EXPECT_GT(ends_known, 50u);
+}
+
+// The same with many groups of edges a body, at rest: cut after any number of them, the parts are the whole.
+TEST(StartState, PartsOfASearchAreTheWhole) {
+  TestStep step = crumpled(3, 2, 24);
+  for (StepBody& body : step.bodies) body.t1 = body.t0;
+  Scene scene(step);
+  StartStateSearch full_test;
+  StepStats full;
+  const std::vector<StartIntersection> expected = full_test.run(scene.arrays, false, NO_DEADLINE, full);
+  ASSERT_GT(expected.size(), 100u);
+  for (const int looks_a_step : {2, 3, 5, 8}) {
+    StartStateSearch test;
+    std::vector<StartIntersection> listed;
+    int steps = 0;
+    for (bool whole = false; !whole && steps < 1000; ++steps) {
+      // What was found is looked at again first, at one look at the clock for many of them.
+      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) + 1 : 0);
+      StepStats stats;
+      listed = test.run(
+          scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
+      whole = test.isWhole();
+      test.remember(scene.arrays, {}, true);
+    }
+    EXPECT_TRUE(same(listed, expected)) << looks_a_step << " looks a step: " << listed.size() << " of "
+                                        << expected.size();
+    EXPECT_GT(steps, 12 / looks_a_step) << "hardly cut";
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,257 @@
+// Rigid bodies that turn: the step is cut into parts whose straight paths stay near the arc.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "dccd/monitor.h"
+#include "step/step_runner.h"
+
+namespace dccd {
+namespace {
+
+constexpr StampNs MS = 1000000;
+constexpr std::int64_t NOW = 0;
+
+std::shared_ptr<const Topology> oneTriangle() {
+  static const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  return topology;
+}
+
+/// A triangle that points down with vertex 0, at (0, 0, z).
+MeshFrame tip(StampNs stamp_ns, double z) {
+  return {
+      stamp_ns, oneTriangle(), {{0, 0, z}, {0.1, 0, z - 1.1}, {-0.1, 0, z - 1.1}}, false, Eigen::Isometry3d::Identity(),
+      {}};
+}
+
+/// A bar of 1 m along x that has turned by `angle` about the y axis at its end: downwards first.
+MeshFrame bar(StampNs stamp_ns, double angle) {
+  MeshFrame frame{
+      stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true, Eigen::Isometry3d::Identity(), {}};
+  frame.pose.linear() = Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix();
+  for (Vec3& p : frame.positions) p = frame.pose * p;
+  return frame;
+}
+
+MonitorOptions loose() {
+  MonitorOptions options;
+  options.store.max_vertex_step_m = 0;
+  return options;
+}
+
+/// The clock body and a rigid bar.
+std::vector<MonitorBody> clockAndBar() {
+  std::vector<MonitorBody> bodies(2);
+  bodies[0].name = "clock";
+  bodies[1].name = "bar";
+  bodies[1].rigid = true;
+  return bodies;
+}
+
+/// The outcome of the step to this frame of the clock body, the bar having come to `angle`.
+StepOutcome step(Monitor& monitor, MeshFrame clock, double angle) {
+  const StampNs stamp_ns = clock.stamp_ns;
+  monitor.push(1, bar(stamp_ns, angle), NOW);
+  monitor.push(0, std::move(clock), NOW);
+  StepOutcome outcome;
+  EXPECT_TRUE(monitor.next(NOW, outcome));
+  return outcome;
+}
+
+TEST(TurningBody, IsCutIntoAsManyPartsAsTheToleranceAsksFor) {
+  StepInput input;
+  input.resize(1);
+  input.t0[0] = {{0, 0, 0}, {1, 0, 0}, {1, 0.1, 0}};
+  input.rigid[0] = 1;
+  input.pose_t1[0].linear() = Eigen::AngleAxisd(3.1, Vec3::UnitY()).toRotationMatrix();
+  const std::size_t parts = requiredSubsteps(input, 1e-3);
+  EXPECT_GT(parts, 30u);
+  EXPECT_LT(parts, 40u);
+  EXPECT_LE(1.005 * (1 - std::cos(3.1 / (2.0 * static_cast<double>(parts)))), 1e-3);
+  input.rigid[0] = 0;
+  EXPECT_EQ(requiredSubsteps(input, 1e-3), 1u);
+}
+
+// A bar of 1 m turns by nearly 180 degrees about its end; half way its other end passes what no chord comes near.
+TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
+  Monitor far(loose(), clockAndBar());
+  step(far, tip(0, -3), 0);
+  const StepOutcome missed = step(far, tip(100 * MS, -3), 3.1);
+  EXPECT_GT(missed.substeps, 30u);
+  ASSERT_TRUE(missed.contacts.empty()) << "the tip is 2 m below";
+  Monitor near(loose(), clockAndBar());
+  step(near, tip(0, -0.9), 0);
+  const StepOutcome met = step(near, tip(100 * MS, -0.9), 3.1);
+  ASSERT_EQ(met.status, StepStatus::OK) << met.reason;
+  EXPECT_NEAR(met.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
+}
+
+// The point that is shown lies on the arc, where the part's straight paths meet, not half way of the whole step's
+// chord.
+TEST(TurningBody, TheGeometryIsThatOfThePart) {
+  Monitor monitor(loose(), clockAndBar());
+  step(monitor, tip(0, -0.9), 0);
+  const StepOutcome outcome = step(monitor, tip(100 * MS, -0.9), 3.1);
+  ASSERT_FALSE(outcome.contacts.empty());
+  for (const Contact& contact : outcome.contacts) {
+    const ContactGeometry geometry = contactGeometry(outcome, contact);
+    EXPECT_NEAR(geometry.point.x(), 0, 0.15);
+    EXPECT_LE(geometry.point.z(), -0.9 + 1e-3);
+    EXPECT_GE(geometry.point.z(), -1 - 1e-3);
+    for (int i = 0; i < 4; ++i) {
+      const bool of_bar = contact.body[i < (contact.kind == PairKind::VERTEX_FACE ? 1 : 2) ? 0 : 1] == 1;
+      const Vec3 at = vertexAtContact(outcome, contact, i);
+      // The bar's two far corners are 1 m from its axis, its near one on it.
+      if (!of_bar) continue;
+      EXPECT_NEAR(std::hypot(at.x(), at.z()), contact.vertex[i] == 0 ? 0 : 1, 2e-3);
+    }
+    // 31 rad/s for a tenth of a second: 2.8 m to 3.1 m a step where it passes the tip.
+    EXPECT_GT(std::abs(geometry.approach_speed), 2.5);
+    EXPECT_LT(std::abs(geometry.approach_speed), 3.3);
+  }
+}
+
+// Frames on the arc are on the path; a turn there and back is not.
+TEST(TurningBody, FramesBetweenTheEndsAreHeldAgainstTheArc) {
+  const auto lastOf = [](double middle, double end) {
+    Monitor monitor(loose(), clockAndBar());
+    step(monitor, tip(0, -3), 0);
+    monitor.push(1, bar(50 * MS, middle), NOW);
+    return step(monitor, tip(100 * MS, -3), end);
+  };
+  EXPECT_TRUE(lastOf(0.5, 1).clear);
+  const StepOutcome back = lastOf(0.5, 0);
+  EXPECT_EQ(back.status, StepStatus::PARTIAL);
+  EXPECT_FALSE(back.clear);
+}
+
+// The budget is one for the whole step: once it is spent, the parts that are left are not begun.
+TEST(TurningBody, TheBudgetIsForTheWholeStep) {
+  const auto run = [](double budget_ms) {
+    MonitorOptions options = loose();
+    options.detector.step_budget_ms = budget_ms;
+    Monitor monitor(options, clockAndBar());
+    step(monitor, tip(0, -3), 0);
+    return step(monitor, tip(100 * MS, -3), 3.1);
+  };
+  const StepOutcome whole = run(0);
+  ASSERT_EQ(whole.status, StepStatus::OK);
+  ASSERT_GT(whole.substeps, 30u);
+  EXPECT_EQ(whole.stats.bodies_refitted + whole.stats.bodies_kept, 2 * whole.substeps) << "two bodies in every part";
+  EXPECT_TRUE(run(1000).complete);
+  const StepOutcome cut = run(1e-6);
+  EXPECT_EQ(cut.status, StepStatus::DEADLINE);
+  EXPECT_FALSE(cut.complete);
+  EXPECT_FALSE(cut.clear);
+  EXPECT_EQ(cut.stats.bodies_refitted + cut.stats.bodies_kept, 2u) << "the first part alone";
+  EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));
+}
+
+// A search of the start state that takes longer than the whole budget gets a share of each part's time: the parts after
+// the first are tested all the same, and the search comes to its end.
+TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
+  constexpr std::size_t SIZE = 120;
+  const auto grid = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
+  Positions flat;
+  for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
+    flat.emplace_back(0.01 * static_cast<double>(i % SIZE), 0.01 * static_cast<double>(i / SIZE), -5);
+  }
+  int at = 0;
+  const auto next = [&](Monitor& monitor) {
+    ++at;
+    return step(monitor, {at * 100 * MS, grid, flat, false, Eigen::Isometry3d::Identity(), {}}, 0.5 * at);
+  };
+  MonitorOptions options = loose();
+  const auto shortest_ms = [&](bool check_start_state) {
+    options.detector.check_start_state = check_start_state;
+    double ms = 1e9;
+    Monitor monitor(options, clockAndBar());
+    for (int i = 0; i < 20; ++i) {
+      monitor.reset(StepStatus::RESET);
+      next(monitor);
+      const StepOutcome outcome = next(monitor);
+      EXPECT_GT(outcome.substeps, 5u);
+      ms = std::min(ms, outcome.stats.total_ms);
+    }
+    return ms;
+  };
+  const double contacts_ms = shortest_ms(false), with_search_ms = shortest_ms(true);
+  ASSERT_GT(with_search_ms, 1.5 * contacts_ms);
+  options.detector.step_budget_ms = std::min(2 * contacts_ms, (contacts_ms + with_search_ms) / 2);
+  // Something else on the machine may take the time that the contacts need; then again.
+  Monitor monitor(options, clockAndBar());
+  next(monitor);
+  bool known = false;
+  for (int i = 0; i < 1000 && !known; ++i) {
+    const StepOutcome outcome = next(monitor);
+    known = outcome.complete;
+    EXPECT_EQ(outcome.clear, known) << outcome.reason;
+  }
+  EXPECT_TRUE(known);
+}
+
+// What the detector knows is where the first part ended; the next step begins where the last one would have.
+TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
+  // Pierced in its middle by the bar's long edges when the bar hangs down, and by nothing before.
+  const auto sheet = [](StampNs stamp_ns) {
+    return MeshFrame{
+        stamp_ns, oneTriangle(), {{-2, -2, -0.5}, {2, -2, -0.5}, {0, 3, -0.5}}, false, Eigen::Isometry3d::Identity(),
+        {}};
+  };
+  MonitorOptions options = loose();
+  const auto last = [&](double budget_ms) {
+    Monitor monitor(options, clockAndBar());
+    step(monitor, sheet(0), 0);
+    options.detector.step_budget_ms = budget_ms;
+    monitor.setOptions(options);
+    const StepOutcome turned = step(monitor, sheet(100 * MS), 1.5);
+    EXPECT_EQ(turned.status, budget_ms > 0 ? StepStatus::DEADLINE : StepStatus::OK);
+    options.detector.step_budget_ms = 0;
+    monitor.setOptions(options);
+    return step(monitor, sheet(200 * MS), 1.5);
+  };
+  EXPECT_EQ(last(0).start_state, StartState::INTERSECTING);
+  const StepOutcome outcome = last(1e-6);
+  EXPECT_EQ(outcome.start_state, StartState::INTERSECTING);
+  EXPECT_FALSE(outcome.clear);
+}
+
+// 12 rad/s for half a second: nearly a whole turn, which two poses alone would call a small one backwards.
+TEST(TurningBody, APredictionMayTurnByMoreThanAHalf) {
+  MonitorOptions options = loose();
+  options.look_ahead_s = 0.5;
+  options.max_substeps = 1000;
+  Monitor monitor(options, clockAndBar());
+  step(monitor, tip(0, -0.9), -2.0);
+  ASSERT_TRUE(step(monitor, tip(100 * MS, -0.9), -0.8).clear);
+  const StepOutcome ahead = monitor.predict();
+  ASSERT_EQ(ahead.status, StepStatus::OK) << ahead.reason;
+  ASSERT_FALSE(ahead.contacts.empty());
+  // It hangs down after 0.8 + pi / 2 of 6 rad, and meets the tip a little earlier.
+  EXPECT_NEAR(ahead.earliest_toc, (0.8 + 0.5 * M_PI) / 6, 0.02);
+  EXPECT_FALSE(ahead.clear);
+}
+
+// Undecided in one part, certain in a later one: the contact is certain, and begins no later than it may.
+TEST(TurningBody, APairThatIsCertainInOnePartIsCertain) {
+  MonitorOptions options = loose();
+  options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
+  const auto run = [&](std::size_t max_subdivisions) {
+    options.detector.accuracy.max_subdivisions = max_subdivisions;
+    std::vector<MonitorBody> bodies = clockAndBar();
+    bodies[0].minimum_separation_m = 0.05;
+    Monitor monitor(options, bodies);
+    step(monitor, tip(0, -0.9), 0);
+    return step(monitor, tip(100 * MS, -0.9), 1.6);
+  };
+  const StepOutcome few = run(1), many = run(AccuracyOptions().max_subdivisions);
+  ASSERT_GT(many.counts.certain, 0u);
+  EXPECT_EQ(many.counts.undecided, 0u);
+  EXPECT_GT(few.counts.certain, 0u) << "every pair was undecided in a part before";
+  for (std::size_t i = 1; i < few.contacts.size(); ++i) {
+    EXPECT_TRUE(canonicalLess(few.contacts[i - 1], few.contacts[i]));
+  }
+}
+
+}  // namespace
+}  // namespace dccd

@@ -1,0 +1,86 @@
+#include "dccd/look_ahead_score.h"
+
+#include <gtest/gtest.h>
+
+namespace dccd {
+namespace {
+
+constexpr StampNs MS = 1000000;
+
+Contact touch(Index vertex, double toc) {
+  Contact c;
+  c.kind = PairKind::VERTEX_VOXEL_FACE;
+  c.body = {0, OBSTACLE_BODY};
+  c.vertex[0] = vertex;
+  c.toc_lower = c.toc_upper = toc;
+  return c;
+}
+
+StepOutcome step(StampNs start_ns, StampNs end_ns, std::vector<Contact> contacts = {}) {
+  StepOutcome outcome;
+  outcome.status = StepStatus::OK;
+  outcome.answered = true;
+  outcome.start_ns = start_ns;
+  outcome.stamp_ns = end_ns;
+  outcome.contacts = std::move(contacts);
+  return outcome;
+}
+
+TEST(LookAheadScore, ErrorsAreThoseOfPredictionsThatCameTrue) {
+  LookAheadScore score(0.4);
+  score.observe(step(0, 100 * MS));
+  score.predict(step(100 * MS, 500 * MS, {touch(7, 0.5), touch(8, 0.9)}));  // at 300 ms, at 460 ms
+  score.observe(step(100 * MS, 200 * MS));
+  score.predict(step(200 * MS, 600 * MS, {touch(7, 0.2)}));  // at 280 ms
+  score.observe(step(200 * MS, 300 * MS, {touch(7, 0.6)}));  // at 260 ms
+  const LookAheadSummary summary = score.summary();
+  EXPECT_EQ(summary.compared, 2u);
+  EXPECT_EQ(summary.not_observed, 0u) << "8 still has time";
+  EXPECT_NEAR(summary.p95_error_s, 0.04, 1e-12);
+  EXPECT_NEAR(summary.median_signed_error_s, 0.04, 1e-12) << "of 20 and 40 ms, the upper";
+  score.observe(step(300 * MS, 400 * MS, {touch(7, 0.0), touch(9, 0.5)}));
+  EXPECT_EQ(score.summary().compared, 2u) << "7 is in contact all along";
+  EXPECT_EQ(score.summary().not_predicted, 1u) << "9 came unannounced";
+  score.observe(step(400 * MS, 510 * MS, {touch(7, 0.0)}));
+  EXPECT_EQ(score.summary().not_observed, 1u) << "the horizon of 8 is over";
+}
+
+TEST(LookAheadScore, WhatTouchesAlreadyOrMayTouchIsNoPrediction) {
+  LookAheadScore score(0.4);
+  score.observe(step(0, 100 * MS, {touch(1, 0.5)}));
+  Contact undecided = touch(2, 0.5), initial = touch(3, 0);
+  undecided.certainty = Certainty::UNDECIDED;
+  initial.initial = true;
+  score.predict(step(100 * MS, 500 * MS, {touch(1, 0.1), undecided, initial}));
+  score.observe(step(100 * MS, 200 * MS, {touch(1, 0.0)}));
+  score.observe(step(200 * MS, 700 * MS, {touch(1, 0.0)}));
+  EXPECT_EQ(score.summary().compared, 0u);
+  EXPECT_EQ(score.summary().not_observed, 0u);
+}
+
+TEST(LookAheadScore, ASeamForgets) {
+  LookAheadScore score(0.4);
+  score.observe(step(0, 100 * MS));
+  score.predict(step(100 * MS, 500 * MS, {touch(7, 0.5)}));
+  StepOutcome gap;
+  gap.status = StepStatus::GAP;
+  score.observe(gap);
+  score.observe(step(150 * MS, 300 * MS, {touch(7, 0.5)}));
+  EXPECT_EQ(score.summary().compared, 0u);
+}
+
+TEST(LookAheadScore, KeepsTheNewestSamplesOnly) {
+  LookAheadScore score(1, 3);
+  for (StampNs k = 0; k < 10; ++k) {
+    score.observe(step(1000 * k * MS, (1000 * k + 100) * MS));
+    score.predict(step((1000 * k + 100) * MS, (1000 * k + 1100) * MS, {touch(7, 0.2)}));  // 200 ms later
+    // Observed later by 10 ms more each time.
+    score.observe(
+        step((1000 * k + 100) * MS, (1000 * k + 900) * MS, {touch(7, 0.25 + 0.0125 * static_cast<double>(k))}));
+  }
+  EXPECT_EQ(score.summary().compared, 3u);
+  EXPECT_NEAR(score.summary().median_error_s, 0.08, 1e-9) << "of 70, 80, 90 ms";
+}
+
+}  // namespace
+}  // namespace dccd

@@ -1,0 +1,153 @@
+#include "dccd/mesh_store.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace dccd {
+namespace {
+
+constexpr StampNs MS = 1000000;
+
+std::shared_ptr<const Topology> triangle() {
+  return std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+}
+
+class MeshStoreTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<const Topology> topology = triangle();
+  MeshStore store{MeshStoreOptions{0.1, 0.5, 4}};
+
+  MeshFrame frame(StampNs stamp_ns, double z = 0) const {
+    return {stamp_ns, topology, {{0, 0, z}, {1, 0, z}, {0, 1, z}}, false, Eigen::Isometry3d::Identity()};
+  }
+};
+
+TEST_F(MeshStoreTest, SaysWhatAFrameIsToTheOneBeforeIt) {
+  EXPECT_EQ(store.push(frame(1000 * MS)), StepStatus::FIRST_FRAME);
+  EXPECT_EQ(store.push(frame(1050 * MS)), StepStatus::OK);
+  EXPECT_EQ(store.push(frame(1050 * MS)), StepStatus::DUPLICATE);
+  EXPECT_EQ(store.push(frame(1150 * MS)), StepStatus::OK) << "a step of exactly max_step_s is one";
+  EXPECT_EQ(store.push(frame(1250 * MS + 1)), StepStatus::GAP);
+  EXPECT_EQ(store.push(frame(1260 * MS, 0.5)), StepStatus::OK) << "exactly max_vertex_step_m";
+  EXPECT_EQ(store.push(frame(1270 * MS, 1.1)), StepStatus::TELEPORT);
+  EXPECT_EQ(store.push(frame(1269 * MS, 1.1)), StepStatus::TIME_JUMP);
+  EXPECT_EQ(store.size(), 1u) << "nothing of the old time is kept";
+  EXPECT_EQ(store.push(frame(1280 * MS, 1.1)), StepStatus::OK);
+}
+
+TEST_F(MeshStoreTest, RefusesAVertexCountThatDoesNotFit) {
+  store.push(frame(0));
+  MeshFrame wrong = frame(10 * MS);
+  wrong.positions.pop_back();
+  EXPECT_EQ(store.push(wrong), StepStatus::VERTEX_COUNT);
+  EXPECT_EQ(store.push(frame(20 * MS)), StepStatus::OK) << "the refused frame leaves no trace";
+}
+
+TEST_F(MeshStoreTest, TellsAnotherTopologyFromAnEqualOne) {
+  store.push(frame(0));
+  topology = triangle();
+  EXPECT_EQ(store.push(frame(10 * MS)), StepStatus::OK) << "equal, though another object";
+  topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 2, 1}}));
+  EXPECT_EQ(store.push(frame(20 * MS)), StepStatus::TOPOLOGY_CHANGED);
+  EXPECT_EQ(store.previous(), nullptr) << "a seam has nothing before it";
+}
+
+TEST_F(MeshStoreTest, VerticesThatAreNotFiniteAreNoTeleport) {
+  store.push(frame(0));
+  MeshFrame lost = frame(10 * MS);
+  lost.positions[1].setConstant(std::numeric_limits<double>::quiet_NaN());
+  lost.positions[2].setConstant(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(store.push(lost), StepStatus::OK);
+  EXPECT_EQ(store.push(frame(20 * MS)), StepStatus::OK);
+}
+
+TEST_F(MeshStoreTest, InterpolatesWithinARunOnly) {
+  store.push(frame(0, 0));
+  store.push(frame(100 * MS, 0.4));
+  store.push(frame(250 * MS, 0.4));  // gap
+  Positions at;
+  ASSERT_EQ(store.lookup(25 * MS), Lookup::READY);
+  store.positionsAt(25 * MS, at);
+  EXPECT_DOUBLE_EQ(at[0].z(), 0.1);
+  store.positionsAt(100 * MS, at);
+  EXPECT_EQ(at[0].z(), 0.4) << "a frame's own positions, bit for bit";
+  EXPECT_EQ(store.lookup(180 * MS), Lookup::TOO_OLD) << "across the gap";
+  EXPECT_EQ(store.lookup(250 * MS), Lookup::READY);
+  EXPECT_EQ(store.lookup(251 * MS), Lookup::NOT_YET);
+  EXPECT_EQ(store.lookup(-1), Lookup::TOO_OLD);
+}
+
+TEST_F(MeshStoreTest, RigidFramesFollowTheArc) {
+  MeshFrame a = frame(0), b = frame(100 * MS);
+  a.rigid = b.rigid = true;
+  b.pose.linear() = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()).toRotationMatrix();
+  for (Vec3& p : b.positions) p = b.pose * p;
+  MeshStore loose(MeshStoreOptions{0.1, 0, 4});
+  loose.push(a);
+  loose.push(b);
+  Positions at;
+  loose.positionsAt(50 * MS, at);
+  EXPECT_NEAR(at[1].norm(), 1, 1e-12) << "the chord would be at 0.707";
+  EXPECT_NEAR(at[1].x(), std::sqrt(0.5), 1e-12);
+}
+
+TEST_F(MeshStoreTest, KeepsNoMoreThanItsCapacity) {
+  for (int i = 0; i < 100; ++i) store.push(frame(i * 10 * MS));
+  EXPECT_EQ(store.size(), 4u);
+  store.forgetBefore(985 * MS);
+  EXPECT_EQ(store.size(), 2u);
+  EXPECT_EQ(store.lookup(985 * MS), Lookup::READY);
+}
+
+// A gripper at 240 Hz beside a tracker that comes 0.4 s late must still be known where the tracker's step begins.
+TEST_F(MeshStoreTest, SmallMeshesAreKeptForLongLargeOnesAreNot) {
+  MeshStore kept{MeshStoreOptions()};
+  for (int i = 0; i < 300; ++i) kept.push(frame(i * 4 * MS));
+  EXPECT_EQ(kept.size(), 300u);
+  EXPECT_EQ(kept.lookup(2 * MS), Lookup::READY);
+  MeshStoreOptions options;
+  options.max_vertices = 100 * frame(0).positions.size();
+  MeshStore large(options);
+  for (int i = 0; i < 300; ++i) {
+    large.push(frame(i * 4 * MS));
+    EXPECT_LE(large.size(), 100u);
+  }
+  EXPECT_EQ(large.size(), 100u);
+  options.max_vertices = 1;
+  MeshStore huge(options);
+  for (int i = 0; i < 300; ++i) huge.push(frame(i * 4 * MS));
+  EXPECT_EQ(huge.size(), 64u);
+  huge.clear();
+  for (int i = 0; i < 10; ++i) huge.push(frame(i * 4 * MS));
+  EXPECT_EQ(huge.size(), 10u);
+}
+
+TEST(MeshStoreOptionsTest, OutOfRangeNamesTheOption) {
+  const auto message = [](const MeshStoreOptions& options) -> std::string {
+    try {
+      MeshStore store(options);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message({0, 0.5, 4}).find("max_step_s"), std::string::npos);
+  EXPECT_NE(message({std::nan(""), 0.5, 4}).find("max_step_s"), std::string::npos);
+  EXPECT_NE(message({0.1, -1, 4}).find("max_vertex_step_m"), std::string::npos);
+  EXPECT_NE(message({0.1, 0.5, 1}).find("capacity"), std::string::npos);
+}
+
+TEST(PoseInterpolation, GoesOnBeyondTheEnd) {
+  const Eigen::Isometry3d a = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d b = a;
+  b.linear() = Eigen::AngleAxisd(0.2, Vec3::UnitX()).toRotationMatrix();
+  b.translation() = Vec3(1, 0, 0);
+  const Eigen::Isometry3d c = interpolate(a, b, 3);
+  EXPECT_NEAR(Eigen::AngleAxisd(c.linear()).angle(), 0.6, 1e-12);
+  EXPECT_NEAR(c.translation().x(), 3, 1e-12);
+}
+
+}  // namespace
+}  // namespace dccd
