@@ -24,6 +24,8 @@ NOT_RUN = {
     'scripts/setup': 'installs packages',
     'scripts/benchmark': 'takes half an hour of a quiet machine',
     'scripts/test': 'is what runs this test',
+    'scripts/package': 'installs packages and takes minutes; deb_test.py does it',
+    'roslaunch deformable_ccd demo.launch': 'plays what scripts/demo recorded, or the recording in a package: deb_test.py does',
     'scripts/build': 'was run before this test, or there would be nothing to test',
     'doxygen': 'doxygen_test.py does it, in a folder of its own',
     'cmake -S . -B build-core': 'takes minutes; install_test.py configures it, scripts/test --aarch64 and --long build it',
