@@ -10,6 +10,14 @@ foreach(library deformable_ccd_octomap deformable_ccd_ros)
   endif()
 endforeach()
 
+# The core counts the versions of its own interface (core.cmake). Before 1.0 each minor version may change that of the others.
+set(NODE_LIBRARIES ${LIBRARY_TARGETS})
+list(REMOVE_ITEM NODE_LIBRARIES deformable_ccd)
+if(NODE_LIBRARIES)
+  set_target_properties(${NODE_LIBRARIES} PROPERTIES
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+endif()
+
 if(DEFORMABLE_CCD_CORE_ONLY)
   include(CMakePackageConfigHelpers)
   install(TARGETS ${TOOL_TARGETS})
@@ -42,3 +50,14 @@ install(DIRECTORY ${TRUE_SOURCE_DIR}/config ${TRUE_SOURCE_DIR}/examples ${TRUE_S
 #catkin_lint: ignore_once missing_file external_file
 install(FILES ${TRUE_SOURCE_DIR}/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 catkin_install_python(PROGRAMS examples/stop_the_arm.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+# The demo's recording belongs to a package: whoever installs one has no checkout, in which scripts/demo would make it.
+if(DEFORMABLE_CCD_RECORD_DEMO)
+  set(DEMO_SCENE ${TRUE_SOURCE_DIR}/config/scenes/table_edge.yaml)
+  set(DEMO_FILES ${CMAKE_CURRENT_BINARY_DIR}/demo/table_edge.bag ${CMAKE_CURRENT_BINARY_DIR}/demo/table_edge.yaml)
+  add_custom_command(OUTPUT ${DEMO_FILES}
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_CURRENT_BINARY_DIR}/demo
+    COMMAND make_scene_bag ${DEMO_SCENE} demo/table_edge.bag --monitor-config demo/table_edge.yaml --quiet
+    DEPENDS make_scene_bag ${DEMO_SCENE} VERBATIM)
+  add_custom_target(demo_recording ALL DEPENDS ${DEMO_FILES})
+  install(FILES ${DEMO_FILES} DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/demo)
+endif()

@@ -36,6 +36,8 @@ NOT_RUN = {
     'scripts/setup': 'installs packages; the demo and the tests call it',
     'scripts/benchmark': 'takes half an hour of a quiet machine',
     'scripts/test': 'is what runs this test; --fresh and --long are run by hand',
+    'scripts/package': 'installs packages and takes minutes; deb_test.py does it',
+    'apt': 'installs or removes what scripts/package makes; deb_test.py does it',
     'scripts/build': 'was run before this test, or there would be nothing to test',
     'doxygen': 'doxygen_test.py does it, in a folder of its own',
     'cmake -S . -B build-core': 'installs into the system: it is run in the bare root alone',

@@ -10,11 +10,11 @@
 #include <set>
 #include <tuple>
 
+#include "oracle/algebraic.h"
 #include "oracle/query_file.h"
 #include "projection/toc_bound.h"
 #include "simd/cluster_kernels.h"
 #include "simd/fused_filter.h"
-#include "support/algebraic.h"
 #include "support/data.h"
 #include "support/scene_data.h"
 #include "support/step_support.h"
