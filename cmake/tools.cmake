@@ -1,12 +1,11 @@
 # Tools that need the core alone, and the report. Every other file in src/apps is built by ros.cmake.
 # The libraries need neither of the two; without them a core-only build has no tools and no report.
+set(TOOLS_NEED REQUIRED)
 if(DEFORMABLE_CCD_CORE_ONLY)
-  find_package(CLI11 QUIET)
-  find_package(nlohmann_json QUIET)
-else()
-  find_package(CLI11 REQUIRED)
-  find_package(nlohmann_json REQUIRED)
+  set(TOOLS_NEED QUIET)
 endif()
+find_package(CLI11 ${TOOLS_NEED})
+find_package(nlohmann_json ${TOOLS_NEED})
 
 # The exact oracle: judges the rungs in the tests and in the tools that report errors. The libraries never link it.
 file(GLOB ORACLE_SOURCES CONFIGURE_DEPENDS oracle/*.cpp)
@@ -25,6 +24,7 @@ if(nlohmann_json_FOUND)
   configure_file(src/report/page_parts.h.in ${CMAKE_CURRENT_BINARY_DIR}/report/page_parts.h @ONLY)
   file(GLOB REPORT_SOURCES CONFIGURE_DEPENDS src/report/*.cpp)
   add_library(deformable_ccd_report STATIC EXCLUDE_FROM_ALL ${REPORT_SOURCES})
+  #catkin_lint: ignore_once missing_directory
   target_include_directories(deformable_ccd_report PUBLIC src PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/report)
   target_link_libraries(deformable_ccd_report PUBLIC deformable_ccd_headers nlohmann_json::nlohmann_json)
 endif()
