@@ -10,6 +10,7 @@ endif()
 file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)
 if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURCES)
   # Two builds of Bullet can be installed side by side; single precision would make the recorded cloth jitter.
+  #catkin_lint: ignore_once duplicate_find
   find_package(PkgConfig REQUIRED)
   if(DEFORMABLE_CCD_CORE_ONLY)
     #catkin_lint: ignore_once duplicate_find

@@ -2,7 +2,7 @@
 # core: octomap_tests, scene_tests, ros_tests, from test/{unit,property,truth}/PART/**.cpp.
 # In a catkin workspace tests are built by the target `tests`, not by `all`, as catkin users expect.
 find_package(GTest REQUIRED)
-find_package(rapidcheck QUIET)
+find_package(rapidcheck QUIET PATHS ${BUILT_DEPENDENCIES})
 find_package(ZLIB REQUIRED)
 enable_testing()
 

@@ -1,5 +1,5 @@
 # Tools that need the core alone. Every other file in src/apps is built by ros.cmake.
-find_package(CLI11 REQUIRED)
+find_package(CLI11 REQUIRED PATHS ${BUILT_DEPENDENCIES})
 find_package(nlohmann_json REQUIRED)
 
 # The exact oracle: judges the rungs in the tests and in the tools that report errors. The libraries never link it.
