@@ -4,7 +4,7 @@
 # They are on by default, as catkin has it, and what they need is no dependency of the package: whoever builds without it gets
 # the package alone. scripts/test installs it, and fails where the suites were not built.
 find_package(GTest QUIET)
-find_package(rapidcheck QUIET)
+find_package(rapidcheck QUIET PATHS ${BUILT_DEPENDENCIES})
 find_package(ZLIB QUIET)
 set(MISSING_FOR_TESTS)
 foreach(needed GTest ZLIB)

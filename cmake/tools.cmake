@@ -4,7 +4,7 @@ set(TOOLS_NEED REQUIRED)
 if(DEFORMABLE_CCD_CORE_ONLY)
   set(TOOLS_NEED QUIET)
 endif()
-find_package(CLI11 ${TOOLS_NEED})
+find_package(CLI11 ${TOOLS_NEED} PATHS ${BUILT_DEPENDENCIES})
 find_package(nlohmann_json ${TOOLS_NEED})
 
 # The exact oracle: judges the rungs in the tests and in the tools that report errors. The libraries never link it.

@@ -1,5 +1,5 @@
 # Sourced by scripts/setup: builds libraries that the release has no package of (dependencies/from-source.txt) into
-# build/dependencies, where CMakeLists.txt looks for them. Nothing outside of the checkout changes; no root is needed.
+# build/dependencies, where CMakeLists.txt looks last. Nothing outside of the checkout changes; no root is needed.
 DEPENDENCIES=$CHECKOUT/build/dependencies
 FROM_SOURCE=$CHECKOUT/dependencies/from-source.txt
 # Of these Debian releases the source packages are taken, the first that can be had.

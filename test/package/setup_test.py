@@ -57,8 +57,11 @@ OS_RELEASES = {
 }
 
 
-def root_with(*programs):
-    return os.geteuid() == 0 and all(shutil.which(program) for program in programs)
+def can_make_namespaces():
+    """Root can; but not where the root folder is none of a file system's, as in a chroot."""
+    if os.geteuid() != 0 or not shutil.which('unshare'):
+        return False
+    return subprocess.run(['unshare', '--mount', '--net', 'true'], capture_output=True, check=False).returncode == 0
 
 
 class Machine(unittest.TestCase):
@@ -328,10 +331,8 @@ class RealMachineTest(Machine):
 
     def setUp(self):
         super().setUp()
-        if not root_with('unshare', 'apt-get', 'mount'):
+        if not can_make_namespaces() or not shutil.which('apt-get'):
             self.skipTest('needs root, apt and namespaces')
-        if subprocess.run(['unshare', '--mount', '--net', 'true'], capture_output=True, check=False).returncode != 0:
-            self.skipTest('no namespaces here')
         if subprocess.run(['dpkg-query', '-W', 'sl'], capture_output=True, check=False).returncode == 0:
             self.skipTest('the package that this test does not install is installed')
 
@@ -371,12 +372,10 @@ class PythonTest(Machine):
         self.assertEqual((ran.returncode, ran.stdout, ran.stderr), (0, '/usr/bin/python3\n', ''))
 
     def test_none_has_the_ros_modules(self):
-        if not root_with('unshare', 'mount'):
+        if not can_make_namespaces():
             self.skipTest('needs root and namespaces')
         hide = 'mount --bind "$0" /usr/bin/python3 2>/dev/null && exec "$@"'
         ran = self.use_ros_python(['unshare', '--mount', 'bash', '-c', hide, str(self.folder / 'own/python3')])
-        if ran.returncode != 0 and not ran.stderr:
-            self.skipTest('no bind mounts here')
         self.assertEqual(ran.returncode, 1)
         self.assertEqual(len(ran.stderr.splitlines()), 1, ran.stderr)
         self.assertIn('no python3 with the ROS modules', ran.stderr)

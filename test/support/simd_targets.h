@@ -1,25 +1,19 @@
 // Runs a check once for every SIMD target that this build has and this machine can run.
 #pragma once
 
-#include <hwy/targets.h>
-
 #include <string>
-#include <vector>
+
+#include "simd/targets.h"
 
 namespace dccd {
 namespace test {
 
-/// While it lives, the kernels run on one target; afterwards on the best one again.
+/// While it lives, the kernels run on one target; afterwards on the best one again. The core is asked, not Highway: where
+/// Highway is a static library, the test program has a copy of its own, of which the kernels know nothing.
 class ForcedTarget {
  public:
-  explicit ForcedTarget(std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-  ~ForcedTarget() {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
+  explicit ForcedTarget(const std::string& target) { simd::restrictTo(target); }
+  ~ForcedTarget() { simd::restrictTo(""); }
   ForcedTarget(const ForcedTarget&) = delete;
   ForcedTarget& operator=(const ForcedTarget&) = delete;
 };
@@ -27,9 +21,9 @@ class ForcedTarget {
 /// check(name of the target), for each target.
 template <class Check>
 void forEachTarget(const Check& check) {
-  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+  for (const std::string& target : simd::usableTargets()) {
     const ForcedTarget forced(target);
-    check(std::string(hwy::TargetName(target)));
+    check(target);
   }
 }
 

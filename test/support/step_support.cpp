@@ -1,12 +1,12 @@
 #include "support/step_support.h"
 
-#include <hwy/targets.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <random>
 #include <sstream>
+
+#include "simd/targets.h"
 
 namespace dccd {
 namespace test {
@@ -332,12 +332,11 @@ TestStep crossing() {
 
 void forEachSimdTarget(const std::function<void(const std::string& target)>& body) {
   struct Undo {
-    ~Undo() { hwy::SetSupportedTargetsForTest(0); }
+    ~Undo() { simd::restrictTo(""); }
   } undo;
-  hwy::SetSupportedTargetsForTest(0);
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    body(hwy::TargetName(target));
+  for (const std::string& target : simd::usableTargets()) {
+    simd::restrictTo(target);
+    body(target);
   }
 }
 
