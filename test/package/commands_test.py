@@ -52,7 +52,7 @@ if os.environ.get('DEFORMABLE_CCD_IN_BARE_ROOT'):
 if os.environ.get('DEFORMABLE_CCD_SANITIZED'):
     NOT_RUN['rosrun nodelet'] = "a library built with a sanitizer cannot be loaded by ROS's own program; nodelet.test loads it"
 # What stands for a value of the reader's in a command, and what is put there.
-PLACEHOLDERS = {'FILE': None, 'v,a,b,c': '0,40,41,61', 'v,x,y,z': '0,32768,32768,32768'}
+PLACEHOLDERS = {'FILE': None, 'v,a,b,c': '100,0,1,30', 'v,x,y,z': '0,32768,32768,32768'}
 
 
 def program_of(text):

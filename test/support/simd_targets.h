@@ -3,17 +3,17 @@
 
 #include <string>
 
-#include "simd/targets.h"
+#include "dccd/simd_target.h"
 
 namespace dccd {
 namespace test {
 
-/// While it lives, the kernels run on one target; afterwards on the best one again. The core is asked, not Highway: where
-/// Highway is a static library, the test program has a copy of its own, of which the kernels know nothing.
+/// While it lives, the kernels run on one target; afterwards on the best one again. The core is asked, not Highway:
+/// where Highway is a static library, the test program has a copy of its own, of which the kernels know nothing.
 class ForcedTarget {
  public:
-  explicit ForcedTarget(const std::string& target) { simd::restrictTo(target); }
-  ~ForcedTarget() { simd::restrictTo(""); }
+  explicit ForcedTarget(const std::string& target) { setSimdTarget(target); }
+  ~ForcedTarget() { setSimdTarget("auto"); }
   ForcedTarget(const ForcedTarget&) = delete;
   ForcedTarget& operator=(const ForcedTarget&) = delete;
 };
@@ -21,7 +21,7 @@ class ForcedTarget {
 /// check(name of the target), for each target.
 template <class Check>
 void forEachTarget(const Check& check) {
-  for (const std::string& target : simd::usableTargets()) {
+  for (const std::string& target : simdTargets()) {
     const ForcedTarget forced(target);
     check(target);
   }

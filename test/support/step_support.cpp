@@ -6,7 +6,7 @@
 #include <random>
 #include <sstream>
 
-#include "simd/targets.h"
+#include "dccd/simd_target.h"
 
 namespace dccd {
 namespace test {
@@ -332,10 +332,10 @@ TestStep crossing() {
 
 void forEachSimdTarget(const std::function<void(const std::string& target)>& body) {
   struct Undo {
-    ~Undo() { simd::restrictTo(""); }
+    ~Undo() { setSimdTarget("auto"); }
   } undo;
-  for (const std::string& target : simd::usableTargets()) {
-    simd::restrictTo(target);
+  for (const std::string& target : simdTargets()) {
+    setSimdTarget(target);
     body(target);
   }
 }

@@ -175,10 +175,10 @@ class ContactTimes {
     std::size_t in_cell = 0;   ///< of those, the ones whose interval is the cell of 2^-bits that holds it
     std::size_t beside = 0;    ///< the ones whose interval is that of a neighbouring cell
   };
-  Tally compare(const std::vector<core::Contact>& contacts, int bits) const {
+  Tally compare(const std::vector<Contact>& contacts, int bits) const {
     Tally tally;
     const double width = std::ldexp(1.0, -bits);
-    for (const core::Contact& contact : contacts) {
+    for (const Contact& contact : contacts) {
       const auto known = finest_.find(canonical(contact.kind, contact.vertex));
       if (known == finest_.end()) continue;
       ++tally.compared;
@@ -230,7 +230,7 @@ TEST(StepTimes, ExactCellsHoldAllTimesThatWereFoundSymbolically) {
 
 // That a cell is held against the time, digit for digit, and not against something coarser.
 TEST(StepTimes, ATimeOutsideOfItsCellIsSeen) {
-  core::Contact contact;
+  Contact contact;
   contact.vertex = {7, 1, 2, 3};
   const auto inCell = [&](const std::string& decimal, double lower, int bits) {
     contact.toc_lower = lower;
