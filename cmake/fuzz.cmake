@@ -25,8 +25,8 @@ set_source_files_properties(src/simd/exact_batch.cpp src/simd/fused_filter.cpp P
 
 # Of ROS the decoders need headers only, the package's own messages among them (from the workspace that scripts/test has
 # built before), so the files themselves are built here, with the fuzzer's eyes.
-find_path(OWN_MESSAGES deformable_ccd/MeshStamped.h REQUIRED)
-find_path(ROS_MESSAGES sensor_msgs/PointCloud2.h REQUIRED)
+find_path(OWN_MESSAGES deformable_ccd/ContactArray.h REQUIRED)
+find_path(ROS_MESSAGES std_msgs/Header.h REQUIRED)
 #catkin_lint: ignore_once duplicate_find
 find_package(PCL REQUIRED COMPONENTS common)
 find_library(PCL_IO_LIBRARY pcl_io REQUIRED HINTS ${PCL_LIBRARY_DIRS})

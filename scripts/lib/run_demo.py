@@ -26,8 +26,6 @@ START_STATE = {ContactArray.CLEAR: 'CLEAR', ContactArray.INTERSECTING: 'INTERSEC
 STATUS_NAMES = ['OK', 'FIRST_FRAME', 'TOPOLOGY_CHANGED', 'GAP', 'TIME_JUMP', 'NO_TRANSFORM', 'NO_MAP', 'NO_BODY', 'PARTIAL',
                 'DEADLINE', 'TRUNCATED', 'DUPLICATE', 'TELEPORT', 'VERTEX_COUNT', 'BAD_MESSAGE', 'QUEUE_FULL', 'DISABLED',
                 'RESET', 'INTERNAL_ERROR']
-MESH_TYPES = {'deformable_ccd/MeshStamped', 'sensor_msgs/PointCloud2', 'pcl_msgs/PolygonMesh',
-              'visualization_msgs/MarkerArray'}
 
 
 class Listener:
@@ -64,10 +62,11 @@ def kind_of(contact):
 def frames_of(bag, params):
     """Frames that the monitor gets: the mesh messages, and one of each rigid body with each of those."""
     with rosbag.Bag(str(bag)) as opened:
-        topics = opened.get_type_and_topic_info().topics.values()
+        topics = opened.get_type_and_topic_info().topics
     bodies = (yaml.safe_load(params.read_text()) or {}).get('bodies', {})
     rigid = sum('rigid' in (body or {}) for body in bodies.values())
-    return sum(topic.message_count for topic in topics if topic.msg_type in MESH_TYPES) * (1 + rigid)
+    meshes = {(body or {}).get('topic', '/' + name) for name, body in bodies.items() if 'rigid' not in (body or {})}
+    return sum(topics[name].message_count for name in meshes if name in topics) * (1 + rigid)
 
 
 def story_steps(arrays, start):

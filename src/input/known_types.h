@@ -1,4 +1,4 @@
-// Whether a connection's type is the one whose layout the readers know: name and md5.
+// What a topic carries besides meshes (message_type.h): octomaps, and a monitor's own markers.
 #pragma once
 
 #include <map>
@@ -6,8 +6,7 @@
 
 namespace dccd {
 
-/// Empty when messages of this type can be read; else one sentence.
-std::string meshTypeProblem(const std::string& datatype, const std::string& md5);
+/// Empty when messages of this type can be read as an octomap; else one sentence. md5 "*" stands for any.
 std::string mapTypeProblem(const std::string& datatype, const std::string& md5);
 
 /// Where a monitor publishes unless it is renamed, and analyze_bag.

@@ -72,30 +72,17 @@ Eigen::Affine3d markerTransform(const MarkerView& marker) {
 
 }  // namespace
 
-const std::vector<MeshType>& meshTypes() {
-  static const std::vector<MeshType> TYPES = {
-      {"mesh_stamped", "deformable_ccd/MeshStamped"},     {"point_cloud2", "sensor_msgs/PointCloud2"},
-      {"polygon_mesh", "pcl_msgs/PolygonMesh"},           {"marker", "visualization_msgs/Marker"},
-      {"marker_array", "visualization_msgs/MarkerArray"}, {"shape_mesh", "shape_msgs/Mesh"}};
-  return TYPES;
-}
-
 MeshDecoder::MeshDecoder(MeshInputConfig config) : config_(std::move(config)) {}
 
-template <typename Read>
-DecodedMesh MeshDecoder::guarded(const std::string& datatype, Read read) {
-  const auto& types = meshTypes();
-  const auto type = std::find_if(types.begin(), types.end(), [&](const MeshType& t) { return datatype == t.datatype; });
-  if (type == types.end()) {
-    refuse("type " + datatype +
-           " is not a mesh; accepted are MeshStamped, PointCloud2, PolygonMesh, Marker, MarkerArray, "
-           "shape_msgs/Mesh");
-  }
+template <typename View>
+DecodedMesh MeshDecoder::decodeAs(const std::string& datatype, View view) {
+  const MeshType* type = findMeshType(datatype);
+  if (!type) refuse(meshTypeProblem(datatype, {}));
   if (config_.type != "auto" && config_.type != type->name) {
     refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
   }
   try {
-    return read(std::string(type->name));
+    return std::visit([this](const auto& mesh) { return decodeView(mesh); }, view(*type));
   } catch (const WireError& error) {
     refuse(datatype + ": " + error.what());
   } catch (const TopologyError& error) {
@@ -105,37 +92,19 @@ DecodedMesh MeshDecoder::guarded(const std::string& datatype, Read read) {
 
 DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
   WireReader wire(data, size);
-  return guarded(datatype, [&](const std::string& name) {
-    if (name == "mesh_stamped") return decodeIndexed(readMeshStamped(wire));
-    if (name == "point_cloud2") return decodeCloud(readCloud(wire, config_.noise_field));
-    if (name == "polygon_mesh") return decodeIndexed(readPolygonMesh(wire, config_.noise_field));
-    if (name == "shape_mesh") return decodeIndexed(readShapeMesh(wire));
-    if (name == "marker") return decodeMarkers({readMarker(wire)});
-    return decodeMarkers(readMarkerArray(wire));
-  });
+  return decodeAs(datatype, [&](const MeshType& type) { return type.read(wire, config_.noise_field); });
 }
 
 DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
-  return guarded(datatypeOf(message), [&](const std::string&) {
-    return std::visit(
-        [this](const auto& typed) {
-          using Message = std::remove_const_t<std::remove_reference_t<decltype(*typed)>>;
-          if constexpr (std::is_same_v<Message, sensor_msgs::PointCloud2> ||
-                        std::is_same_v<Message, pcl_msgs::PolygonMesh>) {
-            return decodeView(viewOf(*typed, config_.noise_field));
-          } else {
-            return decodeView(viewOf(*typed));
-          }
-        },
-        message);
-  });
+  return decodeAs(message.type->datatype,
+                  [&](const MeshType& type) { return type.view(message.message.get(), config_.noise_field); });
 }
 
 void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh) const {
   const bool from_field = !config_.noise_field.empty();
   if (from_field && !cloud) {
     refuse("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
-           "'; send a PointCloud2, or write uncertainty/radius_m");
+           "'; send a point cloud, or write uncertainty/radius_m");
   }
   if (!from_field && !(config_.noise_radius_m > 0)) return;
   mesh.radius_m.assign(mesh.positions.size(), config_.noise_radius_m);
@@ -203,17 +172,17 @@ std::shared_ptr<const Topology> MeshDecoder::fromFaces(std::size_t points, std::
   return topology_;
 }
 
-DecodedMesh MeshDecoder::decodeCloud(const CloudView& cloud) {
+DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   DecodedMesh mesh;
   start(cloud.header, mesh);
   checkCount(cloud.size());
   const bool organised = cloud.height > 1;
   if (config_.source == TopologySource::MESSAGE || config_.source == TopologySource::FIRST_FRAME_WELD) {
-    refuse("a PointCloud2 has no triangles; set topology/source to grid (with rows, cols), polyline or file");
+    refuse("a point cloud has no triangles; set topology/source to grid (with rows, cols), polyline or file");
   }
   if (config_.source == TopologySource::AUTO && !organised && !config_.rows && !config_.cols) {
     refuse(
-        "an unorganised PointCloud2 has no topology; set topology/rows and topology/cols for a grid, or "
+        "an unorganised point cloud has no topology; set topology/rows and topology/cols for a grid, or "
         "topology/source to polyline or file");
   }
   mesh.topology = fixedTopology(cloud.size(), cloud.height, cloud.width);
@@ -223,7 +192,7 @@ DecodedMesh MeshDecoder::decodeCloud(const CloudView& cloud) {
   return mesh;
 }
 
-DecodedMesh MeshDecoder::decodeIndexed(const IndexedView& view) {
+DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   DecodedMesh mesh;
   start(view.header ? *view.header : HeaderView{}, mesh);
   const std::size_t count = view.size();
@@ -260,7 +229,7 @@ DecodedMesh MeshDecoder::decodeIndexed(const IndexedView& view) {
   return mesh;
 }
 
-DecodedMesh MeshDecoder::decodeMarkers(const std::vector<MarkerView>& markers) {
+DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
   std::string seen;
   for (const MarkerView& marker : markers) {
     const bool wanted = (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&

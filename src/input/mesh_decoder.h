@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "dccd/mesh_store.h"
-#include "input/mesh_views.h"
-#include "input/typed_mesh.h"
+#include "input/message_type.h"
 
 namespace dccd {
 
@@ -19,7 +18,7 @@ enum class TopologySource : std::uint8_t { AUTO, MESSAGE, GRID, POLYLINE, FILE, 
 /// How a body's messages are to be read.
 struct MeshInputConfig {
   std::string type = "auto";  ///< auto, or one of meshTypes()' short names
-  std::string frame_id;       ///< used when the message has none; required for shape_msgs/Mesh
+  std::string frame_id;       ///< used when the message has none; required for types without a header
   TopologySource source = TopologySource::AUTO;
   std::size_t rows = 0, cols = 0;  ///< grid; both 0: not given
   std::shared_ptr<const Topology> file_topology;
@@ -48,20 +47,12 @@ struct DecodedMesh {
   std::size_t weld_changes = 0;  ///< welded vertices whose corners came apart
 };
 
-/// An accepted message type: its name in parameters and in ROS.
-struct MeshType {
-  const char* name;
-  const char* datatype;
-};
-/// auto is not among them.
-const std::vector<MeshType>& meshTypes();
-
 /// Keeps the topology from message to message, so that an unchanged one is one object. Not thread-safe.
 class MeshDecoder {
  public:
   explicit MeshDecoder(MeshInputConfig config);
 
-  /// `datatype` as in the connection header, for example "sensor_msgs/PointCloud2". Throws MeshError; after one the
+  /// `datatype` as in the connection header, package/Name. Throws MeshError; after one the
   /// decoder is as before.
   DecodedMesh decode(const std::string& datatype, const std::uint8_t* data, std::size_t size);
   /// The same of a message that was never serialised.
@@ -76,15 +67,11 @@ class MeshDecoder {
   std::vector<Index> weld_;                   // soup corner to vertex
   std::vector<Index> representative_;         // vertex to one of its corners
 
-  template <typename Read>
-  DecodedMesh guarded(const std::string& datatype, Read read);
-  DecodedMesh decodeView(const CloudView& cloud) { return decodeCloud(cloud); }
-  DecodedMesh decodeView(const IndexedView& mesh) { return decodeIndexed(mesh); }
-  DecodedMesh decodeView(const MarkerView& marker) { return decodeMarkers({marker}); }
-  DecodedMesh decodeView(const std::vector<MarkerView>& markers) { return decodeMarkers(markers); }
-  DecodedMesh decodeCloud(const CloudView& cloud);
-  DecodedMesh decodeIndexed(const IndexedView& mesh);
-  DecodedMesh decodeMarkers(const std::vector<MarkerView>& markers);
+  template <typename View>
+  DecodedMesh decodeAs(const std::string& datatype, View view);
+  DecodedMesh decodeView(const CloudView& cloud);
+  DecodedMesh decodeView(const IndexedView& mesh);
+  DecodedMesh decodeView(const std::vector<MarkerView>& markers);
   DecodedMesh decodeSoup(const MarkerView& marker);
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;

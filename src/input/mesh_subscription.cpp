@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <type_traits>
 #include <utility>
 
 #include <ros/subscribe_options.h>
 #include <ros/this_node.h>
 
-#include "input/known_types.h"
+#include "ros/message_bytes.h"
 
 namespace dccd {
 
@@ -22,20 +21,10 @@ const ros::WallDuration MAX_OVERLAP(1.0);
 
 /// Whether the bytes are this message. The header's sequence number is set when bytes are sent, and does not count.
 bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
-  return std::visit(
-      [&](const auto& message) {
-        using Message = std::remove_const_t<std::remove_reference_t<decltype(*message)>>;
-        const std::uint32_t size = ros::serialization::serializationLength(*message);
-        if (bytes.getDataType() != ros::message_traits::datatype<Message>() || size != bytes.size()) return false;
-        std::vector<std::uint8_t> a(size), b(size);
-        ros::serialization::OStream a_stream(a.data(), size), b_stream(b.data(), size);
-        bytes.write(a_stream);
-        ros::serialization::serialize(b_stream, *message);
-        const std::size_t skipped = ros::message_traits::hasHeader<Message>() ? 4 : 0;
-        return std::equal(a.begin() + static_cast<std::ptrdiff_t>(skipped), a.end(),
-                          b.begin() + static_cast<std::ptrdiff_t>(skipped));
-      },
-      mesh);
+  if (bytes.getDataType() != mesh.type->datatype) return false;
+  const std::vector<std::uint8_t> a = bytesOf(bytes), b = mesh.type->serialize(mesh.message.get());
+  const std::ptrdiff_t skipped = mesh.type->leads_with_header ? 4 : 0;
+  return a.size() == b.size() && std::equal(a.begin() + skipped, a.end(), b.begin() + skipped);
 }
 
 }  // namespace
@@ -64,10 +53,10 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
     last_bytes_ = message;
   } else if (event.getPublisherName() == ros::this_node::getName() &&
              meshTypeProblem(message->getDataType(), message->getMD5Sum()).empty()) {
-    narrow(message->getDataType());
+    narrowTo(*findMeshType(message->getDataType()));
     last_bytes_ = message;
   }
-  callback_(message);
+  deliver(*message);
 }
 
 /// What is handed over comes at once, and overtakes the bytes of messages before it that are still on their way; until
@@ -75,7 +64,7 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
 /// have caught up with them. A message that was on its way when the second subscription was made comes through that one
 /// as bytes, too, right behind itself and perhaps behind objects that overtook it.
 void MeshSubscription::onTyped(TypedMesh message) {
-  if (!any_) return callback_(std::move(message));
+  if (!any_) return deliver(std::move(message));
   if (last_bytes_ && isSame(*last_bytes_, message)) {  // came as bytes already
     if (held_.empty()) closeAny();
     return;
@@ -87,26 +76,31 @@ void MeshSubscription::onTyped(TypedMesh message) {
 void MeshSubscription::closeAny() {
   any_.shutdown();
   last_bytes_.reset();
-  for (TypedMesh& message : held_) callback_(std::move(message));
+  for (TypedMesh& message : held_) deliver(std::move(message));
   held_.clear();
 }
 
-template <typename Message>
-void MeshSubscription::narrowIf(const std::string& datatype) {
-  if (datatype != ros::message_traits::datatype<Message>()) return;
-  typed_ = node_.subscribe<Message>(
-      topic_, SUBSCRIBER_QUEUE, [this](const boost::shared_ptr<const Message>& message) { onTyped(message); },
-      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+void MeshSubscription::deliver(const ShapeShifter& bytes) {
+  MeshMessage message;
+  message.datatype = bytes.getDataType();
+  message.md5 = bytes.getMD5Sum();
+  message.bytes = bytesOf(bytes);
+  callback_(std::move(message));
 }
 
-void MeshSubscription::narrow(const std::string& datatype) {
+void MeshSubscription::deliver(TypedMesh object) {
+  MeshMessage message;
+  message.datatype = object.type->datatype;
+  message.object = std::move(object);
+  callback_(std::move(message));
+}
+
+void MeshSubscription::narrowTo(const MeshType& type) {
   narrowed_at_ = ros::SteadyTime::now();
-  narrowIf<deformable_ccd::MeshStamped>(datatype);
-  narrowIf<sensor_msgs::PointCloud2>(datatype);
-  narrowIf<pcl_msgs::PolygonMesh>(datatype);
-  narrowIf<visualization_msgs::Marker>(datatype);
-  narrowIf<visualization_msgs::MarkerArray>(datatype);
-  narrowIf<shape_msgs::Mesh>(datatype);
+  ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
+  options.helper = type.callbackHelper(type, [this](TypedMesh message) { onTyped(std::move(message)); });
+  options.transport_hints = ros::TransportHints().tcpNoDelay();
+  typed_ = node_.subscribe(options);
 }
 
 void MeshSubscription::renew() {

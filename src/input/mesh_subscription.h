@@ -5,19 +5,15 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>
 #include <topic_tools/shape_shifter.h>
 
-#include "input/typed_mesh.h"
+#include "input/mesh_message.h"
 
 namespace dccd {
-
-/// Bytes from another process, or the object itself from a publisher in this one.
-using MeshMessage = std::variant<topic_tools::ShapeShifter::ConstPtr, TypedMesh>;
 
 /// A subscription that is open to any type until the first message. When that comes from a publisher in the same
 /// process (a nodelet beside this one), it subscribes anew with the concrete type, so that the messages after it come
@@ -26,6 +22,7 @@ using MeshMessage = std::variant<topic_tools::ShapeShifter::ConstPtr, TypedMesh>
 /// the handle's callback queue.
 class MeshSubscription {
  public:
+  /// Gets each message, its times of receipt and arrival unset.
   using Callback = std::function<void(MeshMessage)>;
 
   /// Subscribes to `topic` at once.
@@ -54,10 +51,10 @@ class MeshSubscription {
   void openToAnyType();
   void onAny(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
   void onTyped(TypedMesh message);
-  void narrow(const std::string& datatype);
+  void narrowTo(const MeshType& type);
   void closeAny();
-  template <typename Message>
-  void narrowIf(const std::string& datatype);
+  void deliver(const topic_tools::ShapeShifter& bytes);
+  void deliver(TypedMesh object);
 };
 
 }  // namespace dccd

@@ -1,4 +1,5 @@
-// What the accepted message types say about a mesh, as views into the message's bytes (wire.h).
+// What messages say about a mesh, in one of three forms (points, triangles by index, triangle soup), as views into the
+// message. Which message types there are is written in message_types/ alone.
 #pragma once
 
 #include <array>
@@ -6,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "dccd/mesh_store.h"
@@ -21,7 +23,7 @@ struct HeaderView {
 /// std_msgs/Header. Throws WireError, also for a stamp with too many nanoseconds.
 HeaderView readHeader(WireReader& wire);
 
-/// sensor_msgs/PointCloud2. Fields are located by name and datatype; strides are held against the data.
+/// A cloud of points. Fields are located by name and datatype; strides are held against the data.
 struct CloudView {
   HeaderView header;
   std::size_t height = 0, width = 0, point_step = 0, row_step = 0;
@@ -39,7 +41,7 @@ struct CloudView {
   double value(std::size_t i, const Coordinate& field) const;
 };
 /// extra_field: name of a further FLOAT32 or FLOAT64 field that the cloud must have; empty: none.
-CloudView readCloud(WireReader& wire, const std::string& extra_field = {});
+CloudView readCloud(WireReader& wire, const std::string& extra_field);
 
 /// Looks for the fields x, y and z of a cloud, and a further one if it is named, one after the other. Throws WireError
 /// for a type that is no coordinate.
@@ -57,33 +59,31 @@ class CloudFieldFinder {
 /// Throws WireError unless every coordinate of every point lies within `bytes` of data.
 void checkStrides(const CloudView& cloud, std::size_t bytes);
 
-/// Triangles by index: MeshStamped, shape_msgs/Mesh, pcl_msgs/PolygonMesh.
+using PointOnWire = std::array<double, 3>;
+using TriangleOnWire = std::array<std::uint32_t, 3>;
+
+/// Triangles or polygons by index.
 struct IndexedView {
   std::optional<HeaderView> header;
-  std::optional<CloudView> cloud;                    ///< PolygonMesh: the vertices
-  WireSpan<std::array<double, 3>> points;            ///< otherwise
-  WireSpan<std::array<std::uint32_t, 3>> triangles;  ///< otherwise
-  std::vector<WireSpan<std::uint32_t>> polygons;     ///< PolygonMesh
+  std::optional<CloudView> cloud;                 ///< the vertices, where they come as a cloud
+  WireSpan<PointOnWire> points;                   ///< otherwise
+  WireSpan<TriangleOnWire> triangles;             ///< triangles,
+  std::vector<WireSpan<std::uint32_t>> polygons;  ///< or polygons, which become fans
   std::size_t size() const { return cloud ? cloud->size() : points.size; }
 };
-IndexedView readMeshStamped(WireReader& wire);
-IndexedView readShapeMesh(WireReader& wire);
-IndexedView readPolygonMesh(WireReader& wire, const std::string& extra_field = {});
-/// PolygonMesh: where the mesh's own header says nothing, its cloud's counts.
-void fillHeader(IndexedView& mesh);
 
-/// One visualization_msgs/Marker.
+/// One marker, of whatever type; a triangle list is a soup.
 struct MarkerView {
   HeaderView header;
   std::string_view ns;
   std::int32_t id = 0, type = 0, action = 0;
   std::array<double, 7> pose{};  ///< position x y z, quaternion x y z w
   std::array<double, 3> scale{};
-  WireSpan<std::array<double, 3>> points;
+  WireSpan<PointOnWire> points;
 };
 constexpr std::int32_t MARKER_TRIANGLE_LIST = 11;
 constexpr std::int32_t MARKER_ADD = 0;
-MarkerView readMarker(WireReader& wire);
-std::vector<MarkerView> readMarkerArray(WireReader& wire);
+
+using MeshView = std::variant<CloudView, IndexedView, std::vector<MarkerView>>;
 
 }  // namespace dccd

@@ -7,20 +7,13 @@
 #include <ros/time.h>
 
 #include "input/known_types.h"
-#include "input/mesh_decoder.h"
+#include "input/message_type.h"
 
 namespace dccd {
 
 namespace {
 
 constexpr std::size_t MAX_NAMES = 6;
-
-bool isMesh(const std::string& datatype) {
-  for (const MeshType& type : meshTypes()) {
-    if (datatype == type.datatype) return true;
-  }
-  return false;
-}
 
 /// Published topics with a type that can be a mesh; empty when there are none or the master does not answer.
 std::string meshTopics() {
@@ -34,7 +27,7 @@ std::string meshTopics() {
   std::string names;
   std::size_t count = 0;
   for (const auto& [name, datatype] : types) {
-    if (!isMesh(datatype) || isMonitorsMarkers(name, types) || ++count > MAX_NAMES) continue;
+    if (!findMeshType(datatype) || isMonitorsMarkers(name, types) || ++count > MAX_NAMES) continue;
     names += (names.empty() ? "" : ", ") + name + " (" + datatype + ")";
   }
   return names;

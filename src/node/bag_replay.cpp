@@ -7,14 +7,12 @@
 #include <set>
 
 #include <rosbag/view.h>
-#include <shape_msgs/Mesh.h>
 #include <tf2_msgs/TFMessage.h>
-#include <visualization_msgs/MarkerArray.h>
 
 #include "input/known_types.h"
-#include "input/wire.h"
 #include "node/effects.h"
 #include "report/progress_bar.h"
+#include "ros/message_bytes.h"
 #include "ros/transforms.h"
 
 namespace dccd {
@@ -28,13 +26,6 @@ const ros::Duration SEAM(1.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
-std::vector<std::uint8_t> bytesOf(const rosbag::MessageInstance& message) {
-  std::vector<std::uint8_t> bytes(message.size());
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  message.write(stream);
-  return bytes;
-}
-
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
 LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config) {
   LoadedMap map;
@@ -42,24 +33,6 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
   if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config);
   if (map.stamp_ns == 0) map.stamp_ns = static_cast<StampNs>(message.getTime().toNSec());
   return map;
-}
-
-/// Of a serialised message of a mesh type; 0: none.
-StampNs stampOf(const std::string& datatype, const std::vector<std::uint8_t>& bytes) {
-  if (datatype == ros::message_traits::datatype<shape_msgs::Mesh>()) return 0;
-  try {
-    WireReader reader(bytes.data(), bytes.size());
-    // A header comes first; that of an array is its first marker's.
-    if (datatype == ros::message_traits::datatype<visualization_msgs::MarkerArray>() &&
-        reader.readCount("markers", 1) == 0) {
-      return 0;
-    }
-    reader.read<std::uint32_t>("seq");
-    const auto seconds = reader.read<std::uint32_t>("secs");
-    return StampNs{seconds} * 1000000000 + reader.read<std::uint32_t>("nsecs");
-  } catch (const WireError&) {
-    return 0;  // the decoder will say what is wrong
-  }
 }
 
 /// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the
@@ -122,7 +95,7 @@ struct BagReplay::Run {
   MonitorPipeline pipeline;
   EffectTracker effects;
   std::optional<LookAheadScore> look_ahead;
-  std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one MarkerArray
+  std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one message
   BagReplaySummary summary;
   std::set<std::string> complained;
 
@@ -180,13 +153,8 @@ struct BagReplay::Run {
     const ros::Time at = message.getTime();
     const std::int64_t now_ns = static_cast<std::int64_t>(at.toNSec());
     ++summary.mesh_messages;
-    const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
     drain(at);  // what waited for other bodies until now gives up first
-    if (problem.empty()) {
-      pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns});
-    } else {
-      pipeline.refuse(body, now_ns, now_ns, problem);
-    }
+    pipeline.take(body, {message.getDataType(), std::move(bytes), now_ns, now_ns, message.getMD5Sum()});
     if (!pipeline.hint(body).empty()) complain(summary.mesh_topics[body] + ": " + pipeline.hint(body));
     drain(at);
   }

@@ -6,6 +6,7 @@
 
 #include "dccd/simd_target.h"
 #include "input/known_types.h"
+#include "ros/message_bytes.h"
 
 namespace dccd {
 namespace {
@@ -43,7 +44,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
 
 void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   const std::int64_t now_ns = steadyNs();
-  frames_handed_over += std::holds_alternative<TypedMesh>(message);
+  frames_handed_over += message.object.type != nullptr;
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
   if (!enabled && !pipeline.isStatic(body)) {
     queue.command([this, body] {
@@ -52,7 +53,9 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
     });
     return;
   }
-  queue.push(body, {std::move(message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns});
+  message.receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
+  message.arrival_ns = now_ns;
+  queue.push(body, std::move(message));
 }
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {

@@ -15,6 +15,7 @@
 #include <tf2/buffer_core.h>
 #include <topic_tools/shape_shifter.h>
 
+#include "input/mesh_subscription.h"
 #include "node/collision_monitor.h"
 #include "node/effects.h"
 #include "node/input_queue.h"
@@ -31,13 +32,6 @@ namespace dccd {
 inline std::int64_t steadyNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
       .count();
-}
-
-inline std::vector<std::uint8_t> bytesOf(const topic_tools::ShapeShifter& message) {
-  std::vector<std::uint8_t> bytes(message.size());
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  message.write(stream);
-  return bytes;
 }
 
 struct CollisionMonitor::Impl {
@@ -85,7 +79,6 @@ struct CollisionMonitor::Impl {
   void work();
   void run(const std::function<void()>& command);
   void takeMaps();
-  void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
   void tellComplaints();
   void publish(StepOutcome& outcome);

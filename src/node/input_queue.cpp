@@ -10,7 +10,7 @@ namespace dccd {
 InputQueue::InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy)
     : queues_(bodies), dropped_(bodies, 0), capacity_(capacity), policy_(policy) {}
 
-void InputQueue::push(std::size_t body, QueuedMessage message) {
+void InputQueue::push(std::size_t body, MeshMessage message) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     auto& queue = queues_[body];
@@ -25,7 +25,7 @@ void InputQueue::push(std::size_t body, QueuedMessage message) {
   changed_.notify_one();
 }
 
-bool InputQueue::pop(std::size_t body, QueuedMessage& message) {
+bool InputQueue::pop(std::size_t body, MeshMessage& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   auto& queue = queues_[body];
   if (queue.empty()) return false;

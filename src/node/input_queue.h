@@ -10,16 +10,9 @@
 #include <vector>
 
 #include "config/monitor_config.h"
-#include "input/mesh_subscription.h"
+#include "input/mesh_message.h"
 
 namespace dccd {
-
-/// A message as the callback got it; it is read by the worker.
-struct QueuedMessage {
-  MeshMessage message;
-  StampNs receipt_ns = 0;
-  std::int64_t arrival_ns = 0;
-};
 
 /// What a service answers.
 struct Reply {
@@ -33,9 +26,9 @@ class InputQueue {
   InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy);
 
   /// A full queue drops its oldest message (newest) or this one (oldest), and counts it.
-  void push(std::size_t body, QueuedMessage message);
+  void push(std::size_t body, MeshMessage message);
   /// False when the body has none.
-  bool pop(std::size_t body, QueuedMessage& message);
+  bool pop(std::size_t body, MeshMessage& message);
   /// Drops all messages of all bodies but the `spared` ones (none where it is empty); returns how many of each.
   std::vector<std::uint64_t> clear(const std::vector<bool>& spared = {});
   /// Messages dropped since the last call, per body.
@@ -56,7 +49,7 @@ class InputQueue {
  private:
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<std::deque<QueuedMessage>> queues_;
+  std::vector<std::deque<MeshMessage>> queues_;
   std::vector<std::uint64_t> dropped_;
   std::vector<std::function<void()>> commands_;
   std::size_t capacity_;

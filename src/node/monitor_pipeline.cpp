@@ -98,23 +98,29 @@ void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns
   if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
 }
 
-template <typename Decode>
-void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode) {
+DecodedMesh MonitorPipeline::decode(std::size_t body, const MeshMessage& message) {
+  if (message.object.type) return decoders_[body].decode(message.object);
+  const std::string problem = meshTypeProblem(message.datatype, message.md5);
+  if (!problem.empty()) throw MeshError(StepStatus::BAD_MESSAGE, problem);
+  return decoders_[body].decode(message.datatype, message.bytes.data(), message.bytes.size());
+}
+
+void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
-  waiting.arrival_ns = arrival_ns;
+  waiting.arrival_ns = message.arrival_ns;
   try {
-    waiting.mesh = decode(decoders_[body]);
+    waiting.mesh = decode(body, message);
   } catch (const MeshError& error) {
     monitor_->countReceived(body);
-    return skip(body, error.status, receipt_ns, arrival_ns, error.what());
+    return skip(body, error.status, message.receipt_ns, message.arrival_ns, error.what());
   }
   if (hinted_[body] != waiting.mesh.topology) {
     hinted_[body] = waiting.mesh.topology;
     hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;
-  if (unstamped) waiting.mesh.stamp_ns = receipt_ns;
+  if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;
   monitor_->countReceived(body, 1, unstamped);
   weld_changes_ += waiting.mesh.weld_changes;
   if (fixed_frame_.empty() && body == config_.monitor.clock_body) fixed_frame_ = waiting.mesh.frame_id;
@@ -124,21 +130,6 @@ void MonitorPipeline::takeDecoded(std::size_t body, StampNs receipt_ns, std::int
     waiting.reason = std::move(waiting_[body]->reason);
   }
   waiting_[body] = std::move(waiting);
-}
-
-void MonitorPipeline::take(std::size_t body, const RawMessage& message) {
-  takeDecoded(body, message.receipt_ns, message.arrival_ns, [&](MeshDecoder& decoder) {
-    return decoder.decode(message.datatype, message.bytes.data(), message.bytes.size());
-  });
-}
-
-void MonitorPipeline::take(std::size_t body, const TypedMesh& message, StampNs receipt_ns, std::int64_t arrival_ns) {
-  takeDecoded(body, receipt_ns, arrival_ns, [&](MeshDecoder& decoder) { return decoder.decode(message); });
-}
-
-void MonitorPipeline::refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason) {
-  monitor_->countReceived(body);
-  skip(body, StepStatus::BAD_MESSAGE, receipt_ns, arrival_ns, reason);
 }
 
 bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {

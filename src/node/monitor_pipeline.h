@@ -14,16 +14,9 @@
 #include "dccd/known_space.h"
 #include "dccd/monitor.h"
 #include "input/mesh_decoder.h"
+#include "input/mesh_message.h"
 
 namespace dccd {
-
-/// One serialised message as it came.
-struct RawMessage {
-  std::string datatype;
-  std::vector<std::uint8_t> bytes;
-  StampNs receipt_ns = 0;       ///< stamp for messages without one
-  std::int64_t arrival_ns = 0;  ///< on the clock that drives the pipeline
-};
 
 /// A decoded map in its own frame.
 struct LoadedMap {
@@ -42,12 +35,9 @@ class MonitorPipeline {
   /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
   /// and gives way to the next.
   bool idle(std::size_t body) const { return !waiting_[body] || waiting_[body]->kept; }
-  /// Counts, decodes and keeps one message of an idle body.
-  void take(std::size_t body, const RawMessage& message);
-  /// The same of a message that a publisher in this process handed over.
-  void take(std::size_t body, const TypedMesh& message, StampNs receipt_ns, std::int64_t arrival_ns);
-  /// Counts a message that is refused unread; the clock body's yield an outcome.
-  void refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason);
+  /// Counts, decodes and keeps one message of an idle body. One that is refused is counted, too, and the clock body's
+  /// yields an outcome.
+  void take(std::size_t body, const MeshMessage& message);
   void setMap(LoadedMap map, std::int64_t now_ns);
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
   bool next(std::int64_t now_ns, StepOutcome& outcome);
@@ -108,8 +98,8 @@ class MonitorPipeline {
   bool finishing_ = false;
 
   void loadFiles();
-  template <typename Decode>
-  void takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode);
+  /// Throws MeshError.
+  DecodedMesh decode(std::size_t body, const MeshMessage& message);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// unknown_space: report. How much of what the step swept the map does not know.
   void measureUnknown(StepOutcome& outcome) const;

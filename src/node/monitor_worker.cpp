@@ -1,14 +1,12 @@
 // The worker's thread: messages into the pipeline, outcomes out of it.
 #include "node/collision_monitor_impl.h"
 
-#include "input/known_types.h"
 #include "output/advice.h"
 
 namespace dccd {
 namespace {
 
 using std::chrono::microseconds;
-using topic_tools::ShapeShifter;
 
 // While something waits for tf or another body the worker looks again this often; else it sleeps until it is woken, and
 // this long at most, for diagnostics.
@@ -70,24 +68,10 @@ void CollisionMonitor::Impl::takeMaps() {
   pipeline.setMap(std::move(map), steadyNs());
 }
 
-void CollisionMonitor::Impl::takeMessage(std::size_t body, const QueuedMessage& queued) {
-  if (const auto* typed = std::get_if<TypedMesh>(&queued.message)) {
-    return pipeline.take(body, *typed, queued.receipt_ns, queued.arrival_ns);
-  }
-  const ShapeShifter& message = *std::get<ShapeShifter::ConstPtr>(queued.message);
-  const std::string problem = meshTypeProblem(message.getDataType(), message.getMD5Sum());
-  if (problem.empty()) {
-    pipeline.take(body, {message.getDataType(), bytesOf(message), queued.receipt_ns, queued.arrival_ns});
-  } else {
-    pipeline.refuse(body, queued.receipt_ns, queued.arrival_ns, problem);
-  }
-}
-
 void CollisionMonitor::Impl::takeMessages() {
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    QueuedMessage queued;
-    if (!pipeline.idle(b) || !queue.pop(b, queued)) continue;
-    takeMessage(b, queued);
+    MeshMessage message;
+    if (pipeline.idle(b) && queue.pop(b, message)) pipeline.take(b, message);
   }
 }
 

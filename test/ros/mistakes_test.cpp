@@ -131,7 +131,7 @@ TEST_F(Mistake, StampsOfZero) {
 TEST_F(Mistake, CloudWithoutTopology) {
   Tracker tracker;
   const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/no_topology/mesh");
-  expectTold("/no_topology", "an unorganised PointCloud2 has no topology",
+  expectTold("/no_topology", "an unorganised point cloud has no topology",
              "set topology/rows and topology/cols for a grid",
              [&] { publisher.publish(cloud(gridAt(3, 4, 0), tracker.next())); });
 }

@@ -18,8 +18,6 @@ namespace dccd {
 namespace test {
 namespace {
 
-using topic_tools::ShapeShifter;
-
 boost::shared_ptr<const deformable_ccd::MeshStamped> shared(const Mesh& mesh, double stamp_s) {
   return boost::make_shared<const deformable_ccd::MeshStamped>(meshStamped(mesh, stamp_s));
 }
@@ -43,8 +41,7 @@ struct Subscription : ::testing::Test {
     });
   }
   const deformable_ccd::MeshStamped* address(std::size_t i) const {
-    const auto* typed = std::get_if<TypedMesh>(&received[i]);
-    return typed ? std::get<deformable_ccd::MeshStamped::ConstPtr>(*typed).get() : nullptr;
+    return received[i].object.as<deformable_ccd::MeshStamped>();
   }
 };
 
@@ -79,12 +76,11 @@ TEST_F(Subscription, NoneIsLostOrDoubledAtTheChange) {
   callbacks.callAvailable(ros::WallDuration(0.05));
   ASSERT_EQ(received.size(), static_cast<std::size_t>(COUNT));
   for (int i = 0; i < COUNT; ++i) {
-    const auto* typed = std::get_if<TypedMesh>(&received[static_cast<std::size_t>(i)]);
-    const deformable_ccd::MeshStamped::ConstPtr mesh =
-        typed ? std::get<deformable_ccd::MeshStamped::ConstPtr>(*typed)
-              : std::get<ShapeShifter::ConstPtr>(received[i])->instantiate<deformable_ccd::MeshStamped>();
-    ASSERT_TRUE(mesh);
-    EXPECT_EQ(mesh->header.stamp, ros::Time(10 + i)) << "in order";
+    const MeshMessage& message = received[static_cast<std::size_t>(i)];
+    const auto* mesh = message.object.as<deformable_ccd::MeshStamped>();
+    const StampNs stamp_ns =
+        mesh ? static_cast<StampNs>(mesh->header.stamp.toNSec()) : stampOf(message.datatype, message.bytes);
+    EXPECT_EQ(stamp_ns, StampNs{10 + i} * 1000000000) << "in order";
   }
   EXPECT_NE(address(COUNT - 1), nullptr);
 }
@@ -110,7 +106,7 @@ TEST_F(Subscription, OpensToAnotherTypeWhenThePublisherIsGone) {
   const auto last = boost::make_shared<const sensor_msgs::PointCloud2>(cloud(gridAt(2, 2, 0), 51));
   publisher.publish(last);
   ASSERT_TRUE(serveUntil(5));
-  EXPECT_EQ(std::get<sensor_msgs::PointCloud2::ConstPtr>(std::get<TypedMesh>(received[4])), last);
+  EXPECT_EQ(received[4].object.as<sensor_msgs::PointCloud2>(), last.get());
 }
 
 TEST(Nodelet, FindsTheSameContactsWithoutSerialising) {

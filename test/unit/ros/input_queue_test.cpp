@@ -13,7 +13,7 @@ namespace {
 std::vector<StampNs> leftOfFour(QueuePolicy policy) {
   InputQueue queue(2, 2, policy);
   for (StampNs time = 1; time <= 4; ++time) {
-    QueuedMessage message;
+    MeshMessage message;
     message.receipt_ns = time;
     queue.push(1, std::move(message));
   }
@@ -21,7 +21,7 @@ std::vector<StampNs> leftOfFour(QueuePolicy policy) {
   EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 2}));
   EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 0})) << "each is counted once";
   std::vector<StampNs> left;
-  for (QueuedMessage message; queue.pop(1, message);) left.push_back(message.receipt_ns);
+  for (MeshMessage message; queue.pop(1, message);) left.push_back(message.receipt_ns);
   EXPECT_EQ(queue.size(0), 0u) << "the other body's queue is its own";
   return left;
 }
@@ -36,7 +36,7 @@ TEST(InputQueue, ClearSaysWhatItDropped) {
   queue.push(0, {});
   EXPECT_EQ(queue.clear(), (std::vector<std::uint64_t>{2, 0}));
   EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 0})) << "what was cleared was not too much";
-  QueuedMessage message;
+  MeshMessage message;
   EXPECT_FALSE(queue.pop(0, message));
 }
 

@@ -40,7 +40,7 @@ MonitorConfig configuration() {
 /// A cloth that is thrown about over a map, mostly through itself.
 class Stream {
  public:
-  RawMessage next(bool known, bool second) {
+  MeshMessage next(bool known, bool second) {
     std::mt19937 fixed(second ? 2 : 1);
     std::mt19937& random = known ? fixed : random_;
     std::uniform_real_distribution<double> noise(-0.04, 0.04);
@@ -61,7 +61,7 @@ class Stream {
       std::copy(face.begin(), face.end(), triangle.vertex_indices.begin());
       mesh.triangles.push_back(triangle);
     }
-    RawMessage raw;
+    MeshMessage raw;
     raw.datatype = "deformable_ccd/MeshStamped";
     raw.bytes.resize(ros::serialization::serializationLength(mesh));
     ros::serialization::OStream out(raw.bytes.data(), static_cast<std::uint32_t>(raw.bytes.size()));

@@ -1,0 +1,22 @@
+// One message of a body on its way from a topic or a bag to the decoder.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "input/message_type.h"
+
+namespace dccd {
+
+/// As it came: serialised by another process or read from a bag, or the object itself from a publisher in this process.
+struct MeshMessage {
+  std::string datatype;             ///< as in the connection's header, package/Name
+  std::vector<std::uint8_t> bytes;  ///< empty where there is an object
+  StampNs receipt_ns = 0;           ///< stands in for the stamp of messages without one
+  std::int64_t arrival_ns = 0;      ///< on the clock that drives the pipeline
+  std::string md5 = "*";            ///< of the type as the publisher knows it
+  TypedMesh object = {};
+};
+
+}  // namespace dccd

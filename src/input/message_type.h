@@ -1,0 +1,107 @@
+// The message types that carry a mesh, one row each. All that the package knows about a type stands in one file of
+// message_types/, which registers the row; every other place asks this table.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <ros/message_traits.h>
+#include <ros/serialization.h>
+#include <ros/subscription_callback_helper.h>
+#include <boost/make_shared.hpp>
+
+#include "input/mesh_views.h"
+
+namespace dccd {
+
+struct MeshType;
+
+/// A message as the object that a publisher in this process hands over: nothing was serialised, nothing is copied. The
+/// publisher must not write to what it has published, as for every message of roscpp.
+struct TypedMesh {
+  const MeshType* type = nullptr;  ///< null: there is no object
+  boost::shared_ptr<const void> message;
+
+  /// Null where the message is of another type.
+  template <typename Message>
+  const Message* as() const;
+};
+
+struct MeshType {
+  const char* name;      ///< in the parameter `type`
+  const char* datatype;  ///< in ROS, package/Name
+  const char* md5;
+  bool leads_with_header;  ///< its first field is a std_msgs/Header
+  /// What a serialised message says, as views into its bytes. `extra_field`: the point field that must be there, where
+  /// the type has point fields. Throws WireError.
+  MeshView (*read)(WireReader& wire, const std::string& extra_field);
+  /// The header of a serialised message, unread otherwise; empty where there is none. Throws WireError.
+  HeaderView (*readHeader)(WireReader& wire);
+  /// The same views of an object of this type, with the same checks. It must outlive them.
+  MeshView (*view)(const void* message, const std::string& extra_field);
+  std::vector<std::uint8_t> (*serialize)(const void* message);
+  /// What roscpp needs to hand such messages over as they are.
+  ros::SubscriptionCallbackHelperPtr (*callbackHelper)(const MeshType& type, std::function<void(TypedMesh)> callback);
+};
+
+/// In the order of their ROS names. `auto` is not among them.
+const std::vector<MeshType>& meshTypes();
+/// Null: no accepted type has this ROS name.
+const MeshType* findMeshType(const std::string& datatype);
+
+/// Empty when messages of this type can be read; else one sentence. md5 "*" stands for any.
+std::string meshTypeProblem(const std::string& datatype, const std::string& md5);
+/// The part of it that is about the md5, for a type with a `known` one.
+std::string md5Problem(const std::string& datatype, const std::string& md5, const std::string& known);
+
+/// The stamp of a serialised message; 0: it has none, or it cannot be read.
+StampNs stampOf(const std::string& datatype, const std::vector<std::uint8_t>& bytes);
+
+template <typename Message>
+const Message* TypedMesh::as() const {
+  const bool is = type && std::string(type->datatype) == ros::message_traits::datatype<Message>();
+  return is ? static_cast<const Message*>(message.get()) : nullptr;
+}
+
+/// Registers rows before main() begins.
+struct MeshTypeRegistration {
+  explicit MeshTypeRegistration(const MeshType& row);
+};
+
+/// The row of a ROS message. `READ` and `VIEW` are the type's own functions from bytes and from the object to a
+/// MeshView; READ_HEADER only where the header stands elsewhere than first.
+template <typename Message, auto READ, auto VIEW, HeaderView (*READ_HEADER)(WireReader&) = nullptr>
+MeshType meshType(const char* name) {
+  namespace traits = ros::message_traits;
+  MeshType row{};
+  row.name = name;
+  row.datatype = traits::datatype<Message>();
+  row.md5 = traits::md5sum<Message>();
+  row.leads_with_header = traits::hasHeader<Message>();
+  row.read = [](WireReader& wire, const std::string& extra_field) -> MeshView { return READ(wire, extra_field); };
+  row.readHeader = [](WireReader& wire) {
+    if constexpr (READ_HEADER != nullptr) return READ_HEADER(wire);
+    return traits::hasHeader<Message>() ? readHeader(wire) : HeaderView{};
+  };
+  row.view = [](const void* message, const std::string& extra_field) -> MeshView {
+    return VIEW(*static_cast<const Message*>(message), extra_field);
+  };
+  row.serialize = [](const void* message) {
+    const auto& typed = *static_cast<const Message*>(message);
+    std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(typed));
+    ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    ros::serialization::serialize(stream, typed);
+    return bytes;
+  };
+  row.callbackHelper = [](const MeshType& type, std::function<void(TypedMesh)> callback) {
+    using Pointer = const boost::shared_ptr<const Message>&;
+    const auto hand_over = [&type, callback = std::move(callback)](Pointer message) { callback({&type, message}); };
+    return ros::SubscriptionCallbackHelperPtr(boost::make_shared<ros::SubscriptionCallbackHelperT<Pointer>>(hand_over));
+  };
+  return row;
+}
+
+}  // namespace dccd
