@@ -54,12 +54,12 @@ def source_entries(folder=pathlib.Path('/etc/apt')):
 
 
 def sources_of(release, entries, host):
-    """The lines of a sources.list for `release`, from where this machine has its own: first all of them, then the release alone."""
+    """The lines of a sources.list for `release`, from where this machine has its own."""
     own = [(uri, suite[len(host):]) for uri, suite in entries if host and re.fullmatch(host + r'(-\w+)?', suite)]
     if not own:
         raise CannotMake("this machine's apt sources do not name its own release %r" % host)
-    lines = ['deb %s %s%s main' % (uri, release, suffix) for uri, suffix in own]
-    return [lines, [line for line, (_, suffix) in zip(lines, own) if not suffix]]
+    # Of another release only the main suite: what its updates and security list may have gone from this server.
+    return ['deb %s %s%s main' % (uri, release, suffix) for uri, suffix in own if release == host or not suffix]
 
 
 def checkout_files():
@@ -84,16 +84,12 @@ class BareRoot:
         for program in ('mmdebstrap', 'unshare', 'chroot'):
             if not shutil.which(program):
                 raise CannotMake('%s is not installed' % program)
-        said = ''
-        for lines in sources_of(self.release, source_entries(), host_release()):
-            shutil.rmtree(self.folder, ignore_errors=True)
-            made = subprocess.run(['mmdebstrap', '--quiet', '--mode=root', '--variant=minbase', '--include=git,ca-certificates',
-                                   self.release, str(self.folder), '-'], input='\n'.join(lines) + '\n', text=True,
-                                  capture_output=True, check=False)
-            if made.returncode == 0:
-                break
+        lines = sources_of(self.release, source_entries(), host_release())
+        made = subprocess.run(['mmdebstrap', '--quiet', '--mode=root', '--variant=minbase', '--include=git,ca-certificates',
+                               self.release, str(self.folder), '-'], input='\n'.join(lines) + '\n', text=True,
+                              capture_output=True, check=False)
+        if made.returncode != 0:
             said = (made.stderr.strip().splitlines() or ['no word'])[-1]
-        else:
             raise CannotMake('mmdebstrap made no root of %s: %s' % (self.release, said))
         shutil.copy('/etc/resolv.conf', self.folder / 'etc/resolv.conf')
         # Every installer and every container runtime writes it; mmdebstrap does not.
