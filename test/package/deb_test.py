@@ -98,11 +98,13 @@ apt install -y ./build/packages/deformable-ccd-octomap-msgs_*.deb
 REMOVE = r'''
 apt purge -y deformable-ccd libdeformable-ccd-dev deformable-ccd-octomap-msgs
 apt-get purge -y cmake g++ make
-apt-get autoremove -y --purge
+# What another installed package merely recommends or suggests would stay, and says nothing about ours.
+apt-get -o APT::AutoRemove::RecommendsImportant=0 -o APT::AutoRemove::SuggestsImportant=0 autoremove -y --purge
 find / -xdev \( -path /tmp -o -path /proc -o -path /dev \) -prune -o -print | sort >after/files
 '''
 # Where apt, dpkg and ldconfig keep their own books; and what Debian's own packages forget when they are purged.
-OF_THE_TOOLS = ('/var/cache/', '/var/lib/apt/', '/var/lib/dpkg/', '/var/log/')
+OF_THE_TOOLS = ('/var/cache/', '/var/lib/apt/', '/var/lib/dpkg/', '/var/log/',
+                '/etc/gshadow-', '/etc/shadow-', '/etc/xml', '/run/adduser')
 
 
 def control():
