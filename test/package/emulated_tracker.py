@@ -30,9 +30,9 @@ def cloud(rows, cols, t, organised):
 
 
 def wall():
-    """48 x 64 pixels at a depth of 3 m, 20 mm apart; every seventh is lost."""
+    """48 x 64 pixels at a depth of 3 m, 6 mm apart; every seventh is lost."""
     lost = float('nan')
-    seen = [(0.02 * c, 0.02 * r, 3.0) if (r * 64 + c) % 7 else (lost, lost, lost) for r in range(48) for c in range(64)]
+    seen = [(0.006 * c, 0.006 * r, 3.0) if (r * 64 + c) % 7 else (lost, lost, lost) for r in range(48) for c in range(64)]
     message = PointCloud2(height=48, width=64, point_step=16, row_step=16 * 64, is_dense=False,
                           data=b''.join(struct.pack('<fffI', *p, 0xff8040) for p in seen))
     message.fields = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate(('x', 'y', 'z', 'rgb'))]
