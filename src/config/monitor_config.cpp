@@ -14,14 +14,30 @@ constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
 
 TopologySource topologySource(ParameterReader& section) {
-  const std::string text =
-      section.choice("source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld"});
+  const std::string text = section.choice(
+      "source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld", "depth_image"});
   if (text == "message") return TopologySource::MESSAGE;
   if (text == "grid") return TopologySource::GRID;
   if (text == "polyline") return TopologySource::POLYLINE;
   if (text == "file") return TopologySource::FILE;
   if (text == "first_frame_weld") return TopologySource::FIRST_FRAME_WELD;
+  if (text == "depth_image") return TopologySource::DEPTH_IMAGE;
   return TopologySource::AUTO;
+}
+
+void readDepthImage(ParameterReader& section, MeshInputConfig& input) {
+  const bool is_image = input.source == TopologySource::DEPTH_IMAGE;
+  for (const char* name : {"max_edge_m", "stride", "max_range_m", "median"}) {
+    if (!is_image && section.has(name)) section.fail(name, "has no meaning without source: depth_image; remove it");
+  }
+  DepthSurfaceOptions& depth = input.depth;
+  depth.max_edge_m = section.number("max_edge_m", depth.max_edge_m, 1e-6, LARGE);
+  depth.stride = static_cast<std::size_t>(section.integer("stride", static_cast<int>(depth.stride), 1, 1000));
+  depth.max_range_m = section.number("max_range_m", depth.max_range_m, 0, LARGE);
+  depth.median = static_cast<std::size_t>(section.integer("median", static_cast<int>(depth.median), 1, 15));
+  if (depth.median % 2 == 0)
+    section.fail("median", "must be odd, so that a pixel lies in the middle: 1 (off), 3, 5, …");
+  if (is_image && input.rows) section.fail("rows", "has no meaning for a depth image, which brings its own; remove it");
 }
 
 void readTopology(ParameterReader section, BodyConfig& body) {
@@ -30,11 +46,14 @@ void readTopology(ParameterReader section, BodyConfig& body) {
   input.rows = static_cast<std::size_t>(section.integer("rows", 0, 0, 100000));
   input.cols = static_cast<std::size_t>(section.integer("cols", 0, 0, 100000));
   body.topology_file = section.get("file", std::string());
+  readDepthImage(section, input);
   section.finish();
   if ((input.rows == 0) != (input.cols == 0)) section.fail("rows", "and cols go together: set both or neither");
   if (input.rows == 1 || input.cols == 1)
     section.fail("rows", "and cols must be 2 or more; for a rope set source to polyline");
   if (input.source == TopologySource::AUTO && !body.topology_file.empty()) input.source = TopologySource::FILE;
+  if (input.source == TopologySource::DEPTH_IMAGE && !body.topology_file.empty())
+    section.fail("file", "has no meaning for a depth image, whose surface is made anew; remove it");
   if (input.source == TopologySource::FILE && body.topology_file.empty())
     section.fail("file", "is needed for source 'file'");
   if (input.source == TopologySource::POLYLINE && input.rows)
@@ -46,7 +65,7 @@ void readRigid(ParameterReader section, BodyConfig& body) {
   body.tf_frame = section.get("frame", std::string());
   body.mesh_scale = section.number("scale", 1.0, 1e-6, 1e6);
   section.finish();
-  if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY) or a package:// path");
+  if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY, DAE) or a package:// path");
   if (body.tf_frame.empty()) section.fail("frame", "is needed: the tf frame that carries the mesh");
   body.body.rigid = true;
 }
@@ -88,6 +107,14 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
   }
   if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
   body.body.vertex_mask = reader.indices("vertex_mask");
+  if (body.isDepthImage()) {
+    // No vertex of one cloud is a vertex of the next, so there is no path between two, nor a number to mask.
+    if (body.body.motion != BodyMotionKind::STATIC) {
+      reader.fail("motion",
+                  "must be static with topology/source depth_image: no point of a cloud has a path to the next");
+    }
+    if (!body.body.vertex_mask.empty()) reader.fail("vertex_mask", "has no meaning for a depth image; remove it");
+  }
   if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
   readUncertainty(reader.section("uncertainty"), body);
   return body;
@@ -95,12 +122,16 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
 
 void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyConfig& body) {
   const bool self_asked = reader.has("self_collision");
-  body.body.self_collision = reader.get("self_collision", !body.body.rigid);
+  body.body.self_collision = reader.get("self_collision", !body.body.rigid && !body.isDepthImage());
   if (body.body.rigid && self_asked && body.body.self_collision) {
     reader.fail("self_collision", "is true, but the body is rigid and cannot meet itself; remove it");
   }
+  if (body.isDepthImage() && body.body.self_collision) {
+    reader.fail("self_collision",
+                "is true, but a depth image is one view of a surface and cannot meet itself; remove it");
+  }
   body.body.against_bodies = reader.get("against_bodies", true);
-  body.body.against_obstacle = reader.get("against_obstacle", true);
+  body.body.against_obstacle = reader.get("against_obstacle", !body.isDepthImage());
   body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
 }
 

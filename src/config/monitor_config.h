@@ -27,6 +27,7 @@ struct BodyConfig {
   std::string tf_frame;
   double mesh_scale = 1;
   bool isRigid() const { return body.rigid; }
+  bool isDepthImage() const { return input.source == TopologySource::DEPTH_IMAGE; }
   bool isUncertain() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
 };
 

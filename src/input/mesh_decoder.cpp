@@ -81,6 +81,9 @@ DecodedMesh MeshDecoder::decodeAs(const std::string& datatype, View view) {
   if (config_.type != "auto" && config_.type != type->name) {
     refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
   }
+  if (config_.source == TopologySource::DEPTH_IMAGE && type->name != std::string("point_cloud2")) {
+    refuse("topology/source depth_image is for a sensor_msgs/PointCloud2, and " + datatype + " arrives");
+  }
   try {
     return std::visit([this](const auto& mesh) { return decodeView(mesh); }, view(*type));
   } catch (const WireError& error) {
@@ -100,7 +103,7 @@ DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
                   [&](const MeshType& type) { return type.view(message.message.get(), config_.noise_field); });
 }
 
-void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh) const {
+void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel) const {
   const bool from_field = !config_.noise_field.empty();
   if (from_field && !cloud) {
     refuse("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
@@ -111,9 +114,10 @@ void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh) const {
   if (!from_field) return;
   for (std::size_t i = 0; i < mesh.radius_m.size(); ++i) {
     if (!mesh.positions[i].allFinite()) continue;  // unchecked anyway, and trackers leave everything of it open
-    const double value = cloud->extraValue(i);
+    const std::size_t point = pixel ? (*pixel)[i] : i;
+    const double value = cloud->extraValue(point);
     if (!(value >= 0) || !std::isfinite(config_.noise_scale * value)) {
-      refuse("field '" + config_.noise_field + "' of point " + std::to_string(i) + " is " + std::to_string(value) +
+      refuse("field '" + config_.noise_field + "' of point " + std::to_string(point) + " is " + std::to_string(value) +
              "; an uncertainty is finite and not negative");
     }
     mesh.radius_m[i] += config_.noise_scale * value;
@@ -172,7 +176,28 @@ std::shared_ptr<const Topology> MeshDecoder::fromFaces(std::size_t points, std::
   return topology_;
 }
 
+DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
+  if (cloud.height < 2) {
+    refuse("topology/source depth_image needs an organised PointCloud2, and this one has " +
+           std::to_string(cloud.height) + " rows; subscribe to the camera's cloud before it is filtered");
+  }
+  DecodedMesh mesh;
+  start(cloud.header, mesh);
+  checkCount(keptPixels(cloud, config_.depth.stride));
+  DepthSurface surface;
+  try {
+    surface = depthSurface(cloud, config_.depth);
+  } catch (const DepthSurfaceError& error) {
+    refuse(error.what());
+  }
+  mesh.topology = std::make_shared<const Topology>(Topology::fromTriangles(surface.positions.size(), surface.faces));
+  mesh.positions = std::move(surface.positions);
+  addRadii(&cloud, mesh, &surface.pixel);
+  return mesh;
+}
+
 DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
+  if (config_.source == TopologySource::DEPTH_IMAGE) return decodeDepthImage(cloud);
   DecodedMesh mesh;
   start(cloud.header, mesh);
   checkCount(cloud.size());

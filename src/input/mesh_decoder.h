@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "dccd/mesh_store.h"
+#include "input/depth_surface.h"
 #include "input/message_type.h"
 
 namespace dccd {
 
-enum class TopologySource : std::uint8_t { AUTO, MESSAGE, GRID, POLYLINE, FILE, FIRST_FRAME_WELD };
+enum class TopologySource : std::uint8_t { AUTO, MESSAGE, GRID, POLYLINE, FILE, FIRST_FRAME_WELD, DEPTH_IMAGE };
 
 /// How a body's messages are to be read.
 struct MeshInputConfig {
@@ -22,7 +23,8 @@ struct MeshInputConfig {
   TopologySource source = TopologySource::AUTO;
   std::size_t rows = 0, cols = 0;  ///< grid; both 0: not given
   std::shared_ptr<const Topology> file_topology;
-  bool weld = true;  ///< triangle soup: corners with equal coordinates are one vertex
+  DepthSurfaceOptions depth;  ///< of a depth image
+  bool weld = true;           ///< triangle soup: corners with equal coordinates are one vertex
   std::optional<std::string> marker_namespace;
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
@@ -72,10 +74,12 @@ class MeshDecoder {
   DecodedMesh decodeView(const CloudView& cloud);
   DecodedMesh decodeView(const IndexedView& mesh);
   DecodedMesh decodeView(const std::vector<MarkerView>& markers);
+  DecodedMesh decodeDepthImage(const CloudView& cloud) const;
   DecodedMesh decodeSoup(const MarkerView& marker);
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;
-  void addRadii(const CloudView* cloud, DecodedMesh& mesh) const;
+  /// `pixel` has the number in the cloud of each vertex; null: they are the same.
+  void addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel = nullptr) const;
   std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
   std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
   bool weldHolds(const Positions& corners) const;

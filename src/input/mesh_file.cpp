@@ -5,23 +5,22 @@
 #include <pcl/io/ply_io.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <sstream>
+#include <system_error>
 
 #include "input/obj_file.h"
 
 namespace dccd {
 namespace {
 
-std::string extension(const std::string& path) {
-  const std::size_t dot = path.find_last_of("./");
-  std::string e = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot + 1);
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return e;
-}
+constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{512} << 20;
 
 double coordinate(const pcl::PCLPointCloud2& cloud, const pcl::PCLPointField& field, std::size_t point) {
   const std::uint8_t* at = cloud.data.data() + point * cloud.point_step + field.offset;
@@ -163,11 +162,56 @@ class PlyHeaderCheck {
 
 }  // namespace
 
+std::string fileEnding(const std::string& path) {
+  const std::size_t dot = path.find_last_of("./");
+  std::string e = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot + 1);
+  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return e;
+}
+
+void requireReadable(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!error && std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw MeshFileError(path + ": is no regular file");
+  }
+  if (error || !std::ifstream(path)) throw MeshFileError(path + ": cannot be opened");
+  const std::uint64_t bytes = std::filesystem::file_size(path);
+  if (bytes > MAX_FILE_BYTES) {
+    throw MeshFileError(path + ": has " + std::to_string(bytes) + " bytes, at most " + std::to_string(MAX_FILE_BYTES) +
+                        " are read");
+  }
+}
+
+std::string readWholeFile(const std::string& path) {
+  requireReadable(path);
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+MeshFile weldTriangles(const Positions& corners, const std::string& path) {
+  if (corners.empty() || corners.size() % 3 != 0) throw MeshFileError(path + ": no whole triangles");
+  MeshFile mesh;
+  std::map<std::array<double, 3>, Index> known;
+  for (std::size_t c = 0; c < corners.size(); c += 3) {
+    Face face;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3& p = corners[c + static_cast<std::size_t>(k)];
+      if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
+      const auto [it, fresh] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<Index>(mesh.positions.size()));
+      if (fresh) mesh.positions.push_back(p);
+      face[static_cast<std::size_t>(k)] = it->second;
+    }
+    if (face[0] != face[1] && face[1] != face[2] && face[0] != face[2]) mesh.faces.push_back(face);
+  }
+  return mesh;
+}
+
 MeshFile loadMeshFile(const std::string& path) {
-  if (!std::ifstream(path)) throw MeshFileError(path + ": cannot be opened");
+  requireReadable(path);
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // errors are reported below, once
   pcl::PolygonMesh mesh;
-  const std::string type = extension(path);
+  const std::string type = fileEnding(path);
   int result = -1;
   if (type != "ply" && type != "obj") {
     throw MeshFileError(path + ": unknown mesh format '" + type + "'; .ply and .obj can be read");

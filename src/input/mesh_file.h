@@ -18,7 +18,19 @@ struct MeshFile {
   std::vector<Face> faces;  ///< polygons with more than three corners as fans
 };
 
-/// Throws MeshFileError naming the file and what is wrong with it.
+/// PLY or OBJ: vertices keep their numbers, their order and every bit of their coordinates, as frames and topologies
+/// need it. Throws MeshFileError naming the file and what is wrong with it.
 MeshFile loadMeshFile(const std::string& path);
+
+/// The small letters behind a path's last dot; empty where there is none.
+std::string fileEnding(const std::string& path);
+/// Throws MeshFileError unless the path is a regular file of at most 512 MiB that can be read: a pipe or a device would
+/// never come to an end.
+void requireReadable(const std::string& path);
+/// The bytes of such a file. Throws MeshFileError.
+std::string readWholeFile(const std::string& path);
+/// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first
+/// corners; triangles without area are left out. Throws MeshFileError for a coordinate that is not finite.
+MeshFile weldTriangles(const Positions& corners, const std::string& path);
 
 }  // namespace dccd

@@ -1,11 +1,11 @@
 #include "input/mesh_resource.h"
 
 #include <algorithm>
-#include <cctype>
 #include <stdexcept>
 
 #include <ros/package.h>
 
+#include "input/dae_file.h"
 #include "input/mesh_file.h"
 #include "input/stl_file.h"
 
@@ -24,10 +24,12 @@ std::string pathOf(const std::string& address) {
   return slash == std::string::npos ? root : root + address.substr(slash);
 }
 
-bool endsWith(std::string text, const std::string& end) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+MeshFile load(const std::string& path) {
+  const std::string ending = fileEnding(path);
+  if (ending == "stl") return loadStlFile(path);
+  if (ending == "dae") return loadDaeFile(path);
+  if (ending == "ply" || ending == "obj") return loadMeshFile(path);
+  throw MeshFileError(path + ": unknown mesh format '" + ending + "'; STL, OBJ, PLY and DAE can be read");
 }
 
 }  // namespace
@@ -36,8 +38,11 @@ MeshResource loadMeshResource(const std::string& address, double scale) {
   const std::string path = pathOf(address);
   MeshResource resource;
   try {
-    MeshFile mesh = endsWith(path, ".stl") ? loadStlFile(path) : loadMeshFile(path);
-    for (Vec3& p : mesh.positions) p *= scale;
+    MeshFile mesh = load(path);
+    for (Vec3& p : mesh.positions) {
+      p *= scale;
+      if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
+    }
     mesh.faces.erase(std::remove_if(mesh.faces.begin(), mesh.faces.end(),
                                     [](const Face& f) { return f[0] == f[1] || f[1] == f[2] || f[0] == f[2]; }),
                      mesh.faces.end());
@@ -50,6 +55,13 @@ MeshResource loadMeshResource(const std::string& address, double scale) {
   }
   if (!resource.topology->hasFaces()) throw std::invalid_argument(path + ": there are no triangles");
   return resource;
+}
+
+std::shared_ptr<const Topology> loadTopologyFile(const std::string& address) {
+  if (fileEnding(address) == "dae") {
+    throw std::invalid_argument(address + ": a DAE does not number its vertices as a tracker does");
+  }
+  return loadMeshResource(address, 1).topology;
 }
 
 }  // namespace dccd

@@ -87,8 +87,8 @@ class ObjReader {
 }  // namespace
 
 MeshFile loadObjFile(const std::string& path) {
+  requireReadable(path);
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw MeshFileError(path + ": cannot be opened");
   return ObjReader(path).read(file);
 }
 

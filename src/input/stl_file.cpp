@@ -1,10 +1,6 @@
 #include "input/stl_file.h"
 
-#include <array>
 #include <cstring>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <sstream>
 
 namespace dccd {
@@ -41,9 +37,7 @@ Positions asciiCorners(const std::string& text, const std::string& path) {
 }  // namespace
 
 MeshFile loadStlFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw MeshFileError(path + ": cannot be opened");
-  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string bytes = readWholeFile(path);
   std::uint32_t triangles = 0;
   if (bytes.size() >= HEADER_BYTES + 4) std::memcpy(&triangles, bytes.data() + HEADER_BYTES, 4);
   // Binary files may begin with "solid" too; only the size tells for certain.
@@ -52,23 +46,7 @@ MeshFile loadStlFile(const std::string& path) {
   if (!binary && bytes.compare(0, 5, "solid") != 0) {
     throw MeshFileError(path + ": neither an ASCII STL nor a binary one of the size that it states");
   }
-  const Positions corners = binary ? binaryCorners(bytes, triangles) : asciiCorners(bytes, path);
-  if (corners.empty() || corners.size() % 3 != 0) throw MeshFileError(path + ": no whole triangles");
-
-  MeshFile mesh;
-  std::map<std::array<double, 3>, Index> known;
-  for (std::size_t c = 0; c < corners.size(); c += 3) {
-    Face face;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3& p = corners[c + static_cast<std::size_t>(k)];
-      if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
-      const auto [it, fresh] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<Index>(mesh.positions.size()));
-      if (fresh) mesh.positions.push_back(p);
-      face[static_cast<std::size_t>(k)] = it->second;
-    }
-    if (face[0] != face[1] && face[1] != face[2] && face[0] != face[2]) mesh.faces.push_back(face);
-  }
-  return mesh;
+  return weldTriangles(binary ? binaryCorners(bytes, triangles) : asciiCorners(bytes, path), path);
 }
 
 }  // namespace dccd

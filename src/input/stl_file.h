@@ -1,4 +1,6 @@
-// STL, binary and ASCII. PCL reads it through VTK only, which would be a large library for fifty bytes a triangle.
+// STL, binary and ASCII. PCL reads it through VTK only, a large library for fifty bytes a triangle. assimp's reader
+// (5.2.5, of Debian 12) reads past its buffer where a file begins with the mark of UTF-32, as fuzzing found, loses
+// memory on every file that it refuses, and rounds ASCII coordinates to float.
 #pragma once
 
 #include <string>
@@ -7,8 +9,7 @@
 
 namespace dccd {
 
-/// Corners with equal coordinates become one vertex, triangles without area are left out. Throws MeshFileError naming
-/// the file and what is wrong with it.
+/// Welded by weldTriangles(). Throws MeshFileError naming the file and what is wrong with it.
 MeshFile loadStlFile(const std::string& path);
 
 }  // namespace dccd

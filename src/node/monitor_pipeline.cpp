@@ -18,12 +18,14 @@ std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
   return bodies;
 }
 
-MeshResource loadFile(const BodyConfig& body, const std::string& parameter, const std::string& file, double scale) {
+/// What `load` makes of a file; its error as the parameter's.
+template <typename Load>
+auto loadFile(const BodyConfig& body, const std::string& parameter, const std::string& formats, Load load) {
   try {
-    return loadMeshResource(file, scale);
+    return load();
   } catch (const std::invalid_argument& error) {
     throw ParameterError("parameter " + parameter + " of body '" + body.body.name + "': " + error.what() +
-                         "; write the path of an STL, OBJ or PLY mesh, or package://NAME/PATH");
+                         "; write the path of " + formats + " mesh, or package://NAME/PATH");
   }
 }
 
@@ -54,11 +56,13 @@ void MonitorPipeline::loadFiles() {
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     BodyConfig& body = config_.bodies[b];
     if (!body.topology_file.empty()) {
-      body.input.file_topology = loadFile(body, "topology/file", body.topology_file, 1).topology;
+      body.input.file_topology =
+          loadFile(body, "topology/file", "an STL, OBJ or PLY", [&] { return loadTopologyFile(body.topology_file); });
       checkGrid(body);
     }
     if (!body.isRigid()) continue;
-    MeshResource mesh = loadFile(body, "rigid/mesh", body.mesh_file, body.mesh_scale);
+    MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
+                                 [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
     if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
   }
@@ -202,10 +206,11 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
       reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
     }
     waiting.reason = reason;
+    waiting.overdue =
+        finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
     // There is no use in waiting for a static body that has waited in vain itself.
-    const bool timed_out = finishing_ || waiting.kept ||
-                           (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept) ||
-                           static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
+    const bool timed_out =
+        waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept);
     if (!timed_out) return false;
     if (isStatic(body)) {
       keep(body);

@@ -33,8 +33,9 @@ class MonitorPipeline {
   MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms);
 
   /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
-  /// and gives way to the next.
-  bool idle(std::size_t body) const { return !waiting_[body] || waiting_[body]->kept; }
+  /// and gives way to the next. Each waits its own time: where tf lags behind a camera by more than the time between
+  /// two clouds, one that gave way at once would never find its place.
+  bool idle(std::size_t body) const { return !waiting_[body] || waiting_[body]->overdue; }
   /// Counts, decodes and keeps one message of an idle body. One that is refused is counted, too, and the clock body's
   /// yields an outcome.
   void take(std::size_t body, const MeshMessage& message);
@@ -70,9 +71,10 @@ class MonitorPipeline {
   struct Waiting {
     DecodedMesh mesh;
     std::int64_t arrival_ns = 0;
-    bool kept = false;   // past transform_timeout_s: a static body sends its only frame once
-    bool told = false;   // the complaint about it has been set
-    std::string reason;  // why it has no place yet
+    bool overdue = false;  // past transform_timeout_s
+    bool kept = false;     // that, or one before it was: a static body sends its only frame once, and steps do not wait
+    bool told = false;     // the complaint about it has been set
+    std::string reason;    // why it has no place yet
   };
   struct RigidMesh {
     std::shared_ptr<const Topology> topology;

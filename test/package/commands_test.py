@@ -161,11 +161,12 @@ class CommandsTest(unittest.TestCase):
     def tracker_of(self, command):
         """The emulated publisher that a launched monitor is meant for."""
         given = dict(re.findall(r'(\w+):=(\S+)', command))
-        preset = re.search(r'(cdcpd|trackdlo|fabric_simulator|octomap_server)\.launch', command)
+        preset = re.search(r'(cdcpd|trackdlo|fabric_simulator|octomap_server|depth_camera)\.launch', command)
         kind, topic, rows, cols, frame = {
             'cdcpd': ('cloud', '/cdcpd/output', 20, 20, 'world'), 'trackdlo': ('cloud', '/trackdlo/results_pc', 1, 40, 'world'),
             'fabric_simulator': ('markers', '/fabric_markers', 8, 8, 'world'),
-            'octomap_server': ('grid', '/mesh', 10, 10, 'map')}.get(preset and preset.group(1), ('grid', '/mesh', 10, 10, 'world'))
+            'octomap_server': ('grid', '/mesh', 10, 10, 'map'),
+            'depth_camera': ('camera', '/mesh', 10, 10, 'world')}.get(preset and preset.group(1), ('grid', '/mesh', 10, 10, 'world'))
         children = []
         if 'params' in given:
             bodies = yaml.safe_load((self.home / given['params']).read_text())['bodies']
@@ -327,7 +328,7 @@ class CommandsTest(unittest.TestCase):
     def test_every_preset_answers_its_tracker(self):
         """With each tracker emulated as it publishes."""
         presets = sorted(p.name for p in (CHECKOUT / 'launch/presets').glob('*.launch'))
-        self.assertGreaterEqual(len(presets), 4)
+        self.assertGreaterEqual(len(presets), 5)
         for preset in presets:
             with self.subTest(preset):
                 self.run_monitor('roslaunch deformable_ccd ' + preset)

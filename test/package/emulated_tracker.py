@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """A tracker that is not there: publishes a waving cloth at 30 Hz, as the trackers of launch/presets send theirs.
 
-usage: emulated_tracker.py cloud|grid|markers TOPIC ROWS COLS FRAME [RIGID_FRAME...]
+usage: emulated_tracker.py cloud|grid|markers|camera TOPIC ROWS COLS FRAME [RIGID_FRAME...]
   cloud    PointCloud2 of height 1, row by row    grid  an organised PointCloud2    markers  a TRIANGLE_LIST in a MarkerArray
+  camera   a grid, and at 10 Hz the organised cloud of a depth camera that sees a wall behind it, with lost pixels
 Each RIGID_FRAME is sent on /tf, as a child of FRAME.
 """
 import math
@@ -28,6 +29,16 @@ def cloud(rows, cols, t, organised):
     return message
 
 
+def wall():
+    """48 x 64 pixels at a depth of 3 m, 6 mm apart; every seventh is lost."""
+    lost = float('nan')
+    seen = [(0.006 * c, 0.006 * r, 3.0) if (r * 64 + c) % 7 else (lost, lost, lost) for r in range(48) for c in range(64)]
+    message = PointCloud2(height=48, width=64, point_step=16, row_step=16 * 64, is_dense=False,
+                          data=b''.join(struct.pack('<fffI', *p, 0xff8040) for p in seen))
+    message.fields = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate(('x', 'y', 'z', 'rgb'))]
+    return message
+
+
 def markers(rows, cols, t):
     at = [Point(*p) for p in points(rows, cols, t)]
     marker = Marker(ns='', id=2, type=Marker.TRIANGLE_LIST, action=Marker.ADD)
@@ -49,11 +60,17 @@ def main():
     rospy.init_node('emulated_tracker', anonymous=True, disable_signals=True)
     publisher = rospy.Publisher(topic, MarkerArray if kind == 'markers' else PointCloud2, queue_size=3)
     poses = rospy.Publisher('/tf', TFMessage, queue_size=3)
+    camera = rospy.Publisher('/camera/depth_registered/points', PointCloud2, queue_size=3) if kind == 'camera' else None
+    seen, frames = wall(), 0
     while not rospy.is_shutdown():
         now = rospy.Time.now()
-        message = markers(rows, cols, now.to_sec()) if kind == 'markers' else cloud(rows, cols, now.to_sec(), kind == 'grid')
+        message = markers(rows, cols, now.to_sec()) if kind == 'markers' else cloud(rows, cols, now.to_sec(), kind in ('grid', 'camera'))
         message.header.stamp, message.header.frame_id = now, frame
         publisher.publish(MarkerArray([message]) if kind == 'markers' else message)
+        if camera and frames % 3 == 0:
+            seen.header = message.header
+            camera.publish(seen)
+        frames += 1
         poses.publish([pose(frame, child, now) for child in sys.argv[6:]])
         rospy.sleep(1 / 30)
 

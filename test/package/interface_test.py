@@ -9,6 +9,7 @@ ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md
 READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|section)\(\s*"(\w+)"')
 # What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
+            'readDepthImage': 'topology/',
             'readMarkers': 'markers/'}
 # Where a page names a family at once.
 ENTRY_FIELDS = {'between', 'separation_m'}  # of minimum_separation_pairs
@@ -82,7 +83,8 @@ class InterfaceTest(unittest.TestCase):
         self.assertGreater(len(units), 20, 'the search found too little to mean anything')
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
         numbers = numbers_of_bodies()
-        self.assertEqual(numbers, {'minimum_separation_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale'})
+        self.assertEqual(numbers, {'minimum_separation_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale',
+                                   'topology/max_edge_m', 'topology/max_range_m'})
         self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
+#include <set>
 
 #include "octomap/map_builder.h"
 #include "ros/support/meshes.h"
@@ -19,7 +21,7 @@ namespace {
 
 constexpr double RATE_HZ = 30;
 constexpr double TABLE_M = 0;  // height of the table's top in the map
-constexpr std::size_t MONITORS = 4;
+constexpr std::size_t MONITORS = 5;
 
 /// A table of 2 m x 2 m below z = 0 and, where `more` says so, other voxels; as octomap_server sends it: latched,
 /// binary, in the frame map, stamped when the sensor saw it.
@@ -237,6 +239,64 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
   EXPECT_TRUE(rest.contacts.empty()) << "its own voxels are not listed";
   EXPECT_GT(rest.suppressed_contacts, 0u) << "but counted";
   EXPECT_GT(touching(), 0u) << "the table is no part of the cloth";
+}
+
+struct DepthCamera : Preset {
+  DepthCamera() : Preset("depth_camera") {}
+  static constexpr std::uint32_t ROWS = 480, COLS = 640;
+
+  /// A metre above the table, which it sees at depth 1; 525 pixels a metre. Every tenth pixel of every tenth row is
+  /// lost, as are the 40 columns at the left that only one eye sees.
+  static sensor_msgs::PointCloud2 seen(const std::string& frame) {
+    constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
+    Positions points;
+    for (std::uint32_t row = 0; row < ROWS; ++row) {
+      for (std::uint32_t col = 0; col < COLS; ++col) {
+        const bool lost = col < 40 || (row % 10 == 0 && col % 10 == 0);
+        const double x = (static_cast<double>(col) - 319.5) / 525, y = (static_cast<double>(row) - 239.5) / 525;
+        points.push_back(lost ? Vec3(LOST, LOST, LOST) : Vec3(x, y, 1));
+      }
+    }
+    sensor_msgs::PointCloud2 out = pclCloud(points, frame);
+    out.height = ROWS;
+    out.width = COLS;
+    out.row_step = 32 * COLS;
+    out.is_dense = false;
+    return out;
+  }
+};
+
+TEST_F(DepthCamera, ClothOnWhatTheCameraSees) {
+  const std::string frame = "camera_depth_optical_frame";
+  const auto tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf_static", true, MONITORS);
+  tf2_msgs::TFMessage poses;
+  poses.transforms.push_back(cameraPose(frame));
+  tf.publish(poses);
+  const auto points = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/camera/depth_registered/points");
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/depth_camera/mesh");
+  int frames = 0;
+  drop(0.1, -0.05, [&](double z) {
+    if (frames++ % 3 == 0) points.publish(seen(frame));  // a camera at 10 Hz
+    Mesh mesh{grid(3, 3, 0.05, z), {}};
+    for (const Index a : {0u, 1u, 3u, 4u}) {
+      mesh.faces.push_back({a, a + 1, a + 3});
+      mesh.faces.push_back({a + 1, a + 4, a + 3});
+    }
+    deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
+    message.header.stamp = ros::Time::now();
+    publisher.publish(message);
+  });
+  EXPECT_TRUE(rest.contacts.empty());
+  // 150 mm in ten steps of 15 mm: the table is met in the seventh, two thirds of the way down. An outcome of the rest
+  // may come late and be counted among those of the fall.
+  const auto met =
+      std::find_if(fall.begin(), fall.end(), [](const auto& outcome) { return !outcome.contacts.empty(); });
+  ASSERT_NE(met, fall.end()) << "it fell through what the camera sees";
+  EXPECT_GE(met - fall.begin(), 6);
+  for (const auto& contact : met->contacts) {
+    EXPECT_EQ(std::set<unsigned>({contact.body[0], contact.body[1]}), (std::set<unsigned>{0, 1}));
+    EXPECT_NEAR(contact.toc_lower, 2.0 / 3, 1e-3);
+  }
 }
 
 }  // namespace

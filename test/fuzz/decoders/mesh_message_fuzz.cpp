@@ -17,6 +17,12 @@ MeshInputConfig configOf(std::uint8_t byte) {
                                            TopologySource::POLYLINE, TopologySource::FIRST_FRAME_WELD};
   MeshInputConfig config;
   config.source = SOURCES[byte % 5];
+  if (config.source == TopologySource::FIRST_FRAME_WELD && (byte & 0x08) != 0) {
+    config.source = TopologySource::DEPTH_IMAGE;
+    config.depth.max_edge_m = 100;
+    config.depth.stride = (byte & 0x04) != 0 ? 2 : 1;
+    config.depth.median = (byte & 0x01) != 0 ? 3 : 1;
+  }
   config.weld = (byte & 0x20) == 0;
   if ((byte & 0x40) != 0) config.rows = config.cols = 2;
   if ((byte & 0x80) != 0) config.frame_id = "world";

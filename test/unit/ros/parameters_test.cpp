@@ -37,6 +37,12 @@ XmlRpcValue separationPair(const std::string& a, const std::string& b, double se
   return pair;
 }
 
+/// A body `seen` that is a depth camera's cloud, and nothing else.
+void depthImage(XmlRpcValue& tree) {
+  tree["bodies"]["seen"]["motion"] = "static";
+  tree["bodies"]["seen"]["topology"]["source"] = "depth_image";
+}
+
 TEST(Parameters, NoneAtAllIsOneBodyWithDefaults) {
   const MonitorConfig config = readConfig(XmlRpcValue());
   ASSERT_EQ(config.bodies.size(), 1u);
@@ -145,12 +151,56 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
          t["bodies"]["finger"]["rigid"]["frame"] = "finger";
          t["bodies"]["finger"]["self_collision"] = true;
        }},
+      {"~topology/stride has no meaning without source: depth_image",
+       [](XmlRpcValue& t) { t["topology"]["stride"] = 2; }},
+      {"~bodies/seen/motion must be static with topology/source depth_image",
+       [](XmlRpcValue& t) { t["bodies"]["seen"]["topology"]["source"] = "depth_image"; }},
+      {"~bodies/seen/topology/median must be odd",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["topology"]["median"] = 4;
+       }},
+      {"~bodies/seen/topology/rows has no meaning for a depth image",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["topology"]["rows"] = 480;
+         t["bodies"]["seen"]["topology"]["cols"] = 640;
+       }},
+      {"~bodies/seen/topology/file has no meaning for a depth image",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["topology"]["file"] = "a.ply";
+       }},
+      {"~bodies/seen/vertex_mask has no meaning for a depth image",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["vertex_mask"][0] = 1;
+       }},
+      {"is one view of a surface and cannot meet itself",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["self_collision"] = true;
+       }},
+      {"cannot be chosen: no body is a stream of meshes", [](XmlRpcValue& t) { depthImage(t); }},
   };
   for (const Case& one : cases) {
     XmlRpcValue tree;
     one.set(tree);
     EXPECT_TRUE(mentions(errorOf(tree), one.expected)) << one.expected << ": " << errorOf(tree);
   }
+}
+
+TEST(Parameters, ADepthImageIsHeldAgainstOtherBodiesOnly) {
+  XmlRpcValue tree;
+  depthImage(tree);
+  tree["bodies"]["cloth"]["topic"] = "cloth";
+  const MonitorConfig config = readConfig(tree);
+  const BodyConfig &cloth = config.bodies.at(0), &seen = config.bodies.at(1);
+  EXPECT_TRUE(seen.isDepthImage());
+  EXPECT_FALSE(seen.body.self_collision);
+  EXPECT_FALSE(seen.body.against_obstacle) << "the map holds what the camera saw";
+  EXPECT_TRUE(seen.body.against_bodies);
+  EXPECT_TRUE(cloth.body.self_collision && cloth.body.against_obstacle);
 }
 
 TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
@@ -294,7 +344,7 @@ std::string shown(const std::string& text) { return text.empty() ? "none" : "`" 
 std::string shown(bool value) { return value ? "true" : "false"; }
 std::string shown(double value) {
   std::ostringstream text;
-  text << std::setprecision(17) << value;
+  text << std::setprecision(15) << value;
   return text.str();
 }
 std::string shown(std::size_t value) { return std::to_string(value); }
@@ -319,6 +369,10 @@ std::map<std::string, std::string> defaultsInTheCode() {
       {"topology/rows", shown(body.input.rows)},
       {"topology/cols", shown(body.input.cols)},
       {"topology/file", shown(body.topology_file)},
+      {"topology/max_edge_m", shown(body.input.depth.max_edge_m)},
+      {"topology/stride", shown(body.input.depth.stride)},
+      {"topology/max_range_m", shown(body.input.depth.max_range_m)},
+      {"topology/median", shown(body.input.depth.median)},
       {"weld", single.input.weld ? "`on`" : "`off`"},
       {"max_vertices", shown(body.input.max_vertices)},
       {"marker/namespace", body.input.marker_namespace ? "set" : "none"},
