@@ -11,8 +11,8 @@
 namespace dccd {
 
 void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path) {
-  if (spec.monitor_yaml.empty()) return;
-  const MonitorConfig config = readConfig(parseYaml(spec.monitor_yaml, scene_path), scene_path + ": monitor/");
+  if (!spec.monitor.isSet()) return;
+  const MonitorConfig config = readConfig(spec.monitor, "monitor/");
   try {
     const EffectTracker effects(config);  // an effect that is on, but not to be had
     tf2::BufferCore transforms;
