@@ -35,11 +35,13 @@ find_library(PCL_FILTERS_LIBRARY pcl_filters REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_SURFACE_LIBRARY pcl_surface REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
-add_library(deformable_ccd_decoders STATIC
+# Objects, not an archive: a message type registers itself, and nothing else asks for its file.
+file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
+add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
   src/input/depth_surface.cpp src/input/mesh_decoder.cpp src/input/mesh_file.cpp src/input/mesh_views.cpp
-  src/input/obj_file.cpp src/input/stl_file.cpp src/node/map_decode.cpp
-  src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp src/scene/physics/expectations.cpp
-  src/scene/physics/scene_file.cpp src/scene/physics/yaml_map.cpp)
+  src/input/message_type.cpp src/input/obj_file.cpp src/input/stl_file.cpp src/node/map_decode.cpp
+  src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp src/parameters/parameter_reader.cpp
+  src/parameters/parameter_yaml.cpp src/scene/physics/expectations.cpp src/scene/physics/scene_file.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC

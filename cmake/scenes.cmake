@@ -7,6 +7,8 @@ if(SCENE_SOURCES)
   target_link_libraries(deformable_ccd_scene PUBLIC deformable_ccd_headers)
 endif()
 
+# The one strict reader of configuration: of scene files here, of the node's parameters in ros.cmake.
+file(GLOB PARAMETERS_SOURCES CONFIGURE_DEPENDS src/parameters/*.cpp)
 file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)
 if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURCES)
   # Two builds of Bullet can be installed side by side; single precision would make the recorded cloth jitter.
@@ -16,6 +18,9 @@ if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURC
     #catkin_lint: ignore_once duplicate_find
     find_package(yaml-cpp REQUIRED)
   endif()
+  add_library(deformable_ccd_parameters STATIC EXCLUDE_FROM_ALL ${PARAMETERS_SOURCES})
+  target_include_directories(deformable_ccd_parameters PUBLIC src)
+  target_link_libraries(deformable_ccd_parameters PUBLIC deformable_ccd_headers PRIVATE yaml-cpp)
   pkg_check_modules(BULLET_DOUBLE QUIET IMPORTED_TARGET bullet-float64)
   if(NOT BULLET_DOUBLE_FOUND)
     pkg_check_modules(BULLET_DOUBLE QUIET IMPORTED_TARGET bullet)
@@ -28,7 +33,7 @@ if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURC
     target_include_directories(deformable_ccd_physics PUBLIC src)
     # Bullet's headers raise warnings of their own under -Wextra.
     target_include_directories(deformable_ccd_physics SYSTEM PRIVATE ${BULLET_DOUBLE_INCLUDE_DIRS})
-    target_link_libraries(deformable_ccd_physics PUBLIC deformable_ccd_headers PRIVATE PkgConfig::BULLET_DOUBLE yaml-cpp)
+    target_link_libraries(deformable_ccd_physics PUBLIC deformable_ccd_headers deformable_ccd_parameters PRIVATE PkgConfig::BULLET_DOUBLE)
   else()
     message(STATUS "No Bullet in double precision: make_scene_bag is left out")
   endif()

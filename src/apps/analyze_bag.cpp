@@ -28,21 +28,21 @@ struct Arguments {
 };
 
 MonitorConfig configure(const Arguments& a) {
-  XmlRpc::XmlRpcValue tree;
+  ParameterTree tree;
   if (!a.params.empty()) tree = readYaml(a.params);
-  if (a.params.empty() || !tree.hasMember("bodies")) {
+  if (!tree.has("bodies")) {
     const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag) : a.mesh;
-    if (!topic.empty() && !(tree.valid() && tree.hasMember("topic"))) tree["topic"] = topic;
+    if (!topic.empty() && !tree.has("topic")) tree.put("topic", topic);
   }
   // The bag knows where its maps are; one that is named stays.
-  if (!(tree.valid() && tree.hasMember("octomap_topic"))) {
+  if (!tree.has("octomap_topic")) {
     const std::string topic = BagReplay::firstMapTopic(a.bag);
-    if (!topic.empty()) tree["octomap_topic"] = topic;
+    if (!topic.empty()) tree.put("octomap_topic", topic);
   }
-  if (!a.accuracy.empty()) tree["accuracy"] = a.accuracy;
-  if (a.look_ahead_s > 0) tree["look_ahead_s"] = a.look_ahead_s;
-  if (a.threads > 0) tree["num_threads"] = a.threads;
-  return readConfig(tree, a.params.empty() ? "--" : a.params + ": ");
+  if (!a.accuracy.empty()) tree.put("accuracy", a.accuracy);
+  if (a.look_ahead_s > 0) tree.put("look_ahead_s", a.look_ahead_s);
+  if (a.threads > 0) tree.put("num_threads", a.threads);
+  return readConfig(tree, a.params.empty() ? "--" : "");
 }
 
 // The input's messages with the results between them, as the node would have published them to subscribers of all

@@ -7,6 +7,7 @@
 namespace dccd {
 
 using XmlRpc::XmlRpcValue;
+using Kind = ParameterTree::Kind;
 
 namespace {
 
@@ -145,8 +146,8 @@ void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vecto
   std::vector<std::string> known{octomap};
   for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
   std::vector<std::uint16_t> pair;
-  for (XmlRpcValue& name : entry.list("between")) {
-    const std::string text = name.getType() == XmlRpcValue::TypeString ? static_cast<std::string>(name) : std::string();
+  for (const ParameterTree& name : entry.list("between")) {
+    const std::string& text = name.text;
     const auto at = std::find(known.begin(), known.end(), text);
     if (at == known.end()) {
       entry.fail("between", "names '" + text + "', which is no body and not octomap; nearest is '" +
@@ -173,9 +174,8 @@ void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vecto
 
 void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
   std::vector<NamedPair> before;
-  for (XmlRpcValue& entry : reader.list("minimum_separation_pairs")) {
-    const std::string path = reader.path() + "minimum_separation_pairs[" + std::to_string(before.size()) + "]/";
-    readSeparationPair({entry, path}, config, before);
+  for (const ParameterReader& entry : reader.sections("minimum_separation_pairs")) {
+    readSeparationPair(entry, config, before);
   }
 }
 
@@ -256,7 +256,7 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
   monitor.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
   monitor.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
-  for (XmlRpcValue& item : reader.list("exclude_boxes")) {
+  for (const ParameterTree& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);
     const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
     if (box.empty())
@@ -285,8 +285,8 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
                          : unknown == "occupied" ? UnknownSpace::OCCUPIED
                                                  : UnknownSpace::REPORT;
-  XmlRpcValue box = reader.raw("unknown_box");
-  if (box.valid()) {
+  const ParameterTree& box = reader.raw("unknown_box");
+  if (box.isSet()) {
     const auto n = reader.numbers(box, "unknown_box", 6);
     config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
   }
@@ -360,14 +360,51 @@ void applyEffects(MonitorConfig& config) {
   if (off("unknown_space")) config.unknown_space = UnknownSpace::FREE;
 }
 
-/// The parameters proper as text. What dynamic_reconfigure writes back under ~live is not what was given.
-std::string givenText(XmlRpcValue tree) {
-  if (!tree.valid() || tree.getType() != XmlRpcValue::TypeStruct) return {};
-  std::string text;
-  for (auto& member : tree) {
-    if (member.first != "live") text += member.first + member.second.toXml();
+/// The same text for the same values, wherever they were read from.
+void write(const ParameterTree& value, std::ostream& text) {
+  text << static_cast<int>(value.kind) << ' ' << value.truth << ' ' << value.integer << ' ' << value.number << ' '
+       << value.text.size() << ' ' << value.text << ' ' << value.items.size() << ' ' << value.members.size() << ' ';
+  for (const ParameterTree& item : value.items) write(item, text);
+  for (const auto& member : value.members) {
+    text << member.first.size() << ' ' << member.first << ' ';
+    write(member.second, text);
   }
-  return text;
+}
+
+/// The parameters proper as text. What dynamic_reconfigure writes back under ~live is not what was given.
+std::string givenText(ParameterTree tree) {
+  tree.members.erase("live");
+  std::ostringstream text;
+  text << std::setprecision(17);
+  write(tree, text);
+  return text.str();
+}
+
+ParameterTree treeOf(XmlRpcValue value) {
+  ParameterTree tree;
+  switch (value.getType()) {
+    case XmlRpcValue::TypeInvalid:
+      break;
+    case XmlRpcValue::TypeBoolean:
+      return static_cast<bool>(value);
+    case XmlRpcValue::TypeInt:
+      return static_cast<int>(value);
+    case XmlRpcValue::TypeDouble:
+      return static_cast<double>(value);
+    case XmlRpcValue::TypeString:
+      return static_cast<std::string>(value);
+    case XmlRpcValue::TypeArray:
+      tree.kind = Kind::LIST;
+      for (int i = 0; i < value.size(); ++i) tree.items.push_back(treeOf(value[i]));
+      break;
+    case XmlRpcValue::TypeStruct:
+      tree.kind = Kind::SECTION;
+      for (auto& member : value) tree.members[member.first] = treeOf(member.second);
+      break;
+    default:
+      tree.kind = Kind::OTHER;
+  }
+  return tree;
 }
 
 std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every machine
@@ -404,7 +441,9 @@ std::uint64_t MonitorConfig::hash() const {
   return hashOf(text.str());
 }
 
-MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
+MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) { return readConfig(treeOf(tree), path); }
+
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
   config.fixed_frame = reader.get("fixed_frame", std::string());

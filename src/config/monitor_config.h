@@ -8,10 +8,10 @@
 
 #include <xmlrpcpp/XmlRpcValue.h>
 
-#include "config/parameter_reader.h"
 #include "dccd/effect_plan.h"
 #include "dccd/monitor.h"
 #include "input/mesh_decoder.h"
+#include "parameters/parameter_reader.h"
 
 namespace dccd {
 
@@ -68,10 +68,6 @@ struct MonitorConfig {
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
-
-/// The same tree from YAML, typed as rosparam would; `name` stands for the text in messages. Throws ParameterError
-/// naming it and the line.
-XmlRpc::XmlRpcValue parseYaml(const std::string& text, const std::string& name);
-XmlRpc::XmlRpcValue readYaml(const std::string& file);  ///< a whole file
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path);
 
 }  // namespace dccd

@@ -10,7 +10,6 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "input/known_types.h"
-#include "node/effects.h"
 #include "report/progress_bar.h"
 #include "ros/message_bytes.h"
 #include "ros/transforms.h"
@@ -93,14 +92,13 @@ struct BagReplay::Run {
   tf2::BufferCore transforms{TF_KEPT + TF_AHEAD};
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
-  EffectTracker effects;
   std::optional<LookAheadScore> look_ahead;
   std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one message
   BagReplaySummary summary;
   std::set<std::string> complained;
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
-      : sink(to), predictions(predictions_to), bag(r.path_), pipeline(r.config_, transforms), effects(r.config_) {
+      : sink(to), predictions(predictions_to), bag(r.path_), pipeline(r.config_, transforms) {
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
       const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
@@ -136,12 +134,10 @@ struct BagReplay::Run {
 
   void drain(const ros::Time& at) {
     StepOutcome outcome;
-    while (pipeline.next(static_cast<std::int64_t>(at.toNSec()), outcome)) {
-      effects.learn(outcome, pipeline.monitor());
+    while (pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       const std::optional<StepOutcome> prediction = predict(outcome);
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
-      effects.apply(pipeline.monitor(), summary.maps > 0);
     }
     for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {
       const std::string complaint = pipeline.takeComplaint(b);
@@ -208,12 +204,13 @@ std::string BagReplay::firstMapTopic(const std::string& bag) {
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
   Run run(*this, sink, predictions);
   const std::string map_topic = absolute(config_.octomap_topic);
-  const bool bag_maps = config_.octomap_file.empty() && run.effects.mayUseMap();
+  const bool may_use_map = run.pipeline.effects().mayUseMap();
+  const bool bag_maps = config_.octomap_file.empty() && may_use_map;
 
   rosbag::View all(run.bag);
   if (all.size() == 0) return run.summary;
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
-  if (!config_.octomap_file.empty() && run.effects.mayUseMap()) {
+  if (!config_.octomap_file.empty() && may_use_map) {
     run.setMap(loadMapFile(config_.octomap_file, config_), 0);
   }
 
@@ -225,7 +222,6 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     first_map = first.getTime();
     run.setMap(readMap(first, config_), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
   }
-  run.effects.apply(run.pipeline.monitor(), run.summary.maps > 0);
 
   TransformWindow transforms(run.bag, run.feed);
   ProgressBar progress(path_, all.size(), options_.show_progress);
@@ -251,7 +247,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   run.pipeline.finish();
   run.drain(at);
   run.summary.frames = run.pipeline.monitor().total();
-  run.summary.effects = run.effects.plan();
+  run.summary.effects = run.pipeline.effects().plan();
   run.summary.left_out = run.pipeline.monitor().leftOut();
   if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();
   return run.summary;

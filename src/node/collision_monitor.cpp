@@ -27,17 +27,17 @@ MonitorConfig configOf(const ros::NodeHandle& private_node) {
 
 }  // namespace
 
-CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle)
+CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle,
+                             MonitorConfig given)
     : node(node_handle),
       private_node(private_handle),
-      config(configOf(private_handle)),
-      pipeline(config, transforms),
+      pipeline(given, transforms, mapSourceOf(node, given)),
+      config(pipeline.config()),
       recorder(config, pipeline.monitor()),
       outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
       queue(config.bodies.size(), config.queue_size, config.queue_policy),
       diagnostics(private_node.getNamespace(), node),
       log(node, private_node.getNamespace(), config),
-      effects(config, log.mapSource()),
       look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ void CollisionMonitor::Impl::subscribe() {
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, true); });
-  if (!effects.mayUseMap()) return;
+  if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
   if (!config.octomap_file.empty()) {
     maps->submitFile(config.octomap_file);
@@ -151,10 +151,9 @@ void CollisionMonitor::Impl::advertiseServices() {
         response.message = reply.message;
         return true;
       }));
-  reconfigure = std::make_unique<Reconfigure>(
-      service, config, [this](const MonitorOptions& options, const MarkerConfig& markers) {
-        queue.command([this, options, markers] { reconfigureNow(options, markers); });
-      });
+  reconfigure = std::make_unique<Reconfigure>(service, config, [this](const Reconfigure::Change& change) {
+    queue.command([this, change] { reconfigureNow(change); });
+  });
 }
 
 // --- start and stop
@@ -181,7 +180,7 @@ void CollisionMonitor::Impl::stop() {
 }
 
 CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
-    : impl_(std::make_unique<Impl>(node, private_node)) {
+    : impl_(std::make_unique<Impl>(node, private_node, configOf(private_node))) {
   impl_->start();
 }
 

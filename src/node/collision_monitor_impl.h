@@ -17,7 +17,6 @@
 
 #include "input/mesh_subscription.h"
 #include "node/collision_monitor.h"
-#include "node/effects.h"
 #include "node/input_queue.h"
 #include "node/map_loader.h"
 #include "node/monitor_log.h"
@@ -36,16 +35,15 @@ inline std::int64_t steadyNs() {
 
 struct CollisionMonitor::Impl {
   ros::NodeHandle node, private_node;
-  MonitorConfig config;
   tf2::BufferCore transforms;
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
+  const MonitorConfig& config;  // the pipeline's, of which it alone changes `monitor` and `markers`
   StepRecorder recorder;
   Outputs outputs;
   InputQueue queue;
   Diagnostics diagnostics;
   MonitorLog log;
-  EffectTracker effects;
   LookAheadScore look_ahead;
   std::unique_ptr<MapLoader> maps;
 
@@ -62,7 +60,7 @@ struct CollisionMonitor::Impl {
   StampNs newest_ns = 0;                // stamp of the last outcome; the worker's
   std::uint64_t steps_unpublished = 0;  // the worker's, too
 
-  Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle);
+  Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle, MonitorConfig given);
 
   void start();
   void stop();
@@ -77,18 +75,18 @@ struct CollisionMonitor::Impl {
 
   // Worker.
   void work();
-  void run(const std::function<void()>& command);
+  void carryOut(const std::function<void()>& command);
   void takeMaps();
   void takeMessages();
   void tellComplaints();
-  void publish(StepOutcome& outcome);
-  void publishAll(StepOutcome& outcome);
+  void publishOutcome(StepOutcome& outcome);
+  void publishTopics(StepOutcome& outcome);
   void predict(StepOutcome& outcome);
   void publishPrediction(const StepOutcome& prediction);
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();
-  void reconfigureNow(MonitorOptions options, const MarkerConfig& markers);
+  void reconfigureNow(const Reconfigure::Change& change);
   void resetNow(StepStatus status);
   StatsContext statsContext() const;
 };

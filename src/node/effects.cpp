@@ -42,18 +42,18 @@ bool EffectTracker::mayUseMap() const {
   return setting == settings_.end() || setting->second != EffectSetting::OFF;
 }
 
-void EffectTracker::apply(Monitor& monitor, bool map_seen) {
-  if (map_seen && !scene_.map_seen) {
-    scene_.map_seen = true;
-    plan_ = EffectPlan(scene_, settings_);
-  }
+void EffectTracker::expectMap() {
+  if (scene_.map_seen) return;
+  scene_.map_seen = true;
+  plan_ = EffectPlan(scene_, settings_);
+}
+
+bool EffectTracker::decide(MonitorOptions& options) const {
   const bool expected = mapExpected(), start_state = plan_.running("start_state");
-  if (monitor.options().obstacle_expected == expected && monitor.options().detector.check_start_state == start_state)
-    return;
-  MonitorOptions options = monitor.options();
+  if (options.obstacle_expected == expected && options.detector.check_start_state == start_state) return false;
   options.obstacle_expected = expected;
   options.detector.check_start_state = start_state;
-  monitor.setOptions(options);
+  return true;
 }
 
 void EffectTracker::learn(const StepOutcome& outcome, const Monitor& monitor) {

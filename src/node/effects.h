@@ -1,4 +1,4 @@
-// The effect plan of a running monitor: renewed only when the scene changes, applied between steps.
+// The effect plan of a running monitor: renewed only when the scene changes, in force from the next step on.
 #pragma once
 
 #include <string>
@@ -19,8 +19,10 @@ class EffectTracker {
   /// False: the octomap is switched off, nothing is subscribed to for it.
   bool mayUseMap() const;
   bool mapExpected() const { return plan_.running("octomap"); }
-  /// Brings the monitor's options in line with the plan.
-  void apply(Monitor& monitor, bool map_seen);
+  /// A map has come, or somebody is there who publishes maps.
+  void expectMap();
+  /// Sets what the plan decides of a monitor's options. False: they are so already.
+  bool decide(MonitorOptions& options) const;
   /// Learns topologies and what is left out from the outcome.
   void learn(const StepOutcome& outcome, const Monitor& monitor);
   /// True when the plan has changed since the last call, or at the first one.

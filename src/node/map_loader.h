@@ -46,7 +46,7 @@ class MapLoader {
     std::string file;
     StampNs receipt_ns = 0;
   };
-  const MonitorConfig config_;
+  const MonitorConfig& config_;  // what it reads there does not change while the node runs
   std::function<void()> ready_;
   std::mutex mutex_;
   std::condition_variable changed_;

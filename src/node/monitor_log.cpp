@@ -23,8 +23,8 @@ std::int64_t steadyNs() {
 MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config)
     : node_(node), name_(name), config_(config) {}
 
-std::string MonitorLog::mapSource() const {
-  return config_.octomap_file.empty() ? node_.resolveName(config_.octomap_topic) : config_.octomap_file;
+std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
+  return config.octomap_file.empty() ? node.resolveName(config.octomap_topic) : config.octomap_file;
 }
 
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {

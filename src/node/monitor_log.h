@@ -15,6 +15,9 @@
 
 namespace dccd {
 
+/// The octomap's resolved topic, or its file.
+std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config);
+
 class MonitorLog {
  public:
   MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config);
@@ -31,8 +34,7 @@ class MonitorLog {
   const std::string& hint() const { return hint_; }
 
   std::string topicOf(std::size_t body) const { return node_.resolveName(config_.bodies[body].topic); }
-  /// The octomap's resolved topic, or its file.
-  std::string mapSource() const;
+  std::string mapSource() const { return mapSourceOf(node_, config_); }
 
  private:
   ros::NodeHandle node_;

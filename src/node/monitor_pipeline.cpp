@@ -39,8 +39,11 @@ void checkGrid(const BodyConfig& body) {
 
 }  // namespace
 
-MonitorPipeline::MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms)
-    : config_(config), transforms_(transforms), fixed_frame_(config.fixed_frame) {
+MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transforms, const std::string& map_source)
+    : config_(std::move(config)),
+      effects_(config_, map_source),
+      transforms_(transforms),
+      fixed_frame_(config_.fixed_frame) {
   loadFiles();
   monitor_ = std::make_unique<Monitor>(config_.monitor, monitorBodies(config_));
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
@@ -233,7 +236,16 @@ bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
   return true;
 }
 
+void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change) {
+  MonitorOptions options = config_.monitor;
+  change(options, config_.markers);
+  effects_.decide(options);
+  monitor_->setOptions(options);
+  config_.monitor = options;
+}
+
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
+  expectMap();
   unplaced_map_ = std::move(map);
   unplaced_since_ns_ = now_ns;
 }
@@ -264,7 +276,8 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   }
 }
 
-bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
+bool MonitorPipeline::nextOutcome(std::int64_t now_ns, StepOutcome& outcome) {
+  if (MonitorOptions options = monitor_->options(); effects_.decide(options)) monitor_->setOptions(options);
   placeMap(now_ns);
   // Static bodies first: the clock body's frame is a step, which is to find them where they are.
   for (const bool statics : {true, false}) {
@@ -274,6 +287,7 @@ bool MonitorPipeline::next(std::int64_t now_ns, StepOutcome& outcome) {
   }
   if (finishing_) giveUp();
   if (!monitor_->next(now_ns, outcome)) return false;
+  effects_.learn(outcome, *monitor_);
   nameMissing(outcome);
   measureUnknown(outcome);
   outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();

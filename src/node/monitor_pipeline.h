@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@
 #include "dccd/monitor.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
+#include "node/effects.h"
 
 namespace dccd {
 
@@ -29,8 +31,9 @@ struct LoadedMap {
 
 class MonitorPipeline {
  public:
-  /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file.
-  MonitorPipeline(const MonitorConfig& config, tf2::BufferCore& transforms);
+  /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file, or the
+  /// effect that is asked for and that the scene cannot have. `map_source`: as EffectTracker's.
+  MonitorPipeline(MonitorConfig config, tf2::BufferCore& transforms, const std::string& map_source = {});
 
   /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
   /// and gives way to the next. Each waits its own time: where tf lags behind a camera by more than the time between
@@ -40,11 +43,13 @@ class MonitorPipeline {
   /// yields an outcome.
   void take(std::size_t body, const MeshMessage& message);
   void setMap(LoadedMap map, std::int64_t now_ns);
+  /// Somebody is there who publishes maps: from now on a step without one lacks it.
+  void expectMap() { effects_.expectMap(); }
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
-  bool next(std::int64_t now_ns, StepOutcome& outcome);
-  /// Something waits for tf or for other bodies, so that next() is worth calling again without new input.
+  bool nextOutcome(std::int64_t now_ns, StepOutcome& outcome);
+  /// Something waits for tf or for other bodies, so that nextOutcome() is worth calling again without new input.
   bool waiting() const;
-  /// End of input: whatever still waits is given up at the next call of next().
+  /// End of input: whatever still waits is given up at the next call of nextOutcome().
   void finish();
   /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was
   /// learnt: the map and static bodies are placed in it. After RESET triangle soups are welded anew.
@@ -52,14 +57,21 @@ class MonitorPipeline {
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
   StepOutcome checkNow();
 
+  /// Changes what can be changed while it runs. Throws std::invalid_argument naming the option; the monitor's then
+  /// stay.
+  void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
+
   /// The body's newest frame holds at all times. Safe to call from any thread.
   bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
   Monitor& monitor() { return *monitor_; }
   const Monitor& monitor() const { return *monitor_; }
+  /// What is asked for: the one copy of the options, `monitor` and `markers` of which reconfigure() changes. What is in
+  /// force in the monitor follows from it and from the effect plan.
   const MonitorConfig& config() const { return config_; }
+  EffectTracker& effects() { return effects_; }
   const std::string& fixedFrame() const { return fixed_frame_; }
   std::uint64_t weldChanges() const { return weld_changes_; }
-  /// Arrival, on the driving clock, of the frame that the last outcome of next() was about.
+  /// Arrival, on the driving clock, of the frame that the last outcome was about.
   std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
@@ -82,6 +94,7 @@ class MonitorPipeline {
     std::vector<double> radius_m;
   };
   MonitorConfig config_;
+  EffectTracker effects_;
   tf2::BufferCore& transforms_;
   std::unique_ptr<Monitor> monitor_;
   std::vector<MeshDecoder> decoders_;

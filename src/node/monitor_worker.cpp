@@ -14,14 +14,9 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 
 }  // namespace
 
-void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const MarkerConfig& markers) {
-  config.markers = markers;
-  // What the effect plan decides stays with it.
-  options.obstacle_expected = pipeline.monitor().options().obstacle_expected;
-  options.detector.check_start_state = pipeline.monitor().options().detector.check_start_state;
+void CollisionMonitor::Impl::reconfigureNow(const Reconfigure::Change& change) {
   try {
-    pipeline.monitor().setOptions(options);
-    config.monitor = options;
+    pipeline.reconfigure(change);
   } catch (const std::invalid_argument& error) {
     ROS_WARN_STREAM("reconfiguration refused: " << error.what());
   }
@@ -64,7 +59,6 @@ void CollisionMonitor::Impl::takeMaps() {
     log.complain(config.bodies.size(), "map", "refused: " + map.problem);
     map.problem = "the octomap was refused: " + map.problem;
   }
-  map_publisher_seen = true;
   pipeline.setMap(std::move(map), steadyNs());
 }
 
@@ -107,18 +101,18 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
 }
 
 /// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
-void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
+void CollisionMonitor::Impl::publishOutcome(StepOutcome& outcome) {
   try {
-    publishAll(outcome);
+    publishTopics(outcome);
   } catch (const std::exception& error) {
     ++steps_unpublished;
     log.complain(config.monitor.clock_body, "publishing",
                  std::string("not all of a step's results could be published: ") + error.what());
-    run([this] { outputs.publishNotClear(pipeline.fixedFrame()); });
+    carryOut([this] { outputs.publishNotClear(pipeline.fixedFrame()); });
   }
 }
 
-void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
+void CollisionMonitor::Impl::publishTopics(StepOutcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
@@ -126,9 +120,8 @@ void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
-  effects.learn(outcome, pipeline.monitor());
   publishEffects(toRosTime(outcome.stamp_ns));
-  if (effects.takeNewLeftOut(pipeline.monitor())) {
+  if (pipeline.effects().takeNewLeftOut(pipeline.monitor())) {
     outputs.publishLeftOut(toLeftOutPairs(pipeline.monitor().leftOut(), bodies, outcome.stamp_ns, frame));
   }
   predict(outcome);
@@ -139,6 +132,7 @@ void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
 }
 
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
+  EffectTracker& effects = pipeline.effects();
   if (!effects.takeNewPlan()) return;
   outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
   for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
@@ -168,7 +162,7 @@ void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
 }
 
 /// Whatever a command throws, the node goes on; a service's caller has been told by then (InputQueue::call).
-void CollisionMonitor::Impl::run(const std::function<void()>& command) {
+void CollisionMonitor::Impl::carryOut(const std::function<void()>& command) {
   try {
     command();
   } catch (const std::exception& error) {
@@ -181,22 +175,23 @@ void CollisionMonitor::Impl::work() {
   while (!stopping) {
     const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
     if (stopping) return;
-    for (const auto& command : commands) run(command);
+    for (const auto& command : commands) carryOut(command);
     if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
-    effects.apply(pipeline.monitor(), map_publisher_seen);
+    if (map_publisher_seen) pipeline.expectMap();
     publishEffects(ros::Time::now());  // the first plan comes before the first frame
     takeMaps();
     takeMessages();
     accountDropped();
     StepOutcome outcome;
-    while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
+    while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
     tellComplaints();
     const std::string surprise = recorder.takeSurprise();
     if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
     more = false;
     for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
     lookIntoSilence();
-    diagnostics.publishWhenDue(steadyNs(), enabled, effects.mapExpected() ? log.mapSource() : "", log.hint());
+    diagnostics.publishWhenDue(steadyNs(), enabled, pipeline.effects().mapExpected() ? log.mapSource() : "",
+                               log.hint());
   }
 }
 

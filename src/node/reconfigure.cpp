@@ -24,19 +24,29 @@ deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {
   return live;
 }
 
+void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions& options, MarkerConfig& markers) {
+  options.detector.accuracy.rung = static_cast<Accuracy>(live.accuracy);
+  options.detector.step_budget_ms = live.step_budget_ms;
+  options.store.max_step_s = live.max_step_s;
+  options.store.max_vertex_step_m = live.max_vertex_step_m;
+  options.max_contacts = static_cast<std::size_t>(live.max_contacts);
+  options.suppress_initial = live.suppress_initial;
+  markers.point_size_m = live.marker_point_size_m;
+  markers.normal_length_m = live.marker_normal_length_m;
+  markers.mesh = live.marker_mesh;
+  markers.obstacle_m = live.marker_obstacle_m;
+}
+
 }  // namespace
 
 struct Reconfigure::Impl {
-  MonitorOptions options;
-  MarkerConfig markers;
   bool separates = false;
   Changed changed;
   boost::recursive_mutex mutex;  // shared with the server, which asks for it so that updateConfig cannot deadlock
   dynamic_reconfigure::Server<deformable_ccd::CollisionMonitorConfig> server;
 
   Impl(const ros::NodeHandle& node, const MonitorConfig& config, Changed call)
-      : options(config.monitor), markers(config.markers), changed(std::move(call)), server(mutex, node) {
-    separates = config.holdsDistance();
+      : separates(config.holdsDistance()), changed(std::move(call)), server(mutex, node) {
     server.updateConfig(toLive(config));
     bool first = true;  // setCallback calls at once, with what is in force already
     server.setCallback([this, first](deformable_ccd::CollisionMonitorConfig& live, std::uint32_t) mutable {
@@ -46,22 +56,11 @@ struct Reconfigure::Impl {
   }
 
   void apply(deformable_ccd::CollisionMonitorConfig& live) {
-    Accuracy rung = static_cast<Accuracy>(live.accuracy);
+    const auto rung = static_cast<Accuracy>(live.accuracy);
     if (separates && (rung == Accuracy::EXACT || rung == Accuracy::FAST)) {
-      rung = Accuracy::CONSERVATIVE;  // the only rungs that hold a distance are this and screen
-      live.accuracy = static_cast<int>(rung);
+      live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);  // the only rungs that hold a distance: this and screen
     }
-    options.detector.accuracy.rung = rung;
-    options.detector.step_budget_ms = live.step_budget_ms;
-    options.store.max_step_s = live.max_step_s;
-    options.store.max_vertex_step_m = live.max_vertex_step_m;
-    options.max_contacts = static_cast<std::size_t>(live.max_contacts);
-    options.suppress_initial = live.suppress_initial;
-    markers.point_size_m = live.marker_point_size_m;
-    markers.normal_length_m = live.marker_normal_length_m;
-    markers.mesh = live.marker_mesh;
-    markers.obstacle_m = live.marker_obstacle_m;
-    changed(options, markers);
+    changed([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });
   }
 };
 

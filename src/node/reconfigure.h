@@ -13,8 +13,10 @@ namespace dccd {
 
 class Reconfigure {
  public:
-  using Changed = std::function<void(const MonitorOptions&, const MarkerConfig&)>;
-  /// Starts with the values of `config`. `changed` is called from the handle's callback queue with what to apply.
+  /// Writes the live values into the options; the rest of them stays.
+  using Change = std::function<void(MonitorOptions&, MarkerConfig&)>;
+  using Changed = std::function<void(const Change&)>;
+  /// Starts with the values of `config`. `changed` is called from the handle's callback queue with what to change.
   Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Changed changed);
   ~Reconfigure();
 

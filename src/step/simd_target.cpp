@@ -6,12 +6,7 @@
 
 namespace dccd {
 
-std::vector<std::string> simdTargets() {
-  const std::string in_use = simd::activeTarget();
-  const std::vector<std::string> names = simd::usableTargets();
-  simd::restrictTo(in_use == names.front() ? "" : in_use);
-  return names;
-}
+std::vector<std::string> simdTargets() { return simd::usableTargets(); }
 
 std::string simdTarget() { return simd::activeTarget(); }
 

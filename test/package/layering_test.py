@@ -23,12 +23,13 @@ MAY_INCLUDE = {
     **CORE,
     'report': set(),
     'octomap': {'obstacle'},
-    'scene': set(),
+    'parameters': set(),
+    'scene': {'parameters'},
     'ros': set(),
     'input': {'ros'},
-    'config': {'ros', 'input'},
+    'config': {'ros', 'input', 'parameters'},
     'output': {'ros', 'input', 'config', 'report'},
-    'node': {'ros', 'input', 'config', 'output', 'octomap', 'record', 'report'},
+    'node': {'ros', 'input', 'config', 'output', 'octomap', 'record', 'report', 'parameters'},
     'apps': None,  # everything
 }
 ROS_ROOMS = ('ros', 'input', 'config', 'output', 'node', 'apps')

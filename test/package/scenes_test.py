@@ -160,7 +160,7 @@ class MakeSceneBagTest(unittest.TestCase):
         result = run(TOOLS / 'make_scene_bag', bad, self.folder / 'e.bag')
         self.assertEqual(result.returncode, 1)
         line = 1 + bad.read_text().split('mass_kg')[0].count('\n')
-        self.assertIn('bad.yaml:%d: bodies[0].mass_kg: write a number' % line, result.stderr)
+        self.assertIn('bad.yaml:%d: bodies[0]/mass_kg is a string, a number is needed' % line, result.stderr)
         result = run(TOOLS / 'make_scene_bag', self.folder / 'no.yaml', self.folder / 'e.bag')
         self.assertEqual(result.returncode, 1)
         self.assertIn('cannot be read', result.stderr)
@@ -171,17 +171,17 @@ class MakeSceneBagTest(unittest.TestCase):
         mesh, bag = 'package://deformable_ccd/config/scenes/meshes/finger.obj', self.folder / 'e.bag'
         no_mesh = self.folder / 'no_mesh.stl'
         no_mesh.write_text('this is no mesh')
-        block = ':{line}: monitor.'
+        block = ':{line}: monitor/'
         cases = [
             (felt, 'accuracy: conservative', 'accuracy: exact', 'monitor/minimum_separation_m',
              'accuracy: conservative'),
-            (felt, 'separation_m: 0.012', 'separation_m: -1', block + 'minimum_separation_m', 'write a number from 0'),
+            (felt, 'separation_m: 0.012', 'separation_m: -1', block + 'minimum_separation_m', 'it must be from 0'),
             (felt, '  minimum_separation_m', '  minimum_seperation_m', 'monitor/minimum_seperation_m', 'nearest is'),
             (felt, mesh, 'missing.stl', "rigid/mesh of body 'finger'", 'missing.stl'),
             (felt, mesh, str(no_mesh), "rigid/mesh of body 'finger'", 'STL, OBJ or PLY'),
             (felt, '{topic: /felt}', '{topic: /felt, topology: {rows: 9, cols: 9}}',
-             block + 'bodies.felt.topology.rows', 'write rows: 21, cols: 24'),
-            (felt, 'frame: finger}}', 'frame: finger}, self_collision: true}', block + 'bodies.finger.self_collision',
+             block + 'bodies/felt/topology/rows', 'write rows: 21, cols: 24'),
+            (felt, 'frame: finger}}', 'frame: finger}, self_collision: true}', block + 'bodies/finger/self_collision',
              'remove this line'),
             (table, 'octomap: auto,', 'octomap: auto, body_body: on,', 'effects/body_body is on',
              'effects/body_body: auto'),

@@ -5,18 +5,16 @@
 #include <tf2/buffer_core.h>
 
 #include "config/monitor_config.h"
-#include "node/effects.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
 
 void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path) {
-  if (spec.monitor_yaml.empty()) return;
-  const MonitorConfig config = readConfig(parseYaml(spec.monitor_yaml, scene_path), scene_path + ": monitor/");
+  if (!spec.monitor.isSet()) return;
+  const MonitorConfig config = readConfig(spec.monitor, "monitor/");
   try {
-    const EffectTracker effects(config);  // an effect that is on, but not to be had
     tf2::BufferCore transforms;
-    const MonitorPipeline pipeline(config, transforms);  // files
+    const MonitorPipeline pipeline(config, transforms);  // effects that are not to be had, files
   } catch (const std::exception& error) {
     throw std::runtime_error(scene_path + ": monitor: " + error.what());
   }

@@ -2,13 +2,13 @@
 // itself has no use for them, but says at once what is wrong with them.
 #pragma once
 
+#include "parameters/parameter_reader.h"
 #include "scene/physics/scene_spec.h"
-#include "scene/physics/yaml_map.h"
 
 namespace dccd::scene {
 
-/// Throws SceneFileError on what it does not understand, and on facts that contradict the scene (a contact after its
+/// Throws ParameterError on what it does not understand, and on facts that contradict the scene (a contact after its
 /// end, with a body that is not there) or each other (a contact while all is clear).
-void checkExpectations(YamlMap map, const SceneSpec& spec);
+void checkExpectations(ParameterReader map, const SceneSpec& spec);
 
 }  // namespace dccd::scene

@@ -1,5 +1,6 @@
 #include "scene/physics/scene_file.h"
 
+#include <algorithm>
 #include <fstream>
 #include <numeric>
 #include <sstream>
@@ -11,7 +12,7 @@ namespace {
 
 constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
 
-Shape readSheet(YamlMap map) {
+Shape readSheet(ParameterReader map) {
   Shape shape;
   shape.kind = Shape::Kind::SHEET;
   shape.rows = map.integer("rows", 2, 1000);
@@ -23,7 +24,7 @@ Shape readSheet(YamlMap map) {
   return shape;
 }
 
-Shape readTube(YamlMap map) {
+Shape readTube(ParameterReader map) {
   Shape shape;
   shape.kind = Shape::Kind::TUBE;
   shape.rows = map.integer("rows", 2, 1000);
@@ -35,7 +36,7 @@ Shape readTube(YamlMap map) {
   return shape;
 }
 
-Shape readRope(YamlMap map) {
+Shape readRope(ParameterReader map) {
   Shape shape;
   shape.kind = Shape::Kind::ROPE;
   shape.cols = map.integer("points", 2, 10000);
@@ -46,25 +47,25 @@ Shape readRope(YamlMap map) {
   return shape;
 }
 
-Motion readMotion(YamlMap& parent) {
+Motion readMotion(ParameterReader& parent) {
   Motion motion;
-  for (YamlMap& map : parent.list("motion")) {
+  for (ParameterReader& map : parent.sections("motion")) {
     MotionKey key;
     key.time_s = map.number("time_s", 0.0, LARGE);
     key.offset_m = map.vector("offset_m", Vec3::Zero());
     key.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
     if (!motion.empty() && key.time_s <= motion.back().time_s)
-      map.fail("time_s", "write a later time than the key before");
+      map.fail("time_s", "must be later than that of the key before");
     map.finish();
     motion.push_back(key);
   }
   return motion;
 }
 
-Gripper readGripper(YamlMap map, const Shape& shape) {
+Gripper readGripper(ParameterReader map, const Shape& shape) {
   Gripper gripper;
   const bool by_row = map.has("row"), by_col = map.has("col"), by_vertex = map.has("vertices");
-  if (by_row + by_col + by_vertex != 1) map.fail("", "write just one of row, col, vertices: what the gripper holds");
+  if (by_row + by_col + by_vertex != 1) map.fail("", "needs just one of row, col, vertices: what the gripper holds");
   if (by_row) {
     const int row = map.integer("row", 0, shape.rows - 1);
     gripper.vertices.resize(static_cast<std::size_t>(shape.cols));
@@ -81,56 +82,61 @@ Gripper readGripper(YamlMap map, const Shape& shape) {
   return gripper;
 }
 
-Body readBody(YamlMap map, const std::string& fixed_frame) {
+Body readBody(ParameterReader map, const std::string& fixed_frame) {
   Body body;
   body.name = map.text("name");
   body.topic = map.text("topic", "/" + body.name);
   body.frame = map.text("frame", fixed_frame);
-  body.output =
-      static_cast<MeshOutput>(map.choice("output", {"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}, 0));
+  const std::vector<std::string> outputs{"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"};
+  const std::string output = map.choice("output", outputs.front(), outputs);
+  body.output = static_cast<MeshOutput>(std::find(outputs.begin(), outputs.end(), output) - outputs.begin());
   const bool sheet = map.has("sheet"), tube = map.has("tube"), rope = map.has("rope");
-  if (sheet + tube + rope != 1) map.fail("", "write just one of sheet, tube, rope: the body's shape");
-  body.shape = sheet ? readSheet(map.map("sheet")) : tube ? readTube(map.map("tube")) : readRope(map.map("rope"));
+  if (sheet + tube + rope != 1) map.fail("", "needs just one of sheet, tube, rope: the body's shape");
+  body.shape = sheet  ? readSheet(map.neededSection("sheet"))
+               : tube ? readTube(map.neededSection("tube"))
+                      : readRope(map.neededSection("rope"));
   if (rope && body.output != MeshOutput::POINT_CLOUD_GRID)
-    map.fail("output", "write point_cloud_grid: a rope has no faces");
+    map.fail("output", "must be point_cloud_grid: a rope has no faces");
   body.mass_kg = map.number("mass_kg", 1e-6, LARGE);
-  body.thickness_m = map.number("thickness_m", 1e-5, 1.0, body.thickness_m);
-  body.stretch_stiffness = map.number("stretch_stiffness", 0.0, 1.0, body.stretch_stiffness);
-  body.damping = map.number("damping", 0.0, 1.0, 0.0);
-  body.start_noise_m = map.number("start_noise_m", 0.0, 1.0, 0.0);
-  body.tracker_noise_m = map.number("tracker_noise_m", 0.0, 1.0, 0.0);
-  if (auto bending = map.optionalMap("bending")) {
-    body.bending = Bending{bending->number("stiffness", 0.0, 1.0)};
-    bending->finish();
+  body.thickness_m = map.number("thickness_m", body.thickness_m, 1e-5, 1.0);
+  body.stretch_stiffness = map.number("stretch_stiffness", body.stretch_stiffness, 0.0, 1.0);
+  body.damping = map.number("damping", 0.0, 0.0, 1.0);
+  body.start_noise_m = map.number("start_noise_m", 0.0, 0.0, 1.0);
+  body.tracker_noise_m = map.number("tracker_noise_m", 0.0, 0.0, 1.0);
+  if (map.has("bending")) {
+    ParameterReader bending = map.section("bending");
+    body.bending = Bending{bending.number("stiffness", 0.0, 1.0)};
+    bending.finish();
   }
-  if (auto self_collision = map.optionalMap("self_collision")) {
-    if (rope) map.fail("self_collision", "leave it out: physics' self-collision needs faces, and a rope has none");
-    body.self_collision = SelfCollision{self_collision->integer("clusters", 2, 10000, SelfCollision{}.clusters)};
-    self_collision->finish();
+  if (map.has("self_collision")) {
+    if (rope) map.fail("self_collision", "needs faces, and a rope has none; leave it out");
+    ParameterReader self_collision = map.section("self_collision");
+    body.self_collision = SelfCollision{self_collision.integer("clusters", SelfCollision{}.clusters, 2, 10000)};
+    self_collision.finish();
   }
   if (map.has("friction")) body.friction = map.number("friction", 0.0, 1.0);
-  for (YamlMap& gripper : map.list("grippers")) body.grippers.push_back(readGripper(gripper, body.shape));
+  for (ParameterReader& gripper : map.sections("grippers")) body.grippers.push_back(readGripper(gripper, body.shape));
   map.finish();
   return body;
 }
 
-Solid readSolid(YamlMap map) {
+Solid readSolid(ParameterReader map) {
   Solid solid;
   const bool box = map.has("box"), ring = map.has("ring");
-  if (box + ring != 1) map.fail("", "write just one of box, ring");
+  if (box + ring != 1) map.fail("", "needs just one of box, ring");
   if (box) {
-    YamlMap inner = map.map("box");
+    ParameterReader inner = map.neededSection("box");
     solid.box.min = inner.vector("min_m");
     solid.box.max = inner.vector("max_m");
     if (!(solid.box.min.array() < solid.box.max.array()).all())
-      inner.fail("max_m", "write corners with min_m below max_m on every axis");
+      inner.fail("max_m", "must be above min_m on every axis");
     inner.finish();
   } else {
     solid.kind = Solid::Kind::RING;
-    YamlMap inner = map.map("ring");
+    ParameterReader inner = map.neededSection("ring");
     solid.center_m = inner.vector("center_m");
     solid.axis = inner.vector("axis", Vec3::UnitZ());
-    if (solid.axis.norm() < 1e-6) inner.fail("axis", "write a direction that is not zero");
+    if (solid.axis.norm() < 1e-6) inner.fail("axis", "is zero; write a direction");
     solid.axis.normalize();
     solid.radius_m = inner.number("radius_m", 1e-3, 1e3);
     solid.tube_radius_m = inner.number("tube_radius_m", 1e-4, solid.radius_m);
@@ -140,24 +146,25 @@ Solid readSolid(YamlMap map) {
   return solid;
 }
 
-Obstacle readObstacle(YamlMap map, const std::string& fixed_frame) {
+Obstacle readObstacle(ParameterReader map, const std::string& fixed_frame) {
   Obstacle obstacle;
   obstacle.topic = map.text("topic", "/octomap_binary");
   obstacle.frame = map.text("frame", fixed_frame);
   obstacle.resolution_m = map.number("resolution_m", 1e-3, 10.0);
-  obstacle.binary = map.boolean("binary", true);
-  obstacle.collides = map.boolean("collides", false);
-  obstacle.inset_m = map.number("inset_m", 0.0, 1.0, 0.0);
-  for (YamlMap& solid : map.list("solids")) obstacle.solids.push_back(readSolid(solid));
-  if (obstacle.solids.empty()) map.fail("solids", "write at least one solid (box or ring), or leave the obstacle out");
+  obstacle.binary = map.get("binary", true);
+  obstacle.collides = map.get("collides", false);
+  obstacle.inset_m = map.number("inset_m", 0.0, 0.0, 1.0);
+  for (ParameterReader& solid : map.sections("solids")) obstacle.solids.push_back(readSolid(solid));
+  if (obstacle.solids.empty())
+    map.fail("solids", "must hold at least one solid (box or ring); or leave the obstacle out");
   map.finish();
   return obstacle;
 }
 
-RigidBody readRigidBody(YamlMap map) {
+RigidBody readRigidBody(ParameterReader map) {
   RigidBody body;
   if (map.has("self_collision"))
-    map.fail("self_collision", "the body is rigid and cannot meet itself; remove this line");
+    map.fail("self_collision", "has no meaning: the body is rigid and cannot meet itself; remove this line");
   body.name = map.text("name");
   body.frame = map.text("frame", body.name);
   body.size_m = map.numbers("size_m", 3, 1e-4, 1e3);
@@ -167,72 +174,71 @@ RigidBody readRigidBody(YamlMap map) {
   return body;
 }
 
-Wind readWind(YamlMap map) {
+Wind readWind(ParameterReader map) {
   Wind wind;
   wind.velocity_m_s = map.vector("velocity_m_s");
   wind.drag = map.number("drag", 0.0, LARGE);
-  wind.lift = map.number("lift", 0.0, LARGE, 0.0);
-  wind.gust = map.number("gust", 0.0, 10.0, 0.0);
-  wind.gust_period_s = map.number("gust_period_s", 0.01, LARGE, wind.gust_period_s);
+  wind.lift = map.number("lift", 0.0, 0.0, LARGE);
+  wind.gust = map.number("gust", 0.0, 0.0, 10.0);
+  wind.gust_period_s = map.number("gust_period_s", wind.gust_period_s, 0.01, LARGE);
   map.finish();
   return wind;
 }
 
 /// One body of the monitor's block, held against the body of the scene on its topic.
-void checkMonitorBody(YamlMap map, const SceneSpec& spec) {
-  map.number("minimum_separation_m", 0.0, LARGE, 0.0);
-  if (map.has("rigid") && map.boolean("self_collision", false)) {
-    map.fail("self_collision", "the body is rigid and cannot meet itself; remove this line");
+void checkMonitorBody(ParameterReader map, const SceneSpec& spec) {
+  map.number("minimum_separation_m", 0.0, 0.0, LARGE);
+  if (map.has("rigid") && map.get("self_collision", false)) {
+    map.fail("self_collision", "has no meaning: the body is rigid and cannot meet itself; remove this line");
   }
-  std::optional<YamlMap> topology = map.optionalMap("topology");
-  if (!topology || !map.has("topic") || !topology->has("rows")) return;
-  const int rows = topology->integer("rows", 2, 100000), cols = topology->integer("cols", 2, 100000);
+  ParameterReader topology = map.section("topology");
+  if (!map.has("topic") || !topology.has("rows")) return;
+  const int rows = topology.integer("rows", 2, 100000), cols = topology.integer("cols", 2, 100000);
   for (const Body& body : spec.bodies) {
     const int points = body.shape.rows * body.shape.cols;
     if (body.topic != map.text("topic") || rows * cols == points) continue;
-    topology->fail("rows", std::to_string(rows) + " x " + std::to_string(cols) + " = " + std::to_string(rows * cols) +
-                               ", but " + body.name + " has " + std::to_string(points) + " points; write rows: " +
-                               std::to_string(body.shape.rows) + ", cols: " + std::to_string(body.shape.cols));
+    topology.fail("rows", "and cols are " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
+                              std::to_string(rows * cols) + ", but " + body.name + " has " + std::to_string(points) +
+                              " points; write rows: " + std::to_string(body.shape.rows) +
+                              ", cols: " + std::to_string(body.shape.cols));
   }
 }
 
 /// The monitor reads its block itself; what contradicts the scene is refused before anything is recorded.
-void checkMonitor(YamlMap& scene, const SceneSpec& spec) {
-  std::optional<YamlMap> monitor = scene.optionalMap("monitor");
-  if (!monitor) return;
-  monitor->number("minimum_separation_m", 0.0, LARGE, 0.0);
-  std::optional<YamlMap> bodies = monitor->optionalMap("bodies");
-  if (!bodies) return;
-  for (const std::string& name : bodies->keys()) checkMonitorBody(bodies->map(name), spec);
+void checkMonitor(ParameterReader& scene, const SceneSpec& spec) {
+  ParameterReader monitor = scene.section("monitor");
+  monitor.number("minimum_separation_m", 0.0, 0.0, LARGE);
+  ParameterReader bodies = monitor.section("bodies");
+  for (const std::string& name : bodies.names()) checkMonitorBody(bodies.section(name), spec);
 }
 
-SceneSpec readScene(const YAML::Node& root, const std::string& name) {
-  YamlMap map(root, name, "");
+SceneSpec readScene(const ParameterTree& tree) {
+  ParameterReader map(tree, "");
   SceneSpec spec;
   spec.name = map.text("name");
   spec.description = map.text("description");
   spec.fixed_frame = map.text("fixed_frame", "world");
-  spec.frame_rate_hz = map.number("frame_rate_hz", 0.1, 1000.0, spec.frame_rate_hz);
+  spec.frame_rate_hz = map.number("frame_rate_hz", spec.frame_rate_hz, 0.1, 1000.0);
   spec.frames = map.integer("frames", 2, 1000000);
-  YamlMap physics = map.map("physics");
-  spec.substeps = physics.integer("substeps", 1, 1000, spec.substeps);
+  ParameterReader physics = map.neededSection("physics");
+  spec.substeps = physics.integer("substeps", spec.substeps, 1, 1000);
   if (physics.has("gravity_m_s2")) spec.gravity_m_s2 = physics.vector("gravity_m_s2");
-  if (auto wind = physics.optionalMap("wind")) spec.wind = readWind(*wind);
+  if (physics.has("wind")) spec.wind = readWind(physics.section("wind"));
   physics.finish();
-  for (YamlMap& body : map.list("bodies")) {
+  for (ParameterReader& body : map.sections("bodies")) {
     spec.bodies.push_back(readBody(body, spec.fixed_frame));
     for (std::size_t i = 0; i + 1 < spec.bodies.size(); ++i) {
       if (spec.bodies[i].topic == spec.bodies.back().topic)
-        body.fail("topic", "write a topic of its own for each body");
+        body.fail("topic", "is another body's, too; write a topic of its own");
     }
   }
-  if (spec.bodies.empty()) map.fail("bodies", "write at least one body: what moves in this scene");
-  if (auto obstacle = map.optionalMap("obstacle")) spec.obstacle = readObstacle(*obstacle, spec.fixed_frame);
-  for (YamlMap& body : map.list("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
+  if (spec.bodies.empty()) map.fail("bodies", "must hold at least one body: what moves in this scene");
+  if (map.has("obstacle")) spec.obstacle = readObstacle(map.section("obstacle"), spec.fixed_frame);
+  for (ParameterReader& body : map.sections("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
   checkMonitor(map, spec);
-  if (std::optional<YamlMap> expect = map.optionalMap("expect")) checkExpectations(*expect, spec);
-  spec.monitor_yaml = map.raw("monitor");
-  spec.expect_yaml = map.raw("expect");
+  if (map.has("expect")) checkExpectations(map.section("expect"), spec);
+  spec.monitor = map.raw("monitor");
+  spec.monitor.file = tree.file;
   map.finish();
   return spec;
 }
@@ -240,19 +246,16 @@ SceneSpec readScene(const YAML::Node& root, const std::string& name) {
 }  // namespace
 
 SceneSpec parseScene(const std::string& text, const std::string& name) {
-  YAML::Node root;
-  try {
-    root = YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    throw SceneFileError(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML: " + error.msg);
-  }
-  return readScene(root, name);
+  SceneSpec spec = readScene(parseYaml(text, name));
+  spec.monitor_yaml = yamlBelow(text, "monitor");
+  spec.expect_yaml = yamlBelow(text, "expect");
+  return spec;
 }
 
 SceneSpec readSceneFile(const std::string& path) {
   std::ifstream stream(path);
   if (!stream)
-    throw SceneFileError(path + ": cannot be read; name a scene file, such as config/scenes/table_edge.yaml");
+    throw ParameterError(path + ": cannot be read; name a scene file, such as config/scenes/table_edge.yaml");
   std::ostringstream text;
   text << stream.rdbuf();
   return parseScene(text.str(), path);

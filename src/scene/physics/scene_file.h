@@ -3,12 +3,12 @@
 
 #include <string>
 
+#include "parameters/parameter_reader.h"
 #include "scene/physics/scene_spec.h"
-#include "scene/physics/yaml_map.h"
 
 namespace dccd::scene {
 
-/// Reads a scene file. Throws SceneFileError ("FILE:LINE: key: what to write") on whatever it does not understand, and
+/// Reads a scene file. Throws ParameterError ("FILE:LINE: key: what to write") on whatever it does not understand, and
 /// on contradictions: a gripper on a vertex that is not there, a solid without volume, two things on one topic.
 SceneSpec readSceneFile(const std::string& path);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dccd/types.h"
+#include "parameters/parameter_tree.h"
 
 namespace dccd::scene {
 
@@ -115,7 +116,8 @@ struct SceneSpec {
   std::vector<Body> bodies;
   std::optional<Obstacle> obstacle;
   std::vector<RigidBody> rigid_bodies;
-  std::string monitor_yaml;  ///< the scene's `monitor` block: parameters for the node, passed on as written
+  ParameterTree monitor;     ///< the scene's `monitor` block, as the node reads it
+  std::string monitor_yaml;  ///< the same as text, passed on as written
   std::string expect_yaml;   ///< the scene's `expect` block: facts that tests hold the monitor to
 };
 

@@ -8,10 +8,9 @@
 namespace {
 
 void scene_file(const std::uint8_t* data, std::size_t size) {
-  using namespace dccd::scene;
   try {
-    parseScene(std::string(data, data + size), "input");
-  } catch (const SceneFileError& error) {
+    dccd::scene::parseScene(std::string(data, data + size), "input");
+  } catch (const dccd::ParameterError& error) {
     if (std::string(error.what()).rfind("input:", 0) != 0)
       throw std::logic_error(std::string("message: ") + error.what());
   }

@@ -284,11 +284,41 @@ TEST(Parameters, TheHashTellsLiveValuesApart) {
   EXPECT_EQ(seen.size(), std::size(changes) + 1);
 }
 
+TEST(Parameters, OfAFileTheLineIsNamed) {
+  const auto errorIn = [](const std::string& text) -> std::string {
+    try {
+      readConfig(parseYaml(text, "p.yaml"), "");
+    } catch (const ParameterError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(errorIn("fixed_frame: world\ntopology: {source: grid, rows: 3, cols: 4}\n"), "accepted");
+  EXPECT_EQ(errorIn("fixed_frame: world\nmax_step_s: -1\n").find("p.yaml:2: max_step_s is -1, it must be from"), 0u);
+  EXPECT_EQ(errorIn("topology:\n  source: grid\n  rwos: 3\n"),
+            "p.yaml:3: topology/rwos is not known; nearest is topology/rows");
+  EXPECT_EQ(errorIn("\ntopology: grid\n"), "p.yaml:2: topology is a string, a section is needed");
+  EXPECT_EQ(errorIn("minimum_separation_pairs:\n  - {between: [mesh, mesh], separation_m: 1}\n  - {between: [mesh]}\n")
+                .find("p.yaml:3: minimum_separation_pairs[1]/between must name two bodies"),
+            0u);
+  EXPECT_NE(errorIn("fixed_frame: &a [*a]\n").find("p.yaml:1: nests too deeply"), std::string::npos);
+}
+
+TEST(Parameters, TheHashIsThatOfTheValuesWhereverTheyWereRead) {
+  XmlRpcValue tree;
+  tree["max_step_s"] = 0.25;
+  tree["exclude_boxes"][0][0] = 0;
+  for (int i = 1; i < 6; ++i) tree["exclude_boxes"][0][i] = 1.5;
+  const std::string text = "exclude_boxes: [[0, 1.5, 1.5, 1.5, 1.5, 1.5]]\nmax_step_s: 0.25\n";
+  EXPECT_EQ(readConfig(parseYaml(text, "p.yaml"), "").hash(), readConfig(tree).hash());
+  EXPECT_NE(readConfig(parseYaml("max_step_s: 0.5\n", "p.yaml"), "").hash(), readConfig(tree).hash());
+}
+
 TEST(Parameters, YamlReadsAsTheParameterServerWould) {
   const std::string file = ::testing::TempDir() + "monitor_parameters.yaml";
   std::ofstream(file) << "fixed_frame: world\nmax_step_s: 1\nweld: off\ntopology: {source: grid, rows: 3, cols: 4}\n"
                          "exclude_boxes: [[0, 0, 0, 1, 1.5, 1]]\n";
-  const MonitorConfig config = readConfig(readYaml(file), file + ": ");
+  const MonitorConfig config = readConfig(readYaml(file), "");
   EXPECT_EQ(config.fixed_frame, "world");
   EXPECT_EQ(config.monitor.store.max_step_s, 1);
   EXPECT_FALSE(config.bodies[0].input.weld);
@@ -318,7 +348,7 @@ std::string between(const std::string& text, const std::string& from, const std:
 TEST(InterfacePage, TheExampleOfClothAndFingerIsAcceptedAsItStands) {
   const std::string block = between(interfacePage(), "```yaml\n", "```");
   ASSERT_FALSE(block.empty());
-  const MonitorConfig config = readConfig(parseYaml(block, "doc/interface.md"), "doc/interface.md: ");
+  const MonitorConfig config = readConfig(parseYaml(block, "doc/interface.md"), "");
   ASSERT_EQ(config.bodies.size(), 2u);
   const BodyConfig &cloth = config.bodies[0], &finger = config.bodies[1];
   EXPECT_EQ(cloth.body.name, "cloth");

@@ -16,7 +16,6 @@
 #include <limits>
 #include <sstream>
 
-#include "node/effects.h"
 #include "node/map_loader.h"
 
 namespace dccd {
@@ -84,16 +83,14 @@ struct Driven {
   tf2::BufferCore transforms;
   MonitorConfig config;
   MonitorPipeline pipeline;
-  EffectTracker effects;
   StepOutcome outcome;
 
-  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms), effects(config) {}
+  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms) {}
 
   void giveMap(double stamp_s) {
     LoadedMap loaded = decodeMapMessage(map(stamp_s), config);
     EXPECT_EQ(loaded.problem, "");
     pipeline.setMap(std::move(loaded), 0);
-    effects.apply(pipeline.monitor(), true);
   }
   /// The frame `child`, at all times `z` above the world.
   void raise(const std::string& child, double z) {
@@ -107,8 +104,7 @@ struct Driven {
   const StepOutcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {},
                           const std::string& frame = "world") {
     pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma, frame), 0, 0});
-    EXPECT_TRUE(pipeline.next(0, outcome));
-    effects.learn(outcome, pipeline.monitor());
+    EXPECT_TRUE(pipeline.nextOutcome(0, outcome));
     return outcome;
   }
 };
@@ -130,7 +126,7 @@ TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
   EXPECT_TRUE(outcome.clear) << "the unknown is no obstacle";
   EXPECT_EQ(outcome.unknown_fraction, 0);
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 0u);
-  EXPECT_FALSE(free.effects.plan().running("unknown_space"));
+  EXPECT_FALSE(free.pipeline.effects().plan().running("unknown_space"));
 }
 
 TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
@@ -147,7 +143,7 @@ TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].out, 8u);
   EXPECT_NEAR(outcome.unknown_fraction, 2.0 / 3, 1e-12);
   EXPECT_EQ(report.feed(1.2, 0.12f).unknown_fraction, 0) << "within what is known";
-  EXPECT_TRUE(report.effects.plan().running("unknown_space"));
+  EXPECT_TRUE(report.pipeline.effects().plan().running("unknown_space"));
 }
 
 TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
@@ -161,7 +157,7 @@ TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
     const float far[3] = {reach, reach, reach};
     std::memcpy(bytes.data() + bytes.size() - 1 - 16, far, sizeof far);  // the last point; is_dense follows
     report.pipeline.take(0, {"sensor_msgs/PointCloud2", bytes, 0, 0});
-    EXPECT_TRUE(report.pipeline.next(0, report.outcome));
+    EXPECT_TRUE(report.pipeline.nextOutcome(0, report.outcome));
   };
   spread(1, 0.5f);
   spread(1.1, 2000);  // across 5000 blocks of voxels an axis
@@ -224,7 +220,7 @@ TEST(TrackerNoise, ComesFromThePointField) {
   tree["uncertainty"]["scale"] = 3.0;
   Driven noisy(tree);
   noisy.giveMap(1);
-  EXPECT_TRUE(noisy.effects.plan().running("tracker_noise"));
+  EXPECT_TRUE(noisy.pipeline.effects().plan().running("tracker_noise"));
   noisy.feed(1, 0.17f, {0, 0, 0, 0});
   EXPECT_TRUE(noisy.feed(1.1, 0.15f, {0, 0, 0, 0}).clear) << "15 cm above the map";
   // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
@@ -279,6 +275,29 @@ TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
   EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map is where it was, 0.35 m below the mesh";
 }
 
+TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
+  Driven driven(scene());
+  driven.giveMap(1);
+  driven.feed(1, 0.35f);
+  EXPECT_TRUE(driven.pipeline.monitor().options().obstacle_expected) << "a map came";
+  driven.pipeline.reconfigure([](MonitorOptions& options, MarkerConfig& markers) {
+    options.max_contacts = 1;
+    markers.obstacle_m = 2;
+  });
+  EXPECT_EQ(driven.pipeline.monitor().options().max_contacts, 1u);
+  EXPECT_TRUE(driven.pipeline.monitor().options().obstacle_expected) << "the plan's, whatever is reconfigured";
+  EXPECT_EQ(driven.pipeline.config().monitor.max_contacts, 1u);
+  EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
+  EXPECT_EQ(driven.feed(1.1, -0.05f).status, StepStatus::TRUNCATED);
+  const auto another_clock = [](MonitorOptions& options, MarkerConfig&) {
+    options.max_contacts = 7;
+    options.clock_body = 9;
+  };
+  EXPECT_THROW(driven.pipeline.reconfigure(another_clock), std::invalid_argument);
+  EXPECT_EQ(driven.pipeline.config().monitor.max_contacts, 1u) << "what is refused changes nothing";
+  EXPECT_EQ(driven.pipeline.monitor().options().max_contacts, 1u);
+}
+
 constexpr std::int64_t SECOND_NS = 1000000000;
 
 /// A cloth in the world over a static table in a frame of its own, whose transform is not there.
@@ -304,18 +323,18 @@ struct Tabled : Driven {
 TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   Tabled scene;
   scene.take(Tabled::TABLE, 1, 0, 0);
-  EXPECT_FALSE(scene.pipeline.next(0, scene.outcome));
+  EXPECT_FALSE(scene.pipeline.nextOutcome(0, scene.outcome));
   EXPECT_FALSE(scene.pipeline.idle(Tabled::TABLE)) << "a newer one waits its turn at first";
-  EXPECT_FALSE(scene.pipeline.next(SECOND_NS, scene.outcome)) << "nobody knows the fixed frame yet";
+  EXPECT_FALSE(scene.pipeline.nextOutcome(SECOND_NS, scene.outcome)) << "nobody knows the fixed frame yet";
   EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "which is no mistake";
 
   scene.take(Tabled::CLOTH, 2, 0.3f, 2 * SECOND_NS);
-  ASSERT_TRUE(scene.pipeline.next(2 * SECOND_NS, scene.outcome));
+  ASSERT_TRUE(scene.pipeline.nextOutcome(2 * SECOND_NS, scene.outcome));
   const std::string complaint = scene.pipeline.takeComplaint(Tabled::TABLE);
   EXPECT_EQ(complaint.rfind("waits: no transform from 'table' to 'world'", 0), 0u) << complaint;
   scene.take(Tabled::CLOTH, 2.1, 0.3f, 3 * SECOND_NS);
-  scene.pipeline.next(3 * SECOND_NS, scene.outcome);
-  ASSERT_TRUE(scene.pipeline.next(4 * SECOND_NS, scene.outcome));
+  scene.pipeline.nextOutcome(3 * SECOND_NS, scene.outcome);
+  ASSERT_TRUE(scene.pipeline.nextOutcome(4 * SECOND_NS, scene.outcome));
   EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
   EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'table' to 'world'", 0), 0u) << scene.outcome.reason;
   EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "said once";
@@ -331,9 +350,9 @@ TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
 
   scene.raise("table", 0.1);
   scene.take(Tabled::CLOTH, 3, 0.3f, 6 * SECOND_NS);
-  ASSERT_TRUE(scene.pipeline.next(6 * SECOND_NS, scene.outcome));
+  ASSERT_TRUE(scene.pipeline.nextOutcome(6 * SECOND_NS, scene.outcome));
   scene.take(Tabled::CLOTH, 3.1, -0.1f, 7 * SECOND_NS);
-  ASSERT_TRUE(scene.pipeline.next(7 * SECOND_NS, scene.outcome));
+  ASSERT_TRUE(scene.pipeline.nextOutcome(7 * SECOND_NS, scene.outcome));
   ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
   EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
   EXPECT_EQ(scene.tables().processed(), 1u);
@@ -347,7 +366,7 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   double stamp_s = 1;
   const auto feed = [&](float z, std::int64_t now_ns) {
     scene.take(Tabled::CLOTH, stamp_s += 0.1, z, now_ns);
-    return scene.pipeline.next(now_ns, scene.outcome);
+    return scene.pipeline.nextOutcome(now_ns, scene.outcome);
   };
   ASSERT_TRUE(feed(0.3f, 0));
   ASSERT_TRUE(feed(0.3f, 0));
@@ -356,7 +375,7 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   const auto moved = cloud(2, 0, {}, "lorry");
   scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, SECOND_NS});
   EXPECT_FALSE(feed(0.3f, SECOND_NS)) << "waits with the table's frame, as long as that may wait";
-  ASSERT_TRUE(scene.pipeline.next(2 * SECOND_NS, scene.outcome));
+  ASSERT_TRUE(scene.pipeline.nextOutcome(2 * SECOND_NS, scene.outcome));
   EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
   EXPECT_FALSE(scene.outcome.answered);
   EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'lorry' to 'world'", 0), 0u) << scene.outcome.reason;
@@ -399,9 +418,9 @@ TEST(StaticBodies, CloudsThatComeFasterThanTfFindTheirPlace) {
 TEST(StaticBodies, WhatStillWaitsAtTheEndIsCounted) {
   Tabled scene;
   scene.take(Tabled::TABLE, 1, 0, 0);
-  scene.pipeline.next(SECOND_NS, scene.outcome);
+  scene.pipeline.nextOutcome(SECOND_NS, scene.outcome);
   scene.pipeline.finish();
-  EXPECT_FALSE(scene.pipeline.next(SECOND_NS, scene.outcome));
+  EXPECT_FALSE(scene.pipeline.nextOutcome(SECOND_NS, scene.outcome));
   EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u);
   EXPECT_EQ(scene.tables().waiting(), 0u);
 }
@@ -508,7 +527,7 @@ TEST(Weld, AResetWeldsAnew) {
     for (int frame = 0; frame < 2; ++frame) {
       const auto bytes = soup(stamp_s += 0.1, apart);
       welded.pipeline.take(0, {"visualization_msgs/Marker", bytes, 0, 0});
-      EXPECT_TRUE(welded.pipeline.next(0, welded.outcome));
+      EXPECT_TRUE(welded.pipeline.nextOutcome(0, welded.outcome));
     }
     return welded.outcome.answered ? (*welded.outcome.topologies)[0]->vertexCount() : 0;
   };

@@ -99,7 +99,7 @@ TEST(Soak, FlatMemoryAndTheSameBytesForTheSameStep) {
     const bool known = i % period < 2;
     pipeline.take(0, stream.next(known, i % period == 1));
     StepOutcome outcome;
-    ASSERT_TRUE(pipeline.next(static_cast<std::int64_t>(i) * FRAME_NS, outcome));
+    ASSERT_TRUE(pipeline.nextOutcome(static_cast<std::int64_t>(i) * FRAME_NS, outcome));
     ASSERT_TRUE(outcome.answered || i == 0) << outcome.reason;
     contacts += outcome.contacts.size();
     // What is published is built, too.

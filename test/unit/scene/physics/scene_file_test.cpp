@@ -26,7 +26,7 @@ std::string errorOf(std::string text, const std::string& from, const std::string
   text.replace(at, from.size(), to);
   try {
     parseScene(text, "s.yaml");
-  } catch (const SceneFileError& error) {
+  } catch (const ParameterError& error) {
     return error.what();
   }
   return "accepted";
@@ -51,18 +51,17 @@ TEST(SceneFile, ReadsWhatItSays) {
 TEST(SceneFile, AnUnknownKeyIsNamedWithItsLineAndTheKnownOnes) {
   const std::string error = errorOf(GOOD, "mass_kg", "mas_kg");
   EXPECT_NE(error.find("s.yaml:"), std::string::npos) << error;
-  EXPECT_NE(error.find("mass_kg: is missing"), std::string::npos) << error;
+  EXPECT_NE(error.find("mass_kg is needed: a number from"), std::string::npos) << error;
   const std::string extra = errorOf(GOOD, "    mass_kg: 0.1\n", "    mass_kg: 0.1\n    colour: red\n");
-  EXPECT_NE(extra.find("s.yaml:9: bodies[0].colour"), std::string::npos) << extra;
-  EXPECT_NE(extra.find("mass_kg"), std::string::npos) << extra;
+  EXPECT_NE(extra.find("s.yaml:9: bodies[0]/colour is not known; nearest is bodies[0]/"), std::string::npos) << extra;
 }
 
 TEST(SceneFile, ValuesOutOfRangeOrOfTheWrongTypeAreRefused) {
-  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: -1").find("s.yaml:8: bodies[0].mass_kg: write a number from"),
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: -1").find("s.yaml:8: bodies[0]/mass_kg is -1, it must be from"),
             std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: .nan").find("write a number"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: heavy").find("not 'heavy'"), std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: 2.5").find("write a whole number"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: .nan").find("mass_kg is nan, it must be from"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: heavy").find("is a string, a number is needed"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: 2.5").find("an integer is needed"), std::string::npos);
   EXPECT_NE(errorOf(GOOD, "rows: 3", "rows: 1").find("rows"), std::string::npos);
   EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "[0, -9.81]").find("a list of 3 numbers"), std::string::npos);
   EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "9.81").find("a list of 3 numbers"), std::string::npos);
@@ -71,22 +70,24 @@ TEST(SceneFile, ValuesOutOfRangeOrOfTheWrongTypeAreRefused) {
 TEST(SceneFile, ContradictionsAreRefused) {
   EXPECT_NE(errorOf(GOOD, "sheet: {rows: 3", "grippers: [{vertices: [12]}]\n    sheet: {rows: 3").find("from 0 to 11"),
             std::string::npos);
-  EXPECT_NE(errorOf(GOOD, "sheet: {rows: 3", "grippers: [{row: 0, col: 0}]\n    sheet: {rows: 3").find("just one of"),
-            std::string::npos);
+  EXPECT_NE(
+      errorOf(GOOD, "sheet: {rows: 3", "grippers: [{row: 0, col: 0}]\n    sheet: {rows: 3").find("needs just one of"),
+      std::string::npos);
   EXPECT_NE(errorOf(GOOD, "    sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}",
                     "    rope: {points: 9, length_m: 1, center_m: [0, 0, 1]}")
                 .find("a rope has no faces"),
             std::string::npos);
   EXPECT_NE(errorOf(GOOD, "bodies:",
                     "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 1], max_m: [1, 1, 1]}}]}\nbodies:")
-                .find("min_m below max_m"),
+                .find("max_m must be above min_m"),
             std::string::npos);
   EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"),
             std::string::npos);
   EXPECT_NE(
       errorOf(GOOD, "bodies:",
               "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:")
-          .find("s.yaml:7: rigid_bodies[0].self_collision: the body is rigid and cannot meet itself; remove this line"),
+          .find("s.yaml:7: rigid_bodies[0]/self_collision has no meaning: the body is rigid and cannot meet itself; "
+                "remove this line"),
       std::string::npos);
 }
 
@@ -96,20 +97,21 @@ TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
   };
   EXPECT_EQ(with("  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: 4}}\n"),
             "accepted");
-  EXPECT_NE(
-      with("  minimum_separation_m: -0.01\n").find("s.yaml:7: monitor.minimum_separation_m: write a number from 0"),
-      std::string::npos);
-  EXPECT_NE(with("  minimum_separation_m: .nan\n").find("monitor.minimum_separation_m: write a number from 0"),
+  EXPECT_NE(with("  minimum_separation_m: -0.01\n")
+                .find("s.yaml:7: monitor/minimum_separation_m is -0.01, it must be from 0"),
+            std::string::npos);
+  EXPECT_NE(with("  minimum_separation_m: .nan\n").find("monitor/minimum_separation_m is nan, it must be from 0"),
             std::string::npos);
   EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, minimum_separation_m: .inf}\n")
-                .find("s.yaml:8: monitor.bodies.cloth.minimum_separation_m: write a number from 0"),
+                .find("s.yaml:8: monitor/bodies/cloth/minimum_separation_m is inf, it must be from 0"),
             std::string::npos);
   EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\n")
-                .find("s.yaml:8: monitor.bodies.cloth.topology.rows: 4 x 4 = 16, but sheet has 12 points; write rows: "
+                .find("s.yaml:8: monitor/bodies/cloth/topology/rows and cols are 4 x 4 = 16, but sheet has 12 points; "
+                      "write rows: "
                       "3, cols: 4"),
             std::string::npos);
   EXPECT_NE(with("  bodies:\n    finger: {rigid: {mesh: a.stl, frame: finger}, self_collision: true}\n")
-                .find("s.yaml:8: monitor.bodies.finger.self_collision: the body is rigid"),
+                .find("s.yaml:8: monitor/bodies/finger/self_collision has no meaning: the body is rigid"),
             std::string::npos);
 }
 
@@ -131,39 +133,44 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
             "accepted");
   EXPECT_EQ(with("  clear: {share_at_least: 1}\n"), "accepted");
 
-  expectTold("  selv: none\n", "s.yaml:7: expect.selv: is not a key here; known are body, clear, octomap, self");
-  expectTold("  {}\n", "expect: write at least one fact");
-  expectTold("  self: never\n", "s.yaml:7: expect.self: write `key: value` lines here");
-  expectTold("  self: {}\n", "expect.self.first_contact_s: is missing");
-  expectTold("  self: {first_contact_s: 0.1}\n", "expect.self.first_contact_s: write a list of 2 numbers");
-  expectTold("  self: {first_contact_s: [0.1, 0.05]}\n", "expect.self.first_contact_s: write the earliest time first");
-  expectTold("  self: {first_contact_s: [0.1, 0.2]}\n", "expect.self.first_contact_s: write a number from 0 to 0.133");
-  expectTold("  self: {first_contact_s: [0, 0.1], contacts_at_least: 0}\n", "contacts_at_least: write a number from 1");
-  expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect.self.least: is not a key here");
-  expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect.body.names: is missing");
-  expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect.body.names: write a list of 2 texts");
+  expectTold("  selv: none\n", "s.yaml:7: expect/selv is not known; nearest is expect/self");
+  expectTold("  {}\n", "expect needs at least one fact");
+  expectTold("  self: never\n", "s.yaml:7: expect/self is a string, a section is needed");
+  expectTold("  self: {}\n", "expect/self/first_contact_s is needed: a list of 2 numbers");
+  expectTold("  self: {first_contact_s: 0.1}\n", "expect/self/first_contact_s must be a list of 2 numbers");
+  expectTold("  self: {first_contact_s: [0.1, 0.05]}\n",
+             "expect/self/first_contact_s must be the earliest time, then the latest");
+  expectTold("  self: {first_contact_s: [0.1, 0.2]}\n",
+             "expect/self/first_contact_s is 0.2, it must be from 0 to 0.133");
+  expectTold("  self: {first_contact_s: [0, 0.1], contacts_at_least: 0}\n",
+             "contacts_at_least is 0, it must be from 1");
+  expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect/self/least is not known");
+  expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect/body/names is needed");
+  expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect/body/names must be a list of 2 texts");
   expectTold("  body: {names: [sheet, [a]], first_contact_s: [0, 0.1]}\n",
-             "expect.body.names: write a list of 2 texts");
-  expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n", "the scene has no body 'thumb'");
-  expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "write two different names");
-  expectTold("  clear: {until_s: 0.2}\n", "expect.clear.until_s: write a number from 0 to 0.133");
-  expectTold("  clear: {until_s: 0.1, again_s: 0.05}\n", "expect.clear.again_s: write a number from 0.1 to 0.133");
-  expectTold("  clear: {share_at_least: 2}\n", "expect.clear.share_at_least: write a number from 0 to 1");
+             "expect/body/names must be a list of 2 texts");
+  expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n",
+             "has 'thumb', which is no body of the scene");
+  expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "has one name twice");
+  expectTold("  clear: {until_s: 0.2}\n", "expect/clear/until_s is 0.2, it must be from 0 to 0.133");
+  expectTold("  clear: {until_s: 0.1, again_s: 0.05}\n", "expect/clear/again_s is 0.05, it must be from 0.1 to 0.133");
+  expectTold("  clear: {share_at_least: 2}\n", "expect/clear/share_at_least is 2, it must be from 0 to 1");
   expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {until_s: 0.06}\n",
-             "expect.clear.until_s: contradicts first_contact_s: [0.05, 0.1]; write no later time than its first");
+             "expect/clear/until_s contradicts first_contact_s: [0.05, 0.1]; write no later time than its first");
   expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {again_s: 0.09}\n",
-             "expect.clear.again_s: contradicts first_contact_s: [0.05, 0.1]; write no earlier time than its last");
+             "expect/clear/again_s contradicts first_contact_s: [0.05, 0.1]; write no earlier time than its last");
   EXPECT_NE(errorOf(GOOD, "bodies:", "expect: {octomap: {first_contact_s: [0, 0.1]}}\nbodies:")
-                .find("expect.octomap: the scene has no obstacle; remove this line"),
+                .find("expect/octomap has no meaning without an obstacle; remove this line"),
             std::string::npos);
   EXPECT_EQ(errorOf(GOOD, "bodies:", "expect: {octomap: none}\nbodies:"), "accepted");
 }
 
 TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
   EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
-  EXPECT_THROW(readSceneFile("no/such/scene.yaml"), SceneFileError);
-  EXPECT_THROW(parseScene("", "s.yaml"), SceneFileError);
-  EXPECT_THROW(parseScene("- a\n- b\n", "s.yaml"), SceneFileError);
+  EXPECT_THROW(readSceneFile("no/such/scene.yaml"), ParameterError);
+  EXPECT_THROW(parseScene("", "s.yaml"), ParameterError);
+  EXPECT_THROW(parseScene("- a\n- b\n", "s.yaml"), ParameterError);
+  EXPECT_THROW(parseScene("name: &a [*a]\n", "s.yaml"), ParameterError) << "an anchor within itself";
 }
 
 TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
