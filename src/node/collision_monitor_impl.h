@@ -88,10 +88,10 @@ struct CollisionMonitor::Impl {
   void takeMessage(std::size_t body, const QueuedMessage& queued);
   void takeMessages();
   void tellComplaints();
-  void publish(StepOutcome& outcome);
-  void publishAll(StepOutcome& outcome);
-  void predict(StepOutcome& outcome);
-  void publishPrediction(const StepOutcome& prediction);
+  void publish(Outcome& outcome);
+  void publishAll(Outcome& outcome);
+  void predict(Outcome& outcome);
+  void publishPrediction(const Outcome& prediction);
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();

@@ -18,11 +18,11 @@ class EffectTracker {
 
   /// False: the octomap is switched off, nothing is subscribed to for it.
   bool mayUseMap() const;
-  bool mapExpected() const { return plan_.running("octomap"); }
+  bool mapExpected() const { return plan_.running(Effect::OCTOMAP); }
   /// Brings the monitor's options in line with the plan.
   void apply(Monitor& monitor, bool map_seen);
   /// Learns topologies and what is left out from the outcome.
-  void learn(const StepOutcome& outcome, const Monitor& monitor);
+  void learn(const Outcome& outcome, const Monitor& monitor);
   /// True when the plan has changed since the last call, or at the first one.
   bool takeNewPlan();
   /// True when the pairs that are left out have changed since the last call; not at first, while there are none.
@@ -34,7 +34,7 @@ class EffectTracker {
 
  private:
   EffectScene scene_;
-  std::map<std::string, EffectSetting> settings_;
+  EffectSettings settings_;
   EffectPlan plan_, told_;
   std::vector<LeftOutPair> told_left_out_;
 };

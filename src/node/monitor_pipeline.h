@@ -12,7 +12,7 @@
 
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 
 namespace dccd {
@@ -50,7 +50,7 @@ class MonitorPipeline {
   void refuse(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, const std::string& reason);
   void setMap(LoadedMap map, std::int64_t now_ns);
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
-  bool next(std::int64_t now_ns, StepOutcome& outcome);
+  bool next(std::int64_t now_ns, Outcome& outcome);
   /// Something waits for tf or for other bodies, so that next() is worth calling again without new input.
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of next().
@@ -59,7 +59,7 @@ class MonitorPipeline {
   /// learnt: the map and static bodies are placed in it. After RESET triangle soups are welded anew.
   void reset(StepStatus status);
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
-  StepOutcome checkNow();
+  Outcome checkNow();
 
   /// The body's newest frame holds at all times. Safe to call from any thread.
   bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
@@ -112,7 +112,7 @@ class MonitorPipeline {
   void takeDecoded(std::size_t body, StampNs receipt_ns, std::int64_t arrival_ns, Decode decode);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// unknown_space: report. How much of what the step swept the map does not know.
-  void measureUnknown(StepOutcome& outcome) const;
+  void measureUnknown(Outcome& outcome) const;
   /// A static body's frame waits on.
   void keep(std::size_t body);
   /// The end has come for what still waits.
@@ -122,7 +122,7 @@ class MonitorPipeline {
   /// Why the body, whose frame waits, has no place.
   std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
-  void nameMissing(StepOutcome& outcome) const;
+  void nameMissing(Outcome& outcome) const;
   /// False: still waits.
   bool place(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.

@@ -19,7 +19,7 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 void CollisionMonitor::Impl::reconfigureNow(MonitorOptions options, const MarkerConfig& markers) {
   config.markers = markers;
   // What the effect plan decides stays with it.
-  options.obstacle_expected = pipeline.monitor().options().obstacle_expected;
+  options.detector.obstacle_expected = pipeline.monitor().options().detector.obstacle_expected;
   options.detector.check_start_state = pipeline.monitor().options().detector.check_start_state;
   try {
     pipeline.monitor().setOptions(options);
@@ -41,7 +41,7 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
   pipeline.reset(status);
   outputs.publishNotClear(pipeline.fixedFrame());
   if (!outputs.wantsPrediction()) return;
-  StepOutcome none;
+  Outcome none;
   none.status = status;
   none.start_ns = none.stamp_ns = newest_ns;
   publishPrediction(none);
@@ -123,7 +123,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
 }
 
 /// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
-void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
+void CollisionMonitor::Impl::publish(Outcome& outcome) {
   try {
     publishAll(outcome);
   } catch (const std::exception& error) {
@@ -134,7 +134,7 @@ void CollisionMonitor::Impl::publish(StepOutcome& outcome) {
   }
 }
 
-void CollisionMonitor::Impl::publishAll(StepOutcome& outcome) {
+void CollisionMonitor::Impl::publishAll(Outcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
@@ -160,12 +160,12 @@ void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
   for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
 }
 
-void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
+void CollisionMonitor::Impl::predict(Outcome& outcome) {
   if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
   look_ahead.observe(outcome);
   // Nothing to go on from, which whoever listens to predictions alone must hear, too.
   if (!outcome.answered) return publishPrediction(outcome);
-  StepOutcome prediction;
+  Outcome prediction;
   try {
     prediction = pipeline.monitor().predict();
   } catch (const std::exception& error) {
@@ -178,7 +178,7 @@ void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
   publishPrediction(prediction);
 }
 
-void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
+void CollisionMonitor::Impl::publishPrediction(const Outcome& prediction) {
   const double horizon_s = config.monitor.look_ahead_s;
   outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
 }
@@ -204,7 +204,7 @@ void CollisionMonitor::Impl::work() {
     takeMaps();
     takeMessages();
     accountDropped();
-    StepOutcome outcome;
+    Outcome outcome;
     while (!stopping && pipeline.next(steadyNs(), outcome)) publish(outcome);
     tellComplaints();
     const std::string surprise = recorder.takeSurprise();
