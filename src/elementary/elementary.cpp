@@ -7,9 +7,14 @@
 #include <string>
 
 #include "dccd/accuracy.h"
-#include "elementary/rungs.h"
 
 namespace dccd {
+
+// Each in the file of its rung. Options are validated here, once for all of them.
+std::unique_ptr<Rung> makeFastRung(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeConservativeRung(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeExactRung(const AccuracyOptions& options);
+
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("accuracy options: " + what); }

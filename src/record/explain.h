@@ -26,8 +26,8 @@ struct VoxelQuestion {
   VoxelKey voxel;
 };
 
-/// What one stage says of the pair. A stage that rejects has a proof that the features stay apart; all others are asked
-/// all the same.
+/// What one stage says of the pair. A stage that rejects has a proof that the features stay apart; stages before the
+/// rungs are asked all the same, and every rung about what the planar filter keeps.
 struct TraceLine {
   enum class Says : std::uint8_t { KEPT, REJECTED, CONTACT, UNDECIDED };
   std::size_t part = 0;  ///< of the step, where it was split
