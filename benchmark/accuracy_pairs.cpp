@@ -20,6 +20,7 @@
 #include "dccd/elementary.h"
 #include "oracle/query_file.h"
 #include "simd/fused_filter.h"
+#include "support/detector.h"
 #include "support/scene_data.h"
 
 namespace dccd {
@@ -203,13 +204,12 @@ int run(int argc, char** argv) {
   std::vector<std::unique_ptr<SceneArrays>> scenes;
   for (std::size_t i = 0; i + 2 < frames.size(); i += 3) {
     const test::PlyMesh m0 = test::readPly(frames[i + 1]), m1 = test::readPly(frames[i + 2]);
-    BodySetup body;
+    Body body;
     body.name = frames[i];
     body.topology = std::make_shared<const Topology>(Topology::fromTriangles(m0.vertices.size(), m0.faces));
     scenes.push_back(std::make_unique<SceneArrays>());
-    scenes.back()->setBodies({body}, {&m0.vertices});
-    MotionStep step;
-    step.bodies = {{&m0.vertices, &m1.vertices}};
+    const Step step = test::stepOf(body, m0.vertices, m1.vertices);
+    scenes.back()->setBodies(step.bodies);
     StepStats stats;
     scenes.back()->record(step, stats);
     scenes.back()->refit([](std::size_t n, const auto& f) { f(0, n); }, stats);

@@ -8,8 +8,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "dccd/detector.h"
 #include "support/data.h"
+#include "support/detector.h"
 #include "support/scene_data.h"
 #include "support/timing.h"
 
@@ -41,19 +41,17 @@ Case wavingCloth(std::size_t side) {
 }
 
 nlohmann::json measure(const Case& c, int repeat) {
-  BodySetup body;
+  Body body;
   body.name = "cloth";
   body.topology = c.topology;
-  MotionStep step;
-  step.bodies = {{&c.t0, &c.t1}};
-  std::deque<Detector> detectors;
+  const Step step = test::stepOf(body, c.t0, c.t1);
+  std::deque<test::Detector> detectors;
   for (const bool with : {false, true}) {
-    DetectorOptions options;
+    Options options;
     options.keep_bounds = false;  // the same step again and again
     options.check_start_state = false;
     options.unfolded_test = with;
     detectors.emplace_back(options);
-    detectors.back().setBodies({body}, {&c.t0});
   }
   std::vector<double> times[2], ratios;
   std::size_t contacts = 0;
@@ -61,7 +59,7 @@ nlohmann::json measure(const Case& c, int repeat) {
   for (int r = 0; r < repeat; ++r) {
     for (std::size_t with = 0; with < 2; ++with) {
       const Stopwatch watch;
-      const StepResult& result = detectors[with].run(step);
+      const Outcome result = detectors[with].run(step);
       times[with].push_back(watch.milliseconds());
       if (with == 0) contacts = result.contacts.size();
       if (result.contacts.size() != contacts) throw std::runtime_error(c.name + ": the test changes the contacts");

@@ -7,7 +7,7 @@
 #include <iostream>
 
 #include "dccd/effect_plan.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "scene/physics/scene_file.h"
 #include "scene/physics/simulation.h"
 #include "support/timing.h"
@@ -65,25 +65,24 @@ Recorded record(const std::string& scene_file) {
 }
 
 /// A monitor as the plan of these settings makes it.
-std::unique_ptr<Monitor> monitorFor(const Recorded& scene, const std::map<std::string, EffectSetting>& settings) {
+std::unique_ptr<Monitor> monitorFor(const Recorded& scene, const EffectSettings& settings) {
   EffectScene described;
-  EffectBody flag;
-  flag.name = "flag";
-  flag.topology_known = true;
-  described.bodies = {flag};
+  described.bodies.resize(1);
+  described.bodies[0].name = "flag";
+  described.bodies[0].topology = scene.topology;
   described.map_source = "the map";
   described.map_seen = true;
   const EffectPlan plan(described, settings);
   MonitorOptions options;
   options.store.max_vertex_step_m = 0;
-  options.obstacle_expected = plan.running("octomap");
-  options.detector.check_start_state = plan.running("start_state");
-  MonitorBody body;
+  options.detector.obstacle_expected = plan.running(Effect::OCTOMAP);
+  options.detector.check_start_state = plan.running(Effect::START_STATE);
+  Body body;
   body.name = "flag";
-  body.self_collision = plan.running("self_collision");
-  body.against_obstacle = plan.running("octomap");
-  auto monitor = std::make_unique<Monitor>(options, std::vector<MonitorBody>{body});
-  if (plan.running("octomap")) monitor->setMap({scene.map, 1, Eigen::Isometry3d::Identity(), {}});
+  body.self_collision = plan.running(Effect::SELF_COLLISION);
+  body.against_obstacle = plan.running(Effect::OCTOMAP);
+  auto monitor = std::make_unique<Monitor>(options, std::vector<Body>{body});
+  if (plan.running(Effect::OCTOMAP)) monitor->setMap({scene.map, 1, Eigen::Isometry3d::Identity(), {}});
   return monitor;
 }
 
@@ -97,7 +96,7 @@ void feed(Monitor& monitor, const Recorded& scene, std::size_t k, Run& run) {
   frame.stamp_ns = static_cast<StampNs>(k + 1) * scene.period_ns;
   frame.topology = scene.topology;
   frame.positions = scene.frames[k];
-  StepOutcome outcome;
+  Outcome outcome;
   const Stopwatch watch;
   monitor.push(0, std::move(frame), 0);
   monitor.next(0, outcome);
@@ -122,8 +121,7 @@ nlohmann::json medianWithInterval(std::vector<double> values) {
 
 nlohmann::json measureFlag(const std::string& scene_file, int rounds) {
   const Recorded scene = record(scene_file);
-  const std::map<std::string, EffectSetting> only_self = {{"octomap", EffectSetting::OFF},
-                                                          {"start_state", EffectSetting::OFF}};
+  const EffectSettings only_self = {{Effect::OCTOMAP, EffectSetting::OFF}, {Effect::START_STATE, EffectSetting::OFF}};
   std::vector<double> ratios, auto_ms, self_ms;
   for (int r = 0; r < rounds + 1; ++r) {
     const auto everything = monitorFor(scene, {}), self = monitorFor(scene, only_self);
@@ -173,8 +171,8 @@ nlohmann::json measureRope(int repeat) {
   const auto topology = std::make_shared<const Topology>(Topology::polyline(500));
   MonitorOptions options;
   options.store.max_vertex_step_m = 0;
-  options.obstacle_expected = true;
-  MonitorBody body;
+  options.detector.obstacle_expected = true;
+  Body body;
   body.name = "rope";
   Monitor monitor(options, {body});
   monitor.setMap({map, 1, Eigen::Isometry3d::Identity(), {}});
@@ -185,14 +183,14 @@ nlohmann::json measureRope(int repeat) {
     frame.stamp_ns = 10000000LL * (k + 1);
     frame.topology = topology;
     frame.positions = ropeAt(0.003 * (k % 20));
-    StepOutcome outcome;
+    Outcome outcome;
     const Stopwatch watch;
     monitor.push(0, std::move(frame), 0);
     monitor.next(0, outcome);
     if (outcome.answered) times.push_back(watch.milliseconds());
     contacts += outcome.total_contacts;
     self_pairs += outcome.stats[Effect::SELF_COLLISION].in;
-    map_pairs += outcome.stats[Effect::OBSTACLE].in;
+    map_pairs += outcome.stats[Effect::OCTOMAP].in;
   }
   if (self_pairs == 0 || map_pairs == 0 || contacts == 0) throw std::runtime_error("the rope has nothing to do");
   const std::size_t steps = times.size();

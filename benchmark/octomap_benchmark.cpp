@@ -8,8 +8,8 @@
 #include <random>
 #include <set>
 
-#include "dccd/detector.h"
 #include "dccd/voxel_surface.h"
+#include "support/detector.h"
 #include "support/timing.h"
 
 namespace dccd {
@@ -111,33 +111,27 @@ double earliest(const std::vector<Contact>& contacts) {
 nlohmann::json timeSteps(const Case& c, const std::shared_ptr<const VoxelSurface>& surface, const Positions* triangles,
                          const std::shared_ptr<const Topology>& triangle_topology, int repeat,
                          std::vector<Contact>& contacts) {
-  DetectorOptions options;
+  Options options;
   options.keep_bounds = false;  // the same step again and again
   options.check_start_state = false;
-  Detector detector(options);
-  BodySetup cloth;
+  test::Detector detector(options);
+  Body cloth;
   cloth.name = "cloth";
   cloth.topology = std::make_shared<const Topology>(c.topology);
   cloth.self_collision = false;  // what is measured is the map
-  std::vector<BodySetup> bodies{cloth};
-  std::vector<const Positions*> rest{&c.t0};
-  MotionStep step;
-  step.bodies.push_back({&c.t0, &c.t1});
+  Step step = test::stepOf(cloth, c.t0, c.t1);
   if (triangles) {
-    BodySetup table = cloth;
+    Body table = cloth;
     table.name = "table";
     table.topology = triangle_topology;
-    bodies.push_back(table);
-    rest.push_back(triangles);
-    step.bodies.push_back({triangles, triangles});
+    step.bodies.push_back(test::moving(table, *triangles, *triangles));
   } else {
-    step.obstacle = surface;
+    step.map.surface = surface;
   }
-  detector.setBodies(bodies, rest);
   std::vector<double> times;
   for (int r = 0; r < repeat; ++r) {
     const Stopwatch watch;
-    const StepResult& result = detector.run(step);
+    const Outcome result = detector.run(step);
     times.push_back(watch.milliseconds());
     contacts = result.contacts;
   }

@@ -6,8 +6,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "dccd/detector.h"
 #include "scene/generated_scene.h"
+#include "support/detector.h"
 #include "support/timing.h"
 
 namespace dccd {
@@ -48,30 +48,25 @@ bool sameContacts(const std::vector<Contact>& a, const std::vector<Contact>& b) 
 }
 
 nlohmann::json measure(const Frames& frames, int threads, int repeat, std::vector<Contact>& reference) {
-  DetectorOptions options;
+  Options options;
   options.keep_bounds = false;  // the same step again and again
   options.num_threads = threads;
   options.check_start_state = false;  // the scenes start with surfaces through each other
-  Detector detector(options);
-  std::vector<BodySetup> setups;
-  std::vector<const Positions*> rest;
-  MotionStep step;
+  test::Detector detector(options);
+  Step step;
   for (std::size_t b = 0; b < frames.bodies.size(); ++b) {
-    BodySetup setup;
+    Body setup;
     setup.name = frames.bodies[b].name;
     setup.topology = std::make_shared<const Topology>(frames.bodies[b].topology);
     setup.self_collision = frames.bodies[b].deforms;
-    setups.push_back(setup);
-    rest.push_back(&frames.t0[b]);
-    step.bodies.push_back({&frames.t0[b], &frames.t1[b]});
+    step.bodies.push_back(test::moving(setup, frames.t0[b], frames.t1[b]));
   }
   const std::size_t memory_before = residentBytes();
-  detector.setBodies(setups, rest);
   std::vector<double> times;
   nlohmann::json out;
   for (int r = 0; r < repeat; ++r) {
     const Stopwatch watch;
-    const StepResult& result = detector.run(step);
+    const Outcome result = detector.run(step);
     times.push_back(watch.milliseconds());
     if (r > 0) continue;
     if (reference.empty()) reference = result.contacts;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dccd/export.h"
-#include "dccd/monitor.h"
+#include "dccd/outcome.h"
 
 namespace dccd {
 
@@ -27,7 +27,7 @@ struct LookAheadSummary {
 constexpr std::size_t LOOK_AHEAD_SAMPLES = 1000;
 
 /// What a prediction cost, for the statistics of the step that it begins after.
-DCCD_EXPORT StageStats lookAheadStats(const StepOutcome& prediction);
+DCCD_EXPORT StageStats lookAheadStats(const Outcome& prediction);
 
 /// Feed it every outcome in order, and after an outcome the prediction that begins at its end, if there is one. Memory
 /// grows with the vertices times the steps in a horizon, and with max_samples.
@@ -36,8 +36,8 @@ class DCCD_EXPORT LookAheadScore {
   /// max_samples: errors that are kept, the newest ones; 0: all.
   explicit LookAheadScore(double horizon_s, std::size_t max_samples = 0);
 
-  void observe(const StepOutcome& outcome);
-  void predict(const StepOutcome& prediction);
+  void observe(const Outcome& outcome);
+  void predict(const Outcome& prediction);
   /// Sorts what is kept.
   LookAheadSummary summary() const;
 
@@ -51,7 +51,7 @@ class DCCD_EXPORT LookAheadScore {
   };
 
   /// The earliest certain contact of each vertex [0,1]; `touching`: all that is in contact, initial or not certain too.
-  static void vertexTimes(const StepOutcome& outcome, Times& first, std::set<Key>* touching);
+  static void vertexTimes(const Outcome& outcome, Times& first, std::set<Key>* touching);
   void expire(StampNs now_ns);
   void addSample(double error_s);
 

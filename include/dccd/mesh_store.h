@@ -8,41 +8,12 @@
 #include <memory>
 
 #include "dccd/export.h"
+#include "dccd/outcome.h"
 #include "dccd/tolerances.h"
 #include "dccd/topology.h"
 #include "dccd/types.h"
 
 namespace dccd {
-
-using StampNs = std::int64_t;  ///< nanoseconds; the stamp of a mesh, never the wall clock
-
-/// What became of a frame. Values are those of the ContactArray message. "Answered" ones come with a result,
-/// "seams" begin a new pair of frames, all others drop the frame.
-enum class StepStatus : std::uint8_t {
-  OK = 0,
-  FIRST_FRAME = 1,
-  TOPOLOGY_CHANGED = 2,
-  GAP = 3,
-  TIME_JUMP = 4,
-  NO_TRANSFORM = 5,
-  NO_MAP = 6,
-  NO_BODY = 7,
-  PARTIAL = 8,
-  DEADLINE = 9,
-  TRUNCATED = 10,
-  DUPLICATE = 11,
-  TELEPORT = 12,
-  VERTEX_COUNT = 13,
-  BAD_MESSAGE = 14,
-  QUEUE_FULL = 15,
-  DISABLED = 16,
-  RESET = 17,
-  INTERNAL_ERROR = 18,
-  COUNT
-};
-DCCD_EXPORT const char* toString(StepStatus status);
-DCCD_EXPORT bool isAnswered(StepStatus status);
-DCCD_EXPORT bool isSeam(StepStatus status);
 
 /// One frame, already in the fixed frame.
 struct MeshFrame {

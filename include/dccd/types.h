@@ -18,6 +18,7 @@ constexpr Index NO_INDEX = std::numeric_limits<Index>::max();
 using Edge = std::array<Index, 2>;  ///< vertex indices, the smaller one first
 using Face = std::array<Index, 3>;  ///< vertex indices in the order of the input
 using Positions = std::vector<Vec3>;
+using StampNs = std::int64_t;  ///< nanoseconds; the stamp of a mesh, never the wall clock
 
 /// A closed axis-aligned box.
 struct Box {

@@ -1,12 +1,12 @@
 // Occupied space of a map as what a mesh can touch: exposed faces, convex edges, corners. No OctoMap here.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "dccd/contact.h"
+#include "dccd/deadline.h"
 #include "dccd/export.h"
 #include "dccd/topology.h"
 #include "dccd/types.h"
@@ -68,9 +68,9 @@ struct ObstacleOptions {
 /// edges' and its vertices' contacts is that of its first touch of the occupied voxels as closed, solid boxes. At most
 /// one contact for each mesh feature, leaf and kind, the earliest.
 /// - `initial` (TOC 0): the feature touches the leaf at t=0, interior leaves included. A vertex has one for each leaf
-/// it
-///   touches; an edge none of whose ends is inside any leaf, one for each leaf that it pierces or touches; a face none
-///   of whose sides touches a leaf, one for each leaf that pierces it. What an end or a side settles is not said again.
+///   it touches; an edge none of whose ends is inside any leaf, one for each leaf that it pierces or touches; a face
+///   none of whose sides touches a leaf, one for each leaf that pierces it. What an end or a side settles is not said
+///   again.
 /// - `leaving`: a feature that touched some leaf at t=0 meets another one's face, edge or corner from within.
 /// Rungs: vertices are always decided exactly (the path of a point through a box is linear); edges and corners by the
 /// elementary test. `screen` calls all but initial contacts undecided.
@@ -84,10 +84,10 @@ class DCCD_EXPORT ObstacleCheck {
   /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
   /// vertex_radius_m: uncertainty per vertex, 0 or more; null means none. A feature's largest one adds to the
   /// separation, so that rungs other than conservative and screen cannot hold it. deadline: features that have not been
-  /// begun by then are left out, and false is returned; null means none.
+  /// begun by then are left out, and false is returned.
   bool run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
            const std::uint8_t* vertex_active, std::uint16_t body, std::vector<Contact>& contacts, ObstacleStats& stats,
-           const double* vertex_radius_m = nullptr, const std::chrono::steady_clock::time_point* deadline = nullptr);
+           const double* vertex_radius_m = nullptr, const Deadline& deadline = {});
 
  private:
   struct Impl;

@@ -10,6 +10,7 @@
 #include <memory>
 #include <sstream>
 
+#include "dccd/accuracy.h"
 #include "dccd/simd_target.h"
 #include "input/known_types.h"
 #include "node/bag_replay.h"
@@ -59,7 +60,7 @@ class ResultBag {
     if (m.getTopic().compare(0, own.size(), own) == 0) return;
     bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
   }
-  void add(const StepOutcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far,
+  void add(const Outcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far,
            const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
     StatsContext context;
@@ -84,7 +85,7 @@ class ResultBag {
     bag_.write("/collision_monitor/markers", at,
                toMarkers(outcome, pipeline.monitor().bodies(), pipeline.config().markers, frame));
   }
-  void addPrediction(const StepOutcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {
+  void addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
     const double horizon_s = pipeline.config().monitor.look_ahead_s;
     look_ahead_.predict(prediction);
@@ -100,18 +101,20 @@ class ResultBag {
 };
 
 std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config, const BagReplayOptions& options) {
-  std::vector<std::string> names{"screen", "fast", "conservative", "exact"};
-  if (config.holdsDistance()) names = {"screen", "conservative"};  // the others cannot hold a distance
+  std::vector<std::string> names;
+  for (const Accuracy rung : allRungs()) {
+    if (!config.holdsDistance() || holdsDistance(rung)) names.push_back(toString(rung));
+  }
   const auto run = [&](const std::string& name) {
     MonitorConfig one = config;
     one.monitor.detector.accuracy.rung = accuracyFromString(name.c_str());
     one.monitor.detector.step_budget_ms = 0;
     one.monitor.look_ahead_s = 0;
-    one.monitor.max_contacts = std::numeric_limits<std::size_t>::max();
+    one.monitor.detector.max_contacts = std::numeric_limits<std::size_t>::max();
     if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
     ContactLog log;
     BagReplay(a.bag, one, options)
-        .run([&](const StepOutcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { log.add(o); });
+        .run([&](const Outcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { log.add(o); });
     return log;
   };
   // The last is what the others are held against; a log holds every contact of the bag, so no more than two are kept.
@@ -124,8 +127,8 @@ std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config
   return rungs;
 }
 
-std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
-  std::vector<MonitorBody> bodies;
+std::vector<Body> monitorBodies(const MonitorConfig& config) {
+  std::vector<Body> bodies;
   for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
   return bodies;
 }
@@ -157,7 +160,7 @@ int analyze(const Arguments& a) {
   Report report(a.report);
   std::string frame;
   const BagReplaySummary summary = replay.run(
-      [&](const StepOutcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
+      [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
         report.add(outcome, pipeline.monitor().bodies());
         frame = pipeline.fixedFrame();
         if (out) out->add(outcome, pipeline, so_far, at);
@@ -165,7 +168,7 @@ int analyze(const Arguments& a) {
       [&](const rosbag::MessageInstance& m) {
         if (out) out->copy(m);
       },
-      [&](const StepOutcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
+      [&](const Outcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
   report.setEffects(summary.effects);

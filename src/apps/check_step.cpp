@@ -7,7 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "dccd/detector.h"
+#include "dccd/detect.h"
 #include "dccd/simd_target.h"
 #include "input/mesh_file.h"
 
@@ -49,7 +49,7 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   return a;
 }
 
-void writeContacts(const std::string& path, const StepResult& result) {
+void writeContacts(const std::string& path, const Outcome& result) {
   std::ofstream out(path);
   out << "kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty\n" << std::setprecision(17);
   // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
@@ -74,13 +74,13 @@ struct Times {
 };
 
 struct Run {
-  StepResult result;
+  Outcome result;
   std::map<std::string, Times> times;
 };
 
 Run runStep(const Arguments& a, const std::string& accuracy, const std::shared_ptr<const Topology>& topology,
             const Positions& t0, const Positions& t1) {
-  DetectorOptions options;
+  Options options;
   options.keep_bounds = false;  // the same step again and again
   options.accuracy.rung = accuracyFromString(accuracy.c_str());
   options.accuracy.tolerance_m = a.tolerance_m;
@@ -90,23 +90,22 @@ Run runStep(const Arguments& a, const std::string& accuracy, const std::shared_p
   options.earliest_only = a.earliest_only;
   options.check_start_state = a.start_state;
   options.broad_phase = a.broad_phase == "clustered" ? BroadPhase::CLUSTERED : BroadPhase::BRUTE_FORCE;
-  Detector detector(options);
-  BodySetup body;
-  body.name = a.frame_0;
-  body.topology = topology;
-  detector.setBodies({body}, {&t0});
-  MotionStep step;
-  step.bodies = {{&t0, &t1}};
+  Step step;
+  step.bodies.resize(1);
+  step.bodies[0].name = a.frame_0;
+  step.bodies[0].topology = topology;
+  step.bodies[0].t0 = share(t0);
+  step.bodies[0].t1 = share(t1);
+  History history;
   Run run;
-  const StepResult* result = nullptr;
   for (int i = 0; i < a.repeat; ++i) {
-    result = &detector.run(step);
-    for (std::size_t s = 0; s < result->stats.stages.size(); ++s) {
-      run.times[toString(static_cast<Stage>(s))].ms.push_back(result->stats.stages[s].ms);
+    run.result = detect(step, options, history);
+    const StepStats& stats = run.result.stats;
+    for (std::size_t s = 0; s < stats.stages.size(); ++s) {
+      run.times[toString(static_cast<Stage>(s))].ms.push_back(stats.stages[s].ms);
     }
-    run.times["total"].ms.push_back(result->stats.total_ms);
+    run.times["total"].ms.push_back(stats.total_ms);
   }
-  run.result = *result;
   return run;
 }
 
@@ -126,10 +125,10 @@ nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const 
   j["contacts"] = run.result.contacts.size();
   j["undecided"] = run.result.stats.undecided;
   j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
-  j["complete"] = run.result.complete;
+  j["complete"] = run.result.allPairs();
   j["start_state"] = toString(run.result.start_state);
   j["start_state_complete"] = run.result.start_state_complete;
-  if (!run.result.complete) j["unchecked_toc_lower"] = run.result.unchecked_toc_lower;
+  if (!run.result.allPairs()) j["unchecked_toc_lower"] = run.result.unchecked_toc_lower;
   return j;
 }
 
@@ -139,7 +138,7 @@ void print(const std::string& accuracy, const Run& run, bool header) {
               << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
               << "median ms" << '\n';
   }
-  const double earliest = run.result.earliestToc();
+  const double earliest = run.result.earliest_toc;
   std::cout << std::left << std::setw(14) << accuracy << std::right << std::setw(10) << run.result.contacts.size()
             << std::setw(11) << run.result.stats.undecided << std::setw(14);
   if (earliest <= 1)

@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "dccd/simd_target.h"
+#include "record/explain.h"
 #include "record/step_replay.h"
-#include "record/voxel_trace.h"
 
 namespace {
 
@@ -61,13 +61,12 @@ std::uint16_t bodyOf(const Arguments& a, std::size_t side, const StepRecording& 
   if (a.bodies.empty()) return 0;
   const std::string& name = a.bodies[std::min(side, a.bodies.size() - 1)];
   std::size_t b = 0;
-  while (b < recording.bodies.size() && recording.bodies[b].setup.name != name) ++b;
-  if (b == recording.bodies.size()) throw std::invalid_argument("--bodies: no body is called '" + name + "'");
+  while (b < recording.step.bodies.size() && recording.step.bodies[b].name != name) ++b;
+  if (b == recording.step.bodies.size()) throw std::invalid_argument("--bodies: no body is called '" + name + "'");
   return static_cast<std::uint16_t>(b);
 }
 
-std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, const StepRecording& recording,
-                               const StepInput& input, const std::vector<MonitorBody>& bodies) {
+std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, const StepRecording& recording) {
   const std::string kind = text.substr(0, 3);
   if (kind == "VF:" || kind == "EE:") {
     PairQuestion q;
@@ -75,7 +74,7 @@ std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, cons
     const std::vector<std::uint32_t> numbers = numbersOf(text, 4);
     std::copy(numbers.begin(), numbers.end(), q.vertex.begin());
     for (std::size_t side = 0; side < 2; ++side) q.body[side] = bodyOf(a, side, recording);
-    return tracePair(input, bodies, recording.options, q);
+    return explain(recording.step, recording.options, q);
   }
   const std::size_t vertices = kind == "VX:" ? 1 : kind == "EX:" ? 2 : kind == "FX:" ? 3 : 0;
   if (vertices == 0) {
@@ -93,29 +92,14 @@ std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, cons
   q.vertex.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(vertices));
   q.voxel = {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]),
              static_cast<std::uint16_t>(key[2])};
-  return traceVoxel(input, bodies, recording.options, recording.map, q);
+  return explain(recording.step, recording.options, q);
 }
 
 void trace(const Arguments& a, const StepRecording& recording) {
-  StepInput input;
-  input.resize(recording.bodies.size());
-  std::vector<MonitorBody> bodies;
-  for (std::size_t b = 0; b < recording.bodies.size(); ++b) {
-    const RecordedBody& body = recording.bodies[b];
-    bodies.push_back(body.setup);
-    input.t0[b] = body.t0;
-    input.t1[b] = body.t1;
-    input.topologies[b] = body.topology;
-    input.rigid[b] = body.rigid;
-    input.pose_t0[b] = body.pose_t0;
-    input.pose_t1[b] = body.pose_t1;
-    input.radius_m[b] = body.radius_m;
-    input.references[b] = body.reference;
-  }
   for (const std::string& text : a.pairs) {
     std::cout << '\n' << text << "  (* the rung of the recording)\n";
     std::size_t part = 0;
-    for (const TraceLine& line : traceOf(text, a, recording, input, bodies)) {
+    for (const TraceLine& line : traceOf(text, a, recording)) {
       if (line.part != part) std::cout << "  part " << (part = line.part) + 1 << " of the step\n";
       std::cout << "  " << std::left << std::setw(15) << line.stage << std::setw(10) << toString(line.says) << line.text
                 << '\n';
@@ -124,25 +108,25 @@ void trace(const Arguments& a, const StepRecording& recording) {
 }
 
 void describe(const StepRecording& r) {
-  std::cout << std::fixed << std::setprecision(9) << "step " << r.sequence << " from "
-            << static_cast<double>(r.start_ns) * 1e-9 << " s to " << static_cast<double>(r.stamp_ns) * 1e-9
-            << " s, accuracy " << toString(r.options.detector.accuracy.rung) << "; " << r.note << '\n'
+  std::cout << std::fixed << std::setprecision(9) << "step " << r.step.sequence << " from "
+            << static_cast<double>(r.step.start_ns) * 1e-9 << " s to " << static_cast<double>(r.step.stamp_ns) * 1e-9
+            << " s, accuracy " << toString(r.options.accuracy.rung) << "; " << r.note << '\n'
             << std::defaultfloat;
-  for (const RecordedBody& body : r.bodies) {
-    std::cout << "  body '" << body.setup.name << "': " << body.t0.size() << " vertices, "
-              << body.topology->faces().size() << " faces\n";
+  for (const Body& body : r.step.bodies) {
+    std::cout << "  body '" << body.name << "': " << body.t0->size() << " vertices, " << body.topology->faces().size()
+              << " faces\n";
   }
-  if (r.map.surface) std::cout << "  map: " << r.map.surface->leafCount() << " occupied leaves\n";
+  if (r.step.map.surface) std::cout << "  map: " << r.step.map.surface->leafCount() << " occupied leaves\n";
 }
 
-void show(const RecordedAnswer& answer, const StepRecording& recording, std::size_t most) {
+void show(const Outcome& answer, const StepRecording& recording, std::size_t most) {
   std::cout << "replayed: " << toString(answer.status) << ", " << answer.contacts.size() << " contacts, start state "
             << toString(answer.start_state) << '\n'
             << std::setprecision(17);
   for (std::size_t i = 0; i < std::min(most, answer.contacts.size()); ++i) {
     const Contact& c = answer.contacts[i];
-    std::cout << "  " << describeContact(c, recording.bodies) << "  toc [" << c.toc_lower << ", " << c.toc_upper << "]"
-              << (c.certainty == Certainty::UNDECIDED ? " undecided" : "") << (c.initial ? " initial" : "")
+    std::cout << "  " << describeContact(c, recording.step.bodies) << "  toc [" << c.toc_lower << ", " << c.toc_upper
+              << "]" << (c.certainty == Certainty::UNDECIDED ? " undecided" : "") << (c.initial ? " initial" : "")
               << (c.leaving ? " leaving" : "") << '\n';
   }
   if (answer.contacts.size() > most) std::cout << "  ...\n";
@@ -155,7 +139,7 @@ int replay(const Arguments& a) {
   const StepReplay result = replayStep(recording, a.threads);
   show(result.answer, recording, a.show);
   if (!a.pairs.empty()) trace(a, recording);
-  if (!recording.answer.present || !recording.answer.answered) {
+  if (!recording.has_answer || !recording.answer.answered) {
     std::cout << "nothing to compare with: the recorded step had no answer"
               << (recording.answer.reason.empty() ? "" : " (" + recording.answer.reason + ")") << '\n';
     return result.answer.answered ? 0 : 1;

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "dccd/accuracy.h"
 #include "dccd/elementary.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
@@ -159,7 +160,7 @@ class Runner {
 
 std::vector<JudgedRung> makeRungs(const std::string& accuracy, const AccuracyOptions& options) {
   std::vector<JudgedRung> rungs;
-  for (const Accuracy each : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+  for (const Accuracy each : allRungs()) {
     if (accuracy != "all" && accuracyFromString(accuracy.c_str()) != each) continue;
     JudgedRung rung;
     rung.options = options;

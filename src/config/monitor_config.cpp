@@ -4,6 +4,8 @@
 #include <iomanip>
 #include <sstream>
 
+#include "dccd/accuracy.h"
+
 namespace dccd {
 
 using XmlRpc::XmlRpcValue;
@@ -209,9 +211,15 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
   config.monitor.clock_body = static_cast<std::size_t>(found - config.bodies.begin());
 }
 
+std::vector<std::string> rungNames() {
+  std::vector<std::string> names;
+  for (const Accuracy rung : allRungs()) names.push_back(toString(rung));
+  return names;
+}
+
 void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
-  DetectorOptions& detector = config.monitor.detector;
-  const std::string rung = reader.choice("accuracy", "exact", {"screen", "fast", "conservative", "exact"});
+  Options& detector = config.monitor.detector;
+  const std::string rung = reader.choice("accuracy", "exact", rungNames());
   detector.accuracy.rung = accuracyFromString(rung.c_str());
   detector.accuracy.tolerance_m = reader.number("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
   detector.accuracy.toc_bits = reader.integer("toc_bits", detector.accuracy.toc_bits, 10, 52);
@@ -241,7 +249,7 @@ std::string distanceAskedBy(const std::string& path, const MonitorConfig& config
 /// Only conservative and screen hold a distance. Without a choice by the user it is conservative.
 void settleAccuracy(ParameterReader& reader, MonitorConfig& config) {
   Accuracy& rung = config.monitor.detector.accuracy.rung;
-  if (!config.holdsDistance() || rung == Accuracy::CONSERVATIVE || rung == Accuracy::SCREEN) return;
+  if (!config.holdsDistance() || dccd::holdsDistance(rung)) return;
   if (reader.has("accuracy")) {
     reader.fail("accuracy", std::string("is '") + toString(rung) + "', which cannot hold a distance above 0; " +
                                 distanceAskedBy(reader.path(), config, reader.has("bodies")));
@@ -254,17 +262,18 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.store.max_step_s = reader.number("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
   monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
-  monitor.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
-  monitor.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
+  monitor.detector.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
+  monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
   for (const ParameterTree& item : reader.list("exclude_boxes")) {
     const auto n = reader.numbers(item, "exclude_boxes", 6);
     const Box box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
     if (box.empty())
       reader.fail("exclude_boxes", "holds a box whose min exceeds its max; write [x0, y0, z0, x1, y1, z1]");
-    monitor.exclude_boxes.push_back(box);
+    monitor.detector.exclude_boxes.push_back(box);
   }
-  monitor.rigid_tolerance_m = reader.number("rigid_tolerance_m", monitor.rigid_tolerance_m, 1e-9, LARGE);
-  monitor.max_substeps = static_cast<std::size_t>(reader.integer("max_substeps", 64, 1, 100000));
+  monitor.detector.rigid_tolerance_m =
+      reader.number("rigid_tolerance_m", monitor.detector.rigid_tolerance_m, 1e-9, LARGE);
+  monitor.detector.max_substeps = static_cast<std::size_t>(reader.integer("max_substeps", 64, 1, 100000));
   monitor.look_ahead_s = reader.number("look_ahead_s", 0.0, 0, 3600);
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.queue_size = static_cast<std::size_t>(reader.integer("queue_size", 8, 1, 100000));
@@ -298,9 +307,12 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
 }
 
 void readEffects(ParameterReader section, MonitorConfig& config) {
-  for (const std::string& name : effectNames()) {
-    const std::string text = section.choice(name, "auto", {"auto", "on", "off"});
-    config.effects[name] = text == "on" ? EffectSetting::ON : text == "off" ? EffectSetting::OFF : EffectSetting::AUTO;
+  for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
+    const Effect effect = static_cast<Effect>(e);
+    const std::string text = section.choice(toString(effect), "auto", {"auto", "on", "off"});
+    config.effects[effect] = text == "on"    ? EffectSetting::ON
+                             : text == "off" ? EffectSetting::OFF
+                                             : EffectSetting::AUTO;
   }
   section.finish();
 }
@@ -339,25 +351,25 @@ void removeRigidBodies(MonitorConfig& config) {
 
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
-  const auto off = [&](const char* name) { return config.effects[name] == EffectSetting::OFF; };
-  if (off("rigid_bodies")) removeRigidBodies(config);
-  if (off("minimum_separation")) config.minimum_separation_m = 0;
+  const auto off = [&](Effect effect) { return config.effects[effect] == EffectSetting::OFF; };
+  if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
+  if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {
-    if (off("self_collision")) body.body.self_collision = false;
-    if (off("body_body")) body.body.against_bodies = false;
-    if (off("octomap")) body.body.against_obstacle = false;
-    if (off("minimum_separation")) {
+    if (off(Effect::SELF_COLLISION)) body.body.self_collision = false;
+    if (off(Effect::BODY_BODY)) body.body.against_bodies = false;
+    if (off(Effect::OCTOMAP)) body.body.against_obstacle = false;
+    if (off(Effect::MINIMUM_SEPARATION)) {
       body.body.minimum_separation_m = 0;
       body.body.separations.clear();
     }
-    if (off("tracker_noise")) {
+    if (off(Effect::TRACKER_NOISE)) {
       body.input.noise_field.clear();
       body.input.noise_radius_m = 0;
     }
   }
-  if (off("start_state")) config.monitor.detector.check_start_state = false;
-  if (off("look_ahead")) config.monitor.look_ahead_s = 0;
-  if (off("unknown_space")) config.unknown_space = UnknownSpace::FREE;
+  if (off(Effect::START_STATE)) config.monitor.detector.check_start_state = false;
+  if (off(Effect::LOOK_AHEAD)) config.monitor.look_ahead_s = 0;
+  if (off(Effect::UNKNOWN_SPACE)) config.unknown_space = UnknownSpace::FREE;
 }
 
 /// The same text for the same values, wherever they were read from.
@@ -415,18 +427,9 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 
 }  // namespace
 
-double MonitorConfig::largestSeparation() const {
-  double largest = 0;
-  for (const BodyConfig& body : bodies) {
-    largest = std::max(largest, body.body.minimum_separation_m);
-    for (const SeparationFrom& from : body.body.separations) largest = std::max(largest, from.separation_m);
-  }
-  return largest;
-}
-
 bool MonitorConfig::holdsDistance() const {
-  return largestSeparation() > 0 ||
-         std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.isUncertain(); });
+  return std::any_of(bodies.begin(), bodies.end(),
+                     [](const BodyConfig& body) { return body.isUncertain() || largestSeparation({body.body}) > 0; });
 }
 
 std::uint64_t MonitorConfig::hash() const {
@@ -436,8 +439,8 @@ std::uint64_t MonitorConfig::hash() const {
                              markers.point_size_m, markers.normal_length_m, markers.obstacle_m}) {
     text << ' ' << value;
   }
-  text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.max_contacts << ' '
-       << monitor.suppress_initial << ' ' << markers.mesh;
+  text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.detector.max_contacts << ' '
+       << monitor.detector.suppress_initial << ' ' << markers.mesh;
   return hashOf(text.str());
 }
 

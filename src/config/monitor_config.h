@@ -9,7 +9,7 @@
 #include <xmlrpcpp/XmlRpcValue.h>
 
 #include "dccd/effect_plan.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "parameters/parameter_reader.h"
 
@@ -18,7 +18,7 @@ namespace dccd {
 enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
 enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
 struct BodyConfig {
-  MonitorBody body;
+  Body body;
   std::string topic;  ///< streams and static meshes
   MeshInputConfig input;
   std::string topology_file;
@@ -44,7 +44,7 @@ struct MonitorConfig {
   std::string fixed_frame;  ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;
   MonitorOptions monitor;
-  std::map<std::string, EffectSetting> effects;
+  EffectSettings effects;
   double minimum_separation_m = 0;  ///< of bodies that name none
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
@@ -58,8 +58,6 @@ struct MonitorConfig {
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
   std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
-  /// The largest separation that is asked for, of meshes or from the map [m].
-  double largestSeparation() const;
   /// A separation or an uncertainty is asked for, so that only conservative and screen will do.
   bool holdsDistance() const;
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.

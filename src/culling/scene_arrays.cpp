@@ -39,94 +39,74 @@ std::vector<Index> consecutive(std::size_t n, Index first) {
   return v;
 }
 
+/// Throws std::invalid_argument naming the body and what of it does not fit.
+void check(const Body& body, std::size_t bodies) {
+  const auto refuse = [&](const std::string& what) { throw std::invalid_argument("body '" + body.name + "' " + what); };
+  if (!body.topology) refuse("has no topology");
+  const std::size_t n = body.topology->vertexCount();
+  if (!body.t0 || !body.t1 || body.t0->size() != n || body.t1->size() != n) {
+    refuse("needs " + std::to_string(n) + " positions at t0 and t1, got " +
+           std::to_string(body.t0 ? body.t0->size() : 0) + " and " + std::to_string(body.t1 ? body.t1->size() : 0));
+  }
+  for (const Index v : body.vertex_mask) {
+    if (v < n) continue;
+    throw std::invalid_argument("vertex_mask of body '" + body.name + "' names vertex " + std::to_string(v) +
+                                ", but the mesh has " + std::to_string(n));
+  }
+  const auto check_separation = [&](double separation_m) {
+    if (separation_m >= 0 && std::isfinite(separation_m)) return;
+    refuse("has minimum_separation_m = " + std::to_string(separation_m) + "; it must be finite and not negative");
+  };
+  check_separation(body.minimum_separation_m);
+  for (const SeparationFrom& from : body.separations) {
+    check_separation(from.separation_m);
+    if (from.body < bodies || from.body == OBSTACLE_BODY) continue;
+    refuse("has a separation from body " + std::to_string(from.body) + "; there are " + std::to_string(bodies));
+  }
+  const ReferenceFrame* reference = body.reference.get();
+  if (reference &&
+      (reference->positions.size() != n || (!reference->radius_m.empty() && reference->radius_m.size() != n))) {
+    refuse("needs " + std::to_string(n) + " positions and no or as many radii in its reference frame");
+  }
+}
+
+bool sameBody(const Body& a, const Body& b) {
+  const bool same_mesh = a.topology == b.topology || (a.topology && b.topology && *a.topology == *b.topology);
+  return same_mesh && a.reference == b.reference && a.name == b.name && a.rigid == b.rigid &&
+         a.self_collision == b.self_collision && a.against_bodies == b.against_bodies &&
+         a.against_obstacle == b.against_obstacle && a.minimum_separation_m == b.minimum_separation_m &&
+         a.vertex_mask == b.vertex_mask && a.separations == b.separations;
+}
+
 }  // namespace
 
-void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<const Positions*>& rest_positions) {
-  if (setups.size() != rest_positions.size()) {
-    throw std::invalid_argument("setBodies: " + std::to_string(setups.size()) + " bodies but " +
-                                std::to_string(rest_positions.size()) + " rest positions");
+bool SceneArrays::holds(const std::vector<Body>& bodies) const {
+  const bool any_set = !body_levels_.empty();
+  return any_set && std::equal(bodies_.begin(), bodies_.end(), bodies.begin(), bodies.end(),
+                               [](const SceneBody& set, const Body& body) { return sameBody(set.setup, body); });
+}
+
+void SceneArrays::setBodies(const std::vector<Body>& bodies) {
+  if (bodies.size() >= OBSTACLE_BODY) {
+    throw std::invalid_argument(std::to_string(bodies.size()) + " bodies; at most 65534 are possible");
   }
-  if (setups.size() >= OBSTACLE_BODY) {
-    throw std::invalid_argument("setBodies: " + std::to_string(setups.size()) + " bodies; at most 65534 are possible");
-  }
-  for (std::size_t b = 0; b < setups.size(); ++b) {
-    const BodySetup& s = setups[b];
-    if (!s.topology) throw std::invalid_argument("setBodies: body '" + s.name + "' has no topology");
-    const std::size_t n = s.topology->vertexCount();
-    if (!rest_positions[b] || rest_positions[b]->size() != n) {
-      throw std::invalid_argument("setBodies: body '" + s.name + "' needs " + std::to_string(n) + " rest positions");
-    }
-    if (!s.vertex_active.empty() && s.vertex_active.size() != n) {
-      throw std::invalid_argument("setBodies: body '" + s.name + "' has " + std::to_string(s.vertex_active.size()) +
-                                  " activity flags for " + std::to_string(n) + " vertices");
-    }
-    const auto check_separation = [&](double separation_m) {
-      if (separation_m >= 0 && std::isfinite(separation_m)) return;
-      throw std::invalid_argument("setBodies: body '" + s.name + "' has minimum_separation_m = " +
-                                  std::to_string(separation_m) + "; it must be finite and not negative");
-    };
-    check_separation(s.minimum_separation_m);
-    for (const SeparationFrom& from : s.separations) {
-      check_separation(from.separation_m);
-      if (from.body < setups.size() || from.body == OBSTACLE_BODY) continue;
-      throw std::invalid_argument("setBodies: body '" + s.name + "' has a separation from body " +
-                                  std::to_string(from.body) + "; there are " + std::to_string(setups.size()));
-    }
-    if (s.reference &&
-        (s.reference->positions.size() != n || (!s.reference->radius_m.empty() && s.reference->radius_m.size() != n))) {
-      throw std::invalid_argument("setBodies: body '" + s.name + "' needs " + std::to_string(n) +
-                                  " positions and no or as many radii in its reference frame");
-    }
-  }
+  for (const Body& body : bodies) check(body, bodies.size());
   bodies_.clear();
-  bodies_.resize(setups.size());
+  bodies_.resize(bodies.size());
   face_order_.clear();
   vertex_count_ = 0;
   height_ = 2;
-  largest_separation_ = 0;
   Index vertex_begin = 0, edge_begin = 0, face_begin = 0;
-  for (std::size_t b = 0; b < setups.size(); ++b) {
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
     SceneBody& body = bodies_[b];
-    body.setup = std::move(setups[b]);
-    const Topology& t = *body.setup.topology;
-    const Positions& rest = *rest_positions[b];
+    const Topology& t = *bodies[b].topology;
+    body.setup = bodies[b];
+    body.setup.t0 = body.setup.t1 = nullptr;  // of this step alone
+    body.setup.radius_m = nullptr;
     body.vertex_begin = vertex_begin;
     body.edge_begin = edge_begin;
     body.face_begin = face_begin;
-    body.internal_begin = static_cast<Index>(vertex_count_);
-    const std::vector<Index>& used = t.usedVertices();
-    std::vector<Vec3> centres(used.size());
-    for (std::size_t i = 0; i < used.size(); ++i) centres[i] = rest[used[i]];
-    const std::vector<Index> order = spatialOrder(centres);
-    body.slot_vertex.resize(used.size());
-    std::vector<Index> internal_of_local(t.vertexCount(), NO_INDEX), vertex_ranks(used.size());
-    for (std::size_t i = 0; i < used.size(); ++i) {
-      body.slot_vertex[i] = used[order[i]];
-      internal_of_local[used[order[i]]] = static_cast<Index>(vertex_count_ + i);
-      vertex_ranks[i] = vertex_begin + used[order[i]];
-    }
-    body.active.assign(used.size(), 1);
-    body.trees[static_cast<int>(FeatureKind::VERTEX)].build(consecutive(used.size(), body.internal_begin), 1);
-    body.ranks[static_cast<int>(FeatureKind::VERTEX)] = std::move(vertex_ranks);
-
-    std::vector<Index> flat(2 * t.edges().size());
-    for (std::size_t e = 0; e < t.edges().size(); ++e)
-      std::copy(t.edges()[e].begin(), t.edges()[e].end(), &flat[2 * e]);
-    buildTree(body, FeatureKind::EDGE, flat, 2, consecutive(t.edges().size(), edge_begin), internal_of_local, rest);
-
-    // Faces keep the input's vertex order; their rank is that of the index triple.
-    std::vector<Index> by_triple = consecutive(t.faces().size(), 0);
-    std::sort(by_triple.begin(), by_triple.end(), [&](Index x, Index y) { return t.faces()[x] < t.faces()[y]; });
-    std::vector<Index> face_ranks(t.faces().size());
-    for (std::size_t r = 0; r < by_triple.size(); ++r) face_ranks[by_triple[r]] = static_cast<Index>(face_begin + r);
-    face_order_.insert(face_order_.end(), by_triple.begin(), by_triple.end());
-    flat.resize(3 * t.faces().size());
-    for (std::size_t f = 0; f < t.faces().size(); ++f)
-      std::copy(t.faces()[f].begin(), t.faces()[f].end(), &flat[3 * f]);
-    buildTree(body, FeatureKind::FACE, flat, 3, face_ranks, internal_of_local, rest);
-
-    for (const ClusterTree& tree : body.trees) height_ = std::max(height_, tree.height());
-    vertex_count_ += used.size();
+    buildTrees(body, *bodies[b].t0);
     vertex_begin += static_cast<Index>(t.vertexCount());
     edge_begin += static_cast<Index>(t.edges().size());
     face_begin += static_cast<Index>(t.faces().size());
@@ -137,6 +117,50 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
   range_padded_ = uncertain_ = bounds_valid_ = false;
   radii_.clear();
   setReaches();
+  makeRoom();
+}
+
+void SceneArrays::buildTrees(SceneBody& body, const Positions& rest) {
+  const Topology& t = *body.setup.topology;
+  if (!body.setup.vertex_mask.empty()) body.asked.assign(t.vertexCount(), 1);
+  for (const Index v : body.setup.vertex_mask) body.asked[v] = 0;
+  body.internal_begin = static_cast<Index>(vertex_count_);
+  const std::vector<Index>& used = t.usedVertices();
+  std::vector<Vec3> centres(used.size());
+  for (std::size_t i = 0; i < used.size(); ++i) centres[i] = rest[used[i]];
+  const std::vector<Index> order = spatialOrder(centres);
+  body.slot_vertex.resize(used.size());
+  std::vector<Index> internal_of_local(t.vertexCount(), NO_INDEX), vertex_ranks(used.size());
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    body.slot_vertex[i] = used[order[i]];
+    internal_of_local[used[order[i]]] = static_cast<Index>(vertex_count_ + i);
+    vertex_ranks[i] = body.vertex_begin + used[order[i]];
+  }
+  body.active.assign(used.size(), 1);
+  body.trees[static_cast<int>(FeatureKind::VERTEX)].build(consecutive(used.size(), body.internal_begin), 1);
+  body.ranks[static_cast<int>(FeatureKind::VERTEX)] = std::move(vertex_ranks);
+
+  std::vector<Index> flat(2 * t.edges().size());
+  for (std::size_t e = 0; e < t.edges().size(); ++e) std::copy(t.edges()[e].begin(), t.edges()[e].end(), &flat[2 * e]);
+  buildTree(body, FeatureKind::EDGE, flat, 2, consecutive(t.edges().size(), body.edge_begin), internal_of_local, rest);
+
+  // Faces keep the input's vertex order; their rank is that of the index triple.
+  std::vector<Index> by_triple = consecutive(t.faces().size(), 0);
+  std::sort(by_triple.begin(), by_triple.end(), [&](Index x, Index y) { return t.faces()[x] < t.faces()[y]; });
+  std::vector<Index> face_ranks(t.faces().size());
+  for (std::size_t r = 0; r < by_triple.size(); ++r) {
+    face_ranks[by_triple[r]] = static_cast<Index>(body.face_begin + r);
+  }
+  face_order_.insert(face_order_.end(), by_triple.begin(), by_triple.end());
+  flat.resize(3 * t.faces().size());
+  for (std::size_t f = 0; f < t.faces().size(); ++f) std::copy(t.faces()[f].begin(), t.faces()[f].end(), &flat[3 * f]);
+  buildTree(body, FeatureKind::FACE, flat, 3, face_ranks, internal_of_local, rest);
+
+  for (const ClusterTree& tree : body.trees) height_ = std::max(height_, tree.height());
+  vertex_count_ += used.size();
+}
+
+void SceneArrays::makeRoom() {
   if (vertex_count_ > vertex_capacity_) {
     vertices_ = hwy::AllocateAligned<VertexMotion>(vertex_count_);
     if (!vertices_) throw std::bad_alloc();
@@ -158,16 +182,14 @@ void SceneArrays::setBodies(std::vector<BodySetup> setups, const std::vector<con
 }
 
 void SceneArrays::setReaches() {
-  double between_meshes = 0, from_map = 0;
+  double between_meshes = 0;
   for (const SceneBody& body : bodies_) {
     between_meshes = std::max(between_meshes, body.setup.minimum_separation_m);
     for (const SeparationFrom& from : body.setup.separations) {
-      double& largest = from.body == OBSTACLE_BODY ? from_map : between_meshes;
-      largest = std::max(largest, from.separation_m);
+      if (from.body != OBSTACLE_BODY) between_meshes = std::max(between_meshes, from.separation_m);
     }
   }
   for (SceneBody& body : bodies_) body.reach_m = 0.5 * between_meshes;
-  largest_separation_ = std::max(between_meshes, from_map);
 }
 
 double SceneArrays::separation(std::size_t a, std::size_t b) const {

@@ -9,7 +9,7 @@
 #include <hwy/aligned_allocator.h>
 
 #include "culling/cluster_tree.h"
-#include "dccd/detector.h"
+#include "dccd/outcome.h"
 
 namespace dccd {
 
@@ -17,13 +17,14 @@ enum class FeatureKind : std::uint8_t { VERTEX = 0, EDGE = 1, FACE = 2 };
 
 /// One body: where its elements are in the scene's arrays.
 struct SceneBody {
-  BodySetup setup;
+  Body setup;              ///< as it was when it was set; where it is comes with each step
   Index vertex_begin = 0;  ///< of the input numbering; vertices of all bodies follow each other
   Index edge_begin = 0, face_begin = 0;
   std::vector<Index> slot_vertex;    ///< internal vertex - internal_begin -> local vertex
   Index internal_begin = 0;          ///< internal numbering holds the used vertices only
   ClusterTree trees[3];              ///< by FeatureKind, over internal vertices
   std::vector<Index> ranks[3];       ///< slot -> rank: vertex_begin + local vertex, edge rank, face rank
+  std::vector<std::uint8_t> asked;   ///< per vertex; 0: in the body's vertex_mask. Empty: no mask
   std::vector<std::uint8_t> active;  ///< per used vertex; what the trees are masked with
   bool masked = false;
   bool uncertain = false;  ///< some vertex has an uncertainty radius above 0 in this step
@@ -50,12 +51,15 @@ struct SceneBody {
 
 class SceneArrays {
  public:
-  /// Throws std::invalid_argument naming the body when positions and topology do not fit.
-  void setBodies(std::vector<BodySetup> bodies, const std::vector<const Positions*>& rest_positions);
+  /// Positions at t0 guide the order of features in memory; any will do. Throws std::invalid_argument naming the body
+  /// when positions and topology do not fit.
+  void setBodies(const std::vector<Body>& bodies);
+  /// Whether these are the bodies that were set, wherever they are now.
+  bool holds(const std::vector<Body>& bodies) const;
 
   /// Copies the positions, leaves out what is not finite or not active, and sets the record scale.
   /// Throws std::invalid_argument naming the body when a frame has the wrong number of vertices.
-  void record(const MotionStep& step, StepStats& stats);
+  void record(const Step& step, StepStats& stats);
 
   /// Off: every body is refitted in every step.
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
@@ -86,13 +90,11 @@ class SceneArrays {
   /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
   void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
   std::size_t height() const { return height_; }
-  /// Largest separation that any setup names, from meshes or the map [m].
-  double largestSeparation() const { return largest_separation_; }
   /// Separation of two bodies, of a body from itself, or of a body from the map (OBSTACLE_BODY) [m].
   double separation(std::size_t a, std::size_t b) const;
   /// Some body is to be tested against the map.
   bool meetsObstacle() const {
-    return std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& b) { return b.setup.against_obstacle; });
+    return std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& b) { return meetsMap(b.setup); });
   }
   /// Some vertex of some body has an uncertainty radius in this step.
   bool uncertain() const { return uncertain_; }
@@ -103,9 +105,11 @@ class SceneArrays {
   void featureVertices(FeatureKind kind, std::size_t body, Index rank, Index* out) const;
 
  private:
+  void buildTrees(SceneBody& body, const Positions& rest);
+  void makeRoom();
   void setReaches();
-  void recordBody(SceneBody& body, const BodyMotion& motion, bool bounds_valid, StepStats& stats);
-  bool recordRadii(SceneBody& body, const BodyMotion& motion);
+  void recordBody(SceneBody& body, const Body& motion, bool bounds_valid, StepStats& stats);
+  bool recordRadii(SceneBody& body, const Body& motion);
   void setRange(bool keep);
   void setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const;
   void quantize(std::size_t first, std::size_t last);
@@ -123,7 +127,6 @@ class SceneArrays {
   bool range_padded_ = false;
   bool keep_bounds_ = true;
   bool bounds_valid_ = false;  // trees and records are those of the vertices
-  double largest_separation_ = 0;
   bool uncertain_ = false;
   std::vector<double> radii_;
   std::vector<ClusterTree::Level> body_levels_;  // bounds of the bodies, as a tree whose features they are

@@ -42,7 +42,7 @@ bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
 
 }  // namespace
 
-bool SceneArrays::recordRadii(SceneBody& body, const BodyMotion& motion) {
+bool SceneArrays::recordRadii(SceneBody& body, const Body& motion) {
   body.uncertain = false;
   if (!motion.radius_m) return false;
   const std::vector<double>& radius = *motion.radius_m;
@@ -65,7 +65,7 @@ bool SceneArrays::recordRadii(SceneBody& body, const BodyMotion& motion) {
   return body.uncertain;
 }
 
-void SceneArrays::recordBody(SceneBody& body, const BodyMotion& motion, bool bounds_valid, StepStats& stats) {
+void SceneArrays::recordBody(SceneBody& body, const Body& motion, bool bounds_valid, StepStats& stats) {
   const std::size_t n = body.setup.topology->vertexCount();
   if (!motion.t0 || !motion.t1 || motion.t0->size() != n || motion.t1->size() != n) {
     throw std::invalid_argument("body '" + body.setup.name + "' needs " + std::to_string(n) +
@@ -89,7 +89,7 @@ void SceneArrays::recordBody(SceneBody& body, const BodyMotion& motion, bool bou
     const double probe = (p[0] * 0 + p[1] * 0 + p[2] * 0) + (q[0] * 0 + q[1] * 0 + q[2] * 0);
     const bool finite = probe == 0;
     unchecked += !finite;
-    const bool active = finite && (body.setup.vertex_active.empty() || body.setup.vertex_active[v]);
+    const bool active = finite && (body.asked.empty() || body.asked[v]);
     changed |= body.active[i] != static_cast<std::uint8_t>(active);
     body.active[i] = active;
     masked |= !active;
@@ -125,9 +125,9 @@ void SceneArrays::recordBody(SceneBody& body, const BodyMotion& motion, bool bou
   }
 }
 
-void SceneArrays::record(const MotionStep& step, StepStats& stats) {
+void SceneArrays::record(const Step& step, StepStats& stats) {
   if (step.bodies.size() != bodies_.size()) {
-    throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the detector " +
+    throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the scene " +
                                 std::to_string(bodies_.size()));
   }
   uncertain_ = false;

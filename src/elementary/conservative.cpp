@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "dccd/elementary.h"
 #include "elementary/conservative_advance.h"
-#include "elementary/rungs.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {

@@ -2,12 +2,19 @@
 
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
-#include "elementary/rungs.h"
+#include "dccd/accuracy.h"
 
 namespace dccd {
+
+// Each in the file of its rung. Options are validated here, once for all of them.
+std::unique_ptr<Rung> makeFastRung(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeConservativeRung(const AccuracyOptions& options);
+std::unique_ptr<Rung> makeExactRung(const AccuracyOptions& options);
+
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("accuracy options: " + what); }
@@ -24,21 +31,46 @@ void validate(const AccuracyOptions& options) {
   }
 }
 
+/// A rung of the ladder; its place in the list is its value as Accuracy.
+struct RungRow {
+  const char* name;
+  std::unique_ptr<Rung> (*make)(const AccuracyOptions&);  ///< null: the filters' answer is its own
+  bool holds_distance;
+};
+constexpr RungRow RUNGS[] = {
+    {"screen", nullptr, true},
+    {"fast", makeFastRung, false},
+    {"conservative", makeConservativeRung, true},
+    {"exact", makeExactRung, false},
+};
+
+const RungRow* rowOf(Accuracy rung) {
+  const std::size_t place = static_cast<std::size_t>(rung);
+  return place < std::size(RUNGS) ? &RUNGS[place] : nullptr;
+}
+
 }  // namespace
 
 std::unique_ptr<Rung> makeRung(const AccuracyOptions& options) {
   validate(options);
-  switch (options.rung) {
-    case Accuracy::FAST:
-      return makeFastRung(options);
-    case Accuracy::CONSERVATIVE:
-      return makeConservativeRung(options);
-    case Accuracy::EXACT:
-      return makeExactRung(options);
-    case Accuracy::SCREEN:
-      refuse("rung screen has no elementary test, its answer is the filters'");
-  }
-  refuse("rung " + std::to_string(static_cast<int>(options.rung)) + " does not exist");
+  const RungRow* row = rowOf(options.rung);
+  if (!row) refuse("rung " + std::to_string(static_cast<int>(options.rung)) + " does not exist");
+  if (!row->make) refuse(std::string("rung ") + row->name + " has no elementary test, its answer is the filters'");
+  return row->make(options);
+}
+
+const std::vector<Accuracy>& allRungs() {
+  static const std::vector<Accuracy> all = [] {
+    std::vector<Accuracy> rungs;
+    for (std::size_t i = 0; i < std::size(RUNGS); ++i) rungs.push_back(static_cast<Accuracy>(i));
+    return rungs;
+  }();
+  return all;
+}
+
+bool holdsDistance(Accuracy rung) {
+  const RungRow* row = rowOf(rung);
+  return row && row->holds_distance;
 }
 
 ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pair) {
@@ -60,60 +92,31 @@ ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pai
 }
 
 const char* toString(PairKind kind) {
-  switch (kind) {
-    case PairKind::VERTEX_FACE:
-      return "vertex-face";
-    case PairKind::EDGE_EDGE:
-      return "edge-edge";
-    case PairKind::VERTEX_VOXEL_FACE:
-      return "vertex-voxel-face";
-    case PairKind::EDGE_VOXEL_EDGE:
-      return "edge-voxel-edge";
-    case PairKind::FACE_VOXEL_CORNER:
-      return "face-voxel-corner";
-  }
-  return "unknown";
+  static const char* const NAMES[] = {"vertex-face", "edge-edge", "vertex-voxel-face", "edge-voxel-edge",
+                                      "face-voxel-corner"};
+  const std::size_t i = static_cast<std::size_t>(kind);
+  return i < std::size(NAMES) ? NAMES[i] : "unknown";
 }
 
 const char* toString(Accuracy rung) {
-  switch (rung) {
-    case Accuracy::SCREEN:
-      return "screen";
-    case Accuracy::FAST:
-      return "fast";
-    case Accuracy::CONSERVATIVE:
-      return "conservative";
-    case Accuracy::EXACT:
-      return "exact";
-  }
-  return "unknown";
+  const RungRow* row = rowOf(rung);
+  return row ? row->name : "unknown";
 }
 
 const char* toString(Tier tier) {
-  switch (tier) {
-    case Tier::COINCIDENCE:
-      return "coincidence";
-    case Tier::DOUBLE_BATCH:
-      return "double_batch";
-    case Tier::BERNSTEIN:
-      return "bernstein";
-    case Tier::DOUBLE_DOUBLE:
-      return "double_double";
-    case Tier::FIXED_INTEGER:
-      return "fixed_integer";
-    case Tier::BIG_INTEGER:
-      return "big_integer";
-    case Tier::COUNT:
-      break;
-  }
-  return "unknown";
+  static const char* const NAMES[] = {"coincidence",   "double_batch",  "bernstein",
+                                      "double_double", "fixed_integer", "big_integer"};
+  const std::size_t i = static_cast<std::size_t>(tier);
+  return i < std::size(NAMES) ? NAMES[i] : "unknown";
 }
 
 Accuracy accuracyFromString(const char* text) {
-  for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+  std::string known;
+  for (const Accuracy rung : allRungs()) {
     if (std::strcmp(text, toString(rung)) == 0) return rung;
+    known += (known.empty() ? "" : ", ") + std::string(toString(rung));
   }
-  throw std::invalid_argument("accuracy: \"" + std::string(text) + "\" is none of screen, fast, conservative, exact");
+  throw std::invalid_argument("accuracy: \"" + std::string(text) + "\" is none of " + known);
 }
 
 }  // namespace dccd

@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "dccd/elementary.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
-#include "elementary/rungs.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "elementary/rungs.h"
+#include "dccd/elementary.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {

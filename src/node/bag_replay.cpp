@@ -108,11 +108,11 @@ struct BagReplay::Run {
   }
 
   /// The prediction that follows from an answered outcome, whose statistics get its cost.
-  std::optional<StepOutcome> predict(StepOutcome& outcome) {
+  std::optional<Outcome> predict(Outcome& outcome) {
     if (!look_ahead) return std::nullopt;
     look_ahead->observe(outcome);
     if (!outcome.answered) return std::nullopt;
-    std::optional<StepOutcome> prediction = pipeline.monitor().predict();
+    std::optional<Outcome> prediction = pipeline.monitor().predict();
     look_ahead->predict(*prediction);
     outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(*prediction);
     return prediction;
@@ -133,9 +133,9 @@ struct BagReplay::Run {
   }
 
   void drain(const ros::Time& at) {
-    StepOutcome outcome;
+    Outcome outcome;
     while (pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
-      const std::optional<StepOutcome> prediction = predict(outcome);
+      const std::optional<Outcome> prediction = predict(outcome);
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
     }

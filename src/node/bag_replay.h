@@ -38,7 +38,7 @@ class BagReplay {
   /// Called for each outcome, in order; `at` is the bag time of the message that led to it, `so_far` counts messages up
   /// to that one.
   using Sink =
-      std::function<void(const StepOutcome&, MonitorPipeline&, const BagReplaySummary& so_far, const ros::Time& at)>;
+      std::function<void(const Outcome&, MonitorPipeline&, const BagReplaySummary& so_far, const ros::Time& at)>;
   /// Called for each message of the bag, in order, before its outcomes.
   using MessageSink = std::function<void(const rosbag::MessageInstance&)>;
 

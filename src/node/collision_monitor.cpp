@@ -131,7 +131,7 @@ void CollisionMonitor::Impl::advertiseServices() {
     return Reply{true, "frames forgotten; the next one is a first frame"};
   });
   advertise("check_now", [this] {
-    const StepOutcome outcome = pipeline.checkNow();
+    const Outcome outcome = pipeline.checkNow();
     return Reply{outcome.answered, describe(outcome)};
   });
   advertise("record_step", [this] {

@@ -79,10 +79,10 @@ struct CollisionMonitor::Impl {
   void takeMaps();
   void takeMessages();
   void tellComplaints();
-  void publishOutcome(StepOutcome& outcome);
-  void publishTopics(StepOutcome& outcome);
-  void predict(StepOutcome& outcome);
-  void publishPrediction(const StepOutcome& prediction);
+  void publishOutcome(Outcome& outcome);
+  void publishTopics(Outcome& outcome);
+  void predict(Outcome& outcome);
+  void publishPrediction(const Outcome& prediction);
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();

@@ -21,14 +21,9 @@ std::string noiseOf(const MeshInputConfig& input) {
 
 EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map_source) : settings_(config.effects) {
   for (const BodyConfig& body : config.bodies) {
-    EffectBody one;
-    one.name = body.body.name;
-    one.rigid = body.isRigid();
-    one.self_collision = body.body.self_collision;
-    if (body.isUncertain()) one.noise = noiseOf(body.input);
-    scene_.bodies.push_back(one);
+    scene_.bodies.push_back(body.body);
+    scene_.noise.push_back(body.isUncertain() ? noiseOf(body.input) : "");
   }
-  scene_.minimum_separation_m = config.largestSeparation();
   scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
   if (!map_source.empty()) scene_.map_source = map_source;
   scene_.map_seen = !config.octomap_file.empty();
@@ -38,7 +33,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
 }
 
 bool EffectTracker::mayUseMap() const {
-  const auto setting = settings_.find("octomap");
+  const auto setting = settings_.find(Effect::OCTOMAP);
   return setting == settings_.end() || setting->second != EffectSetting::OFF;
 }
 
@@ -49,22 +44,22 @@ void EffectTracker::expectMap() {
 }
 
 bool EffectTracker::decide(MonitorOptions& options) const {
-  const bool expected = mapExpected(), start_state = plan_.running("start_state");
-  if (options.obstacle_expected == expected && options.detector.check_start_state == start_state) return false;
-  options.obstacle_expected = expected;
+  const bool expected = mapExpected(), start_state = plan_.running(Effect::START_STATE);
+  if (options.detector.obstacle_expected == expected && options.detector.check_start_state == start_state) return false;
+  options.detector.obstacle_expected = expected;
   options.detector.check_start_state = start_state;
   return true;
 }
 
-void EffectTracker::learn(const StepOutcome& outcome, const Monitor& monitor) {
-  if (!outcome.answered || !outcome.topologies) return;
+void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {
+  if (!outcome.answered) return;
   bool changed = scene_.left_out_pairs != monitor.leftOut().size();
   scene_.left_out_pairs = monitor.leftOut().size();
   for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
-    const bool has_faces = (*outcome.topologies)[b]->hasFaces();
-    changed = changed || !scene_.bodies[b].topology_known || scene_.bodies[b].has_faces != has_faces;
-    scene_.bodies[b].topology_known = true;
-    scene_.bodies[b].has_faces = has_faces;
+    const auto& topology = outcome.step->bodies[b].topology;
+    std::shared_ptr<const Topology>& known = scene_.bodies[b].topology;
+    changed = changed || !known || known->hasFaces() != topology->hasFaces();
+    known = topology;
   }
   if (changed) plan_ = EffectPlan(scene_, settings_);
 }

@@ -18,13 +18,13 @@ class EffectTracker {
 
   /// False: the octomap is switched off, nothing is subscribed to for it.
   bool mayUseMap() const;
-  bool mapExpected() const { return plan_.running("octomap"); }
+  bool mapExpected() const { return plan_.running(Effect::OCTOMAP); }
   /// A map has come, or somebody is there who publishes maps.
   void expectMap();
   /// Sets what the plan decides of a monitor's options. False: they are so already.
   bool decide(MonitorOptions& options) const;
   /// Learns topologies and what is left out from the outcome.
-  void learn(const StepOutcome& outcome, const Monitor& monitor);
+  void learn(const Outcome& outcome, const Monitor& monitor);
   /// True when the plan has changed since the last call, or at the first one.
   bool takeNewPlan();
   /// True when the pairs that are left out have changed since the last call; not at first, while there are none.
@@ -36,7 +36,7 @@ class EffectTracker {
 
  private:
   EffectScene scene_;
-  std::map<std::string, EffectSetting> settings_;
+  EffectSettings settings_;
   EffectPlan plan_, told_;
   std::vector<LeftOutPair> told_left_out_;
 };

@@ -33,7 +33,7 @@ void MonitorLog::complain(std::size_t body, const std::string& kind, const std::
   if (!line.empty()) ROS_WARN_STREAM(line);
 }
 
-void MonitorLog::tell(const StepOutcome& outcome) {
+void MonitorLog::tell(const Outcome& outcome) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
   const std::string advice = adviceFor(outcome.status, outcome.reason, mapSource());
   const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +

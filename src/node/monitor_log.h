@@ -8,7 +8,7 @@
 #include <ros/node_handle.h>
 
 #include "config/monitor_config.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "input/silence.h"
 #include "node/monitor_pipeline.h"
 #include "ros/log_throttle.h"
@@ -25,7 +25,7 @@ class MonitorLog {
   /// One line per kind and period, led by the body's topic, or by the map's when there is no such body.
   void complain(std::size_t body, const std::string& kind, const std::string& text);
   /// An outcome that is not OK: status, reason, and what to do.
-  void tell(const StepOutcome& outcome);
+  void tell(const Outcome& outcome);
   /// Whether it is time to look into silence again: rarely, and not at once.
   bool isSilenceDue(std::int64_t now_ns);
   /// Logs a hint when it is another one than before.

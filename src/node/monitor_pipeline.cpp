@@ -12,8 +12,8 @@ namespace dccd {
 
 namespace {
 
-std::vector<MonitorBody> monitorBodies(const MonitorConfig& config) {
-  std::vector<MonitorBody> bodies;
+std::vector<Body> monitorBodies(const MonitorConfig& config) {
+  std::vector<Body> bodies;
   for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
   return bodies;
 }
@@ -71,22 +71,21 @@ void MonitorPipeline::loadFiles() {
   }
 }
 
-void MonitorPipeline::measureUnknown(StepOutcome& outcome) const {
+void MonitorPipeline::measureUnknown(Outcome& outcome) const {
   if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return;
   const auto start = std::chrono::steady_clock::now();
   SweptSpace sum;
   Positions map_t0, map_t1;
   std::vector<std::uint8_t> active;
-  for (std::size_t b = 0; b < outcome.topologies->size(); ++b) {
-    const MonitorBody& body = monitor_->bodies()[b];
-    if (!body.against_obstacle) continue;
-    const Topology& topology = *(*outcome.topologies)[b];
+  for (const Body& body : outcome.step->bodies) {
+    if (!meetsMap(body)) continue;
+    const Topology& topology = *body.topology;
     active.assign(topology.vertexCount(), 1);
     for (const Index v : body.vertex_mask) active[v] = 0;
-    map_t0 = (*outcome.positions_t0)[b];
-    map_t1 = (*outcome.positions_t1)[b];
-    transform(outcome.map_from_fixed, map_t0);
-    transform(outcome.map_from_fixed, map_t1);
+    map_t0 = *body.t0;
+    map_t1 = *body.t1;
+    transform(outcome.step->map.map_from_fixed, map_t0);
+    transform(outcome.step->map.map_from_fixed, map_t1);
     const SweptSpace one = known_->sweptSpace(topology, map_t0, map_t1, active.data());
     sum.voxels += one.voxels;
     sum.unknown += one.unknown;
@@ -171,7 +170,7 @@ std::string MonitorPipeline::missing(std::size_t body) const {
   return waiting_[body]->reason + "; body '" + config_.bodies[body].body.name + "' waits for it";
 }
 
-void MonitorPipeline::nameMissing(StepOutcome& outcome) const {
+void MonitorPipeline::nameMissing(Outcome& outcome) const {
   if (outcome.status != StepStatus::NO_BODY) return;
   for (std::size_t b = 0; b < waiting_.size(); ++b) {
     if (!waiting_[b] || !waiting_[b]->kept) continue;
@@ -261,7 +260,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   }
   if (fixed_frame_.empty()) return;
   const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
-  MonitorMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
+  ObstacleMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
   std::string reason;
   if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
     monitor_->setMap(std::move(map));
@@ -276,7 +275,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   }
 }
 
-bool MonitorPipeline::nextOutcome(std::int64_t now_ns, StepOutcome& outcome) {
+bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (MonitorOptions options = monitor_->options(); effects_.decide(options)) monitor_->setOptions(options);
   placeMap(now_ns);
   // Static bodies first: the clock body's frame is a step, which is to find them where they are.
@@ -328,8 +327,8 @@ void MonitorPipeline::reset(StepStatus status) {
   arrivals_.clear();
 }
 
-StepOutcome MonitorPipeline::checkNow() {
-  StepOutcome outcome;
+Outcome MonitorPipeline::checkNow() {
+  Outcome outcome;
   if (const std::size_t body = misplaced(); body < waiting_.size()) {
     outcome.status = StepStatus::NO_BODY;
     outcome.reason = missing(body);

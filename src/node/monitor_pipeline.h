@@ -13,7 +13,7 @@
 
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
 #include "node/effects.h"
@@ -46,7 +46,7 @@ class MonitorPipeline {
   /// Somebody is there who publishes maps: from now on a step without one lacks it.
   void expectMap() { effects_.expectMap(); }
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
-  bool nextOutcome(std::int64_t now_ns, StepOutcome& outcome);
+  bool nextOutcome(std::int64_t now_ns, Outcome& outcome);
   /// Something waits for tf or for other bodies, so that nextOutcome() is worth calling again without new input.
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of nextOutcome().
@@ -55,7 +55,7 @@ class MonitorPipeline {
   /// learnt: the map and static bodies are placed in it. After RESET triangle soups are welded anew.
   void reset(StepStatus status);
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
-  StepOutcome checkNow();
+  Outcome checkNow();
 
   /// Changes what can be changed while it runs. Throws std::invalid_argument naming the option; the monitor's then
   /// stay.
@@ -117,7 +117,7 @@ class MonitorPipeline {
   DecodedMesh decode(std::size_t body, const MeshMessage& message);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// unknown_space: report. How much of what the step swept the map does not know.
-  void measureUnknown(StepOutcome& outcome) const;
+  void measureUnknown(Outcome& outcome) const;
   /// A static body's frame waits on.
   void keep(std::size_t body);
   /// The end has come for what still waits.
@@ -127,7 +127,7 @@ class MonitorPipeline {
   /// Why the body, whose frame waits, has no place.
   std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
-  void nameMissing(StepOutcome& outcome) const;
+  void nameMissing(Outcome& outcome) const;
   /// False: still waits.
   bool place(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.

@@ -34,7 +34,7 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
   pipeline.reset(status);
   outputs.publishNotClear(pipeline.fixedFrame());
   if (!outputs.wantsPrediction()) return;
-  StepOutcome none;
+  Outcome none;
   none.status = status;
   none.start_ns = none.stamp_ns = newest_ns;
   publishPrediction(none);
@@ -101,7 +101,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
 }
 
 /// Whatever a step's messages throw, the node goes on; but nobody is to take what was said before for the whole answer.
-void CollisionMonitor::Impl::publishOutcome(StepOutcome& outcome) {
+void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) {
   try {
     publishTopics(outcome);
   } catch (const std::exception& error) {
@@ -112,7 +112,7 @@ void CollisionMonitor::Impl::publishOutcome(StepOutcome& outcome) {
   }
 }
 
-void CollisionMonitor::Impl::publishTopics(StepOutcome& outcome) {
+void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
@@ -138,12 +138,12 @@ void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
   for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
 }
 
-void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
+void CollisionMonitor::Impl::predict(Outcome& outcome) {
   if (!(config.monitor.look_ahead_s > 0) || !outputs.wantsPrediction()) return;
   look_ahead.observe(outcome);
   // Nothing to go on from, which whoever listens to predictions alone must hear, too.
   if (!outcome.answered) return publishPrediction(outcome);
-  StepOutcome prediction;
+  Outcome prediction;
   try {
     prediction = pipeline.monitor().predict();
   } catch (const std::exception& error) {
@@ -156,7 +156,7 @@ void CollisionMonitor::Impl::predict(StepOutcome& outcome) {
   publishPrediction(prediction);
 }
 
-void CollisionMonitor::Impl::publishPrediction(const StepOutcome& prediction) {
+void CollisionMonitor::Impl::publishPrediction(const Outcome& prediction) {
   const double horizon_s = config.monitor.look_ahead_s;
   outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
 }
@@ -182,7 +182,7 @@ void CollisionMonitor::Impl::work() {
     takeMaps();
     takeMessages();
     accountDropped();
-    StepOutcome outcome;
+    Outcome outcome;
     while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
     tellComplaints();
     const std::string surprise = recorder.takeSurprise();

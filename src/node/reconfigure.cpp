@@ -5,6 +5,8 @@
 #include <deformable_ccd/CollisionMonitorConfig.h>
 #include <dynamic_reconfigure/server.h>
 
+#include "dccd/accuracy.h"
+
 namespace dccd {
 
 namespace {
@@ -15,8 +17,8 @@ deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {
   live.step_budget_ms = config.monitor.detector.step_budget_ms;
   live.max_step_s = config.monitor.store.max_step_s;
   live.max_vertex_step_m = config.monitor.store.max_vertex_step_m;
-  live.max_contacts = static_cast<int>(config.monitor.max_contacts);
-  live.suppress_initial = config.monitor.suppress_initial;
+  live.max_contacts = static_cast<int>(config.monitor.detector.max_contacts);
+  live.suppress_initial = config.monitor.detector.suppress_initial;
   live.marker_point_size_m = config.markers.point_size_m;
   live.marker_normal_length_m = config.markers.normal_length_m;
   live.marker_mesh = config.markers.mesh;
@@ -29,8 +31,8 @@ void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions
   options.detector.step_budget_ms = live.step_budget_ms;
   options.store.max_step_s = live.max_step_s;
   options.store.max_vertex_step_m = live.max_vertex_step_m;
-  options.max_contacts = static_cast<std::size_t>(live.max_contacts);
-  options.suppress_initial = live.suppress_initial;
+  options.detector.max_contacts = static_cast<std::size_t>(live.max_contacts);
+  options.detector.suppress_initial = live.suppress_initial;
   markers.point_size_m = live.marker_point_size_m;
   markers.normal_length_m = live.marker_normal_length_m;
   markers.mesh = live.marker_mesh;
@@ -57,7 +59,7 @@ struct Reconfigure::Impl {
 
   void apply(deformable_ccd::CollisionMonitorConfig& live) {
     const auto rung = static_cast<Accuracy>(live.accuracy);
-    if (separates && (rung == Accuracy::EXACT || rung == Accuracy::FAST)) {
+    if (separates && !holdsDistance(rung)) {
       live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);  // the only rungs that hold a distance: this and screen
     }
     changed([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });

@@ -8,6 +8,8 @@
 
 #include "obstacle/obstacle_check_impl.h"
 
+#include "dccd/accuracy.h"
+
 namespace dccd {
 namespace {
 
@@ -23,7 +25,7 @@ std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options) {
                                 ", which is not a length from 0 up");
   }
   const Accuracy rung = options.accuracy.rung;
-  if (options.minimum_separation_m > 0 && rung != Accuracy::CONSERVATIVE && rung != Accuracy::SCREEN) {
+  if (options.minimum_separation_m > 0 && !holdsDistance(rung)) {
     throw std::invalid_argument(std::string("minimum_separation_m above 0 cannot be had with accuracy ") +
                                 toString(rung) + "; use conservative");
   }
@@ -156,7 +158,7 @@ ObstacleCheck::~ObstacleCheck() = default;
 bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
                         const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
                         std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m,
-                        const std::chrono::steady_clock::time_point* deadline) {
+                        const Deadline& deadline) {
   const auto start = std::chrono::steady_clock::now();
   if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
     throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +

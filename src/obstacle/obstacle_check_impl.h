@@ -47,7 +47,7 @@ struct ObstacleCheck::Impl {
     std::uint16_t body;
     ObstacleStats* stats;
     const double* radius_m = nullptr;  ///< uncertainty per vertex; null: none
-    const std::chrono::steady_clock::time_point* deadline = nullptr;
+    Deadline deadline;
   };
 
   /// Distance from which on a feature of these vertices is in contact.
@@ -66,8 +66,8 @@ struct ObstacleCheck::Impl {
 
   /// The clock is read for one feature in 32.
   bool isLate(const Run& run) {
-    if (!run.deadline || late) return late;
-    return late = (looked_at++ & 31) == 0 && std::chrono::steady_clock::now() >= *run.deadline;
+    if (late || run.deadline.isNever()) return late;
+    return late = (looked_at++ & 31) == 0 && run.deadline.isOver();
   }
 
   bool reachesSurface(const Run& run) const;

@@ -33,7 +33,7 @@ void put(DiagnosticStatus& status, const char* key, const T& value) {
 Diagnostics::Diagnostics(const std::string& name, ros::NodeHandle& node)
     : name_(name), publisher_(node.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10)) {}
 
-void Diagnostics::add(const StepOutcome& outcome, const StatsContext& context) {
+void Diagnostics::add(const Outcome& outcome, const StatsContext& context) {
   ++outcomes_;
   answers_ += outcome.answered;
   worst_latency_s_ = std::max(worst_latency_s_, context.latency_s);
@@ -44,7 +44,7 @@ void Diagnostics::add(const StepOutcome& outcome, const StatsContext& context) {
   if (!outcome.answered) return;
   map_present_ = outcome.obstacle != nullptr;
   map_reason_ = outcome.reason;
-  map_age_s_ = map_present_ ? static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9 : 0;
+  map_age_s_ = map_present_ ? static_cast<double>(outcome.stamp_ns - outcome.step->map.stamp_ns) * 1e-9 : 0;
 }
 
 void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::string& map_topic,
@@ -110,7 +110,7 @@ void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::s
   publisher_.publish(array);
 }
 
-std::string describe(const StepOutcome& outcome) {
+std::string describe(const Outcome& outcome) {
   std::ostringstream text;
   text << toString(outcome.status);
   if (!outcome.reason.empty()) text << " (" << outcome.reason << ")";

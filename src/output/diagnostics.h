@@ -16,7 +16,7 @@ namespace dccd {
 class Diagnostics {
  public:
   Diagnostics(const std::string& name, ros::NodeHandle& node);
-  void add(const StepOutcome& outcome, const StatsContext& context);
+  void add(const Outcome& outcome, const StatsContext& context);
   /// At most once a second. `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty
   /// when none is expected.
   void publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic, const std::string& hint);
@@ -43,6 +43,6 @@ class Diagnostics {
 };
 
 /// One sentence for people: status, contacts, earliest time.
-std::string describe(const StepOutcome& outcome);
+std::string describe(const Outcome& outcome);
 
 }  // namespace dccd

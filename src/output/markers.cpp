@@ -28,7 +28,7 @@ geometry_msgs::Point point(const Vec3& p) {
   return out;
 }
 
-Marker list(const StepOutcome& outcome, const std::string& frame, const std::string& ns, int type, double scale) {
+Marker list(const Outcome& outcome, const std::string& frame, const std::string& ns, int type, double scale) {
   Marker marker;
   marker.header.frame_id = frame;
   marker.header.stamp = toRosTime(outcome.stamp_ns);
@@ -42,7 +42,7 @@ Marker list(const StepOutcome& outcome, const std::string& frame, const std::str
 }
 
 /// The mesh face that takes part, at the time of contact; nothing for edge pairs.
-void addFace(const StepOutcome& outcome, const Contact& contact, Marker& faces) {
+void addFace(const Outcome& outcome, const Contact& contact, Marker& faces) {
   int first = -1;
   if (contact.kind == PairKind::VERTEX_FACE) first = 1;
   if (contact.kind == PairKind::FACE_VOXEL_CORNER) first = 0;
@@ -61,14 +61,14 @@ Vec3 voxelMin(const VoxelKey& key, double resolution_m) {
 }
 
 /// The list for leaves of this size, in the map's pose; `share` of the edge is drawn.
-Marker& voxelList(const StepOutcome& outcome, const std::string& frame, const std::string& ns, std::uint32_t size,
+Marker& voxelList(const Outcome& outcome, const std::string& frame, const std::string& ns, std::uint32_t size,
                   double share, const std_msgs::ColorRGBA& rgba, VoxelLists& by_size) {
   const auto found = by_size.find(size);
   if (found != by_size.end()) return found->second;
   Marker marker = list(outcome, frame, ns, Marker::CUBE_LIST, share * size * outcome.obstacle->resolution());
   marker.id = static_cast<int>(size);
   marker.color = rgba;
-  const Eigen::Isometry3d pose = outcome.map_from_fixed.inverse();
+  const Eigen::Isometry3d pose = outcome.step->map.map_from_fixed.inverse();
   const Eigen::Quaterniond q(pose.linear());
   marker.pose.position = point(pose.translation());
   marker.pose.orientation.x = q.x();
@@ -79,12 +79,12 @@ Marker& voxelList(const StepOutcome& outcome, const std::string& frame, const st
 }
 
 /// Box around all bodies at the end of the step, in the map's frame.
-Box boundsInMap(const StepOutcome& outcome) {
+Box boundsInMap(const Outcome& outcome) {
   Box box;
-  for (const Positions& body : *outcome.positions_t1) {
-    for (const Vec3& p : body) {
+  for (const Body& body : outcome.step->bodies) {
+    for (const Vec3& p : *body.t1) {
       if (!p.allFinite()) continue;
-      const Vec3 in_map = outcome.map_from_fixed * p;
+      const Vec3 in_map = outcome.step->map.map_from_fixed * p;
       box.min = box.min.cwiseMin(in_map);
       box.max = box.max.cwiseMax(in_map);
     }
@@ -93,7 +93,7 @@ Box boundsInMap(const StepOutcome& outcome) {
 }
 
 /// The map around the bodies: cubes a little smaller than the voxels, so that those that were hit show.
-void addObstacle(const StepOutcome& outcome, double within_m, const std::string& frame, MarkerArray& out) {
+void addObstacle(const Outcome& outcome, double within_m, const std::string& frame, MarkerArray& out) {
   if (!outcome.obstacle || within_m <= 0) return;
   const Box bodies = boundsInMap(outcome);
   const double resolution = outcome.obstacle->resolution();
@@ -109,7 +109,7 @@ void addObstacle(const StepOutcome& outcome, double within_m, const std::string&
   for (auto& voxels : by_size) out.markers.push_back(std::move(voxels.second));
 }
 
-void addVoxel(const StepOutcome& outcome, const Contact& contact, const std::string& frame, VoxelLists& by_size) {
+void addVoxel(const Outcome& outcome, const Contact& contact, const std::string& frame, VoxelLists& by_size) {
   if (contact.body[1] != OBSTACLE_BODY) return;
   const double resolution = outcome.obstacle->resolution();
   const geometry_msgs::Point centre =
@@ -133,11 +133,11 @@ std_msgs::ColorRGBA shaded(const Vec3& a, const Vec3& b, const Vec3& c) {
   return color(0.30 * light, 0.62 * light, 0.70 * light, 0.85);
 }
 
-void addMeshes(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& config,
+void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& config,
                const std::string& frame, MarkerArray& out) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const Topology& topology = *(*outcome.topologies)[b];
-    const Positions& at = (*outcome.positions_t1)[b];
+    const Topology& topology = *outcome.step->bodies[b].topology;
+    const Positions& at = *outcome.step->bodies[b].t1;
     const bool rope = !topology.hasFaces();
     Marker marker = list(outcome, frame, "mesh/" + bodies[b].name, rope ? Marker::LINE_LIST : Marker::TRIANGLE_LIST,
                          rope ? config.line_width_m : 1.0);
@@ -161,7 +161,7 @@ void addMeshes(const StepOutcome& outcome, const std::vector<MonitorBody>& bodie
 
 }  // namespace
 
-MarkerArray toMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& config,
+MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& config,
                       const std::string& frame) {
   MarkerArray out;
   Marker clear = list(outcome, frame, "", Marker::CUBE, 1);

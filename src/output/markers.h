@@ -12,7 +12,7 @@ namespace dccd {
 /// First a DELETEALL, then a few list markers: contacts (points coloured by TOC, red early to yellow late), normals,
 /// faces, voxels (one list per size of leaf), initial contacts apart, and the meshes and the map around them if asked
 /// for.
-visualization_msgs::MarkerArray toMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+visualization_msgs::MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies,
                                           const MarkerConfig& config, const std::string& frame);
 
 }  // namespace dccd

@@ -31,12 +31,12 @@ std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
 }
 
 /// Never after the true time: the sum is rounded down to a nanosecond.
-ros::Time timeOf(const StepOutcome& outcome, double toc) {
+ros::Time timeOf(const Outcome& outcome, double toc) {
   const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
   return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
 }
 
-std::string nameOf(const Contact& contact, const std::vector<MonitorBody>& bodies) {
+std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
   static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
   static const std::size_t SIZES[][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}};
   const std::size_t* size = SIZES[static_cast<std::size_t>(contact.kind)];
@@ -53,7 +53,7 @@ std::string nameOf(const Contact& contact, const std::vector<MonitorBody>& bodie
 }
 
 /// "No contact" is said of clear steps alone; of others, what stands in the way of it.
-std::string noContact(const StepOutcome& outcome) {
+std::string noContact(const Outcome& outcome) {
   const std::string start = std::string("starts ") + toString(outcome.start_state);
   if (outcome.clear) return "no contact, " + start;
   std::string text = "no contact found, but ";
@@ -65,7 +65,7 @@ std::string noContact(const StepOutcome& outcome) {
 }
 
 /// A line for people; `first` is null where nothing known touches.
-std::string summaryOf(const StepOutcome& outcome, const Contact* first, const std::vector<MonitorBody>& bodies) {
+std::string summaryOf(const Outcome& outcome, const Contact* first, const std::vector<Body>& bodies) {
   if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
   const std::string start = std::string(", starts ") + toString(outcome.start_state);
   if (!std::isfinite(outcome.earliest_toc)) return noContact(outcome);
@@ -79,7 +79,7 @@ std::string summaryOf(const StepOutcome& outcome, const Contact* first, const st
          nameOf(*first, bodies) + start;
 }
 
-ContactMessage toMessage(const StepOutcome& outcome, const Contact& contact) {
+ContactMessage toMessage(const Outcome& outcome, const Contact& contact) {
   const ContactGeometry geometry = contactGeometry(outcome, contact);
   ContactMessage out;
   out.kind = static_cast<std::uint8_t>(contact.kind);
@@ -126,7 +126,7 @@ void fillFrames(const FrameCounters& frames, StatsMessage& out) {
   out.seams_teleport = frames.of(StepStatus::TELEPORT);
 }
 
-void fillContacts(const StepOutcome& outcome, StatsMessage& out) {
+void fillContacts(const Outcome& outcome, StatsMessage& out) {
   out.contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.contacts_certain = static_cast<std::uint32_t>(outcome.counts.certain);
   out.contacts_undecided = static_cast<std::uint32_t>(outcome.counts.undecided);
@@ -165,8 +165,8 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.body_body_in = stats[Effect::BODY_BODY].in;
   out.body_body_out = stats[Effect::BODY_BODY].out;
   out.body_body_ms = stats[Effect::BODY_BODY].ms;
-  out.obstacle_in = stats[Effect::OBSTACLE].in;
-  out.obstacle_out = stats[Effect::OBSTACLE].out;
+  out.obstacle_in = stats[Effect::OCTOMAP].in;
+  out.obstacle_out = stats[Effect::OCTOMAP].out;
   out.start_state_in = stats[Effect::START_STATE].in;
   out.start_state_out = stats[Effect::START_STATE].out;
   out.rigid_bodies_in = stats[Effect::RIGID_BODIES].in;
@@ -186,6 +186,7 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.look_ahead_ms = stats[Effect::LOOK_AHEAD].ms;
   out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
   out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
+  out.unfolded_bodies = static_cast<std::uint32_t>(stats.unfolded_bodies);
   out.body_pairs = static_cast<std::uint32_t>(stats.body_pairs);
   out.left_out_listed = stats.left_out_listed;
   out.left_out_met = stats.left_out_met;
@@ -208,7 +209,7 @@ ros::Time toRosTime(StampNs stamp_ns) {
   return time;
 }
 
-deformable_ccd::ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::ContactArray out;
   out.header = header(outcome.stamp_ns, frame);
@@ -221,7 +222,7 @@ deformable_ccd::ContactArray toContactArray(const StepOutcome& outcome, const st
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
-  for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
+  for (const Body& body : bodies) out.bodies.push_back(body.name);
   out.contacts.reserve(outcome.contacts.size());
   for (const Contact& contact : outcome.contacts) out.contacts.push_back(toMessage(outcome, contact));
   for (const StartIntersection& crossing : outcome.intersections) {
@@ -233,7 +234,7 @@ deformable_ccd::ContactArray toContactArray(const StepOutcome& outcome, const st
   return out;
 }
 
-deformable_ccd::FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::FirstContact out;
   out.header = header(outcome.stamp_ns, frame);
@@ -258,7 +259,7 @@ deformable_ccd::FirstContact toFirstContact(const StepOutcome& outcome, const st
   return out;
 }
 
-StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context, const std::string& frame) {
+StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
   StatsMessage out;
   out.header = header(outcome.stamp_ns, frame);
   out.status = static_cast<std::uint8_t>(outcome.status);
@@ -275,7 +276,7 @@ StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context
   out.map_present = outcome.obstacle != nullptr;
   if (outcome.obstacle) {
     out.map_leaves = outcome.obstacle->leafCount();
-    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.map_stamp_ns) * 1e-9;
+    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.step->map.stamp_ns) * 1e-9;
   }
   out.excluded_voxels = outcome.excluded_voxels;
   out.unknown_fraction = outcome.unknown_fraction;
@@ -289,12 +290,11 @@ StatsMessage toStepStats(const StepOutcome& outcome, const StatsContext& context
   return out;
 }
 
-deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs,
-                                            const std::vector<MonitorBody>& bodies, StampNs stamp_ns,
-                                            const std::string& frame) {
+deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,
+                                            StampNs stamp_ns, const std::string& frame) {
   deformable_ccd::LeftOutPairs out;
   out.header = header(stamp_ns, frame);
-  for (const MonitorBody& body : bodies) out.bodies.push_back(body.name);
+  for (const Body& body : bodies) out.bodies.push_back(body.name);
   out.pairs.resize(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     out.pairs[i].kind = static_cast<std::uint8_t>(pairs[i].kind);
@@ -304,8 +304,7 @@ deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pair
   return out;
 }
 
-deformable_ccd::TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s,
-                                              const std::string& frame) {
+deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s, const std::string& frame) {
   deformable_ccd::TimeToContact out;
   out.header = header(prediction.start_ns, frame);
   out.status = static_cast<std::uint8_t>(prediction.status);

@@ -9,7 +9,7 @@
 #include <std_msgs/Header.h>
 
 #include "dccd/look_ahead_score.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 
 namespace dccd {
 
@@ -29,18 +29,15 @@ struct StatsContext {
   std::uint64_t parameter_hash = 0;
 };
 
-deformable_ccd::ContactArray toContactArray(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
-deformable_ccd::FirstContact toFirstContact(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
+deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
 /// The message of the package, not StepStats.
-deformable_ccd::StepStats toStepStats(const StepOutcome& outcome, const StatsContext& context,
-                                      const std::string& frame);
-deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs,
-                                            const std::vector<MonitorBody>& bodies, StampNs stamp_ns,
-                                            const std::string& frame);
+deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
+deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,
+                                            StampNs stamp_ns, const std::string& frame);
 /// From a prediction (Monitor::predict) over horizon_s.
-deformable_ccd::TimeToContact toTimeToContact(const StepOutcome& prediction, double horizon_s,
-                                              const std::string& frame);
+deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s, const std::string& frame);
 
 }  // namespace dccd

@@ -28,8 +28,7 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
   publishNotClear("");
 }
 
-void Outputs::publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
-                            const std::string& frame) {
+void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
   std_msgs::Bool clear;
   clear.data = outcome.clear;
   clear_.publish(clear);
@@ -37,15 +36,15 @@ void Outputs::publishResult(const StepOutcome& outcome, const std::vector<Monito
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
 }
 
-void Outputs::publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies,
-                             const MarkerConfig& markers, const std::string& frame) {
+void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
+                             const std::string& frame) {
   if (markers_.getNumSubscribers() > 0 && !frame.empty()) {
     ++markers_built_;
     markers_.publish(toMarkers(outcome, bodies, markers, frame));
   }
 }
 
-void Outputs::publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame) {
+void Outputs::publishStats(const Outcome& outcome, StatsContext context, const std::string& frame) {
   if (stats_.getNumSubscribers() == 0) return;
   context.markers_built = markers_built_;
   stats_.publish(toStepStats(outcome, context, frame));
@@ -56,7 +55,7 @@ bool Outputs::wantsPrediction() const {
          (time_to_contact_ && time_to_contact_.getNumSubscribers() > 0);
 }
 
-void Outputs::publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
+void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                 const std::string& frame) {
   if (predicted_.getNumSubscribers() > 0) predicted_.publish(toContactArray(prediction, bodies, frame));
   if (time_to_contact_.getNumSubscribers() > 0) {

@@ -20,15 +20,15 @@ class Outputs {
   Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates);
 
   /// What a robot waits for, before all else: clear, first contact, contacts.
-  void publishResult(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const std::string& frame);
-  void publishMarkers(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies, const MarkerConfig& markers,
+  void publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
+  void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
                       const std::string& frame);
   /// After the step's prediction, which it tells of.
-  void publishStats(const StepOutcome& outcome, StatsContext context, const std::string& frame);
+  void publishStats(const Outcome& outcome, StatsContext context, const std::string& frame);
   /// Whether anybody listens to predictions.
   bool wantsPrediction() const;
   /// Also one without an answer.
-  void publishPrediction(const StepOutcome& prediction, double horizon_s, const std::vector<MonitorBody>& bodies,
+  void publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                          const std::string& frame);
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.

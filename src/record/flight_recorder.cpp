@@ -6,10 +6,10 @@
 
 namespace dccd {
 
-std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options) {
+std::string surpriseIn(const Outcome& outcome, const Options& options) {
   if (outcome.status == StepStatus::INTERNAL_ERROR) return "the step failed: " + outcome.reason;
   if (!outcome.answered) return {};
-  const bool exact = options.detector.accuracy.rung == Accuracy::EXACT;
+  const bool exact = options.accuracy.rung == Accuracy::EXACT;
   if (exact && outcome.complete && outcome.stats.undecided > 0) {
     return "exact arithmetic left " + std::to_string(outcome.stats.undecided) + " pairs undecided";
   }
@@ -32,20 +32,24 @@ FlightRecorder::~FlightRecorder() {
   if (newest_image_) newest_image_->compare_exchange_strong(mine, nullptr);
 }
 
-void FlightRecorder::onStep(const StepSource& source) {
+void FlightRecorder::onStep(const Step& step, const Options& options) {
   if (newest_image_) *newest_image_ = nullptr;
   next_ = (next_ + 1) % ring_.size();
   count_ = std::min(count_ + 1, ring_.size());
-  setSource(source, newest());
+  newest().step = step;
+  newest().options = options;
+  newest().has_answer = false;
+  newest().answer = Outcome();
   if (!newest_image_) return;
   newest().note = "written by the crash handler";
   image_.build(newest());
   *newest_image_ = &image_;
 }
 
-void FlightRecorder::onOutcome(const StepOutcome& outcome) {
+void FlightRecorder::onOutcome(const Outcome& outcome) {
   if (count_ == 0) return;
-  setAnswer(outcome, newest());  // the image points to nothing of the answer
+  newest().answer = outcome;  // the image points to nothing of the answer
+  newest().has_answer = true;
   const std::string surprise = surpriseIn(outcome, newest().options);
   if (surprise.empty()) return;
   surprise_ = "step " + std::to_string(outcome.sequence) + ": " + surprise;
@@ -64,8 +68,8 @@ void FlightRecorder::onOutcome(const StepOutcome& outcome) {
 std::string FlightRecorder::write(StepRecording& recording, const std::string& kind, const std::string& note) {
   std::error_code ignored;  // the file says so, too
   std::filesystem::create_directories(folder_, ignored);
-  const std::string path = folder_ + "/" + kind + "_" + std::to_string(recording.sequence) + "_" +
-                           std::to_string(recording.stamp_ns) + ".step";
+  const std::string path = folder_ + "/" + kind + "_" + std::to_string(recording.step.sequence) + "_" +
+                           std::to_string(recording.step.stamp_ns) + ".step";
   recording.note = note;
   writeRecording(path, recording);
   return path;

@@ -8,13 +8,14 @@
 
 #include "dccd/export.h"
 
+#include "dccd/stream.h"
 #include "record/step_recording.h"
 
 namespace dccd {
 
 /// What of an outcome contradicts the promises of its options; empty: nothing. The step failed, `exact` left a pair
 /// undecided though no deadline expired, or a time lies outside of the step.
-DCCD_EXPORT std::string surpriseIn(const StepOutcome& outcome, const MonitorOptions& options);
+DCCD_EXPORT std::string surpriseIn(const Outcome& outcome, const Options& options);
 
 /// Memory: `steps` times the positions and contacts of a step; buffers are kept. Not thread-safe: one thread, the
 /// monitor's.
@@ -31,8 +32,8 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
   FlightRecorder(const FlightRecorder&) = delete;
   FlightRecorder& operator=(const FlightRecorder&) = delete;
 
-  void onStep(const StepSource& source) override;
-  void onOutcome(const StepOutcome& outcome) override;
+  void onStep(const Step& step, const Options& options) override;
+  void onOutcome(const Outcome& outcome) override;
 
   /// Steps that are kept.
   std::size_t size() const { return count_; }

@@ -53,6 +53,11 @@ class RecordingWriter {
     number(static_cast<std::uint64_t>(values.size()));
     if (!values.empty()) image_.pieces_.push_back({values.data(), 0, values.size() * sizeof(T)});
   }
+  template <typename T>
+  void shared(const std::shared_ptr<const std::vector<T>>& values) {
+    static const std::vector<T> NONE;
+    array(values ? *values : NONE);
+  }
   /// The count of a list whose items are visited one by one.
   template <typename T>
   void count(const std::vector<T>& values, std::size_t, std::size_t) {
@@ -123,7 +128,9 @@ class RecordingReader {
   void choice(Enum& value, Enum last) {
     std::uint8_t byte = 0;
     number(byte);
-    if (byte > static_cast<std::uint8_t>(last)) fail("a choice is " + std::to_string(byte));
+    if (byte > static_cast<std::uint8_t>(last)) {
+      fail("a choice is " + std::to_string(byte) + ", which this version of the program does not know");
+    }
     value = static_cast<Enum>(byte);
   }
   void text(std::string& value) {
@@ -138,6 +145,12 @@ class RecordingReader {
   void array(std::vector<T>& values) {
     count(values, sizeof(T), std::numeric_limits<std::size_t>::max());
     bytes(static_cast<void*>(values.data()), values.size() * sizeof(T));
+  }
+  template <typename T>
+  void shared(std::shared_ptr<const std::vector<T>>& values) {
+    std::vector<T> read;
+    array(read);
+    values = share(std::move(read));
   }
   void map(std::shared_ptr<const VoxelSurface>& surface) {
     double resolution_m = 0;

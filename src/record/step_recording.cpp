@@ -11,6 +11,7 @@
 #include <iterator>
 #include <limits>
 
+#include "dccd/accuracy.h"
 #include "record/recording_archive.h"
 
 namespace dccd {
@@ -39,23 +40,24 @@ void visitPose(Archive& a, Pose& pose) {
 
 template <typename Archive, typename Options>
 void visitOptions(Archive& a, Options& o) {
-  a.choice(o.detector.accuracy.rung, Accuracy::EXACT);
-  a.number(o.detector.accuracy.tolerance_m);
-  a.number(o.detector.accuracy.toc_bits);
-  a.number(o.detector.accuracy.max_subdivisions);
-  a.choice(o.detector.broad_phase, BroadPhase::BRUTE_FORCE);
-  a.number(o.detector.num_threads);
-  a.number(o.detector.step_budget_ms);
-  a.flag(o.detector.earliest_only);
-  a.flag(o.detector.check_start_state);
-  a.flag(o.detector.unfolded_test);
+  std::size_t reserved = 0;
+  a.choice(o.accuracy.rung, allRungs().back());
+  a.number(o.accuracy.tolerance_m);
+  a.number(o.accuracy.toc_bits);
+  a.number(o.accuracy.max_subdivisions);
+  a.choice(o.broad_phase, BroadPhase::BRUTE_FORCE);
+  a.number(o.num_threads);
+  a.number(o.step_budget_ms);
+  a.flag(o.earliest_only);
+  a.flag(o.check_start_state);
+  a.flag(o.unfolded_test);
   a.size(o.max_contacts);
   a.flag(o.suppress_initial);
   a.array(o.exclude_boxes);
   a.flag(o.obstacle_expected);
   a.number(o.rigid_tolerance_m);
   a.size(o.max_substeps);
-  a.size(o.clock_body);
+  a.size(reserved);  // was the clock body, when a replay took frames
   if constexpr (Archive::READS) {
     if (o.max_substeps > MAX_SUBSTEPS) a.fail("max_substeps is " + std::to_string(o.max_substeps));
   }
@@ -63,52 +65,52 @@ void visitOptions(Archive& a, Options& o) {
 
 template <typename Archive, typename Body>
 void visitBody(Archive& a, Body& body) {
-  a.text(body.setup.name);
-  a.choice(body.setup.motion, BodyMotionKind::STATIC);
-  a.flag(body.setup.rigid);
-  a.flag(body.setup.self_collision);
-  a.flag(body.setup.against_bodies);
-  a.flag(body.setup.against_obstacle);
-  a.number(body.setup.minimum_separation_m);
-  a.array(body.setup.vertex_mask);
-  a.array(body.t0);
-  a.array(body.t1);
+  a.text(body.name);
+  a.choice(body.motion, BodyMotionKind::STATIC);
   a.flag(body.rigid);
+  a.flag(body.self_collision);
+  a.flag(body.against_bodies);
+  a.flag(body.against_obstacle);
+  a.number(body.minimum_separation_m);
+  a.array(body.vertex_mask);
+  a.shared(body.t0);
+  a.shared(body.t1);
+  a.flag(body.turns);
   visitPose(a, body.pose_t0);
   visitPose(a, body.pose_t1);
 }
 
-void visitTopology(RecordingWriter& a, const RecordedBody& body) {
+void visitTopology(RecordingWriter& a, const Body& body) {
   static const std::vector<Face> NONE;
   const bool line = body.topology && !body.topology->hasFaces() && !body.topology->edges().empty();
   a.choice(line ? Connectivity::POLYLINE : Connectivity::TRIANGLES, Connectivity::POLYLINE);
   a.array(body.topology ? body.topology->faces() : NONE);
 }
 
-void visitTopology(RecordingReader& a, RecordedBody& body) {
-  if (body.t0.size() != body.t1.size()) {
-    a.fail("body '" + body.setup.name + "' has " + std::to_string(body.t0.size()) + " vertices at t=0 and " +
-           std::to_string(body.t1.size()) + " at t=1");
+void visitTopology(RecordingReader& a, Body& body) {
+  const std::size_t vertices = body.t0->size();
+  if (vertices != body.t1->size()) {
+    a.fail("body '" + body.name + "' has " + std::to_string(vertices) + " vertices at t=0 and " +
+           std::to_string(body.t1->size()) + " at t=1");
   }
   Connectivity kind = Connectivity::TRIANGLES;
   std::vector<Face> faces;
   a.choice(kind, Connectivity::POLYLINE);
   a.array(faces);
   try {
-    body.topology = std::make_shared<const Topology>(kind == Connectivity::POLYLINE
-                                                         ? Topology::polyline(body.t0.size())
-                                                         : Topology::fromTriangles(body.t0.size(), faces));
+    body.topology = std::make_shared<const Topology>(
+        kind == Connectivity::POLYLINE ? Topology::polyline(vertices) : Topology::fromTriangles(vertices, faces));
   } catch (const TopologyError& error) {
-    a.fail("body '" + body.setup.name + "': " + error.what());
+    a.fail("body '" + body.name + "': " + error.what());
   }
 }
 
-void visitMap(RecordingWriter& a, const MonitorMap& map) {
+void visitMap(RecordingWriter& a, const ObstacleMap& map) {
   a.flag(map.surface != nullptr);
   if (map.surface) a.map(map.surface);
 }
 
-void visitMap(RecordingReader& a, MonitorMap& map) {
+void visitMap(RecordingReader& a, ObstacleMap& map) {
   bool present = false;
   a.flag(present);
   if (present) a.map(map.surface);
@@ -132,17 +134,16 @@ void visitContact(Archive& a, Contact& c) {
 
 template <typename Archive, typename Answer>
 void visitAnswer(Archive& a, Answer& answer) {
-  a.flag(answer.present);
   a.choice(answer.status, StepStatus::INTERNAL_ERROR);
   a.text(answer.reason);
   a.flag(answer.answered);
   a.flag(answer.complete);
   a.flag(answer.clear);
   a.choice(answer.start_state, StartState::NOT_CHECKED);
-  a.number(answer.total_contacts);
-  a.number(answer.suppressed);
+  a.size(answer.total_contacts);
+  a.size(answer.suppressed);
   a.number(answer.excluded_voxels);
-  a.number(answer.substeps);
+  a.size(answer.substeps);
   a.number(answer.unchecked_toc_lower);
   a.number(answer.earliest_toc);
   a.count(answer.contacts, CONTACT_BYTES, std::numeric_limits<std::size_t>::max());
@@ -156,27 +157,28 @@ void visitAnswer(Archive& a, Answer& answer) {
 
 template <typename Archive, typename Body>
 void visitSeparations(Archive& a, Body& body) {
-  a.count(body.setup.separations, SEPARATION_BYTES, MAX_BODIES);
-  for (auto& from : body.setup.separations) {
+  a.count(body.separations, SEPARATION_BYTES, MAX_BODIES);
+  for (auto& from : body.separations) {
     a.number(from.body);
     a.number(from.separation_m);
   }
-  a.array(body.radius_m);
+  a.shared(body.radius_m);
 }
 
-void visitReference(RecordingWriter& a, const RecordedBody& body) {
+void visitReference(RecordingWriter& a, const Body& body) {
   a.flag(body.reference != nullptr);
   if (!body.reference) return;
   a.array(body.reference->positions);
   a.array(body.reference->radius_m);
 }
 
-void visitReference(RecordingReader& a, RecordedBody& body) {
-  const auto fits = [&](const std::vector<double>& radius) {
-    return radius.empty() || radius.size() == body.t0.size();
-  };
-  if (!fits(body.radius_m)) {
-    a.fail("body '" + body.setup.name + "' has " + std::to_string(body.radius_m.size()) + " radii");
+void visitReference(RecordingReader& a, Body& body) {
+  const std::size_t vertices = body.t0->size();
+  const auto fits = [&](const std::vector<double>& radius) { return radius.empty() || radius.size() == vertices; };
+  if (body.radius_m->empty()) {
+    body.radius_m = nullptr;
+  } else if (!fits(*body.radius_m)) {
+    a.fail("body '" + body.name + "' has " + std::to_string(body.radius_m->size()) + " radii");
   }
   bool present = false;
   a.flag(present);
@@ -184,17 +186,17 @@ void visitReference(RecordingReader& a, RecordedBody& body) {
   ReferenceFrame reference;
   a.array(reference.positions);
   a.array(reference.radius_m);
-  if (reference.positions.size() != body.t0.size() || !fits(reference.radius_m)) {
-    a.fail("the reference frame of body '" + body.setup.name + "' has " + std::to_string(reference.positions.size()) +
+  if (reference.positions.size() != vertices || !fits(reference.radius_m)) {
+    a.fail("the reference frame of body '" + body.name + "' has " + std::to_string(reference.positions.size()) +
            " vertices and " + std::to_string(reference.radius_m.size()) + " radii");
   }
-  body.reference = std::make_shared<const ReferenceFrame>(std::move(reference));
+  body.reference = share(std::move(reference));
 }
 
 /// What version 2 added.
 template <typename Archive, typename Recording>
 void visitDistances(Archive& a, Recording& r) {
-  for (auto& body : r.bodies) {
+  for (auto& body : r.step.bodies) {
     visitSeparations(a, body);
     visitReference(a, body);
   }
@@ -204,74 +206,32 @@ void visitDistances(Archive& a, Recording& r) {
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
   a.text(r.note);
-  a.number(r.sequence);
-  a.number(r.start_ns);
-  a.number(r.stamp_ns);
+  a.number(r.step.sequence);
+  a.number(r.step.start_ns);
+  a.number(r.step.stamp_ns);
   if constexpr (Archive::READS) {
-    if (r.start_ns < 0 || r.stamp_ns <= r.start_ns) {
-      a.fail("the step lasts from " + std::to_string(r.start_ns) + " ns to " + std::to_string(r.stamp_ns) + " ns");
+    if (r.step.start_ns < 0 || r.step.stamp_ns <= r.step.start_ns) {
+      a.fail("the step lasts from " + std::to_string(r.step.start_ns) + " ns to " + std::to_string(r.step.stamp_ns) +
+             " ns");
     }
   }
   visitOptions(a, r.options);
-  a.count(r.bodies, BODY_BYTES, MAX_BODIES);
-  for (auto& body : r.bodies) {
+  a.count(r.step.bodies, BODY_BYTES, MAX_BODIES);
+  for (auto& body : r.step.bodies) {
     visitBody(a, body);
     visitTopology(a, body);
   }
-  visitMap(a, r.map);
-  a.number(r.map.stamp_ns);
-  visitPose(a, r.map.map_from_fixed);
-  a.text(r.map.problem);
+  visitMap(a, r.step.map);
+  a.number(r.step.map.stamp_ns);
+  visitPose(a, r.step.map.map_from_fixed);
+  a.text(r.step.map.problem);
+  a.flag(r.has_answer);
   visitAnswer(a, r.answer);
 }
 
 std::string systemText(const std::string& path) { return path + ": cannot be written: " + std::strerror(errno); }
 
 }  // namespace
-
-void setSource(const StepSource& source, StepRecording& recording) {
-  recording.sequence = source.sequence;
-  recording.start_ns = source.start_ns;
-  recording.stamp_ns = source.stamp_ns;
-  recording.options = *source.options;
-  recording.bodies.resize(source.bodies->size());
-  for (std::size_t b = 0; b < recording.bodies.size(); ++b) {
-    RecordedBody& body = recording.bodies[b];
-    body.setup = (*source.bodies)[b];
-    body.topology = (*source.topologies)[b];
-    body.t0.assign((*source.t0)[b].begin(), (*source.t0)[b].end());
-    body.t1.assign((*source.t1)[b].begin(), (*source.t1)[b].end());
-    body.rigid = (*source.rigid)[b] != 0;
-    body.pose_t0 = (*source.pose_t0)[b];
-    body.pose_t1 = (*source.pose_t1)[b];
-    body.radius_m.assign((*source.radius_m)[b].begin(), (*source.radius_m)[b].end());
-    body.reference = (*source.references)[b];
-  }
-  recording.map = *source.map;
-  RecordedAnswer& answer = recording.answer;
-  answer.present = false;
-  answer.contacts.clear();
-  answer.intersections.clear();
-}
-
-void setAnswer(const StepOutcome& outcome, StepRecording& recording) {
-  RecordedAnswer& answer = recording.answer;
-  answer.present = true;
-  answer.status = outcome.status;
-  answer.reason = outcome.reason;
-  answer.answered = outcome.answered;
-  answer.complete = outcome.complete;
-  answer.clear = outcome.clear;
-  answer.start_state = outcome.start_state;
-  answer.total_contacts = outcome.total_contacts;
-  answer.suppressed = outcome.suppressed;
-  answer.excluded_voxels = outcome.excluded_voxels;
-  answer.substeps = outcome.substeps;
-  answer.unchecked_toc_lower = outcome.unchecked_toc_lower;
-  answer.earliest_toc = outcome.earliest_toc;
-  answer.contacts.assign(outcome.contacts.begin(), outcome.contacts.end());
-  answer.intersections.assign(outcome.intersections.begin(), outcome.intersections.end());
-}
 
 void RecordingImage::build(const StepRecording& recording) {
   heads_.clear();

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "dccd/detect.h"
 #include "dccd/export.h"
-#include "dccd/monitor.h"
 
 namespace dccd {
 
@@ -23,42 +23,13 @@ struct DCCD_EXPORT RecordingError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-struct RecordedBody {
-  MonitorBody setup;
-  Positions t0, t1;  ///< [m] fixed frame
-  std::shared_ptr<const Topology> topology;
-  bool rigid = false;
-  Eigen::Isometry3d pose_t0 = Eigen::Isometry3d::Identity(), pose_t1 = Eigen::Isometry3d::Identity();
-  std::vector<double> radius_m;                     ///< uncertainty per vertex; empty: none
-  std::shared_ptr<const ReferenceFrame> reference;  ///< null: nothing is left out of the separation
-};
-
-/// The parts of StepOutcome that do not depend on the machine.
-struct RecordedAnswer {
-  bool present = false;  ///< false: the program ended in the step
-  StepStatus status = StepStatus::INTERNAL_ERROR;
-  std::string reason;
-  bool answered = false, complete = true, clear = false;
-  StartState start_state = StartState::NOT_CHECKED;
-  std::uint64_t total_contacts = 0, suppressed = 0, excluded_voxels = 0, substeps = 0;
-  double unchecked_toc_lower = 0, earliest_toc = 0;
-  std::vector<Contact> contacts;
-  std::vector<StartIntersection> intersections;
-};
-
 struct StepRecording {
   std::string note;  ///< why it was written, by what
-  std::uint64_t sequence = 0;
-  StampNs start_ns = 0, stamp_ns = 0;
-  MonitorOptions options;
-  std::vector<RecordedBody> bodies;
-  MonitorMap map;
-  RecordedAnswer answer;
+  Step step;
+  Options options;
+  bool has_answer = false;  ///< false: the program ended in the step
+  Outcome answer;           ///< the file has what of it does not depend on the machine
 };
-
-/// Copies; buffers of `recording` are used again. setAnswer copies what is in the outcome, setSource drops the answer.
-DCCD_EXPORT void setSource(const StepSource& source, StepRecording& recording);
-DCCD_EXPORT void setAnswer(const StepOutcome& outcome, StepRecording& recording);
 
 /// A recording as the pieces of memory that its file consists of; large arrays stay where they are in the recording.
 class DCCD_EXPORT RecordingImage {

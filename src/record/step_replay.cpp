@@ -59,7 +59,7 @@ class Differences {
   std::vector<std::string> found_;
 };
 
-void compareContacts(const RecordedAnswer& recorded, const RecordedAnswer& replayed, Differences& out) {
+void compareContacts(const Outcome& recorded, const Outcome& replayed, Differences& out) {
   out.field("number of contacts", recorded.contacts.size(), replayed.contacts.size());
   const std::size_t n = std::min(recorded.contacts.size(), replayed.contacts.size());
   for (std::size_t i = 0; i < n; ++i) {
@@ -70,7 +70,7 @@ void compareContacts(const RecordedAnswer& recorded, const RecordedAnswer& repla
 }
 
 /// The recorded step ended early: what it called certain must be among the replayed contacts.
-void compareCertain(const RecordedAnswer& recorded, const RecordedAnswer& replayed, Differences& out) {
+void compareCertain(const Outcome& recorded, const Outcome& replayed, Differences& out) {
   for (const Contact& c : recorded.contacts) {
     if (c.certainty != Certainty::CERTAIN) continue;
     const bool found = std::any_of(replayed.contacts.begin(), replayed.contacts.end(),
@@ -79,23 +79,9 @@ void compareCertain(const RecordedAnswer& recorded, const RecordedAnswer& replay
   }
 }
 
-MonitorOptions replayOptions(const StepRecording& recording, int threads) {
-  MonitorOptions options = recording.options;
-  options.detector.num_threads = threads;
-  options.detector.step_budget_ms = 0;
-  // What was decided before the step was computed is no question any more: it has its frames and its map.
-  options.store = MeshStoreOptions();
-  options.store.max_step_s = 1e12;
-  options.store.max_vertex_step_m = 0;
-  options.sync_timeout_s = 0;
-  options.octomap_timeout_s = 0;
-  options.look_ahead_s = 0;
-  return options;
-}
-
 }  // namespace
 
-std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const RecordedAnswer& replayed) {
+std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed) {
   Differences out;
   if (!recorded.answered || !recorded.complete) {
     if (recorded.answered) compareCertain(recorded, replayed, out);
@@ -119,42 +105,27 @@ std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const Re
 }
 
 StepReplay replayStep(const StepRecording& recording, int threads) {
-  std::vector<MonitorBody> bodies;
-  for (const RecordedBody& body : recording.bodies) bodies.push_back(body.setup);
-  Monitor monitor(replayOptions(recording, threads), bodies);
-  monitor.setMap(recording.map);
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    monitor.setReference(b, recording.bodies[b].topology, recording.bodies[b].reference);
-  }
-  const auto push = [&](bool end) {
-    // The clock body last, so that its step finds all others.
-    for (std::size_t i = 1; i <= bodies.size(); ++i) {
-      const std::size_t b = (recording.options.clock_body + i) % bodies.size();
-      const RecordedBody& body = recording.bodies[b];
-      monitor.push(b,
-                   {end ? recording.stamp_ns : recording.start_ns, body.topology, end ? body.t1 : body.t0, body.rigid,
-                    end ? body.pose_t1 : body.pose_t0, body.radius_m},
-                   0);
-    }
-  };
-  push(false);
-  push(true);
-  monitor.finish();
-  StepOutcome outcome;
-  monitor.next(0, outcome);  // the first frame
-  if (!monitor.next(0, outcome)) throw std::invalid_argument("the recording makes no step");
-  StepRecording replayed;
-  setAnswer(outcome, replayed);
+  Options options = recording.options;
+  options.num_threads = threads;
+  options.step_budget_ms = 0;
+  check(options);
+  if (recording.step.bodies.empty()) throw std::invalid_argument("the recording has no body");
   StepReplay result;
-  result.answer = std::move(replayed.answer);
-  if (recording.answer.present) result.differences = compareAnswers(recording.answer, result.answer);
+  try {
+    History history;
+    result.answer = detect(recording.step, options, history);
+  } catch (const std::invalid_argument& error) {
+    result.answer.status = StepStatus::INTERNAL_ERROR;
+    result.answer.reason = error.what();
+  }
+  if (recording.has_answer) result.differences = compareAnswers(recording.answer, result.answer);
   return result;
 }
 
-std::string describeContact(const Contact& c, const std::vector<RecordedBody>& bodies) {
+std::string describeContact(const Contact& c, const std::vector<Body>& bodies) {
   std::ostringstream text;
   const auto name = [&](std::uint16_t body) {
-    return body < bodies.size()    ? bodies[body].setup.name
+    return body < bodies.size()    ? bodies[body].name
            : body == OBSTACLE_BODY ? "octomap"
                                    : "body " + std::to_string(body);
   };

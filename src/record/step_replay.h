@@ -1,4 +1,4 @@
-// A recorded step once more, through the same monitor.
+// A recorded step once more, by the same call.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 namespace dccd {
 
 struct StepReplay {
-  RecordedAnswer answer;
+  Outcome answer;
   /// What differs from the recorded answer, one sentence each; empty: the same bit for bit, or nothing to compare with.
   std::vector<std::string> differences;
 };
@@ -22,9 +22,9 @@ struct StepReplay {
 DCCD_EXPORT StepReplay replayStep(const StepRecording& recording, int threads = 1);
 
 /// Bits that differ between two answers, one sentence each, ten at most.
-DCCD_EXPORT std::vector<std::string> compareAnswers(const RecordedAnswer& recorded, const RecordedAnswer& replayed);
+DCCD_EXPORT std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed);
 
 /// "VF cloth 3 | table 0 1 2", with the voxel where there is one.
-DCCD_EXPORT std::string describeContact(const Contact& contact, const std::vector<RecordedBody>& bodies);
+DCCD_EXPORT std::string describeContact(const Contact& contact, const std::vector<Body>& bodies);
 
 }  // namespace dccd

@@ -23,7 +23,7 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
-std::string bodyName(std::uint16_t body, const std::vector<MonitorBody>& bodies) {
+std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
   return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
 }
 
@@ -40,7 +40,7 @@ std::string csvField(const std::string& text) {
 }
 
 /// What stands in the way of "no contact" in a step that found none.
-std::string doubtOf(const StepOutcome& outcome) {
+std::string doubtOf(const Outcome& outcome) {
   if (outcome.status != StepStatus::OK) return toString(outcome.status);
   return outcome.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(outcome.start_state);
 }
@@ -49,7 +49,7 @@ nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json
 
 }  // namespace
 
-void ContactLog::add(const StepOutcome& outcome) {
+void ContactLog::add(const Outcome& outcome) {
   if (!outcome.answered) return;
   ms_.push_back(outcome.stats.total_ms);
   auto& step = steps_[outcome.sequence];
@@ -119,7 +119,7 @@ Report::Report(const std::string& folder) : folder_(folder) {
   timing_ << '\n';
 }
 
-void Report::writeContacts(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies) {
+void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodies) {
   for (const Contact& c : outcome.contacts) {
     const ContactGeometry g = contactGeometry(outcome, c);
     contacts_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << KINDS[static_cast<int>(c.kind)] << ','
@@ -141,16 +141,16 @@ void Report::writeContacts(const StepOutcome& outcome, const std::vector<Monitor
   }
 }
 
-void Report::addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies) {
+void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
   if (heat_.empty()) heat_.resize(bodies.size());
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     BodyHeat& heat = heat_[b];
-    const auto& topology = (*outcome.topologies)[b];
+    const auto& topology = outcome.step->bodies[b].topology;
     if (!topology || (heat.topology && heat.contacts.size() == topology->vertexCount())) continue;
     // A body whose topology changed begins anew: its vertices are other ones.
     heat.name = bodies[b].name;
     heat.topology = topology;
-    heat.layout = (*outcome.positions_t0)[b];
+    heat.layout = *outcome.step->bodies[b].t0;
     heat.contacts.assign(topology->vertexCount(), 0);
     heat.first_s.assign(topology->vertexCount(), std::numeric_limits<double>::infinity());
   }
@@ -167,9 +167,7 @@ void Report::addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>&
   }
 }
 
-void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
-  if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
-  any_ = true;
+void Report::addRow(const Outcome& o) {
   const StepStats& s = o.stats;
   double earliest_new = std::numeric_limits<double>::infinity();
   for (const Contact& c : o.contacts) {
@@ -197,6 +195,39 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
                    {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
                    {"toc_new", finiteOrNull(earliest_new)},
                    {"ms", s.total_ms}});
+}
+
+void Report::addFirstContact(const Outcome& o, const std::vector<Body>& bodies) {
+  if (!first_contact_.empty() || o.contacts.empty()) return;
+  const auto first = std::min_element(o.contacts.begin(), o.contacts.end(),
+                                      [](const auto& a, const auto& b) { return a.toc_lower < b.toc_lower; });
+  first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
+  std::ostringstream text;
+  text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
+       << KINDS_IN_WORDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
+  for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
+  text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided") << (first->initial ? ", initial" : "")
+       << ")";
+  first_contact_ = text.str();
+}
+
+void Report::addTimes(const Outcome& o) {
+  timing_ << o.sequence << ',' << o.stats.total_ms;
+  for (std::size_t i = 0; i < stage_ms_.size(); ++i) {
+    timing_ << ',' << o.stats.stages[i].ms;
+    stage_ms_[i].push_back(o.stats.stages[i].ms);
+  }
+  timing_ << '\n';
+  sum_ += o.stats;
+  if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
+  total_ms_.push_back(o.stats.total_ms);
+  step_times_.add(o.stats.total_ms * 1e-3);
+}
+
+void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
+  if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
+  any_ = true;
+  addRow(o);
   if (!o.answered) {
     ++not_answered_;
     return;
@@ -207,34 +238,8 @@ void Report::add(const StepOutcome& o, const std::vector<MonitorBody>& bodies) {
   if (o.total_contacts == 0 && !o.clear) ++doubtful_[doubtOf(o)];
   writeContacts(o, bodies);
   addHeat(o, bodies);
-  if (first_contact_.empty() && !o.contacts.empty()) {
-    const auto first = std::min_element(o.contacts.begin(), o.contacts.end(),
-                                        [](const auto& a, const auto& b) { return a.toc_lower < b.toc_lower; });
-    first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
-    std::ostringstream text;
-    text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
-         << KINDS_IN_WORDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
-    for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
-    text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided")
-         << (first->initial ? ", initial" : "") << ")";
-    first_contact_ = text.str();
-  }
-  timing_ << o.sequence << ',' << s.total_ms;
-  for (std::size_t i = 0; i < stage_ms_.size(); ++i) {
-    timing_ << ',' << s.stages[i].ms;
-    stage_ms_[i].push_back(s.stages[i].ms);
-    stage_sum_[i].in += s.stages[i].in;
-    stage_sum_[i].out += s.stages[i].out;
-  }
-  timing_ << '\n';
-  for (std::size_t i = 0; i < effect_sum_.size(); ++i) effect_sum_[i] += s.effects[i];
-  tiers_ += s.tiers;
-  bodies_refitted_ += s.bodies_refitted;
-  bodies_kept_ += s.bodies_kept;
-  left_out_met_ += s.left_out_met;
-  if (!std::isnan(o.unknown_fraction)) unknown_fraction_.push_back(o.unknown_fraction);  // there is one
-  total_ms_.push_back(s.total_ms);
-  step_times_.add(s.total_ms * 1e-3);
+  addFirstContact(o, bodies);
+  addTimes(o);
 }
 
 std::string Report::headline() const {
@@ -286,12 +291,11 @@ nlohmann::json Report::effectsJson() const {
   nlohmann::json effects = nlohmann::json::array();
   for (const EffectDecision& d : plan_.decisions()) {
     nlohmann::json e = {{"name", d.name}, {"running", d.running}, {"reason", d.reason}};
-    for (std::size_t i = 0; i < effect_sum_.size(); ++i) {
-      const std::string name = toString(static_cast<Effect>(i));
-      if (name != d.name && !(name == "obstacle" && d.name == "octomap")) continue;
-      e["in"] = effect_sum_[i].in;
-      e["out"] = effect_sum_[i].out;
-      e["ms"] = effect_sum_[i].ms;
+    for (std::size_t i = 0; i < sum_.effects.size(); ++i) {
+      if (d.name != toString(static_cast<Effect>(i))) continue;
+      e["in"] = sum_.effects[i].in;
+      e["out"] = sum_.effects[i].out;
+      e["ms"] = sum_.effects[i].ms;
     }
     effects.push_back(std::move(e));
   }
@@ -314,7 +318,7 @@ void Report::setLookAhead(const LookAheadSummary& summary, double horizon_s) {
   horizon_s_ = horizon_s;
 }
 
-void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies) {
+void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies) {
   left_out_ = pairs.size();
   if (pairs.empty()) return;
   std::ofstream file(folder_ + "/left_out.csv");
@@ -345,8 +349,8 @@ nlohmann::json Report::json() const {
   j["stages"] = nlohmann::json::array();
   for (std::size_t s = 0; s < stage_ms_.size(); ++s) {
     j["stages"].push_back({{"name", toString(static_cast<Stage>(s))},
-                           {"in", stage_sum_[s].in},
-                           {"out", stage_sum_[s].out},
+                           {"in", sum_.stages[s].in},
+                           {"out", sum_.stages[s].out},
                            {"median_ms", quantile(stage_ms_[s], 0.5)},
                            {"p95_ms", quantile(stage_ms_[s], 0.95)}});
   }
@@ -359,12 +363,12 @@ nlohmann::json Report::json() const {
     j["histogram"].push_back({{"upper_ms", bin.upper_s * 1e3}, {"steps", bin.count}});
   }
   j["effects"] = effectsJson();
-  j["bounds"] = {{"bodies_refitted", bodies_refitted_}, {"bodies_kept", bodies_kept_}};
-  j["left_out"] = {{"pairs", left_out_}, {"met", left_out_met_}};
+  j["bounds"] = {{"bodies_refitted", sum_.bodies_refitted}, {"bodies_kept", sum_.bodies_kept}};
+  j["left_out"] = {{"pairs", left_out_}, {"met", sum_.left_out_met}};
   j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
-  for (std::size_t t = 0; t < tiers_.settled.size(); ++t) {
-    j["tiers"][toString(static_cast<Tier>(t))] = tiers_.settled[t];
+  for (std::size_t t = 0; t < sum_.tiers.settled.size(); ++t) {
+    j["tiers"][toString(static_cast<Tier>(t))] = sum_.tiers.settled[t];
   }
   j["rungs"] = nlohmann::json::array();
   for (const RungCost& r : rungs_) {

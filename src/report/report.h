@@ -12,7 +12,7 @@
 
 #include "dccd/effect_plan.h"
 #include "dccd/look_ahead_score.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "report/latency_histogram.h"
 
 namespace dccd {
@@ -28,7 +28,7 @@ struct RungCost {
 /// Contacts of each step in a comparable form, so that the runs of two rungs can be held against each other.
 class ContactLog {
  public:
-  void add(const StepOutcome& outcome);
+  void add(const Outcome& outcome);
   /// Missed, false and TOC error of this run against the exact one.
   RungCost against(const ContactLog& exact, const std::string& rung) const;
 
@@ -51,10 +51,10 @@ class Report {
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
   explicit Report(const std::string& folder);
 
-  void add(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
+  void add(const Outcome& outcome, const std::vector<Body>& bodies);
   void setEffects(const EffectPlan& plan) { plan_ = plan; }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
-  void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<MonitorBody>& bodies);
+  void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
   void setRungs(const std::vector<RungCost>& rungs) { rungs_ = rungs; }
   /// Facts for the head of the page: name -> value, in the order given.
@@ -75,8 +75,11 @@ class Report {
     std::vector<std::uint32_t> contacts;  // per vertex
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
   };
-  void addHeat(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
-  void writeContacts(const StepOutcome& outcome, const std::vector<MonitorBody>& bodies);
+  void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
+  void addRow(const Outcome& outcome);
+  void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
+  void addTimes(const Outcome& outcome);
+  void writeContacts(const Outcome& outcome, const std::vector<Body>& bodies);
   nlohmann::json heatJson() const;
   nlohmann::json effectsJson() const;
   nlohmann::json lookAheadJson() const;
@@ -93,12 +96,9 @@ class Report {
   nlohmann::json rows_ = nlohmann::json::array();
   std::vector<BodyHeat> heat_;
   std::array<std::vector<double>, static_cast<std::size_t>(Stage::COUNT)> stage_ms_;
-  std::array<StageStats, static_cast<std::size_t>(Stage::COUNT)> stage_sum_{};
-  std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effect_sum_{};
-  TierCounters tiers_;
+  StepStats sum_;
   std::vector<double> total_ms_;
   std::vector<double> unknown_fraction_;
-  std::uint64_t bodies_refitted_ = 0, bodies_kept_ = 0, left_out_met_ = 0;
   std::size_t left_out_ = 0;
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;

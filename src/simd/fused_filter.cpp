@@ -116,15 +116,13 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
       M = hn::Max(M, hn::Max(hn::Max(hn::Abs(p[t][i].x), hn::Abs(p[t][i].y)), hn::Abs(p[t][i].z)));
     }
   }
-  const VF tiny = hn::Set(d, UNDERFLOW_MARGIN);
-  const VF M_sq = hn::Mul(M, M);
+  const VF tiny = hn::Set(d, UNDERFLOW_MARGIN), M_sq = hn::Mul(M, M);
   const VF margin = hn::Add(hn::Mul(hn::Set(d, 128 * UNIT), M_sq), tiny);
 
   const Quadratic bc = cross(p[0][1], p[1][1], p[0][2], p[1][2]);
   const Quadratic ca = cross(p[0][2], p[1][2], p[0][0], p[1][0]);
   const Quadratic ab = cross(p[0][0], p[1][0], p[0][1], p[1][1]);
-  const Quadratic bc_ca = bc + ca;
-  const Quadratic T = bc_ca + ab;
+  const Quadratic bc_ca = bc + ca, T = bc_ca + ab;
 
   // Non-penetration.
   const VF f0 = dot(p[0][0], bc.A);
@@ -144,9 +142,8 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
   if (planes != FusedPlanes::COORDINATE) {
     const auto rejects = [&](const Vec3V& n) {
       const VF size = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));
-      const VF plane_margin = hn::Add(hn::Mul(margin, size), tiny);
-      return opposite<EDGE_EDGE>(
-          bc, ca, ab, T, [&](const Vec3V& v) { return dot(n, v); }, plane_margin);
+      const auto along = [&](const Vec3V& v) { return dot(n, v); };
+      return opposite<EDGE_EDGE>(bc, ca, ab, T, along, hn::Add(hn::Mul(margin, size), tiny));
     };
     const Quadratic& N = EDGE_EDGE ? bc_ca : T;
     out = hn::Or(out, rejects(N.A + N.B + N.C));

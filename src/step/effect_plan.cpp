@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
@@ -24,21 +25,24 @@ std::string metres(double value) {
 
 bool ropesOnly(const EffectScene& scene) {
   return std::all_of(scene.bodies.begin(), scene.bodies.end(),
-                     [](const EffectBody& body) { return body.topology_known && !body.has_faces; });
+                     [](const Body& body) { return body.topology && !body.topology->hasFaces(); });
+}
+
+void append(std::string& list, const std::string& separator, const std::string& item) {
+  list += (list.empty() ? "" : separator) + item;
 }
 
 Finding selfCollision(const EffectScene& scene) {
   std::string can, rope;
-  bool all_rigid = true;
   std::size_t deforming = 0;
-  for (const EffectBody& body : scene.bodies) {
-    all_rigid = all_rigid && body.rigid;
-    if (body.rigid || !body.self_collision) continue;
-    can += (can.empty() ? "" : ", ") + body.name;
+  for (const Body& body : scene.bodies) {
+    if (!meetsItself(body)) continue;
+    append(can, ", ", body.name);
     ++deforming;
-    if (body.topology_known && !body.has_faces) rope += (rope.empty() ? "" : ", ") + body.name;
+    if (body.topology && !body.topology->hasFaces()) append(rope, ", ", body.name);
   }
   if (can.empty()) {
+    const bool all_rigid = std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.rigid; });
     return {false, !all_rigid,
             all_rigid ? (scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid")
                       : "it is switched off for every body that deforms"};
@@ -48,11 +52,18 @@ Finding selfCollision(const EffectScene& scene) {
 }
 
 Finding bodyBody(const EffectScene& scene) {
-  if (scene.bodies.size() < 2) return {false, false, "there is only one body"};
-  return {true, true, "there are " + std::to_string(scene.bodies.size()) + " bodies"};
+  const std::vector<Body>& bodies = scene.bodies;
+  if (bodies.size() < 2) return {false, false, "there is only one body"};
+  std::size_t able = 0;
+  for (const Body& body : bodies) able += meet(body, body);
+  if (able < 2) return {false, true, "against_bodies is false for all of them but " + std::to_string(able)};
+  return {true, true, "there are " + std::to_string(able) + " bodies"};
 }
 
 Finding octomap(const EffectScene& scene) {
+  if (std::none_of(scene.bodies.begin(), scene.bodies.end(), meetsMap)) {
+    return {false, true, "against_obstacle is false for every body"};
+  }
   if (scene.map_seen) return {true, true, "the map comes from " + scene.map_source};
   return {false, true, "nobody publishes " + scene.map_source + " and no octomap_file is given"};
 }
@@ -63,8 +74,7 @@ Finding startState(const EffectScene& scene) {
 }
 
 Finding rigidBodies(const EffectScene& scene) {
-  const auto count =
-      std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const EffectBody& b) { return b.rigid; });
+  const auto count = std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.rigid; });
   if (count == 0) return {false, false, "no body is rigid; give one under bodies/NAME/rigid"};
   return {true, true, std::to_string(count) + (count == 1 ? " body moves" : " bodies move") + " by tf"};
 }
@@ -81,14 +91,15 @@ std::string leftOut(const EffectScene& scene) {
 }
 
 Finding minimumSeparation(const EffectScene& scene) {
-  if (!(scene.minimum_separation_m > 0)) return {false, false, "minimum_separation_m is 0; set it above"};
-  return {true, true, "contacts are reported from " + metres(scene.minimum_separation_m) + " m" + leftOut(scene)};
+  const double largest_m = largestSeparation(scene.bodies);
+  if (!(largest_m > 0)) return {false, false, "minimum_separation_m is 0; set it above"};
+  return {true, true, "contacts are reported from " + metres(largest_m) + " m" + leftOut(scene)};
 }
 
 Finding trackerNoise(const EffectScene& scene) {
   std::string all;
-  for (const EffectBody& body : scene.bodies) {
-    if (!body.noise.empty()) all += (all.empty() ? "" : "; ") + body.name + ": " + body.noise;
+  for (std::size_t b = 0; b < scene.noise.size(); ++b) {
+    if (!scene.noise[b].empty()) append(all, "; ", scene.bodies[b].name + ": " + scene.noise[b]);
   }
   if (all.empty()) return {false, false, "no body has an uncertainty; give one under uncertainty"};
   return {true, true, "vertices are only known to a radius (" + all + ")" + leftOut(scene)};
@@ -99,17 +110,23 @@ Finding lookAhead(const EffectScene& scene) {
   return {true, true, "predictions reach " + metres(scene.look_ahead_s) + " s ahead"};
 }
 
-Finding find(const std::string& name, const EffectScene& scene) {
-  if (name == "self_collision") return selfCollision(scene);
-  if (name == "body_body") return bodyBody(scene);
-  if (name == "octomap") return octomap(scene);
-  if (name == "start_state") return startState(scene);
-  if (name == "rigid_bodies") return rigidBodies(scene);
-  if (name == "unknown_space") return unknownSpace(scene);
-  if (name == "minimum_separation") return minimumSeparation(scene);
-  if (name == "tracker_noise") return trackerNoise(scene);
-  return lookAhead(scene);
-}
+/// By Effect: its name, and what a scene says of it.
+struct EffectRow {
+  const char* name;
+  Finding (*find)(const EffectScene&);
+};
+constexpr EffectRow EFFECTS[] = {
+    {"self_collision", selfCollision},
+    {"body_body", bodyBody},
+    {"octomap", octomap},
+    {"start_state", startState},
+    {"rigid_bodies", rigidBodies},
+    {"unknown_space", unknownSpace},
+    {"minimum_separation", minimumSeparation},
+    {"tracker_noise", trackerNoise},
+    {"look_ahead", lookAhead},
+};
+static_assert(std::size(EFFECTS) == static_cast<std::size_t>(Effect::COUNT), "a row for each effect");
 
 EffectDecision decide(const std::string& name, EffectSetting setting, const Finding& finding) {
   switch (setting) {
@@ -133,31 +150,23 @@ const char* toString(EffectSetting setting) {
   return setting == EffectSetting::AUTO ? "auto" : setting == EffectSetting::ON ? "on" : "off";
 }
 
-const std::vector<std::string>& effectNames() {
-  static const std::vector<std::string> NAMES = {"self_collision",     "body_body",     "octomap",
-                                                 "start_state",        "rigid_bodies",  "unknown_space",
-                                                 "minimum_separation", "tracker_noise", "look_ahead"};
-  return NAMES;
+const char* toString(Effect effect) { return EFFECTS[static_cast<std::size_t>(effect)].name; }
+
+EffectPlan::EffectPlan(const EffectScene& scene, const EffectSettings& settings) {
+  for (std::size_t e = 0; e < std::size(EFFECTS); ++e) {
+    const auto setting = settings.find(static_cast<Effect>(e));
+    decisions_.push_back(decide(EFFECTS[e].name, setting == settings.end() ? EffectSetting::AUTO : setting->second,
+                                EFFECTS[e].find(scene)));
+  }
+  if (!running(Effect::OCTOMAP)) return;
+  const bool faces = !ropesOnly(scene);
+  decisions_.push_back(
+      {"octomap_corner_face", EffectSetting::AUTO, faces, faces ? "a body has faces" : "a polyline has no faces"});
 }
 
-EffectPlan::EffectPlan(const EffectScene& scene, const std::map<std::string, EffectSetting>& settings) {
-  for (const std::string& name : effectNames()) {
-    const auto setting = settings.find(name);
-    decisions_.push_back(
-        decide(name, setting == settings.end() ? EffectSetting::AUTO : setting->second, find(name, scene)));
-  }
-  if (running("octomap")) {
-    decisions_.push_back(
-        ropesOnly(scene) ? EffectDecision{"octomap_corner_face", EffectSetting::AUTO, false, "a polyline has no faces"}
-                         : EffectDecision{"octomap_corner_face", EffectSetting::AUTO, true, "a body has faces"});
-  }
-}
-
-bool EffectPlan::running(const std::string& name) const {
-  for (const EffectDecision& decision : decisions_) {
-    if (decision.name == name) return decision.running;
-  }
-  throw std::invalid_argument("there is no effect '" + name + "'");
+bool EffectPlan::running(Effect effect) const {
+  const std::size_t e = static_cast<std::size_t>(effect);
+  return e < decisions_.size() && decisions_[e].running;
 }
 
 std::vector<std::string> EffectPlan::lines() const {

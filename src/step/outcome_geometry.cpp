@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "dccd/monitor.h"
+#include "dccd/outcome.h"
 #include "step/closest_points.h"
-#include "step/step_runner.h"
+#include "step/parts.h"
 
 namespace dccd {
 
@@ -81,18 +81,18 @@ void faceOnCorner(const Feature& f, const Cube& cube, ContactGeometry& out) {
 
 /// The straight part of the step in which a contact begins: a turning body's step is tested in several.
 struct Part {
-  const StepInput& input;
+  const Step& step;
   std::size_t parts, part;
   double toc;  ///< [0,1] within the part
 
-  Part(const StepOutcome& outcome, const Contact& contact)
-      : input(*outcome.input), parts(std::max<std::size_t>(outcome.substeps, 1)) {
+  Part(const Outcome& outcome, const Contact& contact)
+      : step(*outcome.step), parts(std::max<std::size_t>(outcome.substeps, 1)) {
     const double along = contact.toc_lower * static_cast<double>(parts);
     part = std::min(static_cast<std::size_t>(along), parts - 1);
     toc = std::min(along - static_cast<double>(part), 1.0);
   }
-  Vec3 from(std::size_t body, Index vertex) const { return placeVertex(input, body, vertex, part, parts); }
-  Vec3 to(std::size_t body, Index vertex) const { return placeVertex(input, body, vertex, part + 1, parts); }
+  Vec3 from(std::size_t body, Index vertex) const { return placeVertex(step, body, vertex, part, parts); }
+  Vec3 to(std::size_t body, Index vertex) const { return placeVertex(step, body, vertex, part + 1, parts); }
 };
 
 /// Bodies of a mesh contact's four vertices; all of body[0] where the second feature is a voxel's.
@@ -101,15 +101,16 @@ std::uint16_t bodyOf(const Contact& contact, int i) {
   return contact.body[1] == OBSTACLE_BODY || i < first ? contact.body[0] : contact.body[1];
 }
 
-ContactGeometry obstacleGeometry(const StepOutcome& outcome, const Contact& contact) {
+ContactGeometry obstacleGeometry(const Outcome& outcome, const Contact& contact) {
   const Part part(outcome, contact);
+  const Eigen::Isometry3d& map_from_fixed = outcome.step->map.map_from_fixed;
   Feature feature;
   const int points = contact.kind == PairKind::VERTEX_VOXEL_FACE ? 1
                      : contact.kind == PairKind::EDGE_VOXEL_EDGE ? 2
                                                                  : 3;
   for (int i = 0; i < points; ++i) {
-    const Vec3 from = outcome.map_from_fixed * part.from(contact.body[0], contact.vertex[i]);
-    const Vec3 to = outcome.map_from_fixed * part.to(contact.body[0], contact.vertex[i]);
+    const Vec3 from = map_from_fixed * part.from(contact.body[0], contact.vertex[i]);
+    const Vec3 to = map_from_fixed * part.to(contact.body[0], contact.vertex[i]);
     feature.at[i] = from + part.toc * (to - from);
     feature.motion[i] = static_cast<double>(part.parts) * (to - from);
   }
@@ -123,7 +124,7 @@ ContactGeometry obstacleGeometry(const StepOutcome& outcome, const Contact& cont
   if (points == 1) vertexOnFace(feature, cube, out);
   if (points == 2) edgeOnEdge(feature, cube, out);
   if (points == 3) faceOnCorner(feature, cube, out);
-  const Eigen::Isometry3d fixed_from_map = outcome.map_from_fixed.inverse();
+  const Eigen::Isometry3d fixed_from_map = map_from_fixed.inverse();
   out.point = fixed_from_map * out.point;
   out.normal = fixed_from_map.linear() * out.normal;
   return out;
@@ -131,7 +132,7 @@ ContactGeometry obstacleGeometry(const StepOutcome& outcome, const Contact& cont
 
 }  // namespace
 
-ContactGeometry contactGeometry(const StepOutcome& outcome, const Contact& contact) {
+ContactGeometry contactGeometry(const Outcome& outcome, const Contact& contact) {
   if (contact.body[1] == OBSTACLE_BODY) return obstacleGeometry(outcome, contact);
   const Part part(outcome, contact);
   PairMotion pair;
@@ -145,7 +146,7 @@ ContactGeometry contactGeometry(const StepOutcome& outcome, const Contact& conta
   return geometry;
 }
 
-Vec3 vertexAtContact(const StepOutcome& outcome, const Contact& contact, int i) {
+Vec3 vertexAtContact(const Outcome& outcome, const Contact& contact, int i) {
   const Part part(outcome, contact);
   const std::uint16_t body = bodyOf(contact, i);
   const Vec3 from = part.from(body, contact.vertex[i]);

@@ -6,6 +6,9 @@
 #include "simd/fused_filter.h"
 
 namespace dccd {
+
+using Clock = Deadline::Clock;
+
 namespace {
 
 constexpr std::size_t CHUNK = 2048;  // pairs that stay in the first-level cache's reach
@@ -137,6 +140,9 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   stats_[Stage::BROAD_PHASE].out += n - count_;
   stats_[effect()].in += n - count_;
   if (rigid()) stats_[Effect::RIGID_BODIES].in += n - count_;
+  if (context_->observer) {
+    context_->observer->onPairs(Stage::BROAD_PHASE, task_->kind, quads_.data() + count_, n - count_);
+  }
   count_ = n;
   lap(Stage::BROAD_PHASE, start);
   if (count_ >= CHUNK) flush();
@@ -161,7 +167,10 @@ void PairWorker::flush() {
 }
 
 void PairWorker::filter() {
-  if (separated_) return;  // the planar filter proves "never touch", not "never closer than d"
+  if (separated_) {  // the planar filter proves "never touch", not "never closer than d"
+    if (context_->observer) context_->observer->onPlanarSkipped(task_->kind, quads_.data(), count_);
+    return;
+  }
   const Clock::time_point start = Clock::now();
   stats_[Stage::PLANAR].in += count_;
   const std::size_t kept =
@@ -173,6 +182,7 @@ void PairWorker::filter() {
   }
   count_ = kept;
   stats_[Stage::PLANAR].out += kept;
+  if (context_->observer) context_->observer->onPairs(Stage::PLANAR, task_->kind, quads_.data(), count_);
   lap(Stage::PLANAR, start);
 }
 
@@ -195,6 +205,7 @@ void PairWorker::setSeparations() {
     const double apart_m = left_out_ ? left_out_->distance(task_->kind, keys_[i]) : INFINITE;
     const PairSeparation pair = rule_.of(task_->kind, quads_[i], apart_m);
     separations_[i] = pair.total_m;
+    if (context_->observer) context_->observer->onSeparation(task_->kind, quads_[i], pair);
     stats_.left_out_met += pair.left_out;
     stats_[Effect::MINIMUM_SEPARATION].in += rule_.bodies_m > 0 && !pair.left_out;
     stats_[Effect::TRACKER_NOISE].in += pair.noise_m > 0;
@@ -256,6 +267,7 @@ void PairWorker::decide() {
   const std::size_t before = hits.size();
   for (std::size_t i = 0; i < count_; ++i) {
     ElementaryResult& r = results_[i];
+    if (context_->observer) context_->observer->onResult(task_->kind, quads_[i], r);
     if (r.verdict == Verdict::NO_CONTACT) continue;
     countOut(i);
     const bool certain = r.verdict == Verdict::CONTACT;

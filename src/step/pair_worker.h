@@ -10,13 +10,13 @@
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
 #include "step/left_out.h"
+#include "step/observer.h"
 #include "step/pair_separation.h"
 
 namespace dccd {
 
-using Clock = std::chrono::steady_clock;
-inline double msSince(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+inline double msSince(Deadline::Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Deadline::Clock::now() - start).count();
 }
 
 /// A contact (certain or undecided) by the ranks of its features; within a kind it sorts canonically by bodies, then
@@ -40,15 +40,16 @@ struct PairTask {
 struct StepContext {
   const SceneArrays* scene = nullptr;
   const Rung* elementary = nullptr;  ///< null: screen
-  Clock::time_point deadline = Clock::time_point::max();
+  Deadline deadline;
   std::atomic<bool> expired{false};
   bool earliest_only = false;
+  StepObserver* observer = nullptr;
   const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   bool timeIsUp() {
     if (expired.load(std::memory_order_relaxed)) return true;
-    if (deadline != Clock::time_point::max() && Clock::now() >= deadline) expired = true;
+    if (deadline.isOver()) expired = true;
     return expired.load(std::memory_order_relaxed);
   }
 };
@@ -82,7 +83,7 @@ class PairWorker {
   double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
   void countOut(std::size_t i);
   void addMs(double ms);
-  Clock::time_point lap(Stage stage, Clock::time_point start);
+  Deadline::Clock::time_point lap(Stage stage, Deadline::Clock::time_point start);
 
   StepContext* context_ = nullptr;
   const PairTask* task_ = nullptr;

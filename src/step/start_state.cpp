@@ -38,14 +38,7 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
                                                             const IsOver& is_over, StepStats& stats) {
   tested_ = 0;
   has_deadline_ = static_cast<bool>(is_over);
-  if (!(continues && known_)) {
-    found_.clear();
-    candidates_.clear();
-    touched_.clear();
-    searched_ = false;
-    next_bodies_ = {};
-    next_group_ = 0;
-  }
+  if (!(continues && known_)) clear();
   testCandidates(scene, is_over);
   if (!searched_) search(scene, is_over);
   whole_ = searched_ && candidates_.empty() && touched_.empty();
@@ -133,13 +126,13 @@ void StartStateSearch::search(const SceneArrays& scene, const IsOver& is_over) {
   const std::vector<SceneBody>& bodies = scene.bodies();
   body_pairs_.clear();
   for (std::uint32_t b = 0; b < bodies.size(); ++b) {
-    if (bodies[b].setup.self_collision) body_pairs_.push_back({b, b});
+    if (meetsItself(bodies[b].setup)) body_pairs_.push_back({b, b});
   }
   overlapping_.clear();
   if (bodies.size() > 1) scene.overlappingBodies(true, overlapping_, scratch_);
   for (std::size_t p = 0; p < overlapping_.size(); p += 2) {
     const std::uint32_t a = overlapping_[p], b = overlapping_[p + 1];
-    if (!bodies[a].setup.against_bodies || !bodies[b].setup.against_bodies) continue;
+    if (!dccd::meet(bodies[a].setup, bodies[b].setup)) continue;
     body_pairs_.push_back({a, b});
     body_pairs_.push_back({b, a});
   }
@@ -272,12 +265,14 @@ void StartStateSearch::learnNeighbourhoods(const SceneArrays& scene) {
   }
 }
 
-void StartStateSearch::forget() {
+void StartStateSearch::clear() {
   known_ = false;
+  searched_ = false;
+  next_bodies_ = {};
+  next_group_ = 0;
   found_.clear();
   candidates_.clear();
   touched_.clear();
-  neighbourhoods_.clear();
 }
 
 }  // namespace dccd

@@ -58,10 +58,11 @@ class StartStateSearch {
   /// What meets at t=1, listed as run() would for a step that continues. False: is_over ended it. Changes nothing.
   bool listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out);
 
-  /// The bodies are about to change: everything is forgotten.
-  void forget();
-  /// A step was done without run() and remember(): the next run() is a full test.
-  void skip() { known_ = false; }
+  /// Nothing is known of a step before: the next run() is a full test.
+  void clear();
+  bool isClear() const { return !known_ && !searched_ && found_.empty() && candidates_.empty() && touched_.empty(); }
+  /// The bodies change: what was learnt of their meshes is forgotten.
+  void forgetBodies() { neighbourhoods_.clear(); }
 
  private:
   /// By slot in the bodies' trees, so that sorted candidates are also near each other in memory.

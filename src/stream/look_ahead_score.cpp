@@ -17,10 +17,10 @@ double quantile(const std::vector<double>& sorted, double q) {
 
 }  // namespace
 
-StageStats lookAheadStats(const StepOutcome& prediction) {
+StageStats lookAheadStats(const Outcome& prediction) {
   const StepStats& stats = prediction.stats;
   StageStats sum;
-  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OBSTACLE}) sum += stats[effect];
+  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP}) sum += stats[effect];
   sum.ms = stats.total_ms;
   return sum;
 }
@@ -28,7 +28,7 @@ StageStats lookAheadStats(const StepOutcome& prediction) {
 LookAheadScore::LookAheadScore(double horizon_s, std::size_t max_samples)
     : horizon_s_(horizon_s), max_samples_(max_samples) {}
 
-void LookAheadScore::vertexTimes(const StepOutcome& outcome, Times& first, std::set<Key>* touching) {
+void LookAheadScore::vertexTimes(const Outcome& outcome, Times& first, std::set<Key>* touching) {
   for (const Contact& contact : outcome.contacts) {
     const std::size_t own = contact.body[1] == OBSTACLE_BODY        ? contact.vertex.size()
                             : contact.kind == PairKind::VERTEX_FACE ? 1
@@ -65,7 +65,7 @@ void LookAheadScore::expire(StampNs now_ns) {
   }
 }
 
-void LookAheadScore::observe(const StepOutcome& outcome) {
+void LookAheadScore::observe(const Outcome& outcome) {
   if (!outcome.answered) {
     if (isSeam(outcome.status)) {
       pending_.clear();
@@ -95,7 +95,7 @@ void LookAheadScore::observe(const StepOutcome& outcome) {
   expire(outcome.stamp_ns);
 }
 
-void LookAheadScore::predict(const StepOutcome& prediction) {
+void LookAheadScore::predict(const Outcome& prediction) {
   if (!prediction.answered || !any_) return;
   Times first;
   vertexTimes(prediction, first, nullptr);

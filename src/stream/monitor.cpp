@@ -1,4 +1,4 @@
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 
 #include <cmath>
 #include <stdexcept>
@@ -11,7 +11,7 @@ namespace dccd {
 
 namespace {
 
-void check(const MonitorOptions& options, std::size_t bodies) {
+void checkStream(const MonitorOptions& options, std::size_t bodies) {
   const auto require = [](bool good, const std::string& text) {
     if (!good) throw std::invalid_argument(text);
   };
@@ -20,11 +20,8 @@ void check(const MonitorOptions& options, std::size_t bodies) {
           "sync_timeout_s must be finite and 0 or more, is " + std::to_string(options.sync_timeout_s));
   require(options.max_waiting >= 1, "max_waiting must be 1 or more");
   require(options.octomap_timeout_s >= 0, "octomap_timeout_s must be 0 (never) or more");
-  require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
-  require(options.max_substeps >= 1, "max_substeps must be 1 or more");
   require(options.look_ahead_s >= 0 && std::isfinite(options.look_ahead_s),
           "look_ahead_s must be finite and 0 (off) or more, is " + std::to_string(options.look_ahead_s));
-  for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
 }
 
 }  // namespace
@@ -54,8 +51,9 @@ FrameCounters& FrameCounters::operator+=(const FrameCounters& other) {
   return *this;
 }
 
-Monitor::Monitor(const MonitorOptions& options, std::vector<MonitorBody> bodies) {
-  check(options, bodies.size());
+Monitor::Monitor(const MonitorOptions& options, std::vector<Body> bodies) {
+  checkStream(options, bodies.size());
+  check(options.detector);
   if (bodies[options.clock_body].motion == BodyMotionKind::STATIC) {
     throw std::invalid_argument("clock_body '" + bodies[options.clock_body].name + "' is static and has no clock");
   }
@@ -65,20 +63,18 @@ Monitor::Monitor(const MonitorOptions& options, std::vector<MonitorBody> bodies)
 Monitor::~Monitor() = default;
 
 const MonitorOptions& Monitor::options() const { return impl_->options; }
-const std::vector<MonitorBody>& Monitor::bodies() const { return impl_->bodies; }
-const MonitorMap& Monitor::map() const { return impl_->map; }
-const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->runner.leftOut(); }
+const std::vector<Body>& Monitor::bodies() const { return impl_->bodies; }
+const ObstacleMap& Monitor::map() const { return impl_->map; }
+const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->history.leftOut(); }
 const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
 
 void Monitor::setOptions(const MonitorOptions& options) {
-  check(options, impl_->bodies.size());
+  checkStream(options, impl_->bodies.size());
+  check(options.detector, impl_->bodies);
   if (options.clock_body != impl_->options.clock_body) throw std::invalid_argument("clock_body must stay");
   // All of it or nothing: what may refuse comes first.
   const MeshStore checked(options.store);
-  impl_->runner.setOptions(options.detector);
   for (MeshStore& store : impl_->stores) store.setOptions(options.store);
-  impl_->side_runner.reset();
-  impl_->reduced_from = nullptr;
   impl_->options = options;
 }
 
@@ -110,7 +106,7 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
     m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
     if (isSeam(status)) {
       m.stores[body] = std::move(store);
-      m.has_last = false;
+      m.forgetLast();
     }
     return status;
   }
@@ -174,40 +170,27 @@ void Monitor::reset(StepStatus status) {
     if (m.isStream(b)) m.stores[b].clear();
   }
   if (status == StepStatus::RESET) m.forgetReferences();
-  m.has_last = false;
+  m.forgetLast();
 }
 
-void Monitor::Impl::runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues,
-                          StepOutcome& outcome, StepRunner* predecessor) {
-  on.run(at, bodies, options, withoutExcluded(used), continues, outcome, predecessor);
-  if (!options.obstacle_expected || used.surface) return;
-  outcome.status = StepStatus::NO_MAP;
-  outcome.reason = used.problem + "; checked without it";
-  outcome.clear = false;
+void Monitor::Impl::forgetLast() {
+  last = nullptr;
+  history.clear();
 }
 
-void Monitor::Impl::runStep(const Pending& step, StepOutcome& outcome) {
-  const bool had_last = has_last;
-  has_last = false;
-  place(step);
-  outcome.start_ns = step.from->stamp_ns;
-  const MonitorMap used = usableMap(step.to->stamp_ns);
+Outcome Monitor::Impl::runStep(const Pending& pending) {
+  const Step step = place(pending);
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
-  const bool continues = had_last && last_end_ns == outcome.start_ns && last_runs == runs;
-  if (listener) {
-    listener->onStep({outcome.start_ns, outcome.stamp_ns, outcome.sequence, &bodies, &options, &input.topologies,
-                      &input.t0, &input.t1, &input.rigid, &input.pose_t0, &input.pose_t1, &input.radius_m,
-                      &input.references, &used});
-  }
-  runOn(runner, input, used, continues, outcome);
-  if (used.surface && !options.exclude_boxes.empty()) outcome.excluded_voxels = excluded_voxels;
-  has_last = true;
-  last_end_ns = outcome.stamp_ns;
-  last_duration_s = outcome.duration_s();
+  if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
+  last = nullptr;  // until this one is done
+  if (listener) listener->onStep(step, options.detector);
+  Outcome outcome = detect(step, options.detector, history);
+  last = outcome.step;
   last_runs = runs;
+  return outcome;
 }
 
-bool Monitor::next(std::int64_t now_ns, StepOutcome& outcome) {
+bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
   Impl& m = *impl_;
   if (m.pending.empty()) return false;
   Impl::Pending& step = m.pending.front();
@@ -215,21 +198,19 @@ bool Monitor::next(std::int64_t now_ns, StepOutcome& outcome) {
     const bool timed_out = m.finishing || Impl::seconds(step.since_ns, now_ns) >= m.options.sync_timeout_s;
     if (m.ready(step, timed_out) == Impl::Ready::WAIT) return false;
   }
-  outcome = StepOutcome{};
-  outcome.status = step.status;
-  outcome.reason = step.reason;
-  outcome.sequence = step.sequence;
-  outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
+  const auto without = [&](StepStatus status, const std::string& reason) {
+    outcome = Outcome{};
+    outcome.status = status;
+    outcome.reason = reason;
+    outcome.sequence = step.sequence;
+    outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
+  };
   if (step.status == StepStatus::OK) {
     try {
-      m.runStep(step, outcome);
+      outcome = m.runStep(step);
     } catch (const std::exception& error) {
-      const std::string what = error.what();
-      outcome = StepOutcome{};
-      outcome.status = StepStatus::INTERNAL_ERROR;
-      outcome.reason = what;
-      outcome.sequence = step.sequence;
-      outcome.start_ns = outcome.stamp_ns = step.stamp_ns;
+      without(StepStatus::INTERNAL_ERROR, error.what());
+      m.forgetLast();
     }
     if (m.listener) m.listener->onOutcome(outcome);
     // Not the computed answer's, which a recording replays, but about it.
@@ -241,7 +222,8 @@ bool Monitor::next(std::int64_t now_ns, StepOutcome& outcome) {
       }
     }
   } else {
-    m.has_last = m.has_last && !isSeam(step.status);
+    without(step.status, step.reason);
+    if (isSeam(step.status)) m.forgetLast();
   }
   m.counters[m.options.clock_body].count(outcome.status);
   m.pending.pop_front();

@@ -1,4 +1,4 @@
-// What a monitor holds and does: monitor.cpp has its frames and steps, monitor_inputs.cpp what a step is computed from
+// What a monitor holds and does: monitor.cpp has its frames and steps, monitor_inputs.cpp what a step is made of
 // (bodies, references, map), monitor_questions.cpp what is asked between steps.
 #pragma once
 
@@ -9,10 +9,25 @@
 #include <utility>
 #include <vector>
 
-#include "dccd/monitor.h"
-#include "step/step_runner.h"
+#include "dccd/stream.h"
 
 namespace dccd {
+
+/// Positions of a frame, shared with it.
+inline std::shared_ptr<const Positions> positionsOf(const std::shared_ptr<const MeshFrame>& frame) {
+  return {frame, &frame->positions};
+}
+
+inline std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
+  return radius_m.empty() ? nullptr : share(std::move(radius_m));
+}
+
+/// The body where the frame has it, during the whole step.
+inline void hold(const std::shared_ptr<const MeshFrame>& frame, Body& body) {
+  body.topology = frame->topology;
+  body.t0 = body.t1 = positionsOf(frame);
+  body.radius_m = radii(frame->radius_m);
+}
 
 struct Monitor::Impl {
   /// A frame of the clock body on its way to an outcome: a step from `from` to `to`, or a status without one.
@@ -32,30 +47,23 @@ struct Monitor::Impl {
   };
 
   MonitorOptions options;
-  std::vector<MonitorBody> bodies;
+  std::vector<Body> bodies;  // as they were given, without mesh and motion
   std::vector<MeshStore> stores;
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
-  MonitorMap map;
-  std::shared_ptr<const VoxelSurface> reduced_from, reduced;  // the map's surface, and what exclude_boxes leave of it
-  std::uint64_t excluded_voxels = 0;
-  StepRunner runner;
-  std::unique_ptr<StepRunner> side_runner;  // predictions and checks; made when first asked for
-  double side_budget_ms = 0;
-  StepInput input, side_input;
+  ObstacleMap map;
+  History history, side_history;     // of steps; of predictions and checks
+  std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
   References references;
   std::vector<std::uint64_t> runs, last_runs;
-  StampNs last_end_ns = 0;
-  double last_duration_s = 0;
-  bool has_last = false, finishing = false;
+  bool finishing = false;
   std::string off_path;  // why the step's paths are not those that were seen; empty: they are
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
 
-  Impl(const MonitorOptions& o, std::vector<MonitorBody> b) : options(o), bodies(std::move(b)), runner(o.detector) {
+  Impl(const MonitorOptions& o, std::vector<Body> b) : options(o), bodies(std::move(b)) {
     stores.assign(bodies.size(), MeshStore(options.store));
     counters.resize(bodies.size());
-    input.resize(bodies.size());
     runs.resize(bodies.size());
     forgetReferences();
   }
@@ -69,18 +77,16 @@ struct Monitor::Impl {
   void onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, std::string reason);
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
-  void place(const Pending& step);
-  void lookBetween(std::size_t body, StampNs from_ns, StampNs to_ns);
-  void keepReferences(StepInput& at, References& kept) const;
+  Step place(const Pending& pending);
+  void placeStream(std::size_t body, const Pending& pending, Body& out);
+  void lookBetween(const Step& step, std::size_t body);
+  void keepReferences(Step& step, References& kept) const;
   void forgetReferences();
-  bool separates(std::size_t body, const std::vector<double>& radius_m) const;
-  MonitorMap usableMap(StampNs stamp_ns) const;
-  MonitorMap withoutExcluded(MonitorMap used);
-  void runStep(const Pending& step, StepOutcome& outcome);
-  /// What a step, a check and a prediction have in common.
-  void runOn(StepRunner& on, const StepInput& at, const MonitorMap& used, bool continues, StepOutcome& outcome,
-             StepRunner* predecessor = nullptr);
-  StepRunner& side(double budget_ms);
+  /// Nothing is carried over a seam.
+  void forgetLast();
+  bool separates(const Body& body) const;
+  ObstacleMap usableMap(StampNs stamp_ns) const;
+  Outcome runStep(const Pending& pending);
 };
 
 }  // namespace dccd

@@ -1,9 +1,8 @@
-// What a step is computed from: where every body is at both of its ends, reference frames, the map.
+// What a step is made of: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
 #include <sstream>
 #include <utility>
 
-#include "obstacle/excluded_leaves.h"
 #include "stream/monitor_impl.h"
 
 namespace dccd {
@@ -59,52 +58,67 @@ Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
 
 /// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the
 /// other. What was seen of it in between must not be contradicted in silence.
-void Monitor::Impl::lookBetween(std::size_t body, StampNs from_ns, StampNs to_ns) {
-  const std::size_t frames = stores[body].framesWithin(from_ns, to_ns);
+void Monitor::Impl::lookBetween(const Step& step, std::size_t b) {
+  const std::size_t frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
   if (frames == 0) return;
-  const double off_m = stores[body].offPath(from_ns, to_ns, input.t0[body], input.t1[body]);
-  if (off_m <= options.rigid_tolerance_m) return;
+  const Body& body = step.bodies[b];
+  const double off_m = stores[b].offPath(step.start_ns, step.stamp_ns, *body.t0, *body.t1);
+  if (off_m <= options.detector.rigid_tolerance_m) return;
   std::ostringstream text;
-  text << "body '" << bodies[body].name << "' was seen up to " << off_m << " m off the path of this step, in " << frames
+  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in " << frames
        << " frames between its ends; make it the clock_body";
   off_path = text.str();
 }
 
-void Monitor::Impl::place(const Pending& step) {
-  off_path.clear();
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    MeshStore& store = stores[b];
-    if (b == options.clock_body) {
-      input.t0[b] = step.from->positions;
-      input.t1[b] = step.to->positions;
-      input.topologies[b] = step.to->topology;
-      input.rigid[b] = step.to->rigid;
-      input.pose_t0[b] = step.from->pose;
-      input.pose_t1[b] = step.to->pose;
-      input.radius_m[b] = largerRadii(step.from->radius_m, step.to->radius_m);
-      store.forgetBefore(step.to->stamp_ns);
-      continue;
-    }
-    // Not the newest frame, which may have begun another run with another topology while the step waited.
-    const MeshFrame& frame = isStream(b) ? store.frameAtOrAfter(step.to->stamp_ns) : store.newest();
-    input.topologies[b] = frame.topology;
-    input.rigid[b] = isStream(b) && frame.rigid;
-    if (!isStream(b)) {
-      input.t0[b] = input.t1[b] = frame.positions;
-      input.radius_m[b] = frame.radius_m;
-      continue;
-    }
-    store.positionsAt(step.from->stamp_ns, input.t0[b]);
-    store.positionsAt(step.to->stamp_ns, input.t1[b]);
-    if (input.rigid[b]) {
-      input.pose_t0[b] = store.poseAt(step.from->stamp_ns);
-      input.pose_t1[b] = store.poseAt(step.to->stamp_ns);
-    }
-    store.radiiOver(step.from->stamp_ns, step.to->stamp_ns, input.radius_m[b]);
-    lookBetween(b, step.from->stamp_ns, step.to->stamp_ns);
-    store.forgetBefore(step.to->stamp_ns);
+void Monitor::Impl::placeStream(std::size_t b, const Pending& pending, Body& out) {
+  const StampNs from_ns = pending.from->stamp_ns, to_ns = pending.to->stamp_ns;
+  Positions t0, t1;
+  stores[b].positionsAt(from_ns, t0);
+  stores[b].positionsAt(to_ns, t1);
+  out.t0 = share(std::move(t0));
+  out.t1 = share(std::move(t1));
+  if (out.turns) {
+    out.pose_t0 = stores[b].poseAt(from_ns);
+    out.pose_t1 = stores[b].poseAt(to_ns);
   }
-  keepReferences(input, references);
+  std::vector<double> radius_m;
+  stores[b].radiiOver(from_ns, to_ns, radius_m);
+  out.radius_m = radii(std::move(radius_m));
+}
+
+Step Monitor::Impl::place(const Pending& pending) {
+  off_path.clear();
+  Step step;
+  step.bodies = bodies;
+  step.start_ns = pending.from->stamp_ns;
+  step.stamp_ns = pending.to->stamp_ns;
+  step.sequence = pending.sequence;
+  step.map = usableMap(step.stamp_ns);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Body& body = step.bodies[b];
+    if (b == options.clock_body) {
+      body.topology = pending.to->topology;
+      body.t0 = positionsOf(pending.from);
+      body.t1 = positionsOf(pending.to);
+      body.turns = pending.to->rigid;
+      body.pose_t0 = pending.from->pose;
+      body.pose_t1 = pending.to->pose;
+      body.radius_m = radii(largerRadii(pending.from->radius_m, pending.to->radius_m));
+    } else if (isStream(b)) {
+      // Not the newest frame, which may have begun another run with another topology while the step waited.
+      const MeshFrame& frame = stores[b].frameAtOrAfter(step.stamp_ns);
+      body.topology = frame.topology;
+      body.turns = frame.rigid;
+      placeStream(b, pending, body);
+      lookBetween(step, b);
+    } else {
+      hold(stores[b].newestShared(), body);
+      continue;
+    }
+    stores[b].forgetBefore(step.stamp_ns);
+  }
+  keepReferences(step, references);
+  return step;
 }
 
 void Monitor::Impl::forgetReferences() {
@@ -115,45 +129,38 @@ void Monitor::Impl::forgetReferences() {
 /// The first frame of each topology is what a minimum separation measures neighbours in: the first that asks for a
 /// distance, for radii may come later. Radii that grow past those of the reference make a new list; twice as large, so
 /// that it happens seldom.
-void Monitor::Impl::keepReferences(StepInput& at, References& kept) const {
+void Monitor::Impl::keepReferences(Step& step, References& kept) const {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Body& body = step.bodies[b];
     std::shared_ptr<const Topology>& topology = kept.topologies[b];
     std::shared_ptr<const ReferenceFrame>& frame = kept.frames[b];
-    if (!topology || (topology != at.topologies[b] && *topology != *at.topologies[b])) {
-      topology = at.topologies[b];
+    if (!topology || (topology != body.topology && *topology != *body.topology)) {
+      topology = body.topology;
       frame = nullptr;
     }
-    const bool needed = bodies[b].self_collision && !bodies[b].rigid && separates(b, at.radius_m[b]);
-    if (needed && !frame) frame = std::make_shared<const ReferenceFrame>(ReferenceFrame{at.t0[b], {}});
-    const double now_m = largest(at.radius_m[b]), listed_m = frame ? largest(frame->radius_m) : now_m;
+    const bool needed = meetsItself(body) && separates(body);
+    if (needed && !frame) frame = share(ReferenceFrame{*body.t0, {}});
+    const double now_m = body.radius_m ? largest(*body.radius_m) : 0;
+    const double listed_m = frame ? largest(frame->radius_m) : now_m;
     if (now_m > listed_m) {
-      std::vector<double> radius_m(at.t0[b].size(), std::max(now_m, 2 * listed_m));
-      frame = std::make_shared<const ReferenceFrame>(ReferenceFrame{frame->positions, std::move(radius_m)});
+      std::vector<double> radius_m(body.t0->size(), std::max(now_m, 2 * listed_m));
+      frame = share(ReferenceFrame{frame->positions, std::move(radius_m)});
     }
-    at.references[b] = frame;
+    body.reference = frame;
   }
 }
 
-bool Monitor::Impl::separates(std::size_t body, const std::vector<double>& radius_m) const {
+bool Monitor::Impl::separates(const Body& body) const {
   const auto named = [](const SeparationFrom& from) { return from.separation_m > 0; };
-  return bodies[body].minimum_separation_m > 0 || !radius_m.empty() ||
-         std::any_of(bodies[body].separations.begin(), bodies[body].separations.end(), named);
+  return body.minimum_separation_m > 0 || body.radius_m ||
+         std::any_of(body.separations.begin(), body.separations.end(), named);
 }
 
-void Monitor::setReference(std::size_t body, std::shared_ptr<const Topology> topology,
-                           std::shared_ptr<const ReferenceFrame> reference) {
-  impl_->references.topologies.at(body) = std::move(topology);
-  impl_->references.frames.at(body) = std::move(reference);
-}
+void Monitor::setMap(ObstacleMap map) { impl_->map = std::move(map); }
 
-void Monitor::setMap(MonitorMap map) {
-  impl_->map = std::move(map);
-  impl_->reduced_from = nullptr;
-}
-
-MonitorMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
-  MonitorMap used = map;
-  if (!options.obstacle_expected) return used;
+ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
+  ObstacleMap used = map;
+  if (!options.detector.obstacle_expected) return used;
   if (!used.surface) {
     if (used.problem.empty()) used.problem = "no octomap has been received yet";
   } else if (options.octomap_timeout_s > 0 && used.stamp_ns > 0 &&
@@ -161,21 +168,6 @@ MonitorMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
     used.surface = nullptr;
     used.problem = "the octomap is older than octomap_timeout_s";
   }
-  return used;
-}
-
-MonitorMap Monitor::Impl::withoutExcluded(MonitorMap used) {
-  if (options.exclude_boxes.empty() || !used.surface) return used;
-  if (reduced_from != used.surface) {
-    RemainingLeaves remaining = leavesOutside(used.surface->leaves(), used.surface->resolution(),
-                                              used.map_from_fixed.inverse(), options.exclude_boxes);
-    reduced = remaining.excluded_voxels == 0
-                  ? used.surface
-                  : VoxelSurface::build(used.surface->resolution(), std::move(remaining.leaves));
-    excluded_voxels = remaining.excluded_voxels;
-    reduced_from = used.surface;
-  }
-  used.surface = reduced;
   return used;
 }
 

@@ -12,12 +12,12 @@ using namespace dccd;
 
 bool isSmall(const StepRecording& recording) {
   std::size_t vertices = 0;
-  for (const RecordedBody& body : recording.bodies) vertices += body.t0.size();
-  const std::size_t leaves = recording.map.surface ? recording.map.surface->leafCount() : 0;
+  for (const Body& body : recording.step.bodies) vertices += body.t0->size();
+  const std::size_t leaves = recording.step.map.surface ? recording.step.map.surface->leafCount() : 0;
   // The scene in the seeds has 28 vertices and few parts; `conservative` may cost max_subdivisions for each pair and
   // part.
   return vertices <= 32 && leaves <= 32 && recording.options.max_substeps <= 64 &&
-         recording.options.rigid_tolerance_m >= 1e-3 && recording.options.detector.accuracy.max_subdivisions <= 5000;
+         recording.options.rigid_tolerance_m >= 1e-3 && recording.options.accuracy.max_subdivisions <= 5000;
 }
 
 void replay(const std::uint8_t* data, std::size_t size) {

@@ -89,7 +89,7 @@ class InterfaceTest(unittest.TestCase):
 
     def test_effects(self):
         source = (CHECKOUT / 'src/step/effect_plan.cpp').read_text()
-        names = re.findall(r'"(\w+)"', re.search(r'NAMES = \{([^}]*)\}', source).group(1))
+        names = re.findall(r'\{"(\w+)", \w+\}', source[source.index('EFFECTS[] = {'):])
         row = next(line for line in PAGE.splitlines() if line.startswith('| `effects/NAME`'))
         self.assertEqual(sorted(re.findall(r'`(\w+)`', row.split('NAME:')[1])), sorted(names))
 

@@ -94,10 +94,9 @@ TEST(StepSequence, ClearWithoutContactEndsClear) {
       steps.push_back(steps.back().continued(t1));
     }
     ASSERT_EQ(judgeSequence(steps, carried, full), "") << "seed " << seed;
-    Detector detector{DetectorOptions()};
-    detector.setBodies(first.setups(), first.positions());
+    Detector detector;
     for (const TestStep& step : steps) {
-      const StepResult& result = detector.run(step.motion());
+      const Outcome result = detector.run(step.motion());
       clear_steps += result.start_state == StartState::CLEAR && result.contacts.empty();
       steps_with_contact += !result.contacts.empty();
     }

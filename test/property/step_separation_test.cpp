@@ -60,22 +60,19 @@ double separationOf(const NoisyStep& noisy, const Contact& c) {
          radiusOf(noisy, c.body[1], c.vertex.data() + first, 4 - first);
 }
 
-StepResult run(const NoisyStep& noisy, BroadPhase broad_phase, bool earliest_only = false) {
-  DetectorOptions options;
+Outcome run(const NoisyStep& noisy, BroadPhase broad_phase, bool earliest_only = false) {
+  Options options;
   options.earliest_only = earliest_only;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   options.accuracy.tolerance_m = TOLERANCE_M;
   options.broad_phase = broad_phase;
   options.check_start_state = false;
-  Detector detector(options);
-  std::vector<BodySetup> setups = noisy.step.setups();
-  MotionStep step = noisy.step.motion();
-  for (std::size_t b = 0; b < setups.size(); ++b) {
-    setups[b].minimum_separation_m = noisy.separation_m[b];
-    if (!noisy.radius_m[b].empty()) step.bodies[b].radius_m = &noisy.radius_m[b];
+  Step step = noisy.step.motion();
+  for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+    step.bodies[b].minimum_separation_m = noisy.separation_m[b];
+    if (!noisy.radius_m[b].empty()) step.bodies[b].radius_m = share(noisy.radius_m[b]);
   }
-  detector.setBodies(setups, noisy.step.positions());
-  return detector.run(step);
+  return Detector(options).run(step);
 }
 
 using Key = std::tuple<PairKind, std::array<std::uint16_t, 2>, std::array<Index, 4>>;
@@ -120,7 +117,7 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
   for (int seed = 0; seed < steps; ++seed) {
     const Draw draw = drawFrom(4200 + static_cast<std::uint64_t>(seed));
     const NoisyStep noisy = randomNoisyStep(draw);
-    const StepResult result = run(noisy, BroadPhase::CLUSTERED);
+    const Outcome result = run(noisy, BroadPhase::CLUSTERED);
     ASSERT_EQ(difference(result.contacts, run(noisy, BroadPhase::BRUTE_FORCE).contacts), "") << "seed " << seed;
     std::map<Key, const Contact*> found;
     for (const Contact& c : result.contacts) {
@@ -158,8 +155,8 @@ TEST(StepSeparation, EarliestOnlyIsTheFirstOfAll) {
   int left_out = 0, several = 0;
   for (int seed = 0; seed < 200; ++seed) {
     const NoisyStep noisy = randomNoisyStep(drawFrom(7700 + static_cast<std::uint64_t>(seed)));
-    const StepResult full = run(noisy, BroadPhase::CLUSTERED), first = run(noisy, BroadPhase::CLUSTERED, true);
-    ASSERT_EQ(first.earliestToc(), full.earliestToc()) << "seed " << seed;
+    const Outcome full = run(noisy, BroadPhase::CLUSTERED), first = run(noisy, BroadPhase::CLUSTERED, true);
+    ASSERT_EQ(first.earliest_toc, full.earliest_toc) << "seed " << seed;
     double upper = 1;
     for (const Contact& c : full.contacts) {
       if (c.certainty == Certainty::CERTAIN) upper = std::min(upper, c.toc_upper);
@@ -200,12 +197,11 @@ TEST(StepSeparation, OtherPairsAreAsWithoutNoise) {
 TEST(StepSeparation, BadRadiiAndRungsAreRefused) {
   const TestStep step = crossing();
   const auto error = [&](std::vector<double> radius, Accuracy rung) -> std::string {
-    DetectorOptions options;
+    Options options;
     options.accuracy.rung = rung;
     Detector detector(options);
-    detector.setBodies(step.setups(), step.positions());
-    MotionStep motion = step.motion();
-    motion.bodies[0].radius_m = &radius;
+    Step motion = step.motion();
+    motion.bodies[0].radius_m = share(radius);
     try {
       detector.run(motion);
     } catch (const std::invalid_argument& e) {

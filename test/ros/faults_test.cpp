@@ -28,7 +28,7 @@ TEST_F(Recording, RecordStepWritesWhatReplaysToTheSameBits) {
   std::vector<StepRecording> steps;
   for (std::string file; std::getline(lines, file);) steps.push_back(readRecordingFile(file));
   ASSERT_EQ(steps.size(), 2u) << "record_steps is 2";
-  EXPECT_EQ(steps[1].start_ns, 10100000000);
+  EXPECT_EQ(steps[1].step.start_ns, 10100000000);
   EXPECT_EQ(steps[1].answer.contacts.size(), outcome.contacts.size());
   for (const StepRecording& step : steps) {
     const StepReplay replay = replayStep(step);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr StampNs STEP_NS = 100000000;
 
-std::vector<MonitorBody> bodies(bool with_distances) {
-  std::vector<MonitorBody> all(3);
+std::vector<Body> bodies(bool with_distances) {
+  std::vector<Body> all(3);
   all[0].name = "cloth";
   all[0].vertex_mask = {0};
   all[1].name = "finger";
@@ -31,8 +31,8 @@ std::vector<MonitorBody> bodies(bool with_distances) {
 MonitorOptions withDefaults(MonitorOptions options) {
   options.store.max_vertex_step_m = 0;
   options.clock_body = 0;
-  options.rigid_tolerance_m = 0.01;
-  options.exclude_boxes = {Box{{9, 9, 9}, {10, 10, 10}}};
+  options.detector.rigid_tolerance_m = 0.01;
+  options.detector.exclude_boxes = {Box{{9, 9, 9}, {10, 10, 10}}};
   return options;
 }
 
@@ -40,8 +40,14 @@ MonitorOptions withDefaults(MonitorOptions options) {
 class Capture : public StepListener {
  public:
   explicit Capture(StepRecording& recording) : recording_(recording) {}
-  void onStep(const StepSource& source) override { setSource(source, recording_); }
-  void onOutcome(const StepOutcome& outcome) override { setAnswer(outcome, recording_); }
+  void onStep(const Step& step, const Options& options) override {
+    recording_.step = step;
+    recording_.options = options;
+  }
+  void onOutcome(const Outcome& outcome) override {
+    recording_.has_answer = true;
+    recording_.answer = outcome;
+  }
 
  private:
   StepRecording& recording_;
@@ -56,13 +62,13 @@ RecordedScene::RecordedScene(const MonitorOptions& options, bool with_map, bool 
       finger_(std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 1, 2}, {0, 3, 1}}))),
       rope_(std::make_shared<const Topology>(Topology::polyline(4))) {
   if (with_map) {
-    MonitorMap map;
+    ObstacleMap map;
     map.surface = VoxelSurface::build(0.1, {{{32768, 32768, 32764}, 1}, {{32770, 32768, 32764}, 2}});
     map.stamp_ns = 1;
     monitor_.setMap(map);
   }
   push();
-  StepOutcome first;
+  Outcome first;
   monitor_.next(0, first);
 }
 
@@ -93,9 +99,9 @@ void RecordedScene::push() {
   monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity(), radius_m}, 0);
 }
 
-StepOutcome RecordedScene::nextFrames() {
+Outcome RecordedScene::nextFrames() {
   push();
-  StepOutcome outcome;
+  Outcome outcome;
   if (!monitor_.next(0, outcome)) throw std::logic_error("the scene's frames make no step");
   return outcome;
 }

@@ -1,6 +1,7 @@
 // Steps recorded from a running monitor, small enough for files in the project.
 #pragma once
 
+#include "dccd/stream.h"
 #include "record/step_recording.h"
 
 namespace dccd {
@@ -13,7 +14,7 @@ namespace test {
 class RecordedScene {
  public:
   explicit RecordedScene(const MonitorOptions& options = {}, bool with_map = true, bool with_distances = false);
-  StepOutcome nextFrames();
+  Outcome nextFrames();
   Monitor& monitor() { return monitor_; }
 
  private:

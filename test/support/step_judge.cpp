@@ -25,7 +25,7 @@ std::string judgeContacts(const std::vector<Contact>& found, std::vector<TrueCon
   return "";
 }
 
-std::string judgeStart(const StepResult& result, const std::vector<StartIntersection>& truth) {
+std::string judgeStart(const Outcome& result, const std::vector<StartIntersection>& truth) {
   if (result.start_state != (truth.empty() ? StartState::CLEAR : StartState::INTERSECTING)) {
     return std::string("start state ") + toString(result.start_state) + " with " + std::to_string(truth.size()) +
            " pairs in truth";
@@ -45,11 +45,9 @@ std::string judgeStep(const TestStep& step) {
   std::string finding;
   forEachSimdTarget([&](const std::string& target) {
     for (const BroadPhase broad_phase : {BroadPhase::CLUSTERED, BroadPhase::BRUTE_FORCE}) {
-      DetectorOptions options;
+      Options options;
       options.broad_phase = broad_phase;
-      Detector detector(options);
-      detector.setBodies(step.setups(), step.positions());
-      const StepResult& result = detector.run(step.motion());
+      const Outcome result = runOnce(step, options);
       std::string wrong = judgeContacts(result.contacts, contacts, options.accuracy.toc_bits);
       if (wrong.empty()) wrong = judgeStart(result, start);
       if (wrong.empty() || !finding.empty()) continue;
@@ -60,14 +58,13 @@ std::string judgeStep(const TestStep& step) {
 }
 
 std::string judgeSequence(const std::vector<TestStep>& steps, int& carried_tests, int& full_tests) {
-  Detector carrying{DetectorOptions()}, full{DetectorOptions()};
-  for (Detector* d : {&carrying, &full}) d->setBodies(steps[0].setups(), steps[0].positions());
+  Detector carrying, full;
   bool must_be_clear = false;
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    MotionStep motion = steps[i].motion();
-    const StepResult& expected = full.run(motion);
-    motion.continues = i > 0;
-    const StepResult& result = carrying.run(motion);
+    Step motion = steps[i].motion();
+    full.history().clear();
+    const Outcome expected = full.run(motion);
+    const Outcome result = carrying.run(motion);
     const std::string where = "step " + std::to_string(i) + ": ";
     if (i > 0) {
       carried_tests += static_cast<int>(result.stats[Stage::START_STATE].in);

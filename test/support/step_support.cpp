@@ -119,29 +119,19 @@ Draw drawFrom(std::uint64_t seed) {
   };
 }
 
-std::vector<BodySetup> TestStep::setups() const {
-  std::vector<BodySetup> result;
-  for (const StepBody& body : bodies) {
-    BodySetup setup;
-    setup.name = "body_" + std::to_string(result.size());
-    setup.topology = std::make_shared<Topology>(body.topology);
-    setup.self_collision = body.self_collision;
-    setup.against_bodies = body.against_bodies;
-    setup.vertex_active = body.vertex_active;
-    result.push_back(std::move(setup));
+Step TestStep::motion() const {
+  Step step;
+  for (const StepBody& from : bodies) {
+    Body body;
+    body.name = "body_" + std::to_string(step.bodies.size());
+    body.topology = share(from.topology);
+    body.self_collision = from.self_collision;
+    body.against_bodies = from.against_bodies;
+    for (Index v = 0; v < from.vertex_active.size(); ++v) {
+      if (!from.vertex_active[v]) body.vertex_mask.push_back(v);
+    }
+    step.bodies.push_back(moving(body, from.t0, from.t1));
   }
-  return result;
-}
-
-std::vector<const Positions*> TestStep::positions() const {
-  std::vector<const Positions*> result;
-  for (const StepBody& body : bodies) result.push_back(&body.t0);
-  return result;
-}
-
-MotionStep TestStep::motion() const {
-  MotionStep step;
-  for (const StepBody& body : bodies) step.bodies.push_back({&body.t0, &body.t1});
   return step;
 }
 
@@ -296,11 +286,7 @@ bool operator==(const StartIntersection& x, const StartIntersection& y) {
   return x.body == y.body && x.vertex == y.vertex;
 }
 
-StepResult runOnce(const TestStep& step, const DetectorOptions& options) {
-  Detector detector(options);
-  detector.setBodies(step.setups(), step.positions());
-  return detector.run(step.motion());
-}
+Outcome runOnce(const TestStep& step, const Options& options) { return Detector(options).run(step.motion()); }
 
 TestStep crumpled(std::uint64_t seed, int bodies, std::size_t size) {
   const Draw draw = drawFrom(seed);

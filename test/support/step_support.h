@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "dccd/detector.h"
 #include "oracle/oracle.h"
+#include "support/detector.h"
 
 namespace dccd {
 namespace test {
@@ -27,9 +27,7 @@ struct StepBody {
 
 struct TestStep {
   std::vector<StepBody> bodies;
-  std::vector<BodySetup> setups() const;  ///< bodies are called body_0, body_1 ...
-  std::vector<const Positions*> positions() const;
-  MotionStep motion() const;
+  Step motion() const;  ///< bodies are called body_0, body_1 ...
   /// The next step: what was t=1 is t=0, and the positions at t=1 are given.
   TestStep continued(std::vector<Positions> t1) const;
 };
@@ -77,7 +75,7 @@ std::vector<StartIntersection> trueIntersections(const TestStep& step);
 bool operator==(const StartIntersection& x, const StartIntersection& y);
 
 /// One step with a detector of its own, as a first step.
-StepResult runOnce(const TestStep& step, const DetectorOptions& options);
+Outcome runOnce(const TestStep& step, const Options& options);
 /// Crumpled cloths of size x size vertices that move through each other and through themselves: thousands of contacts.
 TestStep crumpled(std::uint64_t seed, int bodies, std::size_t size);
 /// Two triangles, one above the inside of the other at t=0; its lowest corner arrives at t=0.5 and passes through.

@@ -55,15 +55,12 @@ struct Scene {
     }
   }
 
-  StepResult run(const DetectorOptions& options) const {
-    Detector detector(options);
-    BodySetup setup;
+  Outcome run(const Options& options) const { return Detector(options).run(step(t0, t1)); }
+  Step step(const Positions& from, const Positions& to) const {
+    Body setup;
     setup.name = "mesh";
     setup.topology = std::make_shared<Topology>(Topology::fromTriangles(t0.size(), data.faces));
-    detector.setBodies({setup}, {&t0});
-    MotionStep step;
-    step.bodies = {{&t0, &t1}};
-    return detector.run(step);
+    return stepOf(setup, from, to);
   }
 };
 
@@ -72,7 +69,7 @@ class StepScenes : public testing::TestWithParam<const char*> {
   void SetUp() override { DEFORMABLE_CCD_REQUIRE_DATA(); }
 };
 
-std::set<Pair> pairsOf(const StepResult& result) {
+std::set<Pair> pairsOf(const Outcome& result) {
   std::set<Pair> pairs;
   for (const Contact& c : result.contacts) pairs.insert(canonical(c.kind, c.vertex));
   EXPECT_EQ(pairs.size(), result.contacts.size()) << "a pair is reported twice";
@@ -86,9 +83,9 @@ std::size_t missing(const std::set<Pair>& from, const std::set<Pair>& wanted) {
 
 TEST_P(StepScenes, ExactGivesExactlyTheTruth) {
   const Scene scene(GetParam());
-  DetectorOptions options;
+  Options options;
   options.num_threads = 2;
-  const StepResult result = scene.run(options);
+  const Outcome result = scene.run(options);
   const std::set<Pair> found = pairsOf(result);
   EXPECT_TRUE(result.complete);
   EXPECT_EQ(result.stats.undecided, 0u);
@@ -102,10 +99,10 @@ TEST_P(StepScenes, ExactGivesExactlyTheTruth) {
 TEST_P(StepScenes, ScreenAndConservativeMissNothing) {
   const Scene scene(GetParam());
   for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::CONSERVATIVE}) {
-    DetectorOptions options;
+    Options options;
     options.accuracy.rung = rung;
     options.check_start_state = false;
-    const StepResult result = scene.run(options);
+    const Outcome result = scene.run(options);
     const std::set<Pair> found = pairsOf(result);
     EXPECT_EQ(missing(found, scene.contacts), 0u) << toString(rung);
     std::cout << GetParam() << ", " << toString(rung) << ": " << found.size() << " for " << scene.contacts.size()
@@ -116,19 +113,13 @@ TEST_P(StepScenes, ScreenAndConservativeMissNothing) {
 // Carried over from step to step, back and forth between the two frames, the start state is that of the full test.
 TEST_P(StepScenes, StartStateIsCarriedOver) {
   const Scene scene(GetParam());
-  DetectorOptions options;
+  Options options;
   Detector carrying(options), full(options);
-  BodySetup setup;
-  setup.name = "mesh";
-  setup.topology = std::make_shared<Topology>(Topology::fromTriangles(scene.t0.size(), scene.data.faces));
-  for (Detector* d : {&carrying, &full}) d->setBodies({setup}, {&scene.t0});
   for (int i = 0; i < 3; ++i) {
-    MotionStep step;
-    step.bodies = {i % 2 == 0 ? BodyMotion{&scene.t0, &scene.t1} : BodyMotion{&scene.t1, &scene.t0}};
-    step.continues = i > 0;
-    const auto& carried = carrying.run(step).intersections;
-    step.continues = false;
-    const auto& expected = full.run(step).intersections;
+    const Step step = i % 2 == 0 ? scene.step(scene.t0, scene.t1) : scene.step(scene.t1, scene.t0);
+    const auto carried = carrying.run(step).intersections;
+    full.history().clear();
+    const auto expected = full.run(step).intersections;
     EXPECT_TRUE(std::equal(carried.begin(), carried.end(), expected.begin(), expected.end(),
                            [](const auto& x, const auto& y) { return x == y; }))
         << carried.size() << " carried over, " << expected.size() << " by the full test";

@@ -21,7 +21,7 @@ struct Scene {
   SceneArrays arrays;
   explicit Scene(TestStep s) : step(std::move(s)) {
     StepStats stats;
-    arrays.setBodies(step.setups(), step.positions());
+    arrays.setBodies(step.motion().bodies);
     arrays.record(step.motion(), stats);
     arrays.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
   }

@@ -111,7 +111,7 @@ TEST(ClusterTree, EveryLevelBoundsWhatIsBelow) {
   step.bodies = {body};
   SceneArrays scene;
   StepStats stats;
-  scene.setBodies(step.setups(), step.positions());
+  scene.setBodies(step.motion().bodies);
   scene.record(step.motion(), stats);
   scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
 

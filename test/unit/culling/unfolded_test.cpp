@@ -6,26 +6,22 @@
 #include <cmath>
 #include <random>
 
-#include "dccd/detector.h"
+#include "support/detector.h"
 
 namespace dccd {
 namespace {
 
-StepResult runStep(const Topology& topology, const Positions& t0, const Positions& t1, BroadPhase broad_phase,
-                   double separation_m = 0, const std::vector<double>* radius_m = nullptr) {
-  DetectorOptions options;
+Outcome runStep(const Topology& topology, const Positions& t0, const Positions& t1, BroadPhase broad_phase,
+                double separation_m = 0, const std::vector<double>* radius_m = nullptr) {
+  Options options;
   options.accuracy.rung = separation_m > 0 || radius_m ? Accuracy::CONSERVATIVE : Accuracy::EXACT;
   options.broad_phase = broad_phase;
   options.check_start_state = false;
-  Detector detector(options);
-  BodySetup body;
+  Body body;
   body.name = "cloth";
   body.topology = std::make_shared<const Topology>(topology);
   body.minimum_separation_m = separation_m;
-  detector.setBodies({body}, {&t0});
-  MotionStep step;
-  step.bodies = {{&t0, &t1, radius_m}};
-  return detector.run(step);
+  return test::Detector(options).run(test::stepOf(body, t0, t1, radius_m));
 }
 
 bool certified(const Topology& topology, const Positions& t0, const Positions& t1) {
@@ -58,7 +54,7 @@ TEST(Unfolded, WavingClothIsCertified) {
       t1.emplace_back(0.02 * c + 0.001, 0.02 * r, 0.03 * std::sin(0.3 * c + 0.2 * r + 0.5) - 0.01);
     }
   }
-  const StepResult result = runStep(topology, t0, t1, BroadPhase::CLUSTERED);
+  const Outcome result = runStep(topology, t0, t1, BroadPhase::CLUSTERED);
   EXPECT_EQ(result.stats.unfolded_bodies, 1u);
   EXPECT_EQ(result.stats[Effect::SELF_COLLISION].in, 0u);
   EXPECT_EQ(trueContacts(topology, t0, t1), 0u);
@@ -68,7 +64,7 @@ TEST(Unfolded, WavingClothIsCertified) {
   EXPECT_EQ(runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius).stats.unfolded_bodies, 1u)
       << "a tracker that is sure";
   radius[77] = 0.03;
-  const StepResult uncertain = runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius);
+  const Outcome uncertain = runStep(topology, t0, t1, BroadPhase::CLUSTERED, 0, &radius);
   EXPECT_EQ(uncertain.stats.unfolded_bodies, 0u) << "nor with a vertex that is only known to a radius";
   EXPECT_FALSE(uncertain.contacts.empty()) << "which reaches its neighbours";
 }

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "elementary/exact_tiers.h"
-#include "elementary/rungs.h"
 #include "oracle/oracle.h"
 #include "oracle/query_file.h"
 #include "support/data.h"
@@ -28,7 +27,7 @@ constexpr Tier COMPLETE_TIERS[] = {Tier::FIXED_INTEGER, Tier::BIG_INTEGER};
 std::unique_ptr<Rung> exactTest(int toc_bits = 32) {
   AccuracyOptions options;
   options.toc_bits = toc_bits;
-  return makeExactRung(options);
+  return makeRung(options);
 }
 
 /// Verdict and cell, not the tier.

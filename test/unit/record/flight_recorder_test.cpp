@@ -36,7 +36,7 @@ TEST_F(FlightRecorderTest, KeepsTheLastSteps) {
   ASSERT_EQ(files.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
     const StepRecording r = readRecordingFile(files[i]);
-    EXPECT_EQ(r.sequence, sequences[i + 2]);
+    EXPECT_EQ(r.step.sequence, sequences[i + 2]);
     EXPECT_EQ(r.note, "why");
     EXPECT_TRUE(replayStep(r).differences.empty());
   }
@@ -47,7 +47,7 @@ TEST_F(FlightRecorderTest, SurprisesAreWrittenAndBounded) {
   RecordedScene scene;
   FlightRecorder recorder(1, folder_);
   scene.monitor().setListener(&recorder);
-  StepOutcome outcome = scene.nextFrames();
+  Outcome outcome = scene.nextFrames();
   outcome.status = StepStatus::INTERNAL_ERROR;
   outcome.reason = "made up";
   for (std::size_t i = 0; i < FlightRecorder::MAX_SURPRISES + 2; ++i) {
@@ -66,8 +66,8 @@ TEST_F(FlightRecorderTest, SurprisesAreWrittenAndBounded) {
 }
 
 TEST(Surprise, OnlyWhatContradictsThePromises) {
-  MonitorOptions options;
-  StepOutcome outcome;
+  Options options;
+  Outcome outcome;
   outcome.status = StepStatus::OK;
   outcome.answered = true;
   EXPECT_TRUE(surpriseIn(outcome, options).empty());
@@ -76,7 +76,7 @@ TEST(Surprise, OnlyWhatContradictsThePromises) {
   outcome.complete = false;
   EXPECT_TRUE(surpriseIn(outcome, options).empty()) << "a deadline leaves pairs undecided";
   outcome.complete = true;
-  options.detector.accuracy.rung = Accuracy::SCREEN;
+  options.accuracy.rung = Accuracy::SCREEN;
   EXPECT_TRUE(surpriseIn(outcome, options).empty()) << "screen decides nothing";
   Contact contact;
   contact.toc_lower = std::numeric_limits<double>::quiet_NaN();
@@ -91,14 +91,14 @@ TEST_F(FlightRecorderTest, AStepThatFailsIsASurprise) {
   MonitorOptions options = scene.monitor().options();
   scene.nextFrames();
   // The mask of another mesh: found only when the step is computed.
-  MonitorBody cloth;
+  Body cloth;
   cloth.name = "cloth";
   cloth.vertex_mask = {99};
   Monitor failing(options, {cloth});
   failing.setListener(&recorder);
   const auto grid = std::make_shared<const Topology>(Topology::grid(2, 2));
   const Positions at{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
-  StepOutcome outcome;
+  Outcome outcome;
   for (const StampNs stamp_ns : {1, 2}) {
     failing.push(0, {stamp_ns, grid, at, false, Eigen::Isometry3d::Identity()}, 0);
     ASSERT_TRUE(failing.next(0, outcome));

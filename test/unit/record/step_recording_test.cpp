@@ -32,13 +32,13 @@ std::string errorOf(const std::vector<std::uint8_t>& bytes) {
 MonitorOptions with(Accuracy rung) {
   MonitorOptions options;
   options.detector.accuracy.rung = rung;
-  options.obstacle_expected = true;
+  options.detector.obstacle_expected = true;
   return options;
 }
 
 TEST(StepRecording, TheSceneCallsForEverything) {
   const StepRecording r = recordScene();
-  EXPECT_EQ(r.bodies.size(), 3u);
+  EXPECT_EQ(r.step.bodies.size(), 3u);
   EXPECT_GT(r.answer.substeps, 1u) << "the finger turns";
   bool self_or_body = false, obstacle = false;
   for (const Contact& c : r.answer.contacts) (c.body[1] == OBSTACLE_BODY ? obstacle : self_or_body) = true;
@@ -51,11 +51,11 @@ TEST(StepRecording, WhatIsReadIsWhatWasWritten) {
   const std::vector<std::uint8_t> bytes = recordingBytes(r);
   const StepRecording again = readRecording(bytes.data(), bytes.size(), "FILE");
   EXPECT_EQ(recordingBytes(again), bytes);
-  EXPECT_EQ(again.bodies[2].setup.motion, BodyMotionKind::STATIC);
-  EXPECT_FALSE(again.bodies[2].topology->hasFaces()) << "the rope is a polyline";
-  EXPECT_EQ(again.bodies[2].topology->edges().size(), 3u);
-  ASSERT_TRUE(again.map.surface);
-  EXPECT_EQ(again.map.surface->leafCount(), 2u);
+  EXPECT_EQ(again.step.bodies[2].motion, BodyMotionKind::STATIC);
+  EXPECT_FALSE(again.step.bodies[2].topology->hasFaces()) << "the rope is a polyline";
+  EXPECT_EQ(again.step.bodies[2].topology->edges().size(), 3u);
+  ASSERT_TRUE(again.step.map.surface);
+  EXPECT_EQ(again.step.map.surface->leafCount(), 2u);
   EXPECT_TRUE(compareAnswers(r.answer, again.answer).empty());
 }
 
@@ -85,12 +85,12 @@ TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
     const std::vector<std::uint8_t> bytes = recordingBytes(r);
     r = readRecording(bytes.data(), bytes.size(), "FILE");
     EXPECT_EQ(recordingBytes(r), bytes);
-    ASSERT_EQ(r.bodies[0].radius_m.size(), 20u);
-    EXPECT_EQ(r.bodies[0].radius_m[7], 3e-3);
-    ASSERT_TRUE(r.bodies[0].reference) << "its first frame";
-    EXPECT_NE(r.bodies[0].reference->positions, r.bodies[0].t0);
-    ASSERT_EQ(r.bodies[2].setup.separations.size(), 1u);
-    EXPECT_EQ(r.bodies[2].setup.separations[0].separation_m, 0.15);
+    ASSERT_EQ(r.step.bodies[0].radius_m->size(), 20u);
+    EXPECT_EQ((*r.step.bodies[0].radius_m)[7], 3e-3);
+    ASSERT_TRUE(r.step.bodies[0].reference) << "its first frame";
+    EXPECT_NE(r.step.bodies[0].reference->positions, *r.step.bodies[0].t0);
+    ASSERT_EQ(r.step.bodies[2].separations.size(), 1u);
+    EXPECT_EQ(r.step.bodies[2].separations[0].separation_m, 0.15);
     EXPECT_GT(r.answer.contacts.size(), without.answer.contacts.size());
     for (const int threads : {1, 3}) {
       const StepReplay replay = replayStep(r, threads);
@@ -102,12 +102,13 @@ TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
       change(changed);
       return !replayStep(changed).differences.empty();
     };
-    EXPECT_TRUE(differs([](StepRecording& c) { c.bodies[0].radius_m.assign(20, 0.05); })) << toString(rung);
-    EXPECT_TRUE(differs([](StepRecording& c) { c.bodies[2].setup.separations.clear(); })) << toString(rung);
+    EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[0].radius_m = share(std::vector<double>(20, 0.05)); }))
+        << toString(rung);
+    EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[2].separations.clear(); })) << toString(rung);
     EXPECT_TRUE(differs([](StepRecording& c) {
-      ReferenceFrame spread = *c.bodies[0].reference;
+      ReferenceFrame spread = *c.step.bodies[0].reference;
       for (Vec3& p : spread.positions) p *= 10;  // nothing is close in it, so nothing is left out
-      c.bodies[0].reference = std::make_shared<const ReferenceFrame>(spread);
+      c.step.bodies[0].reference = std::make_shared<const ReferenceFrame>(spread);
     })) << toString(rung);
   }
 }
@@ -142,7 +143,8 @@ TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
 TEST(StepReplay, AStepWithoutAnAnswerIsComputed) {
   StepRecording r = recordScene();
   const std::size_t contacts = r.answer.contacts.size();
-  r.answer = RecordedAnswer();
+  r.answer = Outcome();
+  r.has_answer = false;
   const StepReplay replay = replayStep(r);
   EXPECT_TRUE(replay.differences.empty());
   EXPECT_EQ(replay.answer.contacts.size(), contacts);
@@ -181,30 +183,29 @@ TEST(StepRecording, LiesAreNamed) {
   bad[8] = 9;
   EXPECT_NE(errorOf(bad).find("version 9"), std::string::npos);
   StepRecording r = recordScene();
-  r.stamp_ns = r.start_ns;
+  r.step.stamp_ns = r.step.start_ns;
   EXPECT_NE(errorOf(recordingBytes(r)).find("the step lasts"), std::string::npos);
   r = recordScene();
-  r.bodies[0].t1.pop_back();
+  r.step.bodies[0].t1 = share(Positions(19, Vec3::Zero()));
   EXPECT_NE(errorOf(recordingBytes(r)).find("20 vertices at t=0 and 19 at t=1"), std::string::npos);
   r = recordScene();
-  r.bodies[0].t0.resize(3);
-  r.bodies[0].t1.resize(3);
+  r.step.bodies[0].t0 = r.step.bodies[0].t1 = share(Positions(3, Vec3::Zero()));
   EXPECT_NE(errorOf(recordingBytes(r)).find("body 'cloth'"), std::string::npos)
       << "faces name vertices that are not there";
   r = recordScene();
-  r.bodies[1].pose_t0.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  r.step.bodies[1].pose_t0.translation().x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(errorOf(recordingBytes(r)).find("pose"), std::string::npos);
 }
 
 TEST(StepReplay, ImpossibleOptionsAreRefused) {
   StepRecording r = recordScene();
-  r.options.clock_body = 7;
+  r.options.max_substeps = 0;
   EXPECT_THROW(replayStep(r), std::invalid_argument);
   r = recordScene();
-  r.bodies.clear();
+  r.step.bodies.clear();
   EXPECT_THROW(replayStep(r), std::invalid_argument);
   r = recordScene();
-  r.options.detector.accuracy.toc_bits = 99;
+  r.options.accuracy.toc_bits = 99;
   EXPECT_THROW(replayStep(r), std::invalid_argument);
 }
 

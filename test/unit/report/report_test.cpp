@@ -7,8 +7,8 @@
 namespace dccd {
 namespace {
 
-StepOutcome nothingFound(StepStatus status, StartState start) {
-  StepOutcome outcome;
+Outcome nothingFound(StepStatus status, StartState start) {
+  Outcome outcome;
   outcome.answered = true;
   outcome.status = status;
   outcome.start_state = start;
@@ -16,19 +16,19 @@ StepOutcome nothingFound(StepStatus status, StartState start) {
   return outcome;
 }
 
-std::string headlineOf(const std::vector<StepOutcome>& outcomes) {
+std::string headlineOf(const std::vector<Outcome>& outcomes) {
   const std::string folder = ::testing::TempDir() + "headline_report";
   Report report(folder);
-  for (const StepOutcome& outcome : outcomes) report.add(outcome, {});
+  for (const Outcome& outcome : outcomes) report.add(outcome, {});
   const std::string headline = report.headline();
   std::filesystem::remove_all(folder);
   return headline;
 }
 
 TEST(Headline, OnlyClearStepsSayNoContact) {
-  const StepOutcome clear = nothingFound(StepStatus::OK, StartState::CLEAR);
-  const StepOutcome no_map = nothingFound(StepStatus::NO_MAP, StartState::CLEAR);
-  const StepOutcome crossing = nothingFound(StepStatus::OK, StartState::INTERSECTING);
+  const Outcome clear = nothingFound(StepStatus::OK, StartState::CLEAR);
+  const Outcome no_map = nothingFound(StepStatus::NO_MAP, StartState::CLEAR);
+  const Outcome crossing = nothingFound(StepStatus::OK, StartState::INTERSECTING);
   EXPECT_EQ(headlineOf({}), "No answer: no step could be checked.");
   EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps.");
   EXPECT_EQ(headlineOf({no_map, no_map, nothingFound(StepStatus::PARTIAL, StartState::CLEAR)}),
@@ -36,7 +36,7 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
   EXPECT_EQ(headlineOf({clear, no_map, crossing}),
             "No contact in 1 of 3 answered steps; in others none was found, but it is not ruled out (NO_MAP 1, start "
             "INTERSECTING 1).");
-  EXPECT_EQ(headlineOf({clear, StepOutcome{}}), "No contact in 1 answered steps; 1 frame without an answer.");
+  EXPECT_EQ(headlineOf({clear, Outcome{}}), "No contact in 1 answered steps; 1 frame without an answer.");
 }
 
 }  // namespace

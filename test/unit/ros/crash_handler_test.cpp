@@ -32,11 +32,11 @@ class CrashHandlerTest : public ::testing::Test {
 class CrashInStep : public StepListener {
  public:
   CrashInStep(FlightRecorder& recorder, int signal) : recorder_(recorder), signal_(signal) {}
-  void onStep(const StepSource& source) override {
-    recorder_.onStep(source);
+  void onStep(const Step& step, const Options& options) override {
+    recorder_.onStep(step, options);
     std::raise(signal_);
   }
-  void onOutcome(const StepOutcome& outcome) override { recorder_.onOutcome(outcome); }
+  void onOutcome(const Outcome& outcome) override { recorder_.onOutcome(outcome); }
 
  private:
   FlightRecorder& recorder_;
@@ -65,8 +65,8 @@ TEST_F(CrashHandlerTest, ACrashWritesTheStep) {
     ASSERT_TRUE(WIFSIGNALED(status)) << "the crash goes on to be one";
     EXPECT_EQ(WTERMSIG(status), signal);
     const StepRecording r = readRecordingFile(folder_ / ("crash_" + std::to_string(child) + ".step"));
-    EXPECT_FALSE(r.answer.present);
-    EXPECT_EQ(r.sequence, expected.sequence);
+    EXPECT_FALSE(r.has_answer);
+    EXPECT_EQ(r.step.sequence, expected.step.sequence);
     const StepReplay replay = replayStep(r);
     EXPECT_TRUE(compareAnswers(expected.answer, replay.answer).empty());
   }

@@ -1,6 +1,6 @@
 // The core's headers, then the package's messages. Each finds its own names in either order.
 #include "dccd/contact.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 
 #include <deformable_ccd/Contact.h>
 #include <deformable_ccd/ContactArray.h>

@@ -4,7 +4,7 @@
 #include <deformable_ccd/StepStats.h>
 
 #include "dccd/contact.h"
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 
 #include <gtest/gtest.h>
 

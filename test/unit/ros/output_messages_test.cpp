@@ -9,8 +9,8 @@ namespace dccd {
 namespace {
 
 /// A step that found nothing.
-StepOutcome nothingFound(StepStatus status, StartState start, const std::string& reason = "") {
-  StepOutcome outcome;
+Outcome nothingFound(StepStatus status, StartState start, const std::string& reason = "") {
+  Outcome outcome;
   outcome.answered = true;
   outcome.status = status;
   outcome.reason = reason;
@@ -19,7 +19,7 @@ StepOutcome nothingFound(StepStatus status, StartState start, const std::string&
   return outcome;
 }
 
-std::string summaryOf(const StepOutcome& outcome) { return toFirstContact(outcome, {}, "world").summary; }
+std::string summaryOf(const Outcome& outcome) { return toFirstContact(outcome, {}, "world").summary; }
 
 TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   EXPECT_EQ(summaryOf(nothingFound(StepStatus::OK, StartState::CLEAR)), "no contact, starts CLEAR");
@@ -29,11 +29,11 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
             "no contact found, but PARTIAL (2 vertices were lost), starts NOT_CHECKED");
   EXPECT_EQ(summaryOf(nothingFound(StepStatus::OK, StartState::INTERSECTING)),
             "no contact found, but starts INTERSECTING");
-  StepOutcome suppressed = nothingFound(StepStatus::OK, StartState::CLEAR);
+  Outcome suppressed = nothingFound(StepStatus::OK, StartState::CLEAR);
   suppressed.suppressed = 3;
   suppressed.clear = false;
   EXPECT_EQ(summaryOf(suppressed), "no contact found, but 3 initial ones suppressed, starts CLEAR");
-  StepOutcome unanswered;
+  Outcome unanswered;
   unanswered.status = StepStatus::GAP;
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");
 }
@@ -48,10 +48,12 @@ TEST(Times, WhatRosCannotHoldIsTheNearestThatItCan) {
 }
 
 TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
-  StepOutcome cut = nothingFound(StepStatus::TRUNCATED, StartState::CLEAR);
+  Outcome cut = nothingFound(StepStatus::TRUNCATED, StartState::CLEAR);
   cut.total_contacts = 7;
   cut.counts = {5, 2, 3, 1, 4, 3};
+  cut.stats.unfolded_bodies = 2;
   const auto stats = toStepStats(cut, {}, "world");
+  EXPECT_EQ(stats.unfolded_bodies, 2u);
   EXPECT_EQ(stats.contacts, 7u);
   EXPECT_EQ(stats.contacts_certain, 5u);
   EXPECT_EQ(stats.contacts_undecided, 2u);

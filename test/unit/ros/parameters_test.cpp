@@ -213,7 +213,7 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   tree["minimum_separation_pairs"][1] = separationPair("felt", "other", 0.02);
   const MonitorConfig config = readConfig(tree);
   EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::CONSERVATIVE);
-  EXPECT_EQ(config.largestSeparation(), 0.02);
+  EXPECT_TRUE(config.holdsDistance());
   ASSERT_EQ(config.bodies[0].body.separations.size(), 2u);
   EXPECT_EQ(config.bodies[0].body.separations[0].body, OBSTACLE_BODY);
   EXPECT_EQ(config.bodies[0].body.separations[1].body, 1u);
@@ -248,7 +248,7 @@ TEST(Parameters, OnAndOffAreWordsThoughYamlTakesThemForBooleans) {
   tree["effects"]["octomap"] = true;
   const MonitorConfig config = readConfig(tree);
   EXPECT_FALSE(config.bodies[0].input.weld);
-  EXPECT_EQ(config.effects.at("octomap"), EffectSetting::ON);
+  EXPECT_EQ(config.effects.at(Effect::OCTOMAP), EffectSetting::ON);
 }
 
 TEST(Parameters, TheHashTellsConfigurationsApart) {
@@ -268,8 +268,8 @@ TEST(Parameters, TheHashTellsLiveValuesApart) {
       [](MonitorConfig& c) { c.monitor.detector.step_budget_ms = 5; },
       [](MonitorConfig& c) { c.monitor.store.max_step_s = 0.25; },
       [](MonitorConfig& c) { c.monitor.store.max_vertex_step_m = 0.25; },
-      [](MonitorConfig& c) { c.monitor.max_contacts = 5; },
-      [](MonitorConfig& c) { c.monitor.suppress_initial = true; },
+      [](MonitorConfig& c) { c.monitor.detector.max_contacts = 5; },
+      [](MonitorConfig& c) { c.monitor.detector.suppress_initial = true; },
       [](MonitorConfig& c) { c.markers.point_size_m = 0.02; },
       [](MonitorConfig& c) { c.markers.normal_length_m = 0.02; },
       [](MonitorConfig& c) { c.markers.mesh = true; },
@@ -323,7 +323,7 @@ TEST(Parameters, YamlReadsAsTheParameterServerWould) {
   EXPECT_EQ(config.monitor.store.max_step_s, 1);
   EXPECT_FALSE(config.bodies[0].input.weld);
   EXPECT_EQ(config.bodies[0].input.cols, 4u);
-  EXPECT_EQ(config.monitor.exclude_boxes.at(0).max.y(), 1.5);
+  EXPECT_EQ(config.monitor.detector.exclude_boxes.at(0).max.y(), 1.5);
   std::ofstream(file) << "max_step_s: [1\n";
   EXPECT_THROW(readYaml(file), ParameterError);
   std::remove(file.c_str());

@@ -83,7 +83,7 @@ struct Driven {
   tf2::BufferCore transforms;
   MonitorConfig config;
   MonitorPipeline pipeline;
-  StepOutcome outcome;
+  Outcome outcome;
 
   explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms) {}
 
@@ -101,8 +101,8 @@ struct Driven {
     transform.transform.rotation.w = 1;
     transforms.setTransform(transform, "test", true);
   }
-  const StepOutcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {},
-                          const std::string& frame = "world") {
+  const Outcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {},
+                      const std::string& frame = "world") {
     pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma, frame), 0, 0});
     EXPECT_TRUE(pipeline.nextOutcome(0, outcome));
     return outcome;
@@ -121,12 +121,12 @@ TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
   EXPECT_EQ(decodeMapMessage(map(1), free.config).known, nullptr) << "nothing is built of it";
   free.giveMap(1);
   free.feed(1, 0.35f);
-  const StepOutcome& outcome = free.feed(1.1, 0.15f);
+  const Outcome& outcome = free.feed(1.1, 0.15f);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
   EXPECT_TRUE(outcome.clear) << "the unknown is no obstacle";
   EXPECT_EQ(outcome.unknown_fraction, 0);
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 0u);
-  EXPECT_FALSE(free.pipeline.effects().plan().running("unknown_space"));
+  EXPECT_FALSE(free.pipeline.effects().plan().running(Effect::UNKNOWN_SPACE));
 }
 
 TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
@@ -136,14 +136,14 @@ TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
   report.giveMap(1);
   report.feed(1, 0.35f);
   // Swept: 2 x 2 columns of voxels, z from 0.1 to 0.4; the upper two of three are unknown.
-  const StepOutcome& outcome = report.feed(1.1, 0.15f);
+  const Outcome& outcome = report.feed(1.1, 0.15f);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
   EXPECT_TRUE(outcome.clear) << "reported, and no obstacle";
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 12u);
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].out, 8u);
   EXPECT_NEAR(outcome.unknown_fraction, 2.0 / 3, 1e-12);
   EXPECT_EQ(report.feed(1.2, 0.12f).unknown_fraction, 0) << "within what is known";
-  EXPECT_TRUE(report.pipeline.effects().plan().running("unknown_space"));
+  EXPECT_TRUE(report.pipeline.effects().plan().running(Effect::UNKNOWN_SPACE));
 }
 
 TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
@@ -194,7 +194,7 @@ TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
   Driven occupied(tree);
   occupied.giveMap(1);
   occupied.feed(1, 0.12f);
-  const StepOutcome& outcome = occupied.feed(1.1, 0.28f);
+  const Outcome& outcome = occupied.feed(1.1, 0.28f);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
   ASSERT_FALSE(outcome.contacts.empty()) << "from the known into the unknown";
   EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-4);
@@ -208,7 +208,7 @@ TEST(UnknownSpace, AnOldMapIsNoMap) {
   old.giveMap(1);
   old.feed(1.8, 0.12f);
   EXPECT_EQ(old.feed(1.9, 0.13f).status, StepStatus::OK);
-  const StepOutcome& late = old.feed(2.1, 0.14f);
+  const Outcome& late = old.feed(2.1, 0.14f);
   EXPECT_EQ(late.status, StepStatus::NO_MAP);
   EXPECT_NE(late.reason.find("octomap_timeout_s"), std::string::npos) << late.reason;
   EXPECT_EQ(late.unknown_fraction, 0) << "of no map nothing is unknown";
@@ -220,11 +220,11 @@ TEST(TrackerNoise, ComesFromThePointField) {
   tree["uncertainty"]["scale"] = 3.0;
   Driven noisy(tree);
   noisy.giveMap(1);
-  EXPECT_TRUE(noisy.pipeline.effects().plan().running("tracker_noise"));
+  EXPECT_TRUE(noisy.pipeline.effects().plan().running(Effect::TRACKER_NOISE));
   noisy.feed(1, 0.17f, {0, 0, 0, 0});
   EXPECT_TRUE(noisy.feed(1.1, 0.15f, {0, 0, 0, 0}).clear) << "15 cm above the map";
   // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
-  const StepOutcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
+  const Outcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
   ASSERT_FALSE(outcome.contacts.empty());
   for (const Contact& c : outcome.contacts) {
     EXPECT_TRUE(std::count(c.vertex.begin(), c.vertex.end(), 2u)) << "feature without the uncertain vertex";
@@ -270,7 +270,7 @@ TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
   learnt.feed(1, 0.25f, {}, "camera");
   learnt.pipeline.reset(StepStatus::RESET);
   learnt.feed(2, 0.35f);
-  const StepOutcome& outcome = learnt.feed(2.1, -0.05f);
+  const Outcome& outcome = learnt.feed(2.1, -0.05f);
   EXPECT_EQ(learnt.pipeline.fixedFrame(), "camera");
   EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map is where it was, 0.35 m below the mesh";
 }
@@ -380,7 +380,7 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   EXPECT_FALSE(scene.outcome.answered);
   EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'lorry' to 'world'", 0), 0u) << scene.outcome.reason;
   EXPECT_NE(scene.outcome.reason.find("body 'table'"), std::string::npos) << scene.outcome.reason;
-  const StepOutcome now = scene.pipeline.checkNow();
+  const Outcome now = scene.pipeline.checkNow();
   EXPECT_FALSE(now.answered);
   EXPECT_EQ(now.status, StepStatus::NO_BODY);
   EXPECT_EQ(now.reason, scene.outcome.reason);
@@ -496,13 +496,13 @@ TEST(DepthImage, TheNewestCloudHoldsWhateverItsTriangles) {
   // Another cloud with other triangles: the plane is 0.15 m higher, half of it.
   scene.feed(1.2, 0.3f);
   scene.see(1.25, {0.15f, 0.15f, 0.15f, 0.15f, LOST, LOST, LOST, LOST});
-  const StepOutcome& higher = scene.feed(1.3, 0.1f);
+  const Outcome& higher = scene.feed(1.3, 0.1f);
   EXPECT_EQ(higher.status, StepStatus::OK) << higher.reason;
   EXPECT_NEAR(higher.earliest_toc, 0.75, 1e-6) << "0.3 to 0.1 meets 0.15";
   // The cloth now hangs over a hole in what is seen.
   scene.see(1.35, {0, LOST, LOST, LOST, LOST, 0, 0, 0});
   scene.feed(1.4, 0.3f);
-  const StepOutcome& hole = scene.feed(1.5, -0.1f);
+  const Outcome& hole = scene.feed(1.5, -0.1f);
   EXPECT_EQ(hole.status, StepStatus::OK) << hole.reason;
   EXPECT_TRUE(hole.contacts.empty());
   EXPECT_EQ(scene.pipeline.monitor().counters(1).processed(), 3u);
@@ -529,7 +529,7 @@ TEST(Weld, AResetWeldsAnew) {
       welded.pipeline.take(0, {"visualization_msgs/Marker", bytes, 0, 0});
       EXPECT_TRUE(welded.pipeline.nextOutcome(0, welded.outcome));
     }
-    return welded.outcome.answered ? (*welded.outcome.topologies)[0]->vertexCount() : 0;
+    return welded.outcome.answered ? welded.outcome.step->bodies[0].topology->vertexCount() : 0;
   };
   EXPECT_EQ(vertices(0), 4u);
   EXPECT_EQ(welded.pipeline.weldChanges(), 0u);

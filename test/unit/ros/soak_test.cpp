@@ -32,7 +32,7 @@ MonitorConfig configuration() {
   body.topic = "cloth";
   config.bodies.push_back(body);
   config.monitor.store.max_vertex_step_m = 0;
-  config.monitor.obstacle_expected = true;
+  config.monitor.detector.obstacle_expected = true;
   config.monitor.look_ahead_s = 0.02;
   return config;
 }
@@ -74,9 +74,9 @@ class Stream {
   StampNs stamp_ns_ = 1000000000;
 };
 
-std::vector<std::uint8_t> answerBytes(const StepOutcome& outcome) {
+std::vector<std::uint8_t> answerBytes(const Outcome& outcome) {
   StepRecording recording;
-  setAnswer(outcome, recording);
+  recording.answer = outcome;
   return test::recordingBytes(recording);
 }
 
@@ -98,7 +98,7 @@ TEST(Soak, FlatMemoryAndTheSameBytesForTheSameStep) {
   for (std::size_t i = 0; i < frames; ++i) {
     const bool known = i % period < 2;
     pipeline.take(0, stream.next(known, i % period == 1));
-    StepOutcome outcome;
+    Outcome outcome;
     ASSERT_TRUE(pipeline.nextOutcome(static_cast<std::int64_t>(i) * FRAME_NS, outcome));
     ASSERT_TRUE(outcome.answered || i == 0) << outcome.reason;
     contacts += outcome.contacts.size();

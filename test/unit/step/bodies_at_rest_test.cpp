@@ -11,12 +11,12 @@ namespace {
 
 /// A cloth that rests (body 0) and one that is waved through it (body 1).
 struct Waved {
-  std::vector<BodySetup> setups;
+  std::vector<Body> setups;
   Positions rest, moving;
   Waved() {
     const auto topology = std::make_shared<const Topology>(Topology::grid(9, 9));
     for (int b = 0; b < 2; ++b) {
-      BodySetup body;
+      Body body;
       body.name = b ? "waved" : "resting";
       body.topology = topology;
       setups.push_back(body);
@@ -33,19 +33,17 @@ struct Waved {
 
 TEST(BodiesAtRest, AreNotRefittedAndAnswersStayTheSame) {
   const Waved scene;
-  Detector kept{DetectorOptions()};
-  kept.setBodies(scene.setups, {&scene.rest, &scene.moving});
+  Detector kept;
   std::uint64_t kept_bodies = 0, contacts = 0;
   for (int k = 0; k < 20; ++k) {
     const Positions t0 = scene.at(k), t1 = scene.at(k + 1);
-    MotionStep step;
-    step.bodies = {{&scene.rest, &scene.rest}, {&t0, &t1}};
-    const StepResult& result = kept.run(step);
+    Step step;
+    step.bodies = {test::moving(scene.setups[0], scene.rest, scene.rest), test::moving(scene.setups[1], t0, t1)};
+    const Outcome result = kept.run(step);
     EXPECT_EQ(result.stats.bodies_kept + result.stats.bodies_refitted, 2u);
     kept_bodies += result.stats.bodies_kept;
-    Detector fresh{DetectorOptions()};
-    fresh.setBodies(scene.setups, {&scene.rest, &scene.moving});
-    const StepResult& expected = fresh.run(step);
+    Detector fresh;
+    const Outcome expected = fresh.run(step);
     ASSERT_EQ(difference(result.contacts, expected.contacts), "") << "step " << k;
     EXPECT_EQ(result.intersections.size(), expected.intersections.size());
     EXPECT_EQ(expected.stats.bodies_kept, 0u) << "a first step has nothing to keep";
@@ -57,16 +55,14 @@ TEST(BodiesAtRest, AreNotRefittedAndAnswersStayTheSame) {
 
 TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
   const Waved scene;
-  Detector detector{DetectorOptions()};
-  detector.setBodies(scene.setups, {&scene.rest, &scene.moving});
+  Detector detector;
   const auto run = [&](double away) {
     Positions t0 = scene.moving, t1 = scene.at(5);
     for (Vec3& p : t0) p.x() += away;
-    MotionStep step;
-    step.bodies = {{&scene.rest, &scene.rest}, {&t0, &t1}};
-    const StepResult result = detector.run(step);
-    Detector fresh{DetectorOptions()};
-    fresh.setBodies(scene.setups, {&scene.rest, &scene.moving});
+    Step step;
+    step.bodies = {test::moving(scene.setups[0], scene.rest, scene.rest), test::moving(scene.setups[1], t0, t1)};
+    const Outcome result = detector.run(step);
+    Detector fresh;
     EXPECT_EQ(difference(result.contacts, fresh.run(step).contacts), "") << away;
     return result.stats.bodies_kept;
   };
@@ -81,12 +77,11 @@ TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
 
 TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
   const Waved scene;
-  Detector detector{DetectorOptions()};
-  detector.setBodies(scene.setups, {&scene.rest, &scene.moving});
+  Detector detector;
   Positions rest = scene.rest;
   const auto run = [&](const Positions& t0, const Positions& t1) {
-    MotionStep step;
-    step.bodies = {{&t0, &t1}, {&scene.moving, &scene.moving}};
+    Step step;
+    step.bodies = {test::moving(scene.setups[0], t0, t1), test::moving(scene.setups[1], scene.moving, scene.moving)};
     return detector.run(step);
   };
   run(rest, rest);
@@ -97,20 +92,20 @@ TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
   EXPECT_EQ(run(rest, moved).stats.bodies_kept, 1u) << "one vertex by one representable number";
   EXPECT_EQ(run(moved, moved).stats.bodies_kept, 1u);
   EXPECT_EQ(run(moved, moved).stats.bodies_kept, 2u);
-  DetectorOptions always;
+  Options always;
   always.keep_bounds = false;
   detector.setOptions(always);
   EXPECT_EQ(run(moved, moved).stats.bodies_kept, 0u) << "by choice";
-  detector.setOptions(DetectorOptions());
+  detector.setOptions(Options());
   run(moved, moved);  // chooses a range that can be kept
   EXPECT_EQ(run(moved, moved).stats.bodies_kept, 2u);
   Positions lost = moved;
   lost[3].x() = std::nan("");
   EXPECT_EQ(run(lost, lost).stats.bodies_kept, 1u);
   EXPECT_EQ(run(lost, lost).stats.unchecked_vertices, 1u) << "and stays unchecked";
-  MotionStep wrong;
+  Step wrong;
   const Positions few(3);
-  wrong.bodies = {{&rest, &rest}, {&few, &few}};
+  wrong.bodies = {test::moving(scene.setups[0], rest, rest), test::moving(scene.setups[1], few, few)};
   EXPECT_THROW(detector.run(wrong), std::invalid_argument);
   EXPECT_EQ(run(rest, rest).stats.bodies_kept, 0u) << "after a refused step nothing is known to be in order";
 }
@@ -118,9 +113,8 @@ TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
 TEST(BodiesApart, AreNotPaired) {
   const auto topology = std::make_shared<const Topology>(Topology::grid(4, 4));
   std::vector<Positions> x(5);
-  std::vector<BodySetup> setups(5);
-  std::vector<const Positions*> at;
-  MotionStep step;
+  std::vector<Body> setups(5);
+  Step step;
   for (std::size_t b = 0; b < 5; ++b) {
     setups[b].name = std::to_string(b);
     setups[b].topology = topology;
@@ -128,20 +122,16 @@ TEST(BodiesApart, AreNotPaired) {
     for (int i = 0; i < 16; ++i)
       x[b].emplace_back(i % 4 + (b < 2 ? 0.0 : 10.0 * static_cast<double>(b)), i / 4, 0.1 * b);
   }
-  for (const Positions& p : x) {
-    at.push_back(&p);
-    step.bodies.push_back({&p, &p});
-  }
   for (Vec3& p : x[1]) p.z() = 0;
-  Detector detector{DetectorOptions()};
-  detector.setBodies(setups, at);
-  const StepResult& result = detector.run(step);
+  for (std::size_t b = 0; b < 5; ++b) step.bodies.push_back(moving(setups[b], x[b], x[b]));
+  Detector detector;
+  const Outcome result = detector.run(step);
   EXPECT_EQ(result.stats.body_pairs, 1u);
   EXPECT_GT(result.stats[Effect::BODY_BODY].in, 0u);
   Positions away = x[1];
   for (Vec3& p : away) p.y() += 50;
-  step.bodies[1] = {&away, &away};
-  const StepResult& none = detector.run(step);
+  step.bodies[1] = moving(setups[1], away, away);
+  const Outcome none = detector.run(step);
   EXPECT_EQ(none.stats.body_pairs, 0u);
   EXPECT_EQ(none.stats[Effect::BODY_BODY].in, 0u);
 }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dccd/detector.h"
+#include "dccd/detect.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -20,17 +20,17 @@ TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
       TestStep step = crumpled(seed, 2, 9);
       for (StepBody& body : step.bodies) body.self_collision = false;
       for (Vec3& x : step.bodies[1].t0) x[2] += 6;
-      DetectorOptions options;
+      Options options;
       options.accuracy.rung = rung;
       if (rung == Accuracy::CONSERVATIVE) options.accuracy.tolerance_m = 0.02;
-      const StepResult full = runOnce(step, options);
+      const Outcome full = runOnce(step, options);
       ASSERT_GT(full.contacts.size(), 10u);
-      ASSERT_GT(full.earliestToc(), 0.01);
+      ASSERT_GT(full.earliest_toc, 0.01);
       options.earliest_only = true;
-      const StepResult first = runOnce(step, options);
+      const Outcome first = runOnce(step, options);
       ASSERT_FALSE(first.contacts.empty());
       EXPECT_LT(first.contacts.size(), full.contacts.size());
-      EXPECT_EQ(first.earliestToc(), full.earliestToc()) << toString(rung) << ", seed " << seed;
+      EXPECT_EQ(first.earliest_toc, full.earliest_toc) << toString(rung) << ", seed " << seed;
       EXPECT_LT(first.stats[Stage::ELEMENTARY].in, full.stats[Stage::ELEMENTARY].in) << "nothing is pruned";
       for (const Contact& c : first.contacts) {
         const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
@@ -54,24 +54,20 @@ TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
     for (Vec3& p : *x) p.z() -= 0.05;
   }
   step.bodies.push_back(near);
-  DetectorOptions options;
+  Options options;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   options.check_start_state = false;
-  std::vector<BodySetup> setups = step.setups();
-  for (BodySetup& setup : setups) setup.self_collision = false;
-  setups[2].separations = {{0, 0.1}};
-  const auto run = [&] {
-    Detector detector(options);
-    detector.setBodies(setups, step.positions());
-    return detector.run(step.motion());
-  };
-  const StepResult full = run();
-  ASSERT_EQ(full.earliestToc(), 0);
+  Step motion = step.motion();
+  for (Body& body : motion.bodies) body.self_collision = false;
+  motion.bodies[2].separations = {{0, 0.1}};
+  const auto run = [&] { return Detector(options).run(motion); };
+  const Outcome full = run();
+  ASSERT_EQ(full.earliest_toc, 0);
   const auto narrow = [](const Contact& c) { return c.toc_lower > 0.49 && c.toc_upper < 0.51; };
   ASSERT_TRUE(std::any_of(full.contacts.begin(), full.contacts.end(), narrow)) << "nothing to take for the first";
   options.earliest_only = true;
-  const StepResult first = run();
-  EXPECT_EQ(first.earliestToc(), 0);
+  const Outcome first = run();
+  EXPECT_EQ(first.earliest_toc, 0);
   // What begins before the narrow one ends may be the first; what begins later is not.
   for (const Contact& c : full.contacts) {
     const bool listed = std::any_of(first.contacts.begin(), first.contacts.end(),
@@ -88,18 +84,18 @@ TEST(DetectorLimits, BudgetKeepsItsWord) {
     if (seed % 2 == 0) {
       for (StepBody& body : step.bodies) body.self_collision = false;
     }
-    DetectorOptions options;
-    const StepResult full = runOnce(step, options);
+    Options options;
+    const Outcome full = runOnce(step, options);
     ASSERT_GT(full.contacts.size(), 10u);
     for (const double budget : {1e-6, 0.5, 2.0}) {
       options.step_budget_ms = budget;
-      const StepResult part = runOnce(step, options);
+      const Outcome part = runOnce(step, options);
       if (budget < 0.01) {
         EXPECT_FALSE(part.complete);
         EXPECT_TRUE(std::isfinite(part.unchecked_toc_lower));
       }
-      EXPECT_EQ(part.complete, !std::isfinite(part.unchecked_toc_lower) && part.stats.undecided == 0);
-      EXPECT_LE(part.earliestToc(), full.earliestToc());
+      EXPECT_EQ(part.allPairs(), !std::isfinite(part.unchecked_toc_lower) && part.stats.undecided == 0);
+      EXPECT_LE(part.earliest_toc, full.earliest_toc);
       for (const Contact& truth : full.contacts) {
         const auto same =
             std::lower_bound(part.contacts.begin(), part.contacts.end(), truth, [](const Contact& a, const Contact& b) {
@@ -120,7 +116,7 @@ TEST(DetectorLimits, BudgetKeepsItsWord) {
     // The bound is as tight as the filter allows: bodies that start apart do not touch at 0.
     if (seed % 2 == 0) {
       options.step_budget_ms = 1e-6;
-      EXPECT_GT(runOnce(step, options).earliestToc(), 0.1);
+      EXPECT_GT(runOnce(step, options).earliest_toc, 0.1);
     }
   }
 }
@@ -128,10 +124,10 @@ TEST(DetectorLimits, BudgetKeepsItsWord) {
 // No pair comes to a test when the deadline is over before the first; what a budget saves in time: scripts/benchmark.
 TEST(DetectorLimits, BudgetEndsTheStep) {
   const TestStep step = crumpled(3, 2, 40);
-  DetectorOptions options;
+  Options options;
   const StepStats full = runOnce(step, options).stats;
   options.step_budget_ms = 1e-6;
-  const StepResult part = runOnce(step, options);
+  const Outcome part = runOnce(step, options);
   EXPECT_FALSE(part.complete);
   EXPECT_EQ(part.start_state, StartState::NOT_CHECKED);
   for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY, Stage::START_STATE}) {
@@ -143,13 +139,13 @@ TEST(DetectorLimits, BudgetEndsTheStep) {
 // Somewhere between no pair and all pairs a budget ends within the contacts.
 TEST(DetectorLimits, ABudgetCutsInTheMiddleOfTheContacts) {
   const TestStep step = crumpled(3, 2, 40);
-  DetectorOptions options;
-  const StepResult full = runOnce(step, options);
+  Options options;
+  const Outcome full = runOnce(step, options);
   std::size_t in_the_middle = 0;
   bool complete = false;
   for (options.step_budget_ms = 0.02; !complete && options.step_budget_ms < 1e5; options.step_budget_ms *= 1.1) {
-    const StepResult part = runOnce(step, options);
-    complete = part.complete;
+    const Outcome part = runOnce(step, options);
+    complete = part.allPairs();
     const auto certain = std::count_if(part.contacts.begin(), part.contacts.end(),
                                        [](const Contact& c) { return c.certainty == Certainty::CERTAIN; });
     in_the_middle += certain > 0 && static_cast<std::size_t>(certain) < full.contacts.size();
@@ -177,8 +173,8 @@ TEST(DetectorLimits, AStartStateThatTheBudgetCutsIsKnownLater) {
   std::vector<Positions> back;
   for (const StepBody& body : steps[0].bodies) back.push_back(body.t0);
   steps[1] = steps[0].continued(back);
-  DetectorOptions options;
-  const StepResult full[2] = {runOnce(steps[0], options), runOnce(steps[1], options)};
+  Options options;
+  const Outcome full[2] = {runOnce(steps[0], options), runOnce(steps[1], options)};
   ASSERT_GT(full[0].contacts.size(), 10u);
   ASSERT_GT(full[1].contacts.size(), 10u);
   ASSERT_GT(full[1].intersections.size(), 10u);
@@ -186,16 +182,13 @@ TEST(DetectorLimits, AStartStateThatTheBudgetCutsIsKnownLater) {
   // On a busy machine the first step with time for the contacts may have had it for the start state as well.
   for (int round = 0; cut_before_the_end == 0 && round < 20; ++round) {
     Detector detector(options);
-    detector.setBodies(steps[0].setups(), steps[0].positions());
     options.step_budget_ms = 0.5;
     bool known = false, was_complete = false;
     std::size_t cut = 0;
     for (std::size_t i = 0; !known && i < 2000; ++i) {
       detector.setOptions(options);
-      MotionStep motion = steps[i % 2].motion();
-      motion.continues = i > 0;
-      const StepResult& part = detector.run(motion);
-      if (!part.complete) {
+      const Outcome part = detector.run(steps[i % 2].motion());
+      if (!part.allPairs()) {
         options.step_budget_ms *= 1.05;
         cut = 0;
         continue;
@@ -217,19 +210,17 @@ TEST(DetectorLimits, AStartStateThatTheBudgetCutsIsKnownLater) {
 // A step that throws leaves positions behind that nothing is known about.
 TEST(DetectorLimits, NothingIsCarriedOverAStepThatThrew) {
   const TestStep step = crumpled(3, 2, 9);
-  const StepResult first = runOnce(step, DetectorOptions());
+  const Outcome first = runOnce(step, Options());
   const std::uint64_t searched = first.stats[Stage::START_STATE].in;
   ASSERT_GT(searched, 0u);
-  Detector detector{DetectorOptions()}, aside{DetectorOptions()};
-  for (Detector* d : {&detector, &aside}) d->setBodies(step.setups(), step.positions());
+  Detector detector, aside;
   std::vector<Positions> back;
   for (const StepBody& body : step.bodies) back.push_back(body.t0);
   const TestStep next = step.continued(back);
-  MotionStep motion = next.motion();
-  motion.predecessor = &detector;
-  const StepResult expected = runOnce(next, DetectorOptions());
+  const Outcome expected = runOnce(next, Options());
   const auto searchedAside = [&] {
-    const StepResult& result = aside.run(motion);
+    aside.history().beginAt(detector.history());
+    const Outcome result = aside.run(next.motion());
     EXPECT_EQ(result.start_state, StartState::INTERSECTING);
     EXPECT_EQ(result.intersections.size(), expected.intersections.size());
     return result.stats[Stage::START_STATE].in > 0;
@@ -237,14 +228,12 @@ TEST(DetectorLimits, NothingIsCarriedOverAStepThatThrew) {
   EXPECT_TRUE(searchedAside()) << "no step yet";
   detector.run(step.motion());
   EXPECT_FALSE(searchedAside());
-  MotionStep uncertain = step.motion();
-  const std::vector<double> radius_m(step.bodies[0].t0.size(), 0.1);
-  uncertain.bodies[0].radius_m = &radius_m;
+  Step uncertain = step.motion();
+  uncertain.bodies[0].radius_m = share(std::vector<double>(step.bodies[0].t0.size(), 0.1));
   EXPECT_THROW(detector.run(uncertain), std::invalid_argument);
+  EXPECT_TRUE(detector.history().isClear());
   EXPECT_TRUE(searchedAside());
-  MotionStep again = step.motion();
-  again.continues = true;
-  EXPECT_EQ(detector.run(again).stats[Stage::START_STATE].in, searched);
+  EXPECT_EQ(detector.run(step.motion()).stats[Stage::START_STATE].in, searched);
 }
 
 // The map's part of a step is cut like the rest: what is listed is true, and of what is not nothing is said.
@@ -256,7 +245,7 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
       leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32768}, 1});
     }
   }
-  BodySetup cloth;
+  Body cloth;
   cloth.name = "cloth";
   cloth.topology = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
   cloth.self_collision = false;
@@ -266,23 +255,20 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
     above.emplace_back(0.9 * x + 0.45, 0.9 * y + 0.35, 1.5 + wave);
     below.emplace_back(0.9 * x + 0.5, 0.9 * y + 0.3, 0.8 - wave);
   }
-  MotionStep step;
-  step.bodies = {{&above, &below}};
-  step.obstacle = VoxelSurface::build(1.0, leaves);
+  Step step = stepOf(cloth, above, below);
+  step.map.surface = VoxelSurface::build(1.0, leaves);
   const auto run = [&](double budget_ms) {
-    DetectorOptions options;
+    Options options;
     options.step_budget_ms = budget_ms;
-    Detector detector(options);
-    detector.setBodies({cloth}, {&above});
-    return detector.run(step);
+    return Detector(options).run(step);
   };
-  const StepResult full = run(0);
+  const Outcome full = run(0);
   EXPECT_TRUE(full.complete);
   ASSERT_GT(full.contacts.size(), 1000u);
   for (const double share : {1e-6, 0.1, 0.3}) {
-    const StepResult part = run(share * full.stats.total_ms);
+    const Outcome part = run(share * full.stats.total_ms);
     // On a busy machine the whole step may have been what took long, and a share of that be enough.
-    if (share > 1e-6 && part.complete) {
+    if (share > 1e-6 && part.allPairs()) {
       EXPECT_EQ(difference(part.contacts, full.contacts), "");
       continue;
     }
@@ -299,10 +285,10 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
 
 TEST(DetectorLimits, ScreenReportsBoundsOfItsPairs) {
   const TestStep step = crossing();
-  DetectorOptions options;
-  const StepResult exact = runOnce(step, options);
+  Options options;
+  const Outcome exact = runOnce(step, options);
   options.accuracy.rung = Accuracy::SCREEN;
-  const StepResult screen = runOnce(step, options);
+  const Outcome screen = runOnce(step, options);
   ASSERT_FALSE(exact.contacts.empty());
   for (const Contact& c : exact.contacts) {
     const auto same = std::find_if(screen.contacts.begin(), screen.contacts.end(), [&](const Contact& s) {

@@ -1,4 +1,4 @@
-#include "dccd/detector.h"
+#include "dccd/detect.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-std::string differenceOfResults(const StepResult& x, const StepResult& y) {
+std::string differenceOfResults(const Outcome& x, const Outcome& y) {
   std::string text = difference(x.contacts, y.contacts);
   if (x.start_state != y.start_state) text += " start states differ";
   if (!std::equal(x.intersections.begin(), x.intersections.end(), y.intersections.begin(), y.intersections.end(),
@@ -31,9 +31,9 @@ TEST(Detector, TheSameForAnyNumberOfThreadsAndAnyTarget) {
   const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
   const TestStep step = crumpled(1, 3, 14);
   for (const Accuracy rung : {Accuracy::SCREEN, Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
-    DetectorOptions options;
+    Options options;
     options.accuracy.rung = rung;
-    const StepResult expected = runOnce(step, options);
+    const Outcome expected = runOnce(step, options);
     ASSERT_GT(expected.contacts.size(), 1000u);
     ASSERT_TRUE(expected.complete);
     EXPECT_TRUE(std::is_sorted(expected.contacts.begin(), expected.contacts.end(), canonicalLess)) << toString(rung);
@@ -41,7 +41,7 @@ TEST(Detector, TheSameForAnyNumberOfThreadsAndAnyTarget) {
     for (const int threads : {1, 2, 3}) {
       options.num_threads = threads;
       forEachSimdTarget([&](const std::string& target) {
-        const StepResult result = runOnce(step, options);
+        const Outcome result = runOnce(step, options);
         EXPECT_EQ(differenceOfResults(result, expected), "")
             << toString(rung) << ", " << threads << " threads, " << target;
         EXPECT_EQ(result.stats.vf_candidates, expected.stats.vf_candidates) << target;
@@ -56,11 +56,11 @@ TEST(Detector, BruteForceFindsTheSame) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const TestStep step = crumpled(seed, 2, 9);
     for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
-      DetectorOptions options;
+      Options options;
       options.accuracy.rung = rung;
-      const StepResult clustered = runOnce(step, options);
+      const Outcome clustered = runOnce(step, options);
       options.broad_phase = BroadPhase::BRUTE_FORCE;
-      const StepResult all = runOnce(step, options);
+      const Outcome all = runOnce(step, options);
       EXPECT_GT(clustered.contacts.size(), 100u);
       EXPECT_LT(clustered.stats.ee_candidates * 3, all.stats.ee_candidates);
       // Whether features that come close without touching are called a contact is up to the bounds before the test.
@@ -76,8 +76,8 @@ TEST(Detector, BruteForceFindsTheSame) {
 
 TEST(Detector, SeveralBodiesAreThePairsOfThem) {
   const TestStep step = crumpled(4, 3, 10);
-  const DetectorOptions options;
-  const StepResult all = runOnce(step, options);
+  const Options options;
+  const Outcome all = runOnce(step, options);
   std::vector<Contact> sum;
   for (std::uint16_t a = 0; a < 3; ++a) {
     TestStep alone;
@@ -116,7 +116,7 @@ TEST(Detector, ManyBodies) {
   }
   const std::size_t each = runOnce(crossing(), {}).contacts.size();
   ASSERT_GT(each, 0u);
-  const StepResult result = runOnce(step, {});
+  const Outcome result = runOnce(step, {});
   EXPECT_EQ(result.contacts.size(), 300 * each);
   EXPECT_TRUE(std::is_sorted(result.contacts.begin(), result.contacts.end(), canonicalLess));
   for (const Contact& c : result.contacts) EXPECT_EQ(c.body[0] / 2, c.body[1] / 2);
@@ -125,7 +125,7 @@ TEST(Detector, ManyBodies) {
 TEST(Detector, EffectsThatAreOffCostNothing) {
   TestStep step = crumpled(5, 2, 8);
   for (StepBody& body : step.bodies) body.self_collision = false;
-  StepResult result = runOnce(step, {});
+  Outcome result = runOnce(step, {});
   EXPECT_EQ(result.stats[Effect::SELF_COLLISION].in, 0u);
   EXPECT_GT(result.stats[Effect::BODY_BODY].in, 0u);
   for (const Contact& c : result.contacts) EXPECT_NE(c.body[0], c.body[1]);
@@ -135,7 +135,7 @@ TEST(Detector, EffectsThatAreOffCostNothing) {
   EXPECT_GT(result.stats[Effect::SELF_COLLISION].in, 0u);
   EXPECT_EQ(result.stats[Effect::BODY_BODY].in, 0u);
   for (const Contact& c : result.contacts) EXPECT_EQ(c.body, (std::array<std::uint16_t, 2>{0, 0}));
-  DetectorOptions options;
+  Options options;
   options.check_start_state = false;
   result = runOnce(step, options);
   EXPECT_EQ(result.start_state, StartState::NOT_CHECKED);
@@ -144,11 +144,11 @@ TEST(Detector, EffectsThatAreOffCostNothing) {
 
 TEST(Detector, VerticesThatAreNotFiniteAreLeftOutAndCounted) {
   TestStep step = crumpled(6, 2, 9);
-  const StepResult whole = runOnce(step, {});
+  const Outcome whole = runOnce(step, {});
   step.bodies[0].t0[10][1] = NOT_A_NUMBER;
   step.bodies[0].t1[40][2] = HUGE_VAL;
   step.bodies[1].t1[3][0] = -HUGE_VAL;
-  const StepResult result = runOnce(step, {});
+  const Outcome result = runOnce(step, {});
   EXPECT_EQ(result.stats.unchecked_vertices, 3u);
   std::size_t faces = 0;
   const auto isBad = [](std::size_t b, Index v) { return b == 0 ? v == 10 || v == 40 : v == 3; };
@@ -175,29 +175,28 @@ TEST(Detector, VerticesComeBack) {
   for (std::size_t v = 0; v < 30; ++v) broken.bodies[0].t1[v][0] = NOT_A_NUMBER;
   TestStep gone = step;
   for (Vec3& x : gone.bodies[0].t0) x[0] = NOT_A_NUMBER;
-  Detector detector{DetectorOptions()};
-  detector.setBodies(step.setups(), step.positions());
-  const StepResult expected = detector.run(step.motion());
-  const StepResult expected_broken = runOnce(broken, {});
+  Detector detector;
+  const Outcome expected = detector.run(step.motion());
+  const Outcome expected_broken = runOnce(broken, {});
   for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(difference(detector.run(broken.motion()).contacts, expected_broken.contacts), "");
-    const StepResult nothing = detector.run(gone.motion());
+    const Outcome nothing = detector.run(gone.motion());
     EXPECT_TRUE(nothing.contacts.empty());
     EXPECT_EQ(nothing.stats.unchecked_vertices, 81u);
     EXPECT_EQ(difference(detector.run(step.motion()).contacts, expected.contacts), "");
   }
   // Also when the first frame, which guides the order in memory, was not finite.
-  Detector other{DetectorOptions()};
-  other.setBodies(step.setups(), gone.positions());
+  Detector other;
+  other.run(gone.motion());
   EXPECT_EQ(difference(other.run(step.motion()).contacts, expected.contacts), "");
 }
 
 TEST(Detector, InactiveVerticesAreLeftOutWithTheirFeatures) {
   TestStep step = crumpled(7, 2, 9);
-  const StepResult whole = runOnce(step, {});
+  const Outcome whole = runOnce(step, {});
   step.bodies[0].vertex_active.assign(81, 1);
   for (std::size_t v = 0; v < 81; v += 5) step.bodies[0].vertex_active[v] = 0;
-  const StepResult result = runOnce(step, {});
+  const Outcome result = runOnce(step, {});
   std::vector<Contact> expected;
   for (const Contact& c : whole.contacts) {
     const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
@@ -227,45 +226,45 @@ void expectContains(const std::string& text, const std::vector<std::string>& par
 
 TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
   const TestStep step = crossing();
-  Detector detector{DetectorOptions()};
-  detector.setBodies(step.setups(), step.positions());
-  const Positions two(2, Vec3::Zero());
-  MotionStep motion = step.motion();
-  motion.bodies[1].t1 = &two;
-  expectContains(refusal([&] { detector.run(motion); }), {"body_1", "3", "2"});
+  Detector detector;
+  const auto refused = [&](const Step& motion, const Options& options = {}) {
+    return refusal([&] { Detector(options).run(motion); }) + refusal([&] {
+             detector.setOptions(options);
+             detector.run(motion);
+           });
+  };
+  Step motion = step.motion();
+  motion.bodies[1].t1 = share(Positions(2, Vec3::Zero()));
+  expectContains(refused(motion), {"body_1", "3", "2"});
   motion = step.motion();
   motion.bodies[0].t0 = nullptr;
-  expectContains(refusal([&] { detector.run(motion); }), {"body_0", "3", "0"});
+  expectContains(refused(motion), {"body_0", "3", "0"});
   motion = step.motion();
-  motion.bodies.pop_back();
-  expectContains(refusal([&] { detector.run(motion); }), {"1 bodies", "2"});
-  expectContains(refusal([&] { detector.setBodies(step.setups(), {&two, &two}); }), {"body_0", "3"});
-  expectContains(refusal([&] { detector.setBodies(step.setups(), {&two}); }), {"2 bodies", "1 "});
-  auto setups = step.setups();
-  setups[1].topology = nullptr;
-  expectContains(refusal([&] { detector.setBodies(setups, step.positions()); }), {"body_1", "topology"});
-  setups = step.setups();
-  setups[0].vertex_active = {1, 1};
-  expectContains(refusal([&] { detector.setBodies(setups, step.positions()); }), {"body_0", "2", "3"});
+  motion.bodies[1].topology = nullptr;
+  expectContains(refused(motion), {"body_1", "topology"});
+  motion = step.motion();
+  motion.bodies[0].vertex_mask = {7};
+  expectContains(refused(motion), {"body_0", "7", "3"});
   for (const double separation : {-1.0, NOT_A_NUMBER, HUGE_VAL}) {
-    setups = step.setups();
-    setups[1].minimum_separation_m = separation;
-    EXPECT_NE(refusal([&] { detector.setBodies(setups, step.positions()); }), "accepted");
+    motion = step.motion();
+    motion.bodies[1].minimum_separation_m = separation;
+    EXPECT_EQ(refused(motion).find("accepted"), std::string::npos) << separation;
   }
-  setups[1].minimum_separation_m = 0.1;
-  expectContains(refusal([&] { detector.setBodies(setups, step.positions()); }), {"exact", "0.1", "conservative"});
-  DetectorOptions options;
+  motion.bodies[1].minimum_separation_m = 0.1;
+  expectContains(refused(motion), {"exact", "0.1", "conservative"});
+  Options options;
   options.num_threads = 0;
-  expectContains(refusal([&] { Detector d(options); }), {"num_threads", "0"});
-  options = DetectorOptions();
+  expectContains(refused(step.motion(), options), {"num_threads", "0"});
+  options = Options();
   options.step_budget_ms = -1;
-  expectContains(refusal([&] { Detector d(options); }), {"step_budget_ms", "-1"});
+  expectContains(refused(step.motion(), options), {"step_budget_ms", "-1"});
+  detector.setOptions(Options());
   // And goes on as if nothing had happened.
   EXPECT_EQ(difference(detector.run(step.motion()).contacts, runOnce(step, {}).contacts), "");
 }
 
 TEST(Detector, KnownTimesOfContact) {
-  const StepResult result = runOnce(crossing(), {});
+  const Outcome result = runOnce(crossing(), {});
   // The corner (1,1,1) moves down by 2 and meets the plane z = 0 half way.
   ASSERT_EQ(result.contacts[0].kind, PairKind::VERTEX_FACE);
   const auto corner = std::find_if(result.contacts.begin(), result.contacts.end(), [](const Contact& c) {
@@ -276,7 +275,7 @@ TEST(Detector, KnownTimesOfContact) {
   EXPECT_EQ(corner->toc_lower, 0.5);
   EXPECT_EQ(corner->toc_upper, 0.5 + 0x1p-32);
   EXPECT_EQ(result.start_state, StartState::CLEAR);
-  EXPECT_EQ(result.earliestToc(), 0.5);
+  EXPECT_EQ(result.earliest_toc, 0.5);
   EXPECT_EQ(result.unchecked_toc_lower, std::numeric_limits<double>::infinity());
 }
 
@@ -284,14 +283,12 @@ TEST(Detector, KnownTimesOfContact) {
 TEST(Detector, ContactsWithAMapAreInOrder) {
   TestStep step = crossing();
   for (StepBody& body : step.bodies) body.against_bodies = false;
-  MotionStep motion = step.motion();
+  Step motion = step.motion();
   std::vector<OccupiedLeaf> leaves;
   for (std::uint16_t x = 0; x < 4; ++x)
     leaves.push_back({VoxelKey{static_cast<std::uint16_t>(32768 + x), 32768, 32768}, 1});
-  motion.obstacle = VoxelSurface::build(1.0, leaves);
-  Detector detector{DetectorOptions()};
-  detector.setBodies(step.setups(), step.positions());
-  const StepResult& result = detector.run(motion);
+  motion.map.surface = VoxelSurface::build(1.0, leaves);
+  const Outcome result = Detector().run(motion);
   std::set<std::uint16_t> bodies;
   std::set<PairKind> kinds;
   for (const Contact& c : result.contacts) {
@@ -302,7 +299,7 @@ TEST(Detector, ContactsWithAMapAreInOrder) {
   EXPECT_EQ(bodies.size(), 2u);
   EXPECT_GT(kinds.size(), 1u);
   EXPECT_TRUE(std::is_sorted(result.contacts.begin(), result.contacts.end(), canonicalLess));
-  EXPECT_EQ(result.stats[Effect::OBSTACLE].out, result.contacts.size());
+  EXPECT_EQ(result.stats[Effect::OCTOMAP].out, result.contacts.size());
 }
 
 TEST(Detector, NothingToDo) {
@@ -310,10 +307,10 @@ TEST(Detector, NothingToDo) {
   EXPECT_TRUE(runOnce(step, {}).contacts.empty()) << "no bodies";
   StepBody empty;
   step.bodies = {empty, empty};
-  const StepResult result = runOnce(step, {});
+  const Outcome result = runOnce(step, {});
   EXPECT_TRUE(result.contacts.empty());
   EXPECT_EQ(result.start_state, StartState::CLEAR);
-  EXPECT_EQ(result.earliestToc(), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(result.earliest_toc, std::numeric_limits<double>::infinity());
   StepBody loose;  // vertices without a feature
   loose.topology = Topology::fromTriangles(5, {});
   loose.t0 = loose.t1 = Positions(5, Vec3::Zero());
@@ -326,17 +323,12 @@ TEST(Detector, MemoryIsFlat) {
   const TestStep step = crumpled(8, 2, 12);
   const TestStep back = step.continued({step.bodies[0].t0, step.bodies[1].t0});
   for (const int threads : {1, 2}) {
-    DetectorOptions options;
+    Options options;
     options.num_threads = threads;
     Detector detector(options);
-    detector.setBodies(step.setups(), step.positions());
     const auto round = [&] {
-      MotionStep motion = step.motion();
-      motion.continues = true;
-      detector.run(motion);
-      motion = back.motion();
-      motion.continues = true;
-      detector.run(motion);
+      detector.run(step.motion());
+      detector.run(back.motion());
     };
     for (int i = 0; i < 10; ++i) round();
     const std::size_t before = heapInUse();

@@ -7,8 +7,8 @@
 namespace dccd {
 namespace {
 
-EffectBody body(const std::string& name, bool rigid = false) {
-  EffectBody out;
+Body body(const std::string& name, bool rigid = false) {
+  Body out;
   out.name = name;
   out.rigid = rigid;
   return out;
@@ -30,15 +30,14 @@ std::string reason(const EffectPlan& plan, const std::string& name) {
 
 TEST(EffectPlan, AutoTakesWhatTheSceneCallsFor) {
   const EffectPlan plan(cloth(), {});
-  EXPECT_TRUE(plan.running("self_collision"));
-  EXPECT_TRUE(plan.running("start_state"));
-  EXPECT_FALSE(plan.running("body_body"));
-  EXPECT_FALSE(plan.running("octomap"));
-  EXPECT_FALSE(plan.running("minimum_separation"));
-  EXPECT_FALSE(plan.running("look_ahead"));
+  EXPECT_TRUE(plan.running(Effect::SELF_COLLISION));
+  EXPECT_TRUE(plan.running(Effect::START_STATE));
+  EXPECT_FALSE(plan.running(Effect::BODY_BODY));
+  EXPECT_FALSE(plan.running(Effect::OCTOMAP));
+  EXPECT_FALSE(plan.running(Effect::MINIMUM_SEPARATION));
+  EXPECT_FALSE(plan.running(Effect::LOOK_AHEAD));
   EXPECT_EQ(reason(plan, "body_body"), "there is only one body");
   for (const EffectDecision& decision : plan.decisions()) EXPECT_FALSE(decision.reason.empty()) << decision.name;
-  EXPECT_THROW(plan.running("wind"), std::invalid_argument);
 }
 
 TEST(EffectPlan, ChangesWithTheScene) {
@@ -48,12 +47,10 @@ TEST(EffectPlan, ChangesWithTheScene) {
   scene.map_seen = true;
   const EffectPlan after(scene, {});
   EXPECT_NE(before, after);
-  EXPECT_TRUE(after.running("octomap"));
-  EXPECT_TRUE(after.running("octomap_corner_face"));
-  scene.bodies[0].topology_known = true;
-  scene.bodies[0].has_faces = false;
+  EXPECT_TRUE(after.running(Effect::OCTOMAP));
+  EXPECT_EQ(reason(after, "octomap_corner_face"), "a body has faces");
+  scene.bodies[0].topology = share(Topology::polyline(3));
   const EffectPlan rope(scene, {});
-  EXPECT_FALSE(rope.running("octomap_corner_face"));
   EXPECT_EQ(reason(rope, "octomap_corner_face"), "a polyline has no faces");
 }
 
@@ -63,27 +60,47 @@ TEST(EffectPlan, RigidBodiesMeetOthersOnly) {
   EXPECT_EQ(reason(EffectPlan(scene, {}), "self_collision"), "the body is rigid");
   scene.bodies.push_back(body("cloth"));
   const EffectPlan both(scene, {});
-  EXPECT_TRUE(both.running("self_collision"));
-  EXPECT_TRUE(both.running("body_body"));
-  EXPECT_TRUE(both.running("rigid_bodies"));
+  EXPECT_TRUE(both.running(Effect::SELF_COLLISION));
+  EXPECT_TRUE(both.running(Effect::BODY_BODY));
+  EXPECT_TRUE(both.running(Effect::RIGID_BODIES));
 }
 
 TEST(EffectPlan, OffIsOffAndOnNeedsItsReason) {
   EffectScene scene = cloth();
   scene.map_seen = true;
-  const EffectPlan plan(scene, {{"octomap", EffectSetting::OFF}, {"self_collision", EffectSetting::OFF}});
-  EXPECT_FALSE(plan.running("octomap"));
-  EXPECT_FALSE(plan.running("self_collision"));
+  const EffectPlan plan(scene, {{Effect::OCTOMAP, EffectSetting::OFF}, {Effect::SELF_COLLISION, EffectSetting::OFF}});
+  EXPECT_FALSE(plan.running(Effect::OCTOMAP));
+  EXPECT_FALSE(plan.running(Effect::SELF_COLLISION));
   scene.map_seen = false;
-  EXPECT_TRUE(EffectPlan(scene, {{"octomap", EffectSetting::ON}}).running("octomap")) << "so a missing map is told";
-  for (const char* name : {"body_body", "rigid_bodies", "unknown_space", "minimum_separation", "look_ahead"}) {
+  EXPECT_TRUE(EffectPlan(scene, {{Effect::OCTOMAP, EffectSetting::ON}}).running(Effect::OCTOMAP))
+      << "so a missing map is told";
+  for (const Effect effect : {Effect::BODY_BODY, Effect::RIGID_BODIES, Effect::UNKNOWN_SPACE,
+                              Effect::MINIMUM_SEPARATION, Effect::LOOK_AHEAD}) {
     try {
-      EffectPlan impossible(scene, {{name, EffectSetting::ON}});
-      ADD_FAILURE() << name;
+      EffectPlan impossible(scene, {{effect, EffectSetting::ON}});
+      ADD_FAILURE() << toString(effect);
     } catch (const std::invalid_argument& error) {
-      EXPECT_NE(std::string(error.what()).find(std::string("effects/") + name), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(std::string("effects/") + toString(effect)), std::string::npos)
+          << error.what();
     }
   }
+}
+
+// What bodies say of themselves counts: the flow asks the same.
+TEST(EffectPlan, BodiesThatMeetNothingRunNothing) {
+  EffectScene scene = cloth();
+  scene.map_seen = true;
+  scene.bodies = {body("cloth"), body("table")};
+  for (Body& one : scene.bodies) one.against_bodies = one.against_obstacle = one.self_collision = false;
+  const EffectPlan none(scene, {});
+  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP}) {
+    EXPECT_FALSE(none.running(effect)) << toString(effect);
+  }
+  EXPECT_EQ(reason(none, "octomap"), "against_obstacle is false for every body");
+  scene.bodies[0].against_bodies = true;
+  EXPECT_FALSE(EffectPlan(scene, {}).running(Effect::BODY_BODY)) << "one alone has nobody to meet";
+  scene.bodies[1].against_bodies = true;
+  EXPECT_TRUE(EffectPlan(scene, {}).running(Effect::BODY_BODY));
 }
 
 TEST(EffectPlan, LinesSayOneThingEach) {

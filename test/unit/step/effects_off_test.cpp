@@ -7,7 +7,7 @@
 #include <functional>
 #include <new>
 
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 
 namespace {
 std::atomic<std::uint64_t> allocations{0};
@@ -32,10 +32,10 @@ namespace {
 
 struct Scene {
   MonitorOptions options;
-  MonitorBody body;
+  Body body;
   bool second = false;  ///< another body, turning through the first; with body's own settings
   bool second_is_rigid = false;
-  MonitorMap map;
+  ObstacleMap map;
   std::vector<double> radius_m;
   bool predicts = false;
 };
@@ -68,14 +68,14 @@ Cost costOf(const Scene& scene) {
     }
     frames.push_back(std::move(frame));
   }
-  std::vector<MonitorBody> bodies{scene.body};
+  std::vector<Body> bodies{scene.body};
   if (scene.second) {
     bodies.push_back(scene.body);
     bodies.back().name = "other";
     bodies.back().rigid = scene.second_is_rigid;
   }
   Cost cost;
-  StepOutcome outcome;
+  Outcome outcome;
   const std::uint64_t before = allocations;
   Monitor monitor(scene.options, bodies);
   if (scene.map.surface) monitor.setMap(scene.map);
@@ -118,7 +118,7 @@ std::vector<Case> cases() {
   const auto surface = VoxelSurface::build(0.05, {{{32768, 32768, 32768}, 1}, {{32770, 32770, 32768}, 2}});
   return {
       {Effect::SELF_COLLISION, [](Scene&) {}, [](Scene& s) { s.body.self_collision = true; }},
-      {Effect::OBSTACLE, [=](Scene& s) { s.map.surface = surface; }, [](Scene& s) { s.body.against_obstacle = true; }},
+      {Effect::OCTOMAP, [=](Scene& s) { s.map.surface = surface; }, [](Scene& s) { s.body.against_obstacle = true; }},
       {Effect::BODY_BODY, [](Scene& s) { s.second = true; }, [](Scene& s) { s.body.against_bodies = true; }},
       {Effect::RIGID_BODIES, [](Scene& s) { s.second = s.body.against_bodies = true; },
        [](Scene& s) { s.second_is_rigid = true; }},
@@ -155,7 +155,7 @@ TEST(EffectsOff, AllocateNothingAndShowZeros) {
     EXPECT_GT(with.stats[one.effect].in, 0u) << toString(one.effect) << " can be told from off";
     EXPECT_GT(with.allocations, without.allocations) << toString(one.effect);
     // Where only the effect itself was left out, the scene costs what an empty one does.
-    if (one.effect == Effect::SELF_COLLISION || one.effect == Effect::OBSTACLE) {
+    if (one.effect == Effect::SELF_COLLISION || one.effect == Effect::OCTOMAP) {
       EXPECT_EQ(without.allocations, nothing.allocations) << toString(one.effect);
     }
   }

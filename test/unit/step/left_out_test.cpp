@@ -6,7 +6,7 @@
 #include <limits>
 #include <set>
 
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 #include "oracle/exact_distance.h"
 #include "support/step_support.h"
 
@@ -47,14 +47,14 @@ struct Layers {
   }
 };
 
-DetectorOptions conservative() {
-  DetectorOptions options;
+Options conservative() {
+  Options options;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   return options;
 }
 
-BodySetup felt(const Layers& layers, const Positions* reference) {
-  BodySetup body;
+Body felt(const Layers& layers, const Positions* reference) {
+  Body body;
   body.name = "felt";
   body.topology = layers.topology;
   body.minimum_separation_m = SEPARATION_M;
@@ -62,11 +62,18 @@ BodySetup felt(const Layers& layers, const Positions* reference) {
   return body;
 }
 
-StepResult run(Detector& detector, const Positions& t0, const Positions& t1) {
-  MotionStep step;
-  step.bodies = {{&t0, &t1}};
-  return detector.run(step);
-}
+/// A detector of one body.
+struct Felt {
+  Body body;
+  Detector detector{conservative()};
+  Felt(const Body& of, const Positions& rest) : body(of) { run(rest, rest); }
+  /// As a first step: at rest nothing of a step that goes on would be tested.
+  Outcome run(const Positions& t0, const Positions& t1) {
+    detector.history().clear();
+    return detector.run(stepOf(body, t0, t1));
+  }
+  const std::vector<LeftOutPair>& leftOut() { return detector.history().leftOut(); }
+};
 
 using Pair = std::pair<PairKind, std::array<Index, 4>>;
 
@@ -100,8 +107,7 @@ std::set<Pair> pairsWithin(const Topology& topology, const Positions& x, double 
 TEST(LeftOut, IsExactlyWhatIsCloserInTheReferenceFrame) {
   const Layers layers;
   const Positions apart = layers.at(0.03);
-  Detector detector(conservative());
-  detector.setBodies({felt(layers, &apart)}, {&apart});
+  Felt detector(felt(layers, &apart), apart);
   std::set<Pair> listed;
   for (const LeftOutPair& pair : detector.leftOut()) {
     EXPECT_EQ(pair.body, 0u);
@@ -113,30 +119,28 @@ TEST(LeftOut, IsExactlyWhatIsCloserInTheReferenceFrame) {
   for (const Pair& pair : sure) EXPECT_TRUE(listed.count(pair));
   for (const Pair& pair : listed) EXPECT_TRUE(possible.count(pair));
 
-  const StepResult rest = run(detector, apart, apart);
+  const Outcome rest = detector.run(apart, apart);
   EXPECT_TRUE(rest.contacts.empty()) << "neighbours are no contacts";
   EXPECT_EQ(rest.stats.left_out_listed, listed.size());
   EXPECT_GT(rest.stats.left_out_met, 0u);
   EXPECT_EQ(rest.stats[Effect::MINIMUM_SEPARATION].out, 0u);
 
-  Detector without(conservative());
-  without.setBodies({felt(layers, nullptr)}, {&apart});
-  EXPECT_EQ(run(without, apart, apart).contacts.size(), listed.size()) << "else they would all be contacts";
+  Felt without(felt(layers, nullptr), apart);
+  EXPECT_EQ(without.run(apart, apart).contacts.size(), listed.size()) << "else they would all be contacts";
   EXPECT_TRUE(without.leftOut().empty());
 }
 
 TEST(LeftOut, LayersThatComeNearAreFoundAllTheSame) {
   const Layers layers;
   const Positions apart = layers.at(0.03), near = layers.at(0.01);
-  Detector detector(conservative());
-  detector.setBodies({felt(layers, &apart)}, {&apart});
-  const StepResult result = run(detector, apart, near);
+  Felt detector(felt(layers, &apart), apart);
+  const Outcome result = detector.run(apart, near);
   ASSERT_FALSE(result.contacts.empty());
   for (const Contact& c : result.contacts) {
     const bool first_below = c.vertex[0] < SIZE * SIZE, last_below = c.vertex[3] < SIZE * SIZE;
     EXPECT_NE(first_below, last_below) << "between the layers only";
   }
-  EXPECT_NEAR(result.earliestToc(), (0.03 - SEPARATION_M) / 0.02, 1e-3);
+  EXPECT_NEAR(result.earliest_toc, (0.03 - SEPARATION_M) / 0.02, 1e-3);
   EXPECT_GT(result.stats[Effect::MINIMUM_SEPARATION].out, 0u);
   EXPECT_GT(result.stats[Effect::MINIMUM_SEPARATION].in, result.stats[Effect::MINIMUM_SEPARATION].out);
 }
@@ -147,44 +151,44 @@ TEST(LeftOut, TrueContactIsNotLost) {
   const Positions apart{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 0.1}, {0.25, 0.25, 1}, {0.5, 0.25, 1}};
   Positions through = apart;
   through[3].z() = -0.1;
-  BodySetup body;
+  Body body;
   body.name = "pair";
   body.topology = topology;
   body.minimum_separation_m = 0.2;
   body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{apart, {}});
-  Detector detector(conservative());
-  detector.setBodies({body}, {&apart});
+  Felt detector(body, apart);
   EXPECT_GT(detector.leftOut().size(), 0u);
-  EXPECT_TRUE(run(detector, apart, apart).contacts.empty());
-  const StepResult result = run(detector, apart, through);
+  EXPECT_TRUE(detector.run(apart, apart).contacts.empty());
+  const Outcome result = detector.run(apart, through);
   ASSERT_FALSE(result.contacts.empty());
-  EXPECT_LE(result.earliestToc(), 0.5);
-  EXPECT_NEAR(result.earliestToc(), 0.5, 1e-4);
+  EXPECT_LE(result.earliest_toc, 0.5);
+  EXPECT_NEAR(result.earliest_toc, 0.5, 1e-4);
 }
 
 TEST(LeftOut, SeparationsOfPairsReplaceTheBodies) {
   const Layers layers;
   const Positions apart = layers.at(0.03), near = layers.at(0.01);
-  BodySetup body = felt(layers, &apart);
+  Body body = felt(layers, &apart);
   body.separations = {{0, 0.0}};  // from itself: none
-  Detector detector(conservative());
-  detector.setBodies({body}, {&apart});
+  Felt detector(body, apart);
   EXPECT_TRUE(detector.leftOut().empty());
-  EXPECT_TRUE(run(detector, apart, near).contacts.empty());
+  EXPECT_TRUE(detector.run(apart, near).contacts.empty());
   const Positions other = layers.at(5);
-  BodySetup second = felt(layers, nullptr);
+  Body second = felt(layers, nullptr);
   second.separations = {{0, 6.0}};
   second.self_collision = body.self_collision = false;
-  detector.setBodies({body, second}, {&apart, &other});
-  MotionStep step;
-  step.bodies = {{&apart, &apart}, {&other, &other}};
-  EXPECT_FALSE(detector.run(step).contacts.empty()) << "5 m apart, 6 m asked for by the other body";
+  const auto both = [&] {
+    Step step = stepOf(body, apart, apart);
+    step.bodies.push_back(moving(second, other, other));
+    return detector.detector.run(step);
+  };
+  EXPECT_FALSE(both().contacts.empty()) << "5 m apart, 6 m asked for by the other body";
   second.separations = {{7, 1.0}};
-  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  EXPECT_THROW(both(), std::invalid_argument);
   second.separations = {{0, -1.0}};
-  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  EXPECT_THROW(both(), std::invalid_argument);
   second.separations = {{0, std::numeric_limits<double>::quiet_NaN()}};
-  EXPECT_THROW(detector.setBodies({body, second}, {&apart, &other}), std::invalid_argument);
+  EXPECT_THROW(both(), std::invalid_argument);
 }
 
 /// A monitor of one body of two layers, fed with frames 0.1 s apart.
@@ -195,11 +199,11 @@ struct MonitoredFelt {
 
   explicit MonitoredFelt(double separation_m) : monitor(options(), {body(separation_m)}) {}
 
-  StepOutcome feed(double gap, std::vector<double> radius_m = {}) {
+  Outcome feed(double gap, std::vector<double> radius_m = {}) {
     stamp_ns += 100000000;
     monitor.push(
         0, {stamp_ns, layers.topology, layers.at(gap), false, Eigen::Isometry3d::Identity(), std::move(radius_m)}, 0);
-    StepOutcome outcome;
+    Outcome outcome;
     EXPECT_TRUE(monitor.next(0, outcome));
     return outcome;
   }
@@ -212,8 +216,8 @@ struct MonitoredFelt {
     options.look_ahead_s = 0.1;
     return options;
   }
-  static MonitorBody body(double separation_m) {
-    MonitorBody body;
+  static Body body(double separation_m) {
+    Body body;
     body.name = "felt";
     body.minimum_separation_m = separation_m;
     return body;
@@ -247,7 +251,7 @@ TEST(LeftOut, AQuestionChangesNoReference) {
   const Layers layers;
   MonitorOptions options;
   options.detector = conservative();
-  MonitorBody felt, other;
+  Body felt, other;
   felt.name = "felt";
   felt.minimum_separation_m = SEPARATION_M;
   other.name = "other";
@@ -261,7 +265,7 @@ TEST(LeftOut, AQuestionChangesNoReference) {
       if (questions) monitor.checkNow();
     };
     std::array<std::size_t, 2> contacts{};
-    StepOutcome outcome;
+    Outcome outcome;
     const auto step = [&](std::size_t i, StampNs stamp_ns) {
       EXPECT_FALSE(monitor.next(0, outcome)) << "the step waits for the other body";
       push(1, stamp_ns, triangle, far);

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "dccd/detector.h"
+#include "dccd/detect.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -15,15 +15,14 @@ struct Radii {
   std::vector<std::vector<double>> of_body;  // empty: none
 };
 
-StepResult run(const TestStep& step, const Radii& radii, BroadPhase broad_phase) {
-  DetectorOptions options;
+Outcome run(const TestStep& step, const Radii& radii, BroadPhase broad_phase) {
+  Options options;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   options.broad_phase = broad_phase;
   Detector detector(options);
-  detector.setBodies(step.setups(), step.positions());
-  MotionStep motion = step.motion();
+  Step motion = step.motion();
   for (std::size_t b = 0; b < radii.of_body.size(); ++b) {
-    if (!radii.of_body[b].empty()) motion.bodies[b].radius_m = &radii.of_body[b];
+    if (!radii.of_body[b].empty()) motion.bodies[b].radius_m = share(radii.of_body[b]);
   }
   return detector.run(motion);
 }
@@ -50,9 +49,9 @@ TEST(SeparationBounds, RadiusOfOneBodyLargerThanTheScene) {
       Radii radii;
       radii.of_body.resize(2);
       radii.of_body[with].assign(step.bodies[with].t0.size(), radius_m);
-      const StepResult result = run(step, radii, BroadPhase::CLUSTERED);
+      const Outcome result = run(step, radii, BroadPhase::CLUSTERED);
       EXPECT_EQ(result.contacts.empty(), radius_m < 0.02) << "radius " << radius_m << " m of body " << with;
-      EXPECT_EQ(result.earliestToc() == 0, radius_m >= 0.02);
+      EXPECT_EQ(result.earliest_toc == 0, radius_m >= 0.02);
       EXPECT_EQ(difference(result.contacts, run(step, radii, BroadPhase::BRUTE_FORCE).contacts), "")
           << "radius " << radius_m << " m of body " << with;
     }
@@ -76,7 +75,7 @@ TEST(SeparationBounds, FeatureReachesFartherThanItsVertices) {
   Radii radii;
   radii.of_body = {std::vector<double>(17, 0.0), {}};
   radii.of_body[0][15] = 0.15;  // at x = 1.5; the edge from there to x = 1.6 is 0.1 from the bar
-  const StepResult result = run(step, radii, BroadPhase::CLUSTERED);
+  const Outcome result = run(step, radii, BroadPhase::CLUSTERED);
   ASSERT_EQ(result.contacts.size(), 1u);
   EXPECT_EQ(result.contacts[0].kind, PairKind::EDGE_EDGE);
   EXPECT_EQ(result.contacts[0].vertex, (std::array<Index, 4>{15, 16, 0, 1}));
@@ -100,7 +99,7 @@ TEST(SeparationBounds, BodyWithoutAnyPositionFarFromTheOthers) {
       for (Vec3& p : *x) p.setConstant(NONE);
     }
     far.bodies.push_back(lost);
-    const StepResult result = runOnce(far, {});
+    const Outcome result = runOnce(far, {});
     EXPECT_EQ(result.contacts.size(), seen);
     EXPECT_GT(seen, 0u);
     EXPECT_EQ(result.stats.unchecked_vertices, 3u);

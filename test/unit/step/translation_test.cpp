@@ -3,9 +3,10 @@
 
 #include <cmath>
 
-#include "dccd/detector.h"
+#include "support/detector.h"
 
 namespace dccd {
+namespace test {
 namespace {
 
 struct Fixture : testing::Test {
@@ -15,27 +16,22 @@ struct Fixture : testing::Test {
   std::shared_ptr<const Topology> topology =
       std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
   Detector detector{[] {
-    DetectorOptions o;
+    Options o;
     o.check_start_state = false;
     return o;
   }()};
 
-  void SetUp() override {
-    BodySetup body;
-    body.name = "cloth";
-    body.topology = topology;
-    detector.setBodies({body}, {&rest});
-  }
   Positions moved(const Vec3& by) const {
     Positions p = rest;
     for (Vec3& v : p) v += by;
     return p;
   }
   std::uint64_t selfPairs(const Positions& t0, const Positions& t1, bool continues) {
-    MotionStep step;
-    step.bodies = {{&t0, &t1}};
-    step.continues = continues;
-    const StepResult& result = detector.run(step);
+    Body body;
+    body.name = "cloth";
+    body.topology = topology;
+    if (!continues) detector.history().clear();
+    const Outcome result = detector.run(stepOf(body, t0, t1));
     EXPECT_TRUE(result.contacts.empty());
     return result.stats[Effect::SELF_COLLISION].in;
   }
@@ -69,18 +65,16 @@ TEST(Translation, ABodyThatTouchedItselfIsTestedAgain) {
   // Two triangles that coincide in a point for ever.
   const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
   const Positions x{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 0}, {1, 1, 1}, {0, 1, 1}};
-  BodySetup body;
+  Body body;
   body.name = "pair";
   body.topology = topology;
-  Detector detector{DetectorOptions{}};
-  detector.setBodies({body}, {&x});
-  MotionStep step;
-  step.bodies = {{&x, &x}};
+  Detector detector;
+  const Step step = stepOf(body, x, x);
   const std::size_t first = detector.run(step).contacts.size();
   ASSERT_GT(first, 0u);
-  step.continues = true;
   EXPECT_EQ(detector.run(step).contacts.size(), first);
 }
 
 }  // namespace
+}  // namespace test
 }  // namespace dccd

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "dccd/monitor.h"
-#include "step/step_runner.h"
+#include "dccd/stream.h"
+#include "step/parts.h"
 
 namespace dccd {
 namespace {
@@ -40,8 +40,8 @@ MonitorOptions loose() {
 }
 
 /// The clock body and a rigid bar.
-std::vector<MonitorBody> clockAndBar() {
-  std::vector<MonitorBody> bodies(2);
+std::vector<Body> clockAndBar() {
+  std::vector<Body> bodies(2);
   bodies[0].name = "clock";
   bodies[1].name = "bar";
   bodies[1].rigid = true;
@@ -49,39 +49,40 @@ std::vector<MonitorBody> clockAndBar() {
 }
 
 /// The outcome of the step to this frame of the clock body, the bar having come to `angle`.
-StepOutcome step(Monitor& monitor, MeshFrame clock, double angle) {
+Outcome step(Monitor& monitor, MeshFrame clock, double angle) {
   const StampNs stamp_ns = clock.stamp_ns;
   monitor.push(1, bar(stamp_ns, angle), NOW);
   monitor.push(0, std::move(clock), NOW);
-  StepOutcome outcome;
+  Outcome outcome;
   EXPECT_TRUE(monitor.next(NOW, outcome));
   return outcome;
 }
 
 TEST(TurningBody, IsCutIntoAsManyPartsAsTheToleranceAsksFor) {
-  StepInput input;
-  input.resize(1);
-  input.t0[0] = {{0, 0, 0}, {1, 0, 0}, {1, 0.1, 0}};
-  input.rigid[0] = 1;
-  input.pose_t1[0].linear() = Eigen::AngleAxisd(3.1, Vec3::UnitY()).toRotationMatrix();
-  const std::size_t parts = requiredSubsteps(input, 1e-3);
+  Step turning;
+  turning.bodies.resize(1);
+  Body& body = turning.bodies[0];
+  body.t0 = share(Positions{{0, 0, 0}, {1, 0, 0}, {1, 0.1, 0}});
+  body.turns = true;
+  body.pose_t1.linear() = Eigen::AngleAxisd(3.1, Vec3::UnitY()).toRotationMatrix();
+  const std::size_t parts = requiredSubsteps(turning, 1e-3);
   EXPECT_GT(parts, 30u);
   EXPECT_LT(parts, 40u);
   EXPECT_LE(1.005 * (1 - std::cos(3.1 / (2.0 * static_cast<double>(parts)))), 1e-3);
-  input.rigid[0] = 0;
-  EXPECT_EQ(requiredSubsteps(input, 1e-3), 1u);
+  body.turns = false;
+  EXPECT_EQ(requiredSubsteps(turning, 1e-3), 1u);
 }
 
 // A bar of 1 m turns by nearly 180 degrees about its end; half way its other end passes what no chord comes near.
 TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
   Monitor far(loose(), clockAndBar());
   step(far, tip(0, -3), 0);
-  const StepOutcome missed = step(far, tip(100 * MS, -3), 3.1);
+  const Outcome missed = step(far, tip(100 * MS, -3), 3.1);
   EXPECT_GT(missed.substeps, 30u);
   ASSERT_TRUE(missed.contacts.empty()) << "the tip is 2 m below";
   Monitor near(loose(), clockAndBar());
   step(near, tip(0, -0.9), 0);
-  const StepOutcome met = step(near, tip(100 * MS, -0.9), 3.1);
+  const Outcome met = step(near, tip(100 * MS, -0.9), 3.1);
   ASSERT_EQ(met.status, StepStatus::OK) << met.reason;
   EXPECT_NEAR(met.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
 }
@@ -91,7 +92,7 @@ TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
 TEST(TurningBody, TheGeometryIsThatOfThePart) {
   Monitor monitor(loose(), clockAndBar());
   step(monitor, tip(0, -0.9), 0);
-  const StepOutcome outcome = step(monitor, tip(100 * MS, -0.9), 3.1);
+  const Outcome outcome = step(monitor, tip(100 * MS, -0.9), 3.1);
   ASSERT_FALSE(outcome.contacts.empty());
   for (const Contact& contact : outcome.contacts) {
     const ContactGeometry geometry = contactGeometry(outcome, contact);
@@ -120,7 +121,7 @@ TEST(TurningBody, FramesBetweenTheEndsAreHeldAgainstTheArc) {
     return step(monitor, tip(100 * MS, -3), end);
   };
   EXPECT_TRUE(lastOf(0.5, 1).clear);
-  const StepOutcome back = lastOf(0.5, 0);
+  const Outcome back = lastOf(0.5, 0);
   EXPECT_EQ(back.status, StepStatus::PARTIAL);
   EXPECT_FALSE(back.clear);
 }
@@ -134,12 +135,12 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
     step(monitor, tip(0, -3), 0);
     return step(monitor, tip(100 * MS, -3), 3.1);
   };
-  const StepOutcome whole = run(0);
+  const Outcome whole = run(0);
   ASSERT_EQ(whole.status, StepStatus::OK);
   ASSERT_GT(whole.substeps, 30u);
   EXPECT_EQ(whole.stats.bodies_refitted + whole.stats.bodies_kept, 2 * whole.substeps) << "two bodies in every part";
   EXPECT_TRUE(run(1000).complete);
-  const StepOutcome cut = run(1e-6);
+  const Outcome cut = run(1e-6);
   EXPECT_EQ(cut.status, StepStatus::DEADLINE);
   EXPECT_FALSE(cut.complete);
   EXPECT_FALSE(cut.clear);
@@ -169,7 +170,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
     for (int i = 0; i < 20; ++i) {
       monitor.reset(StepStatus::RESET);
       next(monitor);
-      const StepOutcome outcome = next(monitor);
+      const Outcome outcome = next(monitor);
       EXPECT_GT(outcome.substeps, 5u);
       ms = std::min(ms, outcome.stats.total_ms);
     }
@@ -183,7 +184,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
   next(monitor);
   bool known = false;
   for (int i = 0; i < 1000 && !known; ++i) {
-    const StepOutcome outcome = next(monitor);
+    const Outcome outcome = next(monitor);
     known = outcome.complete;
     EXPECT_EQ(outcome.clear, known) << outcome.reason;
   }
@@ -204,14 +205,14 @@ TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
     step(monitor, sheet(0), 0);
     options.detector.step_budget_ms = budget_ms;
     monitor.setOptions(options);
-    const StepOutcome turned = step(monitor, sheet(100 * MS), 1.5);
+    const Outcome turned = step(monitor, sheet(100 * MS), 1.5);
     EXPECT_EQ(turned.status, budget_ms > 0 ? StepStatus::DEADLINE : StepStatus::OK);
     options.detector.step_budget_ms = 0;
     monitor.setOptions(options);
     return step(monitor, sheet(200 * MS), 1.5);
   };
   EXPECT_EQ(last(0).start_state, StartState::INTERSECTING);
-  const StepOutcome outcome = last(1e-6);
+  const Outcome outcome = last(1e-6);
   EXPECT_EQ(outcome.start_state, StartState::INTERSECTING);
   EXPECT_FALSE(outcome.clear);
 }
@@ -220,11 +221,11 @@ TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
 TEST(TurningBody, APredictionMayTurnByMoreThanAHalf) {
   MonitorOptions options = loose();
   options.look_ahead_s = 0.5;
-  options.max_substeps = 1000;
+  options.detector.max_substeps = 1000;
   Monitor monitor(options, clockAndBar());
   step(monitor, tip(0, -0.9), -2.0);
   ASSERT_TRUE(step(monitor, tip(100 * MS, -0.9), -0.8).clear);
-  const StepOutcome ahead = monitor.predict();
+  const Outcome ahead = monitor.predict();
   ASSERT_EQ(ahead.status, StepStatus::OK) << ahead.reason;
   ASSERT_FALSE(ahead.contacts.empty());
   // It hangs down after 0.8 + pi / 2 of 6 rad, and meets the tip a little earlier.
@@ -238,13 +239,13 @@ TEST(TurningBody, APairThatIsCertainInOnePartIsCertain) {
   options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
   const auto run = [&](std::size_t max_subdivisions) {
     options.detector.accuracy.max_subdivisions = max_subdivisions;
-    std::vector<MonitorBody> bodies = clockAndBar();
+    std::vector<Body> bodies = clockAndBar();
     bodies[0].minimum_separation_m = 0.05;
     Monitor monitor(options, bodies);
     step(monitor, tip(0, -0.9), 0);
     return step(monitor, tip(100 * MS, -0.9), 1.6);
   };
-  const StepOutcome few = run(1), many = run(AccuracyOptions().max_subdivisions);
+  const Outcome few = run(1), many = run(AccuracyOptions().max_subdivisions);
   ASSERT_GT(many.counts.certain, 0u);
   EXPECT_EQ(many.counts.undecided, 0u);
   EXPECT_GT(few.counts.certain, 0u) << "every pair was undecided in a part before";

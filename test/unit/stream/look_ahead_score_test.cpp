@@ -16,8 +16,8 @@ Contact touch(Index vertex, double toc) {
   return c;
 }
 
-StepOutcome step(StampNs start_ns, StampNs end_ns, std::vector<Contact> contacts = {}) {
-  StepOutcome outcome;
+Outcome step(StampNs start_ns, StampNs end_ns, std::vector<Contact> contacts = {}) {
+  Outcome outcome;
   outcome.status = StepStatus::OK;
   outcome.answered = true;
   outcome.start_ns = start_ns;
@@ -62,7 +62,7 @@ TEST(LookAheadScore, ASeamForgets) {
   LookAheadScore score(0.4);
   score.observe(step(0, 100 * MS));
   score.predict(step(100 * MS, 500 * MS, {touch(7, 0.5)}));
-  StepOutcome gap;
+  Outcome gap;
   gap.status = StepStatus::GAP;
   score.observe(gap);
   score.observe(step(150 * MS, 300 * MS, {touch(7, 0.5)}));

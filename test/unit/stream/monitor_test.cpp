@@ -1,11 +1,9 @@
-#include "dccd/monitor.h"
+#include "dccd/stream.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
-
-#include "step/step_runner.h"
 
 namespace dccd {
 namespace {
@@ -44,14 +42,14 @@ MonitorOptions loose() {
   return options;
 }
 
-MonitorBody named(const std::string& name) {
-  MonitorBody body;
+Body named(const std::string& name) {
+  Body body;
   body.name = name;
   return body;
 }
 
-StepOutcome only(Monitor& monitor, std::int64_t now = NOW) {
-  StepOutcome outcome, more;
+Outcome only(Monitor& monitor, std::int64_t now = NOW) {
+  Outcome outcome, more;
   EXPECT_TRUE(monitor.next(now, outcome));
   EXPECT_FALSE(monitor.next(now, more));
   return outcome;
@@ -65,7 +63,7 @@ void expectAddsUp(const Monitor& monitor) {
 class OneBody : public ::testing::Test {
  protected:
   Monitor monitor{loose(), {named("cloth")}};
-  StepOutcome feed(MeshFrame frame) {
+  Outcome feed(MeshFrame frame) {
     monitor.countReceived(0);
     monitor.push(0, std::move(frame), NOW);
     return only(monitor);
@@ -74,7 +72,7 @@ class OneBody : public ::testing::Test {
 
 TEST_F(OneBody, KnownTimeOfContact) {
   EXPECT_EQ(feed(pair(100 * MS, 1)).status, StepStatus::FIRST_FRAME);
-  const StepOutcome outcome = feed(pair(200 * MS, -3));
+  const Outcome outcome = feed(pair(200 * MS, -3));
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
   ASSERT_TRUE(outcome.answered);
   EXPECT_EQ(outcome.start_ns, 100 * MS);
@@ -93,7 +91,7 @@ TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
   EXPECT_TRUE(feed(pair(200 * MS, 0.9)).clear);
   MeshFrame lost = pair(300 * MS, 0.8);
   lost.positions[5].x() = std::numeric_limits<double>::infinity();
-  const StepOutcome partial = feed(std::move(lost));
+  const Outcome partial = feed(std::move(lost));
   EXPECT_EQ(partial.status, StepStatus::PARTIAL);
   EXPECT_TRUE(partial.answered);
   EXPECT_FALSE(partial.clear);
@@ -109,14 +107,14 @@ TEST_F(OneBody, AStartStateWithoutTimeIsNoClearStep) {
   hurried.detector.step_budget_ms = 1e-6;
   monitor.setOptions(hurried);
   feed(floor(300 * MS, 0));
-  const StepOutcome outcome = feed(floor(400 * MS, 1));
+  const Outcome outcome = feed(floor(400 * MS, 1));
   EXPECT_EQ(outcome.status, StepStatus::DEADLINE);
   EXPECT_EQ(outcome.start_state, StartState::NOT_CHECKED);
   EXPECT_FALSE(outcome.complete);
   EXPECT_FALSE(outcome.clear);
   EXPECT_TRUE(std::isinf(outcome.unchecked_toc_lower)) << "no pair was left out";
   EXPECT_NE(outcome.reason.find("start state"), std::string::npos) << outcome.reason;
-  const StepOutcome question = monitor.checkNow();
+  const Outcome question = monitor.checkNow();
   EXPECT_TRUE(question.complete) << "a question takes the time that it takes";
   EXPECT_TRUE(question.clear);
 }
@@ -140,7 +138,7 @@ TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
   monitor.countReceived(0, 2);
   monitor.skip(0, StepStatus::BAD_MESSAGE, 10 * MS, "index 7");
   monitor.push(0, pair(20 * MS, 0.9), NOW);
-  StepOutcome outcome;
+  Outcome outcome;
   ASSERT_TRUE(monitor.next(NOW, outcome));
   EXPECT_EQ(outcome.status, StepStatus::BAD_MESSAGE);
   EXPECT_EQ(outcome.reason, "index 7");
@@ -162,9 +160,9 @@ TEST_F(OneBody, MapIsMissedOnlyWhenExpected) {
   feed(pair(0, 1));
   EXPECT_EQ(feed(pair(10 * MS, 0.9)).status, StepStatus::OK);
   MonitorOptions options = loose();
-  options.obstacle_expected = true;
+  options.detector.obstacle_expected = true;
   monitor.setOptions(options);
-  const StepOutcome none = feed(pair(20 * MS, 0.8));
+  const Outcome none = feed(pair(20 * MS, 0.8));
   EXPECT_EQ(none.status, StepStatus::NO_MAP);
   EXPECT_FALSE(none.clear);
   monitor.setMap({VoxelSurface::build(0.1, {}), 0, Eigen::Isometry3d::Identity(), {}});
@@ -200,7 +198,7 @@ TEST_F(OneBody, AMapThatComesStartsNoSearchOfTheMeshes) {
 
 TEST_F(OneBody, OldMapIsNoMap) {
   MonitorOptions options = loose();
-  options.obstacle_expected = true;
+  options.detector.obstacle_expected = true;
   options.octomap_timeout_s = 1;
   monitor.setOptions(options);
   monitor.setMap({VoxelSurface::build(0.1, {}), 1000 * MS, Eigen::Isometry3d::Identity(), {}});
@@ -211,7 +209,7 @@ TEST_F(OneBody, OldMapIsNoMap) {
 
 TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   // The map's frame stands 10 m above the fixed frame's: voxel [0, 1]^3 there is [0, 1]^2 x [10, 11] here.
-  MonitorMap map{VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 1}}), 0, Eigen::Isometry3d::Identity(), {}};
+  ObstacleMap map{VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 1}}), 0, Eigen::Isometry3d::Identity(), {}};
   map.map_from_fixed.translation() = Vec3(0, 0, -10);
   monitor.setMap(std::move(map));
   const auto at = [](StampNs stamp_ns, double z) {
@@ -222,7 +220,7 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
                      Eigen::Isometry3d::Identity()};
   };
   feed(at(0, 12));
-  const StepOutcome outcome = feed(at(100 * MS, 10));
+  const Outcome outcome = feed(at(100 * MS, 10));
   ASSERT_FALSE(outcome.contacts.empty());
   EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
   const Contact& contact = outcome.contacts.front();
@@ -233,10 +231,10 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   EXPECT_NEAR(geometry.approach_speed, 2, 1e-9);
 
   MonitorOptions options = loose();
-  options.exclude_boxes = {{{0, 0, 10}, {1, 1, 11}}};
+  options.detector.exclude_boxes = {{{0, 0, 10}, {1, 1, 11}}};
   monitor.setOptions(options);
   feed(at(200 * MS, 12));
-  const StepOutcome excluded = feed(at(300 * MS, 10));
+  const Outcome excluded = feed(at(300 * MS, 10));
   EXPECT_TRUE(excluded.contacts.empty());
   EXPECT_EQ(excluded.excluded_voxels, 1u);
   EXPECT_TRUE(excluded.clear) << "what is excluded is not looked at";
@@ -245,7 +243,7 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
 // An excluded voxel is free space, so what lies behind it is exposed.
 TEST_F(OneBody, WhatLiesBehindAnExcludedVoxelIsTouched) {
   MonitorOptions options = loose();
-  options.exclude_boxes = {{{0, 0, 1}, {2, 2, 2}}};
+  options.detector.exclude_boxes = {{{0, 0, 1}, {2, 2, 2}}};
   monitor.setOptions(options);
   monitor.setMap({VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 2}}), 0, Eigen::Isometry3d::Identity(), {}});
   const auto at = [](StampNs stamp_ns, double z) {
@@ -256,7 +254,7 @@ TEST_F(OneBody, WhatLiesBehindAnExcludedVoxelIsTouched) {
                      Eigen::Isometry3d::Identity()};
   };
   feed(at(0, 3));
-  const StepOutcome outcome = feed(at(100 * MS, 0.5));
+  const Outcome outcome = feed(at(100 * MS, 0.5));
   EXPECT_EQ(outcome.excluded_voxels, 4u);
   ASSERT_FALSE(outcome.contacts.empty());
   EXPECT_NEAR(outcome.earliest_toc, 0.8, 1e-9) << "from 3 m to the upper face of what is left, at 1 m";
@@ -267,10 +265,10 @@ TEST_F(OneBody, WhatLiesBehindAnExcludedVoxelIsTouched) {
 
 TEST_F(OneBody, TooManyContactsKeepTheEarliest) {
   MonitorOptions options = loose();
-  options.max_contacts = 1;
+  options.detector.max_contacts = 1;
   monitor.setOptions(options);
   feed(pair(0, 1));
-  const StepOutcome outcome = feed(pair(100 * MS, -3));
+  const Outcome outcome = feed(pair(100 * MS, -3));
   ASSERT_GT(outcome.total_contacts, 1u);
   EXPECT_EQ(outcome.status, StepStatus::TRUNCATED);
   ASSERT_EQ(outcome.contacts.size(), 1u);
@@ -281,12 +279,12 @@ TEST_F(OneBody, TooManyContactsKeepTheEarliest) {
 }
 
 TEST_F(OneBody, MaskedVerticesMeetNothing) {
-  MonitorBody masked = named("cloth");
+  Body masked = named("cloth");
   masked.vertex_mask = {3};
   Monitor other(loose(), {masked});
   other.push(0, pair(0, 1), NOW);
   other.push(0, pair(100 * MS, 0.2 - 1), NOW);
-  StepOutcome outcome;
+  Outcome outcome;
   other.next(NOW, outcome);
   ASSERT_TRUE(other.next(NOW, outcome));
   for (const Contact& contact : outcome.contacts) {
@@ -309,11 +307,11 @@ TEST_F(OneBody, PredictionMeetsWhatIsObservedLater) {
   EXPECT_FALSE(monitor.predict().answered);
   feed(pair(0, 2));
   ASSERT_TRUE(feed(pair(100 * MS, 1.5)).clear);
-  const StepOutcome ahead = monitor.predict();
+  const Outcome ahead = monitor.predict();
   ASSERT_EQ(ahead.status, StepStatus::OK) << ahead.reason;
   EXPECT_NEAR(ahead.earliest_toc, 0.75, 1e-9) << "0.3 s of 0.4 s";
   EXPECT_EQ(ahead.stamp_ns, 500 * MS);
-  const StepOutcome next = feed(pair(200 * MS, 1));
+  const Outcome next = feed(pair(200 * MS, 1));
   EXPECT_TRUE(next.clear) << "a prediction leaves the observed steps alone";
 }
 
@@ -329,7 +327,7 @@ TEST_F(OneBody, PredictionsKnowTheirStartFromTheLastStep) {
     feed(pair(stamp_ns, 1));
     for (const double tip_z : {0.5, -0.5, -0.25, 1.0, 1.25}) {
       ASSERT_TRUE(feed(pair(stamp_ns += 100 * MS, tip_z)).answered);
-      const StepOutcome ahead = monitor.predict(), question = monitor.checkNow();
+      const Outcome ahead = monitor.predict(), question = monitor.checkNow();
       EXPECT_EQ(ahead.start_state, tip_z < 0 ? StartState::INTERSECTING : StartState::CLEAR) << tip_z;
       EXPECT_TRUE(std::equal(ahead.intersections.begin(), ahead.intersections.end(), question.intersections.begin(),
                              question.intersections.end(),
@@ -344,7 +342,7 @@ TEST_F(OneBody, PredictionsKnowTheirStartFromTheLastStep) {
 TEST_F(OneBody, CheckNowLooksAtTheNewestFrame) {
   EXPECT_FALSE(monitor.checkNow().answered);
   feed(pair(0, 0));
-  const StepOutcome touching = monitor.checkNow();
+  const Outcome touching = monitor.checkNow();
   EXPECT_TRUE(touching.answered);
   EXPECT_FALSE(touching.contacts.empty());
 }
@@ -363,13 +361,13 @@ TEST_F(TwoBodies, OthersAreInterpolatedAtBothEnds) {
   EXPECT_EQ(only(monitor).status, StepStatus::FIRST_FRAME);
   feed(1, tip(0, 4));
   feed(0, floor(200 * MS, 0));
-  StepOutcome outcome;
+  Outcome outcome;
   EXPECT_FALSE(monitor.next(NOW, outcome)) << "waits for the tip";
   EXPECT_TRUE(monitor.waiting());
   feed(1, tip(400 * MS, -4));  // 2 at 100 ms, 0 at 200 ms
   outcome = only(monitor);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
-  EXPECT_NEAR((*outcome.positions_t0)[1][0].z(), 2, 1e-12);
+  EXPECT_NEAR((*outcome.step->bodies[1].t0)[0].z(), 2, 1e-12);
   EXPECT_NEAR(outcome.earliest_toc, 1, 1e-9);
   EXPECT_EQ(outcome.contacts[0].body, (std::array<std::uint16_t, 2>{1, 0}));
   expectAddsUp(monitor);
@@ -387,10 +385,10 @@ TEST_F(TwoBodies, FramesBetweenTheEndsThatLeaveThePathAreNoClearStep) {
     two.push(0, floor(100 * MS, 0), NOW);
     return only(two);
   };
-  const StepOutcome straight = lastOf(1.0005);
+  const Outcome straight = lastOf(1.0005);
   EXPECT_EQ(straight.status, StepStatus::OK);
   EXPECT_TRUE(straight.clear);
-  const StepOutcome through = lastOf(-1);
+  const Outcome through = lastOf(-1);
   EXPECT_EQ(through.status, StepStatus::PARTIAL);
   EXPECT_FALSE(through.clear);
   EXPECT_NE(through.reason.find("body 'tip' was seen up to 2 m off the path"), std::string::npos) << through.reason;
@@ -400,7 +398,7 @@ TEST_F(TwoBodies, MissingBodyIsNoAnswerAfterTheTimeout) {
   feed(0, floor(100 * MS, 0));
   only(monitor);
   feed(0, floor(200 * MS, 0));
-  StepOutcome outcome;
+  Outcome outcome;
   EXPECT_FALSE(monitor.next(NOW, outcome));
   outcome = only(monitor, LATER);
   EXPECT_EQ(outcome.status, StepStatus::NO_BODY);
@@ -415,7 +413,7 @@ TEST_F(TwoBodies, SeamOfAnotherBodyIsASeamOfTheStep) {
   feed(1, tip(1100 * MS, 4));
   only(monitor);
   feed(0, floor(1050 * MS, 0));
-  const StepOutcome outcome = only(monitor);
+  const Outcome outcome = only(monitor);
   EXPECT_EQ(outcome.status, StepStatus::GAP);
   EXPECT_NE(outcome.reason.find("tip"), std::string::npos);
 }
@@ -437,9 +435,9 @@ TEST_F(TwoBodies, TopologyIsThatOfTheStepNotTheNewest) {
     feed(1, four(100 * MS, with_tip, -1));
     feed(1, newest);
     feed(0, floor(100 * MS, 0));
-    const StepOutcome outcome = only(monitor);
+    const Outcome outcome = only(monitor);
     ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
-    EXPECT_EQ((*outcome.topologies)[1], with_tip);
+    EXPECT_EQ(outcome.step->bodies[1].topology, with_tip);
     ASSERT_FALSE(outcome.contacts.empty());
     EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
     // From the seam on it is the new one that counts.
@@ -449,9 +447,9 @@ TEST_F(TwoBodies, TopologyIsThatOfTheStepNotTheNewest) {
     last.stamp_ns = 300 * MS;
     feed(1, last);
     feed(0, floor(300 * MS, 0));
-    const StepOutcome next = only(monitor);
+    const Outcome next = only(monitor);
     EXPECT_EQ(next.status, StepStatus::OK) << next.reason;
-    EXPECT_EQ(*(*next.topologies)[1], *newest.topology);
+    EXPECT_EQ(*next.step->bodies[1].topology, *newest.topology);
     EXPECT_TRUE(next.contacts.empty());
   }
   expectAddsUp(monitor);
@@ -462,7 +460,7 @@ TEST_F(TwoBodies, TimeJumpDropsWhatWaits) {
   only(monitor);
   feed(0, floor(1050 * MS, 0));
   feed(0, floor(10 * MS, 0));
-  StepOutcome outcome;
+  Outcome outcome;
   ASSERT_TRUE(monitor.next(NOW, outcome));
   EXPECT_EQ(outcome.status, StepStatus::NO_BODY);
   ASSERT_TRUE(monitor.next(NOW, outcome));
@@ -471,10 +469,10 @@ TEST_F(TwoBodies, TimeJumpDropsWhatWaits) {
 }
 
 TEST(StaticBody, HoldsAtAllTimes) {
-  MonitorBody table = named("table");
+  Body table = named("table");
   table.motion = BodyMotionKind::STATIC;
   Monitor monitor(loose(), {named("tip"), table});
-  StepOutcome outcome;
+  Outcome outcome;
   monitor.push(0, tip(0, 1), NOW);
   monitor.push(1, floor(5, 0), NOW);
   monitor.push(0, tip(100 * MS, -1), NOW);
@@ -486,7 +484,7 @@ TEST(StaticBody, HoldsAtAllTimes) {
 
 // A static body's frame that cannot be used leaves the one before in its place.
 TEST(StaticBody, KeepsItsPlaceWhenAFrameIsRefused) {
-  MonitorBody table = named("table");
+  Body table = named("table");
   table.motion = BodyMotionKind::STATIC;
   Monitor monitor(loose(), {named("tip"), table});
   monitor.push(1, floor(0, 0), NOW);
@@ -496,7 +494,7 @@ TEST(StaticBody, KeepsItsPlaceWhenAFrameIsRefused) {
   bad.positions.pop_back();
   EXPECT_EQ(monitor.push(1, bad, NOW), StepStatus::VERTEX_COUNT);
   monitor.push(0, tip(200 * MS, -1), NOW);
-  const StepOutcome outcome = only(monitor);
+  const Outcome outcome = only(monitor);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
   EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
 }
@@ -505,7 +503,7 @@ TEST(StaticBody, KeepsItsPlaceWhenAFrameIsRefused) {
 TEST(MonitorOptionsTest, RefusedOnesLeaveTheOldOnesInForce) {
   MonitorOptions options;
   options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
-  MonitorBody felt = named("felt");
+  Body felt = named("felt");
   felt.minimum_separation_m = 0.01;
   Monitor monitor(options, {felt});
   monitor.push(0, tip(0, 0), NOW);
@@ -527,7 +525,7 @@ TEST(MonitorOptionsTest, OutOfRangeNamesTheOption) {
   options.clock_body = 1;
   EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
   options = {};
-  options.exclude_boxes = {Box{}};
+  options.detector.exclude_boxes = {Box{}};
   EXPECT_THROW(Monitor(options, {named("a")}), std::invalid_argument);
 }
 

@@ -1,38 +1,30 @@
 // Which pairs of features a step tests: the tasks of each body and pair of bodies, and what is left out of them.
 #include <algorithm>
 
-#include "step/detector_impl.h"
+#include "step/history.h"
 
 namespace dccd {
+
+using Clock = Deadline::Clock;
+
 namespace {
 
 constexpr std::size_t TASK_SUPERCLUSTERS = 16;  // supercluster pairs in a unit of work: about a millisecond
 
 }  // namespace
 
-void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context) {
+void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context) {
   const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
   if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
   const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
   PairTask task{kind, a, b, a == b, 0, 0};
-  if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
+  if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
     tasks.push_back(task);
     return;
   }
   const TreePair trees{&ta, &tb, same_tree, false};
   superclusterPairs(trees, found_groups, scratch);
-  if (context.deadline != Clock::time_point::max()) {
-    // What the deadline leaves over should be what can touch last; of equal ones what was found last.
-    by_toc.clear();
-    for (std::uint32_t i = 0; 2 * i < found_groups.size(); ++i) {
-      const std::array<std::uint32_t, 2> pair{found_groups[2 * i], found_groups[2 * i + 1]};
-      by_toc.push_back({superclusterTocBound(trees, pair[0], pair[1]), i, pair});
-    }
-    std::sort(by_toc.begin(), by_toc.end());
-    for (std::size_t i = 0; i < by_toc.size(); ++i) {
-      std::copy_n(std::get<2>(by_toc[i]).begin(), 2, &found_groups[2 * i]);
-    }
-  }
+  if (!context.deadline.isNever()) orderByBound(trees);
   const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
   const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);
   group_pairs.insert(group_pairs.end(), found_groups.begin(), found_groups.end());
@@ -43,41 +35,62 @@ void Detector::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, c
   }
 }
 
-// A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
-// stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
-bool Detector::Impl::staysApart(std::size_t body) const {
-  return body < apart.size() && apart[body] && scene.bodies()[body].translates && !scene.bodies()[body].uncertain;
+/// What a deadline leaves over should be what can touch last; of equal ones what was found last.
+void History::Impl::orderByBound(const TreePair& trees) {
+  by_toc.clear();
+  for (std::uint32_t i = 0; 2 * i < found_groups.size(); ++i) {
+    const std::array<std::uint32_t, 2> pair{found_groups[2 * i], found_groups[2 * i + 1]};
+    by_toc.push_back({superclusterTocBound(trees, pair[0], pair[1]), i, pair});
+  }
+  std::sort(by_toc.begin(), by_toc.end());
+  for (std::size_t i = 0; i < by_toc.size(); ++i) std::copy_n(std::get<2>(by_toc[i]).begin(), 2, &found_groups[2 * i]);
 }
 
-void Detector::Impl::chooseSelfTests(const MotionStep& step) {
+// A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
+// stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
+bool History::Impl::staysApart(std::size_t body) const {
+  return body < carried.apart.size() && carried.apart[body] && scene.bodies()[body].translates &&
+         !scene.bodies()[body].uncertain;
+}
+
+void History::Impl::chooseSelfTests(const Part& part) {
   self_tested.assign(scene.bodies().size(), 0);
   for (std::size_t b = 0; b < self_tested.size(); ++b) {
-    if (!scene.bodies()[b].setup.self_collision || (step.continues && staysApart(b))) continue;
+    if (!meetsItself(scene.bodies()[b].setup)) continue;
+    if (part.continues && staysApart(b)) {
+      if (observer)
+        observer->onSelfLeftOut(b, "the whole body moves without turning, and was apart from itself before");
+      continue;
+    }
     const Clock::time_point start = Clock::now();
     const bool unfolded = isUnfolded(b);
     result.stats[Effect::SELF_COLLISION].ms += msSince(start);
     result.stats.unfolded_bodies += unfolded;
     self_tested[b] = !unfolded;
+    if (unfolded && observer) {
+      observer->onSelfLeftOut(b, "the whole surface certainly does not fold onto itself in this step");
+    }
   }
 }
 
 // A single body that cannot meet itself is tested against the obstacle alone, which has bounds of its own.
-bool Detector::Impl::needsTrees(const MotionStep& step) const {
+bool History::Impl::needsTrees(const Part& part) const {
   return self_tested.size() > 1 || std::count(self_tested.begin(), self_tested.end(), 1) > 0 ||
-         (checksStartState(step) && !isStartKnown(step) && start_state.needsTrees(step.continues));
+         (checksStartState(part) && !isStartKnown() && carried.start_state.needsTrees(part.continues));
 }
 
-bool Detector::Impl::isUnfolded(std::size_t body) {
+bool History::Impl::isUnfolded(std::size_t body) {
   const SceneBody& b = scene.bodies()[body];
   // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
-  if (!options.unfolded_test || options.broad_phase == BroadPhase::BRUTE_FORCE) return false;
+  if (!options->unfolded_test || options->broad_phase == BroadPhase::BRUTE_FORCE) return false;
   return scene.separation(body, body) == 0 && !b.uncertain && !b.masked && unfolded[body].run(b, scene.vertices());
 }
 
-void Detector::Impl::rememberApart(bool certain) {
+void History::Impl::rememberApart(bool certain) {
+  std::vector<std::uint8_t>& apart = carried.apart;
   apart.resize(scene.bodies().size(), 0);
   for (std::size_t b = 0; b < apart.size(); ++b) {
-    const bool tested = scene.bodies()[b].setup.self_collision;
+    const bool tested = meetsItself(scene.bodies()[b].setup);
     // With radii that change, what is apart now may be too close without having moved.
     apart[b] = certain && tested && !scene.bodies()[b].masked && !scene.bodies()[b].uncertain;
   }
@@ -86,13 +99,13 @@ void Detector::Impl::rememberApart(bool certain) {
   }
 }
 
-void Detector::Impl::addSelfTasks(std::size_t body, const StepContext& context) {
+void History::Impl::addSelfTasks(std::size_t body, const StepContext& context) {
   const std::uint16_t i = static_cast<std::uint16_t>(body);
   addTasks(PairKind::VERTEX_FACE, i, i, context);
   addTasks(PairKind::EDGE_EDGE, i, i, context);
 }
 
-void Detector::Impl::findPairs(const StepContext& context) {
+void History::Impl::findPairs(const StepContext& context) {
   const Clock::time_point start = Clock::now();
   tasks.clear();
   group_pairs.clear();
@@ -105,7 +118,7 @@ void Detector::Impl::findPairs(const StepContext& context) {
     for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
       const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]),
                           b = static_cast<std::uint16_t>(body_pairs[p + 1]);
-      if (!scene.bodies()[a].setup.against_bodies || !scene.bodies()[b].setup.against_bodies) continue;
+      if (!meet(scene.bodies()[a].setup, scene.bodies()[b].setup)) continue;
       ++result.stats.body_pairs;
       addTasks(PairKind::VERTEX_FACE, a, b, context);
       addTasks(PairKind::VERTEX_FACE, b, a, context);
@@ -115,34 +128,37 @@ void Detector::Impl::findPairs(const StepContext& context) {
   result.stats[Stage::BROAD_PHASE].ms += msSince(start);
 }
 
-bool Detector::Impl::needsReference(std::size_t b) const {
-  const BodySetup& setup = scene.bodies()[b].setup;
-  if (!setup.reference || !setup.self_collision) return false;
+bool History::Impl::needsReference(std::size_t b) const {
+  const Body& setup = scene.bodies()[b].setup;
+  if (!setup.reference || !meetsItself(setup)) return false;
   const auto& radius = setup.reference->radius_m;
   return scene.separation(b, b) > 0 || std::any_of(radius.begin(), radius.end(), [](double r) { return r > 0; });
 }
 
 /// The pairs that a step without motion in the reference frame calls contacts: exactly those that would be contacts for
 /// as long as the body keeps its shape.
-void Detector::Impl::findLeftOut(const std::vector<const Positions*>& rest_positions) {
+void History::Impl::findLeftOut(const Step& step) {
   const std::size_t n = scene.bodies().size();
   left_out.assign(n, {});
   left_out_list.clear();
-  MotionStep step;
+  Step rest = step;
   bool any = false;
   for (std::size_t b = 0; b < n; ++b) {
-    const auto& reference = scene.bodies()[b].setup.reference;
-    const bool needs = needsReference(b);
-    any |= needs;
-    const Positions* at = needs ? &reference->positions : rest_positions[b];
-    step.bodies.push_back({at, at, needs && !reference->radius_m.empty() ? &reference->radius_m : nullptr});
+    Body& body = rest.bodies[b];
+    body.radius_m = nullptr;
+    body.t1 = body.t0;
+    if (!needsReference(b)) continue;
+    any = true;
+    body.t0 = body.t1 = std::shared_ptr<const Positions>(body.reference, &body.reference->positions);
+    if (body.reference->radius_m.empty()) continue;
+    body.radius_m = std::shared_ptr<const std::vector<double>>(body.reference, &body.reference->radius_m);
   }
   if (!any) return;
   const ScopedFloatMode mode;
   result.stats = StepStats();
-  scene.record(step, result.stats);
+  scene.record(rest, result.stats);
   scene.refit([](std::size_t count, const auto& f) { f(0, count); }, result.stats);
-  AccuracyOptions accuracy = options.accuracy;
+  AccuracyOptions accuracy = options->accuracy;
   accuracy.rung = Accuracy::CONSERVATIVE;
   const std::unique_ptr<Rung> test = makeRung(accuracy);
   StepContext context;
@@ -162,7 +178,7 @@ void Detector::Impl::findLeftOut(const std::vector<const Positions*>& rest_posit
   }
 }
 
-void Detector::Impl::listLeftOut(std::size_t b, PairKind kind) {
+void History::Impl::listLeftOut(std::size_t b, PairKind kind) {
   std::vector<LeftOutKey> keys;
   for (const PairWorker& w : workers) {
     for (const Hit& hit : w.hits(kind)) {
@@ -188,11 +204,11 @@ void Detector::Impl::listLeftOut(std::size_t b, PairKind kind) {
                   vertices ? topology.vertexCount() : topology.edges().size());
 }
 
-void Detector::Impl::runPairs(StepContext& context) {
+void History::Impl::runPairs(StepContext& context) {
   parallel(tasks.size(), 1, [&](std::size_t first, std::size_t last) {
     PairWorker& worker = workers.local();
     for (std::size_t t = first; t < last; ++t) {
-      if (options.broad_phase == BroadPhase::BRUTE_FORCE) {
+      if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
         worker.runBruteForce(context, tasks[t]);
       } else {
         worker.run(context, tasks[t], group_pairs, tasks[t].first, tasks[t].last);

@@ -1,0 +1,84 @@
+// A body: what it is, how it is tested, its mesh, and where it is at both ends of a step.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dccd/topology.h"
+#include "dccd/types.h"
+
+namespace dccd {
+
+/// How a body comes by its positions.
+enum class BodyMotionKind : std::uint8_t {
+  STREAM = 0,  ///< frames with stamps, interpolated between them
+  STATIC = 1,  ///< the newest frame holds at all times
+};
+
+/// Where a body was when it was known to be fit: its features that are closer there than the minimum separation are
+/// neighbours, not layers.
+struct ReferenceFrame {
+  Positions positions;           ///< [m]
+  std::vector<double> radius_m;  ///< the largest uncertainty per vertex that the list is to be made for; empty: none
+};
+
+/// A minimum separation [m] from one other body (or itself, or OBSTACLE_BODY) instead of the larger of the two bodies'.
+struct SeparationFrom {
+  std::uint16_t body = 0;
+  double separation_m = 0;
+  friend bool operator==(const SeparationFrom& a, const SeparationFrom& b) {
+    return a.body == b.body && a.separation_m == b.separation_m;
+  }
+};
+
+/// Large parts are shared, never changed: a copy of a body costs no positions.
+struct Body {
+  // What it is and what it is tested against: the same in every step of a stream.
+  std::string name;
+  BodyMotionKind motion = BodyMotionKind::STREAM;
+  bool rigid = false;  ///< never tested against itself
+  bool self_collision = true;
+  bool against_bodies = true;
+  bool against_obstacle = true;
+  double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
+  std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
+  std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
+
+  // Its mesh.
+  std::shared_ptr<const Topology> topology;
+  std::shared_ptr<const ReferenceFrame> reference;  ///< null: no pair is left out of the separation
+
+  // Its way through the step, in the fixed frame [m]. Non-finite positions are unchecked.
+  std::shared_ptr<const Positions> t0, t1;
+  bool turns = false;  ///< moves from pose_t0 to pose_t1 along the rotation, not straight
+  Eigen::Isometry3d pose_t0 = Eigen::Isometry3d::Identity(), pose_t1 = Eigen::Isometry3d::Identity();
+  /// Uncertainty radius per vertex during the whole step [m], finite and 0 or more; null: none. A pair's separation
+  /// grows by the largest radius of each of its two features. Needs accuracy conservative or screen.
+  std::shared_ptr<const std::vector<double>> radius_m;
+};
+
+/// What a step looks at. The flow asks these, and so does the effect plan.
+inline bool meetsItself(const Body& body) { return body.self_collision && !body.rigid; }
+inline bool meet(const Body& a, const Body& b) { return a.against_bodies && b.against_bodies; }
+inline bool meetsMap(const Body& body) { return body.against_obstacle; }
+
+/// The largest separation that is asked for, of bodies or from the map [m].
+inline double largestSeparation(const std::vector<Body>& bodies) {
+  double largest_m = 0;
+  for (const Body& body : bodies) {
+    largest_m = std::max(largest_m, body.minimum_separation_m);
+    for (const SeparationFrom& from : body.separations) largest_m = std::max(largest_m, from.separation_m);
+  }
+  return largest_m;
+}
+
+/// Values to be shared.
+template <class T>
+std::shared_ptr<const T> share(T value) {
+  return std::make_shared<const T>(std::move(value));
+}
+
+}  // namespace dccd

@@ -1,0 +1,80 @@
+// The question: what do these bodies touch during this step? One call, without state but what the caller keeps.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "dccd/deadline.h"
+#include "dccd/elementary.h"
+#include "dccd/export.h"
+#include "dccd/outcome.h"
+#include "dccd/step.h"
+#include "dccd/tolerances.h"
+
+namespace dccd {
+
+/// The paper's own hierarchy is not among them: it serves benchmarks and tests (paper/).
+enum class BroadPhase : std::uint8_t { CLUSTERED = 0, BRUTE_FORCE = 1 };
+
+/// How a step is answered.
+struct Options {
+  AccuracyOptions accuracy;
+  BroadPhase broad_phase = BroadPhase::CLUSTERED;
+  int num_threads = 1;            ///< 1 or more
+  double step_budget_ms = 0;      ///< 0: none
+  bool earliest_only = false;     ///< only contacts that may be the first; with `exact` those in the earliest TOC cell
+  bool check_start_state = true;  ///< run the static tests when the step needs them
+  /// Bodies that move bit for bit as in the step before keep their bounds (no answer changes). Off: to time a step
+  /// again and again.
+  bool keep_bounds = true;
+  /// Leave out the self-collision of surfaces that certainly do not fold (no answer changes).
+  bool unfolded_test = true;
+  /// A step is split until straight paths are this close to a rotation's arc [m].
+  double rigid_tolerance_m = tolerance::RIGID_PATH_M;
+  std::size_t max_substeps = 64;
+  std::size_t max_contacts = std::numeric_limits<std::size_t>::max();  ///< the earliest are kept, status TRUNCATED
+  bool suppress_initial = false;   ///< leave initial obstacle contacts out of the list (they still count)
+  std::vector<Box> exclude_boxes;  ///< [m], fixed frame: voxels with their centre inside count as free
+  bool obstacle_expected = false;  ///< without a map the status is NO_MAP
+};
+DCCD_EXPORT bool operator==(const Options& a, const Options& b);
+/// Throws std::invalid_argument naming the option and value that is out of range, also for these bodies.
+DCCD_EXPORT void check(const Options& options, const std::vector<Body>& bodies = {});
+
+/// All that lasts from one step to the next: what of the last step's end is known, which is carried over when a step
+/// begins exactly there, and arrays and buffers, which change no answer. Not thread-safe.
+class DCCD_EXPORT History {
+ public:
+  History();
+  ~History();
+  History(History&& other) noexcept;
+  History& operator=(History&& other) noexcept;
+
+  /// Nothing is carried over any more: after a seam, a reset, or a step that threw (which clears by itself).
+  void clear();
+  /// The next step begins where `other` ended, aside from all steps of this history; `other` must live until then.
+  void beginAt(History& other);
+  /// Nothing is known of a last step: what clear() leaves, and what a new history has.
+  bool isClear() const;
+  /// Pairs from which the minimum separation is left out; in the order of the bodies, kinds, features. Changes with the
+  /// reference frames only.
+  const std::vector<LeftOutPair>& leftOut() const;
+
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Throws std::invalid_argument naming what of the step or the options does not fit. After warm-up nothing is allocated
+/// that grows with the number of steps.
+DCCD_EXPORT Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline);
+/// Within the options' step budget.
+inline Outcome detect(const Step& step, const Options& options, History& history) {
+  return detect(step, options, history, Deadline::after(options.step_budget_ms));
+}
+
+}  // namespace dccd

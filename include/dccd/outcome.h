@@ -1,0 +1,188 @@
+// The answer to a step, and what it cost.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dccd/contact.h"
+#include "dccd/elementary.h"
+#include "dccd/export.h"
+#include "dccd/step.h"
+
+namespace dccd {
+
+/// What became of a frame. Values are those of the ContactArray message. "Answered" ones come with a result,
+/// "seams" begin a new pair of frames, all others drop the frame.
+enum class StepStatus : std::uint8_t {
+  OK = 0,
+  FIRST_FRAME = 1,
+  TOPOLOGY_CHANGED = 2,
+  GAP = 3,
+  TIME_JUMP = 4,
+  NO_TRANSFORM = 5,
+  NO_MAP = 6,
+  NO_BODY = 7,
+  PARTIAL = 8,
+  DEADLINE = 9,
+  TRUNCATED = 10,
+  DUPLICATE = 11,
+  TELEPORT = 12,
+  VERTEX_COUNT = 13,
+  BAD_MESSAGE = 14,
+  QUEUE_FULL = 15,
+  DISABLED = 16,
+  RESET = 17,
+  INTERNAL_ERROR = 18,
+  COUNT
+};
+DCCD_EXPORT const char* toString(StepStatus status);
+DCCD_EXPORT bool isAnswered(StepStatus status);
+DCCD_EXPORT bool isSeam(StepStatus status);
+
+/// The stages of the flow, in order. Names by toString().
+enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
+/// What a scene can call for, and a user can set (doc/interface.md). Names by toString().
+enum class Effect : std::uint8_t {
+  SELF_COLLISION,
+  BODY_BODY,
+  OCTOMAP,
+  START_STATE,
+  RIGID_BODIES,        ///< those of BODY_BODY with a rigid body; ms: also the split of the step
+  UNKNOWN_SPACE,       ///< in: voxels that the step sweeps, out: those that the map does not know
+  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test
+  TRACKER_NOISE,       ///< pairs whose vertices bring an uncertainty radius
+  LOOK_AHEAD,          ///< the last prediction: pairs past the filters, contacts
+  COUNT
+};
+DCCD_EXPORT const char* toString(Stage stage);
+DCCD_EXPORT const char* toString(Effect effect);
+
+/// Pairs into and out of a stage or an effect, and its time summed over the workers.
+struct StageStats {
+  std::uint64_t in = 0;
+  std::uint64_t out = 0;
+  double ms = 0;
+  StageStats& operator+=(const StageStats& other) {
+    in += other.in;
+    out += other.out;
+    ms += other.ms;
+    return *this;
+  }
+};
+
+struct StepStats {
+  std::array<StageStats, static_cast<std::size_t>(Stage::COUNT)> stages{};
+  std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effects{};
+  TierCounters tiers;
+  double total_ms = 0;
+  std::uint64_t vf_candidates = 0, ee_candidates = 0;  ///< out of the linear filter
+  std::uint64_t undecided = 0, initial = 0, leaving = 0;
+  std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
+  std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
+  std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
+  std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
+  std::uint64_t left_out_listed = 0;                   ///< pairs closer than the separation in the reference frame
+  std::uint64_t left_out_met = 0;  ///< of those, the ones that came to the elementary test, without a separation
+  const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
+  StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
+  const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
+  StageStats& operator[](Effect e) { return effects[static_cast<std::size_t>(e)]; }
+  /// Of the parts of a step, or of the workers of one part.
+  DCCD_EXPORT StepStats& operator+=(const StepStats& other);
+};
+
+/// The counters by name: sums and reports follow from this list.
+struct StepCounter {
+  const char* name;
+  std::uint64_t StepStats::*value;
+  bool same_in_every_part;  ///< of a step that is cut in parts: not added up
+};
+constexpr StepCounter STEP_COUNTERS[] = {
+    {"vf_candidates", &StepStats::vf_candidates, false},
+    {"ee_candidates", &StepStats::ee_candidates, false},
+    {"undecided", &StepStats::undecided, false},
+    {"initial", &StepStats::initial, false},
+    {"leaving", &StepStats::leaving, false},
+    {"unchecked_vertices", &StepStats::unchecked_vertices, true},
+    {"unchecked_faces", &StepStats::unchecked_faces, true},
+    {"unfolded_bodies", &StepStats::unfolded_bodies, false},
+    {"bodies_refitted", &StepStats::bodies_refitted, false},
+    {"bodies_kept", &StepStats::bodies_kept, false},
+    {"body_pairs", &StepStats::body_pairs, false},
+    {"left_out_listed", &StepStats::left_out_listed, true},
+    {"left_out_met", &StepStats::left_out_met, false},
+};
+
+/// Do surfaces already cross at t=0? (doc/algorithm.md)
+enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
+DCCD_EXPORT const char* toString(StartState state);
+
+/// An edge through a face at t=0 (vertex[0..1] of body[0] the edge, vertex[2..4] of body[1] the face), or a mesh vertex
+/// inside occupied space (body[1] = OBSTACLE_BODY, vertex[0] the vertex).
+struct StartIntersection {
+  std::array<std::uint16_t, 2> body{0, 0};
+  std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};
+};
+
+/// A pair of features of one body from which the separation is left out, because it is closer in the reference frame
+/// (with uncertainty radii: while it is closer there than its present separation). It is still tested for contact
+/// without one.
+struct LeftOutPair {
+  PairKind kind = PairKind::VERTEX_FACE;
+  std::uint16_t body = 0;
+  std::array<Index, 4> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< as in Contact
+};
+
+/// Of how many contacts what holds.
+struct ContactCounts {
+  std::size_t certain = 0, undecided = 0;
+  std::size_t initial = 0, leaving = 0;
+  std::size_t mesh = 0, obstacle = 0;  ///< with a body, with the map
+};
+
+/// What became of a step, or of a frame that made none. Shares what it names: it may be kept.
+struct Outcome {
+  StepStatus status = StepStatus::FIRST_FRAME;
+  std::string reason;  ///< one sentence; empty when OK
+  StampNs start_ns = 0, stamp_ns = 0;
+  std::uint64_t sequence = 0;  ///< of the clock body's frames that were pushed or skipped, from 1
+  bool answered = false;       ///< the fields below hold a result
+
+  std::vector<Contact> contacts;      ///< canonical order, filtered and cut as the options say; toc of the whole step
+  std::size_t total_contacts = 0;     ///< before the cut to max_contacts
+  ContactCounts counts;               ///< of all of these
+  std::size_t suppressed = 0;         ///< initial contacts left out by choice
+  std::uint64_t excluded_voxels = 0;  ///< finest voxels of the map taken out by exclude_boxes
+  StartState start_state = StartState::NOT_CHECKED;
+  std::vector<StartIntersection> intersections;
+  bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
+  bool complete = true;  ///< false: the step budget ran out, before the last pair or before the start state was known
+  /// The budget left pairs out, none of which can touch before this; otherwise infinity.
+  double unchecked_toc_lower = std::numeric_limits<double>::infinity();
+  double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
+  StepStats stats;
+  double unknown_fraction = 0;  ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
+  std::size_t substeps = 0;     ///< parts that the step was cut into
+  bool clear = false;           ///< doc/interface.md, ~clear
+
+  std::shared_ptr<const Step> step;              ///< what it answers; null where nothing was answered
+  std::shared_ptr<const VoxelSurface> obstacle;  ///< of the step's map, what exclude_boxes left; null: none
+
+  /// No pair was left out of the contacts, whatever is known of the start state.
+  bool allPairs() const { return !(unchecked_toc_lower <= 1); }
+  double duration_s() const { return static_cast<double>(stamp_ns - start_ns) * 1e-9; }
+};
+
+/// Point, normal, weights and approach speed [m per step] of one of the outcome's contacts, any kind, in the fixed
+/// frame.
+DCCD_EXPORT ContactGeometry contactGeometry(const Outcome& outcome, const Contact& contact);
+
+/// Where one of the contact's vertices is at its toc_lower [m], fixed frame; i counts Contact::vertex. Of a rigid body
+/// that turns, on the path that was tested: the chord of that part of the step.
+DCCD_EXPORT Vec3 vertexAtContact(const Outcome& outcome, const Contact& contact, int i);
+
+}  // namespace dccd

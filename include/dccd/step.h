@@ -1,0 +1,33 @@
+// A step: all that its answer follows from, but the options.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dccd/body.h"
+#include "dccd/voxel_surface.h"
+
+namespace dccd {
+
+/// The map of a step. None: surface null. Valid and empty: a surface without leaves.
+struct ObstacleMap {
+  std::shared_ptr<const VoxelSurface> surface;
+  StampNs stamp_ns = 0;
+  Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< at the map's stamp, held for the whole step
+  std::string problem;                                               ///< why there is none, for the reason of NO_MAP
+};
+
+struct Step {
+  std::vector<Body> bodies;
+  ObstacleMap map;
+  StampNs start_ns = 0, stamp_ns = 0;
+  std::uint64_t sequence = 0;  ///< of the clock body's frames, from 1; 0: of no stream
+  /// Turning bodies go from pose_t0 this many times as far as to pose_t1; t1 is where they end. Two poses alone tell no
+  /// turn of more than a half, which predictions may be.
+  double pose_scale = 1;
+
+  double duration_s() const { return static_cast<double>(stamp_ns - start_ns) * 1e-9; }
+};
+
+}  // namespace dccd

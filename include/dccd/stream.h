@@ -1,0 +1,112 @@
+// The monitor: stamped frames of several bodies in, one outcome per frame of the clock body out. Free of ROS, so that
+// the live node, analyze_bag and the tests run the same code.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dccd/detect.h"
+#include "dccd/export.h"
+#include "dccd/mesh_store.h"
+#include "dccd/tolerances.h"
+
+namespace dccd {
+
+/// How frames become steps.
+struct MonitorOptions {
+  Options detector;  ///< how a step is answered
+  MeshStoreOptions store;
+  double sync_timeout_s = 0.1;   ///< how long a step waits for the other bodies' frames
+  std::size_t clock_body = 0;    ///< a step ends at each of its frames
+  std::size_t max_waiting = 64;  ///< steps that may wait for other bodies; the oldest gives way
+  /// With obstacle_expected, a map older than this at the end of the step is no map; 0: never. (Where none is expected,
+  /// leaving a map out would go unsaid: it is used whatever its age.)
+  double octomap_timeout_s = 0;
+  double look_ahead_s = 0;  ///< horizon of predictions; 0: none
+
+  MonitorOptions() { detector.max_contacts = 10000; }
+};
+
+/// Every frame received ends in exactly one place: received = sum(by_status) + waiting.
+struct DCCD_EXPORT FrameCounters {
+  std::uint64_t received = 0;
+  std::uint64_t receipt_stamps = 0;  ///< frames stamped with their receipt time
+  std::array<std::uint64_t, static_cast<std::size_t>(StepStatus::COUNT)> by_status{};
+
+  std::uint64_t of(StepStatus status) const { return by_status[static_cast<std::size_t>(status)]; }
+  void count(StepStatus status) { ++by_status[static_cast<std::size_t>(status)]; }
+  std::uint64_t processed() const;  ///< came to a result, or serve one as another body's position
+  std::uint64_t started() const;    ///< seams: began a new pair of frames
+  std::uint64_t skipped() const;    ///< all other ends
+  std::uint64_t waiting() const { return received - processed() - started() - skipped(); }
+  FrameCounters& operator+=(const FrameCounters& other);
+};
+
+/// Told of every step that is computed, on the thread that calls next().
+class DCCD_EXPORT StepListener {
+ public:
+  virtual ~StepListener() = default;
+  virtual void onStep(const Step& step, const Options& options) = 0;
+  virtual void onOutcome(const Outcome& outcome) = 0;  ///< of the step before; INTERNAL_ERROR when it failed
+};
+
+/// Not thread-safe: one thread at a time, in the node its worker. `now_ns` is any clock that only goes forward (the
+/// node: steady clock; offline: the bag's); it decides about sync_timeout_s and nothing else.
+class DCCD_EXPORT Monitor {
+ public:
+  /// Throws std::invalid_argument naming the option or body.
+  Monitor(const MonitorOptions& options, std::vector<Body> bodies);
+  ~Monitor();
+
+  const MonitorOptions& options() const;
+  void setOptions(const MonitorOptions& options);  ///< from the next step on; clock_body must stay
+  const std::vector<Body>& bodies() const;
+
+  /// A frame of the body, in the fixed frame. Returns what it is to the frame before it.
+  StepStatus push(std::size_t body, MeshFrame frame, std::int64_t now_ns);
+  /// A frame that never became one (refused, no transform, ...). The clock body's yield an outcome with that status.
+  void skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason);
+  /// Counted only, without outcome: frames dropped by queues, or while disabled.
+  void countDropped(std::size_t body, StepStatus status, std::uint64_t count = 1);
+  void countReceived(std::size_t body, std::uint64_t count = 1, std::uint64_t receipt_stamps = 0);
+
+  /// The map from the next step on.
+  void setMap(ObstacleMap map);
+  const ObstacleMap& map() const;
+
+  /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
+  bool next(std::int64_t now_ns, Outcome& outcome);
+  /// Whether a step waits for other bodies' frames, so that next() is worth calling again later.
+  bool waiting() const;
+  /// End of input: steps that still wait are not waited for any longer.
+  void finish();
+
+  /// Forgets all frames. Waiting frames are counted under `status`. After RESET the next frames are new references for
+  /// what the minimum separation leaves out; else references stay as long as the topology does.
+  void reset(StepStatus status = StepStatus::RESET);
+
+  /// The newest frames as a step without motion: is anything in contact now? Status NO_BODY when a body has none yet.
+  Outcome checkNow();
+  /// From the newest frames to their extrapolation over look_ahead_s; toc is a fraction of that horizon. NO_BODY when
+  /// a body has no two frames without a seam between them. Valid after an outcome with a result.
+  Outcome predict();
+
+  /// Pairs from which the minimum separation is left out (see LeftOutPair); changes with the reference frames only.
+  const std::vector<LeftOutPair>& leftOut() const;
+
+  const FrameCounters& counters(std::size_t body) const;
+  FrameCounters total() const;
+
+  /// Null: none. Must outlive the monitor or be taken away. Steps of checkNow() and predict() are not told.
+  void setListener(StepListener* listener);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dccd

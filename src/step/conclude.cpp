@@ -1,0 +1,197 @@
+#include "step/conclude.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "dccd/accuracy.h"
+
+namespace dccd {
+namespace {
+
+bool samePair(const Contact& a, const Contact& b) {
+  return a.kind == b.kind && a.body == b.body && a.vertex == b.vertex && a.voxel == b.voxel;
+}
+
+/// The same pair in two parts of a step is one contact: it begins in the earlier part, and is certain if it is in
+/// either.
+void join(Contact& into, const Contact& later) {
+  if (later.certainty != Certainty::CERTAIN || into.certainty == Certainty::CERTAIN) return;
+  into.certainty = Certainty::CERTAIN;
+  into.toc_upper = later.toc_upper;
+}
+
+ContactCounts countsOf(const std::vector<Contact>& contacts) {
+  ContactCounts counts;
+  for (const Contact& contact : contacts) {
+    ++(contact.certainty == Certainty::CERTAIN ? counts.certain : counts.undecided);
+    ++(contact.body[1] == OBSTACLE_BODY ? counts.obstacle : counts.mesh);
+    counts.initial += contact.initial;
+    counts.leaving += contact.leaving;
+  }
+  return counts;
+}
+
+void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
+  if (contacts.size() <= count) return;
+  std::stable_sort(contacts.begin(), contacts.end(),
+                   [](const Contact& a, const Contact& b) { return a.toc_lower < b.toc_lower; });
+  contacts.resize(count);
+  std::sort(contacts.begin(), contacts.end(), canonicalLess);
+}
+
+/// Why it is less than a whole answer, if it is: of several reasons the one that says most.
+void judge(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
+  const auto say = [&](StepStatus status, const std::string& reason) {
+    outcome.status = status;
+    outcome.reason = reason;
+  };
+  outcome.status = StepStatus::OK;
+  if (outcome.stats.unchecked_vertices > 0) {
+    say(StepStatus::PARTIAL,
+        std::to_string(outcome.stats.unchecked_vertices) + " vertices are not finite and were not checked");
+  }
+  if (outcome.contacts.size() < outcome.total_contacts) {
+    say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
+                                   std::to_string(outcome.total_contacts) + " contacts are listed");
+  }
+  if (!outcome.complete && !outcome.allPairs()) {
+    say(StepStatus::DEADLINE, "the step budget ran out; nothing that was left out touches before toc " +
+                                  std::to_string(outcome.unchecked_toc_lower));
+  } else if (!outcome.complete) {
+    say(StepStatus::DEADLINE,
+        "the step budget ran out before all of the start state was looked at; no pair was left out of the contacts");
+  }
+  if (outcome.substeps < needed_parts) {
+    say(StepStatus::PARTIAL, "a rigid body turns so far that " + std::to_string(needed_parts) +
+                                 " parts are needed; max_substeps is " + std::to_string(outcome.substeps));
+  }
+  if (options.obstacle_expected && !step.map.surface) {
+    say(StepStatus::NO_MAP, step.map.problem + "; checked without it");
+  }
+}
+
+}  // namespace
+
+/// toc of part i of n as a fraction of the whole step. The division is rounded, so one step outwards.
+double scaleDown(double toc, std::size_t i, std::size_t n) {
+  return n == 1 ? toc : std::max(0.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 0.0));
+}
+double scaleUp(double toc, std::size_t i, std::size_t n) {
+  return n == 1 ? toc : std::min(1.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 2.0));
+}
+
+void leaveOut(double toc, Outcome& outcome) {
+  outcome.complete = false;
+  outcome.unchecked_toc_lower = std::min(outcome.unchecked_toc_lower, toc);
+}
+
+void addPart(std::size_t part, std::size_t parts, const PartResult& result, Outcome& outcome) {
+  if (part == 0) {
+    outcome.start_state = result.start_state;
+    outcome.start_state_complete = result.start_state_complete;
+    outcome.complete = outcome.complete && result.start_state_complete;
+    outcome.intersections = result.intersections;
+  }
+  outcome.contacts.reserve(outcome.contacts.size() + result.contacts.size());
+  for (Contact contact : result.contacts) {
+    contact.toc_lower = scaleDown(contact.toc_lower, part, parts);
+    contact.toc_upper = scaleUp(contact.toc_upper, part, parts);
+    contact.initial = contact.initial && part == 0;
+    outcome.contacts.push_back(contact);
+  }
+  if (!result.complete) leaveOut(scaleDown(std::min(result.unchecked_toc_lower, 1.0), part, parts), outcome);
+  outcome.stats += result.stats;
+}
+
+void joinParts(std::vector<Contact>& contacts) {
+  std::stable_sort(contacts.begin(), contacts.end(), canonicalLess);  // of one pair, the earlier part stays first
+  std::size_t kept = 0;
+  for (const Contact& contact : contacts) {
+    if (kept > 0 && samePair(contacts[kept - 1], contact)) {
+      join(contacts[kept - 1], contact);
+    } else {
+      contacts[kept++] = contact;
+    }
+  }
+  contacts.resize(kept);
+}
+
+void checkHoldsDistance(const Options& options, const std::string& what) {
+  if (holdsDistance(options.accuracy.rung)) return;
+  throw std::invalid_argument(std::string("accuracy = ") + toString(options.accuracy.rung) + " with " + what +
+                              "; a distance above 0 needs accuracy = conservative");
+}
+
+void check(const Options& options, const std::vector<Body>& bodies) {
+  const auto require = [](bool good, const std::string& text) {
+    if (!good) throw std::invalid_argument(text);
+  };
+  require(options.num_threads >= 1 && options.num_threads <= 1024,
+          "num_threads = " + std::to_string(options.num_threads) + " is out of range; 1 to 1024");
+  require(options.step_budget_ms >= 0 && options.step_budget_ms <= 1e9,
+          "step_budget_ms = " + std::to_string(options.step_budget_ms) + " is out of range; 0 (none) to 1e9");
+  require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
+  require(options.max_substeps >= 1, "max_substeps must be 1 or more");
+  for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
+  if (options.accuracy.rung != Accuracy::SCREEN) makeRung(options.accuracy);
+  const double separation_m = largestSeparation(bodies);
+  if (separation_m > 0) checkHoldsDistance(options, "minimum_separation_m = " + std::to_string(separation_m));
+}
+
+bool operator==(const Options& a, const Options& b) {
+  const auto values = [](const Options& o) {
+    return std::tie(o.accuracy.rung, o.accuracy.tolerance_m, o.accuracy.toc_bits, o.accuracy.max_subdivisions,
+                    o.broad_phase, o.num_threads, o.step_budget_ms, o.earliest_only, o.check_start_state, o.keep_bounds,
+                    o.unfolded_test, o.rigid_tolerance_m, o.max_substeps, o.max_contacts, o.suppress_initial,
+                    o.obstacle_expected);
+  };
+  return values(a) == values(b) &&
+         std::equal(a.exclude_boxes.begin(), a.exclude_boxes.end(), b.exclude_boxes.begin(), b.exclude_boxes.end(),
+                    [](const Box& x, const Box& y) { return x.min == y.min && x.max == y.max; });
+}
+
+StepStats& StepStats::operator+=(const StepStats& other) {
+  for (std::size_t i = 0; i < stages.size(); ++i) stages[i] += other.stages[i];
+  for (std::size_t i = 0; i < effects.size(); ++i) effects[i] += other.effects[i];
+  tiers += other.tiers;
+  total_ms += other.total_ms;
+  for (const StepCounter& counter : STEP_COUNTERS) {
+    std::uint64_t& sum = this->*counter.value;
+    const std::uint64_t part = other.*counter.value;
+    sum = counter.same_in_every_part ? std::max(sum, part) : sum + part;
+  }
+  return *this;
+}
+
+const char* toString(Stage stage) {
+  static const char* const NAMES[] = {"record",     "bounds",   "broad_phase", "planar",
+                                      "elementary", "obstacle", "start_state", "sort"};
+  return NAMES[static_cast<std::size_t>(stage)];
+}
+
+const char* toString(StartState state) {
+  static const char* const NAMES[] = {"CLEAR", "INTERSECTING", "NOT_CHECKED"};
+  return NAMES[static_cast<std::size_t>(state)];
+}
+
+void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
+  auto& contacts = outcome.contacts;
+  const bool touched = !contacts.empty();
+  if (options.suppress_initial) {
+    const auto kept = std::remove_if(contacts.begin(), contacts.end(),
+                                     [](const Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; });
+    outcome.suppressed = static_cast<std::size_t>(contacts.end() - kept);
+    contacts.erase(kept, contacts.end());
+  }
+  outcome.total_contacts = contacts.size();
+  outcome.counts = countsOf(contacts);
+  outcome.earliest_toc = outcome.unchecked_toc_lower;
+  for (const Contact& contact : contacts) outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
+  keepEarliest(options.max_contacts, contacts);
+  judge(options, step, needed_parts, outcome);
+  outcome.answered = true;
+  outcome.clear = outcome.status == StepStatus::OK && outcome.start_state == StartState::CLEAR && !touched;
+}
+
+}  // namespace dccd

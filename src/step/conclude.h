@@ -1,0 +1,26 @@
+// From what the parts of a step say to what is said of the step.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "step/history.h"
+
+namespace dccd {
+
+/// toc of part i of n as a fraction of the whole step, not later.
+double scaleDown(double toc, std::size_t i, std::size_t n);
+
+/// The budget left out what does not touch before toc.
+void leaveOut(double toc, Outcome& outcome);
+/// Appends a part's contacts, the start state of the first one, the statistics.
+void addPart(std::size_t part, std::size_t parts, const PartResult& result, Outcome& outcome);
+/// Contacts of several parts into canonical order, a pair once.
+void joinParts(std::vector<Contact>& contacts);
+/// What of the raw contacts is reported, and what the step may be called.
+void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome);
+
+/// Throws std::invalid_argument unless the rung can hold a distance; `what` asks for one.
+void checkHoldsDistance(const Options& options, const std::string& what);
+
+}  // namespace dccd

@@ -1,0 +1,318 @@
+// The flow of a step: options, bodies and map; then of each straight part records, bounds, pairs, map and start state;
+// then what of it is said.
+#include "dccd/detect.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "obstacle/excluded_leaves.h"
+#include "step/conclude.h"
+#include "step/history.h"
+#include "step/parts.h"
+
+namespace dccd {
+namespace {
+
+using Clock = Deadline::Clock;
+
+constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
+constexpr std::size_t PIECE = 256;            // groups or vertices x 16 in a unit of refitting
+
+/// Erases what cannot be the first contact: it begins after another one has certainly happened. How wide a bracket is
+/// says nothing: `conservative` may find the first contact at once, in [0, 1], and a later one in a narrow bracket.
+/// cells: the brackets are cells that do not overlap, and where one ends, the next begins (the last, [1, 1], as well).
+void keepFirst(bool cells, std::vector<Contact>& contacts) {
+  double lower = 2, upper = 2;
+  for (const Contact& c : contacts) {
+    if (c.certainty != Certainty::CERTAIN) continue;
+    lower = std::min(lower, c.toc_lower);
+    upper = std::min(upper, c.toc_upper);
+  }
+  const auto late = [&](const Contact& c) {
+    const bool next_cell = cells && c.certainty == Certainty::CERTAIN && c.toc_lower == upper && c.toc_lower > lower;
+    return c.toc_lower > upper || next_cell;
+  };
+  contacts.erase(std::remove_if(contacts.begin(), contacts.end(), late), contacts.end());
+}
+
+bool sameBits(const std::shared_ptr<const Positions>& a, const std::shared_ptr<const Positions>& b) {
+  return a == b || (a && b && a->size() == b->size() &&
+                    (a->empty() || std::memcmp(a->data(), b->data(), a->size() * sizeof(Vec3)) == 0));
+}
+
+}  // namespace
+
+Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline) {
+  return history.impl().run(step, options, deadline);
+}
+
+History::History() : impl_(std::make_unique<Impl>()) {}
+History::~History() = default;
+History::History(History&& other) noexcept = default;
+History& History::operator=(History&& other) noexcept = default;
+void History::clear() { impl_->carried.clear(); }
+void History::beginAt(History& other) { impl_->begins_at = other.impl_.get(); }
+bool History::isClear() const { return impl_->carried.isClear(); }
+const std::vector<LeftOutPair>& History::leftOut() const { return impl_->left_out_list; }
+
+void Carried::clear() {
+  end.clear();
+  apart.clear();
+  start_state.clear();
+}
+
+bool Carried::isContinuedBy(const Step& step) const {
+  if (end.empty() || end.size() != step.bodies.size()) return false;
+  for (std::size_t b = 0; b < end.size(); ++b) {
+    if (!sameBits(end[b], step.bodies[b].t0)) return false;
+  }
+  return true;
+}
+
+Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline deadline) {
+  // Whatever throws from here on leaves nothing behind that could be taken for known.
+  struct Guard {
+    Carried& carried;
+    bool done = false;
+    ~Guard() {
+      if (!done) carried.clear();
+    }
+  } guard{carried};
+  aside = begins_at != nullptr;
+  const Clock::time_point called = Clock::now();
+  setOptions(wanted);
+  setBodies(step);
+  useMap(step.map);
+  // What is made once for many steps is not taken from the time of the first.
+  if (!deadline.isNever()) deadline = Deadline(deadline.at() + (Clock::now() - called));
+  const bool continues = carried.isContinuedBy(step);
+  if (!continues) carried.clear();
+  const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
+  const std::size_t parts = std::min(needed, options->max_substeps);
+  Outcome outcome;
+  outcome.start_ns = step.start_ns;
+  outcome.stamp_ns = step.stamp_ns;
+  outcome.sequence = step.sequence;
+  outcome.substeps = parts;
+  outcome.excluded_voxels = excluded_voxels;
+  guard.done = runParts(step, continues, parts, deadline, outcome);
+  begins_at = nullptr;
+  outcome.step = std::make_shared<const Step>(step);
+  outcome.obstacle = map_reduced;
+  conclude(*options, step, needed, outcome);
+  return outcome;
+}
+
+void History::Impl::setOptions(const Options& wanted) {
+  if (options && *options == wanted) return;
+  check(wanted);
+  std::unique_ptr<Rung> rung;
+  if (wanted.accuracy.rung != Accuracy::SCREEN) rung = makeRung(wanted.accuracy);
+  if (!arena || wanted.num_threads != options->num_threads) arena.emplace(wanted.num_threads);
+  elementary = std::move(rung);
+  scene.setKeepBounds(wanted.keep_bounds);
+  obstacle_checks.clear();
+  map_given = nullptr;  // other boxes may be excluded
+  options = wanted;
+}
+
+void History::Impl::setBodies(const Step& step) {
+  check(*options, step.bodies);
+  if (scene.holds(step.bodies)) return;
+  carried.clear();
+  carried.start_state.forgetBodies();
+  scene.setBodies(step.bodies);
+  unfolded.clear();
+  for (const SceneBody& body : scene.bodies()) unfolded.emplace_back(body);
+  obstacle_checks.clear();
+  findLeftOut(step);
+}
+
+void History::Impl::useMap(const ObstacleMap& map) {
+  const bool same_pose = map_pose.matrix() == map.map_from_fixed.matrix();
+  if (map_given == map.surface && (same_pose || options->exclude_boxes.empty())) return;
+  map_reduced = map.surface;
+  excluded_voxels = 0;
+  if (map.surface && !options->exclude_boxes.empty()) {
+    RemainingLeaves remaining = leavesOutside(map.surface->leaves(), map.surface->resolution(),
+                                              map.map_from_fixed.inverse(), options->exclude_boxes);
+    excluded_voxels = remaining.excluded_voxels;
+    if (excluded_voxels > 0) {
+      map_reduced = VoxelSurface::build(map.surface->resolution(), std::move(remaining.leaves));
+    }
+  }
+  map_given = map.surface;
+  map_pose = map.map_from_fixed;
+}
+
+bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome) {
+  bool reached_end = true;
+  if (parts == 1) {
+    runPart({step, 0, 1, continues, deadline}, outcome);
+  } else {
+    Step part = step;
+    for (Body& body : part.bodies) body.t1 = body.t0;
+    for (std::size_t i = 0; reached_end && i < parts; ++i) {
+      if (i > 0 && deadline.isOver()) {
+        // Of the rest all that is known is that it has not begun yet.
+        leaveOut(scaleDown(0, i, parts), outcome);
+        reached_end = false;
+        break;
+      }
+      const Clock::time_point start = Clock::now();
+      advance(step, i + 1, parts, part);
+      const double place_ms = msSince(start);
+      outcome.stats[Effect::RIGID_BODIES].ms += place_ms;
+      outcome.stats.total_ms += place_ms;
+      runPart({part, i, parts, i > 0 || continues, deadline}, outcome);
+    }
+    joinParts(outcome.contacts);
+  }
+  // At the end of the last part that was done something else may be.
+  if (reached_end) {
+    carried.end.clear();
+    for (const Body& body : step.bodies) carried.end.push_back(body.t1);
+  }
+  return reached_end;
+}
+
+/// One part, from records to contacts; what it says goes into the outcome.
+void History::Impl::runPart(const Part& part, Outcome& outcome) {
+  const ScopedFloatMode mode;
+  const Clock::time_point begin = Clock::now();
+  result.intersections.clear();
+  result.start_state = StartState::NOT_CHECKED;
+  result.start_state_complete = result.complete = true;
+  result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
+  result.stats = StepStats();
+  fill(part);
+  StepContext context;
+  context.scene = &scene;
+  context.elementary = elementary.get();
+  context.earliest_only = options->earliest_only;
+  context.left_out = &left_out;
+  context.observer = observer;
+  context.deadline = part.deadline;
+  result.stats.left_out_listed = left_out_list.size();
+  if (options->accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options->accuracy.tolerance_m;
+  for (PairWorker& w : workers) w.beginStep();
+  findPairs(context);
+  runPairs(context);
+  collect();
+  const bool all_pairs = result.complete;
+  if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
+  if (map_reduced && scene.meetsObstacle()) runMap(part);
+  rememberApart(all_pairs && !options->earliest_only && options->accuracy.rung != Accuracy::FAST);
+  if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
+  runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
+  result.stats.total_ms = msSince(begin);
+  addPart(part.index, part.count, result, outcome);
+}
+
+/// The part's positions into the scene's arrays, and what of it needs bounds.
+void History::Impl::fill(const Part& part) {
+  StepStats& stats = result.stats;
+  Clock::time_point start = Clock::now();
+  scene.record(part.step, stats);
+  if (observer) observer->onPart(part.index, scene);
+  if (scene.uncertain()) checkHoldsDistance(*options, "an uncertainty radius");
+  stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
+  start = Clock::now();
+  chooseSelfTests(part);
+  stats[Stage::BROAD_PHASE].ms += msSince(start);
+  start = Clock::now();
+  if (needsTrees(part)) scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); }, stats);
+  stats[Stage::BOUNDS].ms = msSince(start);
+}
+
+void History::Impl::writeContact(PairKind kind, const Hit& hit, Contact& c) const {
+  c = Contact();
+  c.kind = kind;
+  c.toc_lower = hit.toc_lower;
+  c.toc_upper = hit.toc_upper;
+  c.certainty = hit.certainty;
+  c.body = {static_cast<std::uint16_t>(hit.bodies >> 16), static_cast<std::uint16_t>(hit.bodies)};
+  const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
+  scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
+  scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
+}
+
+void History::Impl::collect() {
+  const Clock::time_point start = Clock::now();
+  for (const PairWorker& w : workers) {
+    result.stats += w.stats();
+    result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
+  }
+  std::vector<const std::vector<Hit>*> parts;
+  std::size_t base = 0;
+  for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
+    parts.clear();
+    for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
+    const std::vector<const Hit*>& sorted = order.sort(parts);
+    result.contacts.resize(base + sorted.size());
+    parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
+        if (i + 8 < last) __builtin_prefetch(sorted[i + 8]);
+        writeContact(kind, *sorted[i], result.contacts[base + i]);
+      }
+    });
+    base += sorted.size();
+  }
+  result.stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
+}
+
+void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_pairs) {
+  StartStateSearch& search = carried.start_state;
+  if (!checksStartState(part)) return search.clear();
+  const Clock::time_point start = Clock::now();
+  StepStats& stats = result.stats;
+  StartStateSearch::IsOver is_over;
+  if (!part.deadline.isNever()) {
+    // Later parts need as much time for their pairs; what is over that is shared.
+    const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
+    const Clock::duration slack = part.deadline.at() - start - later * (start - begin);
+    is_over = [deadline = Deadline(start + slack / (later + 1))] { return deadline.isOver(); };
+  }
+  std::vector<StartIntersection> met;
+  result.start_state_complete = listStart(part, is_over, met) && result.start_state_complete;
+  if (!met.empty()) {
+    result.start_state = StartState::INTERSECTING;
+  } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
+    result.start_state = StartState::NOT_CHECKED;
+  }
+  result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
+  if (isStartKnown()) {
+    search.clear();
+  } else {
+    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about
+    // the end of the step.
+    const bool complete = all_pairs && !options->earliest_only && stats.unchecked_vertices == 0 &&
+                          options->accuracy.rung != Accuracy::FAST;
+    search.remember(scene, result.contacts, complete);
+  }
+  stats[Stage::START_STATE].ms += msSince(start);
+  stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
+}
+
+/// What meets at t=0. False: is_over ended it.
+bool History::Impl::listStart(const Part& part, const StartStateSearch::IsOver& is_over,
+                              std::vector<StartIntersection>& met) {
+  if (isStartKnown()) return begins_at->carried.start_state.listEnd(begins_at->scene, is_over, met);
+  met = carried.start_state.run(scene, part.continues, is_over, result.stats);
+  return carried.start_state.isWhole();
+}
+
+/// Of a step aside from all others only the first part is asked about: nothing is carried over from it.
+bool History::Impl::checksStartState(const Part& part) const {
+  return options->check_start_state && (part.index == 0 || !aside);
+}
+
+/// By the step that this one begins at.
+bool History::Impl::isStartKnown() const {
+  return begins_at && !begins_at->carried.end.empty() && begins_at->carried.start_state.knowsEnd();
+}
+
+}  // namespace dccd

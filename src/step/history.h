@@ -1,0 +1,151 @@
+// What a history holds, and what a step does with it: detect.cpp has the flow, pairs.cpp the pairs of meshes, map.cpp
+// the map, left_out.h what is left out of the separation.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <memory>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "culling/scene_arrays.h"
+#include "culling/unfolded.h"
+#include "dccd/detect.h"
+#include "step/float_mode.h"
+#include "step/fork_join.h"
+#include "step/hit_order.h"
+#include "step/left_out.h"
+#include "step/pair_worker.h"
+#include "step/start_state.h"
+
+namespace dccd {
+
+inline FeatureKind firstKind(PairKind k) {
+  return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE;
+}
+inline FeatureKind secondKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
+
+/// One straight part of a step, of which the later ones begin where the one before ended.
+struct Part {
+  const Step& step;
+  std::size_t index = 0, count = 1;
+  bool continues = false;  ///< it begins where the last part of this history ended
+  Deadline deadline;
+};
+
+/// What one part says.
+struct PartResult {
+  StartState start_state = StartState::NOT_CHECKED;
+  bool start_state_complete = true;
+  bool complete = true;  ///< of the contacts
+  double unchecked_toc_lower = std::numeric_limits<double>::infinity();
+  std::vector<Contact> contacts;
+  std::vector<StartIntersection> intersections;
+  StepStats stats;
+};
+
+/// What is known of the end of the last step, and nothing else that could change an answer: clear() is its beginning.
+struct Carried {
+  std::vector<std::shared_ptr<const Positions>>
+      end;                          ///< where each body was; empty: no step, or nothing is known of it
+  std::vector<std::uint8_t> apart;  ///< per body: it certainly did not touch itself
+  StartStateSearch start_state;     ///< what may meet there
+
+  void clear();
+  bool isClear() const { return end.empty() && apart.empty() && start_state.isClear(); }
+  /// Does the step begin where the last one ended? Every body bit for bit. The one place that decides it.
+  bool isContinuedBy(const Step& step) const;
+};
+
+struct History::Impl {
+  Outcome run(const Step& step, const Options& wanted, Deadline deadline);
+
+  void setOptions(const Options& wanted);
+  void setBodies(const Step& step);
+  void useMap(const ObstacleMap& map);
+  void findLeftOut(const Step& step);
+  void listLeftOut(std::size_t body, PairKind kind);
+  bool needsReference(std::size_t body) const;
+
+  bool runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome);
+  void runPart(const Part& part, Outcome& outcome);
+  void fill(const Part& part);
+  void chooseSelfTests(const Part& part);
+  bool staysApart(std::size_t body) const;
+  bool isUnfolded(std::size_t body);
+  bool needsTrees(const Part& part) const;
+  void rememberApart(bool certain);
+  void addSelfTasks(std::size_t body, const StepContext& context);
+  void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
+  void orderByBound(const TreePair& trees);
+  void findPairs(const StepContext& context);
+  void runPairs(StepContext& context);
+  void collect();
+  void writeContact(PairKind kind, const Hit& hit, Contact& contact) const;
+  /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
+  void runMap(const Part& part);
+  bool runMapOf(std::size_t body, const Part& part, ObstacleStats& total);
+  bool checksStartState(const Part& part) const;
+  bool isStartKnown() const;
+  /// all_pairs: no pair of meshes was left out.
+  void runStartState(const Part& part, Deadline::Clock::time_point begin, bool all_pairs);
+  bool listStart(const Part& part, const StartStateSearch::IsOver& is_over, std::vector<StartIntersection>& met);
+  template <class Function>
+  void parallel(std::size_t n, std::size_t piece, const Function& function);
+
+  Carried carried;
+  StepObserver* observer = nullptr;
+  Impl* begins_at = nullptr;  // the next step begins where this one's ended
+  bool aside = false;         // so did the step that is being run
+
+  // Made from options, bodies and map, again when these change.
+  std::optional<Options> options;
+  std::unique_ptr<Rung> elementary;
+  std::optional<tbb::task_arena> arena;
+  SceneArrays scene;
+  std::vector<UnfoldedProof> unfolded;  // per body
+  std::vector<LeftOutOfBody> left_out;  // per body
+  std::vector<LeftOutPair> left_out_list;
+  std::shared_ptr<const VoxelSurface> map_given, map_reduced;  // the step's, and what exclude_boxes leave of it
+  Eigen::Isometry3d map_pose = Eigen::Isometry3d::Identity();  // with which
+  std::uint64_t excluded_voxels = 0;
+  std::vector<std::unique_ptr<ObstacleCheck>> obstacle_checks;
+
+  // Buffers of a part.
+  tbb::enumerable_thread_specific<PairWorker> workers;
+  std::vector<PairTask> tasks;
+  std::vector<std::uint32_t> group_pairs, found_groups, scratch, body_pairs;
+  std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc;  // and place, pair of groups
+  std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at
+  std::vector<std::uint8_t> obstacle_active;
+  Positions map_t0, map_t1;
+  HitOrder order;
+  PartResult result;
+};
+
+template <class Function>
+void History::Impl::parallel(std::size_t n, std::size_t piece, const Function& function) {
+  if (options->num_threads == 1 || n <= piece) {
+    function(0, n);
+    return;
+  }
+  const auto in_mode = [&](std::size_t first, std::size_t last) {
+    const ScopedFloatMode mode;
+    function(first, last);
+  };
+  ForkJoin::fork();
+  arena->execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, n, piece),
+        [&](const tbb::blocked_range<std::size_t>& r)
+            DEFORMABLE_CCD_COPIED_BY_TBB { ForkJoin::piece(in_mode, r.begin(), r.end()); },
+        tbb::simple_partitioner());
+  });
+  ForkJoin::join();
+}
+
+}  // namespace dccd

@@ -1,0 +1,79 @@
+// A part of a step against the map.
+#include <algorithm>
+
+#include "step/history.h"
+#include "step/map_frame.h"
+
+namespace dccd {
+namespace {
+
+std::uint64_t pairsIn(const ObstacleStats& stats) {
+  return stats.vertex_pairs_in + stats.edge_pairs_in + stats.corner_pairs_in;
+}
+
+}  // namespace
+
+/// False where the deadline cut it.
+bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& total) {
+  const SceneBody& body = scene.bodies()[b];
+  if (!obstacle_checks[b]) {
+    ObstacleOptions o;
+    o.accuracy = options->accuracy;
+    o.minimum_separation_m = scene.separation(b, OBSTACLE_BODY);
+    obstacle_checks[b] = std::make_unique<ObstacleCheck>(o);
+  }
+  const std::uint8_t* active = nullptr;
+  if (body.masked) {
+    obstacle_active.assign(body.setup.topology->vertexCount(), 0);
+    for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];
+    active = obstacle_active.data();
+  }
+  const Deadline::Clock::time_point start = Deadline::Clock::now();
+  const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
+  const Body& moving = part.step.bodies[b];
+  const Positions& t0 = inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0);
+  const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1);
+  const bool whole = obstacle_checks[b]->run(*map_reduced, *body.setup.topology, t0, t1, active,
+                                             static_cast<std::uint16_t>(b), result.contacts, total,
+                                             body.uncertain ? moving.radius_m->data() : nullptr, part.deadline);
+  const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(start)};
+  if (scene.separation(b, OBSTACLE_BODY) > 0) result.stats[Effect::MINIMUM_SEPARATION] += of_body;
+  if (body.uncertain) result.stats[Effect::TRACKER_NOISE] += of_body;
+  return whole;
+}
+
+void History::Impl::runMap(const Part& part) {
+  const Deadline::Clock::time_point start = Deadline::Clock::now();
+  obstacle_checks.resize(scene.bodies().size());
+  ObstacleStats total;
+  const std::size_t before = result.contacts.size();
+  for (std::size_t b = 0; b < scene.bodies().size(); ++b) {
+    if (!meetsMap(scene.bodies()[b].setup) || runMapOf(b, part, total)) continue;
+    result.complete = false;
+    result.unchecked_toc_lower = 0;
+    result.start_state_complete = false;
+    if (result.start_state == StartState::CLEAR) result.start_state = StartState::NOT_CHECKED;
+  }
+  // Each body's are in order; of several bodies, kinds come first.
+  const auto first = result.contacts.begin() + static_cast<std::ptrdiff_t>(before);
+  if (!std::is_sorted(first, result.contacts.end(), canonicalLess)) {
+    std::sort(first, result.contacts.end(), canonicalLess);
+  }
+  result.stats[Stage::OBSTACLE] = {pairsIn(total), result.contacts.size() - before, msSince(start)};
+  result.stats[Effect::OCTOMAP] = result.stats[Stage::OBSTACLE];
+  for (std::size_t i = before; i < result.contacts.size(); ++i) {
+    const Contact& c = result.contacts[i];
+    result.stats.initial += c.initial;
+    result.stats.leaving += c.leaving;
+    result.stats.undecided += c.certainty == Certainty::UNDECIDED;
+    if (!c.initial || !checksStartState(part)) continue;
+    result.start_state = StartState::INTERSECTING;
+    if (c.kind != PairKind::VERTEX_VOXEL_FACE) continue;
+    StartIntersection s;
+    s.body = {c.body[0], OBSTACLE_BODY};
+    s.vertex[0] = c.vertex[0];
+    result.intersections.push_back(s);
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,29 @@
+// What a step tells of itself while it is computed, to whoever asks why it answers as it does (record/explain.h).
+// Without an observer it costs a look at a pointer for each chunk of pairs.
+#pragma once
+
+#include <cstddef>
+
+#include "culling/scene_arrays.h"
+#include "dccd/elementary.h"
+#include "dccd/outcome.h"
+#include "step/pair_separation.h"
+
+namespace dccd {
+
+/// Called on one thread: a step that is observed has one worker. Pairs are by internal vertices, features in any order.
+class StepObserver {
+ public:
+  virtual ~StepObserver() = default;
+  virtual void onPart(std::size_t part, const SceneArrays& scene) = 0;
+  /// The body's pairs with itself are left out as a whole: it certainly does not fold, or keeps its shape.
+  virtual void onSelfLeftOut(std::size_t body, const char* why) = 0;
+  /// Pairs that are left after a stage.
+  virtual void onPairs(Stage stage, PairKind kind, const Quad* pairs, std::size_t count) = 0;
+  /// The planar filter is not asked: the pairs carry distances.
+  virtual void onPlanarSkipped(PairKind kind, const Quad* pairs, std::size_t count) = 0;
+  virtual void onSeparation(PairKind kind, const Quad& pair, const PairSeparation& separation) = 0;
+  virtual void onResult(PairKind kind, const Quad& pair, const ElementaryResult& result) = 0;
+};
+
+}  // namespace dccd

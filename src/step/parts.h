@@ -1,0 +1,18 @@
+// A step whose bodies turn, as parts that are straight enough.
+#pragma once
+
+#include "dccd/step.h"
+
+namespace dccd {
+
+/// Parts that the step must be cut into so that each turning body's straight vertex paths stay within the tolerance of
+/// its arc [m]: 1 where nothing turns. Not limited.
+std::size_t requiredSubsteps(const Step& step, double tolerance_m);
+
+/// Moves `at`, which ends where part `part` - 1 of `parts` equal parts ends, on by one part.
+void advance(const Step& step, std::size_t part, std::size_t parts, Step& at);
+
+/// One vertex at the end of the first `part` of `parts` equal parts, as advance() has it.
+Vec3 placeVertex(const Step& step, std::size_t body, Index vertex, std::size_t part, std::size_t parts);
+
+}  // namespace dccd

@@ -1,0 +1,130 @@
+"""doc/development.md, "How to add": a toy of a kind, added in the files that the page names and no others, is built and seen."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+from checkout import CHECKOUT, tracked_files
+
+TOY_RUNG = '''#include "dccd/elementary.h"
+
+namespace dccd {
+namespace {
+
+class ToyRung : public Rung {
+ public:
+  void run(const PairBatch& batch, ElementaryResult* results, TierCounters&) const override {
+    for (std::size_t i = 0; i < batch.count; ++i) results[i] = ElementaryResult();
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Rung> makeToyRung(const AccuracyOptions&) { return std::make_unique<ToyRung>(); }
+
+}  // namespace dccd
+'''
+# File -> (text there, text that takes its place); None: the file is new.
+RUNG = {
+    'include/dccd/elementary.h': ('EXACT = 3 }', 'EXACT = 3, TOY }'),
+    'src/elementary/toy.cpp': (None, TOY_RUNG),
+    'src/elementary/elementary.cpp': [
+        ('\nnamespace {\n', '\nstd::unique_ptr<Rung> makeToyRung(const AccuracyOptions& options);\n\nnamespace {\n'),
+        ('{"exact", makeExactRung, false},\n', '{"exact", makeExactRung, false},\n    {"toy", makeToyRung, false},\n')],
+}
+EFFECT = {
+    'include/dccd/outcome.h': (r'contacts' + '\n  COUNT\n', 'contacts\n  TOY,\n  COUNT\n'),
+    'src/step/effect_plan.cpp': [
+        ('/// By Effect:', 'Finding toy(const EffectScene& scene) {\n  return {scene.bodies.size() > 1, true, "toys like company"};\n}\n\n'
+                          '/// By Effect:'),
+        ('{"look_ahead", lookAhead},\n', '{"look_ahead", lookAhead},\n    {"toy", toy},\n')],
+}
+USER = r'''
+#include <dccd/accuracy.h>
+#include <dccd/detect.h>
+#include <dccd/effect_plan.h>
+
+#include <cstdio>
+
+using namespace dccd;
+
+int main() {
+  Step step;
+  step.bodies.resize(2);
+  for (std::size_t b = 0; b < 2; ++b) {
+    const double z = static_cast<double>(b);
+    Body& body = step.bodies[b];
+    body.name = std::to_string(b);
+    body.topology = share(Topology::fromTriangles(3, {{0, 1, 2}}));
+    body.t0 = share(Positions{{0, 0, 0.5 - z}, {1, 0, 0.5 - z}, {0, 1, 0.5 - z}});
+    body.t1 = share(Positions{{0, 0, z - 0.5}, {1, 0, z - 0.4}, {0, 1, z - 0.6}});
+  }
+  Options options;
+  options.accuracy.rung = accuracyFromString("toy");
+  History history;
+  const Outcome outcome = detect(step, options, history);
+  EffectScene scene;
+  scene.bodies = step.bodies;
+  const EffectPlan plan(scene, {});
+  std::printf("%s %zu undecided %d %s\n", toString(allRungs().back()), outcome.counts.undecided,
+              plan.running(Effect::TOY), plan.lines()[static_cast<std::size_t>(Effect::TOY)].c_str());
+}
+'''
+
+
+def recipe(kind):
+    """The files that the page's paragraph names, and the folders for new ones."""
+    page = (CHECKOUT / 'doc/development.md').read_text()
+    text = page[page.index('**%s.**' % kind):]
+    text = text[:text.index('\n\n')]
+    return set(re.findall(r'`((?:include|src)/[\w./]+)`', text))
+
+
+def apply(edits, tree):
+    for name, changes in edits.items():
+        path = tree / name
+        for before, after in changes if isinstance(changes, list) else [changes]:
+            if before is None:
+                path.write_text(after)
+                continue
+            text = path.read_text()
+            assert text.count(before) >= 1, '%s has no %r' % (name, before)
+            path.write_text(text.replace(before, after, 1))
+
+
+class RecipesTest(unittest.TestCase):
+    def test_as_few_files_as_promised_and_the_page_names_them(self):
+        for kind, edits, most in (('a rung', RUNG, 3), ('an effect', EFFECT, 4)):
+            new = {name for name, changes in edits.items() if changes[0] is None}
+            named = recipe(kind)
+            self.assertLessEqual(set(edits) - new, named, kind)
+            self.assertLessEqual({str(pathlib.Path(name).parent) + '/' for name in new}, named, kind)
+            self.assertLessEqual(len(edits), most)
+
+    @unittest.skipUnless(os.environ.get('DEFORMABLE_CCD_LONG'), 'builds the core anew: --long')
+    def test_toys_are_built_and_seen(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tree = pathlib.Path(folder, 'tree')
+            for path in tracked_files():
+                to = tree / path.relative_to(CHECKOUT)
+                to.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(path, to)
+            apply(RUNG, tree)
+            apply(EFFECT, tree)
+            (tree / 'user.cpp').write_text(USER)
+            build = tree / 'build'
+            for command in (['cmake', '-S', str(tree), '-B', str(build), '-DDEFORMABLE_CCD_CORE_ONLY=ON', '-DDEFORMABLE_CCD_TESTS=OFF'],
+                            ['cmake', '--build', str(build), '--target', 'deformable_ccd', '-j2'],
+                            ['g++', '-std=c++17', '-I' + str(tree / 'include'), '-isystem', '/usr/include/eigen3', 'user.cpp',
+                             '-L' + str(build), '-ldeformable_ccd', '-Wl,-rpath,' + str(build), '-o', 'user']):
+                ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+                self.assertEqual(ran.returncode, 0, ran.stdout[-3000:] + ran.stderr[-3000:])
+            said = subprocess.run([str(tree / 'user')], capture_output=True, text=True, check=True).stdout
+            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company$')
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,97 @@
+// What a history holds after each kind of seam is what a new one holds: nothing, and so the next answer is a new one's.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "dccd/stream.h"
+#include "step/history.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+/// All that could be carried over, taken apart.
+void expectFresh(History& history) {
+  History fresh;
+  const Carried &now = history.impl().carried, &then = fresh.impl().carried;
+  EXPECT_EQ(now.end, then.end);
+  EXPECT_EQ(now.apart, then.apart);
+  EXPECT_TRUE(then.start_state.isClear());
+  EXPECT_TRUE(now.start_state.isClear());
+  EXPECT_FALSE(now.start_state.knowsEnd());
+  EXPECT_TRUE(history.isClear());
+}
+
+/// Everything about an answer but its times.
+void expectSame(const Outcome& a, const Outcome& b) {
+  EXPECT_EQ(difference(a.contacts, b.contacts), "");
+  EXPECT_EQ(a.start_state, b.start_state);
+  EXPECT_TRUE(std::equal(a.intersections.begin(), a.intersections.end(), b.intersections.begin(), b.intersections.end(),
+                         [](const auto& x, const auto& y) { return x == y; }));
+  for (std::size_t e = 0; e < a.stats.effects.size(); ++e) {
+    EXPECT_EQ(a.stats.effects[e].in, b.stats.effects[e].in) << toString(static_cast<Effect>(e));
+    EXPECT_EQ(a.stats.effects[e].out, b.stats.effects[e].out) << toString(static_cast<Effect>(e));
+  }
+  EXPECT_EQ(a.stats.undecided, b.stats.undecided);
+  EXPECT_EQ(a.stats.body_pairs, b.stats.body_pairs);
+}
+
+TEST(History, EverySeamLeavesNothingBehind) {
+  const TestStep first = crumpled(3, 2, 9);
+  const TestStep next = first.continued({first.bodies[0].t0, first.bodies[1].t0});
+  const Outcome expected = runOnce(next, {});
+  Step broken = first.motion();
+  broken.bodies[1].t1 = share(Positions(3, Vec3::Zero()));
+  Step other = first.motion();
+  other.bodies.pop_back();
+  const std::vector<std::pair<const char*, std::function<void(Detector&)>>> seams = {
+      {"a seam or a reset", [](Detector& d) { d.history().clear(); }},
+      {"a step that throws", [&](Detector& d) { EXPECT_THROW(d.run(broken), std::invalid_argument); }},
+      {"options that throw",
+       [&](Detector& d) {
+         Options bad;
+         bad.num_threads = 0;
+         d.setOptions(bad);
+         EXPECT_THROW(d.run(next.motion()), std::invalid_argument);
+         d.setOptions(Options());
+       }},
+  };
+  for (const auto& [name, seam] : seams) {
+    SCOPED_TRACE(name);
+    Detector detector;
+    detector.run(first.motion());
+    EXPECT_FALSE(detector.history().isClear());
+    seam(detector);
+    expectFresh(detector.history());
+    expectSame(detector.run(next.motion()), expected);
+  }
+  // Other bodies are no seam that anybody tells of, and nothing of theirs may be taken for these.
+  Detector detector;
+  detector.run(first.motion());
+  detector.run(other);
+  expectSame(detector.run(next.motion()), expected);
+}
+
+TEST(History, WhatContinuesIsCarriedOverAndNothingElse) {
+  const TestStep first = crumpled(3, 2, 9);
+  const TestStep next = first.continued({first.bodies[0].t0, first.bodies[1].t0});
+  const Outcome expected = runOnce(next, {});
+  Detector detector;
+  detector.run(first.motion());
+  const Outcome carried = detector.run(next.motion());
+  EXPECT_EQ(carried.start_state, expected.start_state);
+  EXPECT_LT(carried.stats[Stage::START_STATE].in, expected.stats[Stage::START_STATE].in);
+  // One coordinate by one representable number: no continuation.
+  TestStep elsewhere = next;
+  double& x = elsewhere.bodies[1].t0[7].x();
+  x = std::nextafter(x, 10.0);
+  Detector moved;
+  moved.run(first.motion());
+  expectSame(moved.run(elsewhere.motion()), runOnce(elsewhere, {}));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
