@@ -173,7 +173,8 @@ def sources():
     release = pathlib.Path('/etc/os-release')
     found = re.search(r'^VERSION_CODENAME=(\w+)', release.read_text() if release.exists() else '', re.M)
     apt = pathlib.Path('/etc/apt')
-    files = [apt / 'sources.list', *sorted(apt.glob('sources.list.d/*.list')), *sorted(apt.glob('sources.list.d/*.sources'))]
+    files = [apt / 'sources.list', *sorted(apt.glob('sources.list.d/*.list')),
+             *sorted(apt.glob('sources.list.d/*.sources'))]
     return found and found.group(1), [p for p in files if found and p.exists() and found.group(1) in p.read_text()]
 
 
