@@ -50,7 +50,7 @@ install(DIRECTORY ${TRUE_SOURCE_DIR}/config ${TRUE_SOURCE_DIR}/examples ${TRUE_S
 #catkin_lint: ignore_once missing_file external_file
 install(FILES ${TRUE_SOURCE_DIR}/nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
 catkin_install_python(PROGRAMS examples/stop_the_arm.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-# The demo's recording belongs to a package: whoever installs one has no checkout, in which scripts/demo would make it.
+# The demo's recording belongs to a package: who installs one has no checkout, in which scripts/demo would make it.
 if(DEFORMABLE_CCD_RECORD_DEMO)
   set(DEMO_SCENE ${TRUE_SOURCE_DIR}/config/scenes/table_edge.yaml)
   set(DEMO_FILES ${CMAKE_CURRENT_BINARY_DIR}/demo/table_edge.bag ${CMAKE_CURRENT_BINARY_DIR}/demo/table_edge.yaml)

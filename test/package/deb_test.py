@@ -1,4 +1,4 @@
-"""The Debian packages: what they ask for, and their life in a bare root: installed by apt, used, removed, nothing left."""
+"""The Debian packages: what they ask for; and in a bare root: installed by apt, used, removed, nothing left."""
 import os
 import pathlib
 import re
@@ -15,7 +15,7 @@ from ros_process import free_port
 PACKAGES = CHECKOUT / 'build/packages'
 # By Debian's custom for messages (ros-pcl-msgs, ...): what a Debian with octomap_msgs would call them.
 SYSTEMS_OWN = ['liboctomap-msgs-dev', 'python3-octomap-msgs', 'ros-octomap-msgs']
-# Of the list of scripts/setup, what a build of packages has anyway (build-essential), or only what runs afterwards needs.
+# Of the list of scripts/setup, what every build of packages has (build-essential).
 NOT_FOR_THE_BUILD = {'g++'}
 
 INSTALL = r'''
@@ -172,8 +172,9 @@ def sources():
     """Files of the host's apt configuration that name its own release, and the name."""
     release = pathlib.Path('/etc/os-release')
     found = re.search(r'^VERSION_CODENAME=(\w+)', release.read_text() if release.exists() else '', re.M)
-    files = [p for p in [pathlib.Path('/etc/apt/sources.list'), *sorted(pathlib.Path('/etc/apt/sources.list.d').glob('*'))]
-             if p.suffix in ('.list', '.sources')]
+    apt = pathlib.Path('/etc/apt')
+    files = [apt / 'sources.list', *sorted(apt.glob('sources.list.d/*.list')),
+             *sorted(apt.glob('sources.list.d/*.sources'))]
     return found and found.group(1), [p for p in files if found and p.exists() and found.group(1) in p.read_text()]
 
 
@@ -210,7 +211,8 @@ class LifeTest(unittest.TestCase):
         # How the host reaches its registry, beyond the sources themselves.
         dumped = subprocess.run(['apt-config', 'dump', 'Acquire'], capture_output=True, text=True, check=True).stdout
         options = cls.folder / 'apt.conf'
-        options.write_text(''.join(re.findall(r'^Acquire::(?:https?|Check-Date|Check-Valid-Until|Retries)\b.*\n', dumped, re.M)))
+        reach = re.findall(r'^Acquire::(?:https?|Check-Date|Check-Valid-Until|Retries)\b.*\n', dumped, re.M)
+        options.write_text(''.join(reach))
         release, files = sources()
         ran = subprocess.run(['mmdebstrap', '--variant=minbase', '--aptopt=%s' % options, release, str(cls.root),
                               *map(str, files)], capture_output=True, text=True, check=False)
@@ -229,12 +231,14 @@ class LifeTest(unittest.TestCase):
     def run_inside(self, script):
         """In the root, with /proc and /dev, and nothing else of the host but its network."""
         enter = ('mount --make-rprivate / && mount -t proc proc "$0/proc" && mount --rbind /dev "$0/dev" && '
-                 'exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/tmp/home LC_ALL=C.UTF-8 '
-                 'DEBIAN_FRONTEND=noninteractive ROS_MASTER_URI=http://localhost:%d ROS_HOSTNAME=localhost PORT=%d '
+                 'exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 '
+                 'HOME=/tmp/home ROS_HOME=/tmp/home/.ros DEBIAN_FRONTEND=noninteractive '
+                 'ROS_MASTER_URI=http://localhost:%d ROS_HOSTNAME=localhost PORT=%d '
                  'bash -c "cd /tmp/home; $1"' % (self.port, self.port))
-        ran = subprocess.run(['unshare', '--mount', '--pid', '--fork', '--kill-child', 'bash', '-c', enter, str(self.root),
-                              'set -xeo pipefail\n' + script], capture_output=True, text=True, timeout=1800, check=False)
-        logs = ''.join('%s:\n%s' % (p.name, p.read_text(errors='replace')[-2000:]) for p in self.home.glob('*.log'))
+        command = ['unshare', '--mount', '--pid', '--fork', '--kill-child', 'bash', '-c', enter, str(self.root),
+                   'set -xeo pipefail\n' + script]
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=1800, check=False)
+        logs = ''.join('%s:\n%s' % (p, p.read_text(errors='replace')[-2000:]) for p in self.home.glob('*.log'))
         self.assertEqual(ran.returncode, 0, ran.stdout[-4000:] + ran.stderr[-4000:] + logs)
         return ran.stdout
 

@@ -206,10 +206,10 @@ TEST(StepTimes, ExactCellsHoldAllTimesThatWereFoundSymbolically) {
   std::size_t comparisons = 0;
   forEachSimdTarget([&](const std::string& target) {
     for (const int bits : {10, 32, 52}) {
-      DetectorOptions options;
+      Options options;
       options.accuracy.toc_bits = bits;
       options.check_start_state = false;
-      const StepResult result = scene.run(options);
+      const Outcome result = scene.run(options);
       const ContactTimes::Tally tally = times.compare(result.contacts, bits);
       EXPECT_EQ(tally.compared, KNOWN) << target << ", " << bits << " bits";
       EXPECT_EQ(tally.in_cell, KNOWN) << target << ", " << bits << " bits; one cell off: " << tally.beside;
