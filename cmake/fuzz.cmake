@@ -32,6 +32,7 @@ find_package(PCL REQUIRED COMPONENTS common)
 find_library(PCL_IO_LIBRARY pcl_io REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_FILTERS_LIBRARY pcl_filters REQUIRED HINTS ${PCL_LIBRARY_DIRS})
+find_library(PCL_SEARCH_LIBRARY pcl_search REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_SURFACE_LIBRARY pcl_surface REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
@@ -46,7 +47,7 @@ target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
   deformable_ccd_archive yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY}
-  ${PCL_FILTERS_LIBRARY} ${PCL_SURFACE_LIBRARY})
+  ${PCL_FILTERS_LIBRARY} ${PCL_SEARCH_LIBRARY} ${PCL_SURFACE_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
 add_custom_target(fuzzers)

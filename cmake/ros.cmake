@@ -37,7 +37,7 @@ if(ROS_SOURCES)
   endforeach()
   if(ROS_USES_PCL)
     target_link_libraries(deformable_ccd_ros PRIVATE ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY}
-      ${PCL_FILTERS_LIBRARY} ${PCL_SURFACE_LIBRARY})
+      ${PCL_FILTERS_LIBRARY} ${PCL_SEARCH_LIBRARY} ${PCL_SURFACE_LIBRARY})
   endif()
   target_link_libraries(deformable_ccd_ros PRIVATE ${ASSIMP_LIBRARY})
   list(INSERT ROS_LINK_LIBRARIES 0 deformable_ccd_ros)
