@@ -23,27 +23,31 @@ endif()
 set_source_files_properties(src/simd/exact_batch.cpp src/simd/fused_filter.cpp PROPERTIES
   COMPILE_OPTIONS -fno-sanitize=undefined)
 
-# Of ROS the decoders need headers only, the package's own messages among them (from the workspace that scripts/test has
-# built before), so the files themselves are built here, with the fuzzer's eyes.
+# Of ROS the decoders need headers, the package's own messages among them (from the workspace that scripts/test has built
+# before), and the few libraries that those headers call. The files themselves are built here, with the fuzzer's eyes.
 find_path(OWN_MESSAGES deformable_ccd/ContactArray.h REQUIRED)
 find_path(ROS_MESSAGES std_msgs/Header.h REQUIRED)
 #catkin_lint: ignore_once duplicate_find
 find_package(PCL REQUIRED COMPONENTS common)
 find_library(PCL_IO_LIBRARY pcl_io REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
+foreach(library rosconsole roscpp_serialization rostime)
+  find_library(${library}_LIBRARY ${library} REQUIRED)
+  list(APPEND HEADER_LIBRARIES ${${library}_LIBRARY})
+endforeach()
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
 # Objects, not an archive: a message type registers itself, and nothing else asks for its file.
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
-  src/input/mesh_decoder.cpp src/input/mesh_views.cpp src/input/mesh_file.cpp src/input/obj_file.cpp
-  src/input/stl_file.cpp src/input/message_type.cpp src/node/map_decode.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
-  src/scene/physics/expectations.cpp src/scene/physics/scene_file.cpp
-  src/parameters/parameter_reader.cpp src/parameters/parameter_yaml.cpp)
+  src/input/mesh_decoder.cpp src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_type.cpp
+  src/input/obj_file.cpp src/input/stl_file.cpp src/node/map_decode.cpp src/octomap/octomap_decode.cpp
+  src/octomap/octomap_header.cpp src/parameters/parameter_reader.cpp src/parameters/parameter_yaml.cpp
+  src/scene/physics/expectations.cpp src/scene/physics/scene_file.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
-  deformable_ccd_archive yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY})
+  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
 add_custom_target(fuzzers)
