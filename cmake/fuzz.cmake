@@ -23,8 +23,8 @@ endif()
 set_source_files_properties(src/simd/exact_batch.cpp src/simd/fused_filter.cpp PROPERTIES
   COMPILE_OPTIONS -fno-sanitize=undefined)
 
-# Of ROS the decoders need headers only, the package's own messages among them (from the workspace that scripts/test has
-# built before), so the files themselves are built here, with the fuzzer's eyes.
+# Of ROS the decoders need headers, the package's own messages among them (from the workspace that scripts/test has built
+# before), and the few libraries that those headers call. The files themselves are built here, with the fuzzer's eyes.
 find_path(OWN_MESSAGES deformable_ccd/ContactArray.h REQUIRED)
 find_path(ROS_MESSAGES std_msgs/Header.h REQUIRED)
 #catkin_lint: ignore_once duplicate_find
@@ -34,6 +34,10 @@ find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_FILTERS_LIBRARY pcl_filters REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_SEARCH_LIBRARY pcl_search REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_SURFACE_LIBRARY pcl_surface REQUIRED HINTS ${PCL_LIBRARY_DIRS})
+foreach(library rosconsole roscpp_serialization rostime)
+  find_library(${library}_LIBRARY ${library} REQUIRED)
+  list(APPEND HEADER_LIBRARIES ${${library}_LIBRARY})
+endforeach()
 #catkin_lint: ignore_once duplicate_find
 find_package(yaml-cpp REQUIRED)
 # Objects, not an archive: a message type registers itself, and nothing else asks for its file.
@@ -46,7 +50,7 @@ add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
-  deformable_ccd_archive yaml-cpp ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY}
+  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY}
   ${PCL_FILTERS_LIBRARY} ${PCL_SEARCH_LIBRARY} ${PCL_SURFACE_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")

@@ -193,7 +193,7 @@ bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std:
   return false;
 }
 
-bool MonitorPipeline::place(std::size_t body, std::int64_t now_ns) {
+bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   StepStatus problem = StepStatus::NO_TRANSFORM;
@@ -281,7 +281,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   // Static bodies first: the clock body's frame is a step, which is to find them where they are.
   for (const bool statics : {true, false}) {
     for (std::size_t b = 0; b < waiting_.size(); ++b) {
-      if (waiting_[b] && isStatic(b) == statics) place(b, now_ns);
+      if (waiting_[b] && isStatic(b) == statics) placeFrame(b, now_ns);
     }
   }
   if (finishing_) giveUp();

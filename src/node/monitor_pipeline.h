@@ -129,7 +129,7 @@ class MonitorPipeline {
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
   /// False: still waits.
-  bool place(std::size_t body, std::int64_t now_ns);
+  bool placeFrame(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
   bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);

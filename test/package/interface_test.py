@@ -6,7 +6,7 @@ from checkout import CHECKOUT
 
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
 ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
-READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|section)\(\s*"(\w+)"')
+READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|sections?)\(\s*"(\w+)"')
 # What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
             'readDepthImage': 'topology/',

@@ -88,8 +88,7 @@ TEST_F(Mistake, NoTransform) {
 TEST_F(Mistake, WrongTopicType) {
   const auto publisher = advertiseAndWait<std_msgs::Bool>(node, "/wrong_type/mesh");
   expectTold("/wrong_type", "type std_msgs/Bool is not a mesh",
-             "publish deformable_ccd/MeshStamped, sensor_msgs/PointCloud2",
-             [&] { publisher.publish(std_msgs::Bool()); });
+             "publish deformable_ccd/MeshStamped, pcl_msgs/PolygonMesh", [&] { publisher.publish(std_msgs::Bool()); });
 }
 
 TEST_F(Mistake, RowsAndColumnsSwapped) {
