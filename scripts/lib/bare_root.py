@@ -19,9 +19,9 @@ import tempfile
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
 RELEASES = ('bookworm', 'trixie', 'bullseye')
 # Where the copy lies in the root.
-INSIDE = '/home/stranger/deformable_ccd'
+INSIDE = '/srv/stranger/deformable_ccd'
 # What a login shell of a fresh machine has. IN_BARE_ROOT keeps scripts/test from making a root inside the root.
-ENVIRONMENT = {'HOME': '/home/stranger', 'PATH': '/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin',
+ENVIRONMENT = {'HOME': '/srv/stranger', 'PATH': '/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin',
                'TERM': 'dumb', 'LANG': 'C.UTF-8', 'DEFORMABLE_CCD_IN_BARE_ROOT': '1'}
 
 
@@ -122,7 +122,7 @@ class BareRoot:
         environment = dict(ENVIRONMENT, **more.pop('environment', {}))
         inside = 'mkdir -p %s && cd %s && %s' % (INSIDE, INSIDE, command)
         return subprocess.run(['unshare', '--mount', '--pid', '--fork', '--kill-child', 'sh', '-ec', ' && '.join(mounts), root,
-                               str(CHECKOUT.parent / 'shared') if (self.folder / 'home/stranger/shared').is_dir() else '',
+                               str(CHECKOUT.parent / 'shared') if (self.folder / 'srv/stranger/shared').is_dir() else '',
                                inside], env=environment, stdin=subprocess.DEVNULL, **more)
 
 

@@ -279,23 +279,23 @@ TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
   Driven driven(scene());
   driven.giveMap(1);
   driven.feed(1, 0.35f);
-  EXPECT_TRUE(driven.pipeline.monitor().options().obstacle_expected) << "a map came";
+  EXPECT_TRUE(driven.pipeline.monitor().options().detector.obstacle_expected) << "a map came";
   driven.pipeline.reconfigure([](MonitorOptions& options, MarkerConfig& markers) {
-    options.max_contacts = 1;
+    options.detector.max_contacts = 1;
     markers.obstacle_m = 2;
   });
-  EXPECT_EQ(driven.pipeline.monitor().options().max_contacts, 1u);
-  EXPECT_TRUE(driven.pipeline.monitor().options().obstacle_expected) << "the plan's, whatever is reconfigured";
-  EXPECT_EQ(driven.pipeline.config().monitor.max_contacts, 1u);
+  EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
+  EXPECT_TRUE(driven.pipeline.monitor().options().detector.obstacle_expected) << "the plan's, whatever is reconfigured";
+  EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u);
   EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.feed(1.1, -0.05f).status, StepStatus::TRUNCATED);
   const auto another_clock = [](MonitorOptions& options, MarkerConfig&) {
-    options.max_contacts = 7;
+    options.detector.max_contacts = 7;
     options.clock_body = 9;
   };
   EXPECT_THROW(driven.pipeline.reconfigure(another_clock), std::invalid_argument);
-  EXPECT_EQ(driven.pipeline.config().monitor.max_contacts, 1u) << "what is refused changes nothing";
-  EXPECT_EQ(driven.pipeline.monitor().options().max_contacts, 1u);
+  EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u) << "what is refused changes nothing";
+  EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
 }
 
 constexpr std::int64_t SECOND_NS = 1000000000;
@@ -402,15 +402,15 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
 TEST(StaticBodies, CloudsThatComeFasterThanTfFindTheirPlace) {
   Tabled scene;
   scene.take(Tabled::CLOTH, 1, 0.3f, 0);
-  ASSERT_TRUE(scene.pipeline.next(0, scene.outcome));
+  ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
   scene.take(Tabled::TABLE, 1, 0, 0);
-  scene.pipeline.next(SECOND_NS, scene.outcome);  // has waited in vain
+  scene.pipeline.nextOutcome(SECOND_NS, scene.outcome);  // has waited in vain
   ASSERT_TRUE(scene.pipeline.idle(Tabled::TABLE));
   scene.take(Tabled::TABLE, 2, 0, SECOND_NS);
-  scene.pipeline.next(SECOND_NS, scene.outcome);
+  scene.pipeline.nextOutcome(SECOND_NS, scene.outcome);
   EXPECT_FALSE(scene.pipeline.idle(Tabled::TABLE)) << "its transform may come in a moment";
   scene.raise("table", 0.1);
-  scene.pipeline.next(SECOND_NS + 1, scene.outcome);
+  scene.pipeline.nextOutcome(SECOND_NS + 1, scene.outcome);
   EXPECT_EQ(scene.tables().processed(), 1u);
   EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u);
 }
@@ -480,7 +480,7 @@ struct Seen : Driven {
       std::memcpy(out.data.data() + 16 * i, p, 16);
     }
     pipeline.take(1, {"sensor_msgs/PointCloud2", bytesOf(out), 0, 0});
-    pipeline.next(0, outcome);
+    pipeline.nextOutcome(0, outcome);
   }
 };
 constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
