@@ -7,6 +7,7 @@ usage: emulated_tracker.py cloud|grid|markers|camera TOPIC ROWS COLS FRAME [RIGI
 Each RIGID_FRAME is sent on /tf, as a child of FRAME.
 """
 import math
+import signal
 import struct
 import sys
 
@@ -57,6 +58,8 @@ def pose(frame, child, stamp):
 
 def main():
     kind, topic, rows, cols, frame = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5]
+    # By name, since whoever starts the tests in the background has them inherit a SIGINT that is ignored.
+    signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
     rospy.init_node('emulated_tracker', anonymous=True, disable_signals=True)
     publisher = rospy.Publisher(topic, MarkerArray if kind == 'markers' else PointCloud2, queue_size=3)
     poses = rospy.Publisher('/tf', TFMessage, queue_size=3)
