@@ -81,11 +81,12 @@ DecodedMesh MeshDecoder::decodeAs(const std::string& datatype, View view) {
   if (config_.type != "auto" && config_.type != type->name) {
     refuse("type " + datatype + " arrives, but parameter type asks for " + config_.type);
   }
-  if (config_.source == TopologySource::DEPTH_IMAGE && type->name != std::string("point_cloud2")) {
-    refuse("topology/source depth_image is for a sensor_msgs/PointCloud2, and " + datatype + " arrives");
-  }
   try {
-    return std::visit([this](const auto& mesh) { return decodeView(mesh); }, view(*type));
+    const auto viewed = view(*type);
+    if (config_.source == TopologySource::DEPTH_IMAGE && !std::holds_alternative<CloudView>(viewed)) {
+      refuse("topology/source depth_image is for the points of a depth camera, and " + datatype + " arrives");
+    }
+    return std::visit([this](const auto& mesh) { return decodeView(mesh); }, viewed);
   } catch (const WireError& error) {
     refuse(datatype + ": " + error.what());
   } catch (const TopologyError& error) {

@@ -178,7 +178,7 @@ class MakeSceneBagTest(unittest.TestCase):
             (felt, 'separation_m: 0.012', 'separation_m: -1', block + 'minimum_separation_m', 'it must be from 0'),
             (felt, '  minimum_separation_m', '  minimum_seperation_m', 'monitor/minimum_seperation_m', 'nearest is'),
             (felt, mesh, 'missing.stl', "rigid/mesh of body 'finger'", 'missing.stl'),
-            (felt, mesh, str(no_mesh), "rigid/mesh of body 'finger'", 'STL, OBJ or PLY'),
+            (felt, mesh, str(no_mesh), "rigid/mesh of body 'finger'", 'STL, OBJ, PLY or DAE'),
             (felt, '{topic: /felt}', '{topic: /felt, topology: {rows: 9, cols: 9}}',
              block + 'bodies/felt/topology/rows', 'write rows: 21, cols: 24'),
             (felt, 'frame: finger}}', 'frame: finger}, self_collision: true}', block + 'bodies/finger/self_collision',
