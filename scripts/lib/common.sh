@@ -69,7 +69,7 @@ apt_steps() {
   awk '/ newly installed, / { for (i = 2; i <= NF; ++i) if ($i == "newly") all = $(i - 1); got = unpacked = ready = 0 }
     /^Get:/ { ++got } /^Unpacking / { ++unpacked } /^Setting up / { ++ready }
     END {
-      if (all && ready) print ready " of " all " packages set up"
+      if (all && unpacked >= all) print ready + 0 " of " all " packages set up"
       else if (all && unpacked) print unpacked " of " all " packages unpacked"
       else if (all && got) print got " of " all " packages downloaded"
     }' "$1"
