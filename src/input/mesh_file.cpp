@@ -160,6 +160,19 @@ class PlyHeaderCheck {
   bool in_element_ = false, in_faces_ = false;
 };
 
+/// While it lives PCL prints nothing: what it finds is reported here, once. The level is the process's, so that it must
+/// not stay changed for whoever else uses PCL.
+class QuietPcl {
+ public:
+  QuietPcl() { pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS); }
+  ~QuietPcl() { pcl::console::setVerbosityLevel(before_); }
+  QuietPcl(const QuietPcl&) = delete;
+  QuietPcl& operator=(const QuietPcl&) = delete;
+
+ private:
+  const pcl::console::VERBOSITY_LEVEL before_ = pcl::console::getVerbosityLevel();
+};
+
 }  // namespace
 
 std::string fileEnding(const std::string& path) {
@@ -209,7 +222,7 @@ MeshFile weldTriangles(const Positions& corners, const std::string& path) {
 
 MeshFile loadMeshFile(const std::string& path) {
   requireReadable(path);
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // errors are reported below, once
+  const QuietPcl quiet;
   pcl::PolygonMesh mesh;
   const std::string type = fileEnding(path);
   int result = -1;

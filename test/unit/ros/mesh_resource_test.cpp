@@ -2,6 +2,7 @@
 #include "input/mesh_resource.h"
 
 #include <gtest/gtest.h>
+#include <pcl/console/print.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -156,6 +157,12 @@ TEST_F(OddFiles, ADaeIsNoTopologyOfATracker) {
   const auto load = [](const std::string& path) { return errorOf([&] { loadTopologyFile(path); }); };
   EXPECT_TRUE(mentions(load(ours("pyramid_mm.dae")), "does not number its vertices"));
   EXPECT_EQ(load(ours("pyramid.obj")), "");
+}
+
+TEST_F(OddFiles, ReadingThemLeavesPclAsLoudAsItWas) {
+  const auto before = pcl::console::getVerbosityLevel();
+  EXPECT_NE(errorOf(write("broken.ply", "ply\nformat ascii 1.0\nelement vertex 9\n")), "");
+  EXPECT_EQ(pcl::console::getVerbosityLevel(), before);
 }
 
 TEST_F(OddFiles, WhatIsNoFileOrTooLargeIsNotOpened) {
