@@ -43,6 +43,7 @@ struct Body {
   bool self_collision = true;
   bool against_bodies = true;
   bool against_obstacle = true;
+  bool shell = false;  ///< closed, but hollow: others may be inside of it, a container
   double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
   std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
   std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
