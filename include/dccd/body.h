@@ -43,7 +43,7 @@ struct Body {
   bool self_collision = true;
   bool against_bodies = true;
   bool against_obstacle = true;
-  bool shell = false;  ///< closed, but hollow: others may be inside of it, a container
+  bool shell = false;                       ///< a container: closed, but others may be inside of it
   double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
   std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
   std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
@@ -51,6 +51,8 @@ struct Body {
   // Its mesh.
   std::shared_ptr<const Topology> topology;
   std::shared_ptr<const ReferenceFrame> reference;  ///< null: no pair is left out of the separation
+
+  std::uint64_t dropped_faces = 0;  ///< that were sent and could not be used: unchecked
 
   // Its way through the step, in the fixed frame [m]. Non-finite positions are unchecked.
   std::shared_ptr<const Positions> t0, t1;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "dccd/assurance.h"
 #include "dccd/deadline.h"
 #include "dccd/elementary.h"
 #include "dccd/export.h"

@@ -121,6 +121,14 @@ constexpr StepCounter STEP_COUNTERS[] = {
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
 DCCD_EXPORT const char* toString(StartState state);
 
+/// Whether anything touches in a step. What could not be ruled out counts as touching.
+enum class Touching : std::uint8_t {
+  NONE = 0,
+  LASTING = 1,  ///< all that touches did so when the step began, or crossed then
+  NEW = 2,
+};
+DCCD_EXPORT const char* toString(Touching touching);
+
 /// An edge through a face at t=0 (vertex[0..1] of body[0] the edge, vertex[2..4] of body[1] the face), or a mesh vertex
 /// inside occupied space (body[1] = OBSTACLE_BODY, vertex[0] the vertex).
 struct StartIntersection {
@@ -167,7 +175,10 @@ struct Outcome {
   StepStats stats;
   double unknown_fraction = 0;  ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
   std::size_t substeps = 0;     ///< parts that the step was cut into
-  bool clear = false;           ///< doc/interface.md, ~clear
+  Touching touching = Touching::NONE;
+  // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
+  std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not
+  std::vector<std::string> excluded;  ///< what was left out by choice
 
   std::shared_ptr<const Step> step;              ///< what it answers; null where nothing was answered
   std::shared_ptr<const VoxelSurface> obstacle;  ///< of the step's map, what exclude_boxes left; null: none

@@ -26,6 +26,7 @@ struct Step {
   /// Turning bodies go from pose_t0 this many times as far as to pose_t1; t1 is where they end. Two poses alone tell no
   /// turn of more than a half, which predictions may be.
   double pose_scale = 1;
+  std::string off_path;  ///< why the bodies' paths are not those that were seen, in words; empty: they are
 
   double duration_s() const { return static_cast<double>(stamp_ns - start_ns) * 1e-9; }
 };

@@ -79,7 +79,7 @@ class ResultBag {
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
     bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
     std_msgs::Bool clear;
-    clear.data = outcome.clear;
+    clear.data = assuranceOf(outcome).clear();
     bag_.write("/collision_monitor/clear", at, clear);
     if (frame.empty()) return;
     bag_.write("/collision_monitor/markers", at,

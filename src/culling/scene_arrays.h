@@ -96,6 +96,11 @@ class SceneArrays {
   std::size_t height() const { return height_; }
   /// Separation of two bodies, of a body from itself, or of a body from the map (OBSTACLE_BODY) [m].
   double separation(std::size_t a, std::size_t b) const;
+  /// Some body has faces.
+  bool hasFaces() const {
+    return std::any_of(bodies_.begin(), bodies_.end(),
+                       [](const SceneBody& body) { return body.setup.topology->hasFaces(); });
+  }
   /// Some body is to be tested against the map.
   bool meetsObstacle() const {
     return std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& b) { return meetsMap(b.setup); });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
 namespace dccd {
 
@@ -44,11 +45,7 @@ void EffectTracker::expectMap() {
 }
 
 bool EffectTracker::decide(MonitorOptions& options) const {
-  const bool expected = mapExpected(), start_state = plan_.running(Effect::START_STATE);
-  if (options.detector.obstacle_expected == expected && options.detector.check_start_state == start_state) return false;
-  options.detector.obstacle_expected = expected;
-  options.detector.check_start_state = start_state;
-  return true;
+  return std::exchange(options.detector.obstacle_expected, mapExpected()) != mapExpected();
 }
 
 void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {

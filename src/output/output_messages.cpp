@@ -55,10 +55,13 @@ std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
 /// "No contact" is said of clear steps alone; of others, what stands in the way of it.
 std::string noContact(const Outcome& outcome) {
   const std::string start = std::string("starts ") + toString(outcome.start_state);
-  if (outcome.clear) return "no contact, " + start;
+  if (assuranceOf(outcome).clear()) return "no contact, " + start;
   std::string text = "no contact found, but ";
   if (outcome.status != StepStatus::OK) {
     text += toString(outcome.status) + (outcome.reason.empty() ? "" : " (" + outcome.reason + ")") + ", ";
+  }
+  for (const std::string& sentence : outcome.unproved) {
+    if (sentence != outcome.reason) text += sentence + ", ";
   }
   if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
   return text + start;

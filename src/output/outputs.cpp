@@ -30,7 +30,7 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
 
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
   std_msgs::Bool clear;
-  clear.data = outcome.clear;
+  clear.data = assuranceOf(outcome).clear();
   clear_.publish(clear);
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));

@@ -138,7 +138,8 @@ void visitAnswer(Archive& a, Answer& answer) {
   a.text(answer.reason);
   a.flag(answer.answered);
   a.flag(answer.complete);
-  a.flag(answer.clear);
+  bool clear = false;  // until version 2; since then what it follows from is there
+  a.flag(clear);
   a.choice(answer.start_state, StartState::NOT_CHECKED);
   a.size(answer.total_contacts);
   a.size(answer.suppressed);
@@ -202,6 +203,23 @@ void visitDistances(Archive& a, Recording& r) {
   }
 }
 
+constexpr std::size_t TEXT_BYTES = 4;
+
+/// What version 3 added: what an assurance follows from.
+template <typename Archive, typename Recording>
+void visitVerdict(Archive& a, Recording& r) {
+  a.text(r.step.off_path);
+  for (auto& body : r.step.bodies) {
+    a.flag(body.shell);
+    a.number(body.dropped_faces);
+  }
+  a.choice(r.answer.touching, Touching::NEW);
+  for (auto* sentences : {&r.answer.unproved, &r.answer.excluded}) {
+    a.count(*sentences, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
+    for (auto& sentence : *sentences) a.text(sentence);
+  }
+}
+
 /// The file's fields in their order, for both directions.
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
@@ -241,6 +259,7 @@ void RecordingImage::build(const StepRecording& recording) {
   writer.number(RECORDING_VERSION);
   visit(writer, recording);
   visitDistances(writer, recording);
+  visitVerdict(writer, recording);
 }
 
 bool RecordingImage::write(int descriptor) const noexcept {
@@ -302,6 +321,8 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   StepRecording recording;
   visit(reader, recording);
   if (version >= 2) visitDistances(reader, recording);
+  if (version >= 3) visitVerdict(reader, recording);
+  recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;
 }

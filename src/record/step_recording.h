@@ -16,7 +16,8 @@
 
 namespace dccd {
 
-constexpr std::uint32_t RECORDING_VERSION = 2;  ///< 1, without distances beyond the bodies' own, can be read, too
+/// 1, without distances beyond the bodies' own, and 2, without what an assurance follows from, can be read, too.
+constexpr std::uint32_t RECORDING_VERSION = 3;
 
 /// A recording that cannot be read; the text names the input, the byte and the value.
 struct DCCD_EXPORT RecordingError : std::runtime_error {
@@ -24,7 +25,8 @@ struct DCCD_EXPORT RecordingError : std::runtime_error {
 };
 
 struct StepRecording {
-  std::string note;  ///< why it was written, by what
+  std::uint32_t version = RECORDING_VERSION;  ///< of the file that it was read from
+  std::string note;                           ///< why it was written, by what
   Step step;
   Options options;
   bool has_answer = false;  ///< false: the program ended in the step

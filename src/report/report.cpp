@@ -42,6 +42,7 @@ std::string csvField(const std::string& text) {
 /// What stands in the way of "no contact" in a step that found none.
 std::string doubtOf(const Outcome& outcome) {
   if (outcome.status != StepStatus::OK) return toString(outcome.status);
+  if (!outcome.unproved.empty()) return outcome.unproved.front();
   return outcome.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(outcome.start_state);
 }
 
@@ -174,8 +175,8 @@ void Report::addRow(const Outcome& o) {
     if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
   }
   steps_ << o.sequence << ',' << o.start_ns << ',' << o.stamp_ns << ',' << toString(o.status) << ','
-         << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << o.clear << ','
-         << o.complete << ',' << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ','
+         << csvField(o.reason) << ',' << o.answered << ',' << toString(o.start_state) << ',' << assuranceOf(o).clear()
+         << ',' << o.complete << ',' << o.total_contacts << ',' << o.counts.undecided << ',' << o.counts.initial << ','
          << o.counts.leaving << ',' << o.intersections.size() << ',' << s.unchecked_vertices << ',' << s.unchecked_faces
          << ',';
   if (o.answered && o.earliest_toc <= 1) steps_ << o.earliest_toc;
@@ -188,7 +189,7 @@ void Report::addRow(const Outcome& o) {
                    {"reason", o.reason},
                    {"answered", o.answered},
                    {"start_state", toString(o.start_state)},
-                   {"clear", o.clear},
+                   {"clear", assuranceOf(o).clear()},
                    {"contacts", o.total_contacts},
                    {"undecided", o.counts.undecided},
                    {"initial", o.counts.initial},
@@ -234,8 +235,8 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   }
   ++answered_;
   with_contact_ += o.total_contacts > 0;
-  clear_ += o.clear;
-  if (o.total_contacts == 0 && !o.clear) ++doubtful_[doubtOf(o)];
+  clear_ += assuranceOf(o).clear();
+  if (o.total_contacts == 0 && !assuranceOf(o).clear()) ++doubtful_[doubtOf(o)];
   writeContacts(o, bodies);
   addHeat(o, bodies);
   addFirstContact(o, bodies);

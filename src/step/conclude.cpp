@@ -40,17 +40,48 @@ void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   std::sort(contacts.begin(), contacts.end(), canonicalLess);
 }
 
-/// Why it is less than a whole answer, if it is: of several reasons the one that says most.
+/// Vertices that were sent, but are part of no surface and no line. A mesh file's are of no interest.
+std::uint64_t looseVertices(const Body& body) {
+  const Topology& topology = *body.topology;
+  if (body.rigid || topology.usedVertices().size() == topology.vertexCount()) return 0;
+  std::vector<bool> accounted(topology.vertexCount());
+  for (const Index v : topology.usedVertices()) accounted[v] = true;
+  for (const Index v : body.vertex_mask) accounted.at(v) = true;
+  return static_cast<std::uint64_t>(std::count(accounted.begin(), accounted.end(), false));
+}
+
+/// What of the bodies was not looked at, counted; in words, or empty.
+std::string takeUnchecked(const Step& step, StepStats& stats) {
+  std::uint64_t dropped = 0, loose = 0;
+  for (const Body& body : step.bodies) {
+    dropped += body.dropped_faces;
+    loose += looseVertices(body);
+  }
+  const std::uint64_t lost = stats.unchecked_vertices;
+  stats.unchecked_vertices += loose;
+  stats.unchecked_faces += dropped;
+  std::string text;
+  const auto add = [&](std::uint64_t count, const std::string& what) {
+    if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + what;
+  };
+  add(lost, " vertices are not finite and were not checked");
+  add(dropped, " faces were sent that cannot be used and were not checked");
+  add(loose, " vertices belong to no face and no edge and were not checked");
+  return text;
+}
+
+/// Why it is less than a whole answer, if it is. The status and its reason are those of the one that says most; what of
+/// them stands in the way of a proof goes into `unproved`.
 void judge(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
+  outcome.status = StepStatus::OK;
   const auto say = [&](StepStatus status, const std::string& reason) {
     outcome.status = status;
     outcome.reason = reason;
+    // A list that is cut says nothing wrong about what touches, and all of it was looked at.
+    if (status != StepStatus::TRUNCATED) outcome.unproved.push_back(reason);
   };
-  outcome.status = StepStatus::OK;
-  if (outcome.stats.unchecked_vertices > 0) {
-    say(StepStatus::PARTIAL,
-        std::to_string(outcome.stats.unchecked_vertices) + " vertices are not finite and were not checked");
-  }
+  if (!step.off_path.empty()) say(StepStatus::PARTIAL, step.off_path);
+  if (const std::string text = takeUnchecked(step, outcome.stats); !text.empty()) say(StepStatus::PARTIAL, text);
   if (outcome.contacts.size() < outcome.total_contacts) {
     say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
                                    std::to_string(outcome.total_contacts) + " contacts are listed");
@@ -69,6 +100,38 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   if (options.obstacle_expected && !step.map.surface) {
     say(StepStatus::NO_MAP, step.map.problem + "; checked without it");
   }
+  // Neither changes the status: the step was computed as it was asked for.
+  if (options.accuracy.rung == Accuracy::FAST) {
+    outcome.unproved.push_back("accuracy fast misses contacts and proves nothing");
+  }
+  if (outcome.start_state == StartState::NOT_CHECKED && outcome.start_state_complete) {
+    outcome.unproved.push_back("whether surfaces cross at the start was not checked");
+  }
+}
+
+/// What nobody is to miss who reads "proved".
+std::vector<std::string> excludedByChoice(const Options& options, const Step& step, std::uint64_t excluded_voxels) {
+  std::vector<std::string> excluded;
+  const auto add = [&](const Body& body, const std::string& what) {
+    excluded.push_back("body '" + body.name + "': " + what);
+  };
+  for (const Body& body : step.bodies) {
+    if (!body.vertex_mask.empty()) add(body, std::to_string(body.vertex_mask.size()) + " vertices by vertex_mask");
+    if (!body.self_collision && !body.rigid) add(body, "not against itself");
+    if (!body.against_bodies && step.bodies.size() > 1) add(body, "not against other bodies");
+    if (!body.against_obstacle) add(body, "not against the map");
+  }
+  if (!options.exclude_boxes.empty()) {
+    excluded.push_back(std::to_string(excluded_voxels) + " voxels of the map by exclude_boxes");
+  }
+  return excluded;
+}
+
+Touching touchingOf(const Outcome& outcome) {
+  if (outcome.counts.initial < outcome.total_contacts) return Touching::NEW;
+  const bool lasting =
+      outcome.total_contacts > 0 || outcome.suppressed > 0 || outcome.start_state == StartState::INTERSECTING;
+  return lasting ? Touching::LASTING : Touching::NONE;
 }
 
 }  // namespace
@@ -177,7 +240,6 @@ const char* toString(StartState state) {
 
 void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
   auto& contacts = outcome.contacts;
-  const bool touched = !contacts.empty();
   if (options.suppress_initial) {
     const auto kept = std::remove_if(contacts.begin(), contacts.end(),
                                      [](const Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; });
@@ -190,8 +252,9 @@ void conclude(const Options& options, const Step& step, std::size_t needed_parts
   for (const Contact& contact : contacts) outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
   keepEarliest(options.max_contacts, contacts);
   judge(options, step, needed_parts, outcome);
+  outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);
+  outcome.touching = touchingOf(outcome);
   outcome.answered = true;
-  outcome.clear = outcome.status == StepStatus::OK && outcome.start_state == StartState::CLEAR && !touched;
 }
 
 }  // namespace dccd

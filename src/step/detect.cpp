@@ -202,7 +202,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   for (PairWorker& w : workers) w.beginStep();
   findPairs(context);
   runPairs(context);
-  collect();
+  collect(part.step);
   const bool all_pairs = result.complete;
   if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (map_reduced && scene.meetsObstacle()) runMap(part);
@@ -229,7 +229,19 @@ void History::Impl::fill(const Part& part) {
   stats[Stage::BOUNDS].ms = msSince(start);
 }
 
-void History::Impl::writeContact(PairKind kind, const Hit& hit, Contact& c) const {
+/// Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
+bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
+  if (c.toc_lower > 0) return false;
+  if (scene.separation(c.body[0], c.body[1]) > 0 || scene.uncertain()) return true;
+  const bool face = c.kind == PairKind::VERTEX_FACE;
+  const auto x = [&](std::size_t i) {
+    return (*step.bodies[c.body[i < (face ? 1u : 2u) ? 0 : 1]].t0)[c.vertex[i]].data();
+  };
+  // A vertex is a segment without length, an edge a triangle without area.
+  return face ? segmentMeetsTriangle(x(0), x(0), x(1), x(2), x(3)) : segmentMeetsTriangle(x(0), x(1), x(2), x(3), x(3));
+}
+
+void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, Contact& c) const {
   c = Contact();
   c.kind = kind;
   c.toc_lower = hit.toc_lower;
@@ -239,9 +251,10 @@ void History::Impl::writeContact(PairKind kind, const Hit& hit, Contact& c) cons
   const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
   scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
   scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
+  c.initial = meetAtStart(step, c);
 }
 
-void History::Impl::collect() {
+void History::Impl::collect(const Step& step) {
   const Clock::time_point start = Clock::now();
   for (const PairWorker& w : workers) {
     result.stats += w.stats();
@@ -258,7 +271,7 @@ void History::Impl::collect() {
       for (std::size_t i = first; i < last; ++i) {
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
         if (i + 8 < last) __builtin_prefetch(sorted[i + 8]);
-        writeContact(kind, *sorted[i], result.contacts[base + i]);
+        writeContact(kind, *sorted[i], step, result.contacts[base + i]);
       }
     });
     base += sorted.size();
@@ -271,7 +284,7 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
     carried.start_state.clear();
     carried.inside.clear();
   };
-  if (!checksStartState(part)) return forget();
+  if (!checksStartState(part) || !scene.hasFaces()) return forget();  // edges alone have no inside
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   StartStateSearch::IsOver is_over;

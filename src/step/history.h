@@ -86,8 +86,9 @@ struct History::Impl {
   void orderByBound(const TreePair& trees);
   void findPairs(const StepContext& context);
   void runPairs(StepContext& context);
-  void collect();
-  void writeContact(PairKind kind, const Hit& hit, Contact& contact) const;
+  void collect(const Step& step);
+  void writeContact(PairKind kind, const Hit& hit, const Step& step, Contact& contact) const;
+  bool meetAtStart(const Step& step, const Contact& contact) const;
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runMap(const Part& part);
   bool runMapOf(std::size_t body, const Part& part, ObstacleStats& total);

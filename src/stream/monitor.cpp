@@ -213,14 +213,6 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
       m.forgetLast();
     }
     if (m.listener) m.listener->onOutcome(outcome);
-    // Not the computed answer's, which a recording replays, but about it.
-    if (outcome.answered && !m.off_path.empty()) {
-      outcome.clear = false;
-      if (outcome.status == StepStatus::OK) {
-        outcome.status = StepStatus::PARTIAL;
-        outcome.reason = m.off_path;
-      }
-    }
   } else {
     without(step.status, step.reason);
     if (isSeam(step.status)) m.forgetLast();

@@ -57,7 +57,6 @@ struct Monitor::Impl {
   References references;
   std::vector<std::uint64_t> runs, last_runs;
   bool finishing = false;
-  std::string off_path;  // why the step's paths are not those that were seen; empty: they are
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
 
@@ -79,7 +78,7 @@ struct Monitor::Impl {
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   Step place(const Pending& pending);
   void placeStream(std::size_t body, const Pending& pending, Body& out);
-  void lookBetween(const Step& step, std::size_t body);
+  void lookBetween(std::size_t body, Step& step) const;
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();
   /// Nothing is carried over a seam.

@@ -58,7 +58,7 @@ Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
 
 /// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the
 /// other. What was seen of it in between must not be contradicted in silence.
-void Monitor::Impl::lookBetween(const Step& step, std::size_t b) {
+void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   const std::size_t frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
   if (frames == 0) return;
   const Body& body = step.bodies[b];
@@ -67,7 +67,7 @@ void Monitor::Impl::lookBetween(const Step& step, std::size_t b) {
   std::ostringstream text;
   text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in " << frames
        << " frames between its ends; make it the clock_body";
-  off_path = text.str();
+  step.off_path = text.str();
 }
 
 void Monitor::Impl::placeStream(std::size_t b, const Pending& pending, Body& out) {
@@ -87,7 +87,6 @@ void Monitor::Impl::placeStream(std::size_t b, const Pending& pending, Body& out
 }
 
 Step Monitor::Impl::place(const Pending& pending) {
-  off_path.clear();
   Step step;
   step.bodies = bodies;
   step.start_ns = pending.from->stamp_ns;
@@ -110,7 +109,7 @@ Step Monitor::Impl::place(const Pending& pending) {
       body.topology = frame.topology;
       body.turns = frame.rigid;
       placeStream(b, pending, body);
-      lookBetween(step, b);
+      lookBetween(b, step);
     } else {
       hold(stores[b].newestShared(), body);
       continue;

@@ -12,7 +12,8 @@ Outcome nothingFound(StepStatus status, StartState start) {
   outcome.answered = true;
   outcome.status = status;
   outcome.start_state = start;
-  outcome.clear = status == StepStatus::OK && start == StartState::CLEAR;
+  if (status != StepStatus::OK) outcome.unproved.push_back(toString(status));
+  if (start == StartState::INTERSECTING) outcome.touching = Touching::LASTING;
   return outcome;
 }
 

@@ -15,7 +15,8 @@ Outcome nothingFound(StepStatus status, StartState start, const std::string& rea
   outcome.status = status;
   outcome.reason = reason;
   outcome.start_state = start;
-  outcome.clear = status == StepStatus::OK && start == StartState::CLEAR;
+  if (status != StepStatus::OK) outcome.unproved.push_back(reason);
+  if (start == StartState::INTERSECTING) outcome.touching = Touching::LASTING;
   return outcome;
 }
 
@@ -31,8 +32,11 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
             "no contact found, but starts INTERSECTING");
   Outcome suppressed = nothingFound(StepStatus::OK, StartState::CLEAR);
   suppressed.suppressed = 3;
-  suppressed.clear = false;
+  suppressed.touching = Touching::LASTING;
   EXPECT_EQ(summaryOf(suppressed), "no contact found, but 3 initial ones suppressed, starts CLEAR");
+  Outcome fast = nothingFound(StepStatus::OK, StartState::CLEAR);
+  fast.unproved = {"accuracy fast misses contacts and proves nothing"};
+  EXPECT_EQ(summaryOf(fast), "no contact found, but accuracy fast misses contacts and proves nothing, starts CLEAR");
   Outcome unanswered;
   unanswered.status = StepStatus::GAP;
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");

@@ -123,7 +123,7 @@ TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
   free.feed(1, 0.35f);
   const Outcome& outcome = free.feed(1.1, 0.15f);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
-  EXPECT_TRUE(outcome.clear) << "the unknown is no obstacle";
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << "the unknown is no obstacle";
   EXPECT_EQ(outcome.unknown_fraction, 0);
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 0u);
   EXPECT_FALSE(free.pipeline.effects().plan().running(Effect::UNKNOWN_SPACE));
@@ -138,7 +138,7 @@ TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
   // Swept: 2 x 2 columns of voxels, z from 0.1 to 0.4; the upper two of three are unknown.
   const Outcome& outcome = report.feed(1.1, 0.15f);
   ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
-  EXPECT_TRUE(outcome.clear) << "reported, and no obstacle";
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << "reported, and no obstacle";
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 12u);
   EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].out, 8u);
   EXPECT_NEAR(outcome.unknown_fraction, 2.0 / 3, 1e-12);
@@ -222,7 +222,7 @@ TEST(TrackerNoise, ComesFromThePointField) {
   noisy.giveMap(1);
   EXPECT_TRUE(noisy.pipeline.effects().plan().running(Effect::TRACKER_NOISE));
   noisy.feed(1, 0.17f, {0, 0, 0, 0});
-  EXPECT_TRUE(noisy.feed(1.1, 0.15f, {0, 0, 0, 0}).clear) << "15 cm above the map";
+  EXPECT_TRUE(assuranceOf(noisy.feed(1.1, 0.15f, {0, 0, 0, 0})).clear()) << "15 cm above the map";
   // One vertex known to 3 x 0.04 m: down to 0.1 m above the map it may touch; the features at it too, no others.
   const Outcome& outcome = noisy.feed(1.2, 0.10f, {0, 0, 0.04f, 0});
   ASSERT_FALSE(outcome.contacts.empty());
@@ -237,7 +237,7 @@ TEST(TrackerNoise, ComesFromThePointField) {
   }
   EXPECT_GT(noisy.pipeline.monitor().leftOut().size(), 0u);
   EXPECT_TRUE(noisy.feed(1.3, 0.13f, {0, 0, 0, 0}).answered);
-  EXPECT_TRUE(noisy.feed(1.4, 0.13f, {0, 0, 0, 0}).clear) << "as soon as the tracker is sure again";
+  EXPECT_TRUE(assuranceOf(noisy.feed(1.4, 0.13f, {0, 0, 0, 0})).clear()) << "as soon as the tracker is sure again";
 }
 
 TEST(TrackerNoise, BadFieldsAreRefusedByNameAndValue) {

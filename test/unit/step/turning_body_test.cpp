@@ -120,10 +120,10 @@ TEST(TurningBody, FramesBetweenTheEndsAreHeldAgainstTheArc) {
     monitor.push(1, bar(50 * MS, middle), NOW);
     return step(monitor, tip(100 * MS, -3), end);
   };
-  EXPECT_TRUE(lastOf(0.5, 1).clear);
+  EXPECT_TRUE(assuranceOf(lastOf(0.5, 1)).clear());
   const Outcome back = lastOf(0.5, 0);
   EXPECT_EQ(back.status, StepStatus::PARTIAL);
-  EXPECT_FALSE(back.clear);
+  EXPECT_FALSE(assuranceOf(back).clear());
 }
 
 // The budget is one for the whole step: once it is spent, the parts that are left are not begun.
@@ -143,7 +143,7 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
   const Outcome cut = run(1e-6);
   EXPECT_EQ(cut.status, StepStatus::DEADLINE);
   EXPECT_FALSE(cut.complete);
-  EXPECT_FALSE(cut.clear);
+  EXPECT_FALSE(assuranceOf(cut).clear());
   EXPECT_EQ(cut.stats.bodies_refitted + cut.stats.bodies_kept, 2u) << "the first part alone";
   EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));
 }
@@ -186,7 +186,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
   for (int i = 0; i < 1000 && !known; ++i) {
     const Outcome outcome = next(monitor);
     known = outcome.complete;
-    EXPECT_EQ(outcome.clear, known) << outcome.reason;
+    EXPECT_EQ(assuranceOf(outcome).clear(), known) << outcome.reason;
   }
   EXPECT_TRUE(known);
 }
@@ -214,7 +214,7 @@ TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
   EXPECT_EQ(last(0).start_state, StartState::INTERSECTING);
   const Outcome outcome = last(1e-6);
   EXPECT_EQ(outcome.start_state, StartState::INTERSECTING);
-  EXPECT_FALSE(outcome.clear);
+  EXPECT_FALSE(assuranceOf(outcome).clear());
 }
 
 // 12 rad/s for half a second: nearly a whole turn, which two poses alone would call a small one backwards.
@@ -224,13 +224,13 @@ TEST(TurningBody, APredictionMayTurnByMoreThanAHalf) {
   options.detector.max_substeps = 1000;
   Monitor monitor(options, clockAndBar());
   step(monitor, tip(0, -0.9), -2.0);
-  ASSERT_TRUE(step(monitor, tip(100 * MS, -0.9), -0.8).clear);
+  ASSERT_TRUE(assuranceOf(step(monitor, tip(100 * MS, -0.9), -0.8)).clear());
   const Outcome ahead = monitor.predict();
   ASSERT_EQ(ahead.status, StepStatus::OK) << ahead.reason;
   ASSERT_FALSE(ahead.contacts.empty());
   // It hangs down after 0.8 + pi / 2 of 6 rad, and meets the tip a little earlier.
   EXPECT_NEAR(ahead.earliest_toc, (0.8 + 0.5 * M_PI) / 6, 0.02);
-  EXPECT_FALSE(ahead.clear);
+  EXPECT_FALSE(assuranceOf(ahead).clear());
 }
 
 // Undecided in one part, certain in a later one: the contact is certain, and begins no later than it may.

@@ -1,0 +1,30 @@
+// What may be said of the moment: what was shown, what was not, and whether anything touches (doc/guarantees.md).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dccd/export.h"
+#include "dccd/outcome.h"
+
+namespace dccd {
+
+struct Assurance {
+  bool proved = false;                 ///< all of the list was shown: what does not touch is known not to
+  Touching touching = Touching::NONE;  ///< as far as known, where it is not proved
+  std::vector<std::string> missing;    ///< what of the list was not shown, a sentence each; empty exactly when proved
+  std::vector<std::string> excluded;   ///< what was left out by choice, a sentence each; takes nothing from `proved`
+
+  /// What simple clients ask for.
+  bool clear() const { return proved && touching == Touching::NONE; }
+};
+
+/// The one place where a proof is judged: what the step itself had to show (Outcome::unproved, filled where the step is
+/// concluded), that it has an answer at all, and what else stands in the way now (`faults`: a frame without an answer,
+/// a publisher that fell silent, a reset ...; a sentence each).
+DCCD_EXPORT Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults = {});
+
+/// One line for people: "proved, nothing touches", "proved, touches since before the step", "not proved: ...; ...".
+DCCD_EXPORT std::string describe(const Assurance& assurance);
+
+}  // namespace dccd

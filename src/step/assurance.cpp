@@ -1,0 +1,45 @@
+#include "dccd/assurance.h"
+
+namespace dccd {
+namespace {
+
+std::string joined(const std::vector<std::string>& sentences) {
+  std::string text;
+  for (const std::string& sentence : sentences) text += (text.empty() ? "" : "; ") + sentence;
+  return text;
+}
+
+}  // namespace
+
+Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults) {
+  Assurance assurance;
+  assurance.touching = outcome.touching;
+  assurance.missing = faults;
+  if (outcome.answered) {
+    assurance.missing.insert(assurance.missing.end(), outcome.unproved.begin(), outcome.unproved.end());
+    assurance.excluded = outcome.excluded;
+  } else {
+    assurance.missing.push_back(std::string("no answer, ") + toString(outcome.status) +
+                                (outcome.reason.empty() ? "" : ": " + outcome.reason));
+  }
+  assurance.proved = assurance.missing.empty();
+  return assurance;
+}
+
+std::string describe(const Assurance& assurance) {
+  static const char* const TOUCHING[] = {"nothing touches", "what touches did so when the step began",
+                                         "something touches anew"};
+  std::string text = assurance.proved ? "proved, " : "not proved: " + joined(assurance.missing);
+  if (assurance.proved || assurance.touching != Touching::NONE) {
+    text += (assurance.proved ? "" : "; ") + std::string(TOUCHING[static_cast<std::size_t>(assurance.touching)]);
+  }
+  if (!assurance.excluded.empty()) text += " (left out by choice: " + joined(assurance.excluded) + ")";
+  return text;
+}
+
+const char* toString(Touching touching) {
+  static const char* const NAMES[] = {"NONE", "LASTING", "NEW"};
+  return NAMES[static_cast<std::size_t>(touching)];
+}
+
+}  // namespace dccd
