@@ -124,6 +124,14 @@ TEST(Inside, PiecesEndAtVerticesThatAreLeftOut) {
   rope.vertex_active.clear();
   rope.t1[2][1] = NAN_M;
   EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 3, 1)})) << "unchecked instead of masked";
+  // Lost and found again in a stream: the pieces are those of each step.
+  const Positions lost = rope.t1, whole = rope.t0, solid = step.bodies[1].t0;
+  rope.t1 = whole;
+  Detector detector;
+  for (const Positions& end : {whole, lost, whole, whole, lost}) {
+    EXPECT_TRUE(same(detector.run(step.motion()).intersections, startOf(step).intersections));
+    step = step.continued({end, solid});
+  }
 }
 
 // Over an axis-aligned box every half-line from a lattice point runs through edges, corners and in faces' planes. The
