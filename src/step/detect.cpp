@@ -279,7 +279,8 @@ void History::Impl::collect(const Step& step) {
 
 void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_pairs) {
   StartStateSearch& search = carried.start_state;
-  if (!checksStartState(part) || !scene.hasFaces()) return search.clear();  // edges alone have no inside
+  // Edges alone have no inside, and do not cross but in a contact.
+  if (!checksStartState(part) || !(scene.hasFaces() || map_reduced)) return search.clear();
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   StartStateSearch::IsOver is_over;
