@@ -51,6 +51,7 @@ struct MonitorConfig {
   std::string octomap_topic = "octomap", octomap_file, octomap_frame;
   std::size_t max_map_bytes = std::size_t{512} << 20;
   double transform_timeout_s = 0.2;
+  double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
   std::string simd_target = "auto";

@@ -42,6 +42,11 @@ bool MapLoader::take(LoadedMap& map) {
   return true;
 }
 
+bool MapLoader::busy() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return job_ || decoding_ || done_;
+}
+
 void MapLoader::loop() {
   while (true) {
     Job job;
@@ -51,6 +56,7 @@ void MapLoader::loop() {
       if (stopping_) return;
       job = std::move(*job_);
       job_.reset();
+      decoding_ = true;
     }
     LoadedMap map = job.file.empty() ? decodeMapMessage(job.bytes, config_) : loadMapFile(job.file, config_);
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
@@ -58,6 +64,7 @@ void MapLoader::loop() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       done_ = std::move(map);
+      decoding_ = false;
     }
     ready_();
   }

@@ -284,7 +284,8 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
     carried.start_state.clear();
     carried.inside.clear();
   };
-  if (!checksStartState(part) || !scene.hasFaces()) return forget();  // edges alone have no inside
+  // Edges alone have no inside, and do not cross but in a contact.
+  if (!checksStartState(part) || !(scene.hasFaces() || map_reduced)) return forget();
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   StartStateSearch::IsOver is_over;
