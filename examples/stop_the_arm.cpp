@@ -1,11 +1,13 @@
 // A client of the monitor in a page: says when an arm must stop. It publishes ~stop (std_msgs/Bool) twenty times a
 // second; connect it to whatever stops your arm, and let that stop, too, when ~stop itself falls silent.
 //
-// Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~clear is false, and when
-// either is old: what is not known to be clear is not clear. This is no safety function; see doc/guarantees.md.
+// Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~state is not proved or
+// something touches, and when either is old: what is not known to be clear is not clear. This is no safety function;
+// see doc/guarantees.md.
 #include <algorithm>
 #include <string>
 
+#include <deformable_ccd/State.h>
 #include <deformable_ccd/TimeToContact.h>
 #include <ros/ros.h>
 #include <std_msgs/Bool.h>
@@ -19,15 +21,19 @@ class StopTheArm {
     max_age_s_ = node_.param("max_age_s", 0.2);
     const std::string monitor = node_.param<std::string>("monitor", "/collision_monitor");
     stop_ = node_.advertise<std_msgs::Bool>("stop", 1, true);
-    clear_ = node_.subscribe(monitor + "/clear", 1, &StopTheArm::onClear, this);
+    state_ = node_.subscribe(monitor + "/state", 1, &StopTheArm::onState, this);
     prediction_ = node_.subscribe(monitor + "/time_to_contact", 1, &StopTheArm::onPrediction, this);
     timer_ = node_.createSteadyTimer(ros::WallDuration(0.05), [this](const ros::SteadyTimerEvent&) { decide(); });
   }
 
  private:
-  void onClear(const std_msgs::Bool& message) {
-    is_clear_ = message.data;
-    clear_at_ = ros::SteadyTime::now();
+  void onState(const deformable_ccd::State& message) {
+    proved_ = message.proved;
+    touches_ = message.touching != deformable_ccd::State::NONE;
+    // What is latched may be as old as the frame that it ends with; that it came just now says nothing.
+    const bool newer = message.holds_until != holds_until_;
+    holds_until_ = message.holds_until;
+    if (newer) state_at_ = ros::SteadyTime::now();
   }
 
   void onPrediction(const deformable_ccd::TimeToContact& message) {
@@ -40,9 +46,10 @@ class StopTheArm {
   /// Empty: the arm may move.
   std::string reasonToStop() const {
     const ros::SteadyTime now = ros::SteadyTime::now();
-    const double clear_age_s = (now - clear_at_).toSec(), prediction_age_s = (now - predicted_at_).toSec();
-    if (clear_at_.isZero() || clear_age_s > max_age_s_) return "no news from the monitor";
-    if (!is_clear_) return "not clear";
+    const double state_age_s = (now - state_at_).toSec(), prediction_age_s = (now - predicted_at_).toSec();
+    if (state_at_.isZero() || state_age_s > max_age_s_) return "no news from the monitor";
+    if (!proved_) return "nothing is proved";
+    if (touches_) return "something touches";
     if (predicted_at_.isZero() || prediction_age_s > max_age_s_) return "no prediction; is look_ahead_s set?";
     if (!answered_) return "a prediction without an answer";
     if (contact_in_s_ - prediction_age_s <= stopping_time_s_) return "contact within the stopping time";
@@ -61,11 +68,12 @@ class StopTheArm {
   ros::NodeHandle node_;
   double stopping_time_s_ = 0, max_age_s_ = 0;
   ros::Publisher stop_;
-  ros::Subscriber clear_, prediction_;
+  ros::Subscriber state_, prediction_;
   ros::SteadyTimer timer_;
-  bool is_clear_ = false, answered_ = false;
+  bool proved_ = false, touches_ = false, answered_ = false;
   double contact_in_s_ = 0;
-  ros::SteadyTime clear_at_, predicted_at_;  // the steady clock: no replay and no clock change can make old news fresh
+  ros::Time holds_until_;
+  ros::SteadyTime state_at_, predicted_at_;  // the steady clock: no replay and no clock change can make old news fresh
   std::string told_ = "?";
 };
 

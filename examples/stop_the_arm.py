@@ -2,12 +2,12 @@
 """A client of the monitor in a page: says when an arm must stop. As stop_the_arm.cpp, which says more.
 
 Publishes ~stop (std_msgs/Bool) twenty times a second: true when the predicted contact is nearer in time than the arm
-needs to stand still, when ~clear is false, and when either is old. This is no safety function.
+needs to stand still, when ~state is not proved or something touches, and when either is old. This is no safety function.
 """
 import time
 
 import rospy
-from deformable_ccd.msg import TimeToContact
+from deformable_ccd.msg import State, TimeToContact
 from std_msgs.msg import Bool
 
 
@@ -18,14 +18,17 @@ class StopTheArm:
         self.max_age_s = rospy.get_param('~max_age_s', 0.2)
         monitor = rospy.get_param('~monitor', '/collision_monitor')
         # (steady time of receipt, message); a pair is replaced as a whole, so that no lock is needed.
-        self.clear = self.prediction = (float('-inf'), None)
+        self.state = self.prediction = (float('-inf'), None)
         self.told = None
         self.stop = rospy.Publisher('~stop', Bool, queue_size=1, latch=True)
-        rospy.Subscriber(monitor + '/clear', Bool, self.on_clear, queue_size=1)
+        rospy.Subscriber(monitor + '/state', State, self.on_state, queue_size=1)
         rospy.Subscriber(monitor + '/time_to_contact', TimeToContact, self.on_prediction, queue_size=1)
 
-    def on_clear(self, message):
-        self.clear = (time.monotonic(), message)
+    def on_state(self, message):
+        # What is latched may be as old as the frame that it ends with; that it came just now says nothing.
+        at, before = self.state
+        newer = before is None or message.holds_until != before.holds_until
+        self.state = (time.monotonic() if newer else at, message)
 
     def on_prediction(self, message):
         self.prediction = (time.monotonic(), message)
@@ -33,12 +36,14 @@ class StopTheArm:
     def reason_to_stop(self):
         """Empty: the arm may move."""
         now = time.monotonic()
-        clear_at, clear = self.clear
+        state_at, state = self.state
         predicted_at, prediction = self.prediction
-        if now - clear_at > self.max_age_s:
+        if now - state_at > self.max_age_s:
             return 'no news from the monitor'
-        if not clear.data:
-            return 'not clear'
+        if not state.proved:
+            return 'nothing is proved'
+        if state.touching != State.NONE:
+            return 'something touches'
         if now - predicted_at > self.max_age_s:
             return 'no prediction; is look_ahead_s set?'
         if not prediction.answered:

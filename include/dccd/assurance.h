@@ -15,6 +15,8 @@ struct Assurance {
   std::vector<std::string> missing;    ///< what of the list was not shown, a sentence each; empty exactly when proved
   std::vector<std::string> excluded;   ///< what was left out by choice, a sentence each; takes nothing from `proved`
 
+  /// What stands in the way besides; none changes nothing.
+  DCCD_EXPORT void hinder(const std::vector<std::string>& faults);
   /// What simple clients ask for.
   bool clear() const { return proved && touching == Touching::NONE; }
 };

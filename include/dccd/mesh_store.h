@@ -24,6 +24,7 @@ struct MeshFrame {
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
+  std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
 };
 
 struct MeshStoreOptions {

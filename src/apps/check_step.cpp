@@ -1,4 +1,5 @@
-// check_step FRAME_0 FRAME_1: the contacts of one step between two mesh files of the same topology.
+// check_step FRAME_0 FRAME_1: the contacts of one step between two mesh files of the same topology. Ends with 0 when
+// what it says is proved (contacts or none), with 3 when it is not, with 1 on an error.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
@@ -15,12 +16,14 @@ namespace {
 
 using namespace dccd;
 
+constexpr int NOT_PROVED = 3;  // CLI11 and this program's own errors have others
+
 struct Arguments {
   std::string frame_0, frame_1, contacts, stats;
   std::string accuracy = "exact", broad_phase = "clustered", simd = "auto";
   double tolerance_m = 1e-6, budget_ms = 0;
   int toc_bits = 32, threads = 1, repeat = 1;
-  bool start_state = false, earliest_only = false;
+  bool no_start_state = false, earliest_only = false;
 };
 
 Arguments parse(int argc, char** argv, CLI::App& app) {
@@ -43,7 +46,7 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
-  app.add_flag("--start-state", a.start_state, "test the state at t=0 as well");
+  app.add_flag("--no-start-state", a.no_start_state, "leave out whether surfaces cross at t=0: then nothing is proved");
   app.add_flag("--earliest-only", a.earliest_only, "only the first contacts");
   app.parse(argc, argv);
   return a;
@@ -88,7 +91,7 @@ Run runStep(const Arguments& a, const std::string& accuracy, const std::shared_p
   options.num_threads = a.threads;
   options.step_budget_ms = a.budget_ms;
   options.earliest_only = a.earliest_only;
-  options.check_start_state = a.start_state;
+  options.check_start_state = !a.no_start_state;
   options.broad_phase = a.broad_phase == "clustered" ? BroadPhase::CLUSTERED : BroadPhase::BRUTE_FORCE;
   Step step;
   step.bodies.resize(1);
@@ -125,6 +128,10 @@ nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const 
   j["contacts"] = run.result.contacts.size();
   j["undecided"] = run.result.stats.undecided;
   j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
+  const Assurance assurance = assuranceOf(run.result);
+  j["proved"] = assurance.proved;
+  j["missing"] = assurance.missing;
+  j["touching"] = toString(assurance.touching);
   j["complete"] = run.result.allPairs();
   j["start_state"] = toString(run.result.start_state);
   j["start_state_complete"] = run.result.start_state_complete;
@@ -163,9 +170,14 @@ int checkStep(const Arguments& a) {
                                              ? std::vector<std::string>{"screen", "fast", "conservative", "exact"}
                                              : std::vector<std::string>{a.accuracy};
   nlohmann::json all;
+  std::string words;
+  bool proved = false;
   for (std::size_t i = 0; i < rungs.size(); ++i) {
     const Run run = runStep(a, rungs[i], topology, m0.positions, m1.positions);
     print(rungs[i], run, i == 0);
+    const Assurance assurance = assuranceOf(run.result);
+    proved = assurance.proved;  // of several rungs the last and most accurate one's
+    words += rungs[i] + ": " + describe(assurance) + '\n';
     const nlohmann::json j = statsJson(a, rungs[i], run);
     if (rungs.size() == 1)
       all = j;
@@ -174,22 +186,24 @@ int checkStep(const Arguments& a) {
     // With all rungs the file holds the last and most accurate one's.
     if (!a.contacts.empty() && i + 1 == rungs.size()) writeContacts(a.contacts, run.result);
   }
+  std::cout << words;
   if (!a.stats.empty()) {
     std::ofstream out(a.stats);
     out << all.dump(2) << '\n';
     if (!out) throw std::runtime_error(a.stats + ": cannot be written");
   }
-  return 0;
+  return proved ? 0 : NOT_PROVED;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"Contacts of one step between two meshes of the same topology"};
+  app.footer("Exit status: 0 when the answer is proved, with contacts or without; 3 when it is not; 1 on an error.");
   try {
     return checkStep(parse(argc, argv, app));
   } catch (const CLI::ParseError& e) {
-    return app.exit(e);
+    return app.exit(e) == 0 ? 0 : 1;
   } catch (const std::exception& e) {
     std::cerr << "check_step: " << e.what() << '\n';
     return 1;

@@ -277,6 +277,7 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.detector.max_substeps = static_cast<std::size_t>(reader.integer("max_substeps", 64, 1, 100000));
   monitor.look_ahead_s = reader.number("look_ahead_s", 0.0, 0, 3600);
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
+  config.answer_timeout_s = reader.number("answer_timeout_s", config.answer_timeout_s, 1e-3, LARGE);
   config.queue_size = static_cast<std::size_t>(reader.integer("queue_size", 8, 1, 100000));
   config.queue_policy = reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST
                                                                                                   : QueuePolicy::OLDEST;

@@ -56,6 +56,7 @@ struct MonitorConfig {
   bool octomap_topic_named = false;  ///< as BodyConfig::topic_named
   std::size_t max_map_bytes = std::size_t{512} << 20;
   double transform_timeout_s = 0.2;
+  double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
   std::string simd_target = "auto";

@@ -91,8 +91,7 @@ void SceneArrays::setBodies(const std::vector<Body>& bodies) {
     throw std::invalid_argument(std::to_string(bodies.size()) + " bodies; at most 65534 are possible");
   }
   for (const Body& body : bodies) check(body, bodies.size());
-  bodies_.clear();
-  bodies_.resize(bodies.size());
+  bodies_ = std::vector<SceneBody>(bodies.size());  // resize() would ask old libraries' types to be copied
   face_order_.clear();
   vertex_count_ = 0;
   height_ = 2;

@@ -10,22 +10,52 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& text) { throw MeshError(StepStatus::BAD_MESSAGE, text); }
 
-std::vector<Face> triangulated(const IndexedView& mesh, std::size_t points) {
-  std::vector<Face> faces;
+/// Faces as they were sent: those that span a surface, and those that repeat a vertex.
+struct SentFaces {
+  std::vector<Face> proper, repeating;
+
+  void add(const Face& face) {
+    const bool repeats = face[0] == face[1] || face[1] == face[2] || face[0] == face[2];
+    (repeats ? repeating : proper).push_back(face);
+  }
+};
+
+/// A face that repeats a vertex is no more than an edge or a vertex. Where a proper face has that, too, it is looked
+/// at; else it is dropped.
+std::uint64_t countDropped(const std::vector<Face>& repeating, const Topology& topology) {
+  return static_cast<std::uint64_t>(std::count_if(repeating.begin(), repeating.end(), [&](const Face& face) {
+    const auto ends = std::minmax({face[0], face[1], face[2]});
+    if (ends.first == ends.second) {
+      return !std::binary_search(topology.usedVertices().begin(), topology.usedVertices().end(), ends.first);
+    }
+    return !std::binary_search(topology.edges().begin(), topology.edges().end(), Edge{ends.first, ends.second});
+  }));
+}
+
+void requireSomething(const Topology& topology, std::size_t faces) {
+  if (!topology.usedVertices().empty()) return;
+  refuse("there is nothing to check: " +
+         (faces == 0 ? "the message has no triangle"
+                     : "all of its " + std::to_string(faces) + " triangles name a vertex twice"));
+}
+
+SentFaces triangulated(const IndexedView& mesh, std::size_t points) {
+  SentFaces faces;
   const auto add = [&](Index a, Index b, Index c) {
     for (const Index v : {a, b, c}) {
       if (v >= points) {
         refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
       }
     }
-    if (a != b && b != c && a != c) faces.push_back({a, b, c});  // one without area touches nothing of its own
+    faces.add({a, b, c});
   };
-  faces.reserve(mesh.triangles.size);
+  faces.proper.reserve(mesh.triangles.size);
   for (std::size_t i = 0; i < mesh.triangles.size; ++i) {
     const auto t = mesh.triangles[i];
     add(t[0], t[1], t[2]);
   }
   for (const auto& polygon : mesh.polygons) {
+    if (polygon.size == 1 || polygon.size == 2) add(polygon[0], polygon[0], polygon[polygon.size - 1]);
     for (std::size_t k = 2; k < polygon.size; ++k) add(polygon[0], polygon[k - 1], polygon[k]);
   }
   return faces;
@@ -229,7 +259,11 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   }
   if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
     if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
-    mesh.topology = fromFaces(count, triangulated(view, count));
+    SentFaces sent = triangulated(view, count);
+    const std::size_t faces = sent.proper.size() + sent.repeating.size();
+    mesh.topology = fromFaces(count, std::move(sent.proper));
+    requireSomething(*mesh.topology, faces);
+    mesh.dropped_faces = countDropped(sent.repeating, *mesh.topology);
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
     // A publisher may send the triangles once and vertices ever after.
     if (!topology_) refuse("the message has no triangles and no topology is known yet");
@@ -257,14 +291,28 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
 
 DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
   std::string seen;
+  const MarkerView* taken = nullptr;
+  std::uint64_t unread = 0, unread_faces = 0;
   for (const MarkerView& marker : markers) {
     const bool wanted = (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
                         (!config_.marker_id || marker.id == *config_.marker_id);
-    if (wanted && marker.type == MARKER_TRIANGLE_LIST && marker.action == MARKER_ADD) return decodeSoup(marker);
-    if (seen.size() < 200) {
+    if (wanted && marker.type == MARKER_TRIANGLE_LIST && marker.action == MARKER_ADD) {
+      if (taken) {
+        ++unread;
+        unread_faces += (marker.points.size + 2) / 3;
+      } else {
+        taken = &marker;
+      }
+    } else if (seen.size() < 200) {
       seen += " ('" + std::string(marker.ns.substr(0, 32)) + "', " + std::to_string(marker.id) + ", type " +
               std::to_string(marker.type) + ")";
     }
+  }
+  if (taken) {
+    DecodedMesh mesh = decodeSoup(*taken);
+    mesh.unread_lists = unread;
+    mesh.dropped_faces += unread_faces;
+    return mesh;
   }
   refuse("no TRIANGLE_LIST marker with the wanted namespace and id; there are (namespace, id, type):" +
          (seen.empty() ? " none" : seen));
@@ -325,13 +373,12 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   if (config_.source == TopologySource::FILE) {
     mesh.topology = fixedTopology(count, 0, 0);
   } else {
-    std::vector<Face> faces;
-    faces.reserve(count / 3);
-    for (std::size_t c = 0; c < count; c += 3) {
-      const Face face{weld_[c], weld_[c + 1], weld_[c + 2]};
-      if (face[0] != face[1] && face[1] != face[2] && face[0] != face[2]) faces.push_back(face);
-    }
-    mesh.topology = fromFaces(representative_.size(), std::move(faces));
+    SentFaces sent;
+    sent.proper.reserve(count / 3);
+    for (std::size_t c = 0; c < count; c += 3) sent.add({weld_[c], weld_[c + 1], weld_[c + 2]});
+    mesh.topology = fromFaces(representative_.size(), std::move(sent.proper));
+    requireSomething(*mesh.topology, count / 3);
+    mesh.dropped_faces = countDropped(sent.repeating, *mesh.topology);
   }
   mesh.positions.resize(representative_.size());
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.positions[v] = transform * corners[representative_[v]];

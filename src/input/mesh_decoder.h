@@ -45,8 +45,10 @@ struct DecodedMesh {
   std::string frame_id;
   std::shared_ptr<const Topology> topology;
   Positions positions;
-  std::vector<double> radius_m;  ///< uncertainty per vertex; empty: none
-  std::size_t weld_changes = 0;  ///< welded vertices whose corners came apart
+  std::vector<double> radius_m;     ///< uncertainty per vertex; empty: none
+  std::size_t weld_changes = 0;     ///< welded vertices whose corners came apart
+  std::uint64_t dropped_faces = 0;  ///< that are in no part of the topology
+  std::size_t unread_lists = 0;     ///< triangle lists beside the one that was taken
 };
 
 /// Keeps the topology from message to message, so that an unchanged one is one object. Not thread-safe.

@@ -27,6 +27,10 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
 
 }  // namespace
 
+LivenessLimits livenessLimits(const MonitorConfig& config) {
+  return {config.answer_timeout_s, config.monitor.store.max_step_s, config.monitor.octomap_timeout_s};
+}
+
 CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle,
                              MonitorConfig given)
     : node(node_handle),
@@ -35,6 +39,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       config(pipeline.config()),
       recorder(config, pipeline.monitor()),
       outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
+      state(private_node, livenessLimits(config)),
       queue(config.bodies.size(), config.queue_size, config.queue_policy),
       diagnostics(private_node.getNamespace(), node),
       log(node, private_node.getNamespace(), config),
@@ -53,6 +58,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
     });
     return;
   }
+  if (body == config.monitor.clock_body) state.frameCame(now_ns);
   message.receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   message.arrival_ns = now_ns;
   queue.push(body, std::move(message));
@@ -63,6 +69,7 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
   if (!problem.empty()) return maps->refuse(problem);  // before its bytes are copied
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
+  state.mapCame();  // after it: the worker, which may take the map before, says again and again that none is on its way
 }
 
 void CollisionMonitor::Impl::subscribe() {
@@ -103,19 +110,23 @@ void CollisionMonitor::Impl::advertiseServices() {
   using SetBool = std_srvs::SetBool;
   ros::NodeHandle service(private_node);
   service.setCallbackQueue(&service_callbacks);
-  const auto advertise = [&](const char* name, const std::function<Reply()>& run) {
+  const auto advertise = [&](const char* name, const std::function<Reply()>& run, const char* asks = nullptr) {
     services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
-        name, [this, run](Trigger::Request&, Trigger::Response& response) {
+        name, [this, run, asks](Trigger::Request&, Trigger::Response& response) {
+          if (asks) state.asked(asks);
           const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
           response.success = reply.success;
           response.message = reply.message;
           return true;
         }));
   };
-  advertise("reset", [this] {
-    resetNow(StepStatus::RESET);
-    return Reply{true, "frames forgotten; the next one is a first frame"};
-  });
+  advertise(
+      "reset",
+      [this] {
+        resetNow(StepStatus::RESET);
+        return Reply{true, "frames forgotten; the next one is a first frame"};
+      },
+      "a reset was asked for");
   advertise("check_now", [this] {
     const Outcome outcome = pipeline.checkNow();
     return Reply{outcome.answered, describe(outcome)};
@@ -128,6 +139,8 @@ void CollisionMonitor::Impl::advertiseServices() {
   services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
       "enable", [this](SetBool::Request& request, SetBool::Response& response) {
         enabled = request.data;
+        state.setEnabled(enabled);
+        state.asked("~enable was called");
         const auto run = [this, on = request.data] {
           resetNow(StepStatus::DISABLED);
           return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
@@ -154,6 +167,7 @@ void CollisionMonitor::Impl::start() {
 }
 
 void CollisionMonitor::Impl::stop() {
+  state.stop();
   stopping = true;
   renewal.stop();
   input_spinner.stop();

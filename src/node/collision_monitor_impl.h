@@ -22,6 +22,7 @@
 #include "node/monitor_log.h"
 #include "node/monitor_pipeline.h"
 #include "node/reconfigure.h"
+#include "node/state_reporter.h"
 #include "node/step_recorder.h"
 #include "output/diagnostics.h"
 #include "ros/transforms.h"
@@ -33,6 +34,8 @@ inline std::int64_t steadyNs() {
       .count();
 }
 
+LivenessLimits livenessLimits(const MonitorConfig& config);
+
 struct CollisionMonitor::Impl {
   ros::NodeHandle node, private_node;
   tf2::BufferCore transforms;
@@ -41,6 +44,7 @@ struct CollisionMonitor::Impl {
   const MonitorConfig& config;  // the pipeline's, of which it alone changes `monitor` and `markers`
   StepRecorder recorder;
   Outputs outputs;
+  StateReporter state;
   InputQueue queue;
   Diagnostics diagnostics;
   MonitorLog log;

@@ -49,6 +49,11 @@ bool MapLoader::take(LoadedMap& map) {
   return true;
 }
 
+bool MapLoader::busy() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return job_ || decoding_ || done_;
+}
+
 void MapLoader::loop() {
   while (true) {
     Job job;
@@ -58,6 +63,7 @@ void MapLoader::loop() {
       if (stopping_) return;
       job = std::move(*job_);
       job_.reset();
+      decoding_ = true;
     }
     LoadedMap map = load(job);
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
@@ -65,6 +71,7 @@ void MapLoader::loop() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       done_ = std::move(map);
+      decoding_ = false;
     }
     ready_();
   }

@@ -41,6 +41,9 @@ class MapLoader {
   /// The newest finished map, once.
   bool take(LoadedMap& map);
 
+  /// A map is on its way: it waits to be decoded, is being decoded, or can be taken.
+  bool busy();
+
   std::uint64_t received() const { return received_; }
   std::uint64_t refused() const { return refused_; }
 
@@ -57,7 +60,7 @@ class MapLoader {
   std::condition_variable changed_;
   std::optional<Job> job_;
   std::optional<LoadedMap> done_;
-  bool stopping_ = false;
+  bool stopping_ = false, decoding_ = false;
   std::atomic<std::uint64_t> received_{0}, refused_{0};
   std::thread thread_;
 

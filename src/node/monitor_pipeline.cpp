@@ -228,7 +228,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   transform(fixed_from_mesh, done.mesh.positions);
   monitor_->push(body,
                  {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
-                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m)},
+                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m), done.mesh.dropped_faces},
                  now_ns);
   if (is_clock) arrivals_.push_back(done.arrival_ns);
   placed_[body] = isStatic(body);

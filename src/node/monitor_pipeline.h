@@ -43,6 +43,8 @@ class MonitorPipeline {
   /// yields an outcome.
   void take(std::size_t body, const MeshMessage& message);
   void setMap(LoadedMap map, std::int64_t now_ns);
+  /// A map that was set has no place yet: its transform has not come.
+  bool mapWaits() const { return unplaced_map_.has_value(); }
   /// Somebody is there who publishes maps: from now on a step without one lacks it.
   void expectMap() { effects_.expectMap(); }
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.

@@ -17,6 +17,7 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 void CollisionMonitor::Impl::reconfigureNow(const Reconfigure::Change& change) {
   try {
     pipeline.reconfigure(change);
+    state.setLimits(livenessLimits(config));
   } catch (const std::invalid_argument& error) {
     ROS_WARN_STREAM("reconfiguration refused: " << error.what());
   }
@@ -32,7 +33,9 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
     pipeline.monitor().countDropped(b, status, cleared[b]);
   }
   pipeline.reset(status);
-  outputs.publishNotClear(pipeline.fixedFrame());
+  state.forgotten(std::string("no frame has been answered since ") +
+                  (status == StepStatus::RESET ? "the reset" : "~enable was called"));
+  outputs.publishNothing(pipeline.fixedFrame());
   if (!outputs.wantsPrediction()) return;
   Outcome none;
   none.status = status;
@@ -108,7 +111,8 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) {
     ++steps_unpublished;
     log.complain(config.monitor.clock_body, "publishing",
                  std::string("not all of a step's results could be published: ") + error.what());
-    carryOut([this] { outputs.publishNotClear(pipeline.fixedFrame()); });
+    state.takeBack("not all of a step's results could be published");
+    carryOut([this] { outputs.publishNothing(pipeline.fixedFrame()); });
   }
 }
 
@@ -117,6 +121,7 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
   newest_ns = outcome.stamp_ns;
+  state.tell(outcome, pipeline.arrivalOfOutcome(), frame);
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
@@ -180,6 +185,7 @@ void CollisionMonitor::Impl::work() {
     if (map_publisher_seen) pipeline.expectMap();
     publishEffects(ros::Time::now());  // the first plan comes before the first frame
     takeMaps();
+    if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();
     takeMessages();
     accountDropped();
     Outcome outcome;

@@ -107,6 +107,11 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   std::ostringstream text;
   addSize(mesh, text);
   addSwapped(mesh, config, text);
+  if (mesh.unread_lists > 0) {
+    text << (text.tellp() > 0 ? "; " : "") << mesh.unread_lists << " further TRIANGLE_LIST "
+         << (mesh.unread_lists == 1 ? "marker is" : "markers are")
+         << " not read, so that nothing is proved; name the one that is the mesh by marker/namespace and marker/id";
+  }
   if (mesh.stamp_ns == 0) {
     text << (text.tellp() > 0 ? "; " : "")
          << "messages carry no stamp, so that the time of receipt stands in for it, with "

@@ -21,6 +21,8 @@ static_assert(static_cast<int>(StepStatus::INTERNAL_ERROR) ==
               static_cast<int>(deformable_ccd::ContactArray::INTERNAL_ERROR));
 static_assert(static_cast<int>(StartState::NOT_CHECKED) == static_cast<int>(deformable_ccd::ContactArray::NOT_CHECKED));
 static_assert(static_cast<int>(PairKind::FACE_VOXEL_CORNER) == static_cast<int>(ContactMessage::FACE_VOXEL_CORNER));
+static_assert(static_cast<int>(Touching::LASTING) == static_cast<int>(deformable_ccd::State::LASTING));
+static_assert(static_cast<int>(Touching::NEW) == static_cast<int>(deformable_ccd::State::NEW));
 static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
 std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
@@ -260,6 +262,34 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
   }
   out.summary = summaryOf(outcome, first, bodies);
   return out;
+}
+
+deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) {
+  deformable_ccd::State out;
+  out.header = header(outcome.stamp_ns, frame);
+  if (!outcome.answered) return out;
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    out.checked_self |= meetsItself(bodies[b]);
+    out.checked_map |= outcome.step->map.surface && meetsMap(bodies[b]);
+    for (std::size_t other = 0; other < b; ++other) out.checked_bodies |= meet(bodies[other], bodies[b]);
+  }
+  if (out.checked_map) {
+    out.map_stamp = toRosTime(outcome.step->map.stamp_ns);
+    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.step->map.stamp_ns) * 1e-9;
+  }
+  out.start = toRosTime(outcome.start_ns);
+  out.holds_until = toRosTime(outcome.stamp_ns);
+  return out;
+}
+
+void fillState(const Assurance& assurance, deformable_ccd::State& message) {
+  message.proved = assurance.proved;
+  message.touching = static_cast<std::uint8_t>(assurance.touching);
+  message.clear = assurance.clear();
+  message.reason = describe(assurance);
+  message.missing = assurance.missing;
+  message.excluded = assurance.excluded;
 }
 
 StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {

@@ -4,10 +4,12 @@
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/LeftOutPairs.h>
+#include <deformable_ccd/State.h>
 #include <deformable_ccd/StepStats.h>
 #include <deformable_ccd/TimeToContact.h>
 #include <std_msgs/Header.h>
 
+#include "dccd/assurance.h"
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
 
@@ -33,6 +35,9 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
                                             const std::string& frame);
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
+/// What was checked and when; what may be said of it comes by fillState().
+deformable_ccd::State toState(const Outcome& outcome, const std::string& frame);
+void fillState(const Assurance& assurance, deformable_ccd::State& message);
 /// The message of the package, not StepStats.
 deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
 deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,

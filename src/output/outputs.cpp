@@ -1,7 +1,5 @@
 #include "output/outputs.h"
 
-#include <std_msgs/Bool.h>
-
 #include "output/markers.h"
 
 namespace dccd {
@@ -16,7 +14,6 @@ constexpr std::uint32_t QUEUE = 32;
 Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
   contacts_ = node.advertise<deformable_ccd::ContactArray>("contacts", QUEUE);
   first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", QUEUE);
-  clear_ = node.advertise<std_msgs::Bool>("clear", QUEUE, true);
   stats_ = node.advertise<deformable_ccd::StepStats>("stats", QUEUE);
   markers_ = node.advertise<visualization_msgs::MarkerArray>("markers", 2);
   effects_ = node.advertise<deformable_ccd::EffectArray>("effects", 1, true);
@@ -25,13 +22,9 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
     time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", QUEUE);
   }
   if (separates) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
-  publishNotClear("");
 }
 
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
-  std_msgs::Bool clear;
-  clear.data = assuranceOf(outcome).clear();
-  clear_.publish(clear);
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
 }
@@ -69,8 +62,7 @@ void Outputs::publishLeftOut(const deformable_ccd::LeftOutPairs& pairs) {
   if (left_out_) left_out_.publish(pairs);
 }
 
-void Outputs::publishNotClear(const std::string& frame) {
-  clear_.publish(std_msgs::Bool());
+void Outputs::publishNothing(const std::string& frame) {
   // Of an outcome without an answer all that is shown is that what was there before is gone.
   if (markers_.getNumSubscribers() > 0 && !frame.empty()) markers_.publish(toMarkers({}, {}, {}, frame));
 }

@@ -19,7 +19,7 @@ class Outputs {
  public:
   Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates);
 
-  /// What a robot waits for, before all else: clear, first contact, contacts.
+  /// What a robot waits for, before all that is only looked at: first contact, contacts.
   void publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
   void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
                       const std::string& frame);
@@ -33,11 +33,11 @@ class Outputs {
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.
   void publishLeftOut(const deformable_ccd::LeftOutPairs& pairs);
-  /// Not clear, and nothing shown: after a reset or when disabled. An empty frame: nothing was shown yet.
-  void publishNotClear(const std::string& frame);
+  /// Nothing is shown any more: after a reset or when disabled. An empty frame: nothing was shown yet.
+  void publishNothing(const std::string& frame);
 
  private:
-  ros::Publisher contacts_, first_contact_, clear_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;
+  ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;
   std::uint64_t markers_built_ = 0;
 };
 

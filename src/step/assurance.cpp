@@ -11,18 +11,23 @@ std::string joined(const std::vector<std::string>& sentences) {
 
 }  // namespace
 
+void Assurance::hinder(const std::vector<std::string>& faults) {
+  missing.insert(missing.begin(), faults.begin(), faults.end());
+  proved = proved && faults.empty();
+}
+
 Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults) {
   Assurance assurance;
   assurance.touching = outcome.touching;
-  assurance.missing = faults;
   if (outcome.answered) {
-    assurance.missing.insert(assurance.missing.end(), outcome.unproved.begin(), outcome.unproved.end());
+    assurance.missing = outcome.unproved;
     assurance.excluded = outcome.excluded;
   } else {
     assurance.missing.push_back(std::string("no answer, ") + toString(outcome.status) +
                                 (outcome.reason.empty() ? "" : ": " + outcome.reason));
   }
   assurance.proved = assurance.missing.empty();
+  assurance.hinder(faults);
   return assurance;
 }
 

@@ -27,6 +27,7 @@ inline void hold(const std::shared_ptr<const MeshFrame>& frame, Body& body) {
   body.topology = frame->topology;
   body.t0 = body.t1 = positionsOf(frame);
   body.radius_m = radii(frame->radius_m);
+  body.dropped_faces = frame->dropped_faces;
 }
 
 struct Monitor::Impl {

@@ -104,11 +104,13 @@ Step Monitor::Impl::place(const Pending& pending) {
       body.pose_t0 = pending.from->pose;
       body.pose_t1 = pending.to->pose;
       body.radius_m = radii(largerRadii(pending.from->radius_m, pending.to->radius_m));
+      body.dropped_faces = std::max(pending.from->dropped_faces, pending.to->dropped_faces);
     } else if (isStream(b)) {
       // Not the newest frame, which may have begun another run with another topology while the step waited.
       const MeshFrame& frame = stores[b].frameAtOrAfter(step.stamp_ns);
       body.topology = frame.topology;
       body.turns = frame.rigid;
+      body.dropped_faces = frame.dropped_faces;
       placeStream(b, pending, body);
       lookBetween(b, step);
     } else {

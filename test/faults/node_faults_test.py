@@ -1,143 +1,28 @@
 """What happens to processes around the node: overload, a subscriber that never reads, SIGTERM in mid-step, a master that
 goes away, a publisher that is killed, a clock that jumps, a disk that is full. Each test starts a node of its own."""
-import os
 import pathlib
-import random
-import shutil
 import signal
 import socket
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
-import warnings
 import xmlrpc.client
 
 import rosgraph
 import rospy
-from deformable_ccd.msg import ContactArray, StepStats
+from deformable_ccd.msg import ContactArray
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import PointCloud2, PointField
-from std_msgs.msg import Bool
+from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 
-CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.append(str(CHECKOUT / 'scripts/lib'))
-from ros_process import SLOW, free_port, wait_for
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
+from ros_process import SLOW, wait_for
+from live_node import Cloud, LiveNodeTest, resident_kb
 
 
-def resident_kb(pid):
-    for line in pathlib.Path('/proc/%d/status' % pid).read_text().splitlines():
-        if line.startswith('VmRSS:'):
-            return int(line.split()[1])
-    raise AssertionError('no VmRSS')
-
-
-class Cloud:
-    """A grid of points that is crumpled anew in each frame, so that a step has much to do; `padding` bytes a point are no
-    field's, so that frames that are kept show in the memory."""
-
-    def __init__(self, rows, cols, padding=0):
-        self.rows, self.cols, self.point_step = rows, cols, 24 + padding
-        noise = random.Random(1)
-        self.variants = [b''.join(struct.pack('<3d%dx' % padding, 0.01 * c + noise.uniform(-0.02, 0.02),
-                                              0.01 * r + noise.uniform(-0.02, 0.02), noise.uniform(-0.02, 0.02))
-                                  for r in range(rows) for c in range(cols)) for _ in range(4)]
-        self.count = 0
-
-    def message(self, stamp_s=None):
-        self.count += 1
-        m = PointCloud2(height=self.rows, width=self.cols, point_step=self.point_step, row_step=self.point_step * self.cols, is_dense=True,
-                        data=self.variants[self.count % len(self.variants)])
-        m.fields = [PointField(name=n, offset=8 * i, datatype=PointField.FLOAT64, count=1) for i, n in enumerate('xyz')]
-        m.header.frame_id = 'world'
-        m.header.stamp = rospy.Time.from_sec(stamp_s if stamp_s is not None else 100 + 0.01 * self.count)
-        return m
-
-
-class NodeFaultsTest(unittest.TestCase):
-    """rospy initialises once a process, so one master's address serves all tests; each node has a name of its own."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp(prefix='node_faults_')
-        cls.port = free_port()
-        os.environ.update(ROS_MASTER_URI='http://localhost:%d' % cls.port, ROS_HOSTNAME='localhost', ROS_HOME=cls.folder,
-                          ROS_LOG_DIR=cls.folder)
-        cls.start_master()
-        rospy.init_node('node_faults_test', disable_signals=True)
-
-    @classmethod
-    def tearDownClass(cls):
-        try:
-            rospy.signal_shutdown('done')
-        except AttributeError:
-            pass  # Debian 11: rospy ends with a call that its Python 3.9 does not know, when all the rest is shut down
-        cls.stop_master()
-        shutil.rmtree(cls.folder, ignore_errors=True)
-
-    @classmethod
-    def start_master(cls):
-        cls.master = subprocess.Popen(['rosmaster', '--core', '-p', str(cls.port)], stdout=subprocess.DEVNULL,
-                                      stderr=subprocess.DEVNULL)
-        wait_for(lambda: rosgraph.is_master_online(), 20, 'the master')
-
-    @classmethod
-    def stop_master(cls):
-        cls.master.terminate()
-        cls.master.wait(20)
-
-    def setUp(self):
-        warnings.simplefilter('ignore', ResourceWarning)  # rospy leaves sockets to the collector
-
-    def start_node(self, name, process=None, **parameters):
-        arguments = ['__name:=' + name, 'mesh:=/%s/mesh' % name, '_fixed_frame:=world', '_max_vertex_step_m:=0.0',
-                     '_effects/octomap:=off', '_max_contacts:=100']
-        arguments += ['_%s:=%s' % item for item in parameters.items()]
-        node = subprocess.Popen([str(self.tool('collision_monitor_node'))] + arguments, **(process or {}))
-        self.addCleanup(self.end, node)
-        self.stats, self.clear, self.contacts = [], [], []
-        subscribers = []
-        for topic, kind, into in (('stats', StepStats, self.stats), ('clear', Bool, self.clear),
-                                  ('contacts', ContactArray, self.contacts)):
-            subscriber = rospy.Subscriber('/%s/%s' % (name, topic), kind, into.append)
-            self.addCleanup(subscriber.unregister)
-            subscribers.append(subscriber)
-        self.publisher = rospy.Publisher('/%s/mesh' % name, PointCloud2, queue_size=None, tcp_nodelay=True)
-        self.addCleanup(self.publisher.unregister)
-        wait_for(lambda: self.publisher.get_num_connections() == 1, 20, 'the node to subscribe')
-        wait_for(lambda: all(s.get_num_connections() == 1 for s in subscribers), 20, 'its topics')
-        return node
-
-    def step(self, message):
-        """Publishes one frame; returns the outcome that it leads to, after its statistics have come, too."""
-        seen, counted = len(self.contacts), len(self.stats)
-        self.publisher.publish(message)
-        wait_for(lambda: len(self.contacts) > seen and len(self.stats) > counted, 20, 'a step')
-        return self.contacts[-1]
-
-    @staticmethod
-    def tool(name):
-        for prefix in os.environ['CMAKE_PREFIX_PATH'].split(':'):
-            path = pathlib.Path(prefix) / 'lib/deformable_ccd' / name
-            if path.exists():
-                return path
-        raise AssertionError(name + ' was not built')
-
-    @staticmethod
-    def end(node):
-        if node.poll() is None:
-            node.kill()
-        node.wait()
-
-    def assert_adds_up(self, s):
-        self.assertEqual(s.frames_received, s.frames_processed + s.frames_started + s.frames_skipped + s.frames_waiting)
-        self.assertEqual(s.frames_skipped, s.skipped_duplicate + s.skipped_vertex_count + s.skipped_bad_message +
-                         s.skipped_no_transform + s.skipped_no_body + s.skipped_queue_full + s.skipped_disabled +
-                         s.skipped_reset + s.skipped_error)
-
+class NodeFaultsTest(LiveNodeTest):
     def overload(self, name, policy, size, factor):
         """Frames at `factor` times the rate at which steps are done; returns the newest stamps and the last statistics."""
         node = self.start_node(name, queue_size=size, queue_policy=policy)
@@ -185,7 +70,7 @@ class NodeFaultsTest(unittest.TestCase):
 
     def test_a_subscriber_that_never_reads(self):
         node = self.start_node('unread', queue_size=100)
-        master = rosgraph.Master('/node_faults_test')
+        master = rosgraph.Master('/live_node_test')
         proxy = xmlrpc.client.ServerProxy(master.lookupNode('/unread'))
         sockets = []
         for topic in ('contacts', 'stats', 'markers'):

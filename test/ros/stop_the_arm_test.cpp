@@ -1,4 +1,5 @@
 // examples/stop_the_arm in C++ and Python: it says stop in time, and whenever it cannot know.
+#include <deformable_ccd/State.h>
 #include <deformable_ccd/TimeToContact.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
@@ -17,18 +18,22 @@ namespace {
 class PlayedMonitor {
  public:
   explicit PlayedMonitor(ros::NodeHandle& node)
-      : clear_(advertiseAndWait<std_msgs::Bool>(node, "/played/clear", true, 2)),
+      : state_(advertiseAndWait<deformable_ccd::State>(node, "/played/state", true, 2)),
         prediction_(advertiseAndWait<deformable_ccd::TimeToContact>(node, "/played/time_to_contact", false, 2)) {}
 
-  bool silent = false, clear = true, answered = true;
+  bool silent = false, proved = true, answered = true, goes_on = true;
+  std::uint8_t touching = deformable_ccd::State::NONE;
   double contact_in_s = std::numeric_limits<double>::infinity(), horizon_s = 1;
   bool predicts = true;
 
-  void speak() const {
+  void speak() {
     if (silent) return;
-    std_msgs::Bool is_clear;
-    is_clear.data = clear;
-    clear_.publish(is_clear);
+    deformable_ccd::State state;
+    state.proved = proved;
+    state.touching = touching;
+    if (goes_on) holds_until_ += ros::Duration(0.03);
+    state.holds_until = holds_until_;
+    state_.publish(state);
     if (!predicts) return;
     deformable_ccd::TimeToContact time;
     time.answered = answered;
@@ -39,7 +44,8 @@ class PlayedMonitor {
   }
 
  private:
-  ros::Publisher clear_, prediction_;
+  ros::Publisher state_, prediction_;
+  ros::Time holds_until_{1000};
 };
 
 class StopTheArm : public ::testing::TestWithParam<const char*> {
@@ -69,11 +75,17 @@ TEST_P(StopTheArm, WheneverItCannotKnow) {
   monitor.silent = false;
   expectStop(false, "clear, and nothing in sight");
   monitor.silent = true;
-  expectStop(true, "the monitor fell silent, its last ~clear was true and is latched");
+  expectStop(true, "the monitor fell silent, its last ~state was proved and is latched");
   monitor.silent = false;
   expectStop(false, "it is back");
   monitor.predicts = false;
   expectStop(true, "clear now, but nobody looks ahead");
+  monitor.predicts = true;
+  expectStop(false, "somebody does again");
+  monitor.goes_on = false;
+  expectStop(true, "it says the same again and again, of a frame that grows old");
+  monitor.goes_on = true;
+  expectStop(false, "new frames");
 }
 
 TEST_P(StopTheArm, InTime) {
@@ -86,9 +98,12 @@ TEST_P(StopTheArm, InTime) {
   monitor.horizon_s = 0.2;
   expectStop(true, "who looks only 0.2 s ahead does not see what cannot be avoided any more");
   monitor.horizon_s = 1;
-  monitor.clear = false;
-  expectStop(true, "not clear");
-  monitor.clear = true;
+  monitor.proved = false;
+  expectStop(true, "not proved, as across a seam");
+  monitor.proved = true;
+  monitor.touching = deformable_ccd::State::NEW;
+  expectStop(true, "proved, and something touches");
+  monitor.touching = deformable_ccd::State::NONE;
   monitor.answered = false;
   expectStop(true, "no answer is not \"no contact\"");
 }

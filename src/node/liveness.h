@@ -1,0 +1,64 @@
+// Whether the newest answer is still the newest word: frames go on to come, are answered in time, the map stays fresh.
+// Free of ROS and of any clock: times are those of a watch that only goes forward.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+namespace dccd {
+
+struct LivenessLimits {
+  double answer_timeout_s = 0.5;  ///< a frame has its outcome by then; > 0
+  double max_step_s = 0.5;        ///< frames come more often than this; > 0
+  double octomap_timeout_s = 0;   ///< a map in use is not older; 0: it may be
+};
+
+/// What stands in the way of a proof apart from the step itself. One of a kind at a time.
+struct Fault {
+  enum class Kind : std::uint8_t { ASKED, DISABLED, STOPPED, NO_ANSWER, SILENCE, NEWER_MAP, OLD_MAP };
+  Kind kind = Kind::ASKED;
+  std::string sentence;
+};
+
+/// Not thread-safe. `now_ns`: of the watch.
+class Liveness {
+ public:
+  explicit Liveness(const LivenessLimits& limits) : limits_(limits) {}
+  void setLimits(const LivenessLimits& limits) { limits_ = limits; }
+
+  /// A frame of the clock body came; `name` is any number that grows from frame to frame.
+  void frame(std::int64_t name, std::int64_t now_ns);
+  /// It has its outcome, whatever that says, and so do those before it. `map_age_s`: of the map in use at the frame's
+  /// stamp; negative: none was used.
+  void outcome(std::int64_t name, double map_age_s, std::int64_t now_ns);
+  /// A map came that is not in use yet; it is, or was refused.
+  void mapCame(std::int64_t now_ns);
+  void mapSettled() { map_since_ns_ = NEVER; }
+
+  /// Something is asked for that makes what was said void, until forget().
+  void ask(const std::string& what) { asked_ = what; }
+  /// All frames are forgotten; what was asked for is done.
+  void forget();
+  void disable(bool on) { disabled_ = on; }
+  /// For good.
+  void stop() { stopped_ = true; }
+
+  std::vector<Fault> faults(std::int64_t now_ns) const;
+
+ private:
+  static constexpr std::int64_t NEVER = -1;
+  struct Frame {
+    std::int64_t name, came_ns;
+  };
+  LivenessLimits limits_;
+  std::deque<Frame> open_;  // without an outcome; at most a few thousand, of which the oldest counts
+  Frame newest_{0, NEVER};
+  std::int64_t map_since_ns_ = NEVER, answered_ns_ = NEVER;
+  double map_age_s_ = -1;
+  std::string asked_;
+  bool disabled_ = false, stopped_ = false;
+};
+
+}  // namespace dccd

@@ -1,0 +1,146 @@
+#include "node/state_reporter.h"
+
+#include <chrono>
+#include <utility>
+
+#include <ros/time.h>
+#include <std_msgs/Bool.h>
+
+#include "output/output_messages.h"
+
+namespace dccd {
+namespace {
+
+// As deep as the other topics'.
+constexpr std::uint32_t QUEUE = 32;
+constexpr std::chrono::milliseconds PERIOD{20};
+
+std::int64_t steadyNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+std::int64_t WatchClock::now() {
+  const bool simulated = ros::Time::isSimTime();
+  const std::int64_t now_ns = simulated ? static_cast<std::int64_t>(ros::Time::now().toNSec()) : steadyNs();
+  // Before the first /clock the time is 0, and from there to the first one nothing passes.
+  const bool begins = simulated != std::exchange(simulated_, simulated) || last_ns_ == 0;
+  if (!begins && now_ns > last_ns_) elapsed_ns_ += now_ns - last_ns_;
+  last_ns_ = now_ns;
+  return elapsed_ns_;
+}
+
+StateReporter::StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits)
+    : state_(private_node.advertise<deformable_ccd::State>("state", QUEUE, true)),
+      clear_(private_node.advertise<std_msgs::Bool>("clear", QUEUE, true)),
+      liveness_(limits) {
+  forgotten("no frame has been answered yet");
+  thread_ = std::thread([this] { watch(); });
+}
+
+StateReporter::~StateReporter() {
+  stop();
+  thread_.join();
+}
+
+void StateReporter::setLimits(const LivenessLimits& limits) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.setLimits(limits);
+}
+
+void StateReporter::frameCame(std::int64_t arrival_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.frame(arrival_ns, clock_.now());
+}
+
+void StateReporter::mapCame() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.mapCame(clock_.now());
+}
+
+void StateReporter::mapSettled() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.mapSettled();
+}
+
+void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  answer_ = assuranceOf(outcome);
+  const ros::Time before = told_.holds_until;
+  told_ = toState(outcome, frame);
+  // What was answered last stays to be seen; that it is no more proved is said.
+  if (!outcome.answered) told_.holds_until = before;
+  liveness_.outcome(arrival_ns, outcome.answered && outcome.obstacle ? told_.map_age : -1, clock_.now());
+  say(true);
+}
+
+void StateReporter::asked(const std::string& what) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.ask(what);
+  say(true);
+}
+
+void StateReporter::voidAnswer(const std::string& reason) {
+  answer_ = Assurance();
+  answer_.missing.push_back(reason);
+  const std::string frame = std::move(told_.header.frame_id);
+  told_ = deformable_ccd::State();
+  told_.header.frame_id = frame;
+}
+
+void StateReporter::takeBack(const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  voidAnswer(reason);
+  say(true);
+}
+
+void StateReporter::forgotten(const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  voidAnswer(reason);
+  liveness_.forget();
+  say(true);
+}
+
+void StateReporter::setEnabled(bool on) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.disable(!on);
+  say(false);
+}
+
+void StateReporter::stop() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (stopped_) return;
+  liveness_.stop();
+  say(true);
+  stopped_ = true;
+  ended_.notify_all();
+}
+
+void StateReporter::watch() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!ended_.wait_for(lock, PERIOD, [this] { return stopped_; })) say(false);
+}
+
+void StateReporter::say(bool always) {
+  if (stopped_) return;
+  std::vector<std::string> sentences;
+  std::vector<Fault::Kind> kinds;
+  for (Fault& fault : liveness_.faults(clock_.now())) {
+    kinds.push_back(fault.kind);
+    sentences.push_back(std::move(fault.sentence));
+  }
+  if (std::exchange(hinders_, kinds) == kinds && !always) return;
+  Assurance assurance = answer_;
+  assurance.hinder(sentences);
+  deformable_ccd::State message = told_;
+  fillState(assurance, message);
+  message.header.stamp = ros::Time::now();
+  std_msgs::Bool clear;
+  clear.data = assurance.clear();
+  clear_.publish(clear);
+  state_.publish(message);
+}
+
+}  // namespace dccd

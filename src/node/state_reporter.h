@@ -1,0 +1,75 @@
+// ~state and ~clear: the one place where the node says what it can vouch for. Each step's assurance comes from the
+// worker; what ends it between steps is watched on a thread of its own, so that no step and no callback delays it.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <deformable_ccd/State.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+
+#include "dccd/assurance.h"
+#include "node/liveness.h"
+
+namespace dccd {
+
+/// Runs with the steady clock; with /use_sim_time with /clock, at its rate, and stands while that stands. A clock that
+/// jumps back, as a bag in a loop does, takes nothing away.
+class WatchClock {
+ public:
+  std::int64_t now();
+
+ private:
+  bool simulated_ = false;
+  std::int64_t last_ns_ = 0, elapsed_ns_ = 0;
+};
+
+/// Safe to call from any thread.
+class StateReporter {
+ public:
+  StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits);
+  ~StateReporter();
+  StateReporter(const StateReporter&) = delete;
+  StateReporter& operator=(const StateReporter&) = delete;
+
+  void setLimits(const LivenessLimits& limits);
+
+  /// A frame of the clock body came, whose outcome will bring the same `arrival_ns`.
+  void frameCame(std::int64_t arrival_ns);
+  void mapCame();
+  void mapSettled();
+  /// A step's answer, or why there is none.
+  void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame);
+  /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.
+  void asked(const std::string& what);
+  /// What was told last is void.
+  void takeBack(const std::string& reason);
+  /// The same, and all frames are forgotten; what was asked for is done.
+  void forgotten(const std::string& reason);
+  void setEnabled(bool on);
+  /// The last word: the monitor ends.
+  void stop();
+
+ private:
+  void watch();
+  void voidAnswer(const std::string& reason);
+  /// The mutex is held. Publishes what holds now; `always`: also if it is what was said last.
+  void say(bool always);
+
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  ros::Publisher state_, clear_;
+  WatchClock clock_;
+  Liveness liveness_;
+  Assurance answer_;                  // of the last step or what came instead, without what is wrong besides
+  deformable_ccd::State told_;        // its other fields
+  std::vector<Fault::Kind> hinders_;  // what was said to stand in its way
+  bool stopped_ = false;
+  std::thread thread_;
+};
+
+}  // namespace dccd

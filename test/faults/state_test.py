@@ -1,0 +1,392 @@
+"""What ~state and ~clear say while frames stop, steps take long, clocks stand or run, and the node ends: on meshes as large as
+trackers send. Nothing that is said here rests on one more frame coming."""
+import os
+import pathlib
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import rosbag
+import rospy
+from deformable_ccd.msg import ContactArray, MeshStamped, State
+from geometry_msgs.msg import Point
+from sensor_msgs.msg import PointCloud2
+from shape_msgs.msg import MeshTriangle
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
+from ros_process import SLOW, wait_for
+from live_node import Cloud, LiveNodeTest
+
+ROWS, COLS = 30, 40  # 1,200 vertices
+
+
+class Sheet(Cloud):
+    """A flat sheet that sinks slowly: every step of it is clear."""
+
+    def __init__(self, rows=ROWS, cols=COLS):
+        super().__init__(rows, cols)
+        self.variants = [b''.join(struct.pack('<3d', 0.01 * c, 0.01 * r, 0.001 * z)
+                                  for r in range(rows) for c in range(cols)) for z in range(4)]
+
+
+class Stream:
+    """Publishes frames 30 times a second, stamped so, until it is stopped."""
+
+    def __init__(self, publisher, cloud, rate=30.0):
+        self.publisher, self.cloud, self.rate = publisher, cloud, rate
+        self.stop = threading.Event()
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self):
+        while not self.stop.wait(1 / self.rate):
+            self.publisher.publish(self.cloud.message(100 + (self.cloud.count + 1) / self.rate))
+
+    def end(self):
+        self.stop.set()
+        self.thread.join()
+
+
+class StateTest(LiveNodeTest):
+    def stream(self, cloud, rate=30.0):
+        stream = Stream(self.publisher, cloud, rate)
+        self.addCleanup(stream.end)
+        return stream
+
+    def wait_proved(self, proved=True, seconds=20):
+        wait_for(lambda: self.states and self.states[-1].proved == proved, seconds, 'proved: %s' % proved)
+
+    def wait_missing(self, words):
+        wait_for(lambda: self.states and any(words in m for m in self.states[-1].missing), 20, words)
+        self.assertFalse(self.states[-1].proved)
+        self.assertFalse(self.states[-1].clear)
+        wait_for(lambda: not self.clear[-1].data, 5, '~clear to be false')
+
+    def forget_type(self):
+        time.sleep(0.3)  # else the node may not have seen that there was a publisher of clouds, and wait for the next one
+        self.publisher.unregister()
+
+    def late_subscriber(self, name):
+        """What somebody hears who comes only now."""
+        heard = rospy.wait_for_message('/%s/state' % name, State, 10)
+        self.assertEqual(rospy.wait_for_message('/%s/clear' % name, Bool, 10).data, heard.clear)
+        return heard
+
+    def assert_consistent(self):
+        for state in list(self.states):
+            self.assertEqual(state.proved, not state.missing, state)
+            self.assertEqual(state.clear, state.proved and state.touching == State.NONE, state)
+            self.assertTrue(state.reason)
+
+    def test_a_tracker_that_falls_silent(self):
+        self.start_node('silent')
+        stream = self.stream(Sheet())
+        self.wait_proved()
+        state = self.states[-1]
+        self.assertTrue(state.clear)
+        self.assertTrue(state.checked_self)
+        self.assertFalse(state.checked_map)
+        self.assertGreater(state.holds_until, state.start)
+        stream.end()
+        last = 100 + stream.cloud.count / stream.rate
+        self.wait_missing('no frame has come')
+        late = self.late_subscriber('silent')
+        self.assertFalse(late.proved)
+        self.assertAlmostEqual(late.holds_until.to_sec(), last, 6)
+        self.stream(stream.cloud)
+        self.wait_proved()
+        self.assert_consistent()
+
+    def test_a_tracker_that_is_killed_and_replaced_by_another_type(self):
+        self.start_node('replaced')
+        self.publisher.unregister()
+        tracker = subprocess.Popen([sys.executable, __file__, 'publish', '/replaced/mesh'])
+        self.addCleanup(self.end, tracker)
+        self.wait_proved()
+        self.assertTrue(self.states[-1].clear)
+        tracker.kill()
+        tracker.wait()
+        self.wait_missing('no frame has come')
+        said = len(self.states)
+        successor = rospy.Publisher('/replaced/mesh', MeshStamped, queue_size=5)
+        self.addCleanup(successor.unregister)
+        for i in range(30):
+            successor.publish(mesh_of(Sheet(), [(0, 1, COLS)], 200 + 0.03 * i))
+            time.sleep(0.03)
+        # Whether they are taken or not: of 1,200 vertices but three have a face.
+        self.assertFalse(any(s.proved for s in self.states[said:]))
+        self.assertFalse(self.late_subscriber('replaced').clear)
+
+    def test_steps_that_take_longer_than_frames_come(self):
+        self.start_node('slow', answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
+        cloud = Cloud(220, 220)
+        for _ in range(2):
+            self.publisher.publish(cloud.message())
+        wait_for(lambda: any(c.answered for c in self.contacts), 120, 'a step')
+        step_s = max(s.total_ms for s in self.stats) * 1e-3
+        self.assertGreater(step_s, 0.2, 'the cloth is too small for this machine')
+        said = len(self.states)
+        self.publisher.publish(cloud.message())
+        wait_for(lambda: len(self.states) > said, step_s + 10, 'a word before the answer')
+        self.assertIn('had no answer', self.states[said].missing[0])
+        wait_for(lambda: self.states[-1].proved, 10 + 3 * step_s, 'the answer, which proves contacts')
+        self.assertEqual(self.states[-1].touching, State.NEW)
+        # With a frame behind it that waits, an answer that comes is no proof any more.
+        stream = self.stream(cloud, 100)
+        wait_for(lambda: len(self.contacts) >= 6, 10 + 10 * step_s, 'more steps')
+        said = len(self.states)
+        answers = len(self.contacts)
+        wait_for(lambda: len(self.contacts) >= answers + 3, 10 + 10 * step_s, 'more steps')
+        # A publisher that is held up itself may leave a moment without a frame that waits.
+        ends = {s.holds_until.to_nsec(): s for s in self.states[said:]}
+        late = [s for s in ends.values() if 'had no answer' in s.reason]
+        self.assertTrue(late, 'frames came while each of them was computed')
+        stream.end()
+        self.assert_consistent()
+
+    def test_a_reset_while_a_step_is_computed(self):
+        self.start_node('reset', answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
+        cloud = Cloud(220, 220)
+        for _ in range(2):
+            self.publisher.publish(cloud.message())
+        self.wait_proved(seconds=120)
+        self.publisher.publish(cloud.message())
+        time.sleep(0.1)
+        asked = threading.Thread(target=rospy.ServiceProxy('/reset/reset', Trigger))
+        said = len(self.states)
+        asked.start()
+        wait_for(lambda: len(self.states) > said, 2, 'a word at once')
+        self.assertIn('a reset was asked for', self.states[said].missing[0])
+        asked.join()
+        wait_for(lambda: 'since the reset' in self.states[-1].reason, 60, 'the reset')
+        self.assertFalse(any(s.proved for s in self.states[said:]), 'the step that still ended proves nothing')
+        self.assertTrue(self.states[-1].holds_until.is_zero())
+
+    def test_disabled(self):
+        self.start_node('disabled')
+        stream = self.stream(Sheet())
+        self.wait_proved()
+        enable = rospy.ServiceProxy('/disabled/enable', SetBool)
+        enable(False)
+        said = len(self.states)
+        self.wait_missing('disabled')
+        time.sleep(0.3)
+        self.assertFalse(any(s.proved for s in self.states[said:]))
+        enable(True)
+        self.wait_proved()
+        stream.end()
+        self.assert_consistent()
+
+    def test_the_last_word_of_a_node_that_ends(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(signal=number):
+                name = 'ends_%d' % number
+                node = self.start_node(name)
+                stream = self.stream(Sheet())
+                self.wait_proved()
+                node.send_signal(number)
+                self.assertEqual(node.wait(20 * SLOW), 0)
+                wait_for(lambda: 'stopped' in self.states[-1].reason, 5, 'the last word')
+                self.assertFalse(self.clear[-1].data)
+                stream.end()
+
+    def test_fast_proves_nothing(self):
+        self.start_node('fast', accuracy='fast')
+        stream = self.stream(Sheet())
+        wait_for(lambda: sum(c.answered for c in self.contacts) > 5, 20, 'answers')
+        stream.end()
+        self.assertFalse(any(s.proved for s in self.states))
+        self.assertFalse(any(c.data for c in self.clear))
+        self.assertIn('accuracy fast', self.states[-1].reason)
+
+    def test_a_mesh_that_is_not_wholly_used(self):
+        """Faces that name a vertex twice, none at all, and a second list of triangles."""
+        self.start_node('dropped')
+        self.forget_type()
+        mesh = rospy.Publisher('/dropped/mesh', MeshStamped, queue_size=5)
+        self.addCleanup(mesh.unregister)
+        wait_for(lambda: mesh.get_num_connections() == 1, 20, 'the node to take another type')
+        whole = grid_faces()
+        stamp = [100.0]
+
+        def send(faces):
+            stamp[0] += 0.03
+            return self.send(mesh, mesh_of(Sheet(), faces, stamp[0]))
+
+        none = send([])
+        self.assertEqual(none.status, ContactArray.BAD_MESSAGE)
+        self.assertIn('no triangles', none.reason)
+        send(whole)
+        self.assertEqual(send(whole).status, ContactArray.OK)
+        self.wait_proved()
+        for faces, words in (([(0, 0, 0)] * 10, 'nothing to check'), ([(1, 2, 1)], 'nothing to check')):
+            said = len(self.states)
+            refused = send(faces)
+            self.assertEqual(refused.status, ContactArray.BAD_MESSAGE, faces[:1])
+            self.assertIn(words, refused.reason)
+            wait_for(lambda: len(self.states) > said, 5, 'a word')
+            self.assertFalse(self.states[-1].proved)
+        partly = whole[:-2] + [(0, 0, 0), (1199, 1199, 0)]
+        send(partly)
+        dropped = send(partly)
+        self.assertEqual(dropped.status, ContactArray.PARTIAL, dropped.reason)
+        self.assertIn('1 faces were sent that cannot be used', dropped.reason)
+        self.wait_missing('cannot be used')
+
+    def test_a_second_list_of_triangles(self):
+        self.start_node('lists')
+        self.forget_type()
+        markers = rospy.Publisher('/lists/mesh', MarkerArray, queue_size=5)
+        self.addCleanup(markers.unregister)
+        wait_for(lambda: markers.get_num_connections() == 1, 20, 'the node to take another type')
+
+        def send(count, stamp_s):
+            message = MarkerArray([soup(Sheet(), stamp_s, i) for i in range(count)])
+            return self.send(markers, message)
+
+        send(1, 100)
+        self.assertEqual(send(1, 100.03).status, ContactArray.OK)
+        self.wait_proved()
+        two = send(2, 100.06)
+        self.assertEqual(two.status, ContactArray.PARTIAL, two.reason)
+        self.wait_missing('%d faces' % (2 * (ROWS - 1) * (COLS - 1)))
+
+    def send(self, publisher, message):
+        seen = len(self.contacts)
+        publisher.publish(message)
+        wait_for(lambda: len(self.contacts) > seen, 20, 'an outcome')
+        return self.contacts[-1]
+
+    # rosbag play, at several rates and paused: the watchdog lives in the bag's time.
+
+    @staticmethod
+    def end_session(player):
+        """rosbag play is a script that starts a program."""
+        if player.poll() is None:
+            os.killpg(player.pid, signal.SIGKILL)
+        player.wait()
+
+    def play(self, name, frames, rate, *flags):
+        folder = tempfile.mkdtemp(dir=self.folder)
+        path = os.path.join(folder, 'sheet.bag')
+        cloud = Sheet()
+        with rosbag.Bag(path, 'w') as bag:
+            for i in range(frames):
+                message = cloud.message(1000 + i / 30)
+                bag.write('/%s/mesh' % name, message, message.header.stamp)
+        rospy.set_param('/use_sim_time', True)
+        try:
+            self.start_node(name)
+            self.publisher.unregister()
+            player = subprocess.Popen(['rosbag', 'play', '--clock', '-q', '-d', '1', '-r', str(rate), '--hz', '100', *flags,
+                                       '__name:=player_' + name, path], stdin=subprocess.DEVNULL, start_new_session=True)
+            self.addCleanup(self.end_session, player)
+            wait_for(lambda: self.states and self.states[-1].proved, 30, 'a proof')
+        finally:
+            rospy.delete_param('/use_sim_time')
+        return player
+
+    def unproved_since_first(self):
+        first = [s.proved for s in self.states].index(True)
+        return [s.reason for s in self.states[first:] if not s.proved]
+
+    def test_a_slow_bag(self):
+        player = self.play('slowly', 14, 0.1)  # a frame each third of a second: of the steady clock most are late
+        self.assertEqual(player.wait(60), 0)
+        self.assertEqual(self.unproved_since_first(), [])
+        self.assertTrue(self.states[-1].clear)
+
+    def test_a_fast_bag(self):
+        player = self.play('quickly', 400, 10)
+        self.assertEqual(player.wait(60), 0)
+        proved = sum(s.proved for s in self.states)
+        self.assertGreater(proved, 10)
+
+    def test_a_bag_that_stops_bringing_frames(self):
+        """The clock runs on ten times as fast, so half a second without a frame is over in 50 ms."""
+        folder = tempfile.mkdtemp(dir=self.folder)
+        path = os.path.join(folder, 'ends.bag')
+        cloud = Sheet()
+        with rosbag.Bag(path, 'w') as bag:
+            for i in range(30):
+                message = cloud.message(1000 + i / 30)
+                bag.write('/ending/mesh', message, message.header.stamp)
+            bag.write('/other', Bool(), rospy.Time.from_sec(1020))
+        rospy.set_param('/use_sim_time', True)
+        try:
+            self.start_node('ending')
+            self.publisher.unregister()
+            player = subprocess.Popen(['rosbag', 'play', '--clock', '-q', '-d', '1', '-r', '10', path], stdin=subprocess.DEVNULL,
+                                      start_new_session=True)
+            self.addCleanup(self.end_session, player)
+            wait_for(lambda: self.states and 'no frame has come' in self.states[-1].reason, 30, 'silence to be told')
+            self.assertIsNone(player.poll(), 'while the bag still plays')
+        finally:
+            rospy.delete_param('/use_sim_time')
+
+    def test_a_paused_bag(self):
+        self.play('paused', 300, 1)
+        pause = rospy.ServiceProxy('/player_paused/pause_playback', SetBool)
+        pause(True)
+        time.sleep(0.3)  # what was under way
+        said = len(self.states)
+        time.sleep(1.5)  # three times as long as frames may stay away
+        self.assertEqual([s.reason for s in self.states[said:]], [])
+        self.assertTrue(self.states[-1].proved)
+        pause(False)
+        wait_for(lambda: len(self.states) > said + 20, 20, 'steps')
+        self.assertEqual(self.unproved_since_first(), [])
+
+
+def grid_faces(rows=ROWS, cols=COLS):
+    faces = []
+    for r in range(rows - 1):
+        for c in range(cols - 1):
+            a = r * cols + c
+            faces += [(a, a + 1, a + cols), (a + 1, a + cols + 1, a + cols)]
+    return faces
+
+
+def points_of(cloud):
+    data = cloud.variants[cloud.count % len(cloud.variants)]
+    return [Point(*xyz) for xyz in struct.iter_unpack('<3d', data)]
+
+
+def mesh_of(cloud, faces, stamp_s):
+    message = MeshStamped()
+    message.header.frame_id = 'world'
+    message.header.stamp = rospy.Time.from_sec(stamp_s)
+    message.vertices = points_of(cloud)
+    message.triangles = [MeshTriangle(face) for face in faces]
+    return message
+
+
+def soup(cloud, stamp_s, number):
+    points = points_of(cloud)
+    marker = Marker(type=Marker.TRIANGLE_LIST, action=Marker.ADD, id=number)
+    marker.header.frame_id = 'world'
+    marker.header.stamp = rospy.Time.from_sec(stamp_s)
+    marker.pose.orientation.w = 1
+    marker.points = [points[v] for face in grid_faces() for v in face]
+    return marker
+
+
+def publish_until_killed(topic):
+    rospy.init_node('tracker', anonymous=True)
+    publisher = rospy.Publisher(topic, PointCloud2, queue_size=10)
+    wait_for(lambda: publisher.get_num_connections() == 1, 20, 'the node to subscribe')
+    Stream(publisher, Sheet()).thread.join()
+
+
+if __name__ == '__main__':
+    if sys.argv[1:2] == ['publish']:
+        publish_until_killed(sys.argv[2])
+    unittest.main()

@@ -1,0 +1,103 @@
+"""check_step says "nothing touches" only where that is proved, else why not, and its exit status tells the two apart."""
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+NOT_PROVED = 3
+
+
+def tool():
+    for prefix in os.environ['CMAKE_PREFIX_PATH'].split(':'):
+        path = pathlib.Path(prefix) / 'lib/deformable_ccd/check_step'
+        if path.exists():
+            return str(path)
+    raise AssertionError('check_step was not built')
+
+
+def write(path, points, faces):
+    lines = ['ply', 'format ascii 1.0', 'element vertex %d' % len(points)]
+    lines += ['property double ' + axis for axis in 'xyz']
+    lines += ['element face %d' % len(faces), 'property list uchar int vertex_indices', 'end_header']
+    lines += ['%r %r %r' % point for point in points] + ['3 %d %d %d' % face for face in faces]
+    path.write_text('\n'.join(lines) + '\n')
+
+
+def sheet(z, n=24):
+    return [(0.01 * c, 0.01 * r, z) for r in range(n) for c in range(n)]
+
+
+def faces_of(n=24, first=0):
+    faces = []
+    for r in range(n - 1):
+        for c in range(n - 1):
+            a = first + r * n + c
+            faces += [(a, a + 1, a + n), (a + 1, a + n + 1, a + n)]
+    return faces
+
+
+class CheckStepTest(unittest.TestCase):
+    """Two sheets of 576 vertices; the upper one comes down."""
+
+    FACES = faces_of() + faces_of(first=576)
+
+    def check(self, t0, t1, *flags):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            write(folder / '0.ply', t0, self.FACES)
+            write(folder / '1.ply', t1, self.FACES)
+            done = subprocess.run([tool(), str(folder / '0.ply'), str(folder / '1.ply'), '--stats', str(folder / 'stats.json'),
+                                   *flags], capture_output=True, text=True)
+            self.assertEqual(done.stderr, '')
+            self.stats = json.loads((folder / 'stats.json').read_text())
+        self.said = done.stdout
+        return done.returncode
+
+    def test_nothing_touches(self):
+        self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(0.05)), 0)
+        self.assertIn('exact: proved, nothing touches', self.said)
+        self.assertTrue(self.stats['proved'])
+        self.assertEqual(self.stats['touching'], 'NONE')
+
+    def test_contacts_are_proved_too(self):
+        self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(-0.1)), 0)
+        self.assertIn('exact: proved, something touches anew', self.said)
+
+    def refused(self, words, *arguments):
+        self.assertEqual(self.check(*arguments), NOT_PROVED, self.said)
+        self.assertIn('not proved', self.said)
+        self.assertIn(words, self.said)
+        self.assertNotIn('nothing touches', self.said)
+        self.assertFalse(self.stats['proved'])
+        self.assertTrue(any(words in sentence for sentence in self.stats['missing']))
+
+    def test_a_vertex_that_is_nan(self):
+        lost = sheet(0) + sheet(0.05)
+        lost[700] = (float('nan'), 0.0, 0.0)
+        self.refused('1 vertices are not finite', sheet(0) + sheet(0.1), lost)
+
+    def test_an_edge_through_a_face_at_the_start(self):
+        through = [(x, y, 0.3 * (x - 0.111)) for x, y, _ in sheet(0)]
+        self.assertEqual(self.check(sheet(0) + through, sheet(0) + through), 0)
+        self.assertEqual(self.stats['start_state'], 'INTERSECTING')
+        self.assertNotIn('nothing touches', self.said)
+        self.refused('at the start was not checked', sheet(0) + through, sheet(0) + through, '--no-start-state')
+
+    def test_a_budget_that_was_cut(self):
+        self.refused('the step budget ran out', sheet(0) + sheet(0.1), sheet(0) + sheet(-0.1), '--budget', '0.001')
+
+    def test_fast(self):
+        self.refused('accuracy fast', sheet(0) + sheet(0.1), sheet(0) + sheet(0.05), '--accuracy', 'fast')
+        self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(0.05), '--accuracy', 'all'), 0, 'exact decides')
+        self.assertIn('fast: not proved', self.said)
+
+    def test_errors_are_told_from_what_is_not_proved(self):
+        done = subprocess.run([tool(), 'nowhere.ply', 'nowhere.ply'], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(subprocess.run([tool(), '--no-such-flag'], capture_output=True).returncode, 1)
+
+
+if __name__ == '__main__':
+    unittest.main()
