@@ -67,8 +67,8 @@ class AnalyzeBagTest(unittest.TestCase):
     def analyzed(self, name, bag, *words):
         """Exit status, standard output and error, and the statuses of the steps; whatever comes of it."""
         report = self.folder / name
-        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--report', str(report), '--no-accuracy-table', '--quiet'] +
-                             [str(word) for word in words], capture_output=True, text=True, check=False)
+        command = [TOOLS / 'analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words]
+        ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
         self.assertIn(ran.returncode, (0, 3), ran.stderr)
         return ran.returncode, ran.stdout, ran.stderr, self.statuses_of(report)
 
@@ -224,7 +224,8 @@ class AnalyzeBagTest(unittest.TestCase):
             topic = '/octomap_binray' if 'binray' in words[1].read_text() else '/octomap'
             status, _, said, steps = self.analyzed('misspelt', self.bag, *words)
             self.assertEqual(status, 3, said)
-            self.assertIn('the bag has no octomap on %s, which octomap_topic names; it has them on /octomap_binary' % topic, said)
+            self.assertIn('the bag has no octomap on %s, which octomap_topic names; it has them on /octomap_binary' % topic,
+                          said)
             self.assertEqual(set(steps), {'FIRST_FRAME', 'NO_MAP'})
             status, _, said, steps = self.analyzed('without', self.bag, *words, '--without-map')
             self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), said)
@@ -262,7 +263,7 @@ class AnalyzeBagTest(unittest.TestCase):
         self.assertIn('octomap refused', said)
 
     def test_the_map_that_nobody_named(self):
-        """The default's topic where the bag has it, else the bag's first one; and what else there is is not passed over."""
+        """The default's topic where the bag has it, else the bag's first one; what else there is is not passed over."""
         other = copy.deepcopy(self.octomap())
         table = self.bag_with('table.bag', ('/table', other), ('/later', other))
         status, said, complaints, steps = self.analyzed('table', table)
