@@ -129,8 +129,9 @@ enum class Touching : std::uint8_t {
 };
 DCCD_EXPORT const char* toString(Touching touching);
 
-/// An edge through a face at t=0 (vertex[0..1] of body[0] the edge, vertex[2..4] of body[1] the face), or a mesh vertex
-/// inside occupied space (body[1] = OBSTACLE_BODY, vertex[0] the vertex).
+/// An edge through a face at t=0 (vertex[0..1] of body[0] the edge, vertex[2..4] of body[1] the face), a piece of
+/// body[0] inside of the closed body[1] (vertex[0], the piece's smallest, is enclosed by its surface or on it), or a
+/// mesh vertex inside occupied space (body[1] = OBSTACLE_BODY, vertex[0] the vertex). Other vertices are NO_INDEX.
 struct StartIntersection {
   std::array<std::uint16_t, 2> body{0, 0};
   std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};

@@ -35,6 +35,9 @@ class DCCD_EXPORT Topology {
   const std::vector<Face>& faces() const { return faces_; }
   const std::vector<Edge>& edges() const { return edges_; }
   bool hasFaces() const { return !faces_.empty(); }
+  /// There are faces and every edge lies on an even number of them: no border, so that each point of space that is not
+  /// on the surface is inside of it or outside, however it is bent.
+  bool isClosed() const { return closed_; }
 
   /// Vertices that belong to at least one edge, ascending. Others are not features and never in contact.
   const std::vector<Index>& usedVertices() const { return used_vertices_; }
@@ -49,6 +52,7 @@ class DCCD_EXPORT Topology {
   std::vector<Face> faces_;
   std::vector<Edge> edges_;
   std::vector<Index> used_vertices_;
+  bool closed_ = false;
   void finish();
 };
 

@@ -136,6 +136,7 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   }
   body.body.against_bodies = reader.get("against_bodies", true);
   body.body.against_obstacle = reader.get("against_obstacle", !body.isDepthImage());
+  body.body.shell = reader.get("shell", false);
   body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
 }
 

@@ -74,8 +74,9 @@ bool sameBody(const Body& a, const Body& b) {
   const bool same_mesh = a.topology == b.topology || (a.topology && b.topology && *a.topology == *b.topology);
   return same_mesh && a.reference == b.reference && a.name == b.name && a.rigid == b.rigid &&
          a.self_collision == b.self_collision && a.against_bodies == b.against_bodies &&
-         a.against_obstacle == b.against_obstacle && a.minimum_separation_m == b.minimum_separation_m &&
-         a.vertex_mask == b.vertex_mask && a.separations == b.separations;
+         a.against_obstacle == b.against_obstacle && a.shell == b.shell &&
+         a.minimum_separation_m == b.minimum_separation_m && a.vertex_mask == b.vertex_mask &&
+         a.separations == b.separations;
 }
 
 }  // namespace

@@ -47,6 +47,8 @@ struct SceneBody {
     return true;
   }
   std::size_t usedCount() const { return slot_vertex.size(); }
+  /// In this step others can be inside of it, and must not: closed, nothing of its surface is left out, no container.
+  bool hasInside() const { return setup.topology->isClosed() && !setup.shell && !masked; }
 };
 
 class SceneArrays {
@@ -86,17 +88,20 @@ class SceneArrays {
 
   const std::vector<SceneBody>& bodies() const { return bodies_; }
   const VertexMotion* vertices() const { return vertices_.get(); }
+  /// The RECORD values of an internal vertex, after refit().
+  const std::int16_t* record(Index internal) const { return records_.data() + internal * simd::RECORD; }
   std::size_t vertexCount() const { return vertex_count_; }
   /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
   void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
   std::size_t height() const { return height_; }
   /// Separation of two bodies, of a body from itself, or of a body from the map (OBSTACLE_BODY) [m].
   double separation(std::size_t a, std::size_t b) const;
-  /// Some body is to be tested against the map.
+  /// Some body has faces.
   bool hasFaces() const {
     return std::any_of(bodies_.begin(), bodies_.end(),
                        [](const SceneBody& body) { return body.setup.topology->hasFaces(); });
   }
+  /// Some body is to be tested against the map.
   bool meetsObstacle() const {
     return std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& b) { return meetsMap(b.setup); });
   }

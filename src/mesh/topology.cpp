@@ -97,6 +97,12 @@ Topology Topology::polyline(std::size_t vertex_count) {
 
 void Topology::finish() {
   std::sort(edges_.begin(), edges_.end());
+  closed_ = hasFaces();  // an edge is still listed once for each of its faces
+  for (auto first = edges_.begin(); closed_ && first != edges_.end();) {
+    const auto last = std::find_if(first, edges_.end(), [&](const Edge& e) { return e != *first; });
+    closed_ = (last - first) % 2 == 0;
+    first = last;
+  }
   edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
   edges_.shrink_to_fit();
   std::vector<std::uint8_t> used(vertex_count_, 0);

@@ -110,7 +110,11 @@ struct BagReplay::Run {
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
       const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
       summary.mesh_topics.push_back(topic);
-      if (!topic.empty()) bodies_of_topic[topic].push_back(b);
+      if (!topic.empty()) {
+        bodies_of_topic[topic].push_back(b);
+      } else if (!pipeline.hint(b).empty()) {
+        complain("body '" + r.config_.bodies[b].body.name + "': " + pipeline.hint(b));
+      }
     }
   }
 

@@ -60,7 +60,9 @@ void MonitorLog::hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPi
   if (mapless && !unheard_maps_.empty()) text += (text.empty() ? "" : "; ") + unheard_maps_;
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     if (pipeline.hint(b).empty()) continue;
-    text += (text.empty() ? "" : "; ") + topicOf(b) + ": " + pipeline.hint(b);
+    const BodyConfig& body = config_.bodies[b];
+    const std::string source = body.isRigid() ? "body '" + body.body.name + "'" : topicOf(b);
+    text += (text.empty() ? "" : "; ") + source + ": " + pipeline.hint(b);
   }
   if (!text.empty() && text != hint_) ROS_WARN_STREAM(name_ << ": " << text);
   hint_ = std::move(text);

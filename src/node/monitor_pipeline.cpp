@@ -44,13 +44,13 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transfor
       effects_(config_, map_source),
       transforms_(transforms),
       fixed_frame_(config_.fixed_frame) {
+  hints_.resize(config_.bodies.size());
   loadFiles();
   monitor_ = std::make_unique<Monitor>(config_.monitor, monitorBodies(config_));
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
   placed_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
-  hints_.resize(config_.bodies.size());
   hinted_.resize(config_.bodies.size());
 }
 
@@ -66,6 +66,7 @@ void MonitorPipeline::loadFiles() {
     if (!body.isRigid()) continue;
     MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
                                  [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
+    hints_[b] = rigidHint(body.mesh_file, mesh.positions, body.mesh_scale);
     rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
     if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
   }

@@ -79,7 +79,8 @@ class MonitorPipeline {
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
-  /// What looks like a mistake in the body's messages, though they are valid (advice.h); empty: nothing does.
+  /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h); empty: nothing
+  /// does.
   const std::string& hint(std::size_t body) const { return hints_[body]; }
 
  private:

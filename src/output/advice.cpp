@@ -46,12 +46,11 @@ double meanSpacing(const Positions& positions, std::size_t rows, std::size_t col
   return count ? sum / static_cast<double>(count) : 0;
 }
 
-void addSize(const DecodedMesh& mesh, std::ostringstream& text) {
-  const double extent = extentOf(mesh.positions);
+/// `what` has the positions, `mend` is to be done about them.
+void addSize(const std::string& what, const Positions& positions, const std::string& mend, std::ostringstream& text) {
+  const double extent = extentOf(positions);
   if (extent <= LARGEST_PLAUSIBLE_M) return;
-  text << "the mesh is " << extent
-       << " m across; coordinates are in metres, are these millimetres? Then scale them in the "
-       << "publisher (rigid bodies: rigid/scale)";
+  text << what << " is " << extent << " m across; coordinates are in metres, are these millimetres? Then " << mend;
 }
 
 void addSwapped(const DecodedMesh& mesh, const MeshInputConfig& config, std::ostringstream& text) {
@@ -105,7 +104,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
 
 std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   std::ostringstream text;
-  addSize(mesh, text);
+  addSize("the mesh", mesh.positions, "scale them in the publisher", text);
   addSwapped(mesh, config, text);
   if (mesh.unread_lists > 0) {
     text << (text.tellp() > 0 ? "; " : "") << mesh.unread_lists << " further TRIANGLE_LIST "
@@ -117,6 +116,13 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
          << "messages carry no stamp, so that the time of receipt stands in for it, with "
          << "all its jitter; set header.stamp in the publisher";
   }
+  return text.str();
+}
+
+std::string rigidHint(const std::string& file, const Positions& positions, double scale) {
+  std::ostringstream text, scaled;
+  scaled << "set rigid/scale: " << 0.001 * scale;
+  addSize("rigid/mesh " + file, positions, scaled.str(), text);
   return text.str();
 }
 

@@ -15,4 +15,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
 /// are swapped, no stamp. Empty: nothing does. Linear in the number of points; meant for the first frame of a topology.
 std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config);
 
+/// The same of a rigid body's mesh file: positions [m] after `scale`.
+std::string rigidHint(const std::string& file, const Positions& positions, double scale);
+
 }  // namespace dccd

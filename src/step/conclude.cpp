@@ -120,6 +120,7 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
     if (!body.self_collision && !body.rigid) add(body, "not against itself");
     if (!body.against_bodies && step.bodies.size() > 1) add(body, "not against other bodies");
     if (!body.against_obstacle) add(body, "not against the map");
+    if (body.shell && step.bodies.size() > 1) add(body, "others may be inside of it");
   }
   if (!options.exclude_boxes.empty()) {
     excluded.push_back(std::to_string(excluded_voxels) + " voxels of the map by exclude_boxes");

@@ -61,6 +61,7 @@ void Carried::clear() {
   end.clear();
   apart.clear();
   start_state.clear();
+  inside.clear();
 }
 
 bool Carried::isContinuedBy(const Step& step) const {
@@ -123,6 +124,7 @@ void History::Impl::setBodies(const Step& step) {
   if (scene.holds(step.bodies)) return;
   carried.clear();
   carried.start_state.forgetBodies();
+  carried.inside.forgetBodies();
   scene.setBodies(step.bodies);
   unfolded.clear();
   for (const SceneBody& body : scene.bodies()) unfolded.emplace_back(body);
@@ -278,8 +280,12 @@ void History::Impl::collect(const Step& step) {
 }
 
 void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_pairs) {
-  StartStateSearch& search = carried.start_state;
-  if (!checksStartState(part) || !scene.hasFaces()) return search.clear();  // edges alone have no inside
+  const auto forget = [&] {
+    carried.start_state.clear();
+    carried.inside.clear();
+  };
+  // Edges alone have no inside, and do not cross but in a contact.
+  if (!checksStartState(part) || !(scene.hasFaces() || map_reduced)) return forget();
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   StartStateSearch::IsOver is_over;
@@ -298,24 +304,35 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   }
   result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
   if (isStartKnown()) {
-    search.clear();
+    forget();
   } else {
     // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about
     // the end of the step.
     const bool complete = all_pairs && !options->earliest_only && stats.unchecked_vertices == 0 &&
                           options->accuracy.rung != Accuracy::FAST;
-    search.remember(scene, result.contacts, complete);
+    carried.start_state.remember(scene, result.contacts, complete);
+    carried.inside.remember(scene, result.contacts, complete);
   }
   stats[Stage::START_STATE].ms += msSince(start);
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
 }
 
-/// What meets at t=0. False: is_over ended it.
+/// What meets or is inside at t=0. False: is_over ended it. The vertices come first, for they are few.
 bool History::Impl::listStart(const Part& part, const StartStateSearch::IsOver& is_over,
                               std::vector<StartIntersection>& met) {
-  if (isStartKnown()) return begins_at->carried.start_state.listEnd(begins_at->scene, is_over, met);
-  met = carried.start_state.run(scene, part.continues, is_over, result.stats);
-  return carried.start_state.isWhole();
+  std::vector<StartIntersection> inside;
+  bool whole = false;
+  if (isStartKnown()) {
+    const SceneArrays& before = begins_at->scene;
+    whole = begins_at->carried.inside.listEnd(before, is_over, inside);
+    whole = begins_at->carried.start_state.listEnd(before, is_over, met) && whole;
+  } else {
+    inside = carried.inside.run(scene, part.continues, is_over, result.stats);
+    met = carried.start_state.run(scene, part.continues, is_over, result.stats);
+    whole = carried.inside.isWhole() && carried.start_state.isWhole();
+  }
+  met.insert(met.end(), inside.begin(), inside.end());
+  return whole;
 }
 
 /// Of a step aside from all others only the first part is asked about: nothing is carried over from it.
@@ -325,7 +342,8 @@ bool History::Impl::checksStartState(const Part& part) const {
 
 /// By the step that this one begins at.
 bool History::Impl::isStartKnown() const {
-  return begins_at && !begins_at->carried.end.empty() && begins_at->carried.start_state.knowsEnd();
+  return begins_at && !begins_at->carried.end.empty() && begins_at->carried.start_state.knowsEnd() &&
+         begins_at->carried.inside.knowsEnd();
 }
 
 }  // namespace dccd

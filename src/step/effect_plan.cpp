@@ -71,10 +71,29 @@ Finding octomap(const EffectScene& scene) {
   return {false, true, "nobody publishes " + scene.map_source + " and no octomap_file is given"};
 }
 
+/// Of the bodies that one would take for solid and that others could be inside of, those for which that is not asked.
+/// A cloth, or a camera's view, has a border by nature.
+std::string notSolid(const EffectScene& scene) {
+  if (std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return meet(b, b); }) < 2) return "";
+  std::string border, mask;
+  for (const Body& body : scene.bodies) {
+    if (!body.rigid || !body.topology || !body.topology->hasFaces() || body.shell || !meet(body, body)) continue;
+    if (!body.topology->isClosed()) {
+      append(border, ", ", body.name);
+    } else if (!body.vertex_mask.empty()) {
+      append(mask, ", ", body.name);
+    }
+  }
+  return (border.empty() ? "" : "; with a border, no inside: " + border) +
+         (mask.empty() ? "" : "; with masked vertices, no inside: " + mask);
+}
+
 Finding startState(const EffectScene& scene) {
-  if (ropesOnly(scene) && !scene.map_seen && !scene.map_named)
+  if (ropesOnly(scene) && !scene.map_seen && !scene.map_named) {
     return {false, true, "edges alone cannot be inside of anything"};
-  return {true, true, "surfaces that cross already at the start are invisible to continuous detection"};
+  }
+  return {true, true,
+          "surfaces that cross already at the start are invisible to continuous detection" + notSolid(scene)};
 }
 
 Finding rigidBodies(const EffectScene& scene) {

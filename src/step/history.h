@@ -18,6 +18,7 @@
 #include "step/float_mode.h"
 #include "step/fork_join.h"
 #include "step/hit_order.h"
+#include "step/inside.h"
 #include "step/left_out.h"
 #include "step/pair_worker.h"
 #include "step/start_state.h"
@@ -54,9 +55,10 @@ struct Carried {
       end;                          ///< where each body was; empty: no step, or nothing is known of it
   std::vector<std::uint8_t> apart;  ///< per body: it certainly did not touch itself
   StartStateSearch start_state;     ///< what may meet there
+  InsideSearch inside;              ///< and what may be inside of something
 
   void clear();
-  bool isClear() const { return end.empty() && apart.empty() && start_state.isClear(); }
+  bool isClear() const { return end.empty() && apart.empty() && start_state.isClear() && inside.isClear(); }
   /// Does the step begin where the last one ended? Every body bit for bit. The one place that decides it.
   bool isContinuedBy(const Step& step) const;
 };

@@ -110,7 +110,8 @@ TEST_F(Plain, SeamsAreNeverStepped) {
   Mesh other = tipAbove(0.8);
   other.faces.pop_back();
   EXPECT_EQ(send(publisher, meshStamped(other, 50.2)).status, deformable_ccd::ContactArray::TOPOLOGY_CHANGED);
-  EXPECT_EQ(send(publisher, meshStamped(other, 50.3)).status, deformable_ccd::ContactArray::OK);
+  EXPECT_EQ(send(publisher, meshStamped(other, 50.3)).status, deformable_ccd::ContactArray::PARTIAL)
+      << "three vertices have no face any more";
   other.positions[0].x() = 50;
   EXPECT_EQ(send(publisher, meshStamped(other, 50.4)).status, deformable_ccd::ContactArray::TELEPORT);
   EXPECT_EQ(stats.last().seams_gap > 0, true);

@@ -41,7 +41,7 @@ std::string judgeStart(const Outcome& result, const std::vector<StartIntersectio
 
 std::string judgeStep(const TestStep& step) {
   std::vector<TrueContact> contacts = trueContacts(step);
-  const std::vector<StartIntersection> start = trueIntersections(step);
+  const std::vector<StartIntersection> start = trueStart(step);
   std::string finding;
   forEachSimdTarget([&](const std::string& target) {
     for (const BroadPhase broad_phase : {BroadPhase::CLUSTERED, BroadPhase::BRUTE_FORCE}) {

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <random>
 #include <sstream>
 
 #include "dccd/simd_target.h"
+#include "oracle/exact_inside.h"
 
 namespace dccd {
 namespace test {
@@ -93,6 +95,36 @@ bool arePaired(const TestStep& step, std::size_t a, std::size_t b) {
   return step.bodies[a].against_bodies && step.bodies[b].against_bodies;
 }
 
+/// Straight from the definition: no edge has an odd number of faces, and every vertex of a face counts.
+bool enclosesSpace(const StepBody& body) {
+  std::map<Edge, int> faces_at;
+  for (const Face& f : body.topology.faces()) {
+    if (!isActive(body, f.data(), 3)) return false;
+    for (int i = 0; i < 3; ++i) ++faces_at[{std::min(f[i], f[(i + 1) % 3]), std::max(f[i], f[(i + 1) % 3])}];
+  }
+  const auto odd = [](const auto& edge) { return edge.second % 2 != 0; };
+  return !body.shell && !faces_at.empty() && std::none_of(faces_at.begin(), faces_at.end(), odd);
+}
+
+/// Of the vertices that edges join the one with the smallest number, for each piece; ascending.
+std::vector<Index> firstOfPieces(const StepBody& body) {
+  std::vector<Index> first(body.t0.size());
+  for (Index v = 0; v < first.size(); ++v) first[v] = v;
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const Edge& e : body.topology.edges()) {
+      if (!isActive(body, e.data(), 2) || first[e[0]] == first[e[1]]) continue;
+      first[e[0]] = first[e[1]] = std::min(first[e[0]], first[e[1]]);
+      changed = true;
+    }
+  }
+  std::vector<Index> pieces;
+  for (const Index v : body.topology.usedVertices()) {
+    if (first[v] == v && isActive(body, &v, 1)) pieces.push_back(v);
+  }
+  return pieces;
+}
+
 double coordinate(const Draw& draw, Coordinates coordinates, int exponent, double offset) {
   switch (coordinates) {
     case Coordinates::FEW_BITS:
@@ -127,6 +159,7 @@ Step TestStep::motion() const {
     body.topology = share(from.topology);
     body.self_collision = from.self_collision;
     body.against_bodies = from.against_bodies;
+    body.shell = from.shell;
     for (Index v = 0; v < from.vertex_active.size(); ++v) {
       if (!from.vertex_active[v]) body.vertex_mask.push_back(v);
     }
@@ -279,6 +312,32 @@ std::vector<StartIntersection> trueIntersections(const TestStep& step) {
       }
     }
   }
+  return found;
+}
+
+std::vector<StartIntersection> trueInsides(const TestStep& step) {
+  std::vector<StartIntersection> found;
+  for (std::size_t a = 0; a < step.bodies.size(); ++a) {
+    for (const Index v : firstOfPieces(step.bodies[a])) {
+      for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+        if (a == b || !arePaired(step, a, b) || !enclosesSpace(step.bodies[b])) continue;
+        std::vector<std::array<Vec3, 3>> faces;
+        for (const Face& f : step.bodies[b].topology.faces()) {
+          const Positions& x = step.bodies[b].t0;
+          faces.push_back({x[f[0]], x[f[1]], x[f[2]]});
+        }
+        if (!isInSolid(step.bodies[a].t0[v], faces)) continue;
+        found.push_back({{static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)},
+                         {v, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX}});
+      }
+    }
+  }
+  return found;
+}
+
+std::vector<StartIntersection> trueStart(const TestStep& step) {
+  std::vector<StartIntersection> found = trueIntersections(step);
+  for (const StartIntersection& one : trueInsides(step)) found.push_back(one);
   return found;
 }
 

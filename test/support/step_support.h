@@ -21,7 +21,7 @@ Draw drawFrom(std::uint64_t seed);
 struct StepBody {
   Topology topology;
   Positions t0, t1;
-  bool self_collision = true, against_bodies = true;
+  bool self_collision = true, against_bodies = true, shell = false;
   std::vector<std::uint8_t> vertex_active;  ///< empty: all
 };
 
@@ -72,6 +72,11 @@ PairMotion motionOf(const TestStep& step, const Contact& contact);
 bool trulyMeet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c);
 /// Every edge that meets a face at t=0, in the order that the detector lists them.
 std::vector<StartIntersection> trueIntersections(const TestStep& step);
+/// The first vertex of every piece of a body that lies in another, closed body at t=0, in the order that the detector
+/// lists them, after the edges.
+std::vector<StartIntersection> trueInsides(const TestStep& step);
+/// Both.
+std::vector<StartIntersection> trueStart(const TestStep& step);
 bool operator==(const StartIntersection& x, const StartIntersection& y);
 
 /// One step with a detector of its own, as a first step.

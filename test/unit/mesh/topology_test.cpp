@@ -19,6 +19,25 @@ TEST(Topology, FaceGivenTwiceIsKeptOnceInItsFirstForm) {
   EXPECT_EQ(t.usedVertices(), (std::vector<Index>{0, 1, 2, 4})) << "vertex 3 carries no feature";
 }
 
+TEST(Topology, ClosedIsWhatHasNoBorder) {
+  const std::vector<Face> tetrahedron{{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  EXPECT_TRUE(Topology::fromTriangles(5, tetrahedron).isClosed()) << "vertex 4 is part of nothing";
+  std::vector<Face> faces = tetrahedron;
+  faces.pop_back();
+  EXPECT_FALSE(Topology::fromTriangles(4, faces).isClosed());
+  faces = tetrahedron;
+  for (const Face& f : tetrahedron)
+    faces.push_back({f[0] > 1 ? f[0] + 2 : f[0], f[1] > 1 ? f[1] + 2 : f[1], f[2] > 1 ? f[2] + 2 : f[2]});
+  const Topology joined = Topology::fromTriangles(6, faces);
+  EXPECT_EQ(joined.edges().size(), 11u);
+  EXPECT_TRUE(joined.isClosed()) << "two that share an edge, with four faces at it";
+  faces.push_back({0, 1, 6});
+  EXPECT_FALSE(Topology::fromTriangles(7, faces).isClosed()) << "five faces at one edge";
+  EXPECT_FALSE(Topology::grid(3, 3).isClosed());
+  EXPECT_FALSE(Topology::polyline(3).isClosed());
+  EXPECT_FALSE(Topology().isClosed());
+}
+
 TEST(Topology, RefusesWhatIsNoMeshAndNamesIt) {
   try {
     Topology::fromTriangles(3, {{0, 1, 2}, {0, 1, 7}});

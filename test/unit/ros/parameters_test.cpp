@@ -438,6 +438,7 @@ std::map<std::string, std::string> defaultsInTheCode() {
       {"self_collision", shown(body.body.self_collision)},
       {"against_bodies", shown(body.body.against_bodies)},
       {"against_obstacle", shown(body.body.against_obstacle)},
+      {"shell", shown(body.body.shell)},
       {"minimum_separation_m", shown(body.body.minimum_separation_m)},
       {"uncertainty/radius_m", shown(body.input.noise_radius_m)},
       {"uncertainty/field", shown(body.input.noise_field)},

@@ -118,6 +118,27 @@ TEST(EffectPlan, BodiesThatMeetNothingRunNothing) {
   EXPECT_TRUE(EffectPlan(scene, {}).running(Effect::BODY_BODY));
 }
 
+// Said of what one takes for solid, and of nothing else.
+TEST(EffectPlan, ABodyWithABorderHasNoInside) {
+  const std::vector<Face> faces{{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  EffectScene scene = cloth();
+  scene.bodies[0].topology = share(Topology::grid(2, 2));
+  scene.bodies.push_back(body("finger", true));
+  scene.bodies[1].topology = share(Topology::fromTriangles(4, faces));
+  const std::string plain = "surfaces that cross already at the start are invisible to continuous detection";
+  const auto said = [&] { return reason(EffectPlan(scene, {}), "start_state"); };
+  EXPECT_EQ(said(), plain);
+  scene.bodies[1].vertex_mask = {2};
+  EXPECT_EQ(said(), plain + "; with masked vertices, no inside: finger");
+  scene.bodies[1].topology = share(Topology::fromTriangles(4, {faces[0], faces[1]}));
+  EXPECT_EQ(said(), plain + "; with a border, no inside: finger");
+  scene.bodies[1].shell = true;
+  EXPECT_EQ(said(), plain) << "a container is not asked";
+  scene.bodies[1].shell = false;
+  scene.bodies[0].against_bodies = false;
+  EXPECT_EQ(said(), plain) << "nobody to be inside of it";
+}
+
 TEST(EffectPlan, LinesSayOneThingEach) {
   const EffectPlan plan(cloth(), {});
   ASSERT_EQ(plan.lines().size(), plan.decisions().size());

@@ -1,12 +1,13 @@
 // What a history holds after each kind of seam is what a new one holds: nothing, and so the next answer is a new one's.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "dccd/stream.h"
 #include "step/history.h"
-#include "support/step_support.h"
+#include "support/closed_meshes.h"
 
 namespace dccd {
 namespace test {
@@ -21,6 +22,9 @@ void expectFresh(History& history) {
   EXPECT_TRUE(then.start_state.isClear());
   EXPECT_TRUE(now.start_state.isClear());
   EXPECT_FALSE(now.start_state.knowsEnd());
+  EXPECT_TRUE(then.inside.isClear());
+  EXPECT_TRUE(now.inside.isClear());
+  EXPECT_FALSE(now.inside.knowsEnd());
   EXPECT_TRUE(history.isClear());
 }
 
@@ -38,10 +42,25 @@ void expectSame(const Outcome& a, const Outcome& b) {
   EXPECT_EQ(a.stats.body_pairs, b.stats.body_pairs);
 }
 
+/// Two cloths that cross, in a box around both: something of every kind to carry over.
+TestStep clothsInABox() {
+  TestStep step = crumpled(3, 2, 9);
+  step.bodies.push_back(box(Vec3::Constant(-50), Vec3::Constant(50)));
+  for (Vec3& p : step.bodies[2].t1) p[0] += 1;  // bounds of what rests are wider, and let more through
+  return step;
+}
+
+TestStep nextOf(const TestStep& first) {
+  return first.continued({first.bodies[0].t0, first.bodies[1].t0, first.bodies[2].t0});
+}
+
 TEST(History, EverySeamLeavesNothingBehind) {
-  const TestStep first = crumpled(3, 2, 9);
-  const TestStep next = first.continued({first.bodies[0].t0, first.bodies[1].t0});
+  const TestStep first = clothsInABox(), next = nextOf(first);
   const Outcome expected = runOnce(next, {});
+  ASSERT_EQ(std::count_if(expected.intersections.begin(), expected.intersections.end(),
+                          [](const StartIntersection& one) { return one.vertex[1] == NO_INDEX; }),
+            2)
+      << "both cloths in the box";
   Step broken = first.motion();
   broken.bodies[1].t1 = share(Positions(3, Vec3::Zero()));
   Step other = first.motion();
@@ -75,13 +94,13 @@ TEST(History, EverySeamLeavesNothingBehind) {
 }
 
 TEST(History, WhatContinuesIsCarriedOverAndNothingElse) {
-  const TestStep first = crumpled(3, 2, 9);
-  const TestStep next = first.continued({first.bodies[0].t0, first.bodies[1].t0});
+  const TestStep first = clothsInABox(), next = nextOf(first);
   const Outcome expected = runOnce(next, {});
   Detector detector;
   detector.run(first.motion());
   const Outcome carried = detector.run(next.motion());
   EXPECT_EQ(carried.start_state, expected.start_state);
+  EXPECT_EQ(carried.intersections.size(), expected.intersections.size());
   EXPECT_LT(carried.stats[Stage::START_STATE].in, expected.stats[Stage::START_STATE].in);
   // One coordinate by one representable number: no continuation.
   TestStep elsewhere = next;

@@ -1,0 +1,129 @@
+// What ends a proof between steps, on a watch that the test winds.
+#include "node/liveness.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace dccd {
+namespace {
+
+constexpr std::int64_t MS = 1000000;
+
+std::vector<Fault::Kind> kinds(const Liveness& liveness, std::int64_t now_ns) {
+  std::vector<Fault::Kind> found;
+  for (const Fault& fault : liveness.faults(now_ns)) {
+    EXPECT_FALSE(fault.sentence.empty());
+    found.push_back(fault.kind);
+  }
+  return found;
+}
+
+using Kinds = std::vector<Fault::Kind>;
+
+TEST(Liveness, AFrameWithoutAnAnswer) {
+  Liveness liveness({0.1, 10, 0});
+  EXPECT_EQ(kinds(liveness, 1000 * MS), Kinds{}) << "before the first frame there is no answer to lose";
+  liveness.frame(1, 0);
+  EXPECT_EQ(kinds(liveness, 100 * MS), Kinds{});
+  EXPECT_EQ(kinds(liveness, 100 * MS + 1), Kinds{Fault::Kind::NO_ANSWER}) << "one nanosecond later";
+  liveness.frame(2, 90 * MS);
+  liveness.frame(3, 110 * MS);
+  liveness.outcome(1, -1, 120 * MS);
+  EXPECT_EQ(kinds(liveness, 190 * MS), Kinds{}) << "the first is answered, the second came 100 ms ago";
+  EXPECT_EQ(kinds(liveness, 191 * MS), Kinds{Fault::Kind::NO_ANSWER});
+  liveness.outcome(3, -1, 195 * MS);
+  EXPECT_EQ(kinds(liveness, 900 * MS), Kinds{}) << "the second gave way, the third is answered";
+}
+
+TEST(Liveness, TheOldestFrameWithoutAnAnswerCountsHoweverManyFollow) {
+  Liveness liveness({0.1, 10, 0});
+  std::int64_t now_ns = 0;
+  for (int i = 1; i <= 20000; ++i) liveness.frame(i, now_ns += MS / 100);
+  EXPECT_EQ(kinds(liveness, now_ns), Kinds{Fault::Kind::NO_ANSWER});
+  liveness.outcome(19999, -1, now_ns);
+  EXPECT_EQ(kinds(liveness, now_ns + 100 * MS), Kinds{}) << "the last of them came just now";
+  EXPECT_EQ(kinds(liveness, now_ns + 101 * MS), Kinds{Fault::Kind::NO_ANSWER}) << "and was not lost among so many";
+}
+
+TEST(Liveness, Silence) {
+  Liveness liveness({10, 0.5, 0});
+  liveness.frame(1, 0);
+  liveness.outcome(1, -1, MS);
+  EXPECT_EQ(kinds(liveness, 500 * MS), Kinds{});
+  EXPECT_EQ(kinds(liveness, 501 * MS), Kinds{Fault::Kind::SILENCE});
+  liveness.frame(2, 502 * MS);
+  EXPECT_EQ(kinds(liveness, 503 * MS), Kinds{});
+  liveness.setLimits({10, 0.1, 0});
+  EXPECT_EQ(kinds(liveness, 650 * MS), Kinds{Fault::Kind::SILENCE}) << "a limit that changes counts at once";
+}
+
+TEST(Liveness, AMapThatGrowsOldAndOneThatIsOnItsWay) {
+  Liveness liveness({0.1, 10, 1.0});
+  liveness.frame(1, 0);
+  liveness.outcome(1, 0.7, 50 * MS);
+  EXPECT_EQ(kinds(liveness, 300 * MS), Kinds{}) << "0.7 s old at the frame, which came 0.3 s ago";
+  EXPECT_EQ(kinds(liveness, 301 * MS), Kinds{Fault::Kind::OLD_MAP});
+  liveness.mapCame(310 * MS);
+  liveness.mapCame(400 * MS);
+  EXPECT_EQ(kinds(liveness, 411 * MS), (Kinds{Fault::Kind::NEWER_MAP, Fault::Kind::OLD_MAP}));
+  liveness.mapSettled();
+  liveness.frame(2, 420 * MS);
+  liveness.outcome(2, -1, 430 * MS);
+  EXPECT_EQ(kinds(liveness, 5000 * MS), Kinds{}) << "without a map none is old";
+}
+
+TEST(Liveness, WhatIsAskedForHoldsUntilItIsDone) {
+  Liveness liveness({0.1, 0.1, 0});
+  liveness.frame(1, 0);
+  liveness.ask("a reset was asked for");
+  liveness.outcome(1, -1, MS);
+  EXPECT_EQ(kinds(liveness, MS), Kinds{Fault::Kind::ASKED}) << "an answer does not undo it";
+  liveness.forget();
+  EXPECT_EQ(kinds(liveness, 1000 * MS), Kinds{});
+  liveness.disable(true);
+  liveness.forget();
+  EXPECT_EQ(kinds(liveness, 0), Kinds{Fault::Kind::DISABLED}) << "a reset does not enable";
+  liveness.disable(false);
+  liveness.stop();
+  liveness.forget();
+  EXPECT_EQ(kinds(liveness, 0), Kinds{Fault::Kind::STOPPED}) << "for good";
+}
+
+/// Random frames, answers and times against a list of all frames.
+TEST(Liveness, AnyCourseOfFramesAgainstAListOfThem) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const double timeout_s = 0.001 * static_cast<double>(1 + random() % 300),
+                 step_s = 0.001 * static_cast<double>(1 + random() % 300);
+    Liveness liveness({timeout_s, step_s, 0});
+    struct Came {
+      std::int64_t at;
+      bool answered;
+    };
+    std::vector<Came> all;
+    std::int64_t now_ns = 0;
+    for (int event = 0; event < 300; ++event) {
+      now_ns += static_cast<std::int64_t>(random() % 60) * MS;
+      if (random() % 2) {
+        all.push_back({now_ns, false});
+        liveness.frame(static_cast<std::int64_t>(all.size()), now_ns);
+      } else if (!all.empty()) {
+        const std::size_t last = random() % all.size();
+        for (std::size_t i = 0; i <= last; ++i) all[i].answered = true;
+        liveness.outcome(static_cast<std::int64_t>(last) + 1, -1, now_ns);
+      }
+      bool late = false;
+      for (const Came& frame : all)
+        late |= !frame.answered && static_cast<double>(now_ns - frame.at) * 1e-9 > timeout_s;
+      const bool silent = !all.empty() && static_cast<double>(now_ns - all.back().at) * 1e-9 > step_s;
+      const Kinds found = kinds(liveness, now_ns);
+      EXPECT_EQ(std::count(found.begin(), found.end(), Fault::Kind::NO_ANSWER), late);
+      EXPECT_EQ(std::count(found.begin(), found.end(), Fault::Kind::SILENCE), silent);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dccd

@@ -1,0 +1,283 @@
+// What is inside of a closed body at the start of a step, though no edge meets a face.
+#include "step/inside.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "dccd/stream.h"
+#include "support/closed_meshes.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+const double NAN_M = std::numeric_limits<double>::quiet_NaN();
+
+StartIntersection insideOf(std::uint16_t body, Index vertex, std::uint16_t closed) {
+  return {{body, closed}, {vertex, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX}};
+}
+
+bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(), [](const auto& a, const auto& b) { return a == b; });
+}
+
+StepBody clothAt(const Vec3& corner) { return sheet(4, 5, corner, 0.1); }
+
+/// A cloth in the middle of a box, of which neither has an edge near a face of the other.
+TestStep clothInABox() {
+  TestStep step;
+  step.bodies = {clothAt({0.2, 0.1, 0}), box({-1, -1, -1}, {1, 1, 1})};
+  return step;
+}
+
+Outcome startOf(const TestStep& step) { return runOnce(step, {}); }
+
+TEST(Inside, AClothInAClosedBodyIsNoClearStart) {
+  const Outcome outcome = startOf(clothInABox());
+  EXPECT_EQ(outcome.start_state, StartState::INTERSECTING);
+  EXPECT_TRUE(same(outcome.intersections, {insideOf(0, 0, 1)})) << outcome.intersections.size();
+  EXPECT_FALSE(assuranceOf(outcome).clear());
+  EXPECT_EQ(outcome.touching, Touching::LASTING);
+  EXPECT_TRUE(outcome.contacts.empty()) << "and yet nothing touches";
+  EXPECT_EQ(outcome.status, StepStatus::OK);
+}
+
+TEST(Inside, ABodyThatIsOutsideOrNotAskedForIsClear) {
+  TestStep beside = clothInABox();
+  for (Positions* x : {&beside.bodies[0].t0, &beside.bodies[0].t1}) {
+    for (Vec3& p : *x) p[0] += 5;
+  }
+  EXPECT_EQ(startOf(beside).start_state, StartState::CLEAR);
+  TestStep unasked = clothInABox();
+  unasked.bodies[0].against_bodies = false;
+  EXPECT_EQ(startOf(unasked).start_state, StartState::CLEAR);
+  TestStep container = clothInABox();
+  container.bodies[1].shell = true;
+  const Outcome contained = startOf(container);
+  EXPECT_EQ(contained.start_state, StartState::CLEAR);
+  EXPECT_TRUE(assuranceOf(contained).proved);
+  EXPECT_EQ(contained.excluded, (std::vector<std::string>{"body 'body_1': others may be inside of it"}));
+  Options options;
+  options.check_start_state = false;
+  const Outcome off = runOnce(clothInABox(), options);
+  EXPECT_EQ(off.start_state, StartState::NOT_CHECKED);
+  EXPECT_TRUE(off.intersections.empty());
+}
+
+TEST(Inside, WhatHasABorderHasNoInside) {
+  TestStep open = clothInABox();
+  std::vector<Face> faces = open.bodies[1].topology.faces();
+  faces.pop_back();
+  open.bodies[1].topology = Topology::fromTriangles(8, faces);
+  EXPECT_EQ(startOf(open).start_state, StartState::CLEAR);
+  TestStep masked = clothInABox();
+  masked.bodies[1].vertex_active.assign(8, 1);
+  masked.bodies[1].vertex_active[3] = 0;
+  EXPECT_EQ(startOf(masked).start_state, StartState::CLEAR) << "a hole where the vertex is left out";
+  TestStep lost = clothInABox();
+  lost.bodies[1].t1[3][0] = NAN_M;
+  const Outcome partial = startOf(lost);
+  EXPECT_EQ(partial.start_state, StartState::CLEAR);
+  EXPECT_EQ(partial.status, StepStatus::PARTIAL);
+  EXPECT_FALSE(assuranceOf(partial).clear());
+}
+
+TEST(Inside, ABodyIsNotAskedAboutItself) {
+  TestStep step;
+  step.bodies = {together(box({-2, -2, -2}, {2, 2, 2}), box({-1, -1, -1}, {1, 1, 1})), clothAt({0.2, 0.1, 1.5}),
+                 clothAt({0.2, 0.1, 0})};
+  const Outcome outcome = startOf(step);
+  EXPECT_TRUE(same(outcome.intersections, {insideOf(1, 0, 0)})) << "in the wall, and in the hollow of it";
+}
+
+TEST(Inside, EveryPieceIsListedWithItsFirstVertex) {
+  TestStep step = clothInABox();
+  Positions at;
+  std::vector<Face> faces;
+  for (Index i = 0; i < 30; ++i) {  // a soup across the box; whether one is inside is a matter of x alone
+    const double x = -2.05 + 0.15 * i;
+    for (const Vec3& corner : {Vec3(x, 0.3, 0.2), Vec3(x, 0.35, 0.2), Vec3(x, 0.3, 0.25)}) at.push_back(corner);
+    faces.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  step.bodies[0].topology = Topology::fromTriangles(90, faces);
+  step.bodies[0].t0 = step.bodies[0].t1 = at;
+  std::vector<StartIntersection> expected;
+  for (Index i = 0; i < 30; ++i) {
+    if (std::abs(at[3 * i][0]) < 1) expected.push_back(insideOf(0, 3 * i, 1));
+  }
+  ASSERT_GT(expected.size(), 10u);
+  EXPECT_TRUE(same(startOf(step).intersections, expected));
+  EXPECT_TRUE(same(trueInsides(step), expected));
+}
+
+// What is left out of a body cuts it into pieces, and no edge shows that one of them went in.
+TEST(Inside, PiecesEndAtVerticesThatAreLeftOut) {
+  TestStep step = clothInABox();
+  StepBody& rope = step.bodies[0];
+  rope.topology = Topology::polyline(4);
+  rope.t0 = {Vec3(3, 0.1, 0.2), Vec3(2, 0.1, 0.2), Vec3(0.5, 0.1, 0.2), Vec3(0, 0.1, 0.2)};
+  rope.t1 = rope.t0;
+  rope.vertex_active = {1, 1, 0, 1};
+  EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 3, 1)}));
+  rope.vertex_active.clear();
+  rope.t1[2][1] = NAN_M;
+  EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 3, 1)})) << "unchecked instead of masked";
+}
+
+// Over an axis-aligned box every half-line from a lattice point runs through edges, corners and in faces' planes. The
+// body asked about is a rope of no length, so that its edge meets a face where the point is on the surface alone.
+TEST(Inside, EveryPointOfALatticeOverABox) {
+  for (const double scale : {1.0, 5e-324, 4e307}) {
+    const StepBody solid = box(scale * Vec3(-2, -1, -1), scale * Vec3(1, 2, 2));
+    for (int i = 0; i < 7 * 7 * 7; ++i) {
+      const Vec3 point(i % 7 - 3, i / 7 % 7 - 3, i / 49 - 3);
+      const bool in_solid =
+          (point.array() >= Vec3(-2, -1, -1).array()).all() && (point.array() <= Vec3(1, 2, 2).array()).all();
+      TestStep step;
+      StepBody rope;
+      rope.topology = Topology::polyline(2);
+      rope.t0 = rope.t1 = {scale * point, scale * point};
+      step.bodies = {rope, solid};
+      const Outcome outcome = startOf(step);
+      const bool listed = std::any_of(outcome.intersections.begin(), outcome.intersections.end(),
+                                      [](const auto& one) { return one == insideOf(0, 0, 1); });
+      ASSERT_EQ(listed, in_solid) << point.transpose() << " x " << scale;
+    }
+  }
+}
+
+// --- carried over ----------------------------------------------------------------------------------------------------
+
+TEST(Inside, WhatIsInsideStaysKnownWithoutAQuestion) {
+  TestStep step = clothInABox();
+  Detector detector;
+  EXPECT_GT(detector.run(step.motion()).stats[Stage::START_STATE].in, 0u);
+  for (int i = 0; i < 3; ++i) {
+    Positions moved = step.bodies[0].t1, turned = step.bodies[1].t1;
+    for (Vec3& p : moved) p += Vec3(0.05, 0.02, 0.1);
+    for (Vec3& p : turned) p = Eigen::AngleAxisd(0.1, Vec3::UnitX()) * p;
+    step = step.continued({moved, turned});
+    const Outcome outcome = detector.run(step.motion());
+    EXPECT_TRUE(same(outcome.intersections, {insideOf(0, 0, 1)}));
+    EXPECT_EQ(outcome.stats[Stage::START_STATE].in, 0u);
+  }
+}
+
+TEST(Inside, WhatWentInThroughTheWallIsFoundOnceItIsThere) {
+  TestStep step = clothInABox();
+  Positions outside = step.bodies[0].t0;
+  for (Vec3& p : outside) p[2] += 5;
+  step.bodies[0].t1 = outside;
+  Detector detector;
+  EXPECT_EQ(detector.run(step.motion()).start_state, StartState::INTERSECTING);
+  step = step.continued({step.bodies[0].t0, step.bodies[1].t0});
+  EXPECT_EQ(detector.run(step.motion()).start_state, StartState::CLEAR);
+  step = step.continued({step.bodies[0].t1, step.bodies[1].t1});
+  EXPECT_TRUE(same(detector.run(step.motion()).intersections, {insideOf(0, 0, 1)}));
+}
+
+// A prediction is told by the step that it begins at.
+TEST(Inside, APredictionKnowsItsStart) {
+  TestStep step = clothInABox();
+  Positions outside = step.bodies[0].t0;
+  for (Vec3& p : outside) p[2] += 5;
+  History history, aside;
+  for (const Positions& end : {step.bodies[0].t0, outside, outside, step.bodies[0].t0}) {
+    step = step.continued({end, step.bodies[1].t0});
+    detect(step.motion(), {}, history);
+    const TestStep ahead = step.continued({end, step.bodies[1].t0});
+    aside.beginAt(history);
+    const Outcome predicted = detect(ahead.motion(), {}, aside);
+    EXPECT_TRUE(same(predicted.intersections, startOf(ahead).intersections));
+    EXPECT_EQ(predicted.start_state, startOf(ahead).start_state);
+    EXPECT_EQ(predicted.stats[Stage::START_STATE].in, 0u) << "without a search";
+  }
+}
+
+TEST(Inside, ASearchThatIsCutGoesOnAndNeverSaysOutside) {
+  TestStep step;
+  for (int i = 0; i < 6; ++i) step.bodies.push_back(clothAt({-0.8 + 0.2 * i, 0.1, 0.3 - 0.1 * i}));
+  step.bodies.push_back(box({-1, -1, -1}, {1, 1, 1}));
+  step.bodies.push_back(box({-2, -2, -2}, {2, 2, 2}));
+  const std::vector<StartIntersection> expected = trueInsides(step);
+  ASSERT_EQ(expected.size(), 13u);
+  SceneArrays scene;
+  StepStats stats;
+  scene.setBodies(step.motion().bodies);
+  scene.record(step.motion(), stats);
+  scene.refit([](std::size_t n, const auto& f) { f(0, n); }, stats);
+  InsideSearch search;
+  std::size_t before = 0;
+  int cuts = 0;
+  for (bool whole = false; !whole; ++cuts) {
+    int looks = 1;
+    const auto listed = search.run(
+        scene, cuts > 0, [&] { return looks-- <= 0; }, stats);
+    whole = search.isWhole();
+    ASSERT_GT(listed.size() + whole, before) << "it goes on";
+    ASSERT_LE(listed.size(), expected.size());
+    EXPECT_TRUE(same(listed, {expected.begin(), expected.begin() + static_cast<std::ptrdiff_t>(listed.size())}));
+    before = listed.size();
+    search.remember(scene, {}, true);
+    EXPECT_EQ(search.knowsEnd(), whole);
+  }
+  EXPECT_EQ(before, expected.size());
+  EXPECT_GT(cuts, 5);
+  InsideSearch ended;
+  EXPECT_TRUE(ended
+                  .run(
+                      scene, false, [] { return true; }, stats)
+                  .empty());
+  EXPECT_FALSE(ended.isWhole());
+  ended.remember(scene, {}, false);
+  EXPECT_FALSE(ended.knowsEnd());
+}
+
+// --- in a stream -----------------------------------------------------------------------------------------------------
+
+MeshFrame frameOf(const StepBody& body, int number, bool rigid, double angle) {
+  MeshFrame frame;
+  frame.stamp_ns = 100000000LL * (number + 1);
+  frame.topology = share(body.topology);
+  frame.positions = body.t0;
+  frame.rigid = rigid;
+  frame.pose.linear() = Eigen::AngleAxisd(angle, Vec3::UnitZ()).toRotationMatrix();
+  for (Vec3& p : frame.positions) p = frame.pose * p;
+  return frame;
+}
+
+/// Start states of steps in which a rigid box turns, in parts, around a cloth.
+std::vector<StartState> statesOf(const Body& box_setup, const StepBody& solid, double cloth_z) {
+  Body cloth;
+  cloth.name = "cloth";
+  Monitor monitor({}, {cloth, box_setup});
+  std::vector<StartState> states;
+  for (int i = 0; i < 5; ++i) {
+    monitor.push(1, frameOf(solid, i, true, 0.4 * i), 0);
+    monitor.push(0, frameOf(clothAt({0.2, 0.1, cloth_z}), i, false, 0), 0);
+    for (Outcome outcome; monitor.next(0, outcome);) {
+      if (!outcome.answered) continue;
+      EXPECT_GT(outcome.substeps, 1u);
+      states.push_back(outcome.start_state);
+    }
+  }
+  return states;
+}
+
+TEST(Inside, ARigidBodyThatTurnsAroundAClothInAStream) {
+  Body finger;
+  finger.name = "finger";
+  finger.rigid = true;
+  finger.self_collision = false;
+  const StepBody solid = ball(Vec3::Zero(), 1, 2);
+  EXPECT_EQ(statesOf(finger, solid, 0.1), std::vector<StartState>(4, StartState::INTERSECTING));
+  EXPECT_EQ(statesOf(finger, solid, 1.1), std::vector<StartState>(4, StartState::CLEAR));
+  finger.shell = true;
+  EXPECT_EQ(statesOf(finger, solid, 0.1), std::vector<StartState>(4, StartState::CLEAR));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
