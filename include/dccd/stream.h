@@ -23,8 +23,8 @@ struct MonitorOptions {
   double sync_timeout_s = 0.1;   ///< how long a step waits for the other bodies' frames
   std::size_t clock_body = 0;    ///< a step ends at each of its frames
   std::size_t max_waiting = 64;  ///< steps that may wait for other bodies; the oldest gives way
-  /// With obstacle_expected, a map older than this at the end of the step is no map; 0: never. (Where none is expected,
-  /// leaving a map out would go unsaid: it is used whatever its age.)
+  /// With obstacle_expected, a map whose stamp is further than this from the end of the step, before or after it, is no
+  /// map; 0: never. (Where none is expected, leaving a map out would go unsaid: it is used whatever its age.)
   double octomap_timeout_s = 0;
   double look_ahead_s = 0;  ///< horizon of predictions; 0: none
 

@@ -94,6 +94,7 @@ void readUncertainty(ParameterReader section, BodyConfig& body) {
 BodyConfig readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic) {
   BodyConfig body;
   body.body.name = name;
+  body.topic_named = reader.has("topic");
   body.topic = reader.get("topic", default_topic);
   std::vector<std::string> types{"auto"};
   for (const MeshType& type : meshTypes()) types.push_back(type.name);
@@ -287,7 +288,11 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
 }
 
 void readMap(ParameterReader& reader, MonitorConfig& config) {
+  config.octomap_topic_named = reader.has("octomap_topic");
   config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
+  if (config.octomap_topic.empty()) {
+    reader.fail("octomap_topic", "is empty; remove it, or write effects/octomap: off where there is no map");
+  }
   config.octomap_file = reader.get("octomap_file", std::string());
   config.octomap_frame = reader.get("octomap_frame", std::string());
   config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 4096)) << 20;
@@ -428,6 +433,12 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 }
 
 }  // namespace
+
+bool MonitorConfig::namesOctomap() const {
+  const auto setting = effects.find(Effect::OCTOMAP);
+  const bool automatic = setting == effects.end() || setting->second == EffectSetting::AUTO;
+  return automatic ? octomap_topic_named || !octomap_file.empty() : setting->second == EffectSetting::ON;
+}
 
 bool MonitorConfig::holdsDistance() const {
   return std::any_of(bodies.begin(), bodies.end(),

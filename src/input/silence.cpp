@@ -15,15 +15,21 @@ namespace {
 
 constexpr std::size_t MAX_NAMES = 6;
 
-/// Published topics with a type that can be a mesh; empty when there are none or the master does not answer.
-std::string meshTopics() {
+/// The type of each topic that is published; empty when the master does not answer.
+std::map<std::string, std::string> publishedTypes() {
   XmlRpc::XmlRpcValue request, response, topics;
   request[0] = ros::this_node::getName();
   request[1] = "";
-  // Not getTopics(), which would wait for a master that is gone.
-  if (!ros::master::execute("getPublishedTopics", request, response, topics, false)) return {};
   std::map<std::string, std::string> types;
+  // Not getTopics(), which would wait for a master that is gone.
+  if (!ros::master::execute("getPublishedTopics", request, response, topics, false)) return types;
   for (int i = 0; i < topics.size(); ++i) types[topics[i][0]] = static_cast<std::string>(topics[i][1]);
+  return types;
+}
+
+/// Published topics with a type that can be a mesh; empty when there are none.
+std::string meshTopics() {
+  const std::map<std::string, std::string> types = publishedTypes();
   std::string names;
   std::size_t count = 0;
   for (const auto& [name, datatype] : types) {
@@ -55,6 +61,18 @@ std::string silenceHint(const std::vector<AwaitedTopic>& silent) {
   const std::string names = meshTopics();
   return text + "; give the mesh's topic with mesh:=TOPIC; " +
          (names.empty() ? "no topic of a mesh type is published" : "published are " + names);
+}
+
+std::string unheardMapsHint(const std::string& listened) {
+  std::string names;
+  std::size_t count = 0;
+  for (const auto& [name, datatype] : publishedTypes()) {
+    if (!mapTypeProblem(datatype, "*").empty() || name == listened || ++count > MAX_NAMES) continue;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  if (names.empty()) return "";
+  return "an octomap is published on " + names + ", and this monitor listens to " + listened +
+         ", where none has come; give the topic with octomap:=TOPIC, or do without with effects/octomap: off";
 }
 
 }  // namespace dccd

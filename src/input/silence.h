@@ -17,4 +17,8 @@ struct AwaitedTopic {
 /// Asks the master what there is instead, so call it rarely and never in a callback.
 std::string silenceHint(const std::vector<AwaitedTopic>& silent);
 
+/// A sentence about octomaps that are published on other topics than `listened`, on which none has come; empty: there
+/// are none. Asks the master, as silenceHint() does.
+std::string unheardMapsHint(const std::string& listened);
+
 }  // namespace dccd

@@ -5,7 +5,6 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "dccd/simd_target.h"
-#include "input/known_types.h"
 #include "ros/message_bytes.h"
 
 namespace dccd {
@@ -17,10 +16,11 @@ constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
 const ros::WallDuration RENEWAL(0.05);
 
-MonitorConfig configOf(const ros::NodeHandle& private_node) {
+MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
   private_node.getParam(private_node.getNamespace(), tree);
   MonitorConfig config = readConfig(tree);
+  takeRemappings(node, config);
   setSimdTarget(config.simd_target);
   return config;
 }
@@ -66,23 +66,8 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
-  const std::string problem = mapTypeProblem(message->getDataType(), message->getMD5Sum());
-  if (!problem.empty()) {
-    maps->countRefused();
-    queue.command([this, problem] { log.complain(config.bodies.size(), "map type", problem); });
-    return;
-  }
-  if (message->size() > config.max_map_bytes) {
-    maps->countRefused();
-    queue.command([this, size = message->size()] {
-      log.complain(config.bodies.size(), "map size",
-                   "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
-      LoadedMap refused;
-      refused.problem = "the octomap is larger than max_map_mb";
-      pipeline.setMap(std::move(refused), steadyNs());
-    });
-    return;
-  }
+  const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
+  if (!problem.empty()) return maps->refuse(problem);  // before its bytes are copied
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
   state.mapCame();  // after it: the worker, which may take the map before, says again and again that none is on its way
 }
@@ -107,6 +92,7 @@ void CollisionMonitor::Impl::subscribe() {
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, true); });
+  ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
   if (!config.octomap_file.empty()) {
@@ -194,7 +180,7 @@ void CollisionMonitor::Impl::stop() {
 }
 
 CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
-    : impl_(std::make_unique<Impl>(node, private_node, configOf(private_node))) {
+    : impl_(std::make_unique<Impl>(node, private_node, configOf(node, private_node))) {
   impl_->start();
 }
 

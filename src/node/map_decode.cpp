@@ -3,6 +3,7 @@
 
 #include "dccd/known_space.h"
 #include "dccd/octomap_decode.h"
+#include "input/known_types.h"
 #include "input/mesh_views.h"
 #include "input/wire.h"
 #include "node/map_loader.h"
@@ -32,6 +33,13 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, LoadedMap& map) 
 }
 
 }  // namespace
+
+std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
+                              const MonitorConfig& config) {
+  const std::string problem = mapTypeProblem(datatype, md5);
+  if (!problem.empty() || size <= config.max_map_bytes) return problem;
+  return std::to_string(size) + " bytes are more than max_map_mb";
+}
 
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config) {
   LoadedMap map;

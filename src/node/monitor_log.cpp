@@ -23,10 +23,6 @@ std::int64_t steadyNs() {
 MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config)
     : node_(node), name_(name), config_(config) {}
 
-std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
-  return config.octomap_file.empty() ? node.resolveName(config.octomap_topic) : config.octomap_file;
-}
-
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
   const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();
   const std::string line = throttle_.line(topic + " " + kind, topic + ": " + text, steadyNs());
@@ -56,6 +52,12 @@ bool MonitorLog::isSilenceDue(std::int64_t now_ns) {
 
 void MonitorLog::hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline) {
   std::string text = silenceHint(silent);
+  const bool mapless = pipeline.effects().mayUseMap() && !pipeline.effects().mapSeen();
+  ++silences_;
+  // Where meshes come, at the 1st, 2nd, 4th, 8th … time.
+  const bool is_due = !silent.empty() || (silences_ & (silences_ - 1)) == 0;
+  if (mapless && is_due) unheard_maps_ = unheardMapsHint(mapSource());
+  if (mapless && !unheard_maps_.empty()) text += (text.empty() ? "" : "; ") + unheard_maps_;
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     if (pipeline.hint(b).empty()) continue;
     const BodyConfig& body = config_.bodies[b];

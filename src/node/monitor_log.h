@@ -11,12 +11,10 @@
 #include "dccd/stream.h"
 #include "input/silence.h"
 #include "node/monitor_pipeline.h"
+#include "node/named_inputs.h"
 #include "ros/log_throttle.h"
 
 namespace dccd {
-
-/// The octomap's resolved topic, or its file.
-std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config);
 
 class MonitorLog {
  public:
@@ -28,7 +26,8 @@ class MonitorLog {
   void tell(const Outcome& outcome);
   /// Whether it is time to look into silence again: rarely, and not at once.
   bool isSilenceDue(std::int64_t now_ns);
-  /// Logs a hint when it is another one than before.
+  /// Logs a hint when it is another one than before. As long as no map is in sight the master is asked for those of
+  /// other topics, too: where meshes come ever more rarely, for the worker waits for the answer.
   void hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline);
   /// What looks like a mistake now; empty: nothing does.
   const std::string& hint() const { return hint_; }
@@ -42,6 +41,8 @@ class MonitorLog {
   const MonitorConfig& config_;
   LogThrottle throttle_{5};
   std::int64_t asked_ns_ = 0;
+  std::uint64_t silences_ = 0;  // looked into
+  std::string unheard_maps_;
   std::string hint_;
 };
 

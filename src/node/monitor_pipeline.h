@@ -71,6 +71,7 @@ class MonitorPipeline {
   /// force in the monitor follows from it and from the effect plan.
   const MonitorConfig& config() const { return config_; }
   EffectTracker& effects() { return effects_; }
+  const EffectTracker& effects() const { return effects_; }
   const std::string& fixedFrame() const { return fixed_frame_; }
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Arrival, on the driving clock, of the frame that the last outcome was about.

@@ -61,7 +61,8 @@ void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::strin
   if (!enabled) raise(DiagnosticStatus::WARN, "disabled");
   if (outcomes_ > 0 && answers_ == 0) raise(DiagnosticStatus::ERROR, because("no answer: "));
   if (!map_topic.empty() && answers_ > 0 && !map_present_) {
-    raise(DiagnosticStatus::ERROR, status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_);
+    raise(DiagnosticStatus::WARN, (status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_) +
+                                      (hint.empty() ? "" : "; " + hint));
   }
   if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
   if (context_.frames.of(StepStatus::QUEUE_FULL) > dropped_before_) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <sstream>
 
+#include "dccd/assurance.h"
 #include "report/flat_layout.h"
 
 namespace dccd {
@@ -37,13 +38,6 @@ std::string csvField(const std::string& text) {
   std::string quoted = "\"";
   for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
   return quoted + '"';
-}
-
-/// What stands in the way of "no contact" in a step that found none.
-std::string doubtOf(const Outcome& outcome) {
-  if (outcome.status != StepStatus::OK) return toString(outcome.status);
-  if (!outcome.unproved.empty()) return outcome.unproved.front();
-  return outcome.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(outcome.start_state);
 }
 
 nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
@@ -229,47 +223,59 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
   any_ = true;
   addRow(o);
-  if (!o.answered) {
-    ++not_answered_;
-    return;
-  }
+  addProof(o);
+  if (!o.answered) return;
   ++answered_;
   with_contact_ += o.total_contacts > 0;
-  clear_ += assuranceOf(o).clear();
-  if (o.total_contacts == 0 && !assuranceOf(o).clear()) ++doubtful_[doubtOf(o)];
   writeContacts(o, bodies);
   addHeat(o, bodies);
   addFirstContact(o, bodies);
   addTimes(o);
 }
 
+void Report::addProof(const Outcome& o) {
+  ++frames_;
+  if (o.answered && o.total_contacts == 0 && o.touching != Touching::NONE) {
+    ++lasting_[o.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(o.start_state)];
+  }
+  const Assurance assurance = assuranceOf(o);
+  if (assurance.proved || o.status == StepStatus::FIRST_FRAME) return;
+  const bool is_ok = o.status == StepStatus::OK;
+  const std::string kind = is_ok ? assurance.missing.front() : toString(o.status);
+  const std::string reason = is_ok || o.reason.empty() ? kind : kind + ": " + o.reason;
+  ++unproved_.emplace(kind, std::make_pair(reason, 0)).first->second.second;
+}
+
+std::string Report::unproved() const {
+  std::size_t frames = 0;
+  std::string reasons;
+  for (const auto& [kind, found] : unproved_) {
+    frames += found.second;
+    reasons += (reasons.empty() ? "" : ", ") + found.first + " (" + std::to_string(found.second) + ")";
+  }
+  if (frames > 0) return std::to_string(frames) + " of " + std::to_string(frames_) + " frames: " + reasons;
+  return answered_ > 0 ? "" : frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
+}
+
 std::string Report::headline() const {
   std::ostringstream text;
   text << std::fixed << std::setprecision(4);
+  const bool proved = unproved().empty();
   if (!first_contact_.empty()) {
     text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
          << with_contact_ << " of " << answered_ << " answered steps";
   } else if (answered_ == 0) {
-    text << "No answer: no step could be checked";
-  } else if (clear_ == 0) {
-    text << "No contact found in " << answered_ << " answered steps, but it is not ruled out";
-  } else if (clear_ < answered_) {
-    text << "No contact in " << clear_ << " of " << answered_ << " answered steps";
+    text << "No answer";
   } else {
-    text << "No contact in " << answered_ << " answered steps";
+    text << (proved && lasting_.empty() ? "No contact in " : "No contact found in ") << answered_ << " answered steps";
   }
-  if (!doubtful_.empty()) {
-    if (clear_ > 0 || !first_contact_.empty()) text << "; in others none was found, but it is not ruled out";
-    const char* separator = " (";
-    for (const auto& [doubt, steps] : doubtful_) {
-      text << separator << doubt << ' ' << steps;
-      separator = ", ";
-    }
-    text << ')';
+  const char* separator = "; surfaces touched from the start of a step (";
+  for (const auto& [what, steps] : lasting_) {
+    text << separator << what << ' ' << steps;
+    separator = ", ";
   }
-  if (not_answered_ > 0) {
-    text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";
-  }
+  if (!lasting_.empty()) text << ')';
+  if (!proved) text << "; not proved: " << unproved();
   text << '.';
   return text.str();
 }

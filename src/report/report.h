@@ -64,8 +64,12 @@ class Report {
   /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
   /// naming the file.
   void finish();
-  /// One sentence: the first contact, or that there was none, or that there was no answer.
+  /// One sentence: the first contact, or that there was none, or that there was no answer; and what is not proved of
+  /// it.
   std::string headline() const;
+  /// What stands in the way of a proof: "3 of 40 frames: NO_MAP: no octomap has been received yet (3)". Empty: every
+  /// frame but a first one, of which there is nothing to say, has an answer that is proved, and there is one.
+  std::string unproved() const;
 
  private:
   struct BodyHeat {
@@ -75,6 +79,7 @@ class Report {
     std::vector<std::uint32_t> contacts;  // per vertex
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
   };
+  void addProof(const Outcome& outcome);
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
   void addRow(const Outcome& outcome);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
@@ -89,8 +94,11 @@ class Report {
   std::ofstream contacts_, steps_, timing_;
   StampNs origin_ns_ = 0;
   bool any_ = false;
-  std::map<std::string, std::size_t> doubtful_;  // steps that found no contact and cannot rule it out, by the reason
-  std::size_t answered_ = 0, with_contact_ = 0, clear_ = 0, not_answered_ = 0, undecided_only_ = 0;
+  std::map<std::string, std::size_t> lasting_;  // steps without a contact in which something touched, by what it was
+  /// Frames that are not proved, by status, or by the first sentence of what an OK one lacks: the reason of the first
+  /// of them, and how many.
+  std::map<std::string, std::pair<std::string, std::size_t>> unproved_;
+  std::size_t frames_ = 0, answered_ = 0, with_contact_ = 0;
   double first_contact_s_ = 0;
   std::string first_contact_;
   nlohmann::json rows_ = nlohmann::json::array();

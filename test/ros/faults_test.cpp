@@ -170,6 +170,27 @@ TEST_F(Mapped, AMapThatStopsAndComesBack) {
   expectAddsUp();
 }
 
+TEST_F(Mapped, AMapFromTheFutureIsNoMap) {
+  const auto mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/mapped/mesh");
+  const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/mapped/octomap", true);
+  double stamp_s = 1000;
+  const auto answerAt = [&](double at_s) { return send(mesh, meshStamped(tipAbove(3), at_s)); };
+  map.publish(blockBelowZero(true, 1000));
+  answerAt(stamp_s);
+  ASSERT_TRUE(waitUntil([&] { return answerAt(stamp_s += 0.001).status == deformable_ccd::ContactArray::OK; }));
+  map.publish(blockBelowZero(true, 1100));  // of a clock that runs ahead, or of milliseconds taken for seconds
+  deformable_ccd::ContactArray outcome;
+  EXPECT_TRUE(waitUntil([&] {
+    outcome = answerAt(stamp_s += 0.001);
+    return outcome.status == deformable_ccd::ContactArray::NO_MAP;
+  })) << "it would be fresh for ever";
+  EXPECT_NE(outcome.reason.find("after the end of the step"), std::string::npos) << outcome.reason;
+  EXPECT_NE(outcome.reason.find("octomap_timeout_s"), std::string::npos) << outcome.reason;
+  map.publish(blockBelowZero(true, stamp_s + 0.9));
+  EXPECT_TRUE(waitUntil([&] { return answerAt(stamp_s += 0.001).status == deformable_ccd::ContactArray::OK; }))
+      << "a little ahead is as good as a little behind";
+}
+
 struct Masked : MonitorTest {
   Masked() : MonitorTest("/masked") {}
 };

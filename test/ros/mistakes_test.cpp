@@ -106,6 +106,12 @@ TEST_F(Mistake, NoMap) {
              [&] { publisher.publish(meshStamped(tipAbove(1), tracker.next())); });
 }
 
+TEST_F(Mistake, MapOnAnotherTopic) {
+  const auto map = node.advertise<octomap_msgs::Octomap>("/octomap_full", 1, true);
+  expectTold("/unheard_map", "an octomap is published on /octomap_full, and this monitor listens to /octomap_binary",
+             "give the topic with octomap:=TOPIC, or do without with effects/octomap: off", [] {});
+}
+
 TEST_F(Mistake, MapInAnotherFrame) {
   Tracker tracker;
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/map_frame/octomap", true);

@@ -50,6 +50,32 @@ TEST(Parameters, NoneAtAllIsOneBodyWithDefaults) {
   EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::EXACT);
 }
 
+// Only what nobody named may be missing in silence.
+TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
+  const MonitorConfig none = readConfig(XmlRpcValue());
+  EXPECT_EQ(none.octomap_topic, "octomap_binary");
+  EXPECT_FALSE(none.namesOctomap());
+  EXPECT_FALSE(none.bodies[0].topic_named);
+  const auto with = [](const std::function<void(XmlRpcValue&)>& set) {
+    XmlRpcValue tree;
+    set(tree);
+    return readConfig(tree);
+  };
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_topic"] = "octomap_binary"; }).namesOctomap()) << "also the default";
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_file"] = "/map.bt"; }).namesOctomap());
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "on"; }).namesOctomap());
+  EXPECT_FALSE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "auto"; }).namesOctomap());
+  EXPECT_FALSE(with([](XmlRpcValue& t) {
+                 t["octomap_topic"] = "/map";
+                 t["effects"]["octomap"] = "off";
+               }).namesOctomap());
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["topic"] = "mesh"; }).bodies[0].topic_named);
+  EXPECT_FALSE(with([](XmlRpcValue& t) { t["default_topic"] = "/cloth"; }).bodies[0].topic_named);
+  XmlRpcValue empty;
+  empty["octomap_topic"] = "";
+  EXPECT_TRUE(mentions(errorOf(empty), "octomap_topic is empty; remove it")) << errorOf(empty);
+}
+
 TEST(Parameters, ADefaultTopicIsThatOfASingleBodyWithoutOne) {
   XmlRpcValue tree;
   tree["default_topic"] = "/cloth";
