@@ -80,8 +80,12 @@ class ResultBag {
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
     bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
+    deformable_ccd::State state = toState(outcome, frame);
+    state.header.stamp = at;
+    fillState(assuranceOf(outcome), state);
+    bag_.write("/collision_monitor/state", at, state);
     std_msgs::Bool clear;
-    clear.data = assuranceOf(outcome).clear();
+    clear.data = state.clear;
     bag_.write("/collision_monitor/clear", at, clear);
     if (frame.empty()) return;
     bag_.write("/collision_monitor/markers", at,

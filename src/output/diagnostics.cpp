@@ -118,6 +118,7 @@ std::string describe(const Outcome& outcome) {
   if (!outcome.answered) return text.str();
   text << ": " << outcome.total_contacts << " contacts, start state " << toString(outcome.start_state);
   if (std::isfinite(outcome.earliest_toc)) text << ", earliest toc " << outcome.earliest_toc;
+  text << "; " << describe(assuranceOf(outcome));
   return text.str();
 }
 

@@ -94,7 +94,8 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual(sorted(re.findall(r'`(\w+)`', row.split('NAME:')[1])), sorted(names))
 
     def test_topics(self):
-        code = set(re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src/output/outputs.cpp').read_text()))
+        code = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
+                for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
         table = PAGE[PAGE.index('## What comes out'):PAGE.index('**How to read a contact.**')]
         rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
         self.assertEqual(code, {name for row in rows for name in re.findall(r'`~(\w+)`', row)})
@@ -102,7 +103,7 @@ class InterfaceTest(unittest.TestCase):
     def test_services(self):
         source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()
         source = source[source.index('::advertiseServices()'):]
-        code = set(re.findall(r'advertise\("(\w+)"', source)) | set(re.findall(r'\(\s*"(\w+)", ', source[:3000])) & {'enable'}
+        code = set(re.findall(r'advertise\(\s*"(\w+)"', source)) | set(re.findall(r'\(\s*"(\w+)", ', source[:3000])) & {'enable'}
         section = PAGE[PAGE.index('## Services'):PAGE.index('## Parameters')]
         self.assertGreaterEqual(len(code), 4)
         self.assertEqual(code, set(re.findall(r'(?:^|\. )`~(\w+)` \(', section, re.M)))
