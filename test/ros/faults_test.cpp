@@ -123,7 +123,7 @@ struct Mapped : MonitorTest {
 TEST_F(Mapped, AMapThatStopsAndComesBack) {
   const auto mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/mapped/mesh");
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/mapped/octomap", true);
-  const auto answerAt = [&](double stamp_s) { return send(mesh, meshStamped(tipAbove(3), stamp_s)); };
+  const auto answerAt = [&](double stamp_s) { return send(mesh, meshStamped(sheetAt(3), stamp_s)); };
   map.publish(blockBelowZero(true, 50));
   double stamp_s = 50;
   answerAt(stamp_s);
@@ -174,7 +174,7 @@ TEST_F(Mapped, AMapFromTheFutureIsNoMap) {
   const auto mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/mapped/mesh");
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/mapped/octomap", true);
   double stamp_s = 1000;
-  const auto answerAt = [&](double at_s) { return send(mesh, meshStamped(tipAbove(3), at_s)); };
+  const auto answerAt = [&](double at_s) { return send(mesh, meshStamped(sheetAt(3), at_s)); };
   map.publish(blockBelowZero(true, 1000));
   answerAt(stamp_s);
   ASSERT_TRUE(waitUntil([&] { return answerAt(stamp_s += 0.001).status == deformable_ccd::ContactArray::OK; }));

@@ -22,7 +22,7 @@ struct Inputs : MonitorTest {
   double stamp_s = 10;
 
   /// The next step, far above any map.
-  ContactArray step() { return send(mesh, meshStamped(tipAbove(3), stamp_s += 0.1)); }
+  ContactArray step() { return send(mesh, meshStamped(sheetAt(3), stamp_s += 0.1)); }
   ContactArray stepUntil(std::uint8_t status) {
     waitUntil([&] { return step().status == status; });
     return contacts.last();
