@@ -95,6 +95,9 @@ constexpr double LARGEST_PLAUSIBLE_M = 50;
 /// [1] A grid whose neighbours are this much nearer with rows and columns swapped draws advice; crumpled cloth does not
 /// reach it.
 constexpr double SWAPPED_GRID_RATIO = 0.6;
+/// [bytes] What a triangle of a message may take until its step is done: as it is decoded, its topology, its share of
+/// vertices, edges and trees. A message that would take more than there is room for is refused before it is decoded.
+constexpr unsigned long long BYTES_PER_FACE = 400;
 
 }  // namespace tolerance
 }  // namespace dccd

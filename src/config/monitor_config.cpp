@@ -313,6 +313,15 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   }
 }
 
+/// Half of it is for frames as they are used, with their topology and what a step makes of it.
+void readMemory(ParameterReader& reader, Guards guards, MonitorConfig& config) {
+  constexpr int LIVE_MB = 512;
+  const int megabytes = reader.integer("max_memory_mb", guards == Guards::LIVE ? LIVE_MB : 0, 0, 1 << 20);
+  if (megabytes == 0) return;
+  config.max_memory_bytes = static_cast<std::size_t>(megabytes) << 20;
+  for (BodyConfig& body : config.bodies) body.input.max_faces = config.max_memory_bytes / 2 / tolerance::BYTES_PER_FACE;
+}
+
 void readEffects(ParameterReader section, MonitorConfig& config) {
   for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
     const Effect effect = static_cast<Effect>(e);
@@ -457,9 +466,11 @@ std::uint64_t MonitorConfig::hash() const {
   return hashOf(text.str());
 }
 
-MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) { return readConfig(treeOf(tree), path); }
+MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
+  return readConfig(treeOf(tree), path, Guards::LIVE);
+}
 
-MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, Guards guards) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
   config.fixed_frame = reader.get("fixed_frame", std::string());
@@ -470,6 +481,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
   readSeparationPairs(reader, config);
+  readMemory(reader, guards, config);
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
   applyEffects(config);

@@ -59,6 +59,7 @@ struct MonitorConfig {
   double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
+  std::size_t max_memory_bytes = 0;  ///< of what messages may hold (doc/guarantees.md); 0: no limit
   std::string simd_target = "auto";
   std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
@@ -72,8 +73,11 @@ struct MonitorConfig {
   std::uint64_t hash() const;
 };
 
+/// What guards a live node, which nobody watches, and would only surprise in a tool.
+enum class Guards : std::uint8_t { LIVE, NONE };
+
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
-MonitorConfig readConfig(const ParameterTree& tree, const std::string& path);
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, Guards guards = Guards::NONE);
 
 }  // namespace dccd

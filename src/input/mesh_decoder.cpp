@@ -39,6 +39,12 @@ void requireSomething(const Topology& topology, std::size_t faces) {
                      : "all of its " + std::to_string(faces) + " triangles name a vertex twice"));
 }
 
+std::size_t faceCount(const IndexedView& mesh) {
+  std::size_t count = mesh.triangles.size;
+  for (const auto& polygon : mesh.polygons) count += polygon.size > 2 ? polygon.size - 2 : polygon.size > 0;
+  return count;
+}
+
 SentFaces triangulated(const IndexedView& mesh, std::size_t points) {
   SentFaces faces;
   const auto add = [&](Index a, Index b, Index c) {
@@ -126,6 +132,7 @@ DecodedMesh MeshDecoder::decodeAs(const std::string& datatype, View view) {
 
 DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
   WireReader wire(data, size);
+  wire.limitEntries(config_.max_faces);
   return decodeAs(datatype, [&](const MeshType& type) { return type.read(wire, config_.noise_field); });
 }
 
@@ -160,6 +167,12 @@ void MeshDecoder::checkCount(std::size_t count) const {
     refuse(std::to_string(count) + " vertices are more than max_vertices " + std::to_string(config_.max_vertices));
   }
   if (count == 0) refuse("there are no vertices");
+}
+
+void MeshDecoder::checkFaces(std::size_t count) const {
+  if (count <= config_.max_faces) return;
+  refuse(std::to_string(count) + " triangles are more than the " + std::to_string(config_.max_faces) +
+         " for which there is room; raise max_memory_mb");
 }
 
 void MeshDecoder::start(const HeaderView& header, DecodedMesh& mesh) const {
@@ -259,6 +272,7 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   }
   if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
     if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
+    checkFaces(faceCount(view));
     SentFaces sent = triangulated(view, count);
     const std::size_t faces = sent.proper.size() + sent.repeating.size();
     mesh.topology = fromFaces(count, std::move(sent.proper));
@@ -354,6 +368,7 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   start(marker.header, mesh);
   const std::size_t count = marker.points.size;
   checkCount(count);
+  checkFaces(count / 3);
   if (count % 3 != 0) refuse("a TRIANGLE_LIST of " + std::to_string(count) + " points, which is not a multiple of 3");
   const Eigen::Affine3d transform = markerTransform(marker);
   Positions corners(count);

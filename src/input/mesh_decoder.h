@@ -28,6 +28,7 @@ struct MeshInputConfig {
   std::optional<std::string> marker_namespace;
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
+  std::size_t max_faces = std::numeric_limits<std::size_t>::max();
   /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is
   /// named.
   std::string noise_field;
@@ -78,6 +79,7 @@ class MeshDecoder {
   DecodedMesh decodeView(const std::vector<MarkerView>& markers);
   DecodedMesh decodeDepthImage(const CloudView& cloud) const;
   DecodedMesh decodeSoup(const MarkerView& marker);
+  void checkFaces(std::size_t count) const;
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;
   /// `pixel` has the number in the cloud of each vertex; null: they are the same.

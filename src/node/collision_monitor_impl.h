@@ -79,6 +79,7 @@ struct CollisionMonitor::Impl {
 
   // Worker.
   void work();
+  bool workOn(const std::vector<std::function<void()>>& commands);
   void carryOut(const std::function<void()>& command);
   void takeMaps();
   void takeMessages();

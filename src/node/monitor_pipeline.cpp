@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <limits>
+#include <new>
 #include <utility>
 
 #include "input/mesh_resource.h"
@@ -116,11 +117,21 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
   waiting.arrival_ns = message.arrival_ns;
+  const auto refuse = [&](StepStatus status, const std::string& reason) {
+    monitor_->countReceived(body);
+    skip(body, status, message.receipt_ns, message.arrival_ns, reason);
+  };
+  if (message.too_large > 0) {
+    return refuse(StepStatus::BAD_MESSAGE, "a message of " + std::to_string(message.too_large) +
+                                               " bytes is more than the quarter of max_memory_mb that queues may hold");
+  }
   try {
     waiting.mesh = decode(body, message);
   } catch (const MeshError& error) {
-    monitor_->countReceived(body);
-    return skip(body, error.status, message.receipt_ns, message.arrival_ns, error.what());
+    return refuse(error.status, error.what());
+  } catch (const std::bad_alloc&) {
+    return refuse(StepStatus::BAD_MESSAGE,
+                  "there is not enough memory for this message of " + std::to_string(message.size()) + " bytes");
   }
   if (hinted_[body] != waiting.mesh.topology) {
     hinted_[body] = waiting.mesh.topology;

@@ -50,7 +50,8 @@ void CollisionMonitor::Impl::accountDropped() {
     pipeline.monitor().countReceived(b, dropped[b]);
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
     log.complain(b, "queue",
-                 std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
+                 std::to_string(dropped[b]) +
+                     " frames dropped, steps take longer than frames come or frames are too large for max_memory_mb; " +
                      adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
   }
 }
@@ -175,30 +176,42 @@ void CollisionMonitor::Impl::carryOut(const std::function<void()>& command) {
   }
 }
 
+/// Whatever fails, above all for want of memory, the node goes on; but what was said before is void.
 void CollisionMonitor::Impl::work() {
   bool more = false;
   while (!stopping) {
     const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
     if (stopping) return;
-    for (const auto& command : commands) carryOut(command);
-    if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
-    if (map_publisher_seen) pipeline.expectMap();
-    publishEffects(ros::Time::now());  // the first plan comes before the first frame
-    takeMaps();
-    if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();
-    takeMessages();
-    accountDropped();
-    Outcome outcome;
-    while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
-    tellComplaints();
-    const std::string surprise = recorder.takeSurprise();
-    if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
-    more = false;
-    for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
-    lookIntoSilence();
-    diagnostics.publishWhenDue(steadyNs(), enabled, pipeline.effects().mapExpected() ? log.mapSource() : "",
-                               log.hint());
+    try {
+      more = workOn(commands);
+    } catch (const std::exception& error) {
+      more = false;
+      state.takeBack(std::string("a fault of the monitor: ") + error.what());
+      log.complain(config.monitor.clock_body, "worker", std::string("a fault of the monitor: ") + error.what());
+    }
   }
+}
+
+/// True when more can be done at once.
+bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
+  for (const auto& command : commands) carryOut(command);
+  if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
+  if (map_publisher_seen) pipeline.expectMap();
+  publishEffects(ros::Time::now());  // the first plan comes before the first frame
+  takeMaps();
+  if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();
+  takeMessages();
+  accountDropped();
+  Outcome outcome;
+  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
+  tellComplaints();
+  const std::string surprise = recorder.takeSurprise();
+  if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
+  bool more = false;
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
+  lookIntoSilence();
+  diagnostics.publishWhenDue(steadyNs(), enabled, pipeline.effects().mapExpected() ? log.mapSource() : "", log.hint());
+  return more;
 }
 
 }  // namespace dccd
