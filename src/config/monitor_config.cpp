@@ -15,6 +15,13 @@ namespace {
 
 constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
+// What a contact takes on its way from a pair to a message and its markers, and a start-state intersection on its, and
+// the share of the memory that may go into them.
+constexpr std::size_t FOUND_BYTES = 1024;
+constexpr std::size_t FOUND_SHARE = 4;
+// Contacts for each vertex, edge and face. A cloth of 92,000 triangles that is crumpled into a ball has 0.4, layers
+// within a distance of several edges some tens; a mesh that collapses has half as many as it has features.
+constexpr std::size_t FOUND_PER_FEATURE = 2, FOUND_PER_FEATURE_WITH_DISTANCE = 32;
 
 TopologySource topologySource(ParameterReader& section) {
   const std::string text = section.choice(
@@ -286,6 +293,22 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.record_folder = reader.get("record_folder", std::string());
 }
 
+void limitMemory(MonitorConfig& config) {
+  Options& detector = config.monitor.detector;
+  detector.max_found = config.max_memory_bytes / FOUND_SHARE / FOUND_BYTES;
+  detector.max_found_per_feature = config.holdsDistance() ? FOUND_PER_FEATURE_WITH_DISTANCE : FOUND_PER_FEATURE;
+}
+
+void limitTime(MonitorConfig& config) { config.monitor.detector.max_compute_ms = config.max_compute_s * 1e3; }
+
+/// A tool has the limits that it is given, the node all of them (limitLive).
+void readLimits(ParameterReader& reader, MonitorConfig& config) {
+  config.max_memory_bytes = static_cast<std::size_t>(reader.integer("max_memory_mb", 512, 16, 1 << 20)) << 20;
+  config.max_compute_s = reader.number("max_compute_s", 0.5, 0, LARGE);
+  if (reader.has("max_memory_mb")) limitMemory(config);
+  if (reader.has("max_compute_s")) limitTime(config);
+}
+
 void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
   config.octomap_file = reader.get("octomap_file", std::string());
@@ -429,6 +452,11 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 
 }  // namespace
 
+void limitLive(MonitorConfig& config) {
+  limitMemory(config);
+  limitTime(config);
+}
+
 bool MonitorConfig::holdsDistance() const {
   return std::any_of(bodies.begin(), bodies.end(),
                      [](const BodyConfig& body) { return body.isUncertain() || largestSeparation({body.body}) > 0; });
@@ -459,6 +487,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
   readSeparationPairs(reader, config);
+  readLimits(reader, config);
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
   applyEffects(config);

@@ -50,6 +50,8 @@ struct MonitorConfig {
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = "octomap", octomap_file, octomap_frame;
   std::size_t max_map_bytes = std::size_t{512} << 20;
+  std::size_t max_memory_bytes = std::size_t{512} << 20;
+  double max_compute_s = 0.5;
   double transform_timeout_s = 0.2;
   double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
@@ -68,5 +70,8 @@ struct MonitorConfig {
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
 MonitorConfig readConfig(const ParameterTree& tree, const std::string& path);
+/// What bounds a live node's steps, from max_memory_mb and max_compute_s, defaults included. Elsewhere a limit that was
+/// not given is none, so that no answer depends on a clock.
+void limitLive(MonitorConfig& config);
 
 }  // namespace dccd

@@ -21,6 +21,7 @@ MonitorConfig configOf(const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
   private_node.getParam(private_node.getNamespace(), tree);
   MonitorConfig config = readConfig(tree);
+  limitLive(config);
   setSimdTarget(config.simd_target);
   return config;
 }
