@@ -149,10 +149,11 @@ void addSurvivors(const std::string& name, SceneArrays& scene, std::vector<PairS
         if (!shared) chunk.push_back(q);
       }
       kept.resize(chunk.size());
-      if (chunk.empty()) return;
+      if (chunk.empty()) return true;
       const std::size_t left = simd::fusedFilter(scene.vertices()->t0, chunk[0].data(), chunk.size(), edges,
                                                  simd::FusedPlanes::ADAPTIVE, kept.data());
       for (std::size_t i = 0; i < left; ++i) set.pairs.push_back(chunk[kept[i]]);
+      return true;
     });
     sets.push_back(std::move(set));
   }

@@ -25,6 +25,7 @@ struct Options {
   BroadPhase broad_phase = BroadPhase::CLUSTERED;
   int num_threads = 1;            ///< 1 or more
   double step_budget_ms = 0;      ///< 0: none
+  double max_compute_ms = 0;      ///< ends a step that has no budget as if it were one; 0: none
   bool earliest_only = false;     ///< only contacts that may be the first; with `exact` those in the earliest TOC cell
   bool check_start_state = true;  ///< run the static tests when the step needs them
   /// Bodies that move bit for bit as in the step before keep their bounds (no answer changes). Off: to time a step
@@ -36,6 +37,12 @@ struct Options {
   double rigid_tolerance_m = tolerance::RIGID_PATH_M;
   std::size_t max_substeps = 64;
   std::size_t max_contacts = std::numeric_limits<std::size_t>::max();  ///< the earliest are kept, status TRUNCATED
+  /// A step that finds more than this, contacts and what meets when it begins each by itself, stops looking: status
+  /// TRUNCATED, not complete. The same for any number of threads and SIMD target. 0: no limit.
+  std::size_t max_found = 0;
+  /// The same for each vertex, edge and face of the bodies, but max_contacts at the least: what coincides makes pairs
+  /// by the square. 0: no limit.
+  std::size_t max_found_per_feature = 0;
   bool suppress_initial = false;   ///< leave initial obstacle contacts out of the list (they still count)
   std::vector<Box> exclude_boxes;  ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;  ///< without a map the status is NO_MAP
@@ -73,9 +80,10 @@ class DCCD_EXPORT History {
 /// Throws std::invalid_argument naming what of the step or the options does not fit. After warm-up nothing is allocated
 /// that grows with the number of steps.
 DCCD_EXPORT Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline);
-/// Within the options' step budget.
+/// Within the options' step budget, or what ends a step that has none.
 inline Outcome detect(const Step& step, const Options& options, History& history) {
-  return detect(step, options, history, Deadline::after(options.step_budget_ms));
+  return detect(step, options, history,
+                Deadline::after(options.step_budget_ms > 0 ? options.step_budget_ms : options.max_compute_ms));
 }
 
 }  // namespace dccd

@@ -162,15 +162,18 @@ struct Outcome {
   bool answered = false;       ///< the fields below hold a result
 
   std::vector<Contact> contacts;      ///< canonical order, filtered and cut as the options say; toc of the whole step
-  std::size_t total_contacts = 0;     ///< before the cut to max_contacts
+  std::size_t total_contacts = 0;     ///< before the cut to max_contacts; with `cut` there are at least so many
   ContactCounts counts;               ///< of all of these
   std::size_t suppressed = 0;         ///< initial contacts left out by choice
   std::uint64_t excluded_voxels = 0;  ///< finest voxels of the map taken out by exclude_boxes
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
   bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
-  bool complete = true;  ///< false: the step budget ran out, before the last pair or before the start state was known
-  /// The budget left pairs out, none of which can touch before this; otherwise infinity.
+  /// False: the step budget ran out, or max_found was reached, before the last pair or before the start state was
+  /// known.
+  bool complete = true;
+  bool cut = false;  ///< there was more to find than Options::max_found
+  /// Pairs were left out, none of which can touch before this; otherwise infinity.
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
   StepStats stats;

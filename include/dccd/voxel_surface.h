@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -84,10 +85,14 @@ class DCCD_EXPORT ObstacleCheck {
   /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
   /// vertex_radius_m: uncertainty per vertex, 0 or more; null means none. A feature's largest one adds to the
   /// separation, so that rungs other than conservative and screen cannot hold it. deadline: features that have not been
-  /// begun by then are left out, and false is returned.
+  /// begun by then are left out, and false is returned. most_found: so many contacts at most are appended; of more,
+  /// those found first, and false is returned.
   bool run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
            const std::uint8_t* vertex_active, std::uint16_t body, std::vector<Contact>& contacts, ObstacleStats& stats,
-           const double* vertex_radius_m = nullptr, const Deadline& deadline = {});
+           const double* vertex_radius_m = nullptr, const Deadline& deadline = {},
+           std::size_t most_found = std::numeric_limits<std::size_t>::max());
+  /// Whether the last run had more to find than most_found.
+  bool isFull() const;
 
  private:
   struct Impl;

@@ -15,6 +15,13 @@ namespace {
 
 constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
+// What a contact takes on its way from a pair to a message and its markers, and a start-state intersection on its, and
+// the share of the memory that may go into them.
+constexpr std::size_t FOUND_BYTES = 1024;
+constexpr std::size_t FOUND_SHARE = 4;
+// Contacts for each vertex, edge and face. A cloth of 92,000 triangles that is crumpled into a ball has 0.4, layers
+// within a distance of several edges some tens; a mesh that collapses has half as many as it has features.
+constexpr std::size_t FOUND_PER_FEATURE = 2, FOUND_PER_FEATURE_WITH_DISTANCE = 32;
 
 TopologySource topologySource(ParameterReader& section) {
   const std::string text = section.choice(
@@ -287,6 +294,24 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.record_folder = reader.get("record_folder", std::string());
 }
 
+void limitMemory(MonitorConfig& config) {
+  Options& detector = config.monitor.detector;
+  detector.max_found = config.max_memory_bytes / FOUND_SHARE / FOUND_BYTES;
+  detector.max_found_per_feature = config.holdsDistance() ? FOUND_PER_FEATURE_WITH_DISTANCE : FOUND_PER_FEATURE;
+  config.max_queue_bytes = config.max_memory_bytes / 4;
+  for (BodyConfig& body : config.bodies) body.input.max_faces = config.max_memory_bytes / 2 / tolerance::BYTES_PER_FACE;
+}
+
+void limitTime(MonitorConfig& config) { config.monitor.detector.max_compute_ms = config.max_compute_s * 1e3; }
+
+/// A tool has the limits that it is given, the node all of them (limitLive).
+void readLimits(ParameterReader& reader, MonitorConfig& config) {
+  config.max_memory_bytes = static_cast<std::size_t>(reader.integer("max_memory_mb", 512, 16, 1 << 20)) << 20;
+  config.max_compute_s = reader.number("max_compute_s", 0.5, 0, LARGE);
+  if (reader.has("max_memory_mb")) limitMemory(config);
+  if (reader.has("max_compute_s")) limitTime(config);
+}
+
 void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.octomap_topic_named = reader.has("octomap_topic");
   config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
@@ -311,15 +336,6 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
                 "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
                 "the workspace within which the unknown is an obstacle");
   }
-}
-
-/// Half of it is for frames as they are used, with their topology and what a step makes of it.
-void readMemory(ParameterReader& reader, Guards guards, MonitorConfig& config) {
-  constexpr int LIVE_MB = 512;
-  const int megabytes = reader.integer("max_memory_mb", guards == Guards::LIVE ? LIVE_MB : 0, 0, 1 << 20);
-  if (megabytes == 0) return;
-  config.max_memory_bytes = static_cast<std::size_t>(megabytes) << 20;
-  for (BodyConfig& body : config.bodies) body.input.max_faces = config.max_memory_bytes / 2 / tolerance::BYTES_PER_FACE;
 }
 
 void readEffects(ParameterReader section, MonitorConfig& config) {
@@ -443,6 +459,11 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 
 }  // namespace
 
+void limitLive(MonitorConfig& config) {
+  limitMemory(config);
+  limitTime(config);
+}
+
 bool MonitorConfig::namesOctomap() const {
   const auto setting = effects.find(Effect::OCTOMAP);
   const bool automatic = setting == effects.end() || setting->second == EffectSetting::AUTO;
@@ -470,7 +491,7 @@ MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
   return readConfig(treeOf(tree), path, Guards::LIVE);
 }
 
-MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, Guards guards) {
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
   config.fixed_frame = reader.get("fixed_frame", std::string());
@@ -481,7 +502,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, Gua
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
   readSeparationPairs(reader, config);
-  readMemory(reader, guards, config);
+  readLimits(reader, config);
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
   applyEffects(config);

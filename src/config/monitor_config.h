@@ -55,11 +55,13 @@ struct MonitorConfig {
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
   bool octomap_topic_named = false;  ///< as BodyConfig::topic_named
   std::size_t max_map_bytes = std::size_t{512} << 20;
+  std::size_t max_memory_bytes = std::size_t{512} << 20;  ///< see limitLive()
+  std::size_t max_queue_bytes = 0;                        ///< a quarter of it where it holds; 0: no limit
+  double max_compute_s = 0.5;
   double transform_timeout_s = 0.2;
   double answer_timeout_s = 0.5;
   std::size_t queue_size = 8;
   QueuePolicy queue_policy = QueuePolicy::NEWEST;
-  std::size_t max_memory_bytes = 0;  ///< of what messages may hold (doc/guarantees.md); 0: no limit
   std::string simd_target = "auto";
   std::size_t record_steps = 1;  ///< steps that the flight recorder keeps; 0: off
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
@@ -73,11 +75,11 @@ struct MonitorConfig {
   std::uint64_t hash() const;
 };
 
-/// What guards a live node, which nobody watches, and would only surprise in a tool.
-enum class Guards : std::uint8_t { LIVE, NONE };
-
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
-MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, Guards guards = Guards::NONE);
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path);
+/// What bounds a live node's steps, from max_memory_mb and max_compute_s, defaults included. Elsewhere a limit that was
+/// not given is none, so that no answer depends on a clock.
+void limitLive(MonitorConfig& config);
 
 }  // namespace dccd

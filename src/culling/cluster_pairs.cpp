@@ -4,13 +4,28 @@
 
 namespace dccd {
 
-void superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) {
+namespace {
+
+/// superclusterTocBound() of groups of any level.
+double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::uint32_t b);
+
+}  // namespace
+
+double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch,
+                         std::size_t max_pairs) {
+  double left_out = std::numeric_limits<double>::infinity();
   pairs.assign({0, 0});
   for (std::size_t l = trees.a->height() - 1; l > 1; --l) {
     scratch.clear();
     std::size_t done = 0;
     const std::size_t count = pairs.size() / 2;
     while (done < count) {
+      if (scratch.size() / 2 > max_pairs) {
+        for (; done < count; ++done) {
+          left_out = std::min(left_out, tocBound(trees, l, pairs[2 * done], pairs[2 * done + 1]));
+        }
+        break;
+      }
       constexpr std::size_t STEP = 16 * simd::GROUP * simd::GROUP;
       const std::size_t used = scratch.size();
       scratch.resize(used + 2 * STEP);
@@ -22,12 +37,23 @@ void superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs,
       done += consumed;
     }
     std::swap(pairs, scratch);
+    for (std::size_t p = max_pairs; p < pairs.size() / 2; ++p) {
+      left_out = std::min(left_out, tocBound(trees, l - 1, pairs[2 * p], pairs[2 * p + 1]));
+    }
+    if (pairs.size() / 2 > max_pairs) pairs.resize(2 * max_pairs);
   }
+  return left_out;
 }
 
 double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_t b) {
-  const std::int16_t* x = trees.a->level(1).aos.data() + std::size_t{a} * simd::AOS_SIZE;
-  const std::int16_t* y = trees.b->level(1).aos.data() + std::size_t{b} * simd::AOS_SIZE;
+  return tocBound(trees, 1, a, b);
+}
+
+namespace {
+
+double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::uint32_t b) {
+  const std::int16_t* x = trees.a->level(level).aos.data() + std::size_t{a} * simd::AOS_SIZE;
+  const std::int16_t* y = trees.b->level(level).aos.data() + std::size_t{b} * simd::AOS_SIZE;
   // Gap of real projections in record units: values are truncated to a unit, and the scaling's rounding is far below
   // another one. The ends of moving intervals are bounded by straight lines between the bounds at t0 and t1.
   const auto firstMeeting = [](int gap0, int gap1) {
@@ -45,6 +71,8 @@ double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_
   }
   return latest;
 }
+
+}  // namespace
 
 ClusterPairStream::ClusterPairStream() : clusters_(2 * CLUSTER_PAIRS), slots_(2 * CHUNK) {}
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "culling/cluster_tree.h"
@@ -16,8 +17,11 @@ struct TreePair {
   bool t0_only = false;  ///< test the state at t0 instead of the whole step
 };
 
-/// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads.
-void superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch);
+/// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads. Of more than max_pairs
+/// that many are kept, the first in the trees' order. Returns a time before which nothing of the rest can touch, as
+/// superclusterTocBound() does; infinity when all were kept.
+double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch,
+                         std::size_t max_pairs = std::numeric_limits<std::size_t>::max());
 
 /// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
 /// overlap (to two record units) in all 8 directions at t=0. 1 when they never meet during the step.
@@ -30,9 +34,10 @@ class ClusterPairStream {
 
   ClusterPairStream();
 
-  /// pairs: `count` pairs of level-1 groups. sink(const uint32_t* slot_pairs, size_t count) is called once per chunk.
+  /// pairs: `count` pairs of level-1 groups. sink(const uint32_t* slot_pairs, size_t count) is called once per chunk,
+  /// as long as it returns true. False: it did not.
   template <class Sink>
-  void run(const TreePair& trees, const std::uint32_t* pairs, std::size_t count, Sink&& sink) {
+  bool run(const TreePair& trees, const std::uint32_t* pairs, std::size_t count, Sink&& sink) {
     std::size_t done = 0;
     while (done < count) {
       std::size_t consumed = 0;
@@ -47,9 +52,10 @@ class ClusterPairStream {
             trees.self, simd::Diagonal::STRICT_UPPER, trees.t0_only, slots_.data(), CHUNK, &consumed);
         leaf_done += consumed;
         cluster_pairs_tested_ += consumed;
-        if (found) sink(slots_.data(), found);
+        if (found && !sink(slots_.data(), found)) return false;
       }
     }
+    return true;
   }
 
   std::uint64_t clusterPairsTested() const { return cluster_pairs_tested_; }

@@ -21,6 +21,7 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
   private_node.getParam(private_node.getNamespace(), tree);
   MonitorConfig config = readConfig(tree);
   takeRemappings(node, config);
+  limitLive(config);
   setSimdTarget(config.simd_target);
   return config;
 }
@@ -40,7 +41,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       recorder(config, pipeline.monitor()),
       outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
       state(private_node, livenessLimits(config)),
-      queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_memory_bytes / 4),
+      queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_queue_bytes),
       diagnostics(private_node.getNamespace(), node),
       log(node, private_node.getNamespace(), config),
       look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}

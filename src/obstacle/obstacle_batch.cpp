@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "obstacle/burst.h"
+
 namespace dccd {
 namespace {
 
@@ -79,6 +81,7 @@ void ObstacleBatch::clear() {
   points_.clear();
   separations_.clear();
   any_separation_ = false;
+  releaseBurst(contacts_);
   contacts_.clear();
   tiers_ = TierCounters();
 }

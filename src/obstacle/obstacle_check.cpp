@@ -9,6 +9,7 @@
 #include "obstacle/obstacle_check_impl.h"
 
 #include "dccd/accuracy.h"
+#include "obstacle/burst.h"
 
 namespace dccd {
 namespace {
@@ -126,7 +127,25 @@ void ObstacleCheck::Impl::markNearEdges(const Run& run) {
   }
 }
 
-void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats) {
+/// A feature and a leaf may meet in a dozen places, which are joined now and then. A contact that was settled and one
+/// that was tested may still be the same: hence twice the number.
+bool ObstacleCheck::Impl::foundTooMuch(const Run& run) {
+  if (run.most_found == NO_LIMIT) return false;
+  std::vector<Contact>* const lists[] = {&vertex_contacts,         &edge_contacts,         &face_contacts,
+                                         &vertex_batch.contacts(), &edge_batch.contacts(), &corner_batch.contacts()};
+  const auto count = [&] {
+    std::size_t sum = 0;
+    for (const auto* list : lists) sum += list->size();
+    return sum;
+  };
+  if (count() <= 2 * std::max(run.most_found, joined)) return false;
+  for (auto* list : lists) sortAndJoin(*list);
+  joined = count();
+  return joined > 2 * run.most_found;
+}
+
+void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found,
+                                  ObstacleStats& stats) {
   const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch, std::uint64_t& count) {
     batch.flush();
     stats.tiers += batch.tiers();
@@ -146,6 +165,10 @@ void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t fi
   append(vertex_contacts, vertex_batch, stats.vertex_contacts);
   append(edge_contacts, edge_batch, stats.edge_contacts);
   append(face_contacts, corner_batch, stats.corner_contacts);
+  if (contacts.size() - first > most_found) {
+    full = late = true;
+    contacts.resize(first + most_found);
+  }
   for (std::size_t i = first; i < contacts.size(); ++i) {
     stats.initial += contacts[i].initial;
     stats.leaving += contacts[i].leaving;
@@ -158,7 +181,7 @@ ObstacleCheck::~ObstacleCheck() = default;
 bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
                         const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
                         std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m,
-                        const Deadline& deadline) {
+                        const Deadline& deadline, std::size_t most_found) {
   const auto start = std::chrono::steady_clock::now();
   if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
     throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +
@@ -166,14 +189,21 @@ bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, c
                                 std::to_string(topology.vertexCount()));
   }
   Impl& impl = *impl_;
-  const Impl::Run run{&surface.impl(), &topology, &map_t0, &map_t1, body, &stats, vertex_radius_m, deadline};
-  impl.late = false;
+  const Impl::Run run{&surface.impl(), &topology,       &map_t0,  &map_t1,   body,
+                      &stats,          vertex_radius_m, deadline, most_found};
+  impl.late = impl.full = false;
   impl.looked_at = 0;
+  impl.joined = 0;
   impl.prepareReaches(run);
   if (surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
     impl.vertex_batch.clear();
     impl.edge_batch.clear();
     impl.corner_batch.clear();
+    for (auto* contacts_of : {&impl.vertex_contacts, &impl.edge_contacts, &impl.face_contacts}) {
+      releaseBurst(*contacts_of);
+      contacts_of->clear();
+    }
+    releaseBurst(impl.near_leaves);
     impl.prepareVertices(run, vertex_active);
     if (topology.hasFaces()) {
       impl.markNearFaces(run);
@@ -183,10 +213,12 @@ bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, c
     impl.runVertices(run);
     impl.runEdges(run);
     impl.runFaces(run);
-    impl.collect(contacts, contacts.size(), stats);
+    impl.collect(contacts, contacts.size(), most_found, stats);
   }
   stats.ms += millisecondsSince(start);
   return !impl.late;
 }
+
+bool ObstacleCheck::isFull() const { return impl_->full; }
 
 }  // namespace dccd

@@ -48,7 +48,10 @@ struct ObstacleCheck::Impl {
     ObstacleStats* stats;
     const double* radius_m = nullptr;  ///< uncertainty per vertex; null: none
     Deadline deadline;
+    std::size_t most_found = NO_LIMIT;
+    bool isUnlimited() const { return deadline.isNever() && most_found == NO_LIMIT; }
   };
+  static constexpr std::size_t NO_LIMIT = std::numeric_limits<std::size_t>::max();
 
   /// Distance from which on a feature of these vertices is in contact.
   template <class Feature>
@@ -64,11 +67,14 @@ struct ObstacleCheck::Impl {
   /// The same, as far as bounds must reach.
   static double reachOf(double separation_m) { return separation_m * (1 + tolerance::MAP_REACH); }
 
-  /// The clock is read for one feature in 32.
+  /// Asked before each feature and each leaf near it: has this run found enough, or is its time up? Looks at one in 32.
   bool isLate(const Run& run) {
-    if (late || run.deadline.isNever()) return late;
-    return late = (looked_at++ & 31) == 0 && run.deadline.isOver();
+    if (late || run.isUnlimited() || (looked_at++ & 31) != 0) return late;
+    full = full || foundTooMuch(run);
+    return late = full || run.deadline.isOver();
   }
+  /// Certainly more than most_found are left when collect() has joined what belongs to one feature and leaf.
+  bool foundTooMuch(const Run& run);
 
   bool reachesSurface(const Run& run) const;
   void prepareReaches(const Run& run);
@@ -98,7 +104,7 @@ struct ObstacleCheck::Impl {
                  double separation_m, std::uint32_t leaf, bool inside);
   void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, const MovingBounds& moving,
                    double separation_m, std::uint32_t leaf, bool inside);
-  void collect(std::vector<Contact>& contacts, std::size_t first, ObstacleStats& stats);
+  void collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found, ObstacleStats& stats);
 
   Contact contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const;
   void setInitial(Contact& contact);
@@ -118,14 +124,26 @@ struct ObstacleCheck::Impl {
     return lanes;
   }
   /// Fills near_leaves with the leaves that a key box reaches, by key.
-  void findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box);
+  void findLeaves(const Run& run, const KeyBox& box);
+  /// Of a run that is limited not more than this, 16 MB, are near a feature; of more the run is full.
+  static constexpr std::size_t MOST_NEAR_LEAVES = std::size_t{1} << 22;
+  bool addNear(const Run& run, std::uint32_t leaf) {
+    if (run.most_found != NO_LIMIT && near_leaves.size() == MOST_NEAR_LEAVES) {
+      full = late = true;
+    } else {
+      near_leaves.push_back(leaf);
+    }
+    return !late;
+  }
   static void sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list);
 
   ObstacleOptions options;
   std::unique_ptr<Rung> test;
   ObstacleBatch vertex_batch, edge_batch, corner_batch;
-  bool late = false;  ///< the deadline of this run has passed
+  bool late = false;  ///< this run is to end
+  bool full = false;  ///< because of what it has found
   std::uint32_t looked_at = 0;
+  std::size_t joined = 0;  ///< contacts of this run when they were last joined
 
   std::vector<double> reaches;       ///< per vertex: the largest separation of a feature at it, rounded up; [0] for all
   std::vector<KeyLanes> keys;        ///< over the step, as far as the reaches

@@ -116,10 +116,10 @@ void ObstacleCheck::Impl::setTime(Contact& contact, const CrossingTime& time) {
   }
 }
 
-void ObstacleCheck::Impl::findLeaves(const VoxelSurface::Impl& surface, const KeyBox& box) {
+void ObstacleCheck::Impl::findLeaves(const Run& run, const KeyBox& box) {
   near_leaves.clear();
-  surface.tree.visitLeaves(box, [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
-  sortLeaves(surface, near_leaves);
+  run.surface->tree.visitLeaves(box, [&](std::uint32_t leaf) { return addNear(run, leaf); });
+  if (!full) sortLeaves(*run.surface, near_leaves);
 }
 
 void ObstacleCheck::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list) {
@@ -158,17 +158,17 @@ bool ObstacleCheck::Impl::settleFall(const Run& run, PairKind kind, const Featur
 }
 
 void ObstacleCheck::Impl::runVertices(const Run& run) {
-  vertex_contacts.clear();
   const double resolution = run.surface->resolution_m;
   for (const Index v : run.topology->usedVertices()) {
     if ((state[v] & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
     if (isLate(run)) return;
-    findLeaves(*run.surface, keys[v].box());
+    findLeaves(run, keys[v].box());
     if (near_leaves.empty()) continue;
     run.stats->vertex_pairs_in += near_leaves.size();
     const double* p0 = (*run.t0)[v].data();
     std::size_t apart = 0;
     for (const std::uint32_t leaf : near_leaves) {
+      if (isLate(run)) return;
       if (!pointInBox(p0, leafBox(run.surface->tree.leaves()[leaf], resolution))) {
         near_leaves[apart++] = leaf;
         continue;
@@ -179,6 +179,7 @@ void ObstacleCheck::Impl::runVertices(const Run& run) {
     if (!(state[v] & MOVES)) continue;
     const bool inside = (state[v] & INSIDE) != 0;
     for (std::size_t i = 0; i < apart; ++i) {
+      if (isLate(run)) return;
       if (!(run.surface->features[near_leaves[i]] & FACE_MASK)) continue;
       if (separationOf(run, std::array<Index, 1>{v}) > 0) {
         vertexSeparation(run, v, near_leaves[i], inside);
@@ -228,7 +229,6 @@ void ObstacleCheck::Impl::vertexSeparation(const Run& run, Index vertex, std::ui
 }
 
 void ObstacleCheck::Impl::runEdges(const Run& run) {
-  edge_contacts.clear();
   for (const Edge& edge : run.topology->edges()) {
     const std::uint8_t both = state[edge[0]] & state[edge[1]], either = state[edge[0]] | state[edge[1]];
     if ((both & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
@@ -239,20 +239,24 @@ void ObstacleCheck::Impl::runEdges(const Run& run) {
     if (!(both & NEAR_EDGE) || !(either & MOVES)) continue;
     near_leaves.clear();
     run.surface->tree.visitLeavesWithEdges(unite(keys, edge).box(),
-                                           [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
+                                           [&](std::uint32_t leaf) { return addNear(run, leaf); });
     if (near_leaves.empty()) continue;
     run.stats->edge_pairs_in += near_leaves.size();
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
     const double separation_m = separationOf(run, edge);
     const MovingBounds moving = boundsOf(points, 2, reachOf(separation_m));
-    for (const std::uint32_t leaf : near_leaves) edgePairs(run, edge, points, moving, separation_m, leaf, inside);
+    for (const std::uint32_t leaf : near_leaves) {
+      if (isLate(run)) return;
+      edgePairs(run, edge, points, moving, separation_m, leaf, inside);
+    }
   }
 }
 
 bool ObstacleCheck::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
-  findLeaves(*run.surface, unite(start_keys, edge).box());
+  findLeaves(run, unite(start_keys, edge).box());
   bool inside = false;
   for (const std::uint32_t leaf : near_leaves) {
+    if (isLate(run)) break;
     const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
     if (!segmentMeetsBox((*run.t0)[edge[0]].data(), (*run.t0)[edge[1]].data(), box)) continue;
     inside = true;
@@ -305,7 +309,6 @@ void ObstacleCheck::Impl::edgePairs(const Run& run, const Edge& edge, const Vert
 }
 
 void ObstacleCheck::Impl::runFaces(const Run& run) {
-  face_contacts.clear();
   for (const NearFace& near : near_faces) {
     if (isLate(run)) return;
     const Face& face = run.topology->faces()[near.face];
@@ -315,21 +318,25 @@ void ObstacleCheck::Impl::runFaces(const Run& run) {
     if (!near.corner || !(any & MOVES)) continue;
     near_leaves.clear();
     run.surface->tree.visitLeavesWithCorners(unite(keys, face).box(),
-                                             [this](std::uint32_t leaf) { near_leaves.push_back(leaf); });
+                                             [&](std::uint32_t leaf) { return addNear(run, leaf); });
     run.stats->corner_pairs_in += near_leaves.size();
     if (near_leaves.empty()) continue;
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
     const double separation_m = separationOf(run, face);
     const MovingBounds moving = boundsOf(points, 3, reachOf(separation_m));
-    for (const std::uint32_t leaf : near_leaves) cornerPairs(run, face, points, moving, separation_m, leaf, inside);
+    for (const std::uint32_t leaf : near_leaves) {
+      if (isLate(run)) return;
+      cornerPairs(run, face, points, moving, separation_m, leaf, inside);
+    }
   }
 }
 
 bool ObstacleCheck::Impl::faceStartsInside(const Run& run, const Face& face) {
-  findLeaves(*run.surface, unite(start_keys, face).box());
+  findLeaves(run, unite(start_keys, face).box());
   const double *p0 = (*run.t0)[face[0]].data(), *p1 = (*run.t0)[face[1]].data(), *p2 = (*run.t0)[face[2]].data();
   std::size_t pierced = 0;
   for (const std::uint32_t leaf : near_leaves) {
+    if (isLate(run)) return true;
     const TriangleStart start =
         triangleMeetsBox(p0, p1, p2, leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m));
     if (start == TriangleStart::BOUNDARY) return true;  // known by an edge of the face

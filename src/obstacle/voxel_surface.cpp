@@ -85,9 +85,10 @@ const OccupiedLeaf* VoxelSurface::leafAt(const Vec3& point_map) const {
     const OccupiedLeaf& leaf = impl_->tree.leaves()[index];
     const LeafBox box = leafBox(leaf, impl_->resolution_m);
     for (int axis = 0; axis < 3; ++axis) {
-      if (point_map[axis] < box.lo[axis] || point_map[axis] > box.hi[axis]) return;
+      if (point_map[axis] < box.lo[axis] || point_map[axis] > box.hi[axis]) return true;
     }
     if (found == nullptr || leaf.min < found->min) found = &leaf;
+    return true;
   });
   return found;
 }

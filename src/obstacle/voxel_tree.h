@@ -62,7 +62,8 @@ class VoxelTree {
   /// How far the aligned cube of `size` (a power of two) voxels with smallest key (x, y, z) is occupied.
   Coverage coverage(std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t size) const;
 
-  /// Calls visit(leaf index) once for every leaf with a voxel in the box, in an order fixed by the tree.
+  /// Calls visit(leaf index) once for every leaf with a voxel in the box, in an order fixed by the tree, as long as it
+  /// returns true.
   template <class Visit>
   void visitLeaves(const KeyBox& box, Visit&& visit) const;
   /// Only those with a cell of theirs in the box that may hold a convex edge, or a corner.
@@ -239,7 +240,7 @@ void VoxelTree::visitWanted(const KeyBox& box, Wanted wanted, Visit& visit) cons
       std::uint32_t last = NONE;
       for (; bits != 0; bits &= bits - 1) {
         const std::uint32_t leaf = node.leafAt(lowestBit(bits));
-        if (leaf != last) visit(leaf);
+        if (leaf != last && !visit(leaf)) return true;
         last = leaf;
       }
       return false;

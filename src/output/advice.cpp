@@ -94,7 +94,8 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     case StepStatus::DEADLINE:
       return "raise step_budget_ms or num_threads, or take a cheaper accuracy";
     case StepStatus::TRUNCATED:
-      return "raise max_contacts to see all";
+      return "raise max_contacts to see all; where the work was cut, see what lies in one place, or raise "
+             "max_memory_mb";
     case StepStatus::QUEUE_FULL:
       return "raise num_threads, or take a cheaper accuracy or fewer vertices";
     default:

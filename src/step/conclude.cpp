@@ -37,6 +37,7 @@ void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   std::stable_sort(contacts.begin(), contacts.end(),
                    [](const Contact& a, const Contact& b) { return a.toc_lower < b.toc_lower; });
   contacts.resize(count);
+  contacts.shrink_to_fit();
   std::sort(contacts.begin(), contacts.end(), canonicalLess);
 }
 
@@ -86,12 +87,22 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
     say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
                                    std::to_string(outcome.total_contacts) + " contacts are listed");
   }
-  if (!outcome.complete && !outcome.allPairs()) {
-    say(StepStatus::DEADLINE, "the step budget ran out; nothing that was left out touches before toc " +
-                                  std::to_string(outcome.unchecked_toc_lower));
+  const std::string not_before =
+      "nothing that was left out touches before toc " + std::to_string(outcome.unchecked_toc_lower);
+  const std::string ran_out =
+      options.step_budget_ms > 0 ? "the step budget ran out" : "the time that a step may take without a budget ran out";
+  if (outcome.cut) {
+    const std::string text = "at least " + std::to_string(outcome.total_contacts) +
+                             " contacts; the work was cut at the limit of what a step may find; " +
+                             (outcome.allPairs() ? "not all of the start state was looked at" : not_before);
+    outcome.status = StepStatus::TRUNCATED;
+    outcome.reason = text;
+    outcome.unproved.push_back(text);
+  } else if (!outcome.complete && !outcome.allPairs()) {
+    say(StepStatus::DEADLINE, ran_out + "; " + not_before);
   } else if (!outcome.complete) {
     say(StepStatus::DEADLINE,
-        "the step budget ran out before all of the start state was looked at; no pair was left out of the contacts");
+        ran_out + " before all of the start state was looked at; no pair was left out of the contacts");
   }
   if (outcome.substeps < needed_parts) {
     say(StepStatus::PARTIAL, "a rigid body turns so far that " + std::to_string(needed_parts) +
@@ -164,6 +175,7 @@ void addPart(std::size_t part, std::size_t parts, const PartResult& result, Outc
     contact.initial = contact.initial && part == 0;
     outcome.contacts.push_back(contact);
   }
+  outcome.cut = outcome.cut || result.cut;
   if (!result.complete) leaveOut(scaleDown(std::min(result.unchecked_toc_lower, 1.0), part, parts), outcome);
   outcome.stats += result.stats;
 }
@@ -195,6 +207,8 @@ void check(const Options& options, const std::vector<Body>& bodies) {
           "num_threads = " + std::to_string(options.num_threads) + " is out of range; 1 to 1024");
   require(options.step_budget_ms >= 0 && options.step_budget_ms <= 1e9,
           "step_budget_ms = " + std::to_string(options.step_budget_ms) + " is out of range; 0 (none) to 1e9");
+  require(options.max_compute_ms >= 0 && options.max_compute_ms <= 1e12,
+          "max_compute_ms = " + std::to_string(options.max_compute_ms) + " is out of range; 0 (none) to 1e12");
   require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
   require(options.max_substeps >= 1, "max_substeps must be 1 or more");
   for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
@@ -206,9 +220,9 @@ void check(const Options& options, const std::vector<Body>& bodies) {
 bool operator==(const Options& a, const Options& b) {
   const auto values = [](const Options& o) {
     return std::tie(o.accuracy.rung, o.accuracy.tolerance_m, o.accuracy.toc_bits, o.accuracy.max_subdivisions,
-                    o.broad_phase, o.num_threads, o.step_budget_ms, o.earliest_only, o.check_start_state, o.keep_bounds,
-                    o.unfolded_test, o.rigid_tolerance_m, o.max_substeps, o.max_contacts, o.suppress_initial,
-                    o.obstacle_expected);
+                    o.broad_phase, o.num_threads, o.step_budget_ms, o.max_compute_ms, o.earliest_only,
+                    o.check_start_state, o.keep_bounds, o.unfolded_test, o.rigid_tolerance_m, o.max_substeps,
+                    o.max_contacts, o.max_found, o.max_found_per_feature, o.suppress_initial, o.obstacle_expected);
   };
   return values(a) == values(b) &&
          std::equal(a.exclude_boxes.begin(), a.exclude_boxes.end(), b.exclude_boxes.begin(), b.exclude_boxes.end(),

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "obstacle/burst.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/conclude.h"
 #include "step/history.h"
@@ -157,7 +158,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
     Step part = step;
     for (Body& body : part.bodies) body.t1 = body.t0;
     for (std::size_t i = 0; reached_end && i < parts; ++i) {
-      if (i > 0 && deadline.isOver()) {
+      if (i > 0 && (outcome.cut || deadline.isOver())) {
         // Of the rest all that is known is that it has not begun yet.
         leaveOut(scaleDown(0, i, parts), outcome);
         reached_end = false;
@@ -184,12 +185,19 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
 void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const ScopedFloatMode mode;
   const Clock::time_point begin = Clock::now();
+  for (PairWorker& w : workers) w.beginStep();
+  order.beginStep();
+  releaseBurst(result.contacts);
+  releaseBurst(result.intersections);
   result.intersections.clear();
   result.start_state = StartState::NOT_CHECKED;
   result.start_state_complete = result.complete = true;
+  result.cut = false;
   result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
   result.stats = StepStats();
   fill(part);
+  found_limit = foundLimit();
+  if (found_limit != FoundLimit::NONE) found_limit -= std::min(found_limit, outcome.contacts.size());
   StepContext context;
   context.scene = &scene;
   context.elementary = elementary.get();
@@ -199,7 +207,6 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   context.deadline = part.deadline;
   result.stats.left_out_listed = left_out_list.size();
   if (options->accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options->accuracy.tolerance_m;
-  for (PairWorker& w : workers) w.beginStep();
   findPairs(context);
   runPairs(context);
   collect(part.step);
@@ -276,6 +283,11 @@ void History::Impl::collect(const Step& step) {
     });
     base += sorted.size();
   }
+  if (result.cut) {  // what was found beyond depends on the threads
+    const auto undecided = [](const Contact& c) { return c.certainty == Certainty::UNDECIDED; };
+    result.stats.undecided =
+        static_cast<std::uint64_t>(std::count_if(result.contacts.begin(), result.contacts.end(), undecided));
+  }
   result.stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
 }
 
@@ -328,7 +340,8 @@ bool History::Impl::listStart(const Part& part, const StartStateSearch::IsOver& 
     whole = begins_at->carried.start_state.listEnd(before, is_over, met) && whole;
   } else {
     inside = carried.inside.run(scene, part.continues, is_over, result.stats);
-    met = carried.start_state.run(scene, part.continues, is_over, result.stats);
+    met = carried.start_state.run(scene, part.continues, is_over, result.stats, foundLimit());
+    if (carried.start_state.isCut()) result.cut = true;
     whole = carried.inside.isWhole() && carried.start_state.isWhole();
   }
   met.insert(met.end(), inside.begin(), inside.end());

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <tuple>
@@ -43,6 +44,7 @@ struct PartResult {
   StartState start_state = StartState::NOT_CHECKED;
   bool start_state_complete = true;
   bool complete = true;  ///< of the contacts
+  bool cut = false;      ///< what was left out went over the limit of what may be found
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   std::vector<Contact> contacts;
   std::vector<StartIntersection> intersections;
@@ -86,6 +88,11 @@ struct History::Impl {
   void orderByBound(const TreePair& trees);
   void findPairs(const StepContext& context);
   void runPairs(StepContext& context);
+  void cutHits();
+  /// What may be found in a whole step with these options and bodies; FoundLimit::NONE: no limit.
+  std::size_t foundLimit() const;
+  /// More was there to be found; nothing of what was left out touches before this.
+  void cutAt(double toc);
   void collect(const Step& step);
   void writeContact(PairKind kind, const Hit& hit, const Step& step, Contact& contact) const;
   bool meetAtStart(const Step& step, const Contact& contact) const;
@@ -121,6 +128,9 @@ struct History::Impl {
   // Buffers of a part.
   tbb::enumerable_thread_specific<PairWorker> workers;
   std::vector<PairTask> tasks;
+  std::vector<TaskHits> task_hits;             // per task
+  FoundLimit found;                            // by the tasks
+  std::size_t found_limit = FoundLimit::NONE;  // what the part may find
   std::vector<std::uint32_t> group_pairs, found_groups, scratch, body_pairs;
   std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc;  // and place, pair of groups
   std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at

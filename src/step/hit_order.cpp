@@ -1,6 +1,9 @@
 #include "step/hit_order.h"
 
+#include <algorithm>
 #include <array>
+
+#include "obstacle/burst.h"
 
 namespace dccd {
 namespace {
@@ -26,6 +29,16 @@ void HitOrder::sortByKey(std::uint64_t differing_bits) {
   }
 }
 
+void HitOrder::beginStep() {
+  a_.clear();
+  b_.clear();
+  sorted_.clear();
+  releaseBurst(a_, most_);
+  releaseBurst(b_, most_);
+  releaseBurst(sorted_, most_);
+  most_ = 0;
+}
+
 const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
   a_.clear();
   std::uint64_t key_or = 0, key_and = ~std::uint64_t{0}, bodies_or = 0, bodies_and = ~std::uint64_t{0};
@@ -39,6 +52,7 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
     }
   }
   b_.resize(a_.size());
+  most_ = std::max(most_, a_.size());
   // The ranks fill few of their 32 bits; side by side they need fewer digits.
   int low_bits = 0;
   while (low_bits < 32 && (key_or & 0xffffffffu) >> low_bits) ++low_bits;

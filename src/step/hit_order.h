@@ -13,6 +13,8 @@ class HitOrder {
  public:
   /// The result is valid until the next call; its elements point into the workers' vectors.
   const std::vector<const Hit*>& sort(const std::vector<const std::vector<Hit>*>& parts);
+  /// A step begins: gives back what the last one had no use for.
+  void beginStep();
 
  private:
   struct Entry {
@@ -22,6 +24,7 @@ class HitOrder {
   void sortByKey(std::uint64_t differing_bits);
   std::vector<Entry> a_, b_;
   std::vector<const Hit*> sorted_;
+  std::size_t most_ = 0;  // hits of a call since beginStep()
 };
 
 }  // namespace dccd

@@ -33,9 +33,12 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
   const Body& moving = part.step.bodies[b];
   const Positions& t0 = inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0);
   const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1);
+  const std::size_t room =
+      found_limit == FoundLimit::NONE ? FoundLimit::NONE : found_limit - std::min(found_limit, result.contacts.size());
   const bool whole = obstacle_checks[b]->run(*map_reduced, *body.setup.topology, t0, t1, active,
                                              static_cast<std::uint16_t>(b), result.contacts, total,
-                                             body.uncertain ? moving.radius_m->data() : nullptr, part.deadline);
+                                             body.uncertain ? moving.radius_m->data() : nullptr, part.deadline, room);
+  if (obstacle_checks[b]->isFull()) result.cut = true;
   const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(start)};
   if (scene.separation(b, OBSTACLE_BODY) > 0) result.stats[Effect::MINIMUM_SEPARATION] += of_body;
   if (body.uncertain) result.stats[Effect::TRACKER_NOISE] += of_body;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "obstacle/burst.h"
 #include "projection/toc_bound.h"
 #include "simd/fused_filter.h"
 
@@ -30,7 +31,10 @@ PairWorker::PairWorker()
       separations_(CAPACITY) {}
 
 void PairWorker::beginStep() {
-  for (auto& h : hits_) h.clear();
+  for (auto& h : hits_) {
+    releaseBurst(h);
+    h.clear();
+  }
   stats_ = StepStats();
   unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
 }
@@ -46,9 +50,16 @@ Clock::time_point PairWorker::lap(Stage stage, Clock::time_point start) {
   return now;
 }
 
-void PairWorker::begin(StepContext& context, const PairTask& task) {
+void PairWorker::dropHits(PairKind kind, std::size_t begin) {
+  std::vector<Hit>& hits = hits_[static_cast<int>(kind)];
+  if (begin < hits.size()) hits.resize(begin);
+}
+
+void PairWorker::begin(StepContext& context, const PairTask& task, std::size_t index) {
   context_ = &context;
   task_ = &task;
+  task_index_ = index;
+  enough_ = context.found && !context.found->add(index, 0);
   a_ = &context.scene->bodies()[task.body_a];
   b_ = &context.scene->bodies()[task.body_b];
   rule_ = SeparationRule(*context.scene, task.body_a, task.body_b, context.tolerance_m);
@@ -59,15 +70,15 @@ void PairWorker::begin(StepContext& context, const PairTask& task) {
   count_ = 0;
 }
 
-void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
-  begin(context, task);
+void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
+  begin(context, task, index);
   const Clock::time_point whole = Clock::now();
   const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
   const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(kindA(task.kind)).featureCount());
   const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(kindB(task.kind)).featureCount());
   std::uint32_t slots[2 * ClusterPairStream::CHUNK];
   std::size_t n = 0;
-  for (std::uint32_t i = 0; i < na; ++i) {
+  for (std::uint32_t i = 0; i < na && !enough_; ++i) {
     for (std::uint32_t j = same_tree ? i + 1 : 0; j < nb; ++j) {
       if (!a_->holds(kindA(task.kind), i) || !b_->holds(kindB(task.kind), j)) continue;
       slots[2 * n] = i;
@@ -83,27 +94,27 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task) {
   addMs(msSince(whole));
 }
 
-void PairWorker::run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs,
-                     std::size_t first, std::size_t last) {
-  begin(context, task);
+void PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
+                     const std::vector<std::uint32_t>& pairs) {
+  begin(context, task, index);
   const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
                        task.self && task.kind == PairKind::EDGE_EDGE, false};
   const Clock::time_point whole = Clock::now();
   Clock::time_point start = whole;
-  for (std::size_t p = first; p < last; ++p) {
-    if (context.timeIsUp()) {
-      // Nothing of these was looked at: all that is known is when their groups can meet.
-      for (; p < last; ++p) {
-        unchecked_toc_lower_ =
-            std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
-      }
-      break;
+  for (std::size_t p = task.first; p < task.last; ++p) {
+    const bool whole_pair =
+        goesOn() && stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
+          start = lap(Stage::BROAD_PHASE, start);
+          take(slots, n);
+          start = Clock::now();
+          return goesOn();
+        });
+    if (whole_pair) continue;
+    // Of what was not looked at here all that is known is when the groups can meet.
+    for (; p < task.last; ++p) {
+      unchecked_toc_lower_ =
+          std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
     }
-    stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
-      start = lap(Stage::BROAD_PHASE, start);
-      take(slots, n);
-      start = Clock::now();
-    });
   }
   lap(Stage::BROAD_PHASE, start);
   flush();
@@ -154,12 +165,17 @@ void PairWorker::flush() {
   filter();
   makeCanonical();
   if (separated_) setSeparations();
-  if (context_->earliest_only) dropLate();
+  const std::vector<Hit>& hits = hits_[static_cast<int>(task_->kind)];
+  const std::size_t before = hits.size();
+  // Which pairs are late depends on which were looked at first: no pair is left out where they are counted.
+  const bool counts = context_->found && context_->found->isSet();
+  if (context_->earliest_only && !counts) dropLate();
   if (!context_->elementary || context_->timeIsUp()) {
     keepUndecided();
   } else {
     decide();
   }
+  if (counts) enough_ = !context_->found->add(task_index_, hits.size() - before) || enough_;
   const double ms = msSince(start);
   if (rule_.bodies_m > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
   if (rule_.uncertain) stats_[Effect::TRACKER_NOISE].ms += ms;

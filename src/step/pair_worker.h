@@ -9,6 +9,7 @@
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
+#include "step/found_limit.h"
 #include "step/left_out.h"
 #include "step/observer.h"
 #include "step/pair_separation.h"
@@ -36,6 +37,14 @@ struct PairTask {
   std::uint32_t first, last;  ///< supercluster pairs in the step's list
 };
 
+class PairWorker;
+
+/// Where the hits of a task are: in its worker's list for the task's kind, from `begin` on.
+struct TaskHits {
+  PairWorker* worker = nullptr;
+  std::size_t begin = 0;
+};
+
 /// What all workers share during a step.
 struct StepContext {
   const SceneArrays* scene = nullptr;
@@ -47,6 +56,7 @@ struct StepContext {
   const std::vector<LeftOutOfBody>* left_out = nullptr;  ///< per body; null: nothing is left out
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
+  FoundLimit* found = nullptr;            ///< null: no limit
   bool timeIsUp() {
     if (expired.load(std::memory_order_relaxed)) return true;
     if (deadline.isOver()) expired = true;
@@ -58,18 +68,21 @@ class PairWorker {
  public:
   PairWorker();
   void beginStep();
-  /// Streams supercluster pairs [first, last) of `pairs` through all stages.
-  void run(StepContext& context, const PairTask& task, const std::vector<std::uint32_t>& pairs, std::size_t first,
-           std::size_t last);
+  /// Streams the task's supercluster pairs through all stages. Ends early where context.found has enough. index: of the
+  /// task.
+  void run(StepContext& context, const PairTask& task, std::size_t index, const std::vector<std::uint32_t>& pairs);
   /// The same for every pair of features, without any bounds.
-  void runBruteForce(StepContext& context, const PairTask& task);
+  void runBruteForce(StepContext& context, const PairTask& task, std::size_t index);
+  /// Forgets the hits of a kind from this one on.
+  void dropHits(PairKind kind, std::size_t begin);
 
   const std::vector<Hit>& hits(PairKind kind) const { return hits_[static_cast<int>(kind)]; }
   const StepStats& stats() const { return stats_; }
   double uncheckedTocLower() const { return unchecked_toc_lower_; }
 
  private:
-  void begin(StepContext& context, const PairTask& task);
+  void begin(StepContext& context, const PairTask& task, std::size_t index);
+  bool goesOn() const { return !enough_ && !context_->timeIsUp(); }
   void take(const std::uint32_t* slots, std::size_t count);
   void flush();
   void filter();
@@ -87,6 +100,8 @@ class PairWorker {
 
   StepContext* context_ = nullptr;
   const PairTask* task_ = nullptr;
+  std::size_t task_index_ = 0;
+  bool enough_ = false;  // of hits, for this task
   const SceneBody *a_ = nullptr, *b_ = nullptr;
   ClusterPairStream stream_;
   std::vector<Quad> quads_;

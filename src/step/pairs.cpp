@@ -1,6 +1,7 @@
 // Which pairs of features a step tests: the tasks of each body and pair of bodies, and what is left out of them.
 #include <algorithm>
 
+#include "obstacle/burst.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -23,8 +24,11 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
     return;
   }
   const TreePair trees{&ta, &tb, same_tree, false};
-  superclusterPairs(trees, found_groups, scratch);
-  if (!context.deadline.isNever()) orderByBound(trees);
+  const bool limited = foundLimit() != FoundLimit::NONE;
+  const std::size_t room = limited ? MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
+  const double left_out_toc = superclusterPairs(trees, found_groups, scratch, room);
+  if (left_out_toc <= 1) cutAt(left_out_toc);
+  if (limited || !context.deadline.isNever()) orderByBound(trees);
   const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
   const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);
   group_pairs.insert(group_pairs.end(), found_groups.begin(), found_groups.end());
@@ -35,7 +39,7 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
   }
 }
 
-/// What a deadline leaves over should be what can touch last; of equal ones what was found last.
+/// What a deadline or a limit leaves over should be what can touch last; of equal ones what was found last.
 void History::Impl::orderByBound(const TreePair& trees) {
   by_toc.clear();
   for (std::uint32_t i = 0; 2 * i < found_groups.size(); ++i) {
@@ -107,8 +111,16 @@ void History::Impl::addSelfTasks(std::size_t body, const StepContext& context) {
 
 void History::Impl::findPairs(const StepContext& context) {
   const Clock::time_point start = Clock::now();
+  const std::size_t used = group_pairs.size();  // by the last step
+  for (auto* buffer : {&group_pairs, &found_groups, &scratch}) {
+    buffer->clear();
+    releaseBurst(*buffer, used);
+  }
+  by_toc.clear();
+  releaseBurst(by_toc, used / 2);
+  releaseBurst(tasks);
+  releaseBurst(task_hits);
   tasks.clear();
-  group_pairs.clear();
   const std::size_t n = scene.bodies().size();
   for (std::size_t b = 0; b < n; ++b) {
     if (self_tested[b]) addSelfTasks(b, context);
@@ -168,6 +180,7 @@ void History::Impl::findLeftOut(const Step& step) {
   for (PairWorker& w : workers) w.beginStep();
   tasks.clear();
   group_pairs.clear();
+  found_limit = foundLimit();  // a pair that is not listed keeps its separation
   for (std::size_t b = 0; b < n; ++b) {
     if (needsReference(b)) addSelfTasks(b, context);
   }
@@ -204,18 +217,65 @@ void History::Impl::listLeftOut(std::size_t b, PairKind kind) {
                   vertices ? topology.vertexCount() : topology.edges().size());
 }
 
+std::size_t History::Impl::foundLimit() const {
+  std::size_t limit = options->max_found > 0 ? options->max_found : FoundLimit::NONE;
+  if (options->max_found_per_feature > 0) {
+    std::size_t features = 0;
+    for (const SceneBody& body : scene.bodies()) {
+      for (const FeatureKind kind : {FeatureKind::VERTEX, FeatureKind::EDGE, FeatureKind::FACE}) {
+        features += body.tree(kind).featureCount();
+      }
+    }
+    limit = std::min(limit, std::max(options->max_contacts, options->max_found_per_feature * features));
+  }
+  return limit;
+}
+
+void History::Impl::cutAt(double toc) {
+  result.complete = false;
+  result.cut = true;
+  result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, toc);
+}
+
+/// The tasks are begun in their order, each by the next thread that is free.
 void History::Impl::runPairs(StepContext& context) {
-  parallel(tasks.size(), 1, [&](std::size_t first, std::size_t last) {
+  found.begin(found_limit, tasks.size());
+  context.found = &found;
+  task_hits.assign(tasks.size(), {});
+  std::atomic<std::size_t> next{0};
+  parallel(std::min(tasks.size(), static_cast<std::size_t>(options->num_threads)), 1, [&](std::size_t, std::size_t) {
     PairWorker& worker = workers.local();
-    for (std::size_t t = first; t < last; ++t) {
+    for (std::size_t t = next++; t < tasks.size(); t = next++) {
+      task_hits[t] = {&worker, worker.hits(tasks[t].kind).size()};
       if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
-        worker.runBruteForce(context, tasks[t]);
+        worker.runBruteForce(context, tasks[t], t);
       } else {
-        worker.run(context, tasks[t], group_pairs, tasks[t].first, tasks[t].last);
+        worker.run(context, tasks[t], t, group_pairs);
       }
     }
   });
-  result.complete = !context.expired;
+  if (context.expired) result.complete = false;
+  cutHits();
+}
+
+/// Of what is over the limit all that is known is when the groups can meet.
+void History::Impl::cutHits() {
+  std::size_t listed = 0;
+  const std::size_t cut = found.cutTask(listed);
+  for (std::size_t t = cut; t < tasks.size(); ++t) {
+    const PairTask& task = tasks[t];
+    // A worker's later tasks lie behind in its list, and so go with the first.
+    task_hits[t].worker->dropHits(task.kind, task_hits[t].begin + (t == cut ? listed : 0));
+    if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
+      cutAt(0);
+      continue;
+    }
+    const TreePair trees{&scene.bodies()[task.body_a].tree(firstKind(task.kind)),
+                         &scene.bodies()[task.body_b].tree(secondKind(task.kind)), task.self, false};
+    for (std::size_t p = task.first; p < task.last; ++p) {
+      cutAt(superclusterTocBound(trees, group_pairs[2 * p], group_pairs[2 * p + 1]));
+    }
+  }
 }
 
 }  // namespace dccd

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "obstacle/burst.h"
+
 namespace dccd {
 namespace {
 
@@ -35,13 +37,25 @@ void StartStateSearch::SlotsAtVertex::build(const SceneBody& body, FeatureKind k
 }
 
 const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& scene, bool continues,
-                                                            const IsOver& is_over, StepStats& stats) {
+                                                            const IsOver& is_over, StepStats& stats,
+                                                            std::size_t most_found) {
+  releaseBurst(found_);
+  releaseBurst(candidates_);
+  releaseBurst(touched_);
+  releaseBurst(intersections_);
+  releaseBurst(groups_);
+  releaseBurst(scratch_, groups_.size());
+  releaseBurst(by_group_);
   tested_ = 0;
+  cut_ = false;
+  most_found_ = most_found;
   has_deadline_ = static_cast<bool>(is_over);
   if (!(continues && known_)) clear();
   testCandidates(scene, is_over);
-  if (!searched_) search(scene, is_over);
-  whole_ = searched_ && candidates_.empty() && touched_.empty();
+  if (!searched_ && !hasEnough()) search(scene, is_over);
+  cut_ = cut_ || hasEnough();
+  if (hasEnough()) found_.resize(most_found_);
+  whole_ = searched_ && !cut_ && candidates_.empty() && touched_.empty();
   known_ = false;  // until remember() has this step's contacts
 
   list(scene, found_, intersections_);
@@ -81,6 +95,7 @@ bool StartStateSearch::listEnd(const SceneArrays& scene, const IsOver& is_over, 
       [&] { addCandidates(scene, touched_[expanded++], pairs); },
       [&](const EdgeFace& pair) {
         if (isChecked(scene, pair) && meet(scene, pair, 1)) met.push_back(pair);
+        return true;
       });
   list(scene, met, out);
   return whole;
@@ -92,7 +107,8 @@ bool StartStateSearch::isChecked(const SceneArrays& scene, const EdgeFace& pair)
 }
 
 /// Takes the pairs from the back, a block at a time, and calls test with each: sorted, many are the same and those that
-/// follow each other lie together. expand() adds pairs as long as hasMore(). False: is_over ended it.
+/// follow each other lie together. expand() adds pairs as long as hasMore(). False: is_over, or a test that returned
+/// false, ended it.
 template <class HasMore, class Expand, class Test>
 bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore,
                                 const Expand& expand, const Test& test) {
@@ -103,8 +119,9 @@ bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_o
     while (pairs.size() < block && hasMore()) expand();
     const auto first = pairs.end() - static_cast<std::ptrdiff_t>(std::min(block, pairs.size()));
     std::sort(first, pairs.end());
-    std::for_each(first, std::unique(first, pairs.end()), test);
+    const bool goes_on = std::all_of(first, std::unique(first, pairs.end()), test);
     pairs.erase(first, pairs.end());
+    if (!goes_on) return false;
   }
 }
 
@@ -119,6 +136,7 @@ void StartStateSearch::testCandidates(const SceneArrays& scene, const IsOver& is
       },
       [&](const EdgeFace& pair) {
         if (isChecked(scene, pair)) test(scene, pair);
+        return !hasEnough();
       });
 }
 
@@ -158,7 +176,8 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
   trees.a = &edges;
   trees.b = &faces;
   trees.t0_only = true;
-  superclusterPairs(trees, groups_, scratch_);
+  const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : MAX_SUPERCLUSTER_PAIRS;
+  cut_ = superclusterPairs(trees, groups_, scratch_, room) <= 1 || cut_;
   // By group of edges, so that all before the one that comes next are done.
   by_group_.clear();
   for (std::size_t p = 0; p < groups_.size(); p += 2) {
@@ -175,7 +194,9 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
         if (shareVertex(edges.feature(slots[2 * i]), faces.feature(slots[2 * i + 1]))) continue;
         test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
       }
+      return !hasEnough();
     });
+    if (hasEnough()) return false;
   }
   return true;
 }
@@ -194,7 +215,7 @@ void StartStateSearch::test(const SceneArrays& scene, const EdgeFace& pair) {
 
 void StartStateSearch::remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete) {
   known_ = false;
-  if (!complete) return;
+  if (!complete || cut_) return;
   const std::size_t limit =
       edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
   for (const Contact& contact : contacts) {

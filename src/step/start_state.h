@@ -9,6 +9,7 @@
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
+#include "step/found_limit.h"
 
 namespace dccd {
 
@@ -40,12 +41,14 @@ class StartStateSearch {
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
   /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
   /// effect START_STATE. Nothing more is tested once is_over() says so; isWhole() is false then. Empty: there is
-  /// no deadline.
+  /// no deadline. Of more than most_found the first ones to be found are listed; isCut() is true then, and the next
+  /// run() begins anew.
   const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const IsOver& is_over,
-                                            StepStats& stats);
+                                            StepStats& stats, std::size_t most_found = FoundLimit::NONE);
 
   /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
   bool isWhole() const { return whole_; }
+  bool isCut() const { return cut_; }
 
   /// Whether run() would search the bodies' trees.
   bool needsTrees(bool continues) const { return !(continues && known_ && searched_); }
@@ -107,8 +110,11 @@ class StartStateSearch {
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
                       const Index* other_edge, std::vector<EdgeFace>& out);
   void learnNeighbourhoods(const SceneArrays& scene);
+  bool hasEnough() const { return found_.size() > most_found_; }
 
   bool whole_ = false, has_deadline_ = false;
+  bool cut_ = false;  // there was more to find than most_found_
+  std::size_t most_found_ = FoundLimit::NONE;
   bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
   bool searched_ = false;   // the search has come to its end
   BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the groups of edges

@@ -35,6 +35,7 @@ std::vector<SlotPair> streamed(const TreePair& trees) {
   stream.run(trees, groups.data(), groups.size() / 2, [&](const std::uint32_t* slots, std::size_t n) {
     EXPECT_LE(n, ClusterPairStream::CHUNK);
     for (std::size_t i = 0; i < n; ++i) pairs.push_back({slots[2 * i], slots[2 * i + 1]});
+    return true;
   });
   return pairs;
 }

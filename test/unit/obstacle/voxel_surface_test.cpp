@@ -114,7 +114,10 @@ TEST(VoxelSurface, TheQueryFindsTheLeavesOfABoxEachOnce) {
       }
       if (meets) expected.insert(i);
     }
-    tree.visitLeaves(box, [&](std::uint32_t leaf) { EXPECT_TRUE(found.insert(leaf).second) << "twice"; });
+    tree.visitLeaves(box, [&](std::uint32_t leaf) {
+      EXPECT_TRUE(found.insert(leaf).second) << "twice";
+      return true;
+    });
     EXPECT_EQ(found, expected);
     EXPECT_EQ(tree.reached(box).leaf, !expected.empty());
   }
