@@ -15,7 +15,6 @@ using topic_tools::ShapeShifter;
 
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
-const ros::WallDuration RENEWAL(0.05);
 
 MonitorConfig configOf(const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
@@ -97,11 +96,6 @@ void CollisionMonitor::Impl::subscribe() {
     mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
         input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
-  renewal = input.createSteadyTimer(RENEWAL, [this](const ros::SteadyTimerEvent&) {
-    for (const auto& subscription : mesh_subscriptions) {
-      if (subscription) subscription->renew();
-    }
-  });
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
       ros::VoidConstPtr(), hints);
@@ -175,6 +169,8 @@ void CollisionMonitor::Impl::advertiseServices() {
 void CollisionMonitor::Impl::start() {
   subscribe();
   advertiseServices();
+  master = std::make_unique<MasterWatch>(
+      mesh_subscriptions, map_subscriber, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
   worker = std::thread([this] { work(); });
   input_spinner.start();
   service_spinner.start();
@@ -183,7 +179,6 @@ void CollisionMonitor::Impl::start() {
 void CollisionMonitor::Impl::stop() {
   state.stop();
   stopping = true;
-  renewal.stop();
   input_spinner.stop();
   queue.wake();
   if (worker.joinable()) worker.join();
@@ -191,6 +186,7 @@ void CollisionMonitor::Impl::stop() {
   service_spinner.stop();
   reconfigure.reset();
   maps.reset();
+  master.reset();
 }
 
 CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)

@@ -54,8 +54,8 @@ bool MonitorLog::isSilenceDue(std::int64_t now_ns) {
   return true;
 }
 
-void MonitorLog::hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline) {
-  std::string text = silenceHint(silent);
+void MonitorLog::hintAt(std::string silence, const MonitorPipeline& pipeline) {
+  std::string text = std::move(silence);
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     if (pipeline.hint(b).empty()) continue;
     const BodyConfig& body = config_.bodies[b];

@@ -28,8 +28,8 @@ class MonitorLog {
   void tell(const Outcome& outcome);
   /// Whether it is time to look into silence again: rarely, and not at once.
   bool isSilenceDue(std::int64_t now_ns);
-  /// Logs a hint when it is another one than before.
-  void hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline);
+  /// Logs a hint when it is another one than before. `silence`: why nothing comes, see silenceHint().
+  void hintAt(std::string silence, const MonitorPipeline& pipeline);
   /// What looks like a mistake now; empty: nothing does.
   const std::string& hint() const { return hint_; }
 

@@ -81,13 +81,14 @@ void CollisionMonitor::Impl::tellComplaints() {
 }
 
 void CollisionMonitor::Impl::lookIntoSilence() {
+  if (const auto found = master->takeHint()) log.hintAt(*found, pipeline);
   if (!log.isSilenceDue(steadyNs())) return;
   std::vector<AwaitedTopic> silent;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
   }
-  log.hintAt(silent, pipeline);
+  master->lookInto(std::move(silent));
 }
 
 StatsContext CollisionMonitor::Impl::statsContext() const {
@@ -181,7 +182,6 @@ void CollisionMonitor::Impl::work() {
     const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
     if (stopping) return;
     for (const auto& command : commands) carryOut(command);
-    if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
     if (map_publisher_seen) pipeline.expectMap();
     publishEffects(ros::Time::now());  // the first plan comes before the first frame
     takeMaps();
