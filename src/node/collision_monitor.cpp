@@ -36,7 +36,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       private_node(private_handle),
       pipeline(given, transforms, mapSourceOf(node, given)),
       config(pipeline.config()),
-      recorder(config, pipeline.monitor()),
+      recorder(config, pipeline.monitor(), private_node.getNamespace()),
       outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
       state(private_node, livenessLimits(config)),
       queue(config.bodies.size(), config.queue_size, config.queue_policy),

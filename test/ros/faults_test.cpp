@@ -28,14 +28,14 @@ TEST_F(Recording, RecordStepWritesWhatReplaysToTheSameBits) {
   std::vector<StepRecording> steps;
   for (std::string file; std::getline(lines, file);) steps.push_back(readRecordingFile(file));
   ASSERT_EQ(steps.size(), 2u) << "record_steps is 2";
-  EXPECT_EQ(steps[1].step.start_ns, 10100000000);
-  EXPECT_EQ(steps[1].answer.contacts.size(), outcome.contacts.size());
+  EXPECT_EQ(steps[0].step.start_ns, 10100000000) << "the newest first";
+  EXPECT_EQ(steps[0].answer.contacts.size(), outcome.contacts.size());
   for (const StepRecording& step : steps) {
     const StepReplay replay = replayStep(step);
     EXPECT_TRUE(replay.differences.empty()) << replay.differences.front();
   }
   const auto& message = outcome.contacts.front();
-  const Contact& contact = steps[1].answer.contacts.front();
+  const Contact& contact = steps[0].answer.contacts.front();
   EXPECT_EQ(message.toc_lower, contact.toc_lower);
   EXPECT_EQ(message.toc_upper, contact.toc_upper);
 }
