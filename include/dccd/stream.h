@@ -80,6 +80,9 @@ class DCCD_EXPORT Monitor {
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
   bool next(std::int64_t now_ns, Outcome& outcome);
+  /// The step that is computed, and all after it, are not wanted any more: they end at once, as with a step budget that
+  /// is over. From any thread.
+  void cancel();
   /// Whether a step waits for other bodies' frames, so that next() is worth calling again later.
   bool waiting() const;
   /// End of input: steps that still wait are not waited for any longer.

@@ -1,5 +1,7 @@
 #include "node/collision_monitor_impl.h"
 
+#include <cstdlib>
+
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
@@ -15,6 +17,8 @@ using topic_tools::ShapeShifter;
 
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
+// Of the second in which the process is to end.
+constexpr std::chrono::milliseconds END_AFTER{700};
 
 MonitorConfig configOf(const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
@@ -179,6 +183,8 @@ void CollisionMonitor::Impl::start() {
 void CollisionMonitor::Impl::stop() {
   state.stop();
   stopping = true;
+  if (owns_process) endInTime();
+  pipeline.monitor().cancel();
   input_spinner.stop();
   queue.wake();
   if (worker.joinable()) worker.join();
@@ -189,6 +195,16 @@ void CollisionMonitor::Impl::stop() {
   master.reset();
 }
 
+/// What is left is to leave: the last state has been said. A map that is decoded, a start state that is looked for or a
+/// master that hangs must not hold the process up; a file that is written may.
+void CollisionMonitor::Impl::endInTime() {
+  std::thread([] {
+    std::this_thread::sleep_for(END_AFTER);
+    for (int i = 0; i < 100 && FlightRecorder::filesUnderWay() > 0; ++i) std::this_thread::sleep_for(END_AFTER / 5);
+    std::_Exit(0);
+  }).detach();
+}
+
 CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
     : impl_(std::make_unique<Impl>(node, private_node, configOf(private_node))) {
   impl_->start();
@@ -197,6 +213,7 @@ CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeH
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
 
 void CollisionMonitor::installCrashHandler() {
+  impl_->owns_process = true;
   try {
     impl_->recorder.installCrashHandler();
   } catch (const std::runtime_error& error) {

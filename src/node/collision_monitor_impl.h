@@ -59,6 +59,7 @@ struct CollisionMonitor::Impl {
   std::unique_ptr<MasterWatch> master;
   std::vector<ros::ServiceServer> services;
   std::unique_ptr<Reconfigure> reconfigure;
+  bool owns_process = false;
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
   std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
@@ -69,6 +70,7 @@ struct CollisionMonitor::Impl {
 
   void start();
   void stop();
+  void endInTime();
 
   // Input thread.
   void subscribe();
