@@ -74,6 +74,10 @@ class DCCD_EXPORT Monitor {
   void countDropped(std::size_t body, StepStatus status, std::uint64_t count = 1);
   void countReceived(std::size_t body, std::uint64_t count = 1, std::uint64_t receipt_stamps = 0);
 
+  /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
+  /// again.
+  void withdraw(std::size_t body);
+
   /// The map from the next step on.
   void setMap(ObstacleMap map);
   const ObstacleMap& map() const;

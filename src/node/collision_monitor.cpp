@@ -46,7 +46,8 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       queue(config.bodies.size(), config.queue_size, config.queue_policy),
       diagnostics(private_node.getNamespace(), node),
       log(node, private_node.getNamespace(), config),
-      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
+      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
+      disabled_frames(config.bodies.size()) {}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
@@ -55,10 +56,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   frames_handed_over += message.object.type != nullptr;
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
   if (!enabled && !pipeline.isStatic(body)) {
-    queue.command([this, body] {
-      pipeline.monitor().countReceived(body);
-      pipeline.monitor().countDropped(body, StepStatus::DISABLED);
-    });
+    ++disabled_frames[body];
     return;
   }
   if (body == config.monitor.clock_body) state.frameCame(now_ns);
@@ -162,9 +160,17 @@ void CollisionMonitor::Impl::advertiseServices() {
         response.message = reply.message;
         return true;
       }));
-  reconfigure = std::make_unique<Reconfigure>(service, config, [this](const Reconfigure::Change& change) {
-    queue.command([this, change] { reconfigureNow(change); });
-  });
+  Reconfigure::Events events;
+  events.changed = [this](const MonitorOptions& options, const MarkerConfig& markers) {
+    queue.command([this, options, markers] {
+      pipeline.reconfigure(options, markers);
+      state.setLimits(livenessLimits(config));
+    });
+  };
+  events.refused = [this](const std::string& why) {
+    queue.command([this, why] { log.complain(config.monitor.clock_body, "live", why); });
+  };
+  reconfigure = std::make_unique<Reconfigure>(service, config, std::move(events));
 }
 
 // --- start and stop

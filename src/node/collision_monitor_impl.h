@@ -63,8 +63,10 @@ struct CollisionMonitor::Impl {
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
   std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
-  StampNs newest_ns = 0;                // stamp of the last outcome; the worker's
-  std::uint64_t steps_unpublished = 0;  // the worker's, too
+  std::vector<std::atomic<std::uint64_t>> disabled_frames;  // that came while disabled, not yet counted
+  bool plan_unsaid = false;                                 // the worker's
+  StampNs newest_ns = 0;                                    // stamp of the last outcome; the worker's
+  std::uint64_t steps_unpublished = 0;                      // the worker's, too
 
   Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle, MonitorConfig given);
 
@@ -93,7 +95,6 @@ struct CollisionMonitor::Impl {
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();
-  void reconfigureNow(const Reconfigure::Change& change);
   void resetNow(StepStatus status);
   StatsContext statsContext() const;
 };

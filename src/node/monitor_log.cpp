@@ -5,6 +5,7 @@
 #include <ros/console.h>
 
 #include "output/advice.h"
+#include "ros/short_text.h"
 
 namespace dccd {
 
@@ -29,9 +30,16 @@ std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config
 
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
   const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();
-  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + text, steadyNs());
+  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + shortText(text), steadyNs());
   if (!line.empty()) ROS_WARN_STREAM(line);
 }
+
+void MonitorLog::alarm(const std::string& kind, const std::string& text) {
+  const std::string line = throttle_.line(kind, shortText(text), steadyNs());
+  if (!line.empty()) ROS_ERROR_STREAM(line);
+}
+
+bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
 void MonitorLog::tell(const Outcome& outcome) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
@@ -62,7 +70,8 @@ void MonitorLog::hintAt(std::string silence, const MonitorPipeline& pipeline) {
     const std::string source = body.isRigid() ? "body '" + body.body.name + "'" : topicOf(b);
     text += (text.empty() ? "" : "; ") + source + ": " + pipeline.hint(b);
   }
-  if (!text.empty() && text != hint_) ROS_WARN_STREAM(name_ << ": " << text);
+  if (text.empty()) told_hint_.clear();
+  if (!text.empty() && text != told_hint_ && isDue("hint")) ROS_WARN_STREAM(name_ << ": " << (told_hint_ = text));
   hint_ = std::move(text);
 }
 

@@ -24,6 +24,10 @@ class MonitorLog {
 
   /// One line per kind and period, led by the body's topic, or by the map's when there is no such body.
   void complain(std::size_t body, const std::string& kind, const std::string& text);
+  /// An error line, one per kind and period.
+  void alarm(const std::string& kind, const std::string& text);
+  /// Whether lines of this kind, which are not to be lost, may be written now.
+  bool isDue(const std::string& kind);
   /// An outcome that is not OK: status, reason, and what to do.
   void tell(const Outcome& outcome);
   /// Whether it is time to look into silence again: rarely, and not at once.
@@ -42,7 +46,7 @@ class MonitorLog {
   const MonitorConfig& config_;
   LogThrottle throttle_{5};
   std::int64_t asked_ns_ = 0;
-  std::string hint_;
+  std::string hint_, told_hint_;
 };
 
 }  // namespace dccd

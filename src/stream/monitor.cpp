@@ -158,6 +158,14 @@ void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const 
   }
 }
 
+void Monitor::withdraw(std::size_t body) {
+  Impl& m = *impl_;
+  if (m.isStream(body) || m.stores.at(body).empty()) return;
+  m.stores[body].clear();
+  --m.counters[body].by_status[static_cast<std::size_t>(StepStatus::OK)];
+  m.forgetLast();
+}
+
 void Monitor::cancel() { impl_->cancelled = true; }
 
 bool Monitor::waiting() const { return !impl_->pending.empty(); }
