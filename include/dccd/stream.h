@@ -74,12 +74,19 @@ class DCCD_EXPORT Monitor {
   void countDropped(std::size_t body, StepStatus status, std::uint64_t count = 1);
   void countReceived(std::size_t body, std::uint64_t count = 1, std::uint64_t receipt_stamps = 0);
 
+  /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
+  /// again.
+  void withdraw(std::size_t body);
+
   /// The map from the next step on.
   void setMap(ObstacleMap map);
   const ObstacleMap& map() const;
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
   bool next(std::int64_t now_ns, Outcome& outcome);
+  /// The step that is computed, and all after it, are not wanted any more: they end at once, as with a step budget that
+  /// is over. From any thread.
+  void cancel();
   /// Whether a step waits for other bodies' frames, so that next() is worth calling again later.
   bool waiting() const;
   /// End of input: steps that still wait are not waited for any longer.

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "ros/short_text.h"
+#include "ros/transforms.h"
+
 namespace dccd {
 
 namespace {
@@ -177,9 +180,13 @@ void MeshDecoder::checkFaces(std::size_t count) const {
 
 void MeshDecoder::start(const HeaderView& header, DecodedMesh& mesh) const {
   mesh.stamp_ns = header.stamp_ns;
-  mesh.frame_id = header.frame_id.empty() ? config_.frame_id : std::string(header.frame_id);
-  if (!mesh.frame_id.empty() && mesh.frame_id[0] == '/') mesh.frame_id.erase(0, 1);  // tf2 has no leading slashes
-  if (mesh.frame_id.empty()) refuse("the message names no frame; set parameter frame_id");
+  std::string_view name = header.frame_id.empty() ? std::string_view(config_.frame_id) : header.frame_id;
+  if (!name.empty() && name[0] == '/') name.remove_prefix(1);  // tf2 has no leading slashes
+  if (name.empty()) refuse("the message names no frame; set parameter frame_id");
+  mesh.frame_id = std::string(name.substr(0, MAX_NAME + 1));
+  if (!frameNameProblem(mesh.frame_id).empty()) {  // too long, or one more slash
+    refuse("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
+  }
 }
 
 std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, std::size_t grid_rows,

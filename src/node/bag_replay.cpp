@@ -10,6 +10,7 @@
 #include <rosbag/view.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "dccd/regular_file.h"
 #include "input/known_types.h"
 #include "report/progress_bar.h"
 #include "ros/message_bytes.h"
@@ -17,6 +18,12 @@
 
 namespace dccd {
 namespace {
+
+/// rosbag reads a device for its first line until memory is gone.
+void requireFile(const std::string& bag) {
+  const std::string problem = regularFileProblem(bag);
+  if (!problem.empty()) throw rosbag::BagIOException(bag + ": " + problem);
+}
 
 // Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
 const ros::Duration TF_AHEAD(10.0);
@@ -172,6 +179,7 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
   config_.transform_timeout_s = 0;
   if (!options_.octomap_file.empty()) config_.octomap_file = options_.octomap_file;
+  requireFile(path_);
   rosbag::Bag file(path_);
   rosbag::View view(file);
   std::set<std::string> topics;
@@ -231,6 +239,7 @@ std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
 BagReplay::~BagReplay() = default;
 
 std::string BagReplay::firstMeshTopic(const std::string& bag) {
+  requireFile(bag);
   rosbag::Bag file(bag);
   rosbag::View view(file);
   std::map<std::string, std::string> types;

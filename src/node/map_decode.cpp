@@ -7,6 +7,8 @@
 #include "input/mesh_views.h"
 #include "input/wire.h"
 #include "node/map_loader.h"
+#include "ros/short_text.h"
+#include "ros/transforms.h"
 
 namespace dccd {
 
@@ -47,8 +49,12 @@ LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const Monitor
     WireReader wire(bytes.data(), bytes.size());
     const HeaderView header = readHeader(wire);
     map.stamp_ns = header.stamp_ns;
-    map.frame_id = header.frame_id.empty() ? config.octomap_frame : std::string(header.frame_id);
-    if (!map.frame_id.empty() && map.frame_id[0] == '/') map.frame_id.erase(0, 1);
+    std::string_view name = header.frame_id.empty() ? std::string_view(config.octomap_frame) : header.frame_id;
+    if (!name.empty() && name[0] == '/') name.remove_prefix(1);
+    map.frame_id = std::string(name.substr(0, MAX_NAME + 1));
+    if (!name.empty() && !frameNameProblem(map.frame_id).empty()) {
+      throw WireError("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
+    }
     OctomapFields fields;
     fields.binary = wire.read<std::uint8_t>("binary") != 0;
     fields.id = std::string(wire.readString("id"));
@@ -59,7 +65,7 @@ LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const Monitor
     build(decodeOctomap(fields, limitsOf(config)), config, map);
   } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
     map.surface = nullptr;
-    map.problem = error.what();
+    map.problem = shortText(error.what());
   }
   return map;
 }

@@ -5,6 +5,7 @@
 #include <ros/console.h>
 
 #include "output/advice.h"
+#include "ros/short_text.h"
 
 namespace dccd {
 
@@ -25,9 +26,16 @@ MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, con
 
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
   const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();
-  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + text, steadyNs());
+  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + shortText(text), steadyNs());
   if (!line.empty()) ROS_WARN_STREAM(line);
 }
+
+void MonitorLog::alarm(const std::string& kind, const std::string& text) {
+  const std::string line = throttle_.line(kind, shortText(text), steadyNs());
+  if (!line.empty()) ROS_ERROR_STREAM(line);
+}
+
+bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
 void MonitorLog::tell(const Outcome& outcome) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
@@ -50,21 +58,16 @@ bool MonitorLog::isSilenceDue(std::int64_t now_ns) {
   return true;
 }
 
-void MonitorLog::hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline) {
-  std::string text = silenceHint(silent);
-  const bool mapless = pipeline.effects().mayUseMap() && !pipeline.effects().mapSeen();
-  ++silences_;
-  // Where meshes come, at the 1st, 2nd, 4th, 8th … time.
-  const bool is_due = !silent.empty() || (silences_ & (silences_ - 1)) == 0;
-  if (mapless && is_due) unheard_maps_ = unheardMapsHint(mapSource());
-  if (mapless && !unheard_maps_.empty()) text += (text.empty() ? "" : "; ") + unheard_maps_;
+void MonitorLog::hintAt(std::string silence, const MonitorPipeline& pipeline) {
+  std::string text = std::move(silence);
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     if (pipeline.hint(b).empty()) continue;
     const BodyConfig& body = config_.bodies[b];
     const std::string source = body.isRigid() ? "body '" + body.body.name + "'" : topicOf(b);
     text += (text.empty() ? "" : "; ") + source + ": " + pipeline.hint(b);
   }
-  if (!text.empty() && text != hint_) ROS_WARN_STREAM(name_ << ": " << text);
+  if (text.empty()) told_hint_.clear();
+  if (!text.empty() && text != told_hint_ && isDue("hint")) ROS_WARN_STREAM(name_ << ": " << (told_hint_ = text));
   hint_ = std::move(text);
 }
 

@@ -1,5 +1,6 @@
 #include "node/monitor_pipeline.h"
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <new>
@@ -7,11 +8,16 @@
 
 #include "input/mesh_resource.h"
 #include "output/advice.h"
+#include "ros/short_text.h"
 #include "ros/transforms.h"
 
 namespace dccd {
 
 namespace {
+
+std::string noTransform(const std::string& from, const std::string& to, const std::string& why) {
+  return "no transform from '" + from + "' to '" + to + "': " + shortText(why);
+}
 
 std::vector<Body> monitorBodies(const MonitorConfig& config) {
   std::vector<Body> bodies;
@@ -53,6 +59,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transfor
   placed_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
   hinted_.resize(config_.bodies.size());
+  static_meshes_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::loadFiles() {
@@ -69,6 +76,7 @@ void MonitorPipeline::loadFiles() {
                                  [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     hints_[b] = rigidHint(body.mesh_file, mesh.positions, body.mesh_scale);
     rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
+    if (const std::string problem = maskProblem(b, *mesh.topology); !problem.empty()) throw ParameterError(problem);
     if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
   }
 }
@@ -101,9 +109,18 @@ void MonitorPipeline::measureUnknown(Outcome& outcome) const {
 
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
                            const std::string& reason) {
-  monitor_->skip(body, status, stamp_ns, reason);
-  complaints_[body] = "refused: " + reason;
+  const std::string text = shortText(reason);
+  monitor_->skip(body, status, stamp_ns, text);
+  complaints_[body] = "refused: " + text;
   if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
+}
+
+std::string MonitorPipeline::maskProblem(std::size_t body, const Topology& topology) const {
+  const std::vector<Index>& mask = config_.bodies[body].body.vertex_mask;
+  const auto largest = std::max_element(mask.begin(), mask.end());
+  if (largest == mask.end() || *largest < topology.vertexCount()) return {};
+  return "parameter vertex_mask of body '" + config_.bodies[body].body.name + "' names vertex " +
+         std::to_string(*largest) + ", but the mesh has " + std::to_string(topology.vertexCount());
 }
 
 DecodedMesh MonitorPipeline::decode(std::size_t body, const MeshMessage& message) {
@@ -133,6 +150,10 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     return refuse(StepStatus::BAD_MESSAGE,
                   "there is not enough memory for this message of " + std::to_string(message.size()) + " bytes");
   }
+  if (const std::string problem = maskProblem(body, *waiting.mesh.topology); !problem.empty()) {
+    monitor_->countReceived(body);
+    return skip(body, StepStatus::VERTEX_COUNT, message.receipt_ns, message.arrival_ns, problem);
+  }
   if (hinted_[body] != waiting.mesh.topology) {
     hinted_[body] = waiting.mesh.topology;
     hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
@@ -156,7 +177,10 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
     if (!rigid_[b]) continue;
     MeshFrame frame{stamp_ns, rigid_[b]->topology,           rigid_[b]->rest,
                     true,     Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
-    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) {
+    const std::string& carrier = config_.bodies[b].tf_frame;
+    if (!lookupTransform(transforms_, fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
+      reason =
+          noTransform(carrier, fixed_frame_, reason) + "; body '" + config_.bodies[b].body.name + "' is carried by it";
       return false;
     }
     transform(frame.pose, frame.positions);
@@ -211,14 +235,11 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   StepStatus problem = StepStatus::NO_TRANSFORM;
   Eigen::Isometry3d fixed_from_mesh;
   const bool is_clock = body == config_.monitor.clock_body;
-  const bool placed = !fixed_frame_.empty() &&
-                      lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id, waiting.mesh.stamp_ns,
-                                      fixed_from_mesh, reason) &&
-                      (!is_clock || placeOthers(now_ns, problem, reason));
+  const bool has_place = !fixed_frame_.empty() && lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id,
+                                                                  waiting.mesh.stamp_ns, fixed_from_mesh, reason);
+  const bool placed = has_place && (!is_clock || placeOthers(now_ns, problem, reason));
   if (!placed) {
-    if (problem == StepStatus::NO_TRANSFORM) {
-      reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
-    }
+    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
     waiting.reason = reason;
     waiting.overdue =
         finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
@@ -234,9 +255,11 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting done = std::move(waiting);
   waiting_[body].reset();
   if (!placed) {
+    if (is_clock && !has_place && !frame_answered_) learnAnew(StepStatus::NO_TRANSFORM);
     skip(body, problem, done.mesh.stamp_ns, done.arrival_ns, reason);
     return true;
   }
+  if (isStatic(body) && config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
   transform(fixed_from_mesh, done.mesh.positions);
   monitor_->push(body,
                  {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
@@ -247,12 +270,11 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   return true;
 }
 
-void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change) {
-  MonitorOptions options = config_.monitor;
-  change(options, config_.markers);
+void MonitorPipeline::reconfigure(MonitorOptions options, const MarkerConfig& markers) {
   effects_.decide(options);
   monitor_->setOptions(options);
   config_.monitor = options;
+  config_.markers = markers;
 }
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
@@ -267,6 +289,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
     // Refused: what was there before is out of date, and no map is better than a wrong one.
     monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
     unplaced_map_.reset();
+    placed_map_.reset();
     known_.reset();
     return;
   }
@@ -277,6 +300,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
     monitor_->setMap(std::move(map));
     known_ = unplaced_map_->known;
+    if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
     unplaced_map_.reset();
   } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
@@ -299,6 +323,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (finishing_) giveUp();
   if (!monitor_->next(now_ns, outcome)) return false;
   effects_.learn(outcome, *monitor_);
+  frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);
   measureUnknown(outcome);
   outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
@@ -333,10 +358,37 @@ void MonitorPipeline::reset(StepStatus status) {
     waiting_[b].reset();
   }
   monitor_->reset(status);
-  if (status == StepStatus::RESET) {
-    for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
-  }
   arrivals_.clear();
+  if (status != StepStatus::RESET) return;
+  for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
+  learnAnew(status);
+}
+
+void MonitorPipeline::learnAnew(StepStatus status) {
+  if (!config_.fixed_frame.empty()) return;
+  fixed_frame_.clear();
+  frame_answered_ = false;
+  monitor_->reset(status);
+  arrivals_.clear();
+  for (std::size_t b = 0; b < static_meshes_.size(); ++b) {
+    if (!static_meshes_[b]) continue;
+    monitor_->withdraw(b);
+    placed_[b] = false;
+    if (waiting_[b]) {  // a newer one
+      monitor_->countDropped(b, status);
+    } else {
+      waiting_[b] = Waiting();
+      waiting_[b]->kept = true;
+      waiting_[b]->mesh = std::move(*static_meshes_[b]);
+    }
+    static_meshes_[b].reset();
+  }
+  if (!placed_map_) return;
+  if (!unplaced_map_) unplaced_map_ = std::move(placed_map_);
+  placed_map_.reset();
+  known_.reset();
+  unplaced_since_ns_ = 0;
+  monitor_->setMap({});
 }
 
 Outcome MonitorPipeline::checkNow() {

@@ -14,15 +14,6 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 
 }  // namespace
 
-void CollisionMonitor::Impl::reconfigureNow(const Reconfigure::Change& change) {
-  try {
-    pipeline.reconfigure(change);
-    state.setLimits(livenessLimits(config));
-  } catch (const std::invalid_argument& error) {
-    ROS_WARN_STREAM("reconfiguration refused: " << error.what());
-  }
-}
-
 void CollisionMonitor::Impl::resetNow(StepStatus status) {
   accountDropped();
   std::vector<bool> spared(config.bodies.size());
@@ -32,10 +23,11 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
     pipeline.monitor().countReceived(b, cleared[b]);
     pipeline.monitor().countDropped(b, status, cleared[b]);
   }
+  const std::string frame = pipeline.fixedFrame();  // a reset forgets one that was learnt
   pipeline.reset(status);
   state.forgotten(std::string("no frame has been answered since ") +
                   (status == StepStatus::RESET ? "the reset" : "~enable was called"));
-  outputs.publishNothing(pipeline.fixedFrame());
+  outputs.publishNothing(frame);
   if (!outputs.wantsPrediction()) return;
   Outcome none;
   none.status = status;
@@ -44,6 +36,11 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
 }
 
 void CollisionMonitor::Impl::accountDropped() {
+  for (std::size_t b = 0; b < disabled_frames.size(); ++b) {
+    const std::uint64_t count = disabled_frames[b].exchange(0);
+    pipeline.monitor().countReceived(b, count);
+    pipeline.monitor().countDropped(b, StepStatus::DISABLED, count);
+  }
   const auto dropped = queue.takeDropped();
   for (std::size_t b = 0; b < dropped.size(); ++b) {
     if (dropped[b] == 0) continue;
@@ -82,13 +79,15 @@ void CollisionMonitor::Impl::tellComplaints() {
 }
 
 void CollisionMonitor::Impl::lookIntoSilence() {
+  if (const auto found = master->takeHint()) log.hintAt(*found, pipeline);
   if (!log.isSilenceDue(steadyNs())) return;
   std::vector<AwaitedTopic> silent;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
   }
-  log.hintAt(silent, pipeline);
+  const bool mapless = pipeline.effects().mayUseMap() && !pipeline.effects().mapSeen();
+  master->lookInto({std::move(silent), mapless ? log.mapSource() : ""});
 }
 
 StatsContext CollisionMonitor::Impl::statsContext() const {
@@ -139,8 +138,12 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
 
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
   EffectTracker& effects = pipeline.effects();
-  if (!effects.takeNewPlan()) return;
-  outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
+  if (effects.takeNewPlan()) {
+    outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
+    plan_unsaid = true;
+  }
+  if (!plan_unsaid || !log.isDue("effects")) return;
+  plan_unsaid = false;
   for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
 }
 
@@ -172,7 +175,7 @@ void CollisionMonitor::Impl::carryOut(const std::function<void()>& command) {
   try {
     command();
   } catch (const std::exception& error) {
-    ROS_ERROR_STREAM("a command failed: " << error.what());
+    log.alarm("command", std::string("a command failed: ") + error.what());
   }
 }
 
@@ -195,7 +198,6 @@ void CollisionMonitor::Impl::work() {
 /// True when more can be done at once.
 bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
   for (const auto& command : commands) carryOut(command);
-  if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
   if (map_publisher_seen) pipeline.expectMap();
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
@@ -206,7 +208,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
   tellComplaints();
   const std::string surprise = recorder.takeSurprise();
-  if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
+  if (!surprise.empty()) log.alarm("surprise", surprise);
   bool more = false;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
   lookIntoSilence();

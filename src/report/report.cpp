@@ -396,9 +396,11 @@ nlohmann::json Report::json() const {
 void Report::finish() {
   const nlohmann::json data = json();
   std::ofstream json_file(folder_ + "/report.json"), page(folder_ + "/report.html");
-  json_file << data.dump(1) << '\n';
+  // A name out of a message need not be UTF-8.
+  constexpr auto REPLACE = nlohmann::json::error_handler_t::replace;
+  json_file << data.dump(1, ' ', false, REPLACE) << '\n';
   // "</" would end the script element that carries the data.
-  std::string text = data.dump();
+  std::string text = data.dump(-1, ' ', false, REPLACE);
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
   page << reportPage(text);
   for (std::ofstream* file : {&contacts_, &steps_, &timing_, &json_file, &page}) {

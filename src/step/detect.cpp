@@ -88,7 +88,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   setBodies(step);
   useMap(step.map);
   // What is made once for many steps is not taken from the time of the first.
-  if (!deadline.isNever()) deadline = Deadline(deadline.at() + (Clock::now() - called));
+  if (!deadline.isNever()) deadline = deadline.movedTo(deadline.at() + (Clock::now() - called));
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
   const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
@@ -305,7 +305,7 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
     // Later parts need as much time for their pairs; what is over that is shared.
     const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
     const Clock::duration slack = part.deadline.at() - start - later * (start - begin);
-    is_over = [deadline = Deadline(start + slack / (later + 1))] { return deadline.isOver(); };
+    is_over = [deadline = part.deadline.movedTo(start + slack / (later + 1))] { return deadline.isOver(); };
   }
   std::vector<StartIntersection> met;
   result.start_state_complete = listStart(part, is_over, met) && result.start_state_complete;

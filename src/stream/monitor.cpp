@@ -158,6 +158,16 @@ void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const 
   }
 }
 
+void Monitor::withdraw(std::size_t body) {
+  Impl& m = *impl_;
+  if (m.isStream(body) || m.stores.at(body).empty()) return;
+  m.stores[body].clear();
+  --m.counters[body].by_status[static_cast<std::size_t>(StepStatus::OK)];
+  m.forgetLast();
+}
+
+void Monitor::cancel() { impl_->cancelled = true; }
+
 bool Monitor::waiting() const { return !impl_->pending.empty(); }
 
 void Monitor::finish() { impl_->finishing = true; }
@@ -184,7 +194,7 @@ Outcome Monitor::Impl::runStep(const Pending& pending) {
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
   last = nullptr;  // until this one is done
   if (listener) listener->onStep(step, options.detector);
-  Outcome outcome = detect(step, options.detector, history);
+  Outcome outcome = detect(step, options.detector, history, deadline());
   last = outcome.step;
   last_runs = runs;
   return outcome;

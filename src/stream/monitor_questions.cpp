@@ -26,7 +26,7 @@ Outcome Monitor::checkNow() {
   step.map = m.usableMap(step.stamp_ns);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
-  return detect(step, m.options.detector, m.side_history, Deadline());
+  return detect(step, m.options.detector, m.side_history, Deadline().orWhen(m.cancelled));
 }
 
 Outcome Monitor::predict() {
@@ -63,7 +63,7 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   m.side_history.beginAt(m.history);
-  return detect(step, m.options.detector, m.side_history);
+  return detect(step, m.options.detector, m.side_history, m.deadline());
 }
 
 }  // namespace dccd

@@ -70,10 +70,6 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.states[-1].clear)
         wait_for(lambda: not self.clear[-1].data, 5, '~clear to be false')
 
-    def forget_type(self):
-        time.sleep(0.3)  # else the node may not have seen that there was a publisher of clouds, and wait for the next one
-        self.publisher.unregister()
-
     def late_subscriber(self, name):
         """What somebody hears who comes only now."""
         heard = rospy.wait_for_message('/%s/state' % name, State, 10)
@@ -210,7 +206,7 @@ class StateTest(LiveNodeTest):
     def test_a_mesh_that_is_not_wholly_used(self):
         """Faces that name a vertex twice, none at all, and a second list of triangles."""
         self.start_node('dropped')
-        self.forget_type()
+        self.publisher.unregister()
         mesh = rospy.Publisher('/dropped/mesh', MeshStamped, queue_size=5)
         self.addCleanup(mesh.unregister)
         wait_for(lambda: mesh.get_num_connections() == 1, 20, 'the node to take another type')
@@ -243,7 +239,7 @@ class StateTest(LiveNodeTest):
 
     def test_a_second_list_of_triangles(self):
         self.start_node('lists')
-        self.forget_type()
+        self.publisher.unregister()
         markers = rospy.Publisher('/lists/mesh', MarkerArray, queue_size=5)
         self.addCleanup(markers.unregister)
         wait_for(lambda: markers.get_num_connections() == 1, 20, 'the node to take another type')

@@ -320,7 +320,7 @@ TEST(TrackerNoise, ANumberHoldsForAllVertices) {
   EXPECT_NEAR(noisy.feed(1.1, 0.07f).earliest_toc, 0.5, 1e-3);
 }
 
-TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
+TEST(FixedFrame, OneThatWasLearntIsLearntAnewAfterAReset) {
   XmlRpcValue tree;
   tree["max_vertex_step_m"] = 0.0;
   Driven learnt(tree);
@@ -330,8 +330,47 @@ TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
   learnt.pipeline.reset(StepStatus::RESET);
   learnt.feed(2, 0.35f);
   const Outcome& outcome = learnt.feed(2.1, -0.05f);
-  EXPECT_EQ(learnt.pipeline.fixedFrame(), "camera");
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "world");
   EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map is where it was, 0.35 m below the mesh";
+}
+
+TEST(FixedFrame, OneInWhichNothingWasAnsweredGivesWay) {
+  XmlRpcValue tree;
+  tree["max_vertex_step_m"] = 0.0;
+  tree["transform_timeout_s"] = 0.0;
+  Driven learnt(tree);
+  learnt.giveMap(1);
+  learnt.feed(1, 0.25f, {}, "nowhere");
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "nowhere");
+  EXPECT_EQ(learnt.feed(1.1, 0.35f).status, StepStatus::NO_TRANSFORM);
+  EXPECT_NE(learnt.outcome.reason.find("from 'world' to 'nowhere'"), std::string::npos) << learnt.outcome.reason;
+  EXPECT_EQ(learnt.feed(1.2, 0.35f).status, StepStatus::FIRST_FRAME);
+  const Outcome& outcome = learnt.feed(1.3, -0.05f);
+  EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map has its place in the new one";
+  // From the first answer on it stays.
+  EXPECT_EQ(learnt.feed(1.4, 0.25f, {}, "nowhere").status, StepStatus::NO_TRANSFORM);
+  EXPECT_EQ(learnt.feed(1.5, 0.25f, {}, "nowhere").status, StepStatus::NO_TRANSFORM);
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "world");
+  EXPECT_EQ(learnt.pipeline.monitor().total().waiting(), 0u);
+}
+
+TEST(FrameNames, OnesThatTf2DoesNotTakeAreRefusedInFewWords) {
+  Driven driven(scene());
+  driven.giveMap(1);
+  driven.feed(1, 0.35f);
+  for (const std::string& name : {std::string("//cam"), std::string("/"), std::string(10000000, 'x')}) {
+    EXPECT_EQ(driven.feed(1.1, 0.35f, {}, name).status, StepStatus::BAD_MESSAGE);
+    EXPECT_LT(driven.outcome.reason.size(), 400u);
+  }
+  EXPECT_EQ(driven.feed(1.2, -0.05f, {}, "/world").status, StepStatus::OK) << "one slash was tf's own way";
+}
+
+TEST(VertexMask, BeyondTheMeshIsNoStepAtAll) {
+  XmlRpcValue tree = scene();
+  tree["vertex_mask"][0] = 4;
+  Driven masked(tree);
+  EXPECT_EQ(masked.feed(1, 0.35f).status, StepStatus::VERTEX_COUNT);
+  EXPECT_EQ(masked.outcome.reason, "parameter vertex_mask of body 'mesh' names vertex 4, but the mesh has 4");
 }
 
 TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
@@ -339,20 +378,21 @@ TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
   driven.giveMap(1);
   driven.feed(1, 0.35f);
   EXPECT_TRUE(driven.pipeline.monitor().options().detector.obstacle_expected) << "a map came";
-  driven.pipeline.reconfigure([](MonitorOptions& options, MarkerConfig& markers) {
-    options.detector.max_contacts = 1;
-    markers.obstacle_m = 2;
-  });
+  MonitorOptions options = driven.pipeline.config().monitor;
+  MarkerConfig markers = driven.pipeline.config().markers;
+  options.detector.max_contacts = 1;
+  markers.obstacle_m = 2;
+  driven.pipeline.reconfigure(options, markers);
   EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
   EXPECT_TRUE(driven.pipeline.monitor().options().detector.obstacle_expected) << "the plan's, whatever is reconfigured";
   EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u);
   EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.feed(1.1, -0.05f).status, StepStatus::TRUNCATED);
-  const auto another_clock = [](MonitorOptions& options, MarkerConfig&) {
-    options.detector.max_contacts = 7;
-    options.clock_body = 9;
-  };
-  EXPECT_THROW(driven.pipeline.reconfigure(another_clock), std::invalid_argument);
+  options.detector.max_contacts = 7;
+  options.clock_body = 9;
+  markers.obstacle_m = 3;
+  EXPECT_THROW(driven.pipeline.reconfigure(options, markers), std::invalid_argument);
+  EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u) << "what is refused changes nothing";
   EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
 }
@@ -416,6 +456,26 @@ TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
   EXPECT_EQ(scene.tables().processed(), 1u);
   EXPECT_EQ(scene.pipeline.monitor().total().waiting(), 0u);
+}
+
+TEST(StaticBodies, AreWhereTheyWereWhenTheFixedFrameIsLearntAnew) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  for (const double stamp_s : {2.0, 3.0}) {
+    scene.take(Tabled::CLOTH, stamp_s, 0.3f, 0);
+    ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+    EXPECT_EQ(scene.outcome.status, StepStatus::FIRST_FRAME);
+    scene.take(Tabled::CLOTH, stamp_s + 0.1, -0.1f, 0);
+    ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+    ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+    EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+    EXPECT_EQ(scene.tables().received, 1u);
+    EXPECT_EQ(scene.tables().processed(), 1u);
+    scene.pipeline.reset(StepStatus::RESET);
+    EXPECT_EQ(scene.pipeline.fixedFrame(), "");
+    EXPECT_EQ(scene.tables().waiting(), 1u);
+  }
 }
 
 TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
