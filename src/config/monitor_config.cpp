@@ -487,9 +487,7 @@ std::uint64_t MonitorConfig::hash() const {
   return hashOf(text.str());
 }
 
-MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) {
-  return readConfig(treeOf(tree), path, Guards::LIVE);
-}
+MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) { return readConfig(treeOf(tree), path); }
 
 MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   ParameterReader reader(tree, path);
