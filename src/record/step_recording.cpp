@@ -208,9 +208,12 @@ void visitDistances(Archive& a, Recording& r) {
 
 constexpr std::size_t TEXT_BYTES = 4;
 
-/// What version 3 added: what an assurance follows from.
+/// What version 3 added: what an assurance follows from, and where the work was cut.
 template <typename Archive, typename Recording>
 void visitVerdict(Archive& a, Recording& r) {
+  a.size(r.options.max_found);
+  a.size(r.options.max_found_per_feature);
+  a.flag(r.answer.cut);
   a.text(r.step.off_path);
   for (auto& body : r.step.bodies) {
     a.flag(body.shell);
