@@ -122,7 +122,7 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.late_subscriber('replaced').clear)
 
     def test_steps_that_take_longer_than_frames_come(self):
-        self.start_node('slow', max_compute_s=0.0, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
+        self.start_node('slow', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(220, 220)
         for _ in range(2):
             self.publisher.publish(cloud.message())
@@ -149,7 +149,7 @@ class StateTest(LiveNodeTest):
         self.assert_consistent()
 
     def test_a_reset_while_a_step_is_computed(self):
-        self.start_node('reset', max_compute_s=0.0, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
+        self.start_node('reset', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(220, 220)
         for _ in range(2):
             self.publisher.publish(cloud.message())

@@ -237,6 +237,7 @@ class CommandsTest(unittest.TestCase):
             time.sleep(3 * SLOW)
         finally:
             stop(process)
+        wait_for(bag.exists, 30, 'the recorder, a child of rosbag, to give the bag its name')
         topics = yaml.safe_load(self.runs('rosbag info -y -k topics ' + bag.name))
         kept.rename(bag)
         self.assertLessEqual({'/tracker/cloth', '/octomap_binary'}, {entry['topic'] for entry in topics})
