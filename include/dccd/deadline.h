@@ -31,6 +31,8 @@ class Deadline {
     moved.at_ = at;
     return moved;
   }
+  /// False: there is neither a time nor a flag, and it will never be over.
+  bool canEnd() const { return !isNever() || cancelled_ != nullptr; }
   /// No time is set.
   bool isNever() const { return at_ == Clock::time_point::max(); }
   bool isOver() const {

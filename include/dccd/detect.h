@@ -80,10 +80,12 @@ class DCCD_EXPORT History {
 /// Throws std::invalid_argument naming what of the step or the options does not fit. After warm-up nothing is allocated
 /// that grows with the number of steps.
 DCCD_EXPORT Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline);
-/// Within the options' step budget, or what ends a step that has none.
+/// From now on, as long as the options allow a step: its budget, or what ends a step that has none.
+inline Deadline deadlineOf(const Options& options) {
+  return Deadline::after(options.step_budget_ms > 0 ? options.step_budget_ms : options.max_compute_ms);
+}
 inline Outcome detect(const Step& step, const Options& options, History& history) {
-  return detect(step, options, history,
-                Deadline::after(options.step_budget_ms > 0 ? options.step_budget_ms : options.max_compute_ms));
+  return detect(step, options, history, deadlineOf(options));
 }
 
 }  // namespace dccd

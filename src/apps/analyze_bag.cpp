@@ -133,12 +133,6 @@ std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config
   return rungs;
 }
 
-std::vector<Body> monitorBodies(const MonitorConfig& config) {
-  std::vector<Body> bodies;
-  for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
-  return bodies;
-}
-
 std::string seconds(double s) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(3) << s << " s";
@@ -180,7 +174,7 @@ int analyze(const Arguments& a) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
   report.setEffects(summary.effects);
-  report.setLeftOut(summary.left_out, monitorBodies(config));
+  report.setLeftOut(summary.left_out, config.monitorBodies());
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
   report.setCounters(summary.frames);
   std::string topics;

@@ -67,6 +67,8 @@ struct MonitorConfig {
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
   std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
+  /// The bodies as the monitor is given them.
+  std::vector<Body> monitorBodies() const;
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
   /// A separation or an uncertainty is asked for, so that only conservative and screen will do.

@@ -212,6 +212,7 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
     mismatch("topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
              std::to_string(rows * cols));
   }
+  if (rows >= 2 && cols >= 2) checkFaces(2 * (rows - 1) * (cols - 1));
   if (!topology_ || last_faces_.size() != 1 ||
       last_faces_[0] != Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}) {
     topology_ = std::make_shared<const Topology>(Topology::grid(rows, cols));
@@ -234,7 +235,9 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   }
   DecodedMesh mesh;
   start(cloud.header, mesh);
-  checkCount(keptPixels(cloud, config_.depth.stride));
+  const std::size_t pixels = keptPixels(cloud, config_.depth.stride);
+  checkCount(pixels);
+  checkFaces(2 * pixels);
   DepthSurface surface;
   try {
     surface = depthSurface(cloud, config_.depth);

@@ -11,6 +11,7 @@
 
 #include "ros/master_question.h"
 #include "ros/message_bytes.h"
+#include "ros/steady_clock.h"
 
 namespace dccd {
 
@@ -29,8 +30,6 @@ constexpr std::int64_t ATTEMPT_NS = 1000000000;
 constexpr std::size_t MAX_DOUBLINGS = 5;
 constexpr double MASTER_TIMEOUT_S = 0.5;
 
-std::int64_t nowNs() { return static_cast<std::int64_t>(ros::SteadyTime::now().toNSec()); }
-
 /// Whether the bytes are this message. The header's sequence number is set when bytes are sent, and does not count.
 bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
   if (bytes.getDataType() != mesh.type->datatype) return false;
@@ -42,7 +41,7 @@ bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
 }  // namespace
 
 MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topic, Callback callback)
-    : node_(node), topic_(node_.resolveName(topic)), callback_(std::move(callback)), last_message_ns_(nowNs()) {
+    : node_(node), topic_(node_.resolveName(topic)), callback_(std::move(callback)), last_message_ns_(steadyNs()) {
   open(nullptr);
 }
 
@@ -80,7 +79,7 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
   ros::Subscriber ended;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    last_message_ns_ = nowNs();
+    last_message_ns_ = steadyNs();
     has_type_ = true;  // the publisher may come and go between two looks
     heard_type_ = message->getDataType();
     if (typed_) {
@@ -111,7 +110,7 @@ void MeshSubscription::onTyped(TypedMesh message) {
   ros::Subscriber ended;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    last_message_ns_ = nowNs();
+    last_message_ns_ = steadyNs();
     if (!any_) return deliver(std::move(message));
     if (last_bytes_ && isSame(*last_bytes_, message)) {  // came as bytes already
       if (held_.empty()) ended = endOverlap();
@@ -170,7 +169,7 @@ bool MeshSubscription::wantsRenewal() {
     lost = has_type_ && publishers == 0;
   }
   publishers_ = publishers;
-  const std::int64_t now_ns = nowNs();
+  const std::int64_t now_ns = steadyNs();
   if ((!lost && now_ns - last_message_ns_ < SILENCE_NS) || now_ns < next_look_ns_) return false;
   next_look_ns_ = now_ns + (lost ? LOST_LOOK_NS : LOOK_NS);
   return true;
@@ -209,15 +208,15 @@ void MeshSubscription::attempt(const std::string& published_type) {
   if (published_type != acted_on_) {
     acted_on_ = published_type;
     attempts_ = 0;
-    next_attempt_ns_ = nowNs() + LOOK_NS;  // a publisher that has just come may be about to be connected
+    next_attempt_ns_ = steadyNs() + LOOK_NS;  // a publisher that has just come may be about to be connected
   }
-  if (published_type.empty() || nowNs() < next_attempt_ns_) return;
+  if (published_type.empty() || steadyNs() < next_attempt_ns_) return;
   if (registeredPublishers(topic_, MASTER_TIMEOUT_S).value_or(0) <= publishers_) return;
   // The master's type, any, then each that can be a mesh.
   const auto& types = meshTypes();
   const std::size_t round = attempts_ / (types.size() + 2), at = attempts_ % (types.size() + 2);
   ++attempts_;
-  next_attempt_ns_ = nowNs() + (ATTEMPT_NS << std::min(round, MAX_DOUBLINGS));
+  next_attempt_ns_ = steadyNs() + (ATTEMPT_NS << std::min(round, MAX_DOUBLINGS));
   open(at == 0 ? findMeshType(published_type) : at == 1 ? nullptr : &types[at - 2]);
 }
 

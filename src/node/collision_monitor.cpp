@@ -148,9 +148,9 @@ void CollisionMonitor::Impl::advertiseServices() {
         return true;
       }));
   Reconfigure::Events events;
-  events.changed = [this](const MonitorOptions& options, const MarkerConfig& markers) {
-    queue.command([this, options, markers] {
-      pipeline.reconfigure(options, markers);
+  events.changed = [this](const Reconfigure::Change& change) {
+    queue.command([this, change] {
+      pipeline.reconfigure(change);
       state.setLimits(livenessLimits(config));
     });
   };
@@ -205,7 +205,7 @@ CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeH
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
 
-void CollisionMonitor::installCrashHandler() {
+void CollisionMonitor::takeProcess() {
   impl_->owns_process = true;
   try {
     impl_->recorder.installCrashHandler();

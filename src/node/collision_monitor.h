@@ -17,9 +17,9 @@ class CollisionMonitor {
   CollisionMonitor(const CollisionMonitor&) = delete;
   CollisionMonitor& operator=(const CollisionMonitor&) = delete;
 
-  /// For the program that owns its process: a crash writes the last step (doc/troubleshooting.md), and the process ends
+  /// For the program whose process this is: a crash writes the last step (doc/troubleshooting.md), and the process ends
   /// within a second of the monitor's end, whatever still runs.
-  void installCrashHandler();
+  void takeProcess();
 
  private:
   struct Impl;

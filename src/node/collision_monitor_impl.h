@@ -26,14 +26,10 @@
 #include "node/state_reporter.h"
 #include "node/step_recorder.h"
 #include "output/diagnostics.h"
+#include "ros/steady_clock.h"
 #include "ros/transforms.h"
 
 namespace dccd {
-
-inline std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 LivenessLimits livenessLimits(const MonitorConfig& config);
 

@@ -26,6 +26,8 @@ void Liveness::frame(std::int64_t name, std::int64_t now_ns) {
 }
 
 void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns) {
+  // One that came just before a reset, which forgot it, is answered after it.
+  if (newest_.came_ns == NEVER) newest_ = {name, now_ns};
   answered_ns_ = now_ns;
   while (!open_.empty() && open_.front().name <= name) {
     answered_ns_ = open_.front().came_ns;

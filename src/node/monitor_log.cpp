@@ -6,6 +6,7 @@
 
 #include "output/advice.h"
 #include "ros/short_text.h"
+#include "ros/steady_clock.h"
 
 namespace dccd {
 
@@ -13,11 +14,6 @@ namespace {
 
 // A publisher that has not been heard for so long after the start may not be there.
 constexpr std::int64_t PATIENCE_NS = 3000000000;
-
-std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 

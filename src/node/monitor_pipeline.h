@@ -60,7 +60,7 @@ class MonitorPipeline {
   Outcome checkNow();
 
   /// Changes what can be changed while it runs. Throws std::invalid_argument naming the option; all then stays.
-  void reconfigure(MonitorOptions options, const MarkerConfig& markers);
+  void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
 
   /// The body's newest frame holds at all times. Safe to call from any thread.
   bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }

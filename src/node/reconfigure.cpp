@@ -1,6 +1,7 @@
 #include "node/reconfigure.h"
 
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -16,7 +17,9 @@ namespace dccd {
 
 namespace {
 
-deformable_ccd::CollisionMonitorConfig toLive(const MonitorOptions& options, const MarkerConfig& markers) {
+deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {
+  const MonitorOptions& options = config.monitor;
+  const MarkerConfig& markers = config.markers;
   deformable_ccd::CollisionMonitorConfig live = deformable_ccd::CollisionMonitorConfig::__getDefault__();
   live.accuracy = static_cast<int>(options.detector.accuracy.rung);
   live.step_budget_ms = options.detector.step_budget_ms;
@@ -44,37 +47,33 @@ void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions
   markers.obstacle_m = live.marker_obstacle_m;
 }
 
-/// Empty: the monitor takes them.
-std::string problemOf(const MonitorOptions& options, const std::vector<Body>& bodies) {
-  try {
-    check(options.detector, bodies);
-    MeshStore store(options.store);
-    return {};
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
+/// The one value of the message, in words.
+std::string textOf(const dynamic_reconfigure::Config& message) {
+  std::ostringstream text;
+  for (const auto& value : message.bools) text << (value.value ? "true" : "false");
+  for (const auto& value : message.ints) text << value.value;
+  for (const auto& value : message.doubles) text << value.value;
+  return text.str();
 }
 
 }  // namespace
 
 struct Reconfigure::Impl {
   using Live = deformable_ccd::CollisionMonitorConfig;
-  bool separates = false;
-  MonitorOptions options;  // in force
-  MarkerConfig markers;
-  std::vector<Body> bodies;
+  const MonitorConfig start;  // what cannot be changed live stays as it was
+  const std::vector<Body> bodies;
+  Live in_force;
   Events events;
   boost::recursive_mutex mutex;  // shared with the server, which asks for it so that updateConfig cannot deadlock
   dynamic_reconfigure::Server<Live> server;
 
   Impl(const ros::NodeHandle& node, const MonitorConfig& config, Events call)
-      : separates(config.holdsDistance()),
-        options(config.monitor),
-        markers(config.markers),
+      : start(config),
+        bodies(config.monitorBodies()),
+        in_force(toLive(config)),
         events(std::move(call)),
         server(mutex, node) {
-    for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
-    server.updateConfig(toLive(options, markers));
+    server.updateConfig(in_force);
     bool first = true;  // setCallback calls at once, with what is in force already
     server.setCallback([this, first](Live& live, std::uint32_t) mutable {
       if (!first) apply(live);
@@ -82,42 +81,43 @@ struct Reconfigure::Impl {
     });
   }
 
-  /// Takes over one value, where it is another one and good; else says why it is not. The server has clamped it to its
-  /// range, which a NaN passes.
-  template <typename Value>
-  void take(const char* name, Value Live::*value, const Live& wanted, Live& live) {
-    if (wanted.*value == live.*value) return;
-    const Value before = std::exchange(live.*value, wanted.*value);
-    MonitorOptions tried = options;
-    MarkerConfig tried_markers = markers;
-    fromLive(live, tried, tried_markers);
-    std::string problem = problemOf(tried, bodies);
-    if (!std::isfinite(static_cast<double>(live.*value))) problem = "it is no number";
-    if (problem.empty()) return;
-    live.*value = before;
-    events.refused(std::string("~live/") + name + " " + std::to_string(wanted.*value) + " was refused, " +
-                   std::to_string(before) + " stays: " + problem);
+  /// Empty: the monitor takes them.
+  std::string problemOf(const Live& live) const {
+    MonitorOptions options = start.monitor;
+    MarkerConfig markers = start.markers;
+    fromLive(live, options, markers);
+    try {
+      check(options.detector, bodies);
+      const MeshStore store(options.store);
+      return {};
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
   }
 
+  /// Each value by itself: a bad one is refused alone. The server has clamped them to their ranges, which a NaN passes.
   void apply(Live& live) {
-    Live wanted = live;
-    if (separates && !holdsDistance(static_cast<Accuracy>(wanted.accuracy))) {
-      wanted.accuracy =
-          static_cast<int>(Accuracy::CONSERVATIVE);  // the only rungs that hold a distance: this and screen
+    // The only rungs that hold a distance are this and screen.
+    if (start.holdsDistance() && !holdsDistance(static_cast<Accuracy>(live.accuracy))) {
+      live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);
     }
-    live = toLive(options, markers);
-    take("accuracy", &Live::accuracy, wanted, live);
-    take("step_budget_ms", &Live::step_budget_ms, wanted, live);
-    take("max_step_s", &Live::max_step_s, wanted, live);
-    take("max_vertex_step_m", &Live::max_vertex_step_m, wanted, live);
-    take("max_contacts", &Live::max_contacts, wanted, live);
-    take("suppress_initial", &Live::suppress_initial, wanted, live);
-    take("marker_point_size_m", &Live::marker_point_size_m, wanted, live);
-    take("marker_normal_length_m", &Live::marker_normal_length_m, wanted, live);
-    take("marker_mesh", &Live::marker_mesh, wanted, live);
-    take("marker_obstacle_m", &Live::marker_obstacle_m, wanted, live);
-    fromLive(live, options, markers);
-    events.changed(options, markers);
+    for (const auto& parameter : Live::__getParamDescriptions__()) {
+      dynamic_reconfigure::Config value, before;
+      parameter->toMessage(value, live);
+      parameter->toMessage(before, in_force);
+      Live tried = in_force;
+      parameter->fromMessage(value, tried);
+      const bool is_number = value.doubles.empty() || std::isfinite(value.doubles.front().value);
+      const std::string problem = is_number ? problemOf(tried) : "it is no number";
+      if (problem.empty()) {
+        in_force = tried;
+      } else {
+        events.refused("~live/" + parameter->name + " " + textOf(value) + " was refused, " + textOf(before) +
+                       " stays: " + problem);
+      }
+    }
+    live = in_force;
+    events.changed([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });
   }
 };
 

@@ -14,10 +14,12 @@ namespace dccd {
 
 class Reconfigure {
  public:
+  /// Writes the live values into the options; the rest of them stays.
+  using Change = std::function<void(MonitorOptions&, MarkerConfig&)>;
   /// Called from the handle's callback queue.
   struct Events {
-    std::function<void(const MonitorOptions&, const MarkerConfig&)> changed;  ///< what is in force from now on
-    std::function<void(const std::string& why)> refused;                      ///< one value, for the log
+    std::function<void(const Change&)> changed;           ///< what is in force from the next step on
+    std::function<void(const std::string& why)> refused;  ///< one value, for the log
   };
   /// Starts with the values of `config`; nobody else is to change them. A value that is out of range is refused alone,
   /// and the one before stays in force: what the services answer is in force from the next step on.

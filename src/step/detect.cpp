@@ -301,11 +301,15 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   StartStateSearch::IsOver is_over;
-  if (!part.deadline.isNever()) {
-    // Later parts need as much time for their pairs; what is over that is shared.
-    const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
-    const Clock::duration slack = part.deadline.at() - start - later * (start - begin);
-    is_over = [deadline = part.deadline.movedTo(start + slack / (later + 1))] { return deadline.isOver(); };
+  if (part.deadline.canEnd()) {
+    Deadline deadline = part.deadline;
+    if (!deadline.isNever()) {
+      // Later parts need as much time for their pairs; what is over that is shared.
+      const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
+      const Clock::duration slack = deadline.at() - start - later * (start - begin);
+      deadline = deadline.movedTo(start + slack / (later + 1));
+    }
+    is_over = [deadline] { return deadline.isOver(); };
   }
   std::vector<StartIntersection> met;
   result.start_state_complete = listStart(part, is_over, met) && result.start_state_complete;

@@ -70,7 +70,7 @@ struct Monitor::Impl {
     forgetReferences();
   }
 
-  Deadline deadline() const { return Deadline::after(options.detector.step_budget_ms).orWhen(cancelled); }
+  Deadline deadline() const { return deadlineOf(options.detector).orWhen(cancelled); }
   static double seconds(StampNs from, StampNs to) { return static_cast<double>(to - from) * 1e-9; }
   bool isStream(std::size_t body) const { return bodies[body].motion == BodyMotionKind::STREAM; }
   void drop(Pending& step, StepStatus status, const std::string& reason) {

@@ -378,20 +378,21 @@ TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
   driven.giveMap(1);
   driven.feed(1, 0.35f);
   EXPECT_TRUE(driven.pipeline.monitor().options().detector.obstacle_expected) << "a map came";
-  MonitorOptions options = driven.pipeline.config().monitor;
-  MarkerConfig markers = driven.pipeline.config().markers;
-  options.detector.max_contacts = 1;
-  markers.obstacle_m = 2;
-  driven.pipeline.reconfigure(options, markers);
+  driven.pipeline.reconfigure([](MonitorOptions& options, MarkerConfig& markers) {
+    options.detector.max_contacts = 1;
+    markers.obstacle_m = 2;
+  });
   EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
   EXPECT_TRUE(driven.pipeline.monitor().options().detector.obstacle_expected) << "the plan's, whatever is reconfigured";
   EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u);
   EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.feed(1.1, -0.05f).status, StepStatus::TRUNCATED);
-  options.detector.max_contacts = 7;
-  options.clock_body = 9;
-  markers.obstacle_m = 3;
-  EXPECT_THROW(driven.pipeline.reconfigure(options, markers), std::invalid_argument);
+  const auto another_clock = [](MonitorOptions& options, MarkerConfig& markers) {
+    options.detector.max_contacts = 7;
+    options.clock_body = 9;
+    markers.obstacle_m = 3;
+  };
+  EXPECT_THROW(driven.pipeline.reconfigure(another_clock), std::invalid_argument);
   EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u) << "what is refused changes nothing";
   EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
