@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
 #include "ros/short_text.h"
 #include "ros/transforms.h"
@@ -68,30 +67,6 @@ SentFaces triangulated(const IndexedView& mesh, std::size_t points) {
     for (std::size_t k = 2; k < polygon.size; ++k) add(polygon[0], polygon[k - 1], polygon[k]);
   }
   return faces;
-}
-
-/// Bits of a corner's coordinates; zeros of either sign are the same place.
-struct CornerKey {
-  std::uint64_t bits[3];
-  Index group;
-  bool operator==(const CornerKey& o) const {
-    return bits[0] == o.bits[0] && bits[1] == o.bits[1] && bits[2] == o.bits[2] && group == o.group;
-  }
-};
-struct CornerHash {
-  std::size_t operator()(const CornerKey& key) const {
-    std::uint64_t h = key.group;
-    for (const std::uint64_t b : key.bits) h = (h ^ b) * 0x9e3779b97f4a7c15ull, h ^= h >> 29;
-    return static_cast<std::size_t>(h);
-  }
-};
-CornerKey cornerKey(const Vec3& p, Index group) {
-  CornerKey key{{0, 0, 0}, group};
-  for (int axis = 0; axis < 3; ++axis) {
-    const double value = p[axis] == 0 ? 0.0 : p[axis];
-    std::memcpy(&key.bits[axis], &value, 8);
-  }
-  return key;
 }
 
 Eigen::Affine3d markerTransform(const MarkerView& marker) {
@@ -342,37 +317,6 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
          (seen.empty() ? " none" : seen));
 }
 
-bool MeshDecoder::weldHolds(const Positions& corners) const {
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    if (!(cornerKey(corners[c], 0) == cornerKey(corners[representative_[weld_[c]]], 0))) return false;
-  }
-  return true;
-}
-
-void MeshDecoder::forgetWeld() {
-  weld_.clear();
-  representative_.clear();
-}
-
-std::size_t MeshDecoder::weldAnew(const Positions& corners, bool refine) {
-  // Refining splits groups and never joins any: what touches now for the first time is contact, not mesh.
-  std::unordered_map<CornerKey, Index, CornerHash> groups;
-  groups.reserve(corners.size());
-  std::vector<Index> weld(corners.size());
-  std::vector<std::size_t> pieces(refine ? representative_.size() : 0, 0);  // of each vertex
-  representative_.clear();
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const auto [it, fresh] =
-        groups.try_emplace(cornerKey(corners[c], refine ? weld_[c] : 0), static_cast<Index>(representative_.size()));
-    if (fresh) representative_.push_back(static_cast<Index>(c));
-    if (fresh && refine) ++pieces[weld_[c]];
-    weld[c] = it->second;
-  }
-  weld_ = std::move(weld);
-  const auto apart = [](std::size_t count) { return count > 1; };
-  return static_cast<std::size_t>(std::count_if(pieces.begin(), pieces.end(), apart));
-}
-
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   DecodedMesh mesh;
   start(marker.header, mesh);
@@ -386,27 +330,24 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     const auto p = marker.points[i];
     corners[i] = Vec3(p[0], p[1], p[2]);
   }
-  const bool known = weld_.size() == count;
-  const bool welds = config_.weld && config_.source != TopologySource::FILE;
-  if (!welds && !known) {
-    weld_.resize(count);
-    for (std::size_t c = 0; c < count; ++c) weld_[c] = static_cast<Index>(c);
-    representative_ = weld_;
-  } else if (welds && !(known && weldHolds(corners))) {
-    mesh.weld_changes = weldAnew(corners, known);
+  if (config_.weld && config_.source != TopologySource::FILE) {
+    mesh.weld_changes = weld_.weld(corners);
+  } else {
+    weld_.keepApart(count);
   }
   if (config_.source == TopologySource::FILE) {
     mesh.topology = fixedTopology(count, 0, 0);
   } else {
     SentFaces sent;
     sent.proper.reserve(count / 3);
-    for (std::size_t c = 0; c < count; c += 3) sent.add({weld_[c], weld_[c + 1], weld_[c + 2]});
-    mesh.topology = fromFaces(representative_.size(), std::move(sent.proper));
+    const std::vector<Index>& vertex = weld_.vertexOfCorner();
+    for (std::size_t c = 0; c < count; c += 3) sent.add({vertex[c], vertex[c + 1], vertex[c + 2]});
+    mesh.topology = fromFaces(weld_.cornerOfVertex().size(), std::move(sent.proper));
     requireSomething(*mesh.topology, count / 3);
     mesh.dropped_faces = countDropped(sent.repeating, *mesh.topology);
   }
-  mesh.positions.resize(representative_.size());
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.positions[v] = transform * corners[representative_[v]];
+  mesh.positions.reserve(weld_.cornerOfVertex().size());
+  for (const Index corner : weld_.cornerOfVertex()) mesh.positions.push_back(transform * corners[corner]);
   addRadii(nullptr, mesh);
   return mesh;
 }

@@ -11,6 +11,7 @@
 #include "dccd/mesh_store.h"
 #include "input/depth_surface.h"
 #include "input/message_type.h"
+#include "input/soup_weld.h"
 
 namespace dccd {
 
@@ -63,14 +64,13 @@ class MeshDecoder {
   /// The same of a message that was never serialised.
   DecodedMesh decode(const TypedMesh& message);
   /// The next triangle soup is welded as a first one.
-  void forgetWeld();
+  void forgetWeld() { weld_.forget(); }
 
  private:
   MeshInputConfig config_;
   std::vector<Face> last_faces_;
   std::shared_ptr<const Topology> topology_;  // of the last message
-  std::vector<Index> weld_;                   // soup corner to vertex
-  std::vector<Index> representative_;         // vertex to one of its corners
+  SoupWeld weld_;
 
   template <typename View>
   DecodedMesh decodeAs(const std::string& datatype, View view);
@@ -86,9 +86,6 @@ class MeshDecoder {
   void addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel = nullptr) const;
   std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
   std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
-  bool weldHolds(const Positions& corners) const;
-  /// Returns how many vertices came apart, which they do only where it refines.
-  std::size_t weldAnew(const Positions& corners, bool refine);
 };
 
 }  // namespace dccd

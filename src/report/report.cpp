@@ -9,6 +9,7 @@
 
 #include "dccd/assurance.h"
 #include "report/flat_layout.h"
+#include "report/quantile.h"
 
 namespace dccd {
 namespace {
@@ -16,13 +17,6 @@ namespace {
 const char* const KINDS[] = {"VF", "EE", "vertex-voxel_face", "edge-voxel_edge", "face-voxel_corner"};
 const char* const KINDS_IN_WORDS[] = {"vertex against face", "edge against edge", "vertex against voxel face",
                                       "edge against voxel edge", "face against voxel corner"};
-constexpr std::size_t LEAVING = 4;  // place of that flag in the key of a contact
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
-}
 
 std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
   return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
@@ -43,53 +37,6 @@ std::string csvField(const std::string& text) {
 nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
 
 }  // namespace
-
-void ContactLog::add(const Outcome& outcome) {
-  if (!outcome.answered) return;
-  ms_.push_back(outcome.stats.total_ms);
-  auto& step = steps_[outcome.sequence];
-  for (const Contact& c : outcome.contacts) {
-    const Key key{std::uint64_t{static_cast<std::uint8_t>(c.kind)} << 32 | std::uint64_t{c.body[0]} << 16 | c.body[1],
-                  std::uint64_t{c.vertex[0]} << 32 | c.vertex[1], std::uint64_t{c.vertex[2]} << 32 | c.vertex[3],
-                  std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z,
-                  std::uint64_t{c.leaving}};
-    static_assert(std::tuple_size<Key>::value == LEAVING + 1, "the flag is the key's last word");
-    step[key] = {c.toc_lower, c.certainty == Certainty::CERTAIN};
-  }
-}
-
-// What is undecided may be on its way in or out: a rung that did not look for the time does not know.
-bool ContactLog::covers(const std::map<Key, Entry>& found, Key key) {
-  if (found.count(key) > 0) return true;
-  key[LEAVING] ^= 1;
-  const auto other = found.find(key);
-  return other != found.end() && !other->second.certain;
-}
-
-RungCost ContactLog::against(const ContactLog& exact, const std::string& rung) const {
-  RungCost cost;
-  cost.rung = rung;
-  cost.steps = steps_.size();
-  cost.median_ms = quantile(ms_, 0.5);
-  cost.p95_ms = quantile(ms_, 0.95);
-  static const std::map<Key, Entry> NONE;
-  for (const auto& [sequence, found] : steps_) {
-    const auto other = exact.steps_.find(sequence);
-    const auto& truth = other == exact.steps_.end() ? NONE : other->second;
-    cost.contacts += found.size();
-    for (const auto& [key, entry] : found) {
-      const auto match = truth.find(key);
-      cost.undecided += !entry.certain;
-      if (match == truth.end()) {
-        cost.false_contacts += entry.certain;
-      } else {
-        cost.max_toc_error = std::max(cost.max_toc_error, std::abs(match->second.toc_lower - entry.toc_lower));
-      }
-    }
-    for (const auto& [key, entry] : truth) cost.missed += !covers(found, key);
-  }
-  return cost;
-}
 
 Report::Report(const std::string& folder) : folder_(folder) {
   std::error_code error;

@@ -13,35 +13,10 @@
 #include "dccd/effect_plan.h"
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
+#include "report/contact_log.h"
 #include "report/latency_histogram.h"
 
 namespace dccd {
-
-/// One rung over the whole run, for the table of what accuracy costs. Missed and false are against the run with
-/// `exact`.
-struct RungCost {
-  std::string rung;
-  std::size_t steps = 0, contacts = 0, missed = 0, false_contacts = 0, undecided = 0;
-  double median_ms = 0, p95_ms = 0, max_toc_error = 0;
-};
-
-/// Contacts of each step in a comparable form, so that the runs of two rungs can be held against each other.
-class ContactLog {
- public:
-  void add(const Outcome& outcome);
-  /// Missed, false and TOC error of this run against the exact one.
-  RungCost against(const ContactLog& exact, const std::string& rung) const;
-
- private:
-  struct Entry {
-    double toc_lower;
-    bool certain;
-  };
-  using Key = std::array<std::uint64_t, 5>;
-  static bool covers(const std::map<Key, Entry>& found, Key key);
-  std::map<std::uint64_t, std::map<Key, Entry>> steps_;
-  std::vector<double> ms_;
-};
 
 /// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv,
 /// left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json and report.html.

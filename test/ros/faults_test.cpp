@@ -1,4 +1,5 @@
 // What real systems do to a monitor: the right status within one step, recovery within two, counters that add up.
+#include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 #include <filesystem>
@@ -211,11 +212,4 @@ TEST_F(Masked, AMaskOfAnotherMeshIsNoFaultOfOurs) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "faults_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "faults_test"); }

@@ -1,5 +1,6 @@
 // What a launch argument or a parameter names is called for: a named map that does not come, or that is refused, is
 // NO_MAP, at WARN in diagnostics and never clear. What nobody named is not missed.
+#include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 #include <algorithm>
@@ -168,17 +169,20 @@ TEST_F(Unnamed, ADefaultNamesNothing) {
   EXPECT_EQ(octomapsReason(), "nobody publishes /octomap_binary and no octomap_file is given");
 }
 
+/// There from the start, as the other monitors see, too: with frames coming the master is asked ever more rarely.
+class MisspeltMap : public ::testing::Environment {
+  void SetUp() override {
+    map_ = ros::NodeHandle().advertise<octomap_msgs::Octomap>("/misspelt/octomap_binary", 1, true);
+  }
+  void TearDown() override { map_.shutdown(); }
+  ros::Publisher map_;
+};
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd
 
 int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "inputs_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  // There from the start, as the other monitors see, too: with frames coming the master is asked ever more rarely.
-  const auto map = node.advertise<octomap_msgs::Octomap>("/misspelt/octomap_binary", 1, true);
-  return RUN_ALL_TESTS();
+  testing::AddGlobalTestEnvironment(new dccd::test::MisspeltMap);
+  return dccd::test::runLiveTests(argc, argv, "inputs_test");
 }

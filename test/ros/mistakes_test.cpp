@@ -8,6 +8,7 @@
 #include <std_msgs/Bool.h>
 
 #include "octomap/map_builder.h"
+#include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
@@ -188,11 +189,4 @@ TEST_F(NoClock, SimulatedTimeWithoutAClock) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "mistakes_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "mistakes_test"); }

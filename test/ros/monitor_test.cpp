@@ -20,6 +20,7 @@
 #include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 namespace dccd {
@@ -607,11 +608,4 @@ TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "monitor_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "monitor_test"); }

@@ -13,6 +13,7 @@
 #include <random>
 
 #include "input/mesh_subscription.h"
+#include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
 #include "ros/support/monitor_fixture.h"
 #include "ros/support/probe.h"
@@ -220,11 +221,4 @@ TEST(Nodelet, AWrongParameterIsRefusedByName) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "nodelet_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "nodelet_test"); }
