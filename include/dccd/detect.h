@@ -46,6 +46,9 @@ struct Options {
   bool suppress_initial = false;   ///< leave initial obstacle contacts out of the list (they still count)
   std::vector<Box> exclude_boxes;  ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;  ///< without a map the status is NO_MAP
+  /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
+  /// answer.
+  std::vector<std::string> excluded;
 };
 DCCD_EXPORT bool operator==(const Options& a, const Options& b);
 /// Throws std::invalid_argument naming the option and value that is out of range, also for these bodies.

@@ -178,8 +178,31 @@ void removeRigidBodies(MonitorConfig& config) {
   }
 }
 
+/// What an effect that is off takes away before a step is made, so that no body of a step tells of it. What bodies tell
+/// of (self_collision, body_body, octomap) is not named twice.
+std::vector<std::string> takenAway(const MonitorConfig& config) {
+  std::vector<std::string> sentences;
+  const auto add = [&](Effect effect, const std::string& what) {
+    const auto setting = config.effects.find(effect);
+    if (setting == config.effects.end() || setting->second != EffectSetting::OFF || what.empty()) return;
+    sentences.push_back(what + " by effects/" + toString(effect) + ": off");
+  };
+  std::string rigid;
+  for (const BodyConfig& body : config.bodies) {
+    if (body.isRigid()) rigid += (rigid.empty() ? "rigid body '" : "', '") + body.body.name;
+  }
+  const auto uncertain = [](const BodyConfig& body) { return body.isUncertain(); };
+  const bool any_uncertain = std::any_of(config.bodies.begin(), config.bodies.end(), uncertain);
+  add(Effect::RIGID_BODIES, rigid.empty() ? "" : rigid + "'");
+  add(Effect::MINIMUM_SEPARATION, largestSeparation(config.monitorBodies()) > 0 ? "the minimum separation" : "");
+  add(Effect::TRACKER_NOISE, any_uncertain ? "the uncertainty of positions" : "");
+  add(Effect::UNKNOWN_SPACE, config.unknown_space != UnknownSpace::FREE ? "unknown_space" : "");
+  return sentences;
+}
+
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
+  config.monitor.detector.excluded = takenAway(config);
   const auto off = [&](Effect effect) { return config.effects[effect] == EffectSetting::OFF; };
   if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;

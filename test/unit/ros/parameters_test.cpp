@@ -249,6 +249,9 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   tree["effects"]["tracker_noise"] = "off";
   tree["accuracy"] = "exact";
   const MonitorConfig off = readConfig(tree);
+  EXPECT_EQ(off.monitor.detector.excluded,
+            (std::vector<std::string>{"the minimum separation by effects/minimum_separation: off",
+                                      "the uncertainty of positions by effects/tracker_noise: off"}));
   EXPECT_EQ(off.monitor.detector.accuracy.rung, Accuracy::EXACT) << "what is off asks for nothing";
   EXPECT_FALSE(off.holdsDistance());
 }
@@ -262,6 +265,8 @@ TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
   tree["minimum_separation_pairs"][1] = separationPair("cloth", "cloth", 0.02);
   tree["effects"]["rigid_bodies"] = "off";
   const MonitorConfig config = readConfig(tree);
+  EXPECT_EQ(config.monitor.detector.excluded.size(), 1u) << "who reads ~state is told what is not there";
+  EXPECT_NE(config.monitor.detector.excluded.at(0).find("by effects/rigid_bodies: off"), std::string::npos);
   ASSERT_EQ(config.bodies.size(), 1u);
   EXPECT_EQ(config.monitor.clock_body, 0u);
   ASSERT_EQ(config.bodies[0].body.separations.size(), 1u);
