@@ -196,9 +196,9 @@ bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, c
   impl.joined = 0;
   impl.prepareReaches(run);
   if (surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
-    impl.vertex_batch.clear();
-    impl.edge_batch.clear();
-    impl.corner_batch.clear();
+    impl.vertex_batch.clear(deadline);
+    impl.edge_batch.clear(deadline);
+    impl.corner_batch.clear(deadline);
     for (auto* contacts_of : {&impl.vertex_contacts, &impl.edge_contacts, &impl.face_contacts}) {
       releaseBurst(*contacts_of);
       contacts_of->clear();

@@ -86,7 +86,7 @@ struct Monitor::Impl {
   void forgetLast();
   bool separates(const Body& body) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;
-  Outcome runStep(const Pending& pending);
+  Outcome runStep(const Pending& pending, double step_ms);
 };
 
 }  // namespace dccd

@@ -63,7 +63,8 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   m.side_history.beginAt(m.history);
-  return detect(step, m.options.detector, m.side_history);
+  return detect(step, m.options.detector, m.side_history,
+                Deadline::after(LOOK_AHEAD_SHARE * timeLimitMs(m.options.detector)));
 }
 
 }  // namespace dccd
