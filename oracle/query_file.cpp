@@ -11,6 +11,8 @@
 #include <ostream>
 #include <stdexcept>
 
+#include "dccd/regular_file.h"
+
 namespace dccd {
 namespace {
 
@@ -18,6 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr int LINES_PER_QUERY = 8;
 constexpr int COLUMNS = 7;
+constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{4} << 30;
 // Any double is a fraction of two integers of at most 325 digits. Fractions that are not reduced may be longer; the
 // bound keeps a hostile file from costing more than its own size.
 constexpr std::size_t MAX_DIGITS = 4096;
@@ -161,6 +164,8 @@ std::vector<Query> readQueries(std::istream& in, PairKind kind, const std::strin
 }
 
 std::vector<Query> readQueryFile(const std::string& path, PairKind kind) {
+  const std::string problem = regularFileProblem(path, MAX_FILE_BYTES);
+  if (!problem.empty()) throw std::runtime_error(path + ": " + problem);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw std::runtime_error(path + ": cannot be opened");
   return readQueries(in, kind, path);

@@ -1,6 +1,7 @@
 // When a step has to be done: the one form of it.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 
 namespace dccd {
@@ -17,12 +18,33 @@ class Deadline {
     return Deadline(Clock::now() +
                     std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::milli>(ms)));
   }
+  /// The same, and over as soon as the flag is set, by any thread: what is computed is not wanted any more. The flag
+  /// must outlive it.
+  Deadline orWhen(const std::atomic<bool>& cancelled) const {
+    Deadline both = *this;
+    both.cancelled_ = &cancelled;
+    return both;
+  }
+  /// At another time; the flag stays.
+  Deadline movedTo(Clock::time_point at) const {
+    Deadline moved = *this;
+    moved.at_ = at;
+    return moved;
+  }
+  /// Later by this much, or earlier; a time that is not set stays so.
+  Deadline movedBy(Clock::duration by) const { return isNever() ? *this : movedTo(at_ + by); }
+  /// False: there is neither a time nor a flag, and it will never be over.
+  bool canEnd() const { return !isNever() || cancelled_ != nullptr; }
+  /// No time is set.
   bool isNever() const { return at_ == Clock::time_point::max(); }
-  bool isOver() const { return !isNever() && Clock::now() >= at_; }
+  bool isOver() const {
+    return (cancelled_ && cancelled_->load(std::memory_order_relaxed)) || (!isNever() && Clock::now() >= at_);
+  }
   Clock::time_point at() const { return at_; }
 
  private:
   Clock::time_point at_ = Clock::time_point::max();
+  const std::atomic<bool>* cancelled_ = nullptr;
 };
 
 }  // namespace dccd

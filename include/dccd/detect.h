@@ -46,6 +46,9 @@ struct Options {
   bool suppress_initial = false;   ///< leave initial obstacle contacts out of the list (they still count)
   std::vector<Box> exclude_boxes;  ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;  ///< without a map the status is NO_MAP
+  /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
+  /// answer.
+  std::vector<std::string> excluded;
 };
 DCCD_EXPORT bool operator==(const Options& a, const Options& b);
 /// Throws std::invalid_argument naming the option and value that is out of range, also for these bodies.
@@ -84,9 +87,10 @@ DCCD_EXPORT Outcome detect(const Step& step, const Options& options, History& hi
 inline double timeLimitMs(const Options& options) {
   return options.step_budget_ms > 0 ? options.step_budget_ms : options.max_compute_ms;
 }
-/// Within the options' step budget, or what ends a step that has none.
+/// From now on, as long as the options allow a step: its budget, or what ends a step that has none.
+inline Deadline deadlineOf(const Options& options) { return Deadline::after(timeLimitMs(options)); }
 inline Outcome detect(const Step& step, const Options& options, History& history) {
-  return detect(step, options, history, Deadline::after(timeLimitMs(options)));
+  return detect(step, options, history, deadlineOf(options));
 }
 
 }  // namespace dccd

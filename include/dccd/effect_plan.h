@@ -23,6 +23,7 @@ struct EffectScene {
   std::vector<Body> bodies;        ///< topology null: not known yet
   std::vector<std::string> noise;  ///< per body, where its uncertainty radii come from, in words; empty: it has none
   std::string map_source;          ///< a topic or file, for the sentence
+  bool map_named = false;          ///< by the user, as a topic: it is missed until it comes
   bool map_seen = false;           ///< a file is named, somebody publishes the topic, or a map has come
   std::size_t left_out_pairs = 0;  ///< closer than the minimum separation in the reference frame
   double look_ahead_s = 0;

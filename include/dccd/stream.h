@@ -26,8 +26,8 @@ struct MonitorOptions {
   double sync_timeout_s = 0.1;   ///< how long a step waits for the other bodies' frames
   std::size_t clock_body = 0;    ///< a step ends at each of its frames
   std::size_t max_waiting = 64;  ///< steps that may wait for other bodies; the oldest gives way
-  /// With obstacle_expected, a map older than this at the end of the step is no map; 0: never. (Where none is expected,
-  /// leaving a map out would go unsaid: it is used whatever its age.)
+  /// With obstacle_expected, a map whose stamp is further than this from the end of the step, before or after it, is no
+  /// map; 0: never. (Where none is expected, leaving a map out would go unsaid: it is used whatever its age.)
   double octomap_timeout_s = 0;
   double look_ahead_s = 0;  ///< horizon of predictions; 0: none
 
@@ -80,12 +80,19 @@ class DCCD_EXPORT Monitor {
   void countDropped(std::size_t body, StepStatus status, std::uint64_t count = 1);
   void countReceived(std::size_t body, std::uint64_t count = 1, std::uint64_t receipt_stamps = 0);
 
+  /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
+  /// again.
+  void withdraw(std::size_t body);
+
   /// The map from the next step on.
   void setMap(ObstacleMap map);
   const ObstacleMap& map() const;
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.
   bool next(std::int64_t now_ns, Outcome& outcome);
+  /// The step that is computed, and all after it, are not wanted any more: they end at once, as with a step budget that
+  /// is over. From any thread.
+  void cancel();
   /// Whether a step waits for other bodies' frames, so that next() is worth calling again later.
   bool waiting() const;
   /// End of input: steps that still wait are not waited for any longer.

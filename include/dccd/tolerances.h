@@ -90,11 +90,28 @@ constexpr double MAP_REACH = 0x1p-40;  ///< [1] margin of the boxes that find ca
 // --- streams and advice ----------------------------------------------------------------------------------------------
 /// [ns] tf stamps that go back further begin a recording anew: broadcasters of one tree are late by less.
 constexpr long long TF_JUMP_BACK_NS = 1000000000;
+/// [1] As tf2's own: a rotation whose squared norm is further from 1 is none, and is left out.
+constexpr double TF_QUATERNION_NORM = 1e-2;
 /// [m] A larger mesh draws the advice that it may be in millimetres; no answer depends on it.
 constexpr double LARGEST_PLAUSIBLE_M = 50;
 /// [1] A grid whose neighbours are this much nearer with rows and columns swapped draws advice; crumpled cloth does not
 /// reach it.
 constexpr double SWAPPED_GRID_RATIO = 0.6;
+/// [1] Neighbours on a mesh whose mean distance is more than this part of any two points' draw the advice that the
+/// points are shuffled; of 64 points and more in their order it is below a half.
+constexpr double SHUFFLED_RATIO = 0.7;
+
+// --- limits of a live node -------------------------------------------------------------------------------------------
+/// [bytes] What a triangle of a message may take until its step is done: as it is decoded, its topology, its share of
+/// vertices, edges and trees. A message that would take more than there is room for is refused before it is decoded.
+constexpr unsigned long long BYTES_PER_FACE = 400;
+/// [bytes] What a contact takes on its way from a pair to a message and its markers, or what meets when a step begins
+/// on its. Larger: steps are cut at fewer.
+constexpr unsigned long long BYTES_PER_CONTACT = 1024;
+/// [1] Contacts for each vertex, edge and face at which a step is cut. A cloth of 92,000 triangles that is crumpled
+/// into a ball has 0.4, layers within a distance of several edges some tens; a mesh that collapses has half as many as
+/// it has features.
+constexpr unsigned long long CONTACTS_PER_FEATURE = 2, CONTACTS_PER_FEATURE_WITH_DISTANCE = 32;
 
 }  // namespace tolerance
 }  // namespace dccd

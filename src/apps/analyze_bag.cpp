@@ -21,11 +21,13 @@ namespace {
 
 using namespace dccd;
 
+constexpr int ERROR = 1, NOT_PROVED = 3;
+
 struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh;
   double look_ahead_s = 0;
   int threads = 0;
-  bool no_rungs = false, quiet = false;
+  bool without_map = false, no_rungs = false, quiet = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -35,10 +37,10 @@ MonitorConfig configure(const Arguments& a) {
     const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag) : a.mesh;
     if (!topic.empty() && !tree.has("topic")) tree.put("topic", topic);
   }
-  // The bag knows where its maps are; one that is named stays.
-  if (!tree.has("octomap_topic")) {
-    const std::string topic = BagReplay::firstMapTopic(a.bag);
-    if (!topic.empty()) tree.put("octomap_topic", topic);
+  if (a.without_map) {
+    ParameterTree effects = tree.has("effects") ? tree.members["effects"] : ParameterTree();
+    effects.put("octomap", "off");
+    tree.put("effects", std::move(effects));
   }
   if (!a.accuracy.empty()) tree.put("accuracy", a.accuracy);
   if (a.look_ahead_s > 0) tree.put("look_ahead_s", a.look_ahead_s);
@@ -78,8 +80,12 @@ class ResultBag {
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
     bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
+    deformable_ccd::State state = toState(outcome, frame);
+    state.header.stamp = at;
+    fillState(assuranceOf(outcome), state);
+    bag_.write("/collision_monitor/state", at, state);
     std_msgs::Bool clear;
-    clear.data = assuranceOf(outcome).clear();
+    clear.data = state.clear;
     bag_.write("/collision_monitor/clear", at, clear);
     if (frame.empty()) return;
     bag_.write("/collision_monitor/markers", at,
@@ -127,12 +133,6 @@ std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config
   return rungs;
 }
 
-std::vector<Body> monitorBodies(const MonitorConfig& config) {
-  std::vector<Body> bodies;
-  for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
-  return bodies;
-}
-
 std::string seconds(double s) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(3) << s << " s";
@@ -159,9 +159,11 @@ int analyze(const Arguments& a) {
   std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   Report report(a.report);
   std::string frame;
+  bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
         report.add(outcome, pipeline.monitor().bodies());
+        answered = answered || outcome.answered;
         frame = pipeline.fixedFrame();
         if (out) out->add(outcome, pipeline, so_far, at);
       },
@@ -172,7 +174,7 @@ int analyze(const Arguments& a) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
   report.setEffects(summary.effects);
-  report.setLeftOut(summary.left_out, monitorBodies(config));
+  report.setLeftOut(summary.left_out, config.monitorBodies());
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
   report.setCounters(summary.frames);
   std::string topics;
@@ -183,6 +185,7 @@ int analyze(const Arguments& a) {
       {"fixed frame", frame},
       {"duration", seconds(summary.duration_s)},
       {"mesh messages", std::to_string(summary.mesh_messages)},
+      {"octomap", summary.map_source},
       {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
       {"accuracy", toString(config.monitor.detector.accuracy.rung)},
       {"threads", std::to_string(config.monitor.detector.num_threads)},
@@ -198,9 +201,13 @@ int analyze(const Arguments& a) {
   std::cout << report.headline() << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
-            << lookAheadLine(summary) << "report: " << a.report << "/report.html\n";
+            << lookAheadLine(summary) << "octomap: " << summary.map_source << "\nreport: " << a.report
+            << "/report.html\n";
   for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: " << c << '\n';
-  return 0;
+  const std::string unproved = report.unproved();
+  if (unproved.empty()) return 0;
+  std::cerr << "analyze_bag: " << (answered ? "not proved: " : "no frame was answered: ") << unproved << '\n';
+  return NOT_PROVED;
 }
 
 }  // namespace
@@ -213,18 +220,28 @@ int main(int argc, char** argv) {
   app.add_option("--report", a.report, "folder for the report")->required();
   app.add_option("--params", a.params, "YAML file with the node's parameters")->check(CLI::ExistingFile);
   app.add_option("--mesh", a.mesh, "mesh topic; without parameters the first one of the bag is taken");
-  app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
+  auto* octomap =
+      app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
+  app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")
+      ->excludes(octomap);
   app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact");
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
   app.add_flag("--quiet", a.quiet, "no progress");
-  CLI11_PARSE(app, argc, argv);
+  app.footer(
+      "Exit status:\n"
+      "  0  every step is proved: what does not touch is known not to\n"
+      "  1  an error, and a line that says which\n"
+      "  3  answered, but not all of it is proved, or no frame was answered; a line says why");
   try {
+    app.parse(argc, argv);
     return analyze(a);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : ERROR;
   } catch (const std::exception& e) {
     std::cerr << "analyze_bag: " << e.what() << '\n';
-    return 1;
+    return ERROR;
   }
 }

@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
     dccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
-    monitor.installCrashHandler();
+    monitor.takeProcess();
     while (ros::ok() && !ended) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what());

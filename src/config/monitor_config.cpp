@@ -4,6 +4,7 @@
 #include <iomanip>
 #include <sstream>
 
+#include "config/body_config.h"
 #include "dccd/accuracy.h"
 
 namespace dccd {
@@ -12,212 +13,6 @@ using XmlRpc::XmlRpcValue;
 using Kind = ParameterTree::Kind;
 
 namespace {
-
-constexpr double LARGE = 1e9;
-constexpr int MANY = 1000000000;
-// What a contact takes on its way from a pair to a message and its markers, and a start-state intersection on its, and
-// the share of the memory that may go into them.
-constexpr std::size_t FOUND_BYTES = 1024;
-constexpr std::size_t FOUND_SHARE = 4;
-// Contacts for each vertex, edge and face. A cloth of 92,000 triangles that is crumpled into a ball has 0.4, layers
-// within a distance of several edges some tens; a mesh that collapses has half as many as it has features.
-constexpr std::size_t FOUND_PER_FEATURE = 2, FOUND_PER_FEATURE_WITH_DISTANCE = 32;
-
-TopologySource topologySource(ParameterReader& section) {
-  const std::string text = section.choice(
-      "source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld", "depth_image"});
-  if (text == "message") return TopologySource::MESSAGE;
-  if (text == "grid") return TopologySource::GRID;
-  if (text == "polyline") return TopologySource::POLYLINE;
-  if (text == "file") return TopologySource::FILE;
-  if (text == "first_frame_weld") return TopologySource::FIRST_FRAME_WELD;
-  if (text == "depth_image") return TopologySource::DEPTH_IMAGE;
-  return TopologySource::AUTO;
-}
-
-void readDepthImage(ParameterReader& section, MeshInputConfig& input) {
-  const bool is_image = input.source == TopologySource::DEPTH_IMAGE;
-  for (const char* name : {"max_edge_m", "stride", "max_range_m", "median"}) {
-    if (!is_image && section.has(name)) section.fail(name, "has no meaning without source: depth_image; remove it");
-  }
-  DepthSurfaceOptions& depth = input.depth;
-  depth.max_edge_m = section.number("max_edge_m", depth.max_edge_m, 1e-6, LARGE);
-  depth.stride = static_cast<std::size_t>(section.integer("stride", static_cast<int>(depth.stride), 1, 1000));
-  depth.max_range_m = section.number("max_range_m", depth.max_range_m, 0, LARGE);
-  depth.median = static_cast<std::size_t>(section.integer("median", static_cast<int>(depth.median), 1, 15));
-  if (depth.median % 2 == 0)
-    section.fail("median", "must be odd, so that a pixel lies in the middle: 1 (off), 3, 5, …");
-  if (is_image && input.rows) section.fail("rows", "has no meaning for a depth image, which brings its own; remove it");
-}
-
-void readTopology(ParameterReader section, BodyConfig& body) {
-  MeshInputConfig& input = body.input;
-  input.source = topologySource(section);
-  input.rows = static_cast<std::size_t>(section.integer("rows", 0, 0, 100000));
-  input.cols = static_cast<std::size_t>(section.integer("cols", 0, 0, 100000));
-  body.topology_file = section.get("file", std::string());
-  readDepthImage(section, input);
-  section.finish();
-  if ((input.rows == 0) != (input.cols == 0)) section.fail("rows", "and cols go together: set both or neither");
-  if (input.rows == 1 || input.cols == 1)
-    section.fail("rows", "and cols must be 2 or more; for a rope set source to polyline");
-  if (input.source == TopologySource::AUTO && !body.topology_file.empty()) input.source = TopologySource::FILE;
-  if (input.source == TopologySource::DEPTH_IMAGE && !body.topology_file.empty())
-    section.fail("file", "has no meaning for a depth image, whose surface is made anew; remove it");
-  if (input.source == TopologySource::FILE && body.topology_file.empty())
-    section.fail("file", "is needed for source 'file'");
-  if (input.source == TopologySource::POLYLINE && input.rows)
-    section.fail("rows", "has no meaning for a polyline; remove rows and cols");
-}
-
-void readRigid(ParameterReader section, BodyConfig& body) {
-  body.mesh_file = section.get("mesh", std::string());
-  body.tf_frame = section.get("frame", std::string());
-  body.mesh_scale = section.number("scale", 1.0, 1e-6, 1e6);
-  section.finish();
-  if (body.mesh_file.empty()) section.fail("mesh", "is needed: a file (STL, OBJ, PLY, DAE) or a package:// path");
-  if (body.tf_frame.empty()) section.fail("frame", "is needed: the tf frame that carries the mesh");
-  body.body.rigid = true;
-}
-
-double separationOf(ParameterReader& reader, double fallback) {
-  return reader.number("minimum_separation_m", fallback, 0, LARGE);
-}
-
-void readUncertainty(ParameterReader section, BodyConfig& body) {
-  MeshInputConfig& input = body.input;
-  input.noise_radius_m = section.number("radius_m", 0.0, 0, LARGE);
-  input.noise_field = section.get("field", std::string());
-  const bool scaled = section.has("scale");
-  input.noise_scale = section.number("scale", 1.0, 0, 1e6);
-  section.finish();
-  if (scaled && input.noise_field.empty())
-    section.fail("scale", "has no meaning without field; write radius_m instead");
-  if (!input.noise_field.empty() && body.isRigid()) {
-    section.fail("field", "has no meaning for a rigid body, which sends no points; write radius_m instead");
-  }
-}
-
-BodyConfig readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic) {
-  BodyConfig body;
-  body.body.name = name;
-  body.topic = reader.get("topic", default_topic);
-  std::vector<std::string> types{"auto"};
-  for (const MeshType& type : meshTypes()) types.push_back(type.name);
-  body.input.type = reader.choice("type", "auto", types);
-  body.input.frame_id = reader.get("frame_id", std::string());
-  body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
-  body.input.max_vertices = static_cast<std::size_t>(reader.integer("max_vertices", 1000000, 1, MANY));
-  readTopology(reader.section("topology"), body);
-  if (reader.has("marker")) {
-    ParameterReader marker = reader.section("marker");
-    if (marker.has("namespace")) body.input.marker_namespace = marker.get("namespace", std::string());
-    if (marker.has("id")) body.input.marker_id = marker.integer("id", 0, -2147483647, 2147483647);
-    marker.finish();
-  }
-  if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
-  body.body.vertex_mask = reader.indices("vertex_mask");
-  if (body.isDepthImage()) {
-    // No vertex of one cloud is a vertex of the next, so there is no path between two, nor a number to mask.
-    if (body.body.motion != BodyMotionKind::STATIC) {
-      reader.fail("motion",
-                  "must be static with topology/source depth_image: no point of a cloud has a path to the next");
-    }
-    if (!body.body.vertex_mask.empty()) reader.fail("vertex_mask", "has no meaning for a depth image; remove it");
-  }
-  if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
-  readUncertainty(reader.section("uncertainty"), body);
-  return body;
-}
-
-void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyConfig& body) {
-  const bool self_asked = reader.has("self_collision");
-  body.body.self_collision = reader.get("self_collision", !body.body.rigid && !body.isDepthImage());
-  if (body.body.rigid && self_asked && body.body.self_collision) {
-    reader.fail("self_collision", "is true, but the body is rigid and cannot meet itself; remove it");
-  }
-  if (body.isDepthImage() && body.body.self_collision) {
-    reader.fail("self_collision",
-                "is true, but a depth image is one view of a surface and cannot meet itself; remove it");
-  }
-  body.body.against_bodies = reader.get("against_bodies", true);
-  body.body.against_obstacle = reader.get("against_obstacle", !body.isDepthImage());
-  body.body.shell = reader.get("shell", false);
-  body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
-}
-
-/// Two bodies, in either order, of an entry of minimum_separation_pairs.
-using NamedPair = std::pair<std::uint16_t, std::uint16_t>;
-
-/// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
-/// `before` are the pairs of the entries before it.
-void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vector<NamedPair>& before) {
-  const std::string octomap = "octomap";
-  std::vector<std::string> known{octomap};
-  for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
-  std::vector<std::uint16_t> pair;
-  for (const ParameterTree& name : entry.list("between")) {
-    const std::string& text = name.text;
-    const auto at = std::find(known.begin(), known.end(), text);
-    if (at == known.end()) {
-      entry.fail("between", "names '" + text + "', which is no body and not octomap; nearest is '" +
-                                nearestName(text, known) + "'");
-    }
-    pair.push_back(at == known.begin() ? OBSTACLE_BODY : static_cast<std::uint16_t>(at - known.begin() - 1));
-  }
-  if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
-  if (pair[0] == OBSTACLE_BODY) std::swap(pair[0], pair[1]);
-  if (pair[0] == OBSTACLE_BODY) entry.fail("between", "names octomap twice; name a body and octomap");
-  const NamedPair named = std::minmax(pair[0], pair[1]);
-  const auto twice = std::find(before.begin(), before.end(), named);
-  if (twice != before.end()) {
-    const auto nameOf = [&](std::uint16_t body) { return body == OBSTACLE_BODY ? octomap : known[body + 1u]; };
-    entry.fail("between", "names " + nameOf(pair[0]) + " and " + nameOf(pair[1]) + ", as minimum_separation_pairs[" +
-                              std::to_string(twice - before.begin()) + "] does; remove one of the two");
-  }
-  before.push_back(named);
-  if (!entry.has("separation_m")) entry.fail("separation_m", "is needed");
-  const double separation_m = entry.number("separation_m", 0.0, 0, LARGE);
-  entry.finish();
-  config.bodies[pair[0]].body.separations.push_back({pair[1], separation_m});
-}
-
-void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
-  std::vector<NamedPair> before;
-  for (const ParameterReader& entry : reader.sections("minimum_separation_pairs")) {
-    readSeparationPair(entry, config, before);
-  }
-}
-
-void readBodies(ParameterReader& reader, MonitorConfig& config) {
-  const std::string clock = reader.get("clock_body", std::string());
-  const std::string default_topic = reader.get("default_topic", std::string("mesh"));  // no contradiction to bodies
-  if (!reader.has("bodies")) {
-    BodyConfig body = readBody(reader, "mesh", default_topic);
-    if (body.isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
-    readBodyEffects(reader, config, body);
-    config.bodies.push_back(std::move(body));
-  } else {
-    ParameterReader section = reader.section("bodies");
-    for (const std::string& name : section.names()) {
-      ParameterReader one = section.section(name);
-      BodyConfig body = readBody(one, name, name);
-      readBodyEffects(one, config, body);
-      one.finish();
-      config.bodies.push_back(std::move(body));
-    }
-    if (config.bodies.empty()) reader.fail("bodies", "is empty");
-  }
-  const auto has_clock = [&](const BodyConfig& body) {
-    return !body.isRigid() && body.body.motion == BodyMotionKind::STREAM && (clock.empty() || clock == body.body.name);
-  };
-  const auto found = std::find_if(config.bodies.begin(), config.bodies.end(), has_clock);
-  if (found == config.bodies.end()) {
-    reader.fail("clock_body", clock.empty() ? "cannot be chosen: no body is a stream of meshes"
-                                            : "is '" + clock + "', which is not a body with a stream of meshes");
-  }
-  config.monitor.clock_body = static_cast<std::size_t>(found - config.bodies.begin());
-}
 
 std::vector<std::string> rungNames() {
   std::vector<std::string> names;
@@ -293,10 +88,15 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.record_folder = reader.get("record_folder", std::string());
 }
 
+/// A quarter for what waits in queues, a quarter for what a step finds, half for frames as they are used.
 void limitMemory(MonitorConfig& config) {
   Options& detector = config.monitor.detector;
-  detector.max_found = config.max_memory_bytes / FOUND_SHARE / FOUND_BYTES;
-  detector.max_found_per_feature = config.holdsDistance() ? FOUND_PER_FEATURE_WITH_DISTANCE : FOUND_PER_FEATURE;
+  const std::size_t quarter = config.max_memory_bytes / 4;
+  detector.max_found = quarter / tolerance::BYTES_PER_CONTACT;
+  detector.max_found_per_feature =
+      config.holdsDistance() ? tolerance::CONTACTS_PER_FEATURE_WITH_DISTANCE : tolerance::CONTACTS_PER_FEATURE;
+  config.max_queue_bytes = quarter;
+  for (BodyConfig& body : config.bodies) body.input.max_faces = 2 * quarter / tolerance::BYTES_PER_FACE;
 }
 
 void limitTime(MonitorConfig& config) { config.monitor.detector.max_compute_ms = config.max_compute_s * 1e3; }
@@ -310,7 +110,11 @@ void readLimits(ParameterReader& reader, MonitorConfig& config) {
 }
 
 void readMap(ParameterReader& reader, MonitorConfig& config) {
+  config.octomap_topic_named = reader.has("octomap_topic");
   config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
+  if (config.octomap_topic.empty()) {
+    reader.fail("octomap_topic", "is empty; remove it, or write effects/octomap: off where there is no map");
+  }
   config.octomap_file = reader.get("octomap_file", std::string());
   config.octomap_frame = reader.get("octomap_frame", std::string());
   config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 4096)) << 20;
@@ -374,8 +178,31 @@ void removeRigidBodies(MonitorConfig& config) {
   }
 }
 
+/// What an effect that is off takes away before a step is made, so that no body of a step tells of it. What bodies tell
+/// of (self_collision, body_body, octomap) is not named twice.
+std::vector<std::string> takenAway(const MonitorConfig& config) {
+  std::vector<std::string> sentences;
+  const auto add = [&](Effect effect, const std::string& what) {
+    const auto setting = config.effects.find(effect);
+    if (setting == config.effects.end() || setting->second != EffectSetting::OFF || what.empty()) return;
+    sentences.push_back(what + " by effects/" + toString(effect) + ": off");
+  };
+  std::string rigid;
+  for (const BodyConfig& body : config.bodies) {
+    if (body.isRigid()) rigid += (rigid.empty() ? "rigid body '" : "', '") + body.body.name;
+  }
+  const auto uncertain = [](const BodyConfig& body) { return body.isUncertain(); };
+  const bool any_uncertain = std::any_of(config.bodies.begin(), config.bodies.end(), uncertain);
+  add(Effect::RIGID_BODIES, rigid.empty() ? "" : rigid + "'");
+  add(Effect::MINIMUM_SEPARATION, largestSeparation(config.monitorBodies()) > 0 ? "the minimum separation" : "");
+  add(Effect::TRACKER_NOISE, any_uncertain ? "the uncertainty of positions" : "");
+  add(Effect::UNKNOWN_SPACE, config.unknown_space != UnknownSpace::FREE ? "unknown_space" : "");
+  return sentences;
+}
+
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
+  config.monitor.detector.excluded = takenAway(config);
   const auto off = [&](Effect effect) { return config.effects[effect] == EffectSetting::OFF; };
   if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
@@ -455,6 +282,18 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 void limitLive(MonitorConfig& config) {
   limitMemory(config);
   limitTime(config);
+}
+
+std::vector<Body> MonitorConfig::monitorBodies() const {
+  std::vector<Body> found;
+  for (const BodyConfig& body : bodies) found.push_back(body.body);
+  return found;
+}
+
+bool MonitorConfig::namesOctomap() const {
+  const auto setting = effects.find(Effect::OCTOMAP);
+  const bool automatic = setting == effects.end() || setting->second == EffectSetting::AUTO;
+  return automatic ? octomap_topic_named || !octomap_file.empty() : setting->second == EffectSetting::ON;
 }
 
 bool MonitorConfig::holdsDistance() const {

@@ -19,7 +19,8 @@ enum class UnknownSpace : std::uint8_t { FREE, OCCUPIED, REPORT };
 enum class QueuePolicy : std::uint8_t { NEWEST, OLDEST };
 struct BodyConfig {
   Body body;
-  std::string topic;  ///< streams and static meshes
+  std::string topic;         ///< streams and static meshes
+  bool topic_named = false;  ///< by a parameter; the node knows of remappings, too (node/named_inputs.h)
   MeshInputConfig input;
   std::string topology_file;
   // Rigid bodies: no topic, but a mesh file that a tf frame carries.
@@ -40,6 +41,9 @@ struct MarkerConfig {
   double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
 };
 
+/// Where a map is looked for that nobody named.
+constexpr const char* DEFAULT_OCTOMAP_TOPIC = "octomap_binary";
+
 struct MonitorConfig {
   std::string fixed_frame;  ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;
@@ -48,9 +52,11 @@ struct MonitorConfig {
   double minimum_separation_m = 0;  ///< of bodies that name none
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
-  std::string octomap_topic = "octomap", octomap_file, octomap_frame;
+  std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
+  bool octomap_topic_named = false;  ///< as BodyConfig::topic_named
   std::size_t max_map_bytes = std::size_t{512} << 20;
-  std::size_t max_memory_bytes = std::size_t{512} << 20;
+  std::size_t max_memory_bytes = std::size_t{512} << 20;  ///< see limitLive()
+  std::size_t max_queue_bytes = 0;                        ///< a quarter of it where it holds; 0: no limit
   double max_compute_s = 0.5;
   double transform_timeout_s = 0.2;
   double answer_timeout_s = 0.5;
@@ -61,6 +67,10 @@ struct MonitorConfig {
   std::string record_folder;     ///< empty: deformable_ccd in ROS_HOME (~/.ros)
   MarkerConfig markers;
   std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
+  /// The bodies as the monitor is given them.
+  std::vector<Body> monitorBodies() const;
+  /// The map is called for: a step without one lacks it. Else it is used when it is there.
+  bool namesOctomap() const;
   /// A separation or an uncertainty is asked for, so that only conservative and screen will do.
   bool holdsDistance() const;
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.

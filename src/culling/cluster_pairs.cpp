@@ -7,7 +7,26 @@ namespace dccd {
 namespace {
 
 /// superclusterTocBound() of groups of any level.
-double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::uint32_t b);
+double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::uint32_t b) {
+  const std::int16_t* x = trees.a->level(level).aos.data() + std::size_t{a} * simd::AOS_SIZE;
+  const std::int16_t* y = trees.b->level(level).aos.data() + std::size_t{b} * simd::AOS_SIZE;
+  // Gap of real projections in record units: values are truncated to a unit, and the scaling's rounding is far below
+  // another one. The ends of moving intervals are bounded by straight lines between the bounds at t0 and t1.
+  const auto firstMeeting = [](int gap0, int gap1) {
+    gap0 -= 2;
+    gap1 -= 2;
+    if (gap0 <= 0) return 0.0;
+    if (gap1 > 0) return 1.0;
+    return static_cast<double>(gap0) / (gap0 - gap1) * (1 - 1e-15);
+  };
+  double latest = 0;
+  for (int d = 0; d < 8; ++d) {
+    const int HI = simd::RECORD;
+    latest = std::max(latest, firstMeeting(x[d] - y[HI + d], x[8 + d] - y[HI + 8 + d]));
+    latest = std::max(latest, firstMeeting(y[d] - x[HI + d], y[8 + d] - x[HI + 8 + d]));
+  }
+  return latest;
+}
 
 }  // namespace
 
@@ -48,31 +67,6 @@ double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pair
 double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_t b) {
   return tocBound(trees, 1, a, b);
 }
-
-namespace {
-
-double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::uint32_t b) {
-  const std::int16_t* x = trees.a->level(level).aos.data() + std::size_t{a} * simd::AOS_SIZE;
-  const std::int16_t* y = trees.b->level(level).aos.data() + std::size_t{b} * simd::AOS_SIZE;
-  // Gap of real projections in record units: values are truncated to a unit, and the scaling's rounding is far below
-  // another one. The ends of moving intervals are bounded by straight lines between the bounds at t0 and t1.
-  const auto firstMeeting = [](int gap0, int gap1) {
-    gap0 -= 2;
-    gap1 -= 2;
-    if (gap0 <= 0) return 0.0;
-    if (gap1 > 0) return 1.0;
-    return static_cast<double>(gap0) / (gap0 - gap1) * (1 - 1e-15);
-  };
-  double latest = 0;
-  for (int d = 0; d < 8; ++d) {
-    const int HI = simd::RECORD;
-    latest = std::max(latest, firstMeeting(x[d] - y[HI + d], x[8 + d] - y[HI + 8 + d]));
-    latest = std::max(latest, firstMeeting(y[d] - x[HI + d], y[8 + d] - x[HI + 8 + d]));
-  }
-  return latest;
-}
-
-}  // namespace
 
 ClusterPairStream::ClusterPairStream() : clusters_(2 * CLUSTER_PAIRS), slots_(2 * CHUNK) {}
 

@@ -80,7 +80,7 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
     input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
     input.count = std::min(BLOCK, batch.count - begin);
-    if (batch.deadline && !batch.deadline->isNever() && Deadline(batch.deadline->at() + TIME_FOR_BATCHES).isOver()) {
+    if (batch.deadline && batch.deadline->movedBy(TIME_FOR_BATCHES).isOver()) {
       std::fill_n(results + begin, input.count, exact::undecided(Tier::DOUBLE_BATCH));
       counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)] += input.count;
       continue;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
+
+#include "ros/short_text.h"
+#include "ros/transforms.h"
 
 namespace dccd {
 
@@ -39,6 +41,12 @@ void requireSomething(const Topology& topology, std::size_t faces) {
                      : "all of its " + std::to_string(faces) + " triangles name a vertex twice"));
 }
 
+std::size_t faceCount(const IndexedView& mesh) {
+  std::size_t count = mesh.triangles.size;
+  for (const auto& polygon : mesh.polygons) count += polygon.size > 2 ? polygon.size - 2 : polygon.size > 0;
+  return count;
+}
+
 SentFaces triangulated(const IndexedView& mesh, std::size_t points) {
   SentFaces faces;
   const auto add = [&](Index a, Index b, Index c) {
@@ -59,30 +67,6 @@ SentFaces triangulated(const IndexedView& mesh, std::size_t points) {
     for (std::size_t k = 2; k < polygon.size; ++k) add(polygon[0], polygon[k - 1], polygon[k]);
   }
   return faces;
-}
-
-/// Bits of a corner's coordinates; zeros of either sign are the same place.
-struct CornerKey {
-  std::uint64_t bits[3];
-  Index group;
-  bool operator==(const CornerKey& o) const {
-    return bits[0] == o.bits[0] && bits[1] == o.bits[1] && bits[2] == o.bits[2] && group == o.group;
-  }
-};
-struct CornerHash {
-  std::size_t operator()(const CornerKey& key) const {
-    std::uint64_t h = key.group;
-    for (const std::uint64_t b : key.bits) h = (h ^ b) * 0x9e3779b97f4a7c15ull, h ^= h >> 29;
-    return static_cast<std::size_t>(h);
-  }
-};
-CornerKey cornerKey(const Vec3& p, Index group) {
-  CornerKey key{{0, 0, 0}, group};
-  for (int axis = 0; axis < 3; ++axis) {
-    const double value = p[axis] == 0 ? 0.0 : p[axis];
-    std::memcpy(&key.bits[axis], &value, 8);
-  }
-  return key;
 }
 
 Eigen::Affine3d markerTransform(const MarkerView& marker) {
@@ -126,6 +110,7 @@ DecodedMesh MeshDecoder::decodeAs(const std::string& datatype, View view) {
 
 DecodedMesh MeshDecoder::decode(const std::string& datatype, const std::uint8_t* data, std::size_t size) {
   WireReader wire(data, size);
+  wire.limitEntries(config_.max_faces);
   return decodeAs(datatype, [&](const MeshType& type) { return type.read(wire, config_.noise_field); });
 }
 
@@ -162,11 +147,21 @@ void MeshDecoder::checkCount(std::size_t count) const {
   if (count == 0) refuse("there are no vertices");
 }
 
+void MeshDecoder::checkFaces(std::size_t count) const {
+  if (count <= config_.max_faces) return;
+  refuse(std::to_string(count) + " triangles are more than the " + std::to_string(config_.max_faces) +
+         " for which there is room; raise max_memory_mb");
+}
+
 void MeshDecoder::start(const HeaderView& header, DecodedMesh& mesh) const {
   mesh.stamp_ns = header.stamp_ns;
-  mesh.frame_id = header.frame_id.empty() ? config_.frame_id : std::string(header.frame_id);
-  if (!mesh.frame_id.empty() && mesh.frame_id[0] == '/') mesh.frame_id.erase(0, 1);  // tf2 has no leading slashes
-  if (mesh.frame_id.empty()) refuse("the message names no frame; set parameter frame_id");
+  std::string_view name = header.frame_id.empty() ? std::string_view(config_.frame_id) : header.frame_id;
+  if (!name.empty() && name[0] == '/') name.remove_prefix(1);  // tf2 has no leading slashes
+  if (name.empty()) refuse("the message names no frame; set parameter frame_id");
+  mesh.frame_id = std::string(name.substr(0, MAX_NAME + 1));
+  if (!frameNameProblem(mesh.frame_id).empty()) {  // too long, or one more slash
+    refuse("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
+  }
 }
 
 std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, std::size_t grid_rows,
@@ -192,6 +187,7 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
     mismatch("topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
              std::to_string(rows * cols));
   }
+  if (rows >= 2 && cols >= 2) checkFaces(2 * (rows - 1) * (cols - 1));
   if (!topology_ || last_faces_.size() != 1 ||
       last_faces_[0] != Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}) {
     topology_ = std::make_shared<const Topology>(Topology::grid(rows, cols));
@@ -214,7 +210,9 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   }
   DecodedMesh mesh;
   start(cloud.header, mesh);
-  checkCount(keptPixels(cloud, config_.depth.stride));
+  const std::size_t pixels = keptPixels(cloud, config_.depth.stride);
+  checkCount(pixels);
+  checkFaces(2 * pixels);
   DepthSurface surface;
   try {
     surface = depthSurface(cloud, config_.depth);
@@ -259,6 +257,7 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   }
   if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
     if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
+    checkFaces(faceCount(view));
     SentFaces sent = triangulated(view, count);
     const std::size_t faces = sent.proper.size() + sent.repeating.size();
     mesh.topology = fromFaces(count, std::move(sent.proper));
@@ -318,42 +317,12 @@ DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
          (seen.empty() ? " none" : seen));
 }
 
-bool MeshDecoder::weldHolds(const Positions& corners) const {
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    if (!(cornerKey(corners[c], 0) == cornerKey(corners[representative_[weld_[c]]], 0))) return false;
-  }
-  return true;
-}
-
-void MeshDecoder::forgetWeld() {
-  weld_.clear();
-  representative_.clear();
-}
-
-std::size_t MeshDecoder::weldAnew(const Positions& corners, bool refine) {
-  // Refining splits groups and never joins any: what touches now for the first time is contact, not mesh.
-  std::unordered_map<CornerKey, Index, CornerHash> groups;
-  groups.reserve(corners.size());
-  std::vector<Index> weld(corners.size());
-  std::vector<std::size_t> pieces(refine ? representative_.size() : 0, 0);  // of each vertex
-  representative_.clear();
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const auto [it, fresh] =
-        groups.try_emplace(cornerKey(corners[c], refine ? weld_[c] : 0), static_cast<Index>(representative_.size()));
-    if (fresh) representative_.push_back(static_cast<Index>(c));
-    if (fresh && refine) ++pieces[weld_[c]];
-    weld[c] = it->second;
-  }
-  weld_ = std::move(weld);
-  const auto apart = [](std::size_t count) { return count > 1; };
-  return static_cast<std::size_t>(std::count_if(pieces.begin(), pieces.end(), apart));
-}
-
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   DecodedMesh mesh;
   start(marker.header, mesh);
   const std::size_t count = marker.points.size;
   checkCount(count);
+  checkFaces(count / 3);
   if (count % 3 != 0) refuse("a TRIANGLE_LIST of " + std::to_string(count) + " points, which is not a multiple of 3");
   const Eigen::Affine3d transform = markerTransform(marker);
   Positions corners(count);
@@ -361,27 +330,24 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     const auto p = marker.points[i];
     corners[i] = Vec3(p[0], p[1], p[2]);
   }
-  const bool known = weld_.size() == count;
-  const bool welds = config_.weld && config_.source != TopologySource::FILE;
-  if (!welds && !known) {
-    weld_.resize(count);
-    for (std::size_t c = 0; c < count; ++c) weld_[c] = static_cast<Index>(c);
-    representative_ = weld_;
-  } else if (welds && !(known && weldHolds(corners))) {
-    mesh.weld_changes = weldAnew(corners, known);
+  if (config_.weld && config_.source != TopologySource::FILE) {
+    mesh.weld_changes = weld_.weld(corners);
+  } else {
+    weld_.keepApart(count);
   }
   if (config_.source == TopologySource::FILE) {
     mesh.topology = fixedTopology(count, 0, 0);
   } else {
     SentFaces sent;
     sent.proper.reserve(count / 3);
-    for (std::size_t c = 0; c < count; c += 3) sent.add({weld_[c], weld_[c + 1], weld_[c + 2]});
-    mesh.topology = fromFaces(representative_.size(), std::move(sent.proper));
+    const std::vector<Index>& vertex = weld_.vertexOfCorner();
+    for (std::size_t c = 0; c < count; c += 3) sent.add({vertex[c], vertex[c + 1], vertex[c + 2]});
+    mesh.topology = fromFaces(weld_.cornerOfVertex().size(), std::move(sent.proper));
     requireSomething(*mesh.topology, count / 3);
     mesh.dropped_faces = countDropped(sent.repeating, *mesh.topology);
   }
-  mesh.positions.resize(representative_.size());
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.positions[v] = transform * corners[representative_[v]];
+  mesh.positions.reserve(weld_.cornerOfVertex().size());
+  for (const Index corner : weld_.cornerOfVertex()) mesh.positions.push_back(transform * corners[corner]);
   addRadii(nullptr, mesh);
   return mesh;
 }

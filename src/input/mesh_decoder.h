@@ -11,6 +11,7 @@
 #include "dccd/mesh_store.h"
 #include "input/depth_surface.h"
 #include "input/message_type.h"
+#include "input/soup_weld.h"
 
 namespace dccd {
 
@@ -28,6 +29,7 @@ struct MeshInputConfig {
   std::optional<std::string> marker_namespace;
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
+  std::size_t max_faces = std::numeric_limits<std::size_t>::max();
   /// Uncertainty radius of each vertex [m]: noise_radius_m + noise_scale * the value of the point field, where one is
   /// named.
   std::string noise_field;
@@ -62,14 +64,13 @@ class MeshDecoder {
   /// The same of a message that was never serialised.
   DecodedMesh decode(const TypedMesh& message);
   /// The next triangle soup is welded as a first one.
-  void forgetWeld();
+  void forgetWeld() { weld_.forget(); }
 
  private:
   MeshInputConfig config_;
   std::vector<Face> last_faces_;
   std::shared_ptr<const Topology> topology_;  // of the last message
-  std::vector<Index> weld_;                   // soup corner to vertex
-  std::vector<Index> representative_;         // vertex to one of its corners
+  SoupWeld weld_;
 
   template <typename View>
   DecodedMesh decodeAs(const std::string& datatype, View view);
@@ -78,15 +79,13 @@ class MeshDecoder {
   DecodedMesh decodeView(const std::vector<MarkerView>& markers);
   DecodedMesh decodeDepthImage(const CloudView& cloud) const;
   DecodedMesh decodeSoup(const MarkerView& marker);
+  void checkFaces(std::size_t count) const;
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;
   /// `pixel` has the number in the cloud of each vertex; null: they are the same.
   void addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel = nullptr) const;
   std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
   std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
-  bool weldHolds(const Positions& corners) const;
-  /// Returns how many vertices came apart, which they do only where it refines.
-  std::size_t weldAnew(const Positions& corners, bool refine);
 };
 
 }  // namespace dccd

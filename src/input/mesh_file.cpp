@@ -8,13 +8,12 @@
 #include <array>
 #include <cctype>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <sstream>
-#include <system_error>
 
+#include "dccd/regular_file.h"
 #include "input/obj_file.h"
 
 namespace dccd {
@@ -183,17 +182,9 @@ std::string fileEnding(const std::string& path) {
 }
 
 void requireReadable(const std::string& path) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!error && std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw MeshFileError(path + ": is no regular file");
-  }
-  if (error || !std::ifstream(path)) throw MeshFileError(path + ": cannot be opened");
-  const std::uint64_t bytes = std::filesystem::file_size(path);
-  if (bytes > MAX_FILE_BYTES) {
-    throw MeshFileError(path + ": has " + std::to_string(bytes) + " bytes, at most " + std::to_string(MAX_FILE_BYTES) +
-                        " are read");
-  }
+  const std::string problem = regularFileProblem(path, MAX_FILE_BYTES);
+  if (!problem.empty()) throw MeshFileError(path + ": " + problem);
+  if (!std::ifstream(path)) throw MeshFileError(path + ": cannot be opened");
 }
 
 std::string readWholeFile(const std::string& path) {

@@ -17,6 +17,9 @@ struct MeshMessage {
   std::int64_t arrival_ns = 0;      ///< on the clock that drives the pipeline
   std::string md5 = "*";            ///< of the type as the publisher knows it
   TypedMesh object = {};
+  std::size_t too_large = 0;  ///< bytes that it had; it was emptied, since no queue has room for it
+
+  std::size_t size() const { return object.type ? object.type->size(object.message.get()) : bytes.size(); }
 };
 
 }  // namespace dccd

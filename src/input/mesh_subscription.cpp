@@ -4,10 +4,14 @@
 #include <cstddef>
 #include <utility>
 
+#include <ros/console.h>
+#include <ros/exceptions.h>
 #include <ros/subscribe_options.h>
 #include <ros/this_node.h>
 
+#include "ros/master_question.h"
 #include "ros/message_bytes.h"
+#include "ros/steady_clock.h"
 
 namespace dccd {
 
@@ -18,6 +22,13 @@ using topic_tools::ShapeShifter;
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 // The bytes of what was handed over follow within a moment; when they do not, a queue was full and they will not come.
 const ros::WallDuration MAX_OVERLAP(1.0);
+// A topic that has been quiet so long may have lost its publisher. Asked about so often, and at once when the last
+// publisher has gone.
+constexpr std::int64_t SILENCE_NS = 1000000000, LOOK_NS = 500000000, LOST_LOOK_NS = 200000000;
+// The pause between attempts doubles with each round of them, up to 32 s.
+constexpr std::int64_t ATTEMPT_NS = 1000000000;
+constexpr std::size_t MAX_DOUBLINGS = 5;
+constexpr double MASTER_TIMEOUT_S = 0.5;
 
 /// Whether the bytes are this message. The header's sequence number is set when bytes are sent, and does not count.
 bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
@@ -30,33 +41,65 @@ bool isSame(const ShapeShifter& bytes, const TypedMesh& mesh) {
 }  // namespace
 
 MeshSubscription::MeshSubscription(const ros::NodeHandle& node, std::string topic, Callback callback)
-    : node_(node), topic_(std::move(topic)), callback_(std::move(callback)) {
-  openToAnyType();
+    : node_(node), topic_(node_.resolveName(topic)), callback_(std::move(callback)), last_message_ns_(steadyNs()) {
+  open(nullptr);
 }
 
-void MeshSubscription::openToAnyType() {
-  closeAny();
-  typed_.shutdown();
-  has_type_ = false;
+void MeshSubscription::close() {
+  ros::Subscriber any, typed;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    any = endOverlap();
+    typed = std::exchange(typed_, {});
+    has_type_ = false;
+    heard_type_.clear();
+  }
+  // These wait for a callback that runs, which may wait for the mutex.
+  any.shutdown();
+  typed.shutdown();
+}
+
+void MeshSubscription::open(const MeshType* type) {
+  close();
   ros::SubscribeOptions options;
   options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
       topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onAny(event); });
+  if (type) {
+    options.md5sum = type->md5;
+    options.datatype = type->datatype;
+  }
   options.transport_hints = ros::TransportHints().tcpNoDelay();
-  any_ = node_.subscribe(options);
+  ros::Subscriber opened = node_.subscribe(options);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  any_ = std::move(opened);
 }
 
 void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event) {
   const ShapeShifter::ConstPtr message = event.getConstMessage();
-  has_type_ = true;  // the publisher may come and go between two calls of renew()
-  if (typed_) {
-    if (!held_.empty() && isSame(*message, held_.front())) return closeAny();
-    last_bytes_ = message;
-  } else if (event.getPublisherName() == ros::this_node::getName() &&
-             meshTypeProblem(message->getDataType(), message->getMD5Sum()).empty()) {
-    narrowTo(*findMeshType(message->getDataType()));
-    last_bytes_ = message;
+  ros::Subscriber ended;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    last_message_ns_ = steadyNs();
+    has_type_ = true;  // the publisher may come and go between two looks
+    heard_type_ = message->getDataType();
+    if (typed_) {
+      if (!held_.empty() && isSame(*message, held_.front())) {
+        ended = endOverlap();
+      } else {
+        last_bytes_ = message;
+        deliver(*message);
+      }
+    } else {
+      // Before any_ is known there is nothing to narrow: the first message may overtake open().
+      if (any_ && event.getPublisherName() == ros::this_node::getName() &&
+          meshTypeProblem(message->getDataType(), message->getMD5Sum()).empty()) {
+        narrowTo(*findMeshType(message->getDataType()));
+        last_bytes_ = message;
+      }
+      deliver(*message);
+    }
   }
-  deliver(*message);
+  ended.shutdown();
 }
 
 /// What is handed over comes at once, and overtakes the bytes of messages before it that are still on their way; until
@@ -64,20 +107,26 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
 /// have caught up with them. A message that was on its way when the second subscription was made comes through that one
 /// as bytes, too, right behind itself and perhaps behind objects that overtook it.
 void MeshSubscription::onTyped(TypedMesh message) {
-  if (!any_) return deliver(std::move(message));
-  if (last_bytes_ && isSame(*last_bytes_, message)) {  // came as bytes already
-    if (held_.empty()) closeAny();
-    return;
+  ros::Subscriber ended;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    last_message_ns_ = steadyNs();
+    if (!any_) return deliver(std::move(message));
+    if (last_bytes_ && isSame(*last_bytes_, message)) {  // came as bytes already
+      if (held_.empty()) ended = endOverlap();
+    } else {
+      held_.push_back(std::move(message));
+      if (held_.size() >= SUBSCRIBER_QUEUE) ended = endOverlap();
+    }
   }
-  held_.push_back(std::move(message));
-  if (held_.size() >= SUBSCRIBER_QUEUE) closeAny();
+  ended.shutdown();
 }
 
-void MeshSubscription::closeAny() {
-  any_.shutdown();
+ros::Subscriber MeshSubscription::endOverlap() {
   last_bytes_.reset();
   for (TypedMesh& message : held_) deliver(std::move(message));
   held_.clear();
+  return std::exchange(any_, {});
 }
 
 void MeshSubscription::deliver(const ShapeShifter& bytes) {
@@ -95,6 +144,7 @@ void MeshSubscription::deliver(TypedMesh object) {
   callback_(std::move(message));
 }
 
+/// No question to the master: it joins the subscription that there is.
 void MeshSubscription::narrowTo(const MeshType& type) {
   narrowed_at_ = ros::SteadyTime::now();
   ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
@@ -103,12 +153,71 @@ void MeshSubscription::narrowTo(const MeshType& type) {
   typed_ = node_.subscribe(options);
 }
 
-void MeshSubscription::renew() {
-  if (any_ && !held_.empty() && ros::SteadyTime::now() - narrowed_at_ > MAX_OVERLAP) closeAny();
-  const std::uint32_t publishers = any_ ? any_.getNumPublishers() : typed_.getNumPublishers();
-  has_type_ = has_type_ || publishers > 0;
-  if (has_type_ && publishers == 0) openToAnyType();
+bool MeshSubscription::wantsRenewal() {
+  ros::Subscriber ended, open;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (any_ && !held_.empty() && ros::SteadyTime::now() - narrowed_at_ > MAX_OVERLAP) ended = endOverlap();
+    open = any_ ? any_ : typed_;
+  }
+  ended.shutdown();
+  const std::uint32_t publishers = open ? open.getNumPublishers() : 0;
+  bool lost = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    has_type_ = has_type_ || publishers > 0;
+    lost = has_type_ && publishers == 0;
+  }
   publishers_ = publishers;
+  const std::int64_t now_ns = steadyNs();
+  if ((!lost && now_ns - last_message_ns_ < SILENCE_NS) || now_ns < next_look_ns_) return false;
+  next_look_ns_ = now_ns + (lost ? LOST_LOOK_NS : LOOK_NS);
+  return true;
+}
+
+void MeshSubscription::renew(const std::map<std::string, std::string>& published) {
+  const auto found = published.find(topic_);
+  const std::string type = found == published.end() ? "" : found->second;
+  std::string heard;
+  bool lost = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    heard = heard_type_;
+    lost = has_type_ && publishers_ == 0;
+  }
+  try {
+    if (lost) {
+      attempts_ = 0;
+      open(nullptr);
+    } else if (heard.empty()) {
+      attempt(type);
+    } else if (!type.empty() && type != heard && type != acted_on_) {
+      acted_on_ = type;
+      attempts_ = 0;
+      open(findMeshType(type));
+    }
+  } catch (const ros::Exception& error) {  // another nodelet holds the topic with another type
+    ROS_DEBUG_STREAM(topic_ << ": " << error.what());
+    open(nullptr);
+  }
+}
+
+/// Whose type the subscription has taken on is not known: nothing has come. A single publisher may be silent for good
+/// reasons, and need not be asked again; but one that is not connected was refused for its type, or was killed.
+void MeshSubscription::attempt(const std::string& published_type) {
+  if (published_type != acted_on_) {
+    acted_on_ = published_type;
+    attempts_ = 0;
+    next_attempt_ns_ = steadyNs() + LOOK_NS;  // a publisher that has just come may be about to be connected
+  }
+  if (published_type.empty() || steadyNs() < next_attempt_ns_) return;
+  if (registeredPublishers(topic_, MASTER_TIMEOUT_S).value_or(0) <= publishers_) return;
+  // The master's type, any, then each that can be a mesh.
+  const auto& types = meshTypes();
+  const std::size_t round = attempts_ / (types.size() + 2), at = attempts_ % (types.size() + 2);
+  ++attempts_;
+  next_attempt_ns_ = steadyNs() + (ATTEMPT_NS << std::min(round, MAX_DOUBLINGS));
+  open(at == 0 ? findMeshType(published_type) : at == 1 ? nullptr : &types[at - 2]);
 }
 
 }  // namespace dccd

@@ -19,7 +19,7 @@ constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
 
 CloudView::Coordinate fieldOf(std::string_view name, std::size_t offset, std::uint8_t datatype) {
   if (datatype != FLOAT32 && datatype != FLOAT64) {
-    throw WireError("field '" + std::string(name) + "' has datatype " + std::to_string(datatype) +
+    throw WireError("field '" + std::string(name.substr(0, 32)) + "' has datatype " + std::to_string(datatype) +
                     "; FLOAT32 (7) or FLOAT64 (8) is needed");
   }
   return {offset, datatype == FLOAT64};

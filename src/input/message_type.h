@@ -43,6 +43,7 @@ struct MeshType {
   /// The same views of an object of this type, with the same checks. It must outlive them.
   MeshView (*view)(const void* message, const std::string& extra_field);
   std::vector<std::uint8_t> (*serialize)(const void* message);
+  std::size_t (*size)(const void* message);  ///< bytes, serialised
   /// What roscpp needs to hand such messages over as they are.
   ros::SubscriptionCallbackHelperPtr (*callbackHelper)(const MeshType& type, std::function<void(TypedMesh)> callback);
 };
@@ -95,6 +96,9 @@ MeshType meshType(const char* name) {
     ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
     ros::serialization::serialize(stream, typed);
     return bytes;
+  };
+  row.size = [](const void* message) -> std::size_t {
+    return ros::serialization::serializationLength(*static_cast<const Message*>(message));
   };
   row.callbackHelper = [](const MeshType& type, std::function<void(TypedMesh)> callback) {
     using Pointer = const boost::shared_ptr<const Message>&;

@@ -1,9 +1,5 @@
 #include "input/silence.h"
 
-#include <map>
-
-#include <ros/master.h>
-#include <ros/this_node.h>
 #include <ros/time.h>
 
 #include "input/known_types.h"
@@ -15,15 +11,8 @@ namespace {
 
 constexpr std::size_t MAX_NAMES = 6;
 
-/// Published topics with a type that can be a mesh; empty when there are none or the master does not answer.
-std::string meshTopics() {
-  XmlRpc::XmlRpcValue request, response, topics;
-  request[0] = ros::this_node::getName();
-  request[1] = "";
-  // Not getTopics(), which would wait for a master that is gone.
-  if (!ros::master::execute("getPublishedTopics", request, response, topics, false)) return {};
-  std::map<std::string, std::string> types;
-  for (int i = 0; i < topics.size(); ++i) types[topics[i][0]] = static_cast<std::string>(topics[i][1]);
+/// Published topics with a type that can be a mesh.
+std::string meshTopics(const std::map<std::string, std::string>& types) {
   std::string names;
   std::size_t count = 0;
   for (const auto& [name, datatype] : types) {
@@ -35,7 +24,7 @@ std::string meshTopics() {
 
 }  // namespace
 
-std::string silenceHint(const std::vector<AwaitedTopic>& silent) {
+std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<std::string, std::string>& published) {
   if (ros::Time::isSimTime() && ros::Time::now().isZero()) {
     return "/use_sim_time is set, but nobody publishes /clock; play the bag with --clock, or rosparam set use_sim_time "
            "false";
@@ -52,9 +41,21 @@ std::string silenceHint(const std::vector<AwaitedTopic>& silent) {
     }
   }
   if (!unpublished) return text;
-  const std::string names = meshTopics();
+  const std::string names = meshTopics(published);
   return text + "; give the mesh's topic with mesh:=TOPIC; " +
          (names.empty() ? "no topic of a mesh type is published" : "published are " + names);
+}
+
+std::string unheardMapsHint(const std::string& listened, const std::map<std::string, std::string>& published) {
+  std::string names;
+  std::size_t count = 0;
+  for (const auto& [name, datatype] : published) {
+    if (!mapTypeProblem(datatype, "*").empty() || name == listened || ++count > MAX_NAMES) continue;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  if (names.empty()) return "";
+  return "an octomap is published on " + names + ", and this monitor listens to " + listened +
+         ", where none has come; give the topic with octomap:=TOPIC, or do without with effects/octomap: off";
 }
 
 }  // namespace dccd

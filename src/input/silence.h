@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,11 @@ struct AwaitedTopic {
 };
 
 /// A sentence about the clock or about topics from which no message has come, with what to do; empty when all is well.
-/// Asks the master what there is instead, so call it rarely and never in a callback.
-std::string silenceHint(const std::vector<AwaitedTopic>& silent);
+/// `published`: what there is, datatypes by topic; empty where the master does not answer.
+std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<std::string, std::string>& published);
+
+/// A sentence about octomaps that are published on other topics than `listened`, on which none has come; empty: there
+/// are none.
+std::string unheardMapsHint(const std::string& listened, const std::map<std::string, std::string>& published);
 
 }  // namespace dccd

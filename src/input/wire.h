@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -64,6 +65,15 @@ class WireReader {
     return count;
   }
 
+  /// For lists of which every entry takes memory of its own, however little of the message it is. Throws WireError.
+  void limitEntries(std::size_t count) { max_entries_ = count; }
+  std::size_t readEntries(const char* field, std::size_t min_element_bytes) {
+    const std::size_t count = readCount(field, min_element_bytes);
+    if (count <= max_entries_) return count;
+    throw WireError(std::string(field) + " has " + std::to_string(count) + " entries, more than the " +
+                    std::to_string(max_entries_) + " for which there is room; raise max_memory_mb");
+  }
+
   template <typename T>
   WireSpan<T> readArray(const char* field) {
     const std::size_t count = readCount(field, sizeof(T));
@@ -80,6 +90,7 @@ class WireReader {
  private:
   const std::uint8_t* at_;
   std::size_t left_;
+  std::size_t max_entries_ = std::numeric_limits<std::size_t>::max();
   void need(std::size_t bytes, const char* field) const {
     if (bytes <= left_) return;
     throw WireError(std::string(field) + " needs " + std::to_string(bytes) + " bytes, the message has " +

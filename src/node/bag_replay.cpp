@@ -2,6 +2,7 @@
 
 #include "node/bag_replay.h"
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <set>
@@ -9,6 +10,7 @@
 #include <rosbag/view.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "dccd/regular_file.h"
 #include "input/known_types.h"
 #include "report/progress_bar.h"
 #include "ros/message_bytes.h"
@@ -16,6 +18,12 @@
 
 namespace dccd {
 namespace {
+
+/// rosbag reads a device for its first line until memory is gone.
+void requireFile(const std::string& bag) {
+  const std::string problem = regularFileProblem(bag);
+  if (!problem.empty()) throw rosbag::BagIOException(bag + ": " + problem);
+}
 
 // Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
 const ros::Duration TF_AHEAD(10.0);
@@ -28,10 +36,16 @@ std::string absolute(const std::string& topic) { return topic.empty() || topic[0
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
 LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config) {
   LoadedMap map;
-  map.problem = mapTypeProblem(message.getDataType(), message.getMD5Sum());
+  map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
   if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config);
   if (map.stamp_ns == 0) map.stamp_ns = static_cast<StampNs>(message.getTime().toNSec());
   return map;
+}
+
+std::string listOf(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
 }
 
 /// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the
@@ -165,27 +179,67 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
   config_.transform_timeout_s = 0;
   if (!options_.octomap_file.empty()) config_.octomap_file = options_.octomap_file;
+  requireFile(path_);
   rosbag::Bag file(path_);
   rosbag::View view(file);
   std::set<std::string> topics;
-  for (const rosbag::ConnectionInfo* c : view.getConnections()) topics.insert(c->topic);
+  for (const rosbag::ConnectionInfo* c : view.getConnections()) {
+    const bool is_new = topics.insert(c->topic).second;
+    if (is_new && mapTypeProblem(c->datatype, c->md5sum).empty()) map_topics_.push_back(c->topic);
+  }
+  chooseMapTopic();
   bool found = false;
-  std::string wanted, present;
+  std::vector<std::string> wanted;
   for (const BodyConfig& body : config_.bodies) {
     if (body.isRigid()) continue;
     found |= topics.count(absolute(body.topic)) > 0;
-    wanted += (wanted.empty() ? "" : ", ") + absolute(body.topic);
+    wanted.push_back(absolute(body.topic));
   }
-  for (const std::string& t : topics) present += (present.empty() ? "" : ", ") + t;
   if (!found) {
-    throw std::runtime_error(path_ + ": no topic " + wanted + "; the bag has " +
-                             (present.empty() ? "no messages" : present));
+    throw std::runtime_error(path_ + ": no topic " + listOf(wanted) + "; the bag has " +
+                             (topics.empty() ? "no messages" : listOf({topics.begin(), topics.end()})));
   }
+}
+
+void BagReplay::chooseMapTopic() {
+  config_.octomap_topic = absolute(config_.octomap_topic);
+  const bool there = std::find(map_topics_.begin(), map_topics_.end(), config_.octomap_topic) != map_topics_.end();
+  if (!config_.octomap_topic_named && !there && !map_topics_.empty()) config_.octomap_topic = map_topics_.front();
+}
+
+std::string BagReplay::mapSource() const {
+  if (!config_.octomap_file.empty()) return config_.octomap_file + " (named)";
+  if (config_.octomap_topic_named) return config_.octomap_topic + " (named)";
+  if (config_.octomap_topic == absolute(DEFAULT_OCTOMAP_TOPIC)) return config_.octomap_topic + " (default)";
+  return config_.octomap_topic + " (the first of the bag; nobody named one)";
+}
+
+std::string BagReplay::unheardMaps() const {
+  std::vector<std::string> unheard;
+  for (const std::string& topic : map_topics_) {
+    if (topic != config_.octomap_topic) unheard.push_back(topic);
+  }
+  // A file was given to be taken instead.
+  if (unheard.empty() || !config_.octomap_file.empty()) return "";
+  return "nobody listens to the octomaps on " + listOf(unheard) + "; octomap_topic is " + config_.octomap_topic;
+}
+
+std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
+  if (summary.maps > summary.maps_refused) return "";
+  const bool is_file = !config_.octomap_file.empty();
+  if (summary.maps > 0) {
+    return (is_file ? "the octomap of " + config_.octomap_file : "no octomap on " + config_.octomap_topic) +
+           (is_file ? " could not be used" : " could be used");
+  }
+  return "the bag has no octomap on " + config_.octomap_topic + ", which " +
+         (config_.octomap_topic_named ? "octomap_topic names" : "effects/octomap calls for") + "; it has " +
+         (map_topics_.empty() ? "none" : "them on " + listOf(map_topics_));
 }
 
 BagReplay::~BagReplay() = default;
 
 std::string BagReplay::firstMeshTopic(const std::string& bag) {
+  requireFile(bag);
   rosbag::Bag file(bag);
   rosbag::View view(file);
   std::map<std::string, std::string> types;
@@ -196,20 +250,12 @@ std::string BagReplay::firstMeshTopic(const std::string& bag) {
   return "";
 }
 
-std::string BagReplay::firstMapTopic(const std::string& bag) {
-  rosbag::Bag file(bag);
-  rosbag::View view(file);
-  for (const rosbag::ConnectionInfo* c : view.getConnections()) {
-    if (mapTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
-  }
-  return "";
-}
-
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
   Run run(*this, sink, predictions);
-  const std::string map_topic = absolute(config_.octomap_topic);
+  const std::string& map_topic = config_.octomap_topic;
   const bool may_use_map = run.pipeline.effects().mayUseMap();
   const bool bag_maps = config_.octomap_file.empty() && may_use_map;
+  run.summary.map_source = may_use_map ? mapSource() : "off";
 
   rosbag::View all(run.bag);
   if (all.size() == 0) return run.summary;
@@ -250,6 +296,11 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.pipeline.finish();
   run.drain(at);
+  if (may_use_map && !unheardMaps().empty()) run.complain(unheardMaps());
+  if (run.pipeline.effects().mapExpected()) {
+    const std::string missing = missingMap(run.summary);
+    if (!missing.empty()) run.complain(missing);
+  }
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.effects = run.pipeline.effects().plan();
   run.summary.left_out = run.pipeline.monitor().leftOut();

@@ -25,7 +25,8 @@ struct BagReplayOptions {
 struct BagReplaySummary {
   std::vector<std::string> mesh_topics;  ///< one per body; empty for rigid ones
   std::uint64_t mesh_messages = 0, maps = 0, maps_refused = 0;
-  std::vector<std::string> complaints;  ///< refused messages, each kind once
+  std::string map_source;               ///< its topic or file, and who named it, in words
+  std::vector<std::string> complaints;  ///< refused messages, each kind once; maps that are missing or not listened to
   FrameCounters frames;
   EffectPlan effects;                          ///< at the end
   std::vector<LeftOutPair> left_out;           ///< at the end
@@ -42,6 +43,7 @@ class BagReplay {
   /// Called for each message of the bag, in order, before its outcomes.
   using MessageSink = std::function<void(const rosbag::MessageInstance&)>;
 
+  /// Where nobody names a topic for the map, and the default one is not in the bag, the bag's first one is taken.
   /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.
   BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
   ~BagReplay();
@@ -49,8 +51,6 @@ class BagReplay {
   /// The first topic of the bag that carries meshes and is no monitor's own, for configurations that name none. Empty:
   /// none.
   static std::string firstMeshTopic(const std::string& bag);
-  /// The first topic of the bag that carries octomaps. Empty: none.
-  static std::string firstMapTopic(const std::string& bag);
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that
@@ -64,6 +64,12 @@ class BagReplay {
   std::string path_;
   MonitorConfig config_;
   BagReplayOptions options_;
+  std::vector<std::string> map_topics_;  // of the bag
+
+  void chooseMapTopic();
+  std::string mapSource() const;
+  std::string unheardMaps() const;
+  std::string missingMap(const BagReplaySummary& summary) const;
 };
 
 }  // namespace dccd

@@ -1,11 +1,12 @@
 #include "node/collision_monitor_impl.h"
 
+#include <cstdlib>
+
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "dccd/simd_target.h"
-#include "input/known_types.h"
 #include "ros/message_bytes.h"
 
 namespace dccd {
@@ -15,12 +16,14 @@ using topic_tools::ShapeShifter;
 
 constexpr std::uint32_t SUBSCRIBER_QUEUE = 256;
 constexpr double SERVICE_TIMEOUT_S = 10;
-const ros::WallDuration RENEWAL(0.05);
+// Of the second in which the process is to end.
+constexpr std::chrono::milliseconds END_AFTER{700};
 
-MonitorConfig configOf(const ros::NodeHandle& private_node) {
+MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& private_node) {
   XmlRpc::XmlRpcValue tree;
   private_node.getParam(private_node.getNamespace(), tree);
   MonitorConfig config = readConfig(tree);
+  takeRemappings(node, config);
   limitLive(config);
   setSimdTarget(config.simd_target);
   return config;
@@ -38,13 +41,14 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       private_node(private_handle),
       pipeline(given, transforms, mapSourceOf(node, given)),
       config(pipeline.config()),
-      recorder(config, pipeline.monitor()),
+      recorder(config, pipeline.monitor(), private_node.getNamespace()),
       outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance()),
       state(private_node, livenessLimits(config)),
-      queue(config.bodies.size(), config.queue_size, config.queue_policy),
+      queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_queue_bytes),
       diagnostics(private_node.getNamespace(), node),
       log(node, private_node.getNamespace(), config),
-      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {}
+      look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
+      disabled_frames(config.bodies.size()) {}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
@@ -53,10 +57,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   frames_handed_over += message.object.type != nullptr;
   // A static body's newest frame holds at all times, also those to come: it may be the only one that is ever sent.
   if (!enabled && !pipeline.isStatic(body)) {
-    queue.command([this, body] {
-      pipeline.monitor().countReceived(body);
-      pipeline.monitor().countDropped(body, StepStatus::DISABLED);
-    });
+    ++disabled_frames[body];
     return;
   }
   if (body == config.monitor.clock_body) state.frameCame(now_ns);
@@ -67,23 +68,8 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
-  const std::string problem = mapTypeProblem(message->getDataType(), message->getMD5Sum());
-  if (!problem.empty()) {
-    maps->countRefused();
-    queue.command([this, problem] { log.complain(config.bodies.size(), "map type", problem); });
-    return;
-  }
-  if (message->size() > config.max_map_bytes) {
-    maps->countRefused();
-    queue.command([this, size = message->size()] {
-      log.complain(config.bodies.size(), "map size",
-                   "octomap of " + std::to_string(size) + " bytes is more than max_map_mb and was refused");
-      LoadedMap refused;
-      refused.problem = "the octomap is larger than max_map_mb";
-      pipeline.setMap(std::move(refused), steadyNs());
-    });
-    return;
-  }
+  const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
+  if (!problem.empty()) return maps->refuse(problem);  // before its bytes are copied
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
   state.mapCame();  // after it: the worker, which may take the map before, says again and again that none is on its way
 }
@@ -98,16 +84,12 @@ void CollisionMonitor::Impl::subscribe() {
     mesh_subscriptions[b] = std::make_unique<MeshSubscription>(
         input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
-  renewal = input.createSteadyTimer(RENEWAL, [this](const ros::SteadyTimerEvent&) {
-    for (const auto& subscription : mesh_subscriptions) {
-      if (subscription) subscription->renew();
-    }
-  });
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, true); });
+  ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
   if (!config.octomap_file.empty()) {
@@ -165,9 +147,17 @@ void CollisionMonitor::Impl::advertiseServices() {
         response.message = reply.message;
         return true;
       }));
-  reconfigure = std::make_unique<Reconfigure>(service, config, [this](const Reconfigure::Change& change) {
-    queue.command([this, change] { reconfigureNow(change); });
-  });
+  Reconfigure::Events events;
+  events.changed = [this](const Reconfigure::Change& change) {
+    queue.command([this, change] {
+      pipeline.reconfigure(change);
+      state.setLimits(livenessLimits(config));
+    });
+  };
+  events.refused = [this](const std::string& why) {
+    queue.command([this, why] { log.complain(config.monitor.clock_body, "live", why); });
+  };
+  reconfigure = std::make_unique<Reconfigure>(service, config, std::move(events));
 }
 
 // --- start and stop
@@ -176,6 +166,8 @@ void CollisionMonitor::Impl::advertiseServices() {
 void CollisionMonitor::Impl::start() {
   subscribe();
   advertiseServices();
+  master = std::make_unique<MasterWatch>(
+      mesh_subscriptions, map_subscriber, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
   worker = std::thread([this] { work(); });
   input_spinner.start();
   service_spinner.start();
@@ -184,7 +176,8 @@ void CollisionMonitor::Impl::start() {
 void CollisionMonitor::Impl::stop() {
   state.stop();
   stopping = true;
-  renewal.stop();
+  if (owns_process) endInTime();
+  pipeline.monitor().cancel();
   input_spinner.stop();
   queue.wake();
   if (worker.joinable()) worker.join();
@@ -192,16 +185,28 @@ void CollisionMonitor::Impl::stop() {
   service_spinner.stop();
   reconfigure.reset();
   maps.reset();
+  master.reset();
+}
+
+/// What is left is to leave: the last state has been said. A map that is decoded, a start state that is looked for or a
+/// master that hangs must not hold the process up; a file that is written may.
+void CollisionMonitor::Impl::endInTime() {
+  std::thread([] {
+    std::this_thread::sleep_for(END_AFTER);
+    for (int i = 0; i < 100 && FlightRecorder::filesUnderWay() > 0; ++i) std::this_thread::sleep_for(END_AFTER / 5);
+    std::_Exit(0);
+  }).detach();
 }
 
 CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
-    : impl_(std::make_unique<Impl>(node, private_node, configOf(private_node))) {
+    : impl_(std::make_unique<Impl>(node, private_node, configOf(node, private_node))) {
   impl_->start();
 }
 
 CollisionMonitor::~CollisionMonitor() { impl_->stop(); }
 
-void CollisionMonitor::installCrashHandler() {
+void CollisionMonitor::takeProcess() {
+  impl_->owns_process = true;
   try {
     impl_->recorder.installCrashHandler();
   } catch (const std::runtime_error& error) {

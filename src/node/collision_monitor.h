@@ -12,13 +12,14 @@ class CollisionMonitor {
   /// Reads the parameters under `private_node`, subscribes, advertises and starts its own threads: callbacks never wait
   /// for a step. Throws ParameterError or std::invalid_argument with one sentence that names the parameter.
   CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
-  /// Stops in mid-stream: the step that runs is finished, nothing is published after.
+  /// Stops in mid-stream: the step that runs is cut, nothing is published after it.
   ~CollisionMonitor();
   CollisionMonitor(const CollisionMonitor&) = delete;
   CollisionMonitor& operator=(const CollisionMonitor&) = delete;
 
-  /// For the program that owns its process: a crash writes the last step (doc/troubleshooting.md).
-  void installCrashHandler();
+  /// For the program whose process this is: a crash writes the last step (doc/troubleshooting.md), and the process ends
+  /// within a second of the monitor's end, whatever still runs.
+  void takeProcess();
 
  private:
   struct Impl;

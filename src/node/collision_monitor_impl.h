@@ -1,6 +1,6 @@
-// The node's inside. Three threads: callbacks of topics hand over to queues, services wait for the worker's answer, and
-// the worker alone touches the pipeline and publishes. collision_monitor.cpp holds the first two, monitor_worker.cpp
-// the third.
+// The node's inside. Callbacks of topics hand over to queues, services wait for the worker's answer, one thread asks
+// the master, and the worker alone touches the pipeline and publishes. collision_monitor.cpp holds all but the worker,
+// which is in monitor_worker.cpp.
 #pragma once
 
 #include "output/outputs.h"
@@ -19,20 +19,17 @@
 #include "node/collision_monitor.h"
 #include "node/input_queue.h"
 #include "node/map_loader.h"
+#include "node/master_watch.h"
 #include "node/monitor_log.h"
 #include "node/monitor_pipeline.h"
 #include "node/reconfigure.h"
 #include "node/state_reporter.h"
 #include "node/step_recorder.h"
 #include "output/diagnostics.h"
+#include "ros/steady_clock.h"
 #include "ros/transforms.h"
 
 namespace dccd {
-
-inline std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 LivenessLimits livenessLimits(const MonitorConfig& config);
 
@@ -54,20 +51,24 @@ struct CollisionMonitor::Impl {
   ros::CallbackQueue input_callbacks, service_callbacks;
   ros::AsyncSpinner input_spinner{1, &input_callbacks}, service_spinner{1, &service_callbacks};
   std::vector<std::unique_ptr<MeshSubscription>> mesh_subscriptions;  // one a body; none for rigid ones
-  ros::SteadyTimer renewal;
   ros::Subscriber map_subscriber, tf_subscriber, tf_static_subscriber;
+  std::unique_ptr<MasterWatch> master;
   std::vector<ros::ServiceServer> services;
   std::unique_ptr<Reconfigure> reconfigure;
+  bool owns_process = false;
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
   std::atomic<std::uint64_t> frames_handed_over{0};
   std::thread worker;
-  StampNs newest_ns = 0;                // stamp of the last outcome; the worker's
-  std::uint64_t steps_unpublished = 0;  // the worker's, too
+  std::vector<std::atomic<std::uint64_t>> disabled_frames;  // that came while disabled, not yet counted
+  bool plan_unsaid = false;                                 // the worker's
+  StampNs newest_ns = 0;                                    // stamp of the last outcome; the worker's
+  std::uint64_t steps_unpublished = 0;                      // the worker's, too
 
   Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle, MonitorConfig given);
 
   void start();
   void stop();
+  void endInTime();
 
   // Input thread.
   void subscribe();
@@ -79,6 +80,7 @@ struct CollisionMonitor::Impl {
 
   // Worker.
   void work();
+  bool workOn(const std::vector<std::function<void()>>& commands);
   void carryOut(const std::function<void()>& command);
   void takeMaps();
   void takeMessages();
@@ -90,7 +92,6 @@ struct CollisionMonitor::Impl {
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
   void lookIntoSilence();
-  void reconfigureNow(const Reconfigure::Change& change);
   void resetNow(StepStatus status);
   StatsContext statsContext() const;
 };

@@ -52,8 +52,11 @@ void onCrash(int signal) {
 
 FlightRecorder::NewestImage& crashImage() { return crash_image; }
 
-void installCrashHandler(const std::string& folder) {
-  const std::string path = folder + "/crash_" + std::to_string(::getpid()) + ".step";
+void installCrashHandler(const std::string& folder, const std::string& owner) {
+  const std::string stem = folder + "/crash_" + (owner.empty() ? "" : owner + "_") + std::to_string(::getpid());
+  std::string path = stem + ".step";
+  // In containers every process may have the same number.
+  for (int copy = 2; ::access(path.c_str(), F_OK) == 0; ++copy) path = stem + "_" + std::to_string(copy) + ".step";
   if (path.size() >= PATH_SIZE) throw std::invalid_argument("record_folder is too long: " + folder);
   std::memcpy(crash_path, path.c_str(), path.size() + 1);
   stack_t stack{};

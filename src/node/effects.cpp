@@ -27,6 +27,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   }
   scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
   if (!map_source.empty()) scene_.map_source = map_source;
+  scene_.map_named = config.octomap_topic_named;
   scene_.map_seen = !config.octomap_file.empty();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;

@@ -19,6 +19,8 @@ class EffectTracker {
   /// False: the octomap is switched off, nothing is subscribed to for it.
   bool mayUseMap() const;
   bool mapExpected() const { return plan_.running(Effect::OCTOMAP); }
+  /// A map has come or may come any time, for somebody publishes maps; a file is as good.
+  bool mapSeen() const { return scene_.map_seen; }
   /// A map has come, or somebody is there who publishes maps.
   void expectMap();
   /// Sets what the plan decides of a monitor's options. False: they are so already.

@@ -7,18 +7,30 @@
 
 namespace dccd {
 
-InputQueue::InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy)
-    : queues_(bodies), dropped_(bodies, 0), capacity_(capacity), policy_(policy) {}
+InputQueue::InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy, std::size_t max_bytes)
+    : queues_(bodies), dropped_(bodies, 0), capacity_(capacity), max_bytes_(max_bytes), policy_(policy) {}
 
 void InputQueue::push(std::size_t body, MeshMessage message) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     auto& queue = queues_[body];
-    if (queue.size() >= capacity_) {
+    if (max_bytes_ > 0 && message.size() > max_bytes_) {
+      MeshMessage emptied;  // its turn comes all the same: that it is refused is to be told
+      emptied.too_large = message.size();
+      emptied.receipt_ns = message.receipt_ns;
+      emptied.arrival_ns = message.arrival_ns;
+      message = std::move(emptied);
+    }
+    const std::size_t size = message.size();
+    const auto isFull = [&] { return queue.size() >= capacity_ || (max_bytes_ > 0 && bytes_ + size > max_bytes_); };
+    while (isFull()) {
       ++dropped_[body];
-      if (policy_ == QueuePolicy::OLDEST) return;
+      // What lies in other bodies' queues is theirs.
+      if (policy_ == QueuePolicy::OLDEST || queue.empty()) return;
+      bytes_ -= queue.front().size();
       queue.pop_front();
     }
+    bytes_ += size;
     queue.push_back(std::move(message));
     woken_ = true;
   }
@@ -29,6 +41,7 @@ bool InputQueue::pop(std::size_t body, MeshMessage& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   auto& queue = queues_[body];
   if (queue.empty()) return false;
+  bytes_ -= queue.front().size();
   message = std::move(queue.front());
   queue.pop_front();
   return true;
@@ -40,6 +53,7 @@ std::vector<std::uint64_t> InputQueue::clear(const std::vector<bool>& spared) {
   for (std::size_t b = 0; b < queues_.size(); ++b) {
     if (b < spared.size() && spared[b]) continue;
     counts[b] = queues_[b].size();
+    for (const MeshMessage& message : queues_[b]) bytes_ -= message.size();
     queues_[b].clear();
   }
   return counts;

@@ -23,9 +23,11 @@ struct Reply {
 /// One queue a body, and commands for the worker. Safe to call from any thread.
 class InputQueue {
  public:
-  InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy);
+  /// `max_bytes`: of the messages of all bodies; 0: no limit.
+  InputQueue(std::size_t bodies, std::size_t capacity, QueuePolicy policy, std::size_t max_bytes = 0);
 
-  /// A full queue drops its oldest message (newest) or this one (oldest), and counts it.
+  /// A full queue drops its oldest messages (newest) or this one (oldest), and counts them; so does one for which there
+  /// is no room in bytes beside the others. One that has no room at all is kept without its content.
   void push(std::size_t body, MeshMessage message);
   /// False when the body has none.
   bool pop(std::size_t body, MeshMessage& message);
@@ -52,7 +54,7 @@ class InputQueue {
   std::vector<std::deque<MeshMessage>> queues_;
   std::vector<std::uint64_t> dropped_;
   std::vector<std::function<void()>> commands_;
-  std::size_t capacity_;
+  std::size_t capacity_, max_bytes_, bytes_ = 0;
   QueuePolicy policy_;
   bool woken_ = false, closed_ = false;
 };

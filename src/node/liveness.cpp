@@ -1,5 +1,6 @@
 #include "node/liveness.h"
 
+#include <algorithm>
 #include <iomanip>
 #include <sstream>
 
@@ -25,12 +26,16 @@ void Liveness::frame(std::int64_t name, std::int64_t now_ns) {
 }
 
 void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns) {
+  // One that came just before a reset, which forgot it, is answered after it.
+  if (newest_.came_ns == NEVER) newest_ = {name, now_ns};
   answered_ns_ = now_ns;
   while (!open_.empty() && open_.front().name <= name) {
     answered_ns_ = open_.front().came_ns;
     open_.pop_front();
   }
-  if (open_.empty() && newest_.came_ns != NEVER && newest_.name > name) open_.push_back(newest_);
+  answered_ = std::max(answered_, name);
+  // So many had no answer that the newest found no place: now it is the one that counts.
+  if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
 }
 
@@ -41,7 +46,7 @@ void Liveness::mapCame(std::int64_t now_ns) {
 void Liveness::forget() {
   open_.clear();
   newest_ = {0, NEVER};
-  answered_ns_ = NEVER;
+  answered_ = answered_ns_ = NEVER;
   map_age_s_ = -1;
   asked_.clear();
 }

@@ -55,7 +55,7 @@ class Liveness {
   LivenessLimits limits_;
   std::deque<Frame> open_;  // without an outcome; at most a few thousand, of which the oldest counts
   Frame newest_{0, NEVER};
-  std::int64_t map_since_ns_ = NEVER, answered_ns_ = NEVER;
+  std::int64_t map_since_ns_ = NEVER, answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
   std::string asked_;
   bool disabled_ = false, stopped_ = false;

@@ -3,9 +3,12 @@
 
 #include "dccd/known_space.h"
 #include "dccd/octomap_decode.h"
+#include "input/known_types.h"
 #include "input/mesh_views.h"
 #include "input/wire.h"
 #include "node/map_loader.h"
+#include "ros/short_text.h"
+#include "ros/transforms.h"
 
 namespace dccd {
 
@@ -33,14 +36,25 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, LoadedMap& map) 
 
 }  // namespace
 
+std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
+                              const MonitorConfig& config) {
+  const std::string problem = mapTypeProblem(datatype, md5);
+  if (!problem.empty() || size <= config.max_map_bytes) return problem;
+  return std::to_string(size) + " bytes are more than max_map_mb";
+}
+
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config) {
   LoadedMap map;
   try {
     WireReader wire(bytes.data(), bytes.size());
     const HeaderView header = readHeader(wire);
     map.stamp_ns = header.stamp_ns;
-    map.frame_id = header.frame_id.empty() ? config.octomap_frame : std::string(header.frame_id);
-    if (!map.frame_id.empty() && map.frame_id[0] == '/') map.frame_id.erase(0, 1);
+    std::string_view name = header.frame_id.empty() ? std::string_view(config.octomap_frame) : header.frame_id;
+    if (!name.empty() && name[0] == '/') name.remove_prefix(1);
+    map.frame_id = std::string(name.substr(0, MAX_NAME + 1));
+    if (!name.empty() && !frameNameProblem(map.frame_id).empty()) {
+      throw WireError("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
+    }
     OctomapFields fields;
     fields.binary = wire.read<std::uint8_t>("binary") != 0;
     fields.id = std::string(wire.readString("id"));
@@ -51,7 +65,7 @@ LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const Monitor
     build(decodeOctomap(fields, limitsOf(config)), config, map);
   } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
     map.surface = nullptr;
-    map.problem = error.what();
+    map.problem = shortText(error.what());
   }
   return map;
 }

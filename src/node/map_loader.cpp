@@ -25,13 +25,20 @@ void MapLoader::put(Job job) {
   changed_.notify_one();
 }
 
-void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns) { put({std::move(bytes), {}, receipt_ns}); }
+void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns) {
+  put({std::move(bytes), {}, receipt_ns, {}});
+}
 
-void MapLoader::submitFile(const std::string& file) { put({{}, file, 0}); }
+void MapLoader::submitFile(const std::string& file) { put({{}, file, 0, {}}); }
 
-void MapLoader::countRefused() {
-  ++received_;
-  ++refused_;
+void MapLoader::refuse(const std::string& problem) { put({{}, {}, 0, problem}); }
+
+LoadedMap MapLoader::load(const Job& job) const {
+  if (!job.file.empty()) return loadMapFile(job.file, config_);
+  if (job.problem.empty()) return decodeMapMessage(job.bytes, config_);
+  LoadedMap refused;
+  refused.problem = job.problem;
+  return refused;
 }
 
 bool MapLoader::take(LoadedMap& map) {
@@ -58,7 +65,7 @@ void MapLoader::loop() {
       job_.reset();
       decoding_ = true;
     }
-    LoadedMap map = job.file.empty() ? decodeMapMessage(job.bytes, config_) : loadMapFile(job.file, config_);
+    LoadedMap map = load(job);
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
     if (!map.surface) ++refused_;
     {

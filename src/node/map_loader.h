@@ -16,6 +16,9 @@
 
 namespace dccd {
 
+/// Why a message is no map, as far as its type and its size [bytes] tell; empty: it can be decoded.
+std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
+                              const MonitorConfig& config);
 /// A serialised octomap_msgs/Octomap to a map; never throws: what is wrong is in LoadedMap::problem.
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config);
 /// A .bt or .ot file. Never throws.
@@ -32,8 +35,9 @@ class MapLoader {
   /// A serialised octomap_msgs/Octomap; replaces one that still waits. From any thread.
   void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns);
   void submitFile(const std::string& file);
-  /// Counts a message that was refused before it was worth handing over. From any thread.
-  void countRefused();
+  /// A message that is refused undecoded takes its turn all the same: it is newer than the map in use, which is void
+  /// with it. From any thread.
+  void refuse(const std::string& problem);
   /// The newest finished map, once.
   bool take(LoadedMap& map);
 
@@ -48,6 +52,7 @@ class MapLoader {
     std::vector<std::uint8_t> bytes;
     std::string file;
     StampNs receipt_ns = 0;
+    std::string problem;  // not empty: refused
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
   std::function<void()> ready_;
@@ -59,6 +64,7 @@ class MapLoader {
   std::atomic<std::uint64_t> received_{0}, refused_{0};
   std::thread thread_;
 
+  LoadedMap load(const Job& job) const;
   void put(Job job);
   void loop();
 };

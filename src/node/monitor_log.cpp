@@ -5,6 +5,8 @@
 #include <ros/console.h>
 
 #include "output/advice.h"
+#include "ros/short_text.h"
+#include "ros/steady_clock.h"
 
 namespace dccd {
 
@@ -13,25 +15,23 @@ namespace {
 // A publisher that has not been heard for so long after the start may not be there.
 constexpr std::int64_t PATIENCE_NS = 3000000000;
 
-std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
 }  // namespace
 
 MonitorLog::MonitorLog(const ros::NodeHandle& node, const std::string& name, const MonitorConfig& config)
     : node_(node), name_(name), config_(config) {}
 
-std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
-  return config.octomap_file.empty() ? node.resolveName(config.octomap_topic) : config.octomap_file;
-}
-
 void MonitorLog::complain(std::size_t body, const std::string& kind, const std::string& text) {
   const std::string topic = body < config_.bodies.size() ? topicOf(body) : mapSource();
-  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + text, steadyNs());
+  const std::string line = throttle_.line(topic + " " + kind, topic + ": " + shortText(text), steadyNs());
   if (!line.empty()) ROS_WARN_STREAM(line);
 }
+
+void MonitorLog::alarm(const std::string& kind, const std::string& text) {
+  const std::string line = throttle_.line(kind, shortText(text), steadyNs());
+  if (!line.empty()) ROS_ERROR_STREAM(line);
+}
+
+bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
 void MonitorLog::tell(const Outcome& outcome) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
@@ -54,15 +54,16 @@ bool MonitorLog::isSilenceDue(std::int64_t now_ns) {
   return true;
 }
 
-void MonitorLog::hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline) {
-  std::string text = silenceHint(silent);
+void MonitorLog::hintAt(std::string silence, const MonitorPipeline& pipeline) {
+  std::string text = std::move(silence);
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     if (pipeline.hint(b).empty()) continue;
     const BodyConfig& body = config_.bodies[b];
     const std::string source = body.isRigid() ? "body '" + body.body.name + "'" : topicOf(b);
     text += (text.empty() ? "" : "; ") + source + ": " + pipeline.hint(b);
   }
-  if (!text.empty() && text != hint_) ROS_WARN_STREAM(name_ << ": " << text);
+  if (text.empty()) told_hint_.clear();
+  if (!text.empty() && text != told_hint_ && isDue("hint")) ROS_WARN_STREAM(name_ << ": " << (told_hint_ = text));
   hint_ = std::move(text);
 }
 

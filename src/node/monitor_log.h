@@ -11,12 +11,10 @@
 #include "dccd/stream.h"
 #include "input/silence.h"
 #include "node/monitor_pipeline.h"
+#include "node/named_inputs.h"
 #include "ros/log_throttle.h"
 
 namespace dccd {
-
-/// The octomap's resolved topic, or its file.
-std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config);
 
 class MonitorLog {
  public:
@@ -24,12 +22,16 @@ class MonitorLog {
 
   /// One line per kind and period, led by the body's topic, or by the map's when there is no such body.
   void complain(std::size_t body, const std::string& kind, const std::string& text);
+  /// An error line, one per kind and period.
+  void alarm(const std::string& kind, const std::string& text);
+  /// Whether lines of this kind, which are not to be lost, may be written now.
+  bool isDue(const std::string& kind);
   /// An outcome that is not OK: status, reason, and what to do.
   void tell(const Outcome& outcome);
   /// Whether it is time to look into silence again: rarely, and not at once.
   bool isSilenceDue(std::int64_t now_ns);
-  /// Logs a hint when it is another one than before.
-  void hintAt(const std::vector<AwaitedTopic>& silent, const MonitorPipeline& pipeline);
+  /// Logs a hint when it is another one than before. `silence`: why nothing comes, see silenceHint().
+  void hintAt(std::string silence, const MonitorPipeline& pipeline);
   /// What looks like a mistake now; empty: nothing does.
   const std::string& hint() const { return hint_; }
 
@@ -42,7 +44,7 @@ class MonitorLog {
   const MonitorConfig& config_;
   LogThrottle throttle_{5};
   std::int64_t asked_ns_ = 0;
-  std::string hint_;
+  std::string hint_, told_hint_;
 };
 
 }  // namespace dccd

@@ -1,22 +1,19 @@
 #include "node/monitor_pipeline.h"
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
+#include <new>
 #include <utility>
 
 #include "input/mesh_resource.h"
 #include "output/advice.h"
+#include "ros/short_text.h"
 #include "ros/transforms.h"
 
 namespace dccd {
 
 namespace {
-
-std::vector<Body> monitorBodies(const MonitorConfig& config) {
-  std::vector<Body> bodies;
-  for (const BodyConfig& body : config.bodies) bodies.push_back(body.body);
-  return bodies;
-}
 
 /// What `load` makes of a file; its error as the parameter's.
 template <typename Load>
@@ -46,12 +43,13 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transfor
       fixed_frame_(config_.fixed_frame) {
   hints_.resize(config_.bodies.size());
   loadFiles();
-  monitor_ = std::make_unique<Monitor>(config_.monitor, monitorBodies(config_));
+  monitor_ = std::make_unique<Monitor>(config_.monitor, config_.monitorBodies());
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
   placed_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
   hinted_.resize(config_.bodies.size());
+  static_meshes_.resize(config_.bodies.size());
 }
 
 void MonitorPipeline::loadFiles() {
@@ -68,6 +66,7 @@ void MonitorPipeline::loadFiles() {
                                  [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     hints_[b] = rigidHint(body.mesh_file, mesh.positions, body.mesh_scale);
     rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
+    if (const std::string problem = maskProblem(b, *mesh.topology); !problem.empty()) throw ParameterError(problem);
     if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
   }
 }
@@ -106,9 +105,18 @@ void MonitorPipeline::measureUnknown(Outcome& outcome) const {
 
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
                            const std::string& reason) {
-  monitor_->skip(body, status, stamp_ns, reason);
-  complaints_[body] = "refused: " + reason;
+  const std::string text = shortText(reason);
+  monitor_->skip(body, status, stamp_ns, text);
+  complaints_[body] = "refused: " + text;
   if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
+}
+
+std::string MonitorPipeline::maskProblem(std::size_t body, const Topology& topology) const {
+  const std::vector<Index>& mask = config_.bodies[body].body.vertex_mask;
+  const auto largest = std::max_element(mask.begin(), mask.end());
+  if (largest == mask.end() || *largest < topology.vertexCount()) return {};
+  return "parameter vertex_mask of body '" + config_.bodies[body].body.name + "' names vertex " +
+         std::to_string(*largest) + ", but the mesh has " + std::to_string(topology.vertexCount());
 }
 
 DecodedMesh MonitorPipeline::decode(std::size_t body, const MeshMessage& message) {
@@ -122,11 +130,25 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
   waiting.arrival_ns = message.arrival_ns;
+  const auto refuse = [&](StepStatus status, const std::string& reason) {
+    monitor_->countReceived(body);
+    skip(body, status, message.receipt_ns, message.arrival_ns, reason);
+  };
+  if (message.too_large > 0) {
+    return refuse(StepStatus::BAD_MESSAGE, "a message of " + std::to_string(message.too_large) +
+                                               " bytes is more than the quarter of max_memory_mb that queues may hold");
+  }
   try {
     waiting.mesh = decode(body, message);
   } catch (const MeshError& error) {
+    return refuse(error.status, error.what());
+  } catch (const std::bad_alloc&) {
+    return refuse(StepStatus::BAD_MESSAGE,
+                  "there is not enough memory for this message of " + std::to_string(message.size()) + " bytes");
+  }
+  if (const std::string problem = maskProblem(body, *waiting.mesh.topology); !problem.empty()) {
     monitor_->countReceived(body);
-    return skip(body, error.status, message.receipt_ns, message.arrival_ns, error.what());
+    return skip(body, StepStatus::VERTEX_COUNT, message.receipt_ns, message.arrival_ns, problem);
   }
   if (hinted_[body] != waiting.mesh.topology) {
     hinted_[body] = waiting.mesh.topology;
@@ -145,141 +167,20 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   waiting_[body] = std::move(waiting);
 }
 
-bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
-  std::vector<std::pair<std::size_t, MeshFrame>> frames;
-  for (std::size_t b = 0; b < rigid_.size(); ++b) {
-    if (!rigid_[b]) continue;
-    MeshFrame frame{stamp_ns, rigid_[b]->topology,           rigid_[b]->rest,
-                    true,     Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
-    if (!lookupTransform(transforms_, fixed_frame_, config_.bodies[b].tf_frame, stamp_ns, frame.pose, reason)) {
-      return false;
-    }
-    transform(frame.pose, frame.positions);
-    frames.emplace_back(b, std::move(frame));
-  }
-  for (auto& frame : frames) {
-    monitor_->countReceived(frame.first);
-    monitor_->push(frame.first, std::move(frame.second), now_ns);
-  }
-  return true;
-}
-
-void MonitorPipeline::keep(std::size_t body) {
-  Waiting& waiting = *waiting_[body];
-  waiting.kept = true;
-  // Before the clock body's first message there may be no fixed frame, and nothing is wrong.
-  if (fixed_frame_.empty() || waiting.told) return;
-  waiting.told = true;
-  complaints_[body] = "waits: " + waiting.reason;
-}
-
-std::string MonitorPipeline::missing(std::size_t body) const {
-  return waiting_[body]->reason + "; body '" + config_.bodies[body].body.name + "' waits for it";
-}
-
-void MonitorPipeline::nameMissing(Outcome& outcome) const {
-  if (outcome.status != StepStatus::NO_BODY) return;
-  for (std::size_t b = 0; b < waiting_.size(); ++b) {
-    if (!waiting_[b] || !waiting_[b]->kept) continue;
-    outcome.reason = missing(b);
-    return;
-  }
-}
-
-std::size_t MonitorPipeline::misplaced() const {
-  std::size_t b = 0;
-  while (b < waiting_.size() && !(waiting_[b] && placed_[b])) ++b;
-  return b;
-}
-
-bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason) {
-  const std::size_t body = misplaced();
-  if (body == waiting_.size()) return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, reason);
-  problem = StepStatus::NO_BODY;
-  reason = missing(body);
-  return false;
-}
-
-bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
-  Waiting& waiting = *waiting_[body];
-  std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
-  StepStatus problem = StepStatus::NO_TRANSFORM;
-  Eigen::Isometry3d fixed_from_mesh;
-  const bool is_clock = body == config_.monitor.clock_body;
-  const bool placed = !fixed_frame_.empty() &&
-                      lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id, waiting.mesh.stamp_ns,
-                                      fixed_from_mesh, reason) &&
-                      (!is_clock || placeOthers(now_ns, problem, reason));
-  if (!placed) {
-    if (problem == StepStatus::NO_TRANSFORM) {
-      reason = "no transform from '" + waiting.mesh.frame_id + "' to '" + fixed_frame_ + "': " + reason;
-    }
-    waiting.reason = reason;
-    waiting.overdue =
-        finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
-    // There is no use in waiting for a static body that has waited in vain itself.
-    const bool timed_out =
-        waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept);
-    if (!timed_out) return false;
-    if (isStatic(body)) {
-      keep(body);
-      return false;
-    }
-  }
-  Waiting done = std::move(waiting);
-  waiting_[body].reset();
-  if (!placed) {
-    skip(body, problem, done.mesh.stamp_ns, done.arrival_ns, reason);
-    return true;
-  }
-  transform(fixed_from_mesh, done.mesh.positions);
-  monitor_->push(body,
-                 {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
-                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m), done.mesh.dropped_faces},
-                 now_ns);
-  if (is_clock) arrivals_.push_back(done.arrival_ns);
-  placed_[body] = isStatic(body);
-  return true;
-}
-
 void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change) {
   MonitorOptions options = config_.monitor;
-  change(options, config_.markers);
+  MarkerConfig markers = config_.markers;
+  change(options, markers);
   effects_.decide(options);
   monitor_->setOptions(options);
   config_.monitor = options;
+  config_.markers = markers;
 }
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   expectMap();
   unplaced_map_ = std::move(map);
   unplaced_since_ns_ = now_ns;
-}
-
-void MonitorPipeline::placeMap(std::int64_t now_ns) {
-  if (!unplaced_map_) return;
-  if (!unplaced_map_->surface) {
-    // Refused: what was there before is out of date, and no map is better than a wrong one.
-    monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
-    unplaced_map_.reset();
-    known_.reset();
-    return;
-  }
-  if (fixed_frame_.empty()) return;
-  const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
-  ObstacleMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
-  std::string reason;
-  if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
-    monitor_->setMap(std::move(map));
-    known_ = unplaced_map_->known;
-    unplaced_map_.reset();
-  } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
-    // It is tried again at every call: a map comes rarely, and its transform may come late.
-    if (monitor_->map().problem.empty()) {
-      monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(),
-                        "no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason});
-    }
-  }
 }
 
 bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
@@ -294,6 +195,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   if (finishing_) giveUp();
   if (!monitor_->next(now_ns, outcome)) return false;
   effects_.learn(outcome, *monitor_);
+  frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);
   measureUnknown(outcome);
   outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
@@ -328,10 +230,10 @@ void MonitorPipeline::reset(StepStatus status) {
     waiting_[b].reset();
   }
   monitor_->reset(status);
-  if (status == StepStatus::RESET) {
-    for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
-  }
   arrivals_.clear();
+  if (status != StepStatus::RESET) return;
+  for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
+  learnAnew(status);
 }
 
 Outcome MonitorPipeline::checkNow() {

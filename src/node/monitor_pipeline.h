@@ -53,14 +53,13 @@ class MonitorPipeline {
   bool waiting() const;
   /// End of input: whatever still waits is given up at the next call of nextOutcome().
   void finish();
-  /// Forgets all frames but those of static bodies, also where they wait. The fixed frame stays, also one that was
-  /// learnt: the map and static bodies are placed in it. After RESET triangle soups are welded anew.
+  /// Forgets all frames but those of static bodies, also where they wait. After RESET triangle soups are welded anew,
+  /// and a fixed frame that was learnt is learnt anew: from the clock body's next message.
   void reset(StepStatus status);
   /// Monitor::checkNow(), with the reason why a static body has no place yet.
   Outcome checkNow();
 
-  /// Changes what can be changed while it runs. Throws std::invalid_argument naming the option; the monitor's then
-  /// stay.
+  /// Changes what can be changed while it runs. Throws std::invalid_argument naming the option; all then stays.
   void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
 
   /// The body's newest frame holds at all times. Safe to call from any thread.
@@ -71,6 +70,7 @@ class MonitorPipeline {
   /// force in the monitor follows from it and from the effect plan.
   const MonitorConfig& config() const { return config_; }
   EffectTracker& effects() { return effects_; }
+  const EffectTracker& effects() const { return effects_; }
   const std::string& fixedFrame() const { return fixed_frame_; }
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Arrival, on the driving clock, of the frame that the last outcome was about.
@@ -112,6 +112,10 @@ class MonitorPipeline {
   std::deque<std::int64_t> arrivals_;  // of the clock body's frames inside the monitor
   std::int64_t outcome_arrival_ns_ = 0;
   std::string fixed_frame_;
+  // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
+  std::vector<std::optional<DecodedMesh>> static_meshes_;
+  std::optional<LoadedMap> placed_map_;
+  bool frame_answered_ = false;  // a step was answered in it
   std::uint64_t weld_changes_ = 0;
   bool finishing_ = false;
 
@@ -119,6 +123,11 @@ class MonitorPipeline {
   /// Throws MeshError.
   DecodedMesh decode(std::size_t body, const MeshMessage& message);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
+  /// What of the body's vertex_mask the mesh has not; empty: it has all.
+  std::string maskProblem(std::size_t body, const Topology& topology) const;
+  /// A fixed frame that was learnt is forgotten, and with it where things were in it; frames of streams are counted
+  /// under the status.
+  void learnAnew(StepStatus status);
   /// unknown_space: report. How much of what the step swept the map does not know.
   void measureUnknown(Outcome& outcome) const;
   /// A static body's frame waits on.

@@ -14,15 +14,6 @@ constexpr microseconds POLL{2000}, SLEEP{100000};
 
 }  // namespace
 
-void CollisionMonitor::Impl::reconfigureNow(const Reconfigure::Change& change) {
-  try {
-    pipeline.reconfigure(change);
-    state.setLimits(livenessLimits(config));
-  } catch (const std::invalid_argument& error) {
-    ROS_WARN_STREAM("reconfiguration refused: " << error.what());
-  }
-}
-
 void CollisionMonitor::Impl::resetNow(StepStatus status) {
   accountDropped();
   std::vector<bool> spared(config.bodies.size());
@@ -32,10 +23,11 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
     pipeline.monitor().countReceived(b, cleared[b]);
     pipeline.monitor().countDropped(b, status, cleared[b]);
   }
+  const std::string frame = pipeline.fixedFrame();  // a reset forgets one that was learnt
   pipeline.reset(status);
   state.forgotten(std::string("no frame has been answered since ") +
                   (status == StepStatus::RESET ? "the reset" : "~enable was called"));
-  outputs.publishNothing(pipeline.fixedFrame());
+  outputs.publishNothing(frame);
   if (!outputs.wantsPrediction()) return;
   Outcome none;
   none.status = status;
@@ -44,13 +36,19 @@ void CollisionMonitor::Impl::resetNow(StepStatus status) {
 }
 
 void CollisionMonitor::Impl::accountDropped() {
+  for (std::size_t b = 0; b < disabled_frames.size(); ++b) {
+    const std::uint64_t count = disabled_frames[b].exchange(0);
+    pipeline.monitor().countReceived(b, count);
+    pipeline.monitor().countDropped(b, StepStatus::DISABLED, count);
+  }
   const auto dropped = queue.takeDropped();
   for (std::size_t b = 0; b < dropped.size(); ++b) {
     if (dropped[b] == 0) continue;
     pipeline.monitor().countReceived(b, dropped[b]);
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
     log.complain(b, "queue",
-                 std::to_string(dropped[b]) + " frames dropped, steps take longer than frames come; " +
+                 std::to_string(dropped[b]) +
+                     " frames dropped, steps take longer than frames come or frames are too large for max_memory_mb; " +
                      adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
   }
 }
@@ -81,13 +79,15 @@ void CollisionMonitor::Impl::tellComplaints() {
 }
 
 void CollisionMonitor::Impl::lookIntoSilence() {
+  if (const auto found = master->takeHint()) log.hintAt(*found, pipeline);
   if (!log.isSilenceDue(steadyNs())) return;
   std::vector<AwaitedTopic> silent;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
     silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
   }
-  log.hintAt(silent, pipeline);
+  const bool mapless = pipeline.effects().mayUseMap() && !pipeline.effects().mapSeen();
+  master->lookInto({std::move(silent), mapless ? log.mapSource() : ""});
 }
 
 StatsContext CollisionMonitor::Impl::statsContext() const {
@@ -138,8 +138,12 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
 
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
   EffectTracker& effects = pipeline.effects();
-  if (!effects.takeNewPlan()) return;
-  outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
+  if (effects.takeNewPlan()) {
+    outputs.publishEffects(effects.message(stamp, pipeline.fixedFrame()));
+    plan_unsaid = true;
+  }
+  if (!plan_unsaid || !log.isDue("effects")) return;
+  plan_unsaid = false;
   for (const std::string& line : effects.lines()) ROS_INFO_STREAM(line);
 }
 
@@ -171,34 +175,45 @@ void CollisionMonitor::Impl::carryOut(const std::function<void()>& command) {
   try {
     command();
   } catch (const std::exception& error) {
-    ROS_ERROR_STREAM("a command failed: " << error.what());
+    log.alarm("command", std::string("a command failed: ") + error.what());
   }
 }
 
+/// Whatever fails, above all for want of memory, the node goes on; but what was said before is void.
 void CollisionMonitor::Impl::work() {
   bool more = false;
   while (!stopping) {
     const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
     if (stopping) return;
-    for (const auto& command : commands) carryOut(command);
-    if (map_subscriber && map_subscriber.getNumPublishers() > 0) map_publisher_seen = true;
-    if (map_publisher_seen) pipeline.expectMap();
-    publishEffects(ros::Time::now());  // the first plan comes before the first frame
-    takeMaps();
-    if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();
-    takeMessages();
-    accountDropped();
-    Outcome outcome;
-    while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
-    tellComplaints();
-    const std::string surprise = recorder.takeSurprise();
-    if (!surprise.empty()) ROS_ERROR_STREAM(surprise);
-    more = false;
-    for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
-    lookIntoSilence();
-    diagnostics.publishWhenDue(steadyNs(), enabled, pipeline.effects().mapExpected() ? log.mapSource() : "",
-                               log.hint());
+    try {
+      more = workOn(commands);
+    } catch (const std::exception& error) {
+      more = false;
+      state.takeBack(std::string("a fault of the monitor: ") + error.what());
+      log.complain(config.monitor.clock_body, "worker", std::string("a fault of the monitor: ") + error.what());
+    }
   }
+}
+
+/// True when more can be done at once.
+bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
+  for (const auto& command : commands) carryOut(command);
+  if (map_publisher_seen) pipeline.expectMap();
+  publishEffects(ros::Time::now());  // the first plan comes before the first frame
+  takeMaps();
+  if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();
+  takeMessages();
+  accountDropped();
+  Outcome outcome;
+  while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
+  tellComplaints();
+  const std::string surprise = recorder.takeSurprise();
+  if (!surprise.empty()) log.alarm("surprise", surprise);
+  bool more = false;
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
+  lookIntoSilence();
+  diagnostics.publishWhenDue(steadyNs(), enabled, pipeline.effects().mapExpected() ? log.mapSource() : "", log.hint());
+  return more;
 }
 
 }  // namespace dccd

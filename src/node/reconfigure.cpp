@@ -1,5 +1,11 @@
 #include "node/reconfigure.h"
 
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
 #include <boost/thread/recursive_mutex.hpp>
 
 #include <deformable_ccd/CollisionMonitorConfig.h>
@@ -12,17 +18,19 @@ namespace dccd {
 namespace {
 
 deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {
+  const MonitorOptions& options = config.monitor;
+  const MarkerConfig& markers = config.markers;
   deformable_ccd::CollisionMonitorConfig live = deformable_ccd::CollisionMonitorConfig::__getDefault__();
-  live.accuracy = static_cast<int>(config.monitor.detector.accuracy.rung);
-  live.step_budget_ms = config.monitor.detector.step_budget_ms;
-  live.max_step_s = config.monitor.store.max_step_s;
-  live.max_vertex_step_m = config.monitor.store.max_vertex_step_m;
-  live.max_contacts = static_cast<int>(config.monitor.detector.max_contacts);
-  live.suppress_initial = config.monitor.detector.suppress_initial;
-  live.marker_point_size_m = config.markers.point_size_m;
-  live.marker_normal_length_m = config.markers.normal_length_m;
-  live.marker_mesh = config.markers.mesh;
-  live.marker_obstacle_m = config.markers.obstacle_m;
+  live.accuracy = static_cast<int>(options.detector.accuracy.rung);
+  live.step_budget_ms = options.detector.step_budget_ms;
+  live.max_step_s = options.store.max_step_s;
+  live.max_vertex_step_m = options.store.max_vertex_step_m;
+  live.max_contacts = static_cast<int>(options.detector.max_contacts);
+  live.suppress_initial = options.detector.suppress_initial;
+  live.marker_point_size_m = markers.point_size_m;
+  live.marker_normal_length_m = markers.normal_length_m;
+  live.marker_mesh = markers.mesh;
+  live.marker_obstacle_m = markers.obstacle_m;
   return live;
 }
 
@@ -39,37 +47,84 @@ void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions
   markers.obstacle_m = live.marker_obstacle_m;
 }
 
+/// The one value of the message, in words.
+std::string textOf(const dynamic_reconfigure::Config& message) {
+  std::ostringstream text;
+  for (const auto& value : message.bools) text << (value.value ? "true" : "false");
+  for (const auto& value : message.ints) text << value.value;
+  for (const auto& value : message.doubles) text << value.value;
+  return text.str();
+}
+
 }  // namespace
 
 struct Reconfigure::Impl {
-  bool separates = false;
-  Changed changed;
+  using Live = deformable_ccd::CollisionMonitorConfig;
+  const MonitorConfig start;  // what cannot be changed live stays as it was
+  const std::vector<Body> bodies;
+  Live in_force;
+  Events events;
   boost::recursive_mutex mutex;  // shared with the server, which asks for it so that updateConfig cannot deadlock
-  dynamic_reconfigure::Server<deformable_ccd::CollisionMonitorConfig> server;
+  dynamic_reconfigure::Server<Live> server;
 
-  Impl(const ros::NodeHandle& node, const MonitorConfig& config, Changed call)
-      : separates(config.holdsDistance()), changed(std::move(call)), server(mutex, node) {
-    server.updateConfig(toLive(config));
+  Impl(const ros::NodeHandle& node, const MonitorConfig& config, Events call)
+      : start(config),
+        bodies(config.monitorBodies()),
+        in_force(toLive(config)),
+        events(std::move(call)),
+        server(mutex, node) {
+    server.updateConfig(in_force);
     bool first = true;  // setCallback calls at once, with what is in force already
-    server.setCallback([this, first](deformable_ccd::CollisionMonitorConfig& live, std::uint32_t) mutable {
+    server.setCallback([this, first](Live& live, std::uint32_t) mutable {
       if (!first) apply(live);
       first = false;
     });
   }
 
-  void apply(deformable_ccd::CollisionMonitorConfig& live) {
-    const auto rung = static_cast<Accuracy>(live.accuracy);
-    if (separates && !holdsDistance(rung)) {
-      live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);  // the only rungs that hold a distance: this and screen
+  /// Empty: the monitor takes them.
+  std::string problemOf(const Live& live) const {
+    MonitorOptions options = start.monitor;
+    MarkerConfig markers = start.markers;
+    fromLive(live, options, markers);
+    try {
+      check(options.detector, bodies);
+      const MeshStore store(options.store);
+      return {};
+    } catch (const std::invalid_argument& error) {
+      return error.what();
     }
-    changed([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });
+  }
+
+  /// Each value by itself: a bad one is refused alone. The server has clamped them to their ranges, which a NaN passes.
+  void apply(Live& live) {
+    // The only rungs that hold a distance are this and screen.
+    if (start.holdsDistance() && !holdsDistance(static_cast<Accuracy>(live.accuracy))) {
+      live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);
+    }
+    for (const auto& parameter : Live::__getParamDescriptions__()) {
+      dynamic_reconfigure::Config value, before;
+      parameter->toMessage(value, live);
+      parameter->toMessage(before, in_force);
+      Live tried = in_force;
+      parameter->fromMessage(value, tried);
+      const bool is_number = value.doubles.empty() || std::isfinite(value.doubles.front().value);
+      const std::string problem = is_number ? problemOf(tried) : "it is no number";
+      if (problem.empty()) {
+        in_force = tried;
+      } else {
+        events.refused("~live/" + parameter->name + " " + textOf(value) + " was refused, " + textOf(before) +
+                       " stays: " + problem);
+      }
+    }
+    live = in_force;
+    events.changed([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });
   }
 };
 
-Reconfigure::Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Changed changed) {
+Reconfigure::Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Events events) {
   ros::NodeHandle live(private_node, "live");
   live.setCallbackQueue(private_node.getCallbackQueue());
-  impl_ = std::make_unique<Impl>(live, config, std::move(changed));
+  impl_ = std::make_unique<Impl>(live, config, std::move(events));
 }
 
 Reconfigure::~Reconfigure() = default;

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 
 #include <ros/node_handle.h>
 
@@ -15,9 +16,14 @@ class Reconfigure {
  public:
   /// Writes the live values into the options; the rest of them stays.
   using Change = std::function<void(MonitorOptions&, MarkerConfig&)>;
-  using Changed = std::function<void(const Change&)>;
-  /// Starts with the values of `config`. `changed` is called from the handle's callback queue with what to change.
-  Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Changed changed);
+  /// Called from the handle's callback queue.
+  struct Events {
+    std::function<void(const Change&)> changed;           ///< what is in force from the next step on
+    std::function<void(const std::string& why)> refused;  ///< one value, for the log
+  };
+  /// Starts with the values of `config`; nobody else is to change them. A value that is out of range is refused alone,
+  /// and the one before stays in force: what the services answer is in force from the next step on.
+  Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Events events);
   ~Reconfigure();
 
  private:

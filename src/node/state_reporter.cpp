@@ -7,6 +7,7 @@
 #include <std_msgs/Bool.h>
 
 #include "output/output_messages.h"
+#include "ros/steady_clock.h"
 
 namespace dccd {
 namespace {
@@ -14,11 +15,6 @@ namespace {
 // As deep as the other topics'.
 constexpr std::uint32_t QUEUE = 32;
 constexpr std::chrono::milliseconds PERIOD{20};
-
-std::int64_t steadyNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 

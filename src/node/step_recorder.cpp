@@ -1,5 +1,6 @@
 #include "node/step_recorder.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -17,12 +18,20 @@ std::string rosHome() {
   return std::string(user ? user : "/tmp") + "/.ros";
 }
 
+/// A node's name as a part of a file's.
+std::string inFileName(std::string name) {
+  if (!name.empty() && name[0] == '/') name.erase(0, 1);
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
 }  // namespace
 
-StepRecorder::StepRecorder(const MonitorConfig& config, Monitor& monitor)
-    : folder_(config.record_folder.empty() ? rosHome() + "/deformable_ccd" : config.record_folder) {
+StepRecorder::StepRecorder(const MonitorConfig& config, Monitor& monitor, const std::string& node)
+    : folder_(config.record_folder.empty() ? rosHome() + "/deformable_ccd" : config.record_folder),
+      owner_(inFileName(node)) {
   if (config.record_steps == 0) return;
-  recorder_ = std::make_unique<FlightRecorder>(config.record_steps, folder_, &crashImage());
+  recorder_ = std::make_unique<FlightRecorder>(config.record_steps, folder_, &crashImage(), owner_);
   monitor.setListener(recorder_.get());
 }
 
@@ -53,7 +62,7 @@ void StepRecorder::installCrashHandler() {
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error) throw std::runtime_error("record_folder " + folder_ + " cannot be made: " + error.message());
-  dccd::installCrashHandler(folder_);
+  dccd::installCrashHandler(folder_, owner_);
 }
 
 }  // namespace dccd

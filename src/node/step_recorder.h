@@ -13,7 +13,8 @@ namespace dccd {
 class StepRecorder {
  public:
   /// Listens to the monitor unless record_steps is 0. The monitor must not run any more when this ends.
-  StepRecorder(const MonitorConfig& config, Monitor& monitor);
+  /// `node`: its name, a part of each file's.
+  StepRecorder(const MonitorConfig& config, Monitor& monitor, const std::string& node);
 
   /// Writes the steps that are kept. True with the files' names in the message, false with the reason why there are
   /// none.
@@ -25,7 +26,7 @@ class StepRecorder {
   void installCrashHandler();
 
  private:
-  std::string folder_;
+  std::string folder_, owner_;
   std::unique_ptr<FlightRecorder> recorder_;
 };
 

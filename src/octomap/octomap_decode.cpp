@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "dccd/regular_file.h"
 #include "octomap/octomap_header.h"
 
 namespace dccd {
@@ -201,6 +202,8 @@ DecodedOctomap decodeOctomap(const OctomapFields& fields, const OctomapLimits& l
 
 DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& limits) {
   try {
+    const std::string problem = regularFileProblem(path);
+    if (!problem.empty()) throw OctomapError("the file " + problem);
     std::ifstream file(path, std::ios::binary | std::ios::ate);
     if (!file) throw OctomapError("the file cannot be opened");
     const std::streamoff size = file.tellg();

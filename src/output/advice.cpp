@@ -15,6 +15,8 @@ using tolerance::LARGEST_PLAUSIBLE_M;
 // A grid read with rows and columns swapped has neighbours several times as far apart; a cloth that is merely crumpled
 // or sheared does not reach this.
 constexpr double SWAPPED_RATIO = tolerance::SWAPPED_GRID_RATIO;
+constexpr double SHUFFLED_RATIO = tolerance::SHUFFLED_RATIO;
+constexpr std::size_t SHUFFLED_POINTS = 64, SHUFFLED_SAMPLES = 1024;
 
 double extentOf(const Positions& positions) {
   Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity()), max = -min;
@@ -65,6 +67,36 @@ void addSwapped(const DecodedMesh& mesh, const MeshInputConfig& config, std::ost
        << ", cols: " << rows;
 }
 
+/// Neighbours on the mesh that are as far apart as any two of its points: a tracker that lists them in another order
+/// each time, or in one that the topology does not know. Points are paired by fixed strides, which no order of a mesh
+/// has.
+void addShuffled(const DecodedMesh& mesh, std::ostringstream& text) {
+  const std::vector<Edge>& edges = mesh.topology->edges();
+  const Positions& p = mesh.positions;
+  if (p.size() < SHUFFLED_POINTS || edges.empty()) return;
+  double near_m = 0, any_m = 0;
+  std::size_t near = 0, any = 0;
+  const auto add = [&](Index a, Index b, double& sum, std::size_t& count) {
+    const double length = (p[a] - p[b]).norm();
+    if (!std::isfinite(length)) return;
+    sum += length;
+    ++count;
+  };
+  for (std::size_t i = 0; i < SHUFFLED_SAMPLES; ++i) {
+    const Edge& edge = edges[i * edges.size() / SHUFFLED_SAMPLES];
+    add(edge[0], edge[1], near_m, near);
+    add(static_cast<Index>(i * 7919 % p.size()), static_cast<Index>((i * 104729 + p.size() / 2) % p.size()), any_m,
+        any);
+  }
+  if (near == 0 || any == 0) return;
+  near_m /= static_cast<double>(near);
+  any_m /= static_cast<double>(any);
+  if (!(near_m > SHUFFLED_RATIO * any_m) || !(any_m > 0)) return;
+  text << (text.tellp() > 0 ? "; " : "") << "the points look shuffled: neighbours on the mesh are " << near_m
+       << " m apart on average, any two points " << any_m
+       << " m; publish them in the order of the topology, the same in each frame";
+}
+
 }  // namespace
 
 std::string adviceFor(StepStatus status, const std::string& reason, const std::string& map_source) {
@@ -90,6 +122,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     case StepStatus::DUPLICATE:
       return "the publisher must stamp every frame anew";
     case StepStatus::VERTEX_COUNT:
+      if (reason.compare(0, 21, "parameter vertex_mask") == 0) return "the vertices are numbered from 0";
       return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
     case StepStatus::DEADLINE:
       return "raise step_budget_ms or num_threads, or take a cheaper accuracy";
@@ -107,6 +140,7 @@ std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   std::ostringstream text;
   addSize("the mesh", mesh.positions, "scale them in the publisher", text);
   addSwapped(mesh, config, text);
+  addShuffled(mesh, text);
   if (mesh.unread_lists > 0) {
     text << (text.tellp() > 0 ? "; " : "") << mesh.unread_lists << " further TRIANGLE_LIST "
          << (mesh.unread_lists == 1 ? "marker is" : "markers are")

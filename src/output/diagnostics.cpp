@@ -61,7 +61,8 @@ void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::strin
   if (!enabled) raise(DiagnosticStatus::WARN, "disabled");
   if (outcomes_ > 0 && answers_ == 0) raise(DiagnosticStatus::ERROR, because("no answer: "));
   if (!map_topic.empty() && answers_ > 0 && !map_present_) {
-    raise(DiagnosticStatus::ERROR, status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_);
+    raise(DiagnosticStatus::WARN, (status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_) +
+                                      (hint.empty() ? "" : "; " + hint));
   }
   if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
   if (context_.frames.of(StepStatus::QUEUE_FULL) > dropped_before_) {
@@ -117,6 +118,7 @@ std::string describe(const Outcome& outcome) {
   if (!outcome.answered) return text.str();
   text << ": " << outcome.total_contacts << " contacts, start state " << toString(outcome.start_state);
   if (std::isfinite(outcome.earliest_toc)) text << ", earliest toc " << outcome.earliest_toc;
+  text << "; " << describe(assuranceOf(outcome));
   return text.str();
 }
 

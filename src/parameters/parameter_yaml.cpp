@@ -4,11 +4,14 @@
 #include <fstream>
 #include <iterator>
 
+#include "dccd/regular_file.h"
 #include "parameters/parameter_tree.h"
 
 namespace dccd {
 
 namespace {
+
+constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{16} << 20;
 
 using Kind = ParameterTree::Kind;
 
@@ -73,6 +76,8 @@ ParameterTree parseYaml(const std::string& text, const std::string& name) {
 }
 
 ParameterTree readYaml(const std::string& file) {
+  const std::string problem = regularFileProblem(file, MAX_FILE_BYTES);
+  if (!problem.empty()) throw ParameterError(file + ": " + problem + "; name a YAML file");
   std::ifstream stream(file);
   if (!stream) throw ParameterError(file + ": cannot be read; name a YAML file");
   return parseYaml({std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()}, file);

@@ -5,6 +5,20 @@
 #include <utility>
 
 namespace dccd {
+namespace {
+
+std::atomic<int> files_under_way{0};
+
+struct FileUnderWay {
+  FileUnderWay() { ++files_under_way; }
+  ~FileUnderWay() { --files_under_way; }
+  FileUnderWay(const FileUnderWay&) = delete;
+  FileUnderWay& operator=(const FileUnderWay&) = delete;
+};
+
+}  // namespace
+
+int FlightRecorder::filesUnderWay() { return files_under_way; }
 
 std::string surpriseIn(const Outcome& outcome, const Options& options) {
   if (outcome.status == StepStatus::INTERNAL_ERROR) return "the step failed: " + outcome.reason;
@@ -22,8 +36,8 @@ std::string surpriseIn(const Outcome& outcome, const Options& options) {
   return {};
 }
 
-FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image)
-    : ring_(steps), folder_(std::move(folder)), newest_image_(newest_image) {
+FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image, std::string owner)
+    : ring_(steps), folder_(std::move(folder)), owner_(std::move(owner)), newest_image_(newest_image) {
   if (steps == 0) throw std::invalid_argument("a flight recorder keeps at least 1 step");
 }
 
@@ -66,20 +80,27 @@ void FlightRecorder::onOutcome(const Outcome& outcome) {
 }
 
 std::string FlightRecorder::write(StepRecording& recording, const std::string& kind, const std::string& note) {
+  const FileUnderWay under_way;
   std::error_code ignored;  // the file says so, too
   std::filesystem::create_directories(folder_, ignored);
-  const std::string path = folder_ + "/" + kind + "_" + std::to_string(recording.step.sequence) + "_" +
-                           std::to_string(recording.step.stamp_ns) + ".step";
   recording.note = note;
-  writeRecording(path, recording);
-  return path;
+  return writeNewRecording(folder_ + "/" + kind + "_" + (owner_.empty() ? "" : owner_ + "_") +
+                               std::to_string(recording.step.sequence) + "_" + std::to_string(recording.step.stamp_ns),
+                           recording);
 }
 
 std::vector<std::string> FlightRecorder::writeAll(const std::string& note) {
   std::vector<std::string> files;
-  for (std::size_t i = count_; i-- > 0;) {
+  for (std::size_t i = 0; i < count_; ++i) {
     StepRecording& recording = ring_[(next_ + 2 * ring_.size() - 1 - i) % ring_.size()];
-    files.push_back(write(recording, "step", note));
+    try {
+      files.push_back(write(recording, "step", note));
+    } catch (const std::runtime_error& error) {
+      std::string text = error.what();
+      if (!files.empty()) text += "; written before it, newest first:";
+      for (const std::string& file : files) text += "\n" + file;
+      throw std::runtime_error(text);
+    }
   }
   return files;
 }

@@ -27,7 +27,8 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
   using NewestImage = std::atomic<const RecordingImage*>;
 
   /// steps >= 1. The folder is created when a file is written. newest_image: kept up to date, must outlive this.
-  FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image = nullptr);
+  /// `owner`: a part of each file's name, for a folder that several share.
+  FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image = nullptr, std::string owner = {});
   ~FlightRecorder() override;
   FlightRecorder(const FlightRecorder&) = delete;
   FlightRecorder& operator=(const FlightRecorder&) = delete;
@@ -37,9 +38,11 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
 
   /// Steps that are kept.
   std::size_t size() const { return count_; }
-  /// Writes all steps that are kept, oldest first; returns the files. Throws std::runtime_error naming the file and why
-  /// it cannot be written.
+  /// Writes all steps that are kept, the newest first, into files that were not there before; returns them. Throws
+  /// std::runtime_error naming the file, why it cannot be written, and what was written before it.
   std::vector<std::string> writeAll(const std::string& note);
+  /// Of all recorders of the process, for one that is to end: files that are being written. From any thread.
+  static int filesUnderWay();
   /// One sentence about a surprise since the last call, with the file that it is in; empty: none.
   std::string takeSurprise();
 
@@ -49,7 +52,7 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
 
   std::vector<StepRecording> ring_;
   std::size_t next_ = 0, count_ = 0, surprises_ = 0;
-  std::string folder_, surprise_;
+  std::string folder_, owner_, surprise_;
   NewestImage* newest_image_;
   RecordingImage image_;  // of the newest step without its answer, for the crash handler
 };

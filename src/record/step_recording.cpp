@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "dccd/accuracy.h"
+#include "dccd/regular_file.h"
 #include "record/recording_archive.h"
 
 namespace dccd {
@@ -20,6 +21,8 @@ namespace {
 
 constexpr char MAGIC[8] = {'D', 'C', 'C', 'D', 'S', 'T', 'E', 'P'};
 // What hostile options could cost: parts of a step, and buffers for so many workers.
+constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{4} << 30;
+constexpr int MAX_COPIES = 1000;
 constexpr std::size_t MAX_SUBSTEPS = 100000;
 constexpr std::size_t MAX_BODIES = 65534;
 
@@ -205,9 +208,12 @@ void visitDistances(Archive& a, Recording& r) {
 
 constexpr std::size_t TEXT_BYTES = 4;
 
-/// What version 3 added: what an assurance follows from.
+/// What version 3 added: what an assurance follows from, and where the work was cut.
 template <typename Archive, typename Recording>
 void visitVerdict(Archive& a, Recording& r) {
+  a.size(r.options.max_found);
+  a.size(r.options.max_found_per_feature);
+  a.flag(r.answer.cut);
   a.text(r.step.off_path);
   for (auto& body : r.step.bodies) {
     a.flag(body.shell);
@@ -283,6 +289,25 @@ std::size_t RecordingImage::bytes() const {
   return sum;
 }
 
+std::string writeNewRecording(const std::string& stem, const StepRecording& recording) {
+  for (int copy = 1; copy <= MAX_COPIES; ++copy) {
+    const std::string path = stem + (copy == 1 ? "" : "_" + std::to_string(copy)) + ".step";
+    // Whoever makes the file has its name; it is written in its place when it is whole.
+    const int reserved = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (reserved < 0 && errno == EEXIST) continue;
+    if (reserved < 0) throw std::runtime_error(systemText(path));
+    ::close(reserved);
+    try {
+      writeRecording(path, recording);
+    } catch (const std::runtime_error&) {
+      ::unlink(path.c_str());
+      throw;
+    }
+    return path;
+  }
+  throw std::runtime_error(stem + ".step: " + std::to_string(MAX_COPIES) + " files of this name are there already");
+}
+
 void writeRecording(const std::string& path, const StepRecording& recording) {
   RecordingImage image;
   image.build(recording);
@@ -328,6 +353,8 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
 }
 
 StepRecording readRecordingFile(const std::string& path) {
+  const std::string problem = regularFileProblem(path, MAX_FILE_BYTES);
+  if (!problem.empty()) throw RecordingError(path + ": " + problem);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw RecordingError(path + ": cannot be read");
   const std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};

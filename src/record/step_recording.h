@@ -64,6 +64,9 @@ class DCCD_EXPORT RecordingImage {
 /// and the system's reason (disk full, no permission); nothing is left behind then.
 DCCD_EXPORT void writeRecording(const std::string& path, const StepRecording& recording);
 
+/// The same into a file that was not there before: STEM.step, or STEM_2.step and so on. Returns its name.
+DCCD_EXPORT std::string writeNewRecording(const std::string& stem, const StepRecording& recording);
+
 /// Lengths are held against the bytes that are there before anything is allocated. Throws RecordingError.
 DCCD_EXPORT StepRecording readRecording(const void* data, std::size_t size, const std::string& name);
 DCCD_EXPORT StepRecording readRecordingFile(const std::string& path);

@@ -114,6 +114,7 @@ StepReplay replayStep(const StepRecording& recording, int threads) {
   Options options = recording.options;
   options.num_threads = threads;
   options.step_budget_ms = 0;
+  options.max_compute_ms = 0;
   check(options);
   if (recording.step.bodies.empty()) throw std::invalid_argument("the recording has no body");
   StepReplay result;

@@ -7,7 +7,9 @@
 #include <limits>
 #include <sstream>
 
+#include "dccd/assurance.h"
 #include "report/flat_layout.h"
+#include "report/quantile.h"
 
 namespace dccd {
 namespace {
@@ -15,13 +17,6 @@ namespace {
 const char* const KINDS[] = {"VF", "EE", "vertex-voxel_face", "edge-voxel_edge", "face-voxel_corner"};
 const char* const KINDS_IN_WORDS[] = {"vertex against face", "edge against edge", "vertex against voxel face",
                                       "edge against voxel edge", "face against voxel corner"};
-constexpr std::size_t LEAVING = 4;  // place of that flag in the key of a contact
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
-}
 
 std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
   return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
@@ -39,63 +34,9 @@ std::string csvField(const std::string& text) {
   return quoted + '"';
 }
 
-/// What stands in the way of "no contact" in a step that found none.
-std::string doubtOf(const Outcome& outcome) {
-  if (outcome.status != StepStatus::OK) return toString(outcome.status);
-  if (!outcome.unproved.empty()) return outcome.unproved.front();
-  return outcome.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(outcome.start_state);
-}
-
 nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
 
 }  // namespace
-
-void ContactLog::add(const Outcome& outcome) {
-  if (!outcome.answered) return;
-  ms_.push_back(outcome.stats.total_ms);
-  auto& step = steps_[outcome.sequence];
-  for (const Contact& c : outcome.contacts) {
-    const Key key{std::uint64_t{static_cast<std::uint8_t>(c.kind)} << 32 | std::uint64_t{c.body[0]} << 16 | c.body[1],
-                  std::uint64_t{c.vertex[0]} << 32 | c.vertex[1], std::uint64_t{c.vertex[2]} << 32 | c.vertex[3],
-                  std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z,
-                  std::uint64_t{c.leaving}};
-    static_assert(std::tuple_size<Key>::value == LEAVING + 1, "the flag is the key's last word");
-    step[key] = {c.toc_lower, c.certainty == Certainty::CERTAIN};
-  }
-}
-
-// What is undecided may be on its way in or out: a rung that did not look for the time does not know.
-bool ContactLog::covers(const std::map<Key, Entry>& found, Key key) {
-  if (found.count(key) > 0) return true;
-  key[LEAVING] ^= 1;
-  const auto other = found.find(key);
-  return other != found.end() && !other->second.certain;
-}
-
-RungCost ContactLog::against(const ContactLog& exact, const std::string& rung) const {
-  RungCost cost;
-  cost.rung = rung;
-  cost.steps = steps_.size();
-  cost.median_ms = quantile(ms_, 0.5);
-  cost.p95_ms = quantile(ms_, 0.95);
-  static const std::map<Key, Entry> NONE;
-  for (const auto& [sequence, found] : steps_) {
-    const auto other = exact.steps_.find(sequence);
-    const auto& truth = other == exact.steps_.end() ? NONE : other->second;
-    cost.contacts += found.size();
-    for (const auto& [key, entry] : found) {
-      const auto match = truth.find(key);
-      cost.undecided += !entry.certain;
-      if (match == truth.end()) {
-        cost.false_contacts += entry.certain;
-      } else {
-        cost.max_toc_error = std::max(cost.max_toc_error, std::abs(match->second.toc_lower - entry.toc_lower));
-      }
-    }
-    for (const auto& [key, entry] : truth) cost.missed += !covers(found, key);
-  }
-  return cost;
-}
 
 Report::Report(const std::string& folder) : folder_(folder) {
   std::error_code error;
@@ -229,47 +170,59 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
   any_ = true;
   addRow(o);
-  if (!o.answered) {
-    ++not_answered_;
-    return;
-  }
+  addProof(o);
+  if (!o.answered) return;
   ++answered_;
   with_contact_ += o.total_contacts > 0;
-  clear_ += assuranceOf(o).clear();
-  if (o.total_contacts == 0 && !assuranceOf(o).clear()) ++doubtful_[doubtOf(o)];
   writeContacts(o, bodies);
   addHeat(o, bodies);
   addFirstContact(o, bodies);
   addTimes(o);
 }
 
+void Report::addProof(const Outcome& o) {
+  ++frames_;
+  if (o.answered && o.total_contacts == 0 && o.touching != Touching::NONE) {
+    ++lasting_[o.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(o.start_state)];
+  }
+  const Assurance assurance = assuranceOf(o);
+  if (assurance.proved || o.status == StepStatus::FIRST_FRAME) return;
+  const bool is_ok = o.status == StepStatus::OK;
+  const std::string kind = is_ok ? assurance.missing.front() : toString(o.status);
+  const std::string reason = is_ok || o.reason.empty() ? kind : kind + ": " + o.reason;
+  ++unproved_.emplace(kind, std::make_pair(reason, 0)).first->second.second;
+}
+
+std::string Report::unproved() const {
+  std::size_t frames = 0;
+  std::string reasons;
+  for (const auto& [kind, found] : unproved_) {
+    frames += found.second;
+    reasons += (reasons.empty() ? "" : ", ") + found.first + " (" + std::to_string(found.second) + ")";
+  }
+  if (frames > 0) return std::to_string(frames) + " of " + std::to_string(frames_) + " frames: " + reasons;
+  return answered_ > 0 ? "" : frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
+}
+
 std::string Report::headline() const {
   std::ostringstream text;
   text << std::fixed << std::setprecision(4);
+  const bool proved = unproved().empty();
   if (!first_contact_.empty()) {
     text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
          << with_contact_ << " of " << answered_ << " answered steps";
   } else if (answered_ == 0) {
-    text << "No answer: no step could be checked";
-  } else if (clear_ == 0) {
-    text << "No contact found in " << answered_ << " answered steps, but it is not ruled out";
-  } else if (clear_ < answered_) {
-    text << "No contact in " << clear_ << " of " << answered_ << " answered steps";
+    text << "No answer";
   } else {
-    text << "No contact in " << answered_ << " answered steps";
+    text << (proved && lasting_.empty() ? "No contact in " : "No contact found in ") << answered_ << " answered steps";
   }
-  if (!doubtful_.empty()) {
-    if (clear_ > 0 || !first_contact_.empty()) text << "; in others none was found, but it is not ruled out";
-    const char* separator = " (";
-    for (const auto& [doubt, steps] : doubtful_) {
-      text << separator << doubt << ' ' << steps;
-      separator = ", ";
-    }
-    text << ')';
+  const char* separator = "; surfaces touched from the start of a step (";
+  for (const auto& [what, steps] : lasting_) {
+    text << separator << what << ' ' << steps;
+    separator = ", ";
   }
-  if (not_answered_ > 0) {
-    text << "; " << not_answered_ << (not_answered_ == 1 ? " frame" : " frames") << " without an answer";
-  }
+  if (!lasting_.empty()) text << ')';
+  if (!proved) text << "; not proved: " << unproved();
   text << '.';
   return text.str();
 }
@@ -390,9 +343,11 @@ nlohmann::json Report::json() const {
 void Report::finish() {
   const nlohmann::json data = json();
   std::ofstream json_file(folder_ + "/report.json"), page(folder_ + "/report.html");
-  json_file << data.dump(1) << '\n';
+  // A name out of a message need not be UTF-8.
+  constexpr auto REPLACE = nlohmann::json::error_handler_t::replace;
+  json_file << data.dump(1, ' ', false, REPLACE) << '\n';
   // "</" would end the script element that carries the data.
-  std::string text = data.dump();
+  std::string text = data.dump(-1, ' ', false, REPLACE);
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
   page << reportPage(text);
   for (std::ofstream* file : {&contacts_, &steps_, &timing_, &json_file, &page}) {

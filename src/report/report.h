@@ -13,35 +13,10 @@
 #include "dccd/effect_plan.h"
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
+#include "report/contact_log.h"
 #include "report/latency_histogram.h"
 
 namespace dccd {
-
-/// One rung over the whole run, for the table of what accuracy costs. Missed and false are against the run with
-/// `exact`.
-struct RungCost {
-  std::string rung;
-  std::size_t steps = 0, contacts = 0, missed = 0, false_contacts = 0, undecided = 0;
-  double median_ms = 0, p95_ms = 0, max_toc_error = 0;
-};
-
-/// Contacts of each step in a comparable form, so that the runs of two rungs can be held against each other.
-class ContactLog {
- public:
-  void add(const Outcome& outcome);
-  /// Missed, false and TOC error of this run against the exact one.
-  RungCost against(const ContactLog& exact, const std::string& rung) const;
-
- private:
-  struct Entry {
-    double toc_lower;
-    bool certain;
-  };
-  using Key = std::array<std::uint64_t, 5>;
-  static bool covers(const std::map<Key, Entry>& found, Key key);
-  std::map<std::uint64_t, std::map<Key, Entry>> steps_;
-  std::vector<double> ms_;
-};
 
 /// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv,
 /// left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json and report.html.
@@ -64,8 +39,12 @@ class Report {
   /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
   /// naming the file.
   void finish();
-  /// One sentence: the first contact, or that there was none, or that there was no answer.
+  /// One sentence: the first contact, or that there was none, or that there was no answer; and what is not proved of
+  /// it.
   std::string headline() const;
+  /// What stands in the way of a proof: "3 of 40 frames: NO_MAP: no octomap has been received yet (3)". Empty: every
+  /// frame but a first one, of which there is nothing to say, has an answer that is proved, and there is one.
+  std::string unproved() const;
 
  private:
   struct BodyHeat {
@@ -75,6 +54,7 @@ class Report {
     std::vector<std::uint32_t> contacts;  // per vertex
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
   };
+  void addProof(const Outcome& outcome);
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
   void addRow(const Outcome& outcome);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
@@ -89,8 +69,11 @@ class Report {
   std::ofstream contacts_, steps_, timing_;
   StampNs origin_ns_ = 0;
   bool any_ = false;
-  std::map<std::string, std::size_t> doubtful_;  // steps that found no contact and cannot rule it out, by the reason
-  std::size_t answered_ = 0, with_contact_ = 0, clear_ = 0, not_answered_ = 0, undecided_only_ = 0;
+  std::map<std::string, std::size_t> lasting_;  // steps without a contact in which something touched, by what it was
+  /// Frames that are not proved, by status, or by the first sentence of what an OK one lacks: the reason of the first
+  /// of them, and how many.
+  std::map<std::string, std::pair<std::string, std::size_t>> unproved_;
+  std::size_t frames_ = 0, answered_ = 0, with_contact_ = 0;
   double first_contact_s_ = 0;
   std::string first_contact_;
   nlohmann::json rows_ = nlohmann::json::array();

@@ -1,11 +1,39 @@
 #include "ros/transforms.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <geometry_msgs/TransformStamped.h>
 #include <tf2/exceptions.h>
 
+#include "ros/short_text.h"
+
 namespace dccd {
+
+namespace {
+
+/// What tf2 would refuse with a line on the console, each time that it comes.
+bool isUsable(const geometry_msgs::TransformStamped& transform) {
+  const auto& p = transform.transform.translation;
+  const auto& q = transform.transform.rotation;
+  const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+  const auto unslashed = [](const std::string& name) {
+    return !name.empty() && name[0] == '/' ? name.substr(1) : name;
+  };
+  const std::string child = unslashed(transform.child_frame_id), parent = unslashed(transform.header.frame_id);
+  // Written so that a NaN is refused.
+  return frameNameProblem(child).empty() && frameNameProblem(parent).empty() && child != parent && std::isfinite(p.x) &&
+         std::isfinite(p.y) && std::isfinite(p.z) && std::abs(norm2 - 1) < tolerance::TF_QUATERNION_NORM;
+}
+
+}  // namespace
+
+std::string frameNameProblem(const std::string& name) {
+  if (name.empty()) return "it is empty";
+  if (name[0] == '/') return "it begins with a slash";
+  if (name.size() > MAX_NAME) return "it has " + std::to_string(name.size()) + " characters";
+  return {};
+}
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
   const auto known = newest_.find(transform.child_frame_id);
@@ -20,6 +48,7 @@ bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) c
 bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
   bool cleared = false;
   for (const auto& transform : message.transforms) {
+    if (!isUsable(transform)) continue;
     if (!is_static) {
       if (goesBack(transform)) {
         buffer_.clear();  // keeps static transforms
@@ -38,6 +67,12 @@ bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, c
                      StampNs stamp_ns, Eigen::Isometry3d& transform, std::string& reason) {
   transform = Eigen::Isometry3d::Identity();
   if (target == source) return true;
+  for (const std::string* name : {&target, &source}) {
+    reason = frameNameProblem(*name);
+    if (reason.empty()) continue;
+    reason = "'" + shortText(*name, MAX_NAME) + "' is no frame's name: " + reason;
+    return false;
+  }
   ros::Time stamp;
   stamp.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
   try {

@@ -122,7 +122,7 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
 
 /// What nobody is to miss who reads "proved".
 std::vector<std::string> excludedByChoice(const Options& options, const Step& step, std::uint64_t excluded_voxels) {
-  std::vector<std::string> excluded;
+  std::vector<std::string> excluded = options.excluded;
   const auto add = [&](const Body& body, const std::string& what) {
     excluded.push_back("body '" + body.name + "': " + what);
   };
@@ -222,7 +222,8 @@ bool operator==(const Options& a, const Options& b) {
     return std::tie(o.accuracy.rung, o.accuracy.tolerance_m, o.accuracy.toc_bits, o.accuracy.max_subdivisions,
                     o.broad_phase, o.num_threads, o.step_budget_ms, o.max_compute_ms, o.earliest_only,
                     o.check_start_state, o.keep_bounds, o.unfolded_test, o.rigid_tolerance_m, o.max_substeps,
-                    o.max_contacts, o.max_found, o.max_found_per_feature, o.suppress_initial, o.obstacle_expected);
+                    o.max_contacts, o.max_found, o.max_found_per_feature, o.suppress_initial, o.obstacle_expected,
+                    o.excluded);
   };
   return values(a) == values(b) &&
          std::equal(a.exclude_boxes.begin(), a.exclude_boxes.end(), b.exclude_boxes.begin(), b.exclude_boxes.end(),

@@ -92,7 +92,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   useMap(step.map);
   // What is made once for many steps is not taken from the time of the first.
   const Clock::time_point begun = Clock::now();
-  if (!deadline.isNever()) deadline = Deadline(deadline.at() + (begun - called));
+  deadline = deadline.movedBy(begun - called);
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
   const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
@@ -317,14 +317,18 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
   StartStateSearch::IsOver is_over;
-  if (!part.deadline.isNever()) {
-    // Later parts need as much time for their pairs; what is over that is shared.
-    const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
-    const Clock::duration slack = part.deadline.at() - start - later * (start - begin);
-    // Contacts are still to be joined, counted and cut: half of what one takes after the pairs.
-    const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size()) / 2;
-    is_over = [this, at = start + slack / (later + 1) - concluding] {
-      return Deadline(at - LISTING_AN_INTERSECTION * carried.start_state.foundCount()).isOver();
+  if (part.deadline.canEnd()) {
+    Deadline deadline = part.deadline;
+    if (!deadline.isNever()) {
+      // Later parts need as much time for their pairs; what is over that is shared.
+      const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
+      const Clock::duration slack = deadline.at() - start - later * (start - begin);
+      // Contacts are still to be joined, counted and cut: half of what one takes after the pairs.
+      const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size()) / 2;
+      deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
+    }
+    is_over = [this, deadline] {
+      return deadline.movedBy(-LISTING_AN_INTERSECTION * carried.start_state.foundCount()).isOver();
     };
   }
   std::vector<StartIntersection> met;

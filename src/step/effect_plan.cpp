@@ -65,6 +65,9 @@ Finding octomap(const EffectScene& scene) {
     return {false, true, "against_obstacle is false for every body"};
   }
   if (scene.map_seen) return {true, true, "the map comes from " + scene.map_source};
+  if (scene.map_named) {
+    return {true, true, "octomap_topic names " + scene.map_source + ", from which no map has come"};
+  }
   return {false, true, "nobody publishes " + scene.map_source + " and no octomap_file is given"};
 }
 
@@ -86,7 +89,9 @@ std::string notSolid(const EffectScene& scene) {
 }
 
 Finding startState(const EffectScene& scene) {
-  if (ropesOnly(scene) && !scene.map_seen) return {false, true, "edges alone cannot be inside of anything"};
+  if (ropesOnly(scene) && !scene.map_seen && !scene.map_named) {
+    return {false, true, "edges alone cannot be inside of anything"};
+  }
   return {true, true,
           "surfaces that cross already at the start are invisible to continuous detection" + notSolid(scene)};
 }

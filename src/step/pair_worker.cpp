@@ -262,8 +262,8 @@ void PairWorker::dropLate() {
 
 /// 0 where there is no time for a better one.
 double PairWorker::boundOf(std::size_t i, double distance_m) {
-  if (bounds_++ % BOUNDS_PER_LOOK_AT_THE_CLOCK == 0 && !context_->deadline.isNever()) {
-    late_ = late_ || Deadline(context_->deadline.at() + TIME_FOR_BOUNDS).isOver();
+  if (bounds_++ % BOUNDS_PER_LOOK_AT_THE_CLOCK == 0) {
+    late_ = late_ || context_->deadline.movedBy(TIME_FOR_BOUNDS).isOver();
   }
   return late_ ? 0 : linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance_m);
 }
@@ -293,7 +293,7 @@ void PairWorker::decide() {
   batch.count = count_;
   if (separated_) batch.minimum_separation_m = separations_.data();
   const Deadline deadline = context_->pairsDeadline();
-  if (!deadline.isNever()) batch.deadline = &deadline;
+  if (deadline.canEnd()) batch.deadline = &deadline;
   context_->elementary->run(batch, results_.data(), stats_.tiers);
   context_->timeIsUp();  // pairs that it left undecided are known to be
   auto& hits = hits_[static_cast<int>(task_->kind)];

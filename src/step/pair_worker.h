@@ -61,12 +61,11 @@ struct StepContext {
   std::chrono::nanoseconds per_hit{0};
   std::atomic<std::size_t> hits{0};
   Deadline pairsDeadline() const {
-    if (deadline.isNever()) return deadline;
-    return Deadline(deadline.at() - per_hit * static_cast<std::int64_t>(hits.load(std::memory_order_relaxed)));
+    return deadline.movedBy(-per_hit * static_cast<std::int64_t>(hits.load(std::memory_order_relaxed)));
   }
   bool timeIsUp() {
     if (expired.load(std::memory_order_relaxed)) return true;
-    if (!deadline.isNever() && pairsDeadline().isOver()) expired = true;
+    if (deadline.canEnd() && pairsDeadline().isOver()) expired = true;
     return expired.load(std::memory_order_relaxed);
   }
 };

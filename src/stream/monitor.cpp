@@ -162,6 +162,16 @@ void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const 
   }
 }
 
+void Monitor::withdraw(std::size_t body) {
+  Impl& m = *impl_;
+  if (m.isStream(body) || m.stores.at(body).empty()) return;
+  m.stores[body].clear();
+  --m.counters[body].by_status[static_cast<std::size_t>(StepStatus::OK)];
+  m.forgetLast();
+}
+
+void Monitor::cancel() { impl_->cancelled = true; }
+
 bool Monitor::waiting() const { return !impl_->pending.empty(); }
 
 void Monitor::finish() { impl_->finishing = true; }
@@ -182,13 +192,13 @@ void Monitor::Impl::forgetLast() {
   history.clear();
 }
 
-Outcome Monitor::Impl::runStep(const Pending& pending, double step_ms) {
+Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline) {
   const Step step = place(pending);
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
   last = nullptr;  // until this one is done
   if (listener) listener->onStep(step, options.detector);
-  Outcome outcome = detect(step, options.detector, history, Deadline::after(step_ms));
+  Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;
   return outcome;
@@ -211,7 +221,7 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
   };
   if (step.status == StepStatus::OK) {
     try {
-      outcome = m.runStep(step, stepMs());
+      outcome = m.runStep(step, m.deadlineAfter(stepMs()));
     } catch (const std::exception& error) {
       without(StepStatus::INTERNAL_ERROR, error.what());
       m.forgetLast();

@@ -2,6 +2,7 @@
 // (bodies, references, map), monitor_questions.cpp what is asked between steps.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -58,6 +59,7 @@ struct Monitor::Impl {
   References references;
   std::vector<std::uint64_t> runs, last_runs;
   bool finishing = false;
+  std::atomic<bool> cancelled{false};
   StepListener* listener = nullptr;
   std::uint64_t sequence = 0;
 
@@ -68,6 +70,7 @@ struct Monitor::Impl {
     forgetReferences();
   }
 
+  Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
   static double seconds(StampNs from, StampNs to) { return static_cast<double>(to - from) * 1e-9; }
   bool isStream(std::size_t body) const { return bodies[body].motion == BodyMotionKind::STREAM; }
   void drop(Pending& step, StepStatus status, const std::string& reason) {
@@ -86,7 +89,7 @@ struct Monitor::Impl {
   void forgetLast();
   bool separates(const Body& body) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;
-  Outcome runStep(const Pending& pending, double step_ms);
+  Outcome runStep(const Pending& pending, const Deadline& deadline);
 };
 
 }  // namespace dccd

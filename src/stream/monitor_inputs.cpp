@@ -1,5 +1,6 @@
 // What a step is made of: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <utility>
 
@@ -164,11 +165,20 @@ ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
   if (!options.detector.obstacle_expected) return used;
   if (!used.surface) {
     if (used.problem.empty()) used.problem = "no octomap has been received yet";
-  } else if (options.octomap_timeout_s > 0 && used.stamp_ns > 0 &&
-             seconds(used.stamp_ns, stamp_ns) > options.octomap_timeout_s) {
-    used.surface = nullptr;
-    used.problem = "the octomap is older than octomap_timeout_s";
+    return used;
   }
+  if (!(options.octomap_timeout_s > 0) || used.stamp_ns <= 0) return used;
+  // Also one from the future: by its stamp it would be fresh for ever, and its clock is not that of the meshes.
+  const double age_s = seconds(used.stamp_ns, stamp_ns);
+  if (std::abs(age_s) <= options.octomap_timeout_s) return used;
+  used.surface = nullptr;
+  std::ostringstream problem;
+  if (age_s > 0) {
+    problem << "the octomap is older than octomap_timeout_s";
+  } else {
+    problem << "the octomap is stamped " << -age_s << " s after the end of the step, more than octomap_timeout_s";
+  }
+  used.problem = problem.str();
   return used;
 }
 

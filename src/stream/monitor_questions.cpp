@@ -26,7 +26,7 @@ Outcome Monitor::checkNow() {
   step.map = m.usableMap(step.stamp_ns);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
-  return detect(step, m.options.detector, m.side_history, Deadline());
+  return detect(step, m.options.detector, m.side_history, Deadline().orWhen(m.cancelled));
 }
 
 Outcome Monitor::predict() {
@@ -38,6 +38,7 @@ Outcome Monitor::predict() {
     outcome.reason = "no step has been answered yet";
     return outcome;
   }
+  const Deadline deadline = m.deadlineAfter(LOOK_AHEAD_SHARE * timeLimitMs(m.options.detector));
   const double ahead = m.options.look_ahead_s / last_s;
   Step step = *m.last;
   step.start_ns = m.last->stamp_ns;
@@ -63,8 +64,7 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   m.side_history.beginAt(m.history);
-  return detect(step, m.options.detector, m.side_history,
-                Deadline::after(LOOK_AHEAD_SHARE * timeLimitMs(m.options.detector)));
+  return detect(step, m.options.detector, m.side_history, deadline);
 }
 
 }  // namespace dccd

@@ -84,7 +84,8 @@ class LiveNodeTest(unittest.TestCase):
     def setUp(self):
         warnings.simplefilter('ignore', ResourceWarning)  # rospy leaves sockets to the collector
 
-    def start_node(self, name, process=None, **parameters):
+    def start_node(self, name, process=None, publishes=True, **parameters):
+        """`publishes`: with `self.publisher`, to which the node has then subscribed."""
         arguments = ['__name:=' + name, 'mesh:=/%s/mesh' % name, '_fixed_frame:=world', '_max_vertex_step_m:=0.0',
                      '_effects/octomap:=off', '_max_contacts:=100']
         arguments += ['_%s:=%s' % item for item in parameters.items()]
@@ -97,9 +98,10 @@ class LiveNodeTest(unittest.TestCase):
             subscriber = rospy.Subscriber('/%s/%s' % (name, topic), kind, into.append)
             self.addCleanup(subscriber.unregister)
             subscribers.append(subscriber)
-        self.publisher = rospy.Publisher('/%s/mesh' % name, PointCloud2, queue_size=None, tcp_nodelay=True)
-        self.addCleanup(self.publisher.unregister)
-        wait_for(lambda: self.publisher.get_num_connections() == 1, 20, 'the node to subscribe')
+        if publishes:
+            self.publisher = rospy.Publisher('/%s/mesh' % name, PointCloud2, queue_size=None, tcp_nodelay=True)
+            self.addCleanup(self.publisher.unregister)
+            wait_for(lambda: self.publisher.get_num_connections() == 1, 20, 'the node to subscribe')
         wait_for(lambda: all(s.get_num_connections() == 1 for s in subscribers), 20, 'its topics')
         return node
 

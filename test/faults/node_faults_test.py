@@ -182,7 +182,7 @@ class NodeFaultsTest(LiveNodeTest):
         for _ in range(2):
             self.step(cloud.message())
         # The file that comes next lies on a device without space.
-        part = folder / ('step_2_%d.step.part' % self.contacts[-1].header.stamp.to_nsec())
+        part = folder / ('step_full_2_%d.step.part' % self.contacts[-1].header.stamp.to_nsec())
         part.symlink_to('/dev/full')
         record = rospy.ServiceProxy('/full/record_step', Trigger)
         answer = record()

@@ -70,10 +70,6 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.states[-1].clear)
         wait_for(lambda: not self.clear[-1].data, 5, '~clear to be false')
 
-    def forget_type(self):
-        time.sleep(0.3)  # else the node may not have seen that there was a publisher of clouds, and wait for the next one
-        self.publisher.unregister()
-
     def late_subscriber(self, name):
         """What somebody hears who comes only now."""
         heard = rospy.wait_for_message('/%s/state' % name, State, 10)
@@ -126,7 +122,7 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.late_subscriber('replaced').clear)
 
     def test_steps_that_take_longer_than_frames_come(self):
-        self.start_node('slow', answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
+        self.start_node('slow', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(220, 220)
         for _ in range(2):
             self.publisher.publish(cloud.message())
@@ -152,8 +148,17 @@ class StateTest(LiveNodeTest):
         stream.end()
         self.assert_consistent()
 
+    def test_a_step_without_a_budget_is_cut(self):
+        self.start_node('cut', max_compute_s=0.02, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6)
+        cloud = Cloud(220, 220)
+        for _ in range(2):
+            self.publisher.publish(cloud.message())
+        wait_for(lambda: any(c.answered for c in self.contacts), 60, 'an answer')
+        self.assertEqual(self.contacts[-1].status, ContactArray.DEADLINE, self.contacts[-1].reason)
+        self.wait_missing('the time that a step may take without a budget ran out')
+
     def test_a_reset_while_a_step_is_computed(self):
-        self.start_node('reset', answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
+        self.start_node('reset', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=1e3, max_step_s=1e6, max_contacts=10)
         cloud = Cloud(220, 220)
         for _ in range(2):
             self.publisher.publish(cloud.message())
@@ -210,7 +215,7 @@ class StateTest(LiveNodeTest):
     def test_a_mesh_that_is_not_wholly_used(self):
         """Faces that name a vertex twice, none at all, and a second list of triangles."""
         self.start_node('dropped')
-        self.forget_type()
+        self.publisher.unregister()
         mesh = rospy.Publisher('/dropped/mesh', MeshStamped, queue_size=5)
         self.addCleanup(mesh.unregister)
         wait_for(lambda: mesh.get_num_connections() == 1, 20, 'the node to take another type')
@@ -243,7 +248,7 @@ class StateTest(LiveNodeTest):
 
     def test_a_second_list_of_triangles(self):
         self.start_node('lists')
-        self.forget_type()
+        self.publisher.unregister()
         markers = rospy.Publisher('/lists/mesh', MarkerArray, queue_size=5)
         self.addCleanup(markers.unregister)
         wait_for(lambda: markers.get_num_connections() == 1, 20, 'the node to take another type')

@@ -64,10 +64,35 @@ class AnalyzeBagTest(unittest.TestCase):
         cls.tool('analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words)
         return report
 
+    def analyzed(self, name, bag, *words):
+        """Exit status, standard output and error, and the statuses of the steps; whatever comes of it."""
+        report = self.folder / name
+        command = [TOOLS / 'analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words]
+        ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+        self.assertIn(ran.returncode, (0, 3), ran.stderr)
+        return ran.returncode, ran.stdout, ran.stderr, self.statuses_of(report)
+
+    def params(self, text):
+        path = self.folder / 'given.yaml'
+        path.write_text('fixed_frame: world\n' + text)
+        return ['--params', path]
+
+    def bag_with(self, name, *maps):
+        """The scene's cloth and, at the bag's beginning, other messages: (topic, message)."""
+        path, start = self.folder / name, self.messages[0][2]
+        with rosbag.Bag(str(path), 'w') as bag:
+            for topic, message in maps:
+                bag.write(topic, message, start)
+            for topic, message, at in self.messages:
+                if topic == '/cloth':
+                    bag.write(topic, message, at)
+        return path
+
+    def octomap(self):
+        return next(message for topic, message, _ in self.messages if topic == '/octomap_binary')
+
     def statuses(self, bag):
-        params = self.folder / 'statuses.yaml'
-        params.write_text('fixed_frame: world\nmax_step_s: 1.0\n')
-        return self.statuses_of(self.analyze('statuses', bag, '--params', params))
+        return self.analyzed('statuses', bag, *self.params('max_step_s: 1.0\n'))[-1]
 
     @staticmethod
     def statuses_of(report):
@@ -97,7 +122,7 @@ class AnalyzeBagTest(unittest.TestCase):
         self.expect_same(self.analyze('late', late))
 
     def test_a_map_from_a_file(self):
-        octomap = next(m for t, m, _ in self.messages if t == '/octomap_binary')
+        octomap = self.octomap()
         self.assertEqual((octomap.id, octomap.binary), ('OcTree', True))
         data = bytes(b & 0xff for b in octomap.data)
         # Two bits for each child of a node that has children, 0 for none; the header counts the root, too.
@@ -105,11 +130,7 @@ class AnalyzeBagTest(unittest.TestCase):
         header = '# Octomap OcTree binary file\nid OcTree\nsize %d\nres %r\ndata\n' % (nodes, octomap.resolution)
         tree = self.folder / 'map.bt'
         tree.write_bytes(header.encode() + data)
-        bare = self.folder / 'bare.bag'
-        with rosbag.Bag(str(bare), 'w') as bag:
-            for topic, message, at in self.messages:
-                if topic == '/cloth':
-                    bag.write(topic, message, at)
+        bare = self.bag_with('bare.bag')
         self.expect_same(self.analyze('file', bare, '--octomap', tree))
 
     def test_transforms_of_a_long_bag(self):
@@ -184,7 +205,7 @@ class AnalyzeBagTest(unittest.TestCase):
 
     def test_a_map_without_a_stamp_is_as_old_as_its_message(self):
         unstamped, frames = self.folder / 'unstamped.bag', 0
-        octomap = copy.deepcopy(next(m for t, m, _ in self.messages if t == '/octomap_binary'))
+        octomap = copy.deepcopy(self.octomap())
         octomap.header.stamp = genpy.Time()
         with rosbag.Bag(str(unstamped), 'w') as bag:
             start = next(at for topic, _, at in self.messages if topic == '/cloth')
@@ -193,12 +214,92 @@ class AnalyzeBagTest(unittest.TestCase):
                 if topic == '/cloth':
                     bag.write(topic, message, at)
                     frames += message.header.stamp - start > genpy.Duration.from_sec(0.31)
-        params = self.folder / 'unstamped.yaml'
-        params.write_text('fixed_frame: world\nmax_step_s: 1.0\noctomap_timeout_s: 0.31\n')
         self.assertGreater(frames, 2)
-        statuses = self.statuses_of(self.analyze('unstamped', unstamped, '--params', params))
+        statuses = self.analyzed('unstamped', unstamped, *self.params('max_step_s: 1.0\noctomap_timeout_s: 0.31\n'))[-1]
         self.assertEqual(statuses['NO_MAP'], frames, statuses)
         self.assertGreater(statuses['OK'], 2)
+
+    def test_a_named_map_that_the_bag_does_not_have(self):
+        for words in (self.params('octomap_topic: /octomap_binray\n'), self.params('octomap_topic: octomap\n')):
+            topic = '/octomap_binray' if 'binray' in words[1].read_text() else '/octomap'
+            status, _, said, steps = self.analyzed('misspelt', self.bag, *words)
+            self.assertEqual(status, 3, said)
+            self.assertIn('the bag has no octomap on %s, which octomap_topic names; it has them on /octomap_binary' % topic,
+                          said)
+            self.assertEqual(set(steps), {'FIRST_FRAME', 'NO_MAP'})
+            status, _, said, steps = self.analyzed('without', self.bag, *words, '--without-map')
+            self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), said)
+            self.assertNotIn('octomap', said)
+
+    def test_a_named_map_of_which_nothing_is_usable(self):
+        broken = copy.deepcopy(self.octomap())
+        broken.resolution = -1
+        bag = self.bag_with('broken.bag', ('/table', broken))
+        status, _, said, steps = self.analyzed('broken', bag, *self.params('octomap_topic: /table\n'))
+        self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'NO_MAP'}), said)
+        self.assertIn('octomap refused', said)
+        self.assertIn('no octomap on /table could be used', said)
+        nothing = self.bag_with('nothing.bag')
+        status, _, said, steps = self.analyzed('nothing', nothing, *self.params('effects: {octomap: "on"}\n'))
+        self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'NO_MAP'}), said)
+        self.assertIn('the bag has no octomap on /octomap_binary, which effects/octomap calls for; it has none', said)
+        status, _, said, steps = self.analyzed('nothing', nothing)
+        self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), 'nobody called for one: ' + said)
+
+    def test_a_refused_map_makes_the_one_before_void(self):
+        start = self.messages[0][2]
+        bag = self.folder / 'void.bag'
+        with rosbag.Bag(str(bag), 'w') as written:
+            written.write('/octomap_binary', self.octomap(), start)
+            for i, (topic, message, at) in enumerate(self.messages):
+                if i == len(self.messages) // 2:
+                    written.write('/octomap_binary', MarkerArray(), at)
+                if topic == '/cloth':
+                    written.write(topic, message, at)
+        status, _, said, steps = self.analyzed('void', bag)
+        self.assertEqual(status, 3)
+        self.assertGreater(steps['OK'], 10)
+        self.assertGreater(steps['NO_MAP'], 10, 'no map is better than an old one')
+        self.assertIn('octomap refused', said)
+
+    def test_the_map_that_nobody_named(self):
+        """The default's topic where the bag has it, else the bag's first one; what else there is is not passed over."""
+        other = copy.deepcopy(self.octomap())
+        table = self.bag_with('table.bag', ('/table', other), ('/later', other))
+        status, said, complaints, steps = self.analyzed('table', table)
+        self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), complaints)
+        self.assertIn('octomap: /table (the first of the bag; nobody named one)\n', said)
+        self.assertIn(['octomap', '/table (the first of the bag; nobody named one)'],
+                      json.loads((self.folder / 'table/report.json').read_text())['facts'])
+        self.assertIn('nobody listens to the octomaps on /later', complaints)
+        self.assertEqual((self.folder / 'table/contacts.csv').read_bytes(), (self.plain / 'contacts.csv').read_bytes())
+
+        both = self.bag_with('both.bag', ('/another', other), ('/octomap_binary', other))
+        status, said, complaints, _ = self.analyzed('both', both)
+        self.assertEqual(complaints.count('analyze_bag: '), 1, complaints)
+        self.assertIn('octomap: /octomap_binary (default)\n', said)
+        self.assertIn('nobody listens to the octomaps on /another', complaints)
+        self.assertEqual(self.analyzed('both', both, '--without-map')[2], '')
+
+    def test_a_bag_in_which_no_frame_is_answered(self):
+        short = self.folder / 'short.bag'
+        with rosbag.Bag(str(short), 'w') as bag:
+            for topic, message, at in [m for m in self.messages if m[0] == '/cloth'][:1]:
+                bag.write(topic, message, at)
+        status, _, said, steps = self.analyzed('short', short)
+        self.assertEqual((status, steps), (3, {'FIRST_FRAME': 1}))
+        self.assertIn('no frame was answered', said)
+        lost = self.bag_with('lost.bag')
+        params = self.params('')
+        params[1].write_text('fixed_frame: moon\n')
+        status, _, said, steps = self.analyzed('lost', lost, *params)
+        self.assertEqual((status, set(steps)), (3, {'NO_TRANSFORM'}))
+        self.assertRegex(said, r'no frame was answered: (\d+) of \1 frames: NO_TRANSFORM: no transform .*moon.*\(\1\)\n')
+
+    def test_the_help_lists_the_exit_statuses(self):
+        said = self.tool('analyze_bag', '--help').stdout
+        for line in ('0', '1', '3'):
+            self.assertRegex(said, r'(?m)^ *%s +\w' % line)
 
     def test_the_bag_of_results(self):
         out = self.folder / 'out.bag'

@@ -7,7 +7,8 @@ from checkout import CHECKOUT
 PAGE = (CHECKOUT / 'doc/interface.md').read_text()
 ALL_PAGES = sorted(CHECKOUT.glob('*.md')) + sorted((CHECKOUT / 'doc').glob('*.md'))
 READ = re.compile(r'(\w+)\.(?:get|choice|number|integer|indices|list|raw|sections?)\(\s*"(\w+)"')
-# What a function of monitor_config.cpp reads is below this name; the others read the root, or a body's own level.
+CONFIG = ''.join(path.read_text() for path in sorted((CHECKOUT / 'src/config').glob('*.cpp')))
+# What a function of src/config reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
             'readDepthImage': 'topology/',
             'readMarkers': 'markers/'}
@@ -25,7 +26,7 @@ def functions(text):
 def read_parameters():
     """Every parameter that the code asks for, bodies' own without their bodies/NAME/."""
     found = set()
-    for name, body in functions((CHECKOUT / 'src/config/monitor_config.cpp').read_text()):
+    for name, body in functions(CONFIG):
         for reader, parameter in READ.findall(body):
             prefix = 'marker/' if reader == 'marker' else SECTIONS.get(name, '')
             found.add(prefix + parameter)
@@ -45,9 +46,8 @@ def names_of(line):
 
 def numbers_of_bodies():
     """The parameters of a body that the code reads as a number with a fraction."""
-    source = (CHECKOUT / 'src/config/monitor_config.cpp').read_text()
     found = set()
-    for name, body in functions(source[:source.index('void readSeparationPair(')]):
+    for name, body in functions(CONFIG[:CONFIG.index('void readSeparationPair(')]):
         found |= {SECTIONS.get(name, '') + parameter for parameter in re.findall(r'\.number\(\s*"(\w+)"', body)}
     return found
 
@@ -94,7 +94,8 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual(sorted(re.findall(r'`(\w+)`', row.split('NAME:')[1])), sorted(names))
 
     def test_topics(self):
-        code = set(re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src/output/outputs.cpp').read_text()))
+        code = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
+                for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
         table = PAGE[PAGE.index('## What comes out'):PAGE.index('**How to read a contact.**')]
         rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
         self.assertEqual(code, {name for row in rows for name in re.findall(r'`~(\w+)`', row)})
@@ -102,7 +103,7 @@ class InterfaceTest(unittest.TestCase):
     def test_services(self):
         source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()
         source = source[source.index('::advertiseServices()'):]
-        code = set(re.findall(r'advertise\("(\w+)"', source)) | set(re.findall(r'\(\s*"(\w+)", ', source[:3000])) & {'enable'}
+        code = set(re.findall(r'advertise\(\s*"(\w+)"', source)) | set(re.findall(r'\(\s*"(\w+)", ', source[:3000])) & {'enable'}
         section = PAGE[PAGE.index('## Services'):PAGE.index('## Parameters')]
         self.assertGreaterEqual(len(code), 4)
         self.assertEqual(code, set(re.findall(r'(?:^|\. )`~(\w+)` \(', section, re.M)))
@@ -115,7 +116,7 @@ class InterfaceTest(unittest.TestCase):
 
     def test_live_limits(self):
         """A live set of one value sets all of them: narrower limits than the parameters' would clamp the others."""
-        source = (CHECKOUT / 'src/config/monitor_config.cpp').read_text()
+        source = CONFIG
         limits = {}
         for name, least, most in re.findall(
                 r'\.(?:number|integer)\(\s*"(\w+)", [^;]*?, ([-\w.]+), ([\w.]+)\)', source):

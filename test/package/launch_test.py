@@ -4,6 +4,7 @@ import pathlib
 import subprocess
 import tempfile
 import unittest
+import xml.etree.ElementTree as ElementTree
 
 import rosgraph
 import yaml
@@ -33,8 +34,14 @@ step_budget_ms: 7.5
 look_ahead_s: 0.5
 '''
 # What the launch files set where the file does not.
-DEFAULTS = {'monitor.launch': {'octomap_topic': 'octomap_binary'},
-            'replay.launch': {'octomap_topic': 'octomap_binary', 'default_topic': '/cloth'}}
+DEFAULTS = {'monitor.launch': {}, 'replay.launch': {'default_topic': '/cloth'}}
+LAUNCH_FILES = sorted((CHECKOUT / 'launch').rglob('*.launch'))
+PRESETS = [path for path in LAUNCH_FILES if path.parent.name == 'presets']
+# What a launch file has another default for than monitor.launch: of the presets, one calls for a map.
+OWN_DEFAULTS = {'octomap_server.launch': {'octomap': '/octomap_binary'}, 'demo.launch': {'params', 'default_mesh'},
+                'replay.launch': {'default_mesh'}}
+# A cloth among several bodies: its file has it under bodies/cloth.
+UNDER_BODIES = {'mesh', 'topology', 'rows', 'cols'}
 
 
 class LaunchTest(unittest.TestCase):
@@ -90,13 +97,13 @@ class LaunchTest(unittest.TestCase):
                 arguments += ['%s:=%s' % (argument, value) for argument, (_, value) in given.items()]
                 found = self.parameters(launch, *arguments)
                 # The default names, which the node is told to take for those that were given.
-                self.assertEqual(found, {**dict(given.values()), 'topic': 'mesh', 'octomap_topic': 'octomap'})
-                self.assertLessEqual({'mesh:=/mine', 'octomap:=/my_map'}, self.words(launch, *arguments))
+                self.assertEqual(found, {**dict(given.values()), 'topic': 'mesh', 'octomap_topic': 'octomap_binary'})
+                self.assertLessEqual({'mesh:=/mine', 'octomap_binary:=/my_map'}, self.words(launch, *arguments))
                 self.assertEqual({type(found[name]) for name in ('step_budget_ms', 'look_ahead_s')}, {float})
 
     def test_a_topic_for_the_map_wins_over_its_file(self):
         found = self.parameters('monitor.launch', self.file(EVERYTHING), 'octomap:=/my_map')
-        self.assertEqual((found['octomap_topic'], found['octomap_file']), ('octomap', ''))
+        self.assertEqual((found['octomap_topic'], found['octomap_file']), ('octomap_binary', ''))
 
     def test_neither(self):
         for launch, defaults in DEFAULTS.items():
@@ -106,9 +113,20 @@ class LaunchTest(unittest.TestCase):
             self.assertEqual({name: found[name] for name in defaults}, defaults)
 
     def test_names_that_are_not_given_are_not_remapped(self):
-        """A remapping holds for the resolved name, too: what the file calls /octomap or /mesh would be sent elsewhere."""
+        """A remapping names a topic, and it holds for the resolved name, too: what the file calls /mesh would be sent
+        elsewhere."""
         for launch in DEFAULTS:
-            self.assertFalse([word for word in self.words(launch) if word.startswith(('octomap:=', 'mesh:='))], launch)
+            self.assertFalse([word for word in self.words(launch) if word.startswith(('octomap:=', 'octomap_binary:=', 'mesh:='))], launch)
+
+    def test_a_preset_keeps_what_is_its_own_under_a_file(self):
+        for preset in PRESETS:
+            own = CHECKOUT / 'config/presets' / (preset.stem + '.yaml')
+            with self.subTest(preset.name):
+                plain = self.parameters(preset, 'accuracy:=fast', 'num_threads:=2')
+                self.assertLessEqual({'accuracy': 'fast', 'num_threads': 2}.items(), plain.items())
+                self.assertIn('config/presets/' + own.name, preset.read_text())
+                added = self.parameters(preset, self.file('max_step_s: 7.0\n'), 'accuracy:=fast', 'num_threads:=2')
+                self.assertEqual(added, {**plain, 'max_step_s': 7.0})
 
     def test_demo(self):
         shown = {'markers/mesh': True, 'markers/obstacle_m': 1.0}
@@ -124,6 +142,9 @@ class LaunchTest(unittest.TestCase):
         master.setParam(NODE + 'topology', {'rows': 5})
         self.launch_until_subscribed(master, {'/felt', '/finger'}, 'monitor.launch', self.file(BODIES))
         self.assertFalse(master.hasParam(NODE + 'topology'), 'an earlier launch shows through')
+        stop(self.started)  # which flushes what it said
+        self.expect_said('listens to felt: /felt (named), finger: /finger (named), octomap: /table (named), tf; publishes under '
+                         '/collision_monitor')
 
     def test_a_monitor_listens_to_the_topics_that_the_file_names(self):
         """Also where they are those that the node has by default."""
@@ -134,20 +155,68 @@ class LaunchTest(unittest.TestCase):
 
     def test_a_replay_listens_to_the_topics_that_the_file_names(self):
         master = self.start_master()
-        scene = self.home / 'scene.bag'
-        subprocess.run([str(TOOLS / 'make_scene_bag'), str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(scene),
-                        '--frames', '2', '--quiet'], check=True, stdin=subprocess.DEVNULL)
         topics = self.launch_until_subscribed(
-            master, {'/octomap', '/mesh'}, 'replay.launch', 'bag:=%s' % scene, 'start_paused:=true',
+            master, {'/octomap', '/mesh'}, 'replay.launch', 'bag:=%s' % self.scene(), 'start_paused:=true',
             self.file('{octomap_topic: octomap, bodies: {mesh: {self_collision: true}}}'))
         self.assertFalse(topics & {'/octomap_binary', '/cloth'})
 
+    def test_an_unknown_key_of_a_file_ends_a_preset_with_an_error(self):
+        self.start_master()
+        for preset in PRESETS:
+            with self.subTest(preset.name):
+                launched = self.start('roslaunch', '--wait', str(preset), self.file('acuracy: exact\n'))
+                self.expect_said('cannot start: parameter ~acuracy')
+                launched.wait(30)
+
+    def test_everybody_looks_for_the_map_in_the_same_place(self):
+        """Node, nodelet, launch files, presets and analyze_bag: nobody named it, but for the one preset that does."""
+        default = 'octomap: /octomap_binary (default)'
+        master = self.start_master()
+        scene = self.scene()
+        starts = {path.name: ('roslaunch', '--wait', str(path)) for path in LAUNCH_FILES}
+        for name in ('demo.launch', 'replay.launch'):
+            starts[name] += ('bag:=%s' % scene, self.file('{}'))
+        starts['node'] = (str(TOOLS / 'collision_monitor_node'), '__name:=collision_monitor')
+        starts['nodelet'] = ('rosrun', 'nodelet', 'nodelet', 'standalone', 'deformable_ccd/CollisionMonitor',
+                             '__name:=collision_monitor')
+        for name, words in starts.items():
+            with self.subTest(name):
+                started = self.start(*words)
+                wait_for(lambda: '/tf' in self.subscribed(master), 30, 'the monitor')
+                stop(started)  # which flushes what it said
+                said = default.replace('default', 'named') if name == 'octomap_server.launch' else default
+                self.expect_said(said, words[0])
+                wait_for(lambda: not self.subscribed(master), 30, 'its end')
+                for parameter in ('/collision_monitor', '/use_sim_time'):
+                    if master.hasParam(parameter):
+                        master.deleteParam(parameter)
+        said = subprocess.run([str(TOOLS / 'analyze_bag'), str(scene), '--report', str(self.home / 'report'), '--quiet',
+                               '--no-accuracy-table'], capture_output=True, text=True, check=True).stdout
+        self.assertIn(default + '\n', said)
+
+    def scene(self):
+        scene = self.home / 'scene.bag'
+        subprocess.run([str(TOOLS / 'make_scene_bag'), str(CHECKOUT / 'config/scenes/table_edge.yaml'), str(scene),
+                        '--frames', '2', '--quiet'], check=True, stdin=subprocess.DEVNULL)
+        return scene
+
+    def log_of(self, program):
+        return self.home / (pathlib.Path(program).name + '.txt')
+
+    def expect_said(self, text, program='roslaunch'):
+        try:
+            wait_for(lambda: text in self.log_of(program).read_text(), 30, text)
+        except TimeoutError:
+            self.fail('%s: not said in\n%s' % (text, self.log_of(program).read_text()))
+
     def start(self, *words):
-        log = open(self.home / (words[0] + '.txt'), 'w')
+        log = open(self.log_of(words[0]), 'w')
         self.addCleanup(log.close)
         process = subprocess.Popen(words, env=self.environment, stdin=subprocess.DEVNULL, stdout=log,
                                    stderr=subprocess.STDOUT, start_new_session=True)
         self.addCleanup(stop, process)
+        self.started = process
+        return process
 
     def start_master(self):
         port = free_port()
@@ -160,15 +229,56 @@ class LaunchTest(unittest.TestCase):
     def launch_until_subscribed(self, master, topics, launch, *arguments):
         """All that the monitor listens to, as soon as these topics are among it."""
         self.start('roslaunch', '--wait', str(CHECKOUT / 'launch' / launch), *arguments)
-
-        def subscribed():
-            return {topic for topic, nodes in master.getSystemState()[1] if NODE[:-1] in nodes}
-
         try:
-            wait_for(lambda: subscribed() >= topics, 30, 'the monitor')
+            wait_for(lambda: self.subscribed(master) >= topics, 30, 'the monitor')
         except TimeoutError:
-            self.fail('%s\n%s' % (subscribed(), (self.home / 'roslaunch.txt').read_text()))
-        return subscribed()
+            self.fail('%s\n%s' % (self.subscribed(master), self.log_of('roslaunch').read_text()))
+        return self.subscribed(master)
+
+    @staticmethod
+    def subscribed(master):
+        return {topic for topic, nodes in master.getSystemState()[1] if NODE[:-1] in nodes}
+
+
+def arguments_of(path):
+    """Those that can be given, with their defaults."""
+    return {arg.get('name'): arg.get('default') for arg in ElementTree.parse(path).getroot().findall('arg')
+            if arg.get('value') is None}
+
+
+class ArgumentsTest(unittest.TestCase):
+    """roslaunch passes over an argument that the file on its command line does not have: all of them have all."""
+
+    def test_all_launch_files_pass_all_arguments_on(self):
+        monitor = arguments_of(CHECKOUT / 'launch/monitor.launch')
+        self.assertGreater(len(monitor), 12)
+        self.assertEqual(len(PRESETS), 5)
+        for path in LAUNCH_FILES:
+            for include in ElementTree.parse(path).getroot().findall('include'):
+                included = CHECKOUT / 'launch' / pathlib.Path(include.get('file')).name
+                needed = set(arguments_of(included))
+                if path.name == 'depth_camera.launch':
+                    needed -= UNDER_BODIES | {'default_mesh'}
+                    self.assertLessEqual(UNDER_BODIES, set(arguments_of(path)))
+                    for name in UNDER_BODIES:
+                        self.assertGreaterEqual(path.read_text().count("arg('%s')" % name), 1, name)
+                with self.subTest(path.name):
+                    self.assertEqual({arg.get('name'): arg.get('value') for arg in include.findall('arg')},
+                                     {name: '$(arg %s)' % name for name in needed})
+                    self.assertLessEqual(needed, set(arguments_of(path)))
+
+    def test_the_defaults_are_the_same(self):
+        monitor = arguments_of(CHECKOUT / 'launch/monitor.launch')
+        for path in LAUNCH_FILES:
+            own = set(OWN_DEFAULTS.get(path.name, {'default_mesh', 'params'} if path in PRESETS else ()))
+            if path.name == 'octomap_server.launch':
+                own |= {'params'}
+            given = arguments_of(path)
+            differing = {name for name in set(given) & set(monitor) if given[name] != monitor[name]}
+            with self.subTest(path.name):
+                self.assertLessEqual(differing, own)
+                self.assertEqual(given.get('octomap'),
+                                 '/octomap_binary' if path.name == 'octomap_server.launch' else '')
 
 
 if __name__ == '__main__':

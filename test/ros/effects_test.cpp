@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
+#include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 namespace dccd {
@@ -211,11 +212,4 @@ TEST_F(Turning, ARopeOnTheArcIsMetThoughBothEndsAreClearOfIt) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "effects_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "effects_test"); }

@@ -8,6 +8,7 @@
 #include <std_msgs/Bool.h>
 
 #include "octomap/map_builder.h"
+#include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
@@ -106,6 +107,12 @@ TEST_F(Mistake, NoMap) {
              [&] { publisher.publish(meshStamped(tipAbove(1), tracker.next())); });
 }
 
+TEST_F(Mistake, MapOnAnotherTopic) {
+  const auto map = node.advertise<octomap_msgs::Octomap>("/octomap_full", 1, true);
+  expectTold("/unheard_map", "an octomap is published on /octomap_full, and this monitor listens to /octomap_binary",
+             "give the topic with octomap:=TOPIC, or do without with effects/octomap: off", [] {});
+}
+
 TEST_F(Mistake, MapInAnotherFrame) {
   Tracker tracker;
   const auto map = advertiseAndWait<octomap_msgs::Octomap>(node, "/map_frame/octomap", true);
@@ -182,11 +189,4 @@ TEST_F(NoClock, SimulatedTimeWithoutAClock) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "mistakes_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "mistakes_test"); }

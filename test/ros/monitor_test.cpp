@@ -20,6 +20,7 @@
 #include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 namespace dccd {
@@ -333,7 +334,7 @@ TEST_F(Plain, EffectsSayWhy) {
     }
     if (effect.name == "octomap") {
       EXPECT_FALSE(effect.running);
-      EXPECT_EQ(effect.reason, "nobody publishes /plain/octomap and no octomap_file is given")
+      EXPECT_EQ(effect.reason, "nobody publishes /octomap_binary and no octomap_file is given")
           << "where it was looked for";
     }
   }
@@ -506,7 +507,7 @@ struct Pair : MonitorTest {
 
 // What is off has no topic, neither to listen to nor to speak on.
 TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
-  const auto wanted = node.advertise<octomap_msgs::Octomap>("/plain/octomap", 1);
+  const auto wanted = node.advertise<octomap_msgs::Octomap>("/octomap_binary", 1);
   const auto unwanted = node.advertise<octomap_msgs::Octomap>("/pair/octomap", 1);
   const auto rigid = node.advertise<deformable_ccd::MeshStamped>("/pair/finger", 1);
   EXPECT_TRUE(waitUntil([&] { return wanted.getNumSubscribers() > 0; })) << "auto listens for a map";
@@ -607,11 +608,4 @@ TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "monitor_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "monitor_test"); }

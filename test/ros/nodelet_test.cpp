@@ -5,13 +5,17 @@
 #include <nodelet/loader.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
+#include <rosgraph_msgs/Log.h>
 #include <std_srvs/Trigger.h>
 #include <boost/make_shared.hpp>
 
+#include <algorithm>
 #include <random>
 
 #include "input/mesh_subscription.h"
+#include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
+#include "ros/support/monitor_fixture.h"
 #include "ros/support/probe.h"
 
 namespace dccd {
@@ -93,13 +97,13 @@ TEST_F(Subscription, OpensToAnotherTypeWhenThePublisherIsGone) {
       publisher.publish(shared(tipAbove(1), 10.0 * static_cast<double>(i)));
       ASSERT_TRUE(serveUntil(i));
     }
-    subscription->renew();
+    subscription->wantsRenewal();  // counts
   }
   ASSERT_TRUE(waitUntil([&] {
-    subscription->renew();
-    return subscription->getNumPublishers() == 0;
+    const bool wants = subscription->wantsRenewal();
+    if (wants) subscription->renew({});
+    return wants && subscription->getNumPublishers() == 0;
   }));
-  subscription->renew();
   const ros::Publisher publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/change/mesh");
   publisher.publish(boost::make_shared<const sensor_msgs::PointCloud2>(cloud(gridAt(2, 2, 0), 50)));
   ASSERT_TRUE(serveUntil(4));
@@ -111,7 +115,7 @@ TEST_F(Subscription, OpensToAnotherTypeWhenThePublisherIsGone) {
 
 TEST(Nodelet, FindsTheSameContactsWithoutSerialising) {
   nodelet::Loader loader;
-  nodelet::M_string remappings{{"/mesh", "/nodelet/mesh"}, {"/octomap", "/nodelet/octomap"}};
+  nodelet::M_string remappings{{"/mesh", "/nodelet/mesh"}};
   ros::param::set("/inside/fixed_frame", "world");
   ros::param::set("/inside/max_vertex_step_m", 10.0);
   ASSERT_TRUE(loader.load("/inside", "deformable_ccd/CollisionMonitor", remappings, {}));
@@ -180,6 +184,32 @@ TEST(Nodelet, UnloadingEndsCallsThatWaitForTheWorker) {
   EXPECT_EQ(answers.back(), "the monitor is being stopped") << "and not 10 s later that the worker is busy";
 }
 
+TEST(Nodelet, TheMapIsLookedForWhereTheNodeLooksForIt) {
+  ros::NodeHandle node;
+  Probe<rosgraph_msgs::Log> log(node, "/rosout");
+  nodelet::Loader loader;
+  ros::param::set("/defaults/fixed_frame", "world");
+  ASSERT_TRUE(loader.load("/defaults", "deformable_ccd/CollisionMonitor", {{"/mesh", "/defaults/cloth"}}, {}));
+  const std::string line =
+      "listens to mesh: /defaults/cloth (named), octomap: /octomap_binary (default), tf; publishes under /defaults";
+  EXPECT_TRUE(waitUntil([&] {
+    const auto all = log.all();
+    return std::any_of(all.begin(), all.end(), [&](const rosgraph_msgs::Log& one) { return one.msg == line; });
+  }));
+  const ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/octomap_binary", true);
+  map.publish(blockBelowZero(true));
+  const ros::Publisher publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/defaults/cloth");
+  Probe<deformable_ccd::ContactArray> contacts(node, "/defaults/contacts");
+  Probe<deformable_ccd::StepStats> stats(node, "/defaults/stats");
+  double stamp_s = 10;
+  EXPECT_TRUE(waitUntil([&] {
+    const std::size_t seen = contacts.count();
+    publisher.publish(shared(tipAbove(1), stamp_s += 0.1));
+    contacts.after(seen);
+    return stats.last().map_present;
+  })) << "the map of the pages' octomap_server";
+}
+
 TEST(Nodelet, AWrongParameterIsRefusedByName) {
   nodelet::Loader loader;
   ros::param::set("/wrong/acuracy", "exact");
@@ -191,11 +221,4 @@ TEST(Nodelet, AWrongParameterIsRefusedByName) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "nodelet_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "nodelet_test"); }

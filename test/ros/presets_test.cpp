@@ -13,6 +13,7 @@
 #include <set>
 
 #include "octomap/map_builder.h"
+#include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
@@ -309,11 +310,4 @@ TEST_F(DepthCamera, ClothOnWhatTheCameraSees) {
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "presets_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "presets_test"); }

@@ -7,6 +7,7 @@
 
 #include <limits>
 
+#include "ros/support/live_tests.h"
 #include "ros/support/meshes.h"
 #include "ros/support/probe.h"
 
@@ -141,11 +142,4 @@ INSTANTIATE_TEST_SUITE_P(Clients, WithTheMonitor, ::testing::Values("live_cpp", 
 }  // namespace test
 }  // namespace dccd
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "stop_the_arm_test");
-  ros::NodeHandle node;
-  ros::AsyncSpinner spinner(2);
-  spinner.start();
-  return RUN_ALL_TESTS();
-}
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "stop_the_arm_test"); }

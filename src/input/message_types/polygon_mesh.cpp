@@ -19,7 +19,7 @@ IndexedView read(WireReader& wire, const std::string& extra_field) {
   const HeaderView own = readHeader(wire);
   mesh.cloud = readCloud(wire, extra_field);
   mesh.header = eitherOf(own, mesh.cloud->header);
-  const std::size_t count = wire.readCount("polygons", 4);
+  const std::size_t count = wire.readEntries("polygons", 4);
   mesh.polygons.reserve(count);
   for (std::size_t i = 0; i < count; ++i) mesh.polygons.push_back(wire.readArray<std::uint32_t>("polygons.vertices"));
   return mesh;

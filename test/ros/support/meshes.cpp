@@ -32,6 +32,10 @@ Positions gridAt(std::size_t rows, std::size_t cols, double z) {
   return positions;
 }
 
+Mesh sheetAt(double z, std::size_t rows, std::size_t cols) {
+  return {gridAt(rows, cols, z), Topology::grid(rows, cols).faces()};
+}
+
 std_msgs::Header header(double stamp_s, const std::string& frame) {
   std_msgs::Header out;
   out.stamp = ros::Time(stamp_s);

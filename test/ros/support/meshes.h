@@ -23,6 +23,8 @@ struct Mesh {
 Mesh tipAbove(double z);
 /// rows x cols points, 0.1 m apart, row by row in the plane at height z, first corner at (0.05, 0.05).
 Positions gridAt(std::size_t rows, std::size_t cols, double z);
+/// The same with triangles: as large as trackers send.
+Mesh sheetAt(double z, std::size_t rows = 30, std::size_t cols = 30);
 
 std_msgs::Header header(double stamp_s, const std::string& frame = "world");
 deformable_ccd::MeshStamped meshStamped(const Mesh& mesh, double stamp_s, const std::string& frame = "world");

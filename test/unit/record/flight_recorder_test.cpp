@@ -1,6 +1,10 @@
 #include "record/flight_recorder.h"
 
+#include <sys/stat.h>
+
+#include <cstdlib>
 #include <filesystem>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -36,11 +40,60 @@ TEST_F(FlightRecorderTest, KeepsTheLastSteps) {
   ASSERT_EQ(files.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
     const StepRecording r = readRecordingFile(files[i]);
-    EXPECT_EQ(r.step.sequence, sequences[i + 2]);
+    EXPECT_EQ(r.step.sequence, sequences[4 - i]) << "the newest first";
     EXPECT_EQ(r.note, "why");
     EXPECT_TRUE(replayStep(r).differences.empty());
   }
   EXPECT_TRUE(recorder.takeSurprise().empty());
+}
+
+TEST_F(FlightRecorderTest, TwoInOneFolderOverwriteNothing) {
+  RecordedScene scene;
+  FlightRecorder one(2, folder_, nullptr, "one"), same(2, folder_, nullptr, "one"), other(2, folder_, nullptr, "other");
+  for (int i = 0; i < 2; ++i) {
+    const Outcome outcome = scene.nextFrames();
+    for (FlightRecorder* recorder : {&one, &same, &other}) {
+      recorder->onStep(*outcome.step, scene.monitor().options().detector);
+      recorder->onOutcome(outcome);
+    }
+  }
+  std::set<std::string> files;
+  for (FlightRecorder* recorder : {&one, &same, &other, &one}) {
+    for (const std::string& file : recorder->writeAll("asked")) {
+      EXPECT_TRUE(files.insert(file).second) << file;
+      EXPECT_EQ(readRecordingFile(file).note, "asked");
+    }
+  }
+  EXPECT_EQ(files.size(), 8u);
+}
+
+TEST_F(FlightRecorderTest, AFailureNamesWhatWasWrittenBefore) {
+  RecordedScene scene;
+  FlightRecorder recorder(2, folder_);
+  scene.monitor().setListener(&recorder);
+  const Outcome oldest = scene.nextFrames(), newest = scene.nextFrames();
+  const auto name = [&](const Outcome& o) {
+    return (folder_ / ("step_" + std::to_string(o.sequence) + "_" + std::to_string(o.stamp_ns) + ".step")).string();
+  };
+  fs::create_symlink("/dev/full", name(oldest) + ".part");
+  std::string text;
+  try {
+    recorder.writeAll("asked");
+  } catch (const std::runtime_error& error) {
+    text = error.what();
+  }
+  EXPECT_NE(text.find(name(oldest) + ": "), std::string::npos) << text;
+  EXPECT_NE(text.find("newest first:\n" + name(newest)), std::string::npos) << text;
+  EXPECT_TRUE(fs::exists(name(newest)));
+  EXPECT_FALSE(fs::exists(name(oldest))) << "nothing is left of what failed";
+}
+
+TEST_F(FlightRecorderTest, SpecialFilesAreNotRead) {
+  const std::string pipe = folder_ / "pipe.step";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe, std::string("/dev/zero"), folder_.string()}) {
+    EXPECT_THROW(readRecordingFile(path), RecordingError) << path;
+  }
 }
 
 TEST_F(FlightRecorderTest, SurprisesAreWrittenAndBounded) {
@@ -62,7 +115,8 @@ TEST_F(FlightRecorderTest, SurprisesAreWrittenAndBounded) {
     ++files;
     EXPECT_FALSE(readRecordingFile(entry.path()).note.empty());
   }
-  EXPECT_EQ(files, 2u) << "one of the surprises, which are the same step, and one asked for";
+  EXPECT_EQ(files, FlightRecorder::MAX_SURPRISES + 1)
+      << "the surprises, though they are the same step, and one asked for";
 }
 
 TEST(Surprise, OnlyWhatContradictsThePromises) {

@@ -30,14 +30,30 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
   const Outcome clear = nothingFound(StepStatus::OK, StartState::CLEAR);
   const Outcome no_map = nothingFound(StepStatus::NO_MAP, StartState::CLEAR);
   const Outcome crossing = nothingFound(StepStatus::OK, StartState::INTERSECTING);
-  EXPECT_EQ(headlineOf({}), "No answer: no step could be checked.");
+  Outcome lost;
+  lost.status = StepStatus::NO_TRANSFORM;
+  lost.reason = "no transform from 'camera' to 'world'";
+  EXPECT_EQ(headlineOf({}), "No answer; not proved: no frame came.");
+  EXPECT_EQ(headlineOf({Outcome{}}), "No answer; not proved: a first frame alone makes no step.");
+  EXPECT_EQ(headlineOf({lost, lost}),
+            "No answer; not proved: 2 of 2 frames: NO_TRANSFORM: no transform from 'camera' to 'world' (2).");
   EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps.");
   EXPECT_EQ(headlineOf({no_map, no_map, nothingFound(StepStatus::PARTIAL, StartState::CLEAR)}),
-            "No contact found in 3 answered steps, but it is not ruled out (NO_MAP 2, PARTIAL 1).");
+            "No contact found in 3 answered steps; not proved: 3 of 3 frames: NO_MAP (2), PARTIAL (1).");
   EXPECT_EQ(headlineOf({clear, no_map, crossing}),
-            "No contact in 1 of 3 answered steps; in others none was found, but it is not ruled out (NO_MAP 1, start "
-            "INTERSECTING 1).");
-  EXPECT_EQ(headlineOf({clear, Outcome{}}), "No contact in 1 answered steps; 1 frame without an answer.");
+            "No contact found in 3 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
+            "not proved: 1 of 3 frames: NO_MAP (1).");
+  EXPECT_EQ(headlineOf({clear, crossing}),
+            "No contact found in 2 answered steps; surfaces touched from the start of a step (start INTERSECTING 1).");
+  EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered steps.") << "of a first frame nothing is asked";
+  EXPECT_EQ(headlineOf({Outcome{}, clear, lost, clear}),
+            "No contact found in 2 answered steps; not proved: 1 of 4 frames: NO_TRANSFORM: no transform from 'camera' "
+            "to 'world' (1).");
+  Outcome doubtful = clear;
+  doubtful.unproved = {"accuracy fast misses contacts and proves nothing", "and more"};
+  EXPECT_EQ(headlineOf({doubtful}),
+            "No contact found in 1 answered steps; not proved: 1 of 1 frames: accuracy fast "
+            "misses contacts and proves nothing (1).");
 }
 
 }  // namespace

@@ -30,6 +30,39 @@ TEST(InputQueue, NewestKeepsTheLast) { EXPECT_EQ(leftOfFour(QueuePolicy::NEWEST)
 
 TEST(InputQueue, OldestKeepsTheFirst) { EXPECT_EQ(leftOfFour(QueuePolicy::OLDEST), (std::vector<StampNs>{1, 2})); }
 
+/// Bytes of what is left in two queues for 100 bytes in all, and how many were dropped of each.
+TEST(InputQueue, BytesAreBoundedOverAllBodies) {
+  const auto message = [](std::size_t bytes) {
+    MeshMessage m;
+    m.bytes.resize(bytes);
+    return m;
+  };
+  for (const QueuePolicy policy : {QueuePolicy::NEWEST, QueuePolicy::OLDEST}) {
+    InputQueue queue(2, 64, policy, 100);
+    queue.push(0, message(40));
+    for (const std::size_t bytes : {20, 30, 25}) queue.push(1, message(bytes));
+    EXPECT_EQ(queue.size(0), 1u) << "nobody's messages make room for another body's";
+    MeshMessage last, first;
+    ASSERT_TRUE(queue.pop(1, first));
+    ASSERT_TRUE(queue.pop(1, last));
+    const bool newest = policy == QueuePolicy::NEWEST;
+    EXPECT_EQ(first.bytes.size(), newest ? 30u : 20u);
+    EXPECT_EQ(last.bytes.size(), newest ? 25u : 30u);
+    EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 1}));
+    queue.push(1, message(61));
+    EXPECT_EQ(queue.size(1), 0u) << "beside what the other body has there is no room for it";
+    queue.clear();
+    queue.push(1, message(100));
+    EXPECT_EQ(queue.size(1), 1u) << "what was popped or cleared has left its room";
+    EXPECT_EQ(queue.takeDropped(), (std::vector<std::uint64_t>{0, 1}));
+    queue.push(1, message(101));
+    ASSERT_TRUE(queue.pop(1, first));
+    ASSERT_TRUE(queue.pop(1, last)) << "what never finds room keeps its turn, to be refused in words";
+    EXPECT_EQ(last.too_large, 101u);
+    EXPECT_TRUE(last.bytes.empty());
+  }
+}
+
 TEST(InputQueue, ClearSaysWhatItDropped) {
   InputQueue queue(2, 3, QueuePolicy::NEWEST);
   queue.push(0, {});

@@ -59,6 +59,15 @@ TEST(Liveness, Silence) {
   EXPECT_EQ(kinds(liveness, 650 * MS), Kinds{Fault::Kind::SILENCE}) << "a limit that changes counts at once";
 }
 
+TEST(Liveness, AFrameThatOvertookAResetIsOneThatCame) {
+  Liveness liveness({10, 0.5, 0});
+  liveness.frame(1, 0);
+  liveness.forget();
+  liveness.outcome(1, -1, 20 * MS);
+  EXPECT_EQ(kinds(liveness, 520 * MS), Kinds{});
+  EXPECT_EQ(kinds(liveness, 521 * MS), Kinds{Fault::Kind::SILENCE}) << "else nothing would ever end what it proved";
+}
+
 TEST(Liveness, AMapThatGrowsOldAndOneThatIsOnItsWay) {
   Liveness liveness({0.1, 10, 1.0});
   liveness.frame(1, 0);

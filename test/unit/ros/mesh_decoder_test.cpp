@@ -162,6 +162,15 @@ TEST(MeshDecoder, RefusesLies) {
   MeshInputConfig small;
   small.max_vertices = 3;
   EXPECT_TRUE(mentions(errorOf(small, MESH, mesh(SQUARE, HALVES)), "max_vertices"));
+  // Whatever makes the triangles: the message, its shape, or corners by three.
+  small = grid(2, 2);
+  small.max_faces = 1;
+  EXPECT_TRUE(mentions(errorOf(small, CLOUD, cloud({})), "2 triangles are more than the 1"));
+  small.source = TopologySource::AUTO;
+  small.rows = small.cols = 0;
+  EXPECT_TRUE(mentions(errorOf(small, MESH, mesh(SQUARE, HALVES)), "2 triangles are more than the 1"));
+  small.max_faces = 0;
+  EXPECT_TRUE(mentions(errorOf(small, MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]})), "1 triangles are more"));
   EXPECT_TRUE(mentions(errorOf({}, MARKER, marker(SQUARE)), "multiple of 3"));
   EXPECT_TRUE(mentions(errorOf({}, MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]}, std::nan(""))), "pose"));
 }

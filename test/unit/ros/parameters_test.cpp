@@ -50,6 +50,32 @@ TEST(Parameters, NoneAtAllIsOneBodyWithDefaults) {
   EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::EXACT);
 }
 
+// Only what nobody named may be missing in silence.
+TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
+  const MonitorConfig none = readConfig(XmlRpcValue());
+  EXPECT_EQ(none.octomap_topic, "octomap_binary");
+  EXPECT_FALSE(none.namesOctomap());
+  EXPECT_FALSE(none.bodies[0].topic_named);
+  const auto with = [](const std::function<void(XmlRpcValue&)>& set) {
+    XmlRpcValue tree;
+    set(tree);
+    return readConfig(tree);
+  };
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_topic"] = "octomap_binary"; }).namesOctomap()) << "also the default";
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_file"] = "/map.bt"; }).namesOctomap());
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "on"; }).namesOctomap());
+  EXPECT_FALSE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "auto"; }).namesOctomap());
+  EXPECT_FALSE(with([](XmlRpcValue& t) {
+                 t["octomap_topic"] = "/map";
+                 t["effects"]["octomap"] = "off";
+               }).namesOctomap());
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["topic"] = "mesh"; }).bodies[0].topic_named);
+  EXPECT_FALSE(with([](XmlRpcValue& t) { t["default_topic"] = "/cloth"; }).bodies[0].topic_named);
+  XmlRpcValue empty;
+  empty["octomap_topic"] = "";
+  EXPECT_TRUE(mentions(errorOf(empty), "octomap_topic is empty; remove it")) << errorOf(empty);
+}
+
 TEST(Parameters, ADefaultTopicIsThatOfASingleBodyWithoutOne) {
   XmlRpcValue tree;
   tree["default_topic"] = "/cloth";
@@ -223,6 +249,9 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   tree["effects"]["tracker_noise"] = "off";
   tree["accuracy"] = "exact";
   const MonitorConfig off = readConfig(tree);
+  EXPECT_EQ(off.monitor.detector.excluded,
+            (std::vector<std::string>{"the minimum separation by effects/minimum_separation: off",
+                                      "the uncertainty of positions by effects/tracker_noise: off"}));
   EXPECT_EQ(off.monitor.detector.accuracy.rung, Accuracy::EXACT) << "what is off asks for nothing";
   EXPECT_FALSE(off.holdsDistance());
 }
@@ -236,6 +265,8 @@ TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
   tree["minimum_separation_pairs"][1] = separationPair("cloth", "cloth", 0.02);
   tree["effects"]["rigid_bodies"] = "off";
   const MonitorConfig config = readConfig(tree);
+  EXPECT_EQ(config.monitor.detector.excluded.size(), 1u) << "who reads ~state is told what is not there";
+  EXPECT_NE(config.monitor.detector.excluded.at(0).find("by effects/rigid_bodies: off"), std::string::npos);
   ASSERT_EQ(config.bodies.size(), 1u);
   EXPECT_EQ(config.monitor.clock_body, 0u);
   ASSERT_EQ(config.bodies[0].body.separations.size(), 1u);

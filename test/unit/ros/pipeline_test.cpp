@@ -15,7 +15,9 @@
 #include <fstream>
 #include <limits>
 #include <sstream>
+#include <thread>
 
+#include "dccd/assurance.h"
 #include "node/map_loader.h"
 
 namespace dccd {
@@ -214,6 +216,63 @@ TEST(UnknownSpace, AnOldMapIsNoMap) {
   EXPECT_EQ(late.unknown_fraction, 0) << "of no map nothing is unknown";
 }
 
+TEST(Map, OneThatIsNamedIsMissedFromTheFirstStepOn) {
+  XmlRpcValue tree = scene();
+  tree["octomap_topic"] = "/table";
+  Driven named(tree);
+  named.feed(1, 0.35f);
+  EXPECT_EQ(named.feed(1.1, 0.34f).status, StepStatus::NO_MAP);
+  EXPECT_FALSE(assuranceOf(named.outcome).proved);
+  named.giveMap(1);
+  EXPECT_EQ(named.feed(1.2, 0.33f).status, StepStatus::OK) << named.outcome.reason;
+  Driven unnamed(scene());
+  unnamed.feed(1, 0.35f);
+  EXPECT_TRUE(assuranceOf(unnamed.feed(1.1, 0.34f)).clear()) << "nobody called for one";
+}
+
+TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
+  XmlRpcValue tree = scene();
+  tree["max_map_mb"] = 1;
+  Driven driven(tree);
+  MapLoader loader(driven.config, [] {});
+  const auto take = [&] {
+    LoadedMap loaded;
+    while (!loader.take(loaded)) std::this_thread::yield();
+    driven.pipeline.setMap(std::move(loaded), 0);
+  };
+  double stamp_s = 1;
+  driven.feed(stamp_s, 0.35f);
+  const std::pair<std::string, std::size_t> refusals[] = {{"std_msgs/Bool", 1},
+                                                          {"octomap_msgs/Octomap", std::size_t{2} << 20}};
+  for (const auto& [datatype, size] : refusals) {
+    loader.submit(map(1), 0);
+    take();
+    EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::OK) << driven.outcome.reason;
+    const std::string problem = mapMessageProblem(datatype, "*", size, driven.config);
+    ASSERT_FALSE(problem.empty()) << datatype;
+    loader.refuse(problem);
+    take();
+    EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::NO_MAP) << datatype << ", " << size << " bytes";
+    EXPECT_NE(driven.outcome.reason.find(problem), std::string::npos) << driven.outcome.reason;
+  }
+  EXPECT_EQ(loader.received(), 4u);
+  EXPECT_EQ(loader.refused(), 2u);
+  EXPECT_EQ(mapMessageProblem("octomap_msgs/Octomap", "*", std::size_t{1} << 20, driven.config), "");
+}
+
+TEST(Map, OneFromTheFutureIsNoMap) {
+  XmlRpcValue tree = scene();
+  tree["octomap_timeout_s"] = 1.0;
+  Driven early(tree);
+  early.giveMap(2.25);
+  early.feed(1, 0.35f);
+  EXPECT_EQ(early.feed(1.2, 0.35f).status, StepStatus::NO_MAP);
+  EXPECT_NE(early.outcome.reason.find("1.05 s after the end of the step, more than octomap_timeout_s"),
+            std::string::npos)
+      << early.outcome.reason;
+  EXPECT_EQ(early.feed(1.3, 0.35f).status, StepStatus::OK) << early.outcome.reason;
+}
+
 TEST(TrackerNoise, ComesFromThePointField) {
   XmlRpcValue tree = scene();
   tree["uncertainty"]["field"] = "sigma";
@@ -261,7 +320,7 @@ TEST(TrackerNoise, ANumberHoldsForAllVertices) {
   EXPECT_NEAR(noisy.feed(1.1, 0.07f).earliest_toc, 0.5, 1e-3);
 }
 
-TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
+TEST(FixedFrame, OneThatWasLearntIsLearntAnewAfterAReset) {
   XmlRpcValue tree;
   tree["max_vertex_step_m"] = 0.0;
   Driven learnt(tree);
@@ -271,8 +330,47 @@ TEST(FixedFrame, OneThatWasLearntIsKeptOverAReset) {
   learnt.pipeline.reset(StepStatus::RESET);
   learnt.feed(2, 0.35f);
   const Outcome& outcome = learnt.feed(2.1, -0.05f);
-  EXPECT_EQ(learnt.pipeline.fixedFrame(), "camera");
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "world");
   EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map is where it was, 0.35 m below the mesh";
+}
+
+TEST(FixedFrame, OneInWhichNothingWasAnsweredGivesWay) {
+  XmlRpcValue tree;
+  tree["max_vertex_step_m"] = 0.0;
+  tree["transform_timeout_s"] = 0.0;
+  Driven learnt(tree);
+  learnt.giveMap(1);
+  learnt.feed(1, 0.25f, {}, "nowhere");
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "nowhere");
+  EXPECT_EQ(learnt.feed(1.1, 0.35f).status, StepStatus::NO_TRANSFORM);
+  EXPECT_NE(learnt.outcome.reason.find("from 'world' to 'nowhere'"), std::string::npos) << learnt.outcome.reason;
+  EXPECT_EQ(learnt.feed(1.2, 0.35f).status, StepStatus::FIRST_FRAME);
+  const Outcome& outcome = learnt.feed(1.3, -0.05f);
+  EXPECT_NEAR(outcome.earliest_toc, 0.875, 1e-4) << "the map has its place in the new one";
+  // From the first answer on it stays.
+  EXPECT_EQ(learnt.feed(1.4, 0.25f, {}, "nowhere").status, StepStatus::NO_TRANSFORM);
+  EXPECT_EQ(learnt.feed(1.5, 0.25f, {}, "nowhere").status, StepStatus::NO_TRANSFORM);
+  EXPECT_EQ(learnt.pipeline.fixedFrame(), "world");
+  EXPECT_EQ(learnt.pipeline.monitor().total().waiting(), 0u);
+}
+
+TEST(FrameNames, OnesThatTf2DoesNotTakeAreRefusedInFewWords) {
+  Driven driven(scene());
+  driven.giveMap(1);
+  driven.feed(1, 0.35f);
+  for (const std::string& name : {std::string("//cam"), std::string("/"), std::string(10000000, 'x')}) {
+    EXPECT_EQ(driven.feed(1.1, 0.35f, {}, name).status, StepStatus::BAD_MESSAGE);
+    EXPECT_LT(driven.outcome.reason.size(), 400u);
+  }
+  EXPECT_EQ(driven.feed(1.2, -0.05f, {}, "/world").status, StepStatus::OK) << "one slash was tf's own way";
+}
+
+TEST(VertexMask, BeyondTheMeshIsNoStepAtAll) {
+  XmlRpcValue tree = scene();
+  tree["vertex_mask"][0] = 4;
+  Driven masked(tree);
+  EXPECT_EQ(masked.feed(1, 0.35f).status, StepStatus::VERTEX_COUNT);
+  EXPECT_EQ(masked.outcome.reason, "parameter vertex_mask of body 'mesh' names vertex 4, but the mesh has 4");
 }
 
 TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
@@ -289,11 +387,13 @@ TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {
   EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u);
   EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.feed(1.1, -0.05f).status, StepStatus::TRUNCATED);
-  const auto another_clock = [](MonitorOptions& options, MarkerConfig&) {
+  const auto another_clock = [](MonitorOptions& options, MarkerConfig& markers) {
     options.detector.max_contacts = 7;
     options.clock_body = 9;
+    markers.obstacle_m = 3;
   };
   EXPECT_THROW(driven.pipeline.reconfigure(another_clock), std::invalid_argument);
+  EXPECT_EQ(driven.pipeline.config().markers.obstacle_m, 2);
   EXPECT_EQ(driven.pipeline.config().monitor.detector.max_contacts, 1u) << "what is refused changes nothing";
   EXPECT_EQ(driven.pipeline.monitor().options().detector.max_contacts, 1u);
 }
@@ -357,6 +457,26 @@ TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
   EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
   EXPECT_EQ(scene.tables().processed(), 1u);
   EXPECT_EQ(scene.pipeline.monitor().total().waiting(), 0u);
+}
+
+TEST(StaticBodies, AreWhereTheyWereWhenTheFixedFrameIsLearntAnew) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  for (const double stamp_s : {2.0, 3.0}) {
+    scene.take(Tabled::CLOTH, stamp_s, 0.3f, 0);
+    ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+    EXPECT_EQ(scene.outcome.status, StepStatus::FIRST_FRAME);
+    scene.take(Tabled::CLOTH, stamp_s + 0.1, -0.1f, 0);
+    ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+    ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+    EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+    EXPECT_EQ(scene.tables().received, 1u);
+    EXPECT_EQ(scene.tables().processed(), 1u);
+    scene.pipeline.reset(StepStatus::RESET);
+    EXPECT_EQ(scene.pipeline.fixedFrame(), "");
+    EXPECT_EQ(scene.tables().waiting(), 1u);
+  }
 }
 
 TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {

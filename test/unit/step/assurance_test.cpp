@@ -149,6 +149,8 @@ TEST(Assurance, WhatIsLeftOutByChoiceIsNamedAndTakesNothingAway) {
     EXPECT_TRUE(mentions(assurance.excluded, sentence)) << sentence;
   }
   EXPECT_EQ(assurance.excluded.size(), 4u);
+  asked.options.excluded = {"rigid body 'finger' by effects/rigid_bodies: off"};
+  EXPECT_TRUE(mentions(assuranceOf(asked.answer()).excluded, "'finger'")) << "what was taken away before the step, too";
   // A vertex of no face that is masked is left out by choice, too.
   Asked loose;
   loosen(loose);

@@ -54,6 +54,21 @@ TEST(EffectPlan, ChangesWithTheScene) {
   EXPECT_EQ(reason(rope, "octomap_corner_face"), "a polyline has no faces");
 }
 
+TEST(EffectPlan, AMapThatIsNamedIsWantedBeforeItComes) {
+  EffectScene scene = cloth();
+  scene.map_source = "/table";
+  scene.map_named = true;
+  const EffectPlan before(scene, {});
+  EXPECT_TRUE(before.running(Effect::OCTOMAP));
+  EXPECT_EQ(reason(before, "octomap"), "octomap_topic names /table, from which no map has come");
+  scene.bodies[0].topology = share(Topology::polyline(3));
+  EXPECT_TRUE(EffectPlan(scene, {}).running(Effect::START_STATE)) << "a rope may begin inside of the map";
+  scene.map_seen = true;
+  EXPECT_EQ(reason(EffectPlan(scene, {}), "octomap"), "the map comes from /table");
+  scene.bodies[0].against_obstacle = false;
+  EXPECT_FALSE(EffectPlan(scene, {}).running(Effect::OCTOMAP)) << "nobody could meet it";
+}
+
 TEST(EffectPlan, RigidBodiesMeetOthersOnly) {
   EffectScene scene = cloth();
   scene.bodies = {body("finger", true)};

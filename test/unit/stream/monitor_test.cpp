@@ -86,6 +86,24 @@ TEST_F(OneBody, KnownTimeOfContact) {
   EXPECT_NEAR(geometry.approach_speed, 4, 1e-6);
 }
 
+/// What ends a step that has no budget ends it also where frames come as a stream, which makes a deadline of its own.
+TEST(StreamLimits, AStepWithoutABudgetEndsAtMaxCompute) {
+  for (const bool budget : {false, true}) {
+    MonitorOptions options = loose();
+    (budget ? options.detector.step_budget_ms : options.detector.max_compute_ms) = 1e-6;
+    Monitor monitor(options, {named("cloth")});
+    for (const double z : {1.0, -3.0}) {
+      monitor.countReceived(0);
+      monitor.push(0, pair(z > 0 ? 100 * MS : 200 * MS, z), NOW);
+    }
+    Outcome outcome;
+    ASSERT_TRUE(monitor.next(NOW, outcome));
+    ASSERT_TRUE(monitor.next(NOW, outcome));
+    EXPECT_EQ(outcome.status, StepStatus::DEADLINE) << outcome.reason;
+    EXPECT_FALSE(assuranceOf(outcome).proved);
+  }
+}
+
 TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
   EXPECT_FALSE(assuranceOf(feed(pair(100 * MS, 1))).clear()) << "one frame is no answer";
   EXPECT_TRUE(assuranceOf(feed(pair(200 * MS, 0.9))).clear());

@@ -1,0 +1,173 @@
+// Where things are: frames, rigid bodies and the map wait for their transforms and are moved into the fixed frame,
+// which may be learnt, and learnt anew.
+#include <utility>
+
+#include "node/monitor_pipeline.h"
+#include "ros/short_text.h"
+#include "ros/transforms.h"
+
+namespace dccd {
+
+namespace {
+
+std::string noTransform(const std::string& from, const std::string& to, const std::string& why) {
+  return "no transform from '" + from + "' to '" + to + "': " + shortText(why);
+}
+
+}  // namespace
+
+bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
+  std::vector<std::pair<std::size_t, MeshFrame>> frames;
+  for (std::size_t b = 0; b < rigid_.size(); ++b) {
+    if (!rigid_[b]) continue;
+    MeshFrame frame{stamp_ns, rigid_[b]->topology,           rigid_[b]->rest,
+                    true,     Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
+    const std::string& carrier = config_.bodies[b].tf_frame;
+    if (!lookupTransform(transforms_, fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
+      reason =
+          noTransform(carrier, fixed_frame_, reason) + "; body '" + config_.bodies[b].body.name + "' is carried by it";
+      return false;
+    }
+    transform(frame.pose, frame.positions);
+    frames.emplace_back(b, std::move(frame));
+  }
+  for (auto& frame : frames) {
+    monitor_->countReceived(frame.first);
+    monitor_->push(frame.first, std::move(frame.second), now_ns);
+  }
+  return true;
+}
+
+void MonitorPipeline::keep(std::size_t body) {
+  Waiting& waiting = *waiting_[body];
+  waiting.kept = true;
+  // Before the clock body's first message there may be no fixed frame, and nothing is wrong.
+  if (fixed_frame_.empty() || waiting.told) return;
+  waiting.told = true;
+  complaints_[body] = "waits: " + waiting.reason;
+}
+
+std::string MonitorPipeline::missing(std::size_t body) const {
+  return waiting_[body]->reason + "; body '" + config_.bodies[body].body.name + "' waits for it";
+}
+
+void MonitorPipeline::nameMissing(Outcome& outcome) const {
+  if (outcome.status != StepStatus::NO_BODY) return;
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    if (!waiting_[b] || !waiting_[b]->kept) continue;
+    outcome.reason = missing(b);
+    return;
+  }
+}
+
+std::size_t MonitorPipeline::misplaced() const {
+  std::size_t b = 0;
+  while (b < waiting_.size() && !(waiting_[b] && placed_[b])) ++b;
+  return b;
+}
+
+bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason) {
+  const std::size_t body = misplaced();
+  if (body == waiting_.size()) return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, reason);
+  problem = StepStatus::NO_BODY;
+  reason = missing(body);
+  return false;
+}
+
+bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
+  Waiting& waiting = *waiting_[body];
+  std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
+  StepStatus problem = StepStatus::NO_TRANSFORM;
+  Eigen::Isometry3d fixed_from_mesh;
+  const bool is_clock = body == config_.monitor.clock_body;
+  const bool has_place = !fixed_frame_.empty() && lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id,
+                                                                  waiting.mesh.stamp_ns, fixed_from_mesh, reason);
+  const bool placed = has_place && (!is_clock || placeOthers(now_ns, problem, reason));
+  if (!placed) {
+    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
+    waiting.reason = reason;
+    waiting.overdue =
+        finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
+    // There is no use in waiting for a static body that has waited in vain itself.
+    const bool timed_out =
+        waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept);
+    if (!timed_out) return false;
+    if (isStatic(body)) {
+      keep(body);
+      return false;
+    }
+  }
+  Waiting done = std::move(waiting);
+  waiting_[body].reset();
+  if (!placed) {
+    if (is_clock && !has_place && !frame_answered_) learnAnew(StepStatus::NO_TRANSFORM);
+    skip(body, problem, done.mesh.stamp_ns, done.arrival_ns, reason);
+    return true;
+  }
+  if (isStatic(body) && config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
+  transform(fixed_from_mesh, done.mesh.positions);
+  monitor_->push(body,
+                 {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
+                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m), done.mesh.dropped_faces},
+                 now_ns);
+  if (is_clock) arrivals_.push_back(done.arrival_ns);
+  placed_[body] = isStatic(body);
+  return true;
+}
+
+void MonitorPipeline::placeMap(std::int64_t now_ns) {
+  if (!unplaced_map_) return;
+  if (!unplaced_map_->surface) {
+    // Refused: what was there before is out of date, and no map is better than a wrong one.
+    monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
+    unplaced_map_.reset();
+    placed_map_.reset();
+    known_.reset();
+    return;
+  }
+  if (fixed_frame_.empty()) return;
+  const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
+  ObstacleMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
+  std::string reason;
+  if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
+    monitor_->setMap(std::move(map));
+    known_ = unplaced_map_->known;
+    if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
+    unplaced_map_.reset();
+  } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
+    // It is tried again at every call: a map comes rarely, and its transform may come late.
+    if (monitor_->map().problem.empty()) {
+      monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(),
+                        "no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason});
+    }
+  }
+}
+
+void MonitorPipeline::learnAnew(StepStatus status) {
+  if (!config_.fixed_frame.empty()) return;
+  fixed_frame_.clear();
+  frame_answered_ = false;
+  monitor_->reset(status);
+  arrivals_.clear();
+  for (std::size_t b = 0; b < static_meshes_.size(); ++b) {
+    if (!static_meshes_[b]) continue;
+    monitor_->withdraw(b);
+    placed_[b] = false;
+    if (waiting_[b]) {  // a newer one
+      monitor_->countDropped(b, status);
+    } else {
+      waiting_[b] = Waiting();
+      waiting_[b]->kept = true;
+      waiting_[b]->mesh = std::move(*static_meshes_[b]);
+    }
+    static_meshes_[b].reset();
+  }
+  if (!placed_map_) return;
+  if (!unplaced_map_) unplaced_map_ = std::move(placed_map_);
+  placed_map_.reset();
+  known_.reset();
+  unplaced_since_ns_ = 0;
+  monitor_->setMap({});
+}
+
+}  // namespace dccd

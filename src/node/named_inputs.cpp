@@ -1,0 +1,49 @@
+#include "node/named_inputs.h"
+
+#include <ros/names.h>
+
+namespace dccd {
+
+namespace {
+
+bool isRemapped(const ros::NodeHandle& node, const std::string& name) {
+  const std::string plain = node.resolveName(name, false);
+  // Also to itself: that is a name that somebody typed.
+  return node.resolveName(name) != plain || ros::names::getRemappings().count(plain) > 0;
+}
+
+std::string howNamed(bool named) { return named ? " (named)" : " (default)"; }
+
+}  // namespace
+
+void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
+  for (BodyConfig& body : config.bodies) {
+    if (!body.isRigid() && isRemapped(node, body.topic)) body.topic_named = true;
+  }
+  if (config.octomap_topic_named || !config.octomap_file.empty()) return;
+  for (const char* name : {DEFAULT_OCTOMAP_TOPIC, "octomap"}) {
+    if (!isRemapped(node, name)) continue;
+    config.octomap_topic = name;
+    config.octomap_topic_named = true;
+    return;
+  }
+}
+
+std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
+  return config.octomap_file.empty() ? node.resolveName(config.octomap_topic) : config.octomap_file;
+}
+
+std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
+  std::string text;
+  for (const BodyConfig& body : config.bodies) {
+    text += body.body.name + ": ";
+    text += body.isRigid() ? "tf frame " + body.tf_frame : node.resolveName(body.topic) + howNamed(body.topic_named);
+    text += ", ";
+  }
+  const auto setting = config.effects.find(Effect::OCTOMAP);
+  const bool off = setting != config.effects.end() && setting->second == EffectSetting::OFF;
+  text += "octomap: " + (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
+  return text + ", tf";
+}
+
+}  // namespace dccd

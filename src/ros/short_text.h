@@ -1,0 +1,21 @@
+// What messages say, where it goes into a reason, a hint or a line of log: a message can hold 50 MB of a name.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace dccd {
+
+constexpr std::size_t MAX_NAME = 200, MAX_TEXT = 1000;
+
+/// At most `limit` bytes, with how many were left out; control characters as spaces, so that one line stays one.
+inline std::string shortText(std::string_view text, std::size_t limit = MAX_TEXT) {
+  std::string kept(text.substr(0, limit));
+  for (char& c : kept) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  }
+  if (text.size() > limit) kept += "… (" + std::to_string(text.size() - limit) + " more)";
+  return kept;
+}
+
+}  // namespace dccd

@@ -1,0 +1,112 @@
+"""An attack from outside on a live node: what it may cost, in memory and in lines of log."""
+import pathlib
+import struct
+import sys
+import time
+
+import rospy
+from geometry_msgs.msg import Point
+from deformable_ccd.msg import MeshStamped
+from sensor_msgs.msg import PointCloud2
+from shape_msgs.msg import MeshTriangle
+
+sys.path += [str(pathlib.Path(__file__).resolve().parents[1] / 'faults'),
+             str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib')]
+from live_node import Cloud, LiveNodeTest, resident_kb  # noqa: F401
+from ros_process import SLOW, wait_for  # noqa: F401
+
+ROWS, COLS = 20, 30
+
+
+class AttackTest(LiveNodeTest):
+    """A node whose log is read. What follows an attack is asserted in outcomes: the status within one step, recovery within two."""
+
+    def start_node(self, name, process=None, publishes=True, **parameters):
+        self.log_path = pathlib.Path(self.folder) / (name + '.log')
+        with open(self.log_path, 'w') as log:
+            return super().start_node(name, {**(process or {}), 'stdout': log, 'stderr': log}, publishes, **parameters)
+
+    def log_lines(self):
+        return self.log_path.read_text(errors='replace').splitlines()
+
+    def assert_quiet(self, seconds, kinds):
+        """Each kind of line at most once in five seconds, none of them long."""
+        lines = self.log_lines()
+        self.assertLessEqual(len(lines), kinds * (2 + seconds / 5), '\n'.join(line[:200] for line in lines[-20:]))
+        self.assertLess(max([len(line) for line in lines] or [0]), 2000)
+
+    def outcomes_of(self, publisher, messages):
+        """Publishes each after the one before has its outcome; the outcomes."""
+        outcomes = []
+        for message in messages:
+            seen = len(self.contacts)
+            publisher.publish(message)
+            wait_for(lambda: len(self.contacts) > seen, 20, 'an outcome')
+            outcomes.append(self.contacts[seen])
+        return outcomes
+
+
+def stamped(index):
+    return rospy.Time.from_sec(1000 + 0.03 * index)
+
+
+def sheet_mesh(index, rows=ROWS, cols=COLS):
+    """A flat sheet as a message with a topology of its own."""
+    message = MeshStamped()
+    message.header.frame_id = 'world'
+    message.header.stamp = stamped(index)
+    message.vertices = [Point(0.01 * c, 0.01 * r, 0) for r in range(rows) for c in range(cols)]
+    for r in range(rows - 1):
+        for c in range(cols - 1):
+            a = r * cols + c
+            message.triangles += [MeshTriangle((a, a + 1, a + cols)), MeshTriangle((a + 1, a + cols + 1, a + cols))]
+    return message
+
+
+def flat_cloud(index, rows=ROWS, cols=COLS):
+    return cloud_of(index, [(0.01 * c, 0.01 * r, 0.0) for r in range(rows) for c in range(cols)], rows, cols)
+
+
+def cloud_of(index, points, rows, cols):
+    cloud = Cloud(1, 1)
+    cloud.rows, cloud.cols = rows, cols
+    cloud.variants = [b''.join(struct.pack('<3d', *p) for p in points)]
+    return cloud.message(1000 + 0.03 * index)
+
+
+def publish_stream(topic, make, kind, rate=30.0):
+    """The main of a publisher's process: publishes until it is killed."""
+    rospy.init_node('publisher', anonymous=True)
+    publisher = rospy.Publisher(topic, kind, queue_size=10)
+    index = 0
+    while not rospy.is_shutdown():
+        publisher.publish(make(index))
+        index += 1
+        time.sleep(1 / rate)
+
+
+def be_silent(topic, kind):
+    """A publisher that says nothing."""
+    rospy.init_node('silent', anonymous=True)
+    publisher = rospy.Publisher(topic, kind, queue_size=10)
+    while not rospy.is_shutdown():
+        time.sleep(0.1)
+    return publisher
+
+
+KINDS = {'cloud': (PointCloud2, flat_cloud), 'mesh': (MeshStamped, sheet_mesh)}
+
+
+def main(arguments):
+    """PROGRAM publish|silent KIND TOPIC"""
+    from std_msgs.msg import String
+    what, kind, topic = arguments
+    message, make = KINDS.get(kind, (String, None))
+    if what == 'publish':
+        publish_stream(topic, make, message)
+    else:
+        be_silent(topic, message)
+
+
+if __name__ == '__main__':
+    main(sys.argv[1:])

@@ -1,0 +1,92 @@
+"""What must not hold the node up: a master that hangs, and a step or a map that is computed while it is told to end."""
+import os
+import signal
+import struct
+import subprocess
+import time
+import unittest
+
+import rospy
+from attack import COLS, ROWS, SLOW, AttackTest, cloud_of, flat_cloud, wait_for
+
+# The promise is a second; what is asserted is that nothing hangs.
+HANGS_S = 10
+
+
+class EndingTest(AttackTest):
+    def ends(self, node, number, what):
+        begin = time.monotonic()
+        node.send_signal(number)
+        self.assertEqual(node.wait(HANGS_S * SLOW), 0)
+        took = time.monotonic() - begin
+        print('%s: ended after %.2f s' % (what, took))
+        self.assertLess(took, HANGS_S * SLOW)
+
+    def test_a_frozen_master_and_a_silent_body(self):
+        for key, value in {'cloth/topic': '/frozen/mesh', 'table/topic': '/frozen/table', 'cloth/topology/rows': ROWS,
+                           'cloth/topology/cols': COLS}.items():
+            rospy.set_param('/frozen/bodies/' + key, value)
+        node = self.start_node('frozen', clock_body='cloth')
+        self.publisher.publish(flat_cloud(0))
+        wait_for(lambda: self.contacts, 20, 'the first outcome')
+        self.master.send_signal(signal.SIGSTOP)
+        try:
+            slowest, index = 0, 1
+            end = time.monotonic() + 8  # the node looks into silence every three seconds
+            while time.monotonic() < end:
+                begin = time.monotonic()
+                self.outcomes_of(self.publisher, [flat_cloud(index)])
+                slowest = max(slowest, time.monotonic() - begin)
+                index += 1
+                time.sleep(0.03)
+            print('a frozen master: the slowest outcome after %.2f s' % slowest)
+            self.assertLess(slowest, 3 * SLOW)
+            self.ends(node, signal.SIGTERM, 'a frozen master')
+        finally:
+            self.master.send_signal(signal.SIGCONT)
+        wait_for(lambda: 'stopped' in self.states[-1].reason, 5, 'the last word')
+
+    def test_a_step_of_seconds(self):
+        """A tracker that collapses to one point: every pair of features meets."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            name = 'collapsed_%d' % number
+            node = self.start_node(name)
+            side = 30
+            self.outcomes_of(self.publisher, [flat_cloud(0, side, side)])
+            self.publisher.publish(cloud_of(1, [(0.1, 0.1, 0.1)] * (side * side), side, side))
+            time.sleep(0.4)
+            self.ends(node, number, 'a step of seconds')
+            wait_for(lambda: 'stopped' in self.states[-1].reason, 5, 'the last word')
+
+    def test_a_map_that_is_being_decoded(self):
+        """A checkerboard: 8.4 million leaves in 4.8 MB; a file, so that it is there at once."""
+        path = os.path.join(self.folder, 'board.bt')
+        checkerboard(path, 7)
+        node = subprocess.Popen([str(self.tool('collision_monitor_node')), '__name:=board', '_fixed_frame:=world',
+                                 '_octomap_file:=' + path, '_unknown_space:=report'])
+        self.addCleanup(self.end, node)
+        time.sleep(0.5)
+        self.assertIsNone(node.poll())
+        self.ends(node, signal.SIGINT, 'a map that is being decoded')
+
+
+def checkerboard(path, depth):
+    """An octree file in which every other voxel of a cube of 2^(depth + 1) is occupied."""
+    # Two bits a child: 00 unknown, 01 free, 10 occupied, 11 has children.
+    leaves = sum((0b10 if bin(child).count('1') % 2 else 0b01) << (2 * child) for child in range(8))
+
+    def node(level):
+        if level == 0:
+            return struct.pack('<H', leaves)
+        return struct.pack('<H', 0xffff) + 8 * node(level - 1)
+
+    # From the root down to the cube one child each: the tree is 16 levels deep.
+    data = node(depth)
+    for _ in range(15 - depth):
+        data = struct.pack('<H', 0b11) + data
+    with open(path, 'wb') as file:
+        file.write(b'# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0.01\ndata\n' + data)
+
+
+if __name__ == '__main__':
+    unittest.main()

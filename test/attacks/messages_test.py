@@ -1,0 +1,176 @@
+"""Messages and parameters that are wrong in a way that used to stay: what they say must be refused in few words, and what comes
+after them must be taken."""
+import pathlib
+import random
+import time
+import unittest
+
+import dynamic_reconfigure.msg
+import dynamic_reconfigure.srv
+import rospy
+from attack import COLS, ROWS, AttackTest, cloud_of, flat_cloud, resident_kb, stamped, wait_for
+from deformable_ccd.msg import ContactArray
+from geometry_msgs.msg import TransformStamped
+from std_srvs.srv import SetBool, Trigger
+from tf2_msgs.msg import TFMessage
+
+
+def in_frame(message, frame_id):
+    message.header.frame_id = frame_id
+    return message
+
+
+class MessagesTest(AttackTest):
+    def test_a_stray_first_frame_names_an_unknown_frame(self):
+        self.start_node('stray', fixed_frame='', transform_timeout_s=0.1)
+        [stray] = self.outcomes_of(self.publisher, [in_frame(flat_cloud(0), 'nowhere')])
+        self.assertIn(stray.status, (ContactArray.FIRST_FRAME, ContactArray.NO_TRANSFORM))
+        after = self.outcomes_of(self.publisher, [flat_cloud(i) for i in range(1, 4)])
+        self.assertEqual([a.status for a in after],
+                         [ContactArray.NO_TRANSFORM, ContactArray.FIRST_FRAME, ContactArray.OK], [a.reason for a in after])
+
+    def test_a_reset_forgets_the_fixed_frame(self):
+        self.start_node('relearns', fixed_frame='', transform_timeout_s=0.1)
+        before = self.outcomes_of(self.publisher, [in_frame(flat_cloud(i), 'one') for i in range(3)])
+        self.assertTrue(before[2].answered)
+        [other] = self.outcomes_of(self.publisher, [in_frame(flat_cloud(3), 'two')])
+        self.assertEqual(other.status, ContactArray.NO_TRANSFORM)
+        self.assertTrue(rospy.ServiceProxy('/relearns/reset', Trigger)().success)
+        after = self.outcomes_of(self.publisher, [in_frame(flat_cloud(i), 'two') for i in range(4, 6)])
+        self.assertTrue(after[1].answered, after[1].reason)
+        self.assertEqual(after[1].header.frame_id, 'two')
+
+    def test_long_and_invalid_frame_ids(self):
+        """50 MB, and ones that tf2 itself complains about on the console each time it is asked."""
+        begin = time.monotonic()
+        node = self.start_node('names', transform_timeout_s=0.0)
+        self.outcomes_of(self.publisher, [flat_cloud(0), flat_cloud(1)])
+        start_kb = resident_kb(node.pid)
+        [long] = self.outcomes_of(self.publisher, [in_frame(flat_cloud(2), 'x' * 50000000)])
+        self.assertFalse(long.answered)
+        self.assertLess(len(long.reason), 1000)
+        self.assertLess(len(self.states[-1].reason), 2000)
+        bad = []
+        for i, name in enumerate(['//cam', '', '/', 'a b\n' * 100, '\x01', '///' + 'y' * 5000] * 20):
+            bad += self.outcomes_of(self.publisher, [in_frame(flat_cloud(3 + i), name)])
+        self.assertFalse(any(b.answered for b in bad))
+        self.assertLess(max(len(b.reason) for b in bad), 1000)
+        after = self.outcomes_of(self.publisher, [flat_cloud(200 + i) for i in range(2)])
+        self.assertTrue(after[1].answered or after[0].answered, after[1].reason)
+        # The frame that came, the decoded one and no copy of it in a text; and it is given back.
+        self.assertLess(resident_kb(node.pid) - start_kb, 60000)
+        self.assert_quiet(time.monotonic() - begin, 4)
+
+    def test_a_stream_of_frames_without_a_place(self):
+        begin = time.monotonic()
+        self.start_node('unplaced', transform_timeout_s=0.2)
+        for i in range(60):
+            self.publisher.publish(in_frame(flat_cloud(i), '//cam'))
+            time.sleep(1 / 30)
+        wait_for(lambda: len(self.contacts) >= 60, 20, 'their outcomes')
+        self.assert_quiet(time.monotonic() - begin, 4)
+
+    def test_a_mask_beyond_the_mesh(self):
+        begin = time.monotonic()
+        rospy.set_param('/masked/vertex_mask', [0, 1, 5000])
+        self.start_node('masked', record_folder=self.folder + '/masked')
+        outcomes = self.outcomes_of(self.publisher, [flat_cloud(i) for i in range(20)])
+        self.assertEqual({o.status for o in outcomes}, {ContactArray.VERTEX_COUNT})
+        for words in ('vertex_mask', '5000', str(ROWS * COLS)):
+            self.assertIn(words, outcomes[-1].reason)
+
+        self.assertEqual(list(pathlib.Path(self.folder, 'masked').glob('*.step')), [])
+        self.assert_quiet(time.monotonic() - begin, 3)
+        self.assertFalse([line for line in self.log_lines() if 'ERROR' in line])
+        larger = self.outcomes_of(self.publisher, [flat_cloud(100 + i, 100, 60) for i in range(2)])
+        self.assertTrue(larger[1].answered, larger[1].reason)
+
+    def test_shuffled_points_say_so(self):
+        """600 points in another order than the grid's: every step is full of contacts, and more threads are no help."""
+        self.start_node('shuffled')
+        points = [(0.01 * c, 0.01 * r, 0.0) for r in range(ROWS) for c in range(COLS)]
+        random.Random(1).shuffle(points)
+        self.outcomes_of(self.publisher, [cloud_of(i, points, ROWS, COLS) for i in range(2)])
+        wait_for(lambda: any('look shuffled' in line for line in self.log_lines()), 10, 'a hint')
+        self.start_node('ordered')
+        self.outcomes_of(self.publisher, [flat_cloud(i) for i in range(2)])
+        time.sleep(4)  # one second more than it takes to say what looks like a mistake
+        self.assertFalse([line for line in self.log_lines() if 'shuffled' in line])
+
+    def test_a_rigid_body_without_a_transform_names_both_frames(self):
+        mesh = pathlib.Path(__file__).resolve().parents[1] / 'ros/finger.stl'
+        for key, value in {'cloth/topic': '/rigid/mesh', 'hand/rigid/frame': 'hand', 'hand/rigid/mesh': str(mesh)}.items():
+            rospy.set_param('/rigid/bodies/' + key, value)
+        self.start_node('rigid', clock_body='cloth', transform_timeout_s=0.1)
+        [outcome] = self.outcomes_of(self.publisher, [flat_cloud(0)])
+        self.assertEqual(outcome.status, ContactArray.NO_TRANSFORM)
+        self.assertIn("no transform from 'hand' to 'world'", outcome.reason)
+        self.assertIn("body 'hand'", outcome.reason)
+        self.assertNotIn("from 'world' to 'world'", outcome.reason)
+
+    def test_transforms_that_are_none(self):
+        """tf2 writes a line for each on the console."""
+        begin = time.monotonic()
+        self.start_node('transforms')
+        tf = rospy.Publisher('/tf', TFMessage, queue_size=100)
+        self.addCleanup(tf.unregister)
+        wait_for(lambda: tf.get_num_connections() == 1, 20, 'the node to listen')
+        nan = float('nan')
+        for i in range(300):
+            for child, parent, x, w in (('a', 'world', nan, 1.0), ('a', 'a', 0.0, 1.0), ('', 'world', 0.0, 1.0), ('a', '', 0.0, 1.0),
+                                        ('a', 'world', 0.0, 0.0), ('//a', 'world', 0.0, 1.0), ('y' * 10000, 'world', 0.0, 1.0)):
+                transform = TransformStamped(child_frame_id=child)
+                transform.header.frame_id, transform.header.stamp = parent, stamped(i)
+                transform.transform.translation.x, transform.transform.rotation.w = x, w
+                tf.publish(TFMessage([transform]))
+        self.outcomes_of(self.publisher, [flat_cloud(i) for i in range(2)])
+        self.assertTrue(self.contacts[-1].answered)
+        self.assert_quiet(time.monotonic() - begin, 4)
+
+    def set(self, name, **values):
+        """What the service answers, by name."""
+        config = dynamic_reconfigure.msg.Config()
+        for key, value in values.items():
+            kind = dynamic_reconfigure.msg.DoubleParameter if isinstance(value, float) else dynamic_reconfigure.msg.IntParameter
+            (config.doubles if isinstance(value, float) else config.ints).append(kind(key, value))
+        answer = rospy.ServiceProxy('/%s/live/set_parameters' % name, dynamic_reconfigure.srv.Reconfigure)(config).config
+        return {p.name: p.value for p in answer.doubles + answer.ints + answer.bools}
+
+    def test_not_a_number_by_dynamic_reconfigure(self):
+        self.start_node('live', max_step_s=5.0)
+        self.outcomes_of(self.publisher, [flat_cloud(0), flat_cloud(1)])
+        before = self.set('live', max_contacts=77)
+        self.assertEqual((before['max_contacts'], before['max_step_s']), (77, 5.0))
+        for bad in (float('nan'), float('inf'), float('-inf'), -1.0):
+            for key in ('max_step_s', 'step_budget_ms', 'max_vertex_step_m', 'marker_point_size_m', 'marker_obstacle_m'):
+                answer = self.set('live', **{key: bad, 'max_contacts': 78})
+                self.assertTrue(all(v == v and abs(v) <= 1e9 for v in answer.values()), (key, bad, answer))
+        answer = self.set('live', max_contacts=79, max_step_s=2.5)
+        self.assertEqual((answer['max_contacts'], answer['max_step_s']), (79, 2.5))
+        # What is said is in force: a pause of 2 s is none, one of 3 s is a gap.
+        outcomes = self.outcomes_of(self.publisher, [flat_cloud(2), flat_cloud(2 + 2 / 0.03), flat_cloud(2 + 5 / 0.03)])
+        self.assertEqual([o.status for o in outcomes], [ContactArray.OK, ContactArray.OK, ContactArray.GAP])
+
+    def test_a_bad_value_is_refused_alone(self):
+        self.start_node('alone', max_step_s=5.0)
+        self.outcomes_of(self.publisher, [flat_cloud(0), flat_cloud(1)])
+        answer = self.set('alone', max_step_s=float('nan'), max_contacts=33)
+        self.assertEqual((answer['max_contacts'], answer['max_step_s']), (33, 5.0))
+
+    def test_frames_while_disabled_are_counted(self):
+        self.start_node('disabled')
+        self.outcomes_of(self.publisher, [flat_cloud(0), flat_cloud(1)])
+        enable = rospy.ServiceProxy('/disabled/enable', SetBool)
+        enable(False)
+        for i in range(2000):
+            self.publisher.publish(flat_cloud(2 + i, 3, 3))
+        time.sleep(0.5)
+        enable(True)
+        self.outcomes_of(self.publisher, [flat_cloud(3000 + i) for i in range(2)])
+        wait_for(lambda: self.stats[-1].frames_received >= 2004, 5, 'all frames; %d were counted' % self.stats[-1].frames_received)
+        self.assert_adds_up(self.stats[-1])
+        self.assertEqual(self.stats[-1].skipped_disabled, 2000)
+
+
+if __name__ == '__main__':
+    unittest.main()
