@@ -31,6 +31,8 @@ class Deadline {
     moved.at_ = at;
     return moved;
   }
+  /// Later by this much, or earlier; a time that is not set stays so.
+  Deadline movedBy(Clock::duration by) const { return isNever() ? *this : movedTo(at_ + by); }
   /// False: there is neither a time nor a flag, and it will never be over.
   bool canEnd() const { return !isNever() || cancelled_ != nullptr; }
   /// No time is set.

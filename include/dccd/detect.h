@@ -83,10 +83,12 @@ class DCCD_EXPORT History {
 /// Throws std::invalid_argument naming what of the step or the options does not fit. After warm-up nothing is allocated
 /// that grows with the number of steps.
 DCCD_EXPORT Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline);
-/// From now on, as long as the options allow a step: its budget, or what ends a step that has none.
-inline Deadline deadlineOf(const Options& options) {
-  return Deadline::after(options.step_budget_ms > 0 ? options.step_budget_ms : options.max_compute_ms);
+/// What a step may take [ms]; 0: as long as it takes.
+inline double timeLimitMs(const Options& options) {
+  return options.step_budget_ms > 0 ? options.step_budget_ms : options.max_compute_ms;
 }
+/// From now on, as long as the options allow a step: its budget, or what ends a step that has none.
+inline Deadline deadlineOf(const Options& options) { return Deadline::after(timeLimitMs(options)); }
 inline Outcome detect(const Step& step, const Options& options, History& history) {
   return detect(step, options, history, deadlineOf(options));
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "dccd/deadline.h"
 #include "dccd/export.h"
 #include "dccd/tolerances.h"
 #include "dccd/types.h"
@@ -78,6 +79,8 @@ struct PairBatch {
   const Quad* pairs = nullptr;
   std::size_t count = 0;
   const double* minimum_separation_m = nullptr;  ///< one per pair, or null for none (conservative only)
+  /// Pairs whose test takes long, and has not ended by then, are UNDECIDED with what is known of them; null: never.
+  const Deadline* deadline = nullptr;
 };
 
 /// Pairs settled per tier since the counters were cleared.

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "dccd/deadline.h"
 #include "dccd/export.h"
 #include "dccd/topology.h"
 #include "dccd/types.h"
@@ -45,10 +46,12 @@ class DCCD_EXPORT KnownSpace {
   /// std::invalid_argument for a crop box that is not finite.
   std::vector<OccupiedLeaf> unknownLeaves(const Box& crop_m, std::size_t max_leaves = 2'000'000) const;
 
+  static constexpr std::size_t MOST_BLOCKS = 1'000'000;
   /// Counts what the mesh's swept bounds touch. vertex_active as for ObstacleCheck::run. limit: blocks of 4^3
-  /// voxels, each once however many faces touch it.
+  /// voxels, each once however many faces touch it. Not complete, too, when it would not be done by the deadline.
   SweptSpace sweptSpace(const Topology& topology, const Positions& map_t0, const Positions& map_t1,
-                        const std::uint8_t* vertex_active, std::size_t limit = 1'000'000) const;
+                        const std::uint8_t* vertex_active, std::size_t limit = MOST_BLOCKS,
+                        const Deadline& deadline = {}) const;
 
  private:
   struct Impl;

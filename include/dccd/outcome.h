@@ -78,7 +78,7 @@ struct StepStats {
   std::array<StageStats, static_cast<std::size_t>(Stage::COUNT)> stages{};
   std::array<StageStats, static_cast<std::size_t>(Effect::COUNT)> effects{};
   TierCounters tiers;
-  double total_ms = 0;
+  double total_ms = 0;  ///< from the start of a step to its outcome; what is made once for many steps is not counted
   std::uint64_t vf_candidates = 0, ee_candidates = 0;  ///< out of the linear filter
   std::uint64_t undecided = 0, initial = 0, leaving = 0;
   std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;

@@ -16,6 +16,9 @@
 
 namespace dccd {
 
+/// Of a step's time, what is kept for the prediction after it where there is one.
+constexpr double LOOK_AHEAD_SHARE = 0.25;
+
 /// How frames become steps.
 struct MonitorOptions {
   Options detector;  ///< how a step is answered
@@ -63,6 +66,9 @@ class DCCD_EXPORT Monitor {
   ~Monitor();
 
   const MonitorOptions& options() const;
+  /// What a step may take, unknown space included, so that a prediction has its share of the time [ms]; 0: as long as
+  /// it takes.
+  double stepMs() const;
   void setOptions(const MonitorOptions& options);  ///< from the next step on; clock_body must stay
   const std::vector<Body>& bodies() const;
 

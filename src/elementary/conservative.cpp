@@ -81,7 +81,7 @@ void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, Ti
       ElementaryResult& result = results[begin + i];
       result = {};
       const conservative::Limits limits = {options_.tolerance_m, separation == nullptr ? 0 : separation[i],
-                                           options_.max_subdivisions};
+                                           options_.max_subdivisions, batch.deadline};
       if (limits.minimum_separation_m == 0) result = fromBatch(batch.kind, corners, output, i);
       if (result.verdict == Verdict::UNDECIDED) result = conservative::advance(batch.kind, corners, limits);
       ++counters.settled[static_cast<std::size_t>(result.tier)];

@@ -185,12 +185,15 @@ ElementaryResult resultOf(Verdict verdict, double t) {
 
 }  // namespace
 
+constexpr int STEPS_PER_LOOK_AT_THE_CLOCK = 64;
+
 ElementaryResult advance(PairKind kind, const Corners& corners, const Limits& limits) {
   const Differences pair = differencesOf(kind, corners);
   const double near = limits.minimum_separation_m + limits.tolerance_m;
   if (!(pair.largest <= LARGEST) || !(near <= LARGEST)) return resultOf(Verdict::UNDECIDED, 0);
   double t = 0;
   for (int step = 0; step < limits.max_steps; ++step) {
+    if (limits.deadline && step % STEPS_PER_LOOK_AT_THE_CLOCK == 0 && limits.deadline->isOver()) break;
     const Vec u = pair.u.at(t), v = pair.v.at(t), w = pair.w[0].at(t);
     const Connection shortest = kind == PairKind::VERTEX_FACE ? fromTriangle(u, v, w) : betweenSegments(u, v, w);
     const double distance = length(shortest.vector) * (1 + LENGTH_ERROR);

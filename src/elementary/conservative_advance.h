@@ -14,6 +14,7 @@ struct Limits {
   double tolerance_m = tolerance::CONTACT_M;  ///< > 0
   double minimum_separation_m = 0;            ///< >= 0: contact means that the distance is at most this
   int max_steps = 4096;                       ///< then UNDECIDED
+  const Deadline* deadline = nullptr;         ///< then, too
 };
 
 /// Advances from t = 0 as long as the features are certainly more than the minimum separation apart.

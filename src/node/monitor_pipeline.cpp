@@ -74,6 +74,10 @@ void MonitorPipeline::loadFiles() {
 void MonitorPipeline::measureUnknown(Outcome& outcome) const {
   if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return;
   const auto start = std::chrono::steady_clock::now();
+  const double limit_ms = monitor_->stepMs();
+  // The clock is past the budget where none is left: 0 would be none.
+  const Deadline deadline =
+      limit_ms > 0 ? Deadline::after(std::max(1e-6, limit_ms - outcome.stats.total_ms)) : Deadline();
   SweptSpace sum;
   Positions map_t0, map_t1;
   std::vector<std::uint8_t> active;
@@ -86,7 +90,8 @@ void MonitorPipeline::measureUnknown(Outcome& outcome) const {
     map_t1 = *body.t1;
     transform(outcome.step->map.map_from_fixed, map_t0);
     transform(outcome.step->map.map_from_fixed, map_t1);
-    const SweptSpace one = known_->sweptSpace(topology, map_t0, map_t1, active.data());
+    const SweptSpace one =
+        known_->sweptSpace(topology, map_t0, map_t1, active.data(), KnownSpace::MOST_BLOCKS, deadline);
     sum.voxels += one.voxels;
     sum.unknown += one.unknown;
     sum.complete = sum.complete && one.complete;
@@ -95,6 +100,7 @@ void MonitorPipeline::measureUnknown(Outcome& outcome) const {
   outcome.unknown_fraction = sum.complete ? sum.unknownFraction() : std::numeric_limits<double>::quiet_NaN();
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
   outcome.stats[Effect::UNKNOWN_SPACE] = {sum.voxels, sum.unknown, spent.count()};
+  outcome.stats.total_ms += spent.count();
 }
 
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,

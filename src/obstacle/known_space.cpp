@@ -1,6 +1,7 @@
 #include "dccd/known_space.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -84,6 +85,15 @@ void uniteBlocks(std::vector<TouchedBlock>& blocks) {
     }
   }
   blocks.resize(kept);
+}
+
+constexpr std::chrono::nanoseconds BLOCK_TIME(100);  // to sort a block among a million, and to count its voxels
+constexpr std::size_t FEATURES_PER_LOOK_AT_THE_CLOCK = 32;
+
+/// How many can be sorted and counted until then.
+std::size_t blocksUntil(const Deadline& deadline) {
+  const auto left = deadline.at() - Deadline::Clock::now();
+  return static_cast<std::size_t>(std::max<std::int64_t>(0, left / BLOCK_TIME));
 }
 
 /// Appends the blocks of a key box; false when that makes more than the limit. Neighbours touch the same blocks: up to
@@ -184,10 +194,16 @@ std::vector<OccupiedLeaf> KnownSpace::unknownLeaves(const Box& crop_m, std::size
 }
 
 SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map_t0, const Positions& map_t1,
-                                  const std::uint8_t* vertex_active, std::size_t limit) const {
+                                  const std::uint8_t* vertex_active, std::size_t limit,
+                                  const Deadline& deadline) const {
   SweptSpace swept;
   std::vector<TouchedBlock> blocks;
+  std::size_t features = 0;
+  // Up to twice as many are held, and sorted and counted in the end.
+  const std::size_t most_blocks = deadline.isNever() ? limit : std::min(limit, blocksUntil(deadline) / 2);
+  const auto isLate = [&] { return !deadline.isNever() && blocksUntil(deadline) < blocks.size(); };
   const auto add = [&](const auto& feature) {
+    if (swept.complete && features++ % FEATURES_PER_LOOK_AT_THE_CLOCK == 0) swept.complete = !isLate();
     if (!swept.complete) return;
     Box box;
     for (const Index v : feature) {
@@ -197,14 +213,16 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
       box.max = box.max.cwiseMax(map_t0[v]).cwiseMax(map_t1[v]);
     }
     KeyBox keys;
-    if (touchedKeys(box, impl_->resolution_m, keys) && !addBlocks(keys, limit, blocks)) swept.complete = false;
+    if (touchedKeys(box, impl_->resolution_m, keys) && !addBlocks(keys, most_blocks, blocks)) swept.complete = false;
   };
   for (const Face& face : topology.faces()) add(face);
   if (!topology.hasFaces()) {
     for (const Edge& edge : topology.edges()) add(edge);
   }
+  swept.complete = swept.complete && !isLate();
+  if (!swept.complete) return swept;
   uniteBlocks(blocks);
-  swept.complete = swept.complete && blocks.size() <= limit;
+  swept.complete = blocks.size() <= most_blocks;
   for (const auto& [block, touched] : blocks) {
     const auto at = [packed = block](int shift) { return static_cast<std::int32_t>(packed >> shift & 0xffff); };
     swept.voxels += bitCount(touched);

@@ -75,7 +75,8 @@ ObstacleBatch::ObstacleBatch(PairKind kind, const Rung* test) : kind_(kind), tes
   points_.reserve(4 * CHUNK);
 }
 
-void ObstacleBatch::clear() {
+void ObstacleBatch::clear(const Deadline& deadline) {
+  deadline_ = deadline;
   pairs_.clear();
   toc_bounds_.clear();
   points_.clear();
@@ -105,6 +106,7 @@ void ObstacleBatch::flush() {
     batch.pairs = quads_.data();
     batch.count = count;
     if (any_separation_) batch.minimum_separation_m = separations_.data();
+    if (deadline_.canEnd()) batch.deadline = &deadline_;
     test_->run(batch, results_.data(), tiers_);
     for (std::size_t i = 0; i < count; ++i) {
       if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);

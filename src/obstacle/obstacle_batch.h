@@ -23,8 +23,9 @@ class ObstacleBatch {
   /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`.
   ObstacleBatch(PairKind kind, const Rung* test);
 
-  /// Drops whatever an earlier run left behind.
-  void clear();
+  /// Drops whatever an earlier run left behind. What the tests of the next run have not ended by the deadline is
+  /// undecided.
+  void clear(const Deadline& deadline);
   /// points: as the elementary kind wants them. toc_bound: not after a contact, if any, by cheaper means.
   void add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m);
   /// Tests what is left. Contacts are found in the order of add().
@@ -39,6 +40,7 @@ class ObstacleBatch {
   static constexpr std::size_t CHUNK = 512;
   PairKind kind_;
   const Rung* test_;
+  Deadline deadline_;
   bool any_separation_ = false;  // of the pairs that wait
   std::vector<ObstaclePair> pairs_;
   std::vector<double> toc_bounds_;

@@ -175,6 +175,19 @@ void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t fi
   }
 }
 
+/// Forgets the last run, whose contacts would be counted as found.
+void ObstacleCheck::Impl::begin(const Deadline& deadline) {
+  late = full = false;
+  looked_at = 0;
+  joined = 0;
+  for (ObstacleBatch* batch : {&vertex_batch, &edge_batch, &corner_batch}) batch->clear(deadline);
+  for (auto* contacts : {&vertex_contacts, &edge_contacts, &face_contacts}) {
+    releaseBurst(*contacts);
+    contacts->clear();
+  }
+  releaseBurst(near_leaves);
+}
+
 ObstacleCheck::ObstacleCheck(const ObstacleOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 ObstacleCheck::~ObstacleCheck() = default;
 
@@ -191,19 +204,9 @@ bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, c
   Impl& impl = *impl_;
   const Impl::Run run{&surface.impl(), &topology,       &map_t0,  &map_t1,   body,
                       &stats,          vertex_radius_m, deadline, most_found};
-  impl.late = impl.full = false;
-  impl.looked_at = 0;
-  impl.joined = 0;
+  impl.begin(deadline);
   impl.prepareReaches(run);
   if (surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
-    impl.vertex_batch.clear();
-    impl.edge_batch.clear();
-    impl.corner_batch.clear();
-    for (auto* contacts_of : {&impl.vertex_contacts, &impl.edge_contacts, &impl.face_contacts}) {
-      releaseBurst(*contacts_of);
-      contacts_of->clear();
-    }
-    releaseBurst(impl.near_leaves);
     impl.prepareVertices(run, vertex_active);
     if (topology.hasFaces()) {
       impl.markNearFaces(run);

@@ -76,6 +76,7 @@ struct ObstacleCheck::Impl {
   /// Certainly more than most_found are left when collect() has joined what belongs to one feature and leaf.
   bool foundTooMuch(const Run& run);
 
+  void begin(const Deadline& deadline);
   bool reachesSurface(const Run& run) const;
   void prepareReaches(const Run& run);
   void prepareVertices(const Run& run, const std::uint8_t* vertex_active);
@@ -125,8 +126,8 @@ struct ObstacleCheck::Impl {
   }
   /// Fills near_leaves with the leaves that a key box reaches, by key.
   void findLeaves(const Run& run, const KeyBox& box);
-  /// Of a run that is limited not more than this, 16 MB, are near a feature; of more the run is full.
-  static constexpr std::size_t MOST_NEAR_LEAVES = std::size_t{1} << 22;
+  /// Of a run that is limited not more than this, 4 MB, are near a feature; of more the run is full.
+  static constexpr std::size_t MOST_NEAR_LEAVES = std::size_t{1} << 20;
   bool addNear(const Run& run, std::uint32_t leaf) {
     if (run.most_found != NO_LIMIT && near_leaves.size() == MOST_NEAR_LEAVES) {
       full = late = true;

@@ -19,7 +19,10 @@ namespace {
 using Clock = Deadline::Clock;
 
 constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
-constexpr std::size_t PIECE = 256;            // groups or vertices x 16 in a unit of refitting
+constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
+constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(200);  // sorting and copying one of half a million
+constexpr std::size_t FEWEST_TO_MEASURE = 1000;                   // hits of a step that tell what one takes
+constexpr std::size_t PIECE = 256;                                // groups or vertices x 16 in a unit of refitting
 
 /// Erases what cannot be the first contact: it begins after another one has certainly happened. How wide a bracket is
 /// says nothing: `conservative` may find the first contact at once, in [0, 1], and a later one in a narrow bracket.
@@ -88,7 +91,8 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   setBodies(step);
   useMap(step.map);
   // What is made once for many steps is not taken from the time of the first.
-  if (!deadline.isNever()) deadline = deadline.movedTo(deadline.at() + (Clock::now() - called));
+  const Clock::time_point begun = Clock::now();
+  deadline = deadline.movedBy(begun - called);
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
   const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
@@ -103,7 +107,14 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   begins_at = nullptr;
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
+  const std::size_t hits = outcome.contacts.size();
   conclude(*options, step, needed, outcome);
+  outcome.stats.total_ms = msSince(begun);
+  if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
+    const double others_ms = outcome.stats[Stage::OBSTACLE].ms + outcome.stats[Stage::START_STATE].ms;
+    const double after_ms = std::max(0.0, msSince(hits_done) - others_ms);
+    per_hit = std::chrono::nanoseconds(static_cast<std::int64_t>(1.5e6 * after_ms / static_cast<double>(hits)));
+  }
   return outcome;
 }
 
@@ -205,11 +216,13 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   context.left_out = &left_out;
   context.observer = observer;
   context.deadline = part.deadline;
+  context.per_hit = per_hit;
   result.stats.left_out_listed = left_out_list.size();
   if (options->accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options->accuracy.tolerance_m;
   findPairs(context);
   runPairs(context);
-  collect(part.step);
+  hits_done = Clock::now();
+  collect(part.step, part.deadline);
   const bool all_pairs = result.complete;
   if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (map_reduced && scene.meetsObstacle()) runMap(part);
@@ -248,7 +261,7 @@ bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
   return face ? segmentMeetsTriangle(x(0), x(0), x(1), x(2), x(3)) : segmentMeetsTriangle(x(0), x(1), x(2), x(3), x(3));
 }
 
-void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, Contact& c) const {
+void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& c) const {
   c = Contact();
   c.kind = kind;
   c.toc_lower = hit.toc_lower;
@@ -258,10 +271,11 @@ void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step
   const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
   scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
   scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
-  c.initial = meetAtStart(step, c);
+  c.initial = !(late && hit.certainty == Certainty::UNDECIDED) && meetAtStart(step, c);
 }
 
-void History::Impl::collect(const Step& step) {
+/// What is undecided when the deadline is over may be new: nothing is computed for it any more.
+void History::Impl::collect(const Step& step, const Deadline& deadline) {
   const Clock::time_point start = Clock::now();
   for (const PairWorker& w : workers) {
     result.stats += w.stats();
@@ -275,10 +289,12 @@ void History::Impl::collect(const Step& step) {
     const std::vector<const Hit*>& sorted = order.sort(parts);
     result.contacts.resize(base + sorted.size());
     parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
+      bool late = false;
       for (std::size_t i = first; i < last; ++i) {
+        if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
         if (i + 8 < last) __builtin_prefetch(sorted[i + 8]);
-        writeContact(kind, *sorted[i], step, result.contacts[base + i]);
+        writeContact(kind, *sorted[i], step, late, result.contacts[base + i]);
       }
     });
     base += sorted.size();
@@ -307,9 +323,13 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
       // Later parts need as much time for their pairs; what is over that is shared.
       const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
       const Clock::duration slack = deadline.at() - start - later * (start - begin);
-      deadline = deadline.movedTo(start + slack / (later + 1));
+      // Contacts are still to be joined, counted and cut: half of what one takes after the pairs.
+      const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size()) / 2;
+      deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
     }
-    is_over = [deadline] { return deadline.isOver(); };
+    is_over = [this, deadline] {
+      return deadline.movedBy(-LISTING_AN_INTERSECTION * carried.start_state.foundCount()).isOver();
+    };
   }
   std::vector<StartIntersection> met;
   result.start_state_complete = listStart(part, is_over, met) && result.start_state_complete;

@@ -93,8 +93,8 @@ struct History::Impl {
   std::size_t foundLimit() const;
   /// More was there to be found; nothing of what was left out touches before this.
   void cutAt(double toc);
-  void collect(const Step& step);
-  void writeContact(PairKind kind, const Hit& hit, const Step& step, Contact& contact) const;
+  void collect(const Step& step, const Deadline& deadline);
+  void writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& contact) const;
   bool meetAtStart(const Step& step, const Contact& contact) const;
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runMap(const Part& part);
@@ -131,6 +131,9 @@ struct History::Impl {
   std::vector<TaskHits> task_hits;             // per task
   FoundLimit found;                            // by the tasks
   std::size_t found_limit = FoundLimit::NONE;  // what the part may find
+  std::chrono::nanoseconds per_hit{
+      400};  // half as much again as a hit took, after the pairs, in the last step with many
+  Deadline::Clock::time_point hits_done;  // when the last part's pairs ended
   std::vector<std::uint32_t> group_pairs, found_groups, scratch, body_pairs;
   std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc;  // and place, pair of groups
   std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at

@@ -15,6 +15,10 @@ namespace {
 constexpr std::size_t CHUNK = 2048;  // pairs that stay in the first-level cache's reach
 constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
 
+// What is undecided when time is up still gets its bound, but not for longer than this: denormal numbers are slow.
+constexpr std::chrono::microseconds TIME_FOR_BOUNDS(250);
+constexpr std::size_t BOUNDS_PER_LOOK_AT_THE_CLOCK = 64;
+
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
 FeatureKind kindA(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
@@ -36,6 +40,8 @@ void PairWorker::beginStep() {
     h.clear();
   }
   stats_ = StepStats();
+  bounds_ = 0;
+  late_ = false;
   unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
 }
 
@@ -175,6 +181,7 @@ void PairWorker::flush() {
   } else {
     decide();
   }
+  context_->hits += hits.size() - before;
   if (counts) enough_ = !context_->found->add(task_index_, hits.size() - before) || enough_;
   const double ms = msSince(start);
   if (rule_.bodies_m > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
@@ -253,13 +260,21 @@ void PairWorker::dropLate() {
   count_ = n;
 }
 
+/// 0 where there is no time for a better one.
+double PairWorker::boundOf(std::size_t i, double distance_m) {
+  if (bounds_++ % BOUNDS_PER_LOOK_AT_THE_CLOCK == 0) {
+    late_ = late_ || context_->deadline.movedBy(TIME_FOR_BOUNDS).isOver();
+  }
+  return late_ ? 0 : linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance_m);
+}
+
 void PairWorker::keepUndecided() {
   const Clock::time_point start = Clock::now();
   auto& hits = hits_[static_cast<int>(task_->kind)];
   const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   std::size_t out = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    const double bound = linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], separationOf(i));
+    const double bound = boundOf(i, separationOf(i));
     if (bound > 1) continue;
     countOut(i);
     hits.push_back({keys_[i], bound, 1, bodies, Certainty::UNDECIDED});
@@ -277,7 +292,10 @@ void PairWorker::decide() {
   batch.pairs = quads_.data();
   batch.count = count_;
   if (separated_) batch.minimum_separation_m = separations_.data();
+  const Deadline deadline = context_->pairsDeadline();
+  if (deadline.canEnd()) batch.deadline = &deadline;
   context_->elementary->run(batch, results_.data(), stats_.tiers);
+  context_->timeIsUp();  // pairs that it left undecided are known to be
   auto& hits = hits_[static_cast<int>(task_->kind)];
   const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   const std::size_t before = hits.size();
@@ -289,8 +307,7 @@ void PairWorker::decide() {
     const bool certain = r.verdict == Verdict::CONTACT;
     if (!certain) {
       // As tight as the linear filter allows; dropLate() decides by the same bound.
-      const double bound =
-          linearTocBound(task_->kind, batch.vertices, quads_[i], separationOf(i) + context_->tolerance_m);
+      const double bound = boundOf(i, separationOf(i) + context_->tolerance_m);
       r.toc_lower = std::max(r.toc_lower, std::min(bound, 1.0));
     }
     hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,

@@ -57,9 +57,15 @@ struct StepContext {
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   FoundLimit* found = nullptr;            ///< null: no limit
+  /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
+  std::chrono::nanoseconds per_hit{0};
+  std::atomic<std::size_t> hits{0};
+  Deadline pairsDeadline() const {
+    return deadline.movedBy(-per_hit * static_cast<std::int64_t>(hits.load(std::memory_order_relaxed)));
+  }
   bool timeIsUp() {
     if (expired.load(std::memory_order_relaxed)) return true;
-    if (deadline.isOver()) expired = true;
+    if (deadline.canEnd() && pairsDeadline().isOver()) expired = true;
     return expired.load(std::memory_order_relaxed);
   }
 };
@@ -89,6 +95,7 @@ class PairWorker {
   void makeCanonical();
   void decide();
   void keepUndecided();
+  double boundOf(std::size_t i, double distance_m);
   void dropLate();
   Effect effect() const { return task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY; }
   bool rigid() const { return !task_->self && (a_->setup.rigid || b_->setup.rigid); }
@@ -114,6 +121,8 @@ class PairWorker {
   bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
   const LeftOutOfBody* left_out_ = nullptr;
   std::size_t count_ = 0;
+  std::size_t bounds_ = 0;  // that were asked for in this step
+  bool late_ = false;       // there is no time for more
   std::vector<Hit> hits_[2];
   StepStats stats_;
   double unchecked_toc_lower_ = std::numeric_limits<double>::infinity();  // workers may be made during a step

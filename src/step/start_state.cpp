@@ -11,6 +11,8 @@ namespace {
 // end.
 constexpr std::size_t CANDIDATES_PER_EDGE = 2, CANDIDATES_PER_EDGE_WITH_DEADLINE = 8;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
+// A group that is begun may go on for this many tests, so that a search comes to its end in the end.
+constexpr std::uint64_t TESTS_PER_LOOK_AT_THE_CLOCK = 64, TESTS_IN_ANY_CASE = 1024;
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 
 bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
@@ -189,14 +191,19 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
     next_group_ = by_group_[first][0];
     if (first > 0 && is_over && is_over()) return false;
     while (last < by_group_.size() && by_group_[last][0] == next_group_) ++last;
+    const std::uint64_t tested_before = tested_;
+    bool late = false;
     stream_.run(trees, by_group_[first].data(), last - first, [&](const std::uint32_t* slots, std::size_t count) {
       for (std::size_t i = 0; i < count; ++i) {
         if (shareVertex(edges.feature(slots[2 * i]), faces.feature(slots[2 * i + 1]))) continue;
         test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
+        const std::uint64_t tested = tested_ - tested_before;
+        if (!is_over || tested < TESTS_IN_ANY_CASE || tested % TESTS_PER_LOOK_AT_THE_CLOCK != 0) continue;
+        if ((late = is_over())) break;
       }
-      return !hasEnough();
+      return !late && !hasEnough();
     });
-    if (hasEnough()) return false;
+    if (late || hasEnough()) return false;
   }
   return true;
 }

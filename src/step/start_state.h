@@ -49,6 +49,8 @@ class StartStateSearch {
   /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
   bool isWhole() const { return whole_; }
   bool isCut() const { return cut_; }
+  /// So far, by a run() that has not ended.
+  std::size_t foundCount() const { return found_.size(); }
 
   /// Whether run() would search the bodies' trees.
   bool needsTrees(bool continues) const { return !(continues && known_ && searched_); }

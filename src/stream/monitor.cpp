@@ -64,6 +64,10 @@ Monitor::~Monitor() = default;
 
 const MonitorOptions& Monitor::options() const { return impl_->options; }
 const std::vector<Body>& Monitor::bodies() const { return impl_->bodies; }
+double Monitor::stepMs() const {
+  const double limit_ms = timeLimitMs(impl_->options.detector);
+  return impl_->options.look_ahead_s > 0 ? (1 - LOOK_AHEAD_SHARE) * limit_ms : limit_ms;
+}
 const ObstacleMap& Monitor::map() const { return impl_->map; }
 const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->history.leftOut(); }
 const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
@@ -188,13 +192,13 @@ void Monitor::Impl::forgetLast() {
   history.clear();
 }
 
-Outcome Monitor::Impl::runStep(const Pending& pending) {
+Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline) {
   const Step step = place(pending);
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
   last = nullptr;  // until this one is done
   if (listener) listener->onStep(step, options.detector);
-  Outcome outcome = detect(step, options.detector, history, deadline());
+  Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;
   return outcome;
@@ -217,7 +221,7 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
   };
   if (step.status == StepStatus::OK) {
     try {
-      outcome = m.runStep(step);
+      outcome = m.runStep(step, m.deadlineAfter(stepMs()));
     } catch (const std::exception& error) {
       without(StepStatus::INTERNAL_ERROR, error.what());
       m.forgetLast();

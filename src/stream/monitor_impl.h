@@ -70,7 +70,7 @@ struct Monitor::Impl {
     forgetReferences();
   }
 
-  Deadline deadline() const { return deadlineOf(options.detector).orWhen(cancelled); }
+  Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
   static double seconds(StampNs from, StampNs to) { return static_cast<double>(to - from) * 1e-9; }
   bool isStream(std::size_t body) const { return bodies[body].motion == BodyMotionKind::STREAM; }
   void drop(Pending& step, StepStatus status, const std::string& reason) {
@@ -89,7 +89,7 @@ struct Monitor::Impl {
   void forgetLast();
   bool separates(const Body& body) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;
-  Outcome runStep(const Pending& pending);
+  Outcome runStep(const Pending& pending, const Deadline& deadline);
 };
 
 }  // namespace dccd

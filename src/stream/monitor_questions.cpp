@@ -38,6 +38,7 @@ Outcome Monitor::predict() {
     outcome.reason = "no step has been answered yet";
     return outcome;
   }
+  const Deadline deadline = m.deadlineAfter(LOOK_AHEAD_SHARE * timeLimitMs(m.options.detector));
   const double ahead = m.options.look_ahead_s / last_s;
   Step step = *m.last;
   step.start_ns = m.last->stamp_ns;
@@ -63,7 +64,7 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   m.side_history.beginAt(m.history);
-  return detect(step, m.options.detector, m.side_history, m.deadline());
+  return detect(step, m.options.detector, m.side_history, deadline);
 }
 
 }  // namespace dccd

@@ -56,6 +56,52 @@ TEST(ExactRung, NamesThereAndBack) {
   EXPECT_THROW(accuracyFromString(""), std::invalid_argument);
 }
 
+// Between two pairs that are slow to decide lies a look at the clock: with none left, none of them is begun, and what
+// the batch knows stands.
+TEST(ExactRung, PastTheDeadlineNoSlowTierIsBegun) {
+  constexpr std::size_t PAIRS = 600;
+  std::vector<VertexMotion> vertices;
+  std::vector<Quad> pairs;
+  for (std::size_t i = 0; i < PAIRS; ++i) {
+    // Everything falls into one point at the end of the step, and every third pair stays far apart.
+    for (int v = 0; v < 4; ++v) {
+      const double x = 0.1 * v, y = v == 2 ? 0.3 : 0.07 * static_cast<double>(i % 7), z = v == 0 ? 0.2 : 1e-9 * v;
+      const double apart = i % 3 == 0 && v == 0 ? 10 : 0;
+      vertices.push_back({{x, y, z + apart, 0}, {0.1, 0.2, 0.3 + apart, 0}});
+    }
+    const auto first = static_cast<Index>(4 * i);
+    pairs.push_back({first, first + 1, first + 2, first + 3});
+  }
+  PairBatch batch;
+  batch.vertices = vertices.data();
+  batch.pairs = pairs.data();
+  batch.count = PAIRS;
+  const auto rung = makeRung(AccuracyOptions());
+  const auto run = [&](TierCounters& tiers) {
+    std::vector<ElementaryResult> results(PAIRS);
+    rung->run(batch, results.data(), tiers);
+    return results;
+  };
+  TierCounters all, none;
+  const std::vector<ElementaryResult> full = run(all);
+  const Deadline over(Deadline::Clock::now());
+  batch.deadline = &over;
+  const std::vector<ElementaryResult> cut = run(none);
+  EXPECT_GT(PAIRS - all.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)], PAIRS / 2);
+  EXPECT_EQ(none.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)], PAIRS);
+  for (std::size_t i = 0; i < PAIRS; ++i) {
+    if (full[i].tier == Tier::DOUBLE_BATCH && cut[i].verdict == full[i].verdict) continue;
+    EXPECT_EQ(cut[i].verdict, Verdict::UNDECIDED);
+    EXPECT_EQ(cut[i].toc_lower, 0);
+    EXPECT_EQ(cut[i].toc_upper, 1);
+  }
+  const Deadline later(over.at() + std::chrono::hours(1));
+  batch.deadline = &later;
+  TierCounters again;
+  run(again);
+  EXPECT_EQ(again.settled, all.settled);
+}
+
 TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
   const VertexMotion vertices[4] = {};
   const Quad quad = {0, 1, 2, 3};

@@ -115,6 +115,9 @@ TEST(KnownSpace, TheLimitCountsABlockOnceHoweverManyFacesTouchIt) {
   EXPECT_EQ(bounded.voxels, all.voxels);
   EXPECT_EQ(bounded.unknown, 1u);
   EXPECT_FALSE(space->sweptSpace(many, t0, t0, nullptr, 7).complete);
+  const Deadline over(Deadline::Clock::now()), later(over.at() + std::chrono::hours(1));
+  EXPECT_FALSE(space->sweptSpace(many, t0, t0, nullptr, KnownSpace::MOST_BLOCKS, over).complete);
+  EXPECT_EQ(space->sweptSpace(many, t0, t0, nullptr, KnownSpace::MOST_BLOCKS, later).voxels, all.voxels);
   // In any order: one face alone fits, all of them do not.
   Positions apart = t0;
   for (std::size_t v = 297; v < 300; ++v) apart[v] += Vec3(2, 2, 2);

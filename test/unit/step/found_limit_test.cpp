@@ -197,6 +197,11 @@ TEST(FoundLimit, TheMapIsCutAsWell) {
   }
   options.max_found = full.contacts.size();
   EXPECT_FALSE(Detector(options).run(step).cut);
+  // What a step found is not counted in the next one.
+  options.max_found = 1000;
+  Detector again(options);
+  again.run(step);
+  expectSameAnswer(again.run(step), cut);
 }
 
 // A task that ended early is one behind the cut.
