@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """What accuracy costs in time: every rung on whole steps and per pair, as CSV, JSON, a table and a plot.
 
-The whole step: check_step on the real scenes; answers are held against the scenes' truth before a time is printed.
-Per pair: accuracy_pairs on hard queries and on what the filters leave of the scenes, FCL's elementary tests in the same run.
+The whole step: check_step runs all settings in turns on the real scenes; answers are held against the scenes' truth
+before a time is printed. Per pair: accuracy_pairs on hard queries and on what the filters leave of the scenes, FCL's
+elementary tests in the same run.
 """
 import argparse
 import csv
@@ -14,83 +15,71 @@ import subprocess
 import sys
 import tempfile
 
-RUNGS = [
-    ("screen", ["--accuracy", "screen"]),
-    ("fast", ["--accuracy", "fast"]),
-    ("conservative 1e-3", ["--accuracy", "conservative", "--tolerance", "1e-3"]),
-    ("conservative 1e-6", ["--accuracy", "conservative", "--tolerance", "1e-6"]),
-    ("conservative 1e-9", ["--accuracy", "conservative", "--tolerance", "1e-9"]),
-    ("exact 2^-10", ["--accuracy", "exact", "--toc-bits", "10"]),
-    ("exact 2^-32", ["--accuracy", "exact", "--toc-bits", "32"]),
-    ("exact 2^-52", ["--accuracy", "exact", "--toc-bits", "52"]),
-]
-STEP_COLUMNS = ["scene", "rung", "reported", "missed", "false", "undecided", "max_toc_error", "best_ms", "median_ms"]
+STEP_COLUMNS = ["scene", "setting", "contacts", "missed", "false", "undecided", "toc_error", "best_ms", "median_ms",
+                "ratio_low", "ratio", "ratio_high", "rounds"]
+# Measured apart, on a machine of this kind: one core, the same steps, all contacts. Seconds and false contacts.
+APART = {"cloth-ball": [("additive CCD (ipc-toolkit)", 3.3, 137872), ("Tight-Inclusion 1e-6", 47.0, 20)],
+         "n-body": [("additive CCD (ipc-toolkit)", 2.0, None), ("Tight-Inclusion 1e-6", 29.9, None)]}
 
 
-def normal(kind, v):
-    """A pair whatever the order of its vertices."""
-    if kind == "VF":
-        return (kind, v[0]) + tuple(sorted(v[1:]))
-    return (kind,) + tuple(sorted((tuple(sorted(v[:2])), tuple(sorted(v[2:])))))
-
-
-def truth(scene_dir):
-    pairs = set()
-    for kind, name in (("VF", "vf.txt.gz"), ("EE", "ee.txt.gz")):
-        with gzip.open(os.path.join(scene_dir, name), "rt") as lines:
-            for line in lines:
-                if line.startswith("#"):
-                    continue
-                row = [int(x) for x in line.split()]
-                if row[4]:
-                    pairs.add(normal(kind, row[:4]))
-    return pairs
-
-
-def contacts(path):
-    with open(path, newline="") as f:
-        return {normal(r["kind"], [int(r["v%d" % i]) for i in range(4)]): r for r in csv.DictReader(f)}
-
-
-def check_step(tools, scene_dir, arguments, repeat, folder):
-    frames = [os.path.join(scene_dir, "frame_%d.ply" % i) for i in (0, 1)]
-    out, stats = os.path.join(folder, "contacts.csv"), os.path.join(folder, "stats.json")
-    done = subprocess.run([os.path.join(tools, "check_step"), *frames, "--contacts", out, "--stats", stats,
-                           "--no-start-state", "--repeat", str(repeat), *arguments], stdout=subprocess.DEVNULL)
-    if done.returncode not in (0, 3):  # 3: not proved, as nothing is without the start state
-        sys.exit("check_step ended with %d" % done.returncode)
-    with open(stats) as f:
-        return contacts(out), json.load(f)
+def write_truth(scene_dir, path):
+    """The scene's contacts and, where others found them, their times, as check_step reads them."""
+    with open(path, "w") as out:
+        for kind, name in (("VF", "vf.txt.gz"), ("EE", "ee.txt.gz"), ("VF", "toc_vf.txt.gz")):
+            if not os.path.exists(os.path.join(scene_dir, name)):
+                continue
+            with gzip.open(os.path.join(scene_dir, name), "rt") as lines:
+                for line in lines:
+                    row = line.split()
+                    if line.startswith("#"):
+                        continue
+                    if name.startswith("toc"):
+                        out.write("%s %s\n" % (kind, " ".join(row[:5])))
+                    elif int(row[4]):
+                        out.write("%s %s\n" % (kind, " ".join(row[:4])))
 
 
 def whole_steps(tools, scenes, repeat):
-    rows, stages = [], {}
-    with tempfile.TemporaryDirectory() as folder:
-        for scene in scenes:
-            name, true_pairs = os.path.basename(scene.rstrip("/")), truth(scene)
-            finest, _ = check_step(tools, scene, RUNGS[-1][1], 1, folder)
-            for rung, arguments in RUNGS:
-                found, stats = check_step(tools, scene, arguments, repeat, folder)
-                missed, false = len(true_pairs - found.keys()), 0
-                undecided, error = 0, 0.0
-                for pair, row in found.items():
-                    if row["certainty"] == "undecided":
-                        undecided += 1
-                    elif pair not in true_pairs:
-                        false += 1
-                    if pair in finest:
-                        error = max(error, abs(float(finest[pair]["toc_lower"]) - float(row["toc_lower"])))
-                if rung.startswith("exact") and (missed or false or undecided):
-                    sys.exit("%s on %s: %d missed, %d false, %d undecided; no time is printed for wrong answers"
-                             % (rung, name, missed, false, undecided))
-                rows.append(dict(zip(STEP_COLUMNS, [name, rung, len(found), missed, false, undecided, error,
-                                                    stats["ms"]["total"]["best"], stats["ms"]["total"]["median"]])))
-                stages["%s, %s" % (name, rung)] = {"ms": stats["ms"], "pairs": stats["pairs"], "tiers": stats["tiers"],
-                                                   "simd_target": stats["simd_target"]}
-                print("%-11s %-18s %7d reported %5d missed %6d false %7d undecided  toc error %-9.2g %8.1f ms (median %.1f)"
-                      % (name, rung, len(found), missed, false, undecided, error, rows[-1]["best_ms"], rows[-1]["median_ms"]),
-                      flush=True)
-    return rows, stages
+    """All settings in turns within one process, held against the scenes' truth."""
+    rows, details = [], {}
+    for scene in scenes:
+        name = os.path.basename(scene.rstrip("/"))
+        with tempfile.TemporaryDirectory() as folder:
+            truth, stats = os.path.join(folder, "truth.txt"), os.path.join(folder, "stats.json")
+            write_truth(scene, truth)
+            frames = [os.path.join(scene, "frame_%d.ply" % i) for i in (0, 1)]
+            done = subprocess.run([os.path.join(tools, "check_step"), *frames, "--accuracy", "all", "--truth", truth, "--stats", stats,
+                                   "--no-start-state", "--repeat", str(repeat)], stdout=subprocess.PIPE, universal_newlines=True)
+            if done.returncode not in (0, 3):  # 3: not proved, as nothing is without the start state
+                sys.exit("check_step ended with %d" % done.returncode)
+            print(name + ": " + done.stdout, flush=True)
+            with open(stats) as f:
+                details[name] = json.load(f)
+        for setting, s in sorted(details[name].items(), key=lambda item: item[0]):
+            if setting.startswith("exact") and (s["missed"] or s["false"] or s["undecided"]):
+                sys.exit("%s on %s: %d missed, %d false, %d undecided; no time is printed for wrong answers"
+                         % (setting, name, s["missed"], s["false"], s["undecided"]))
+            rows.append(dict(zip(STEP_COLUMNS, [name, setting, s["contacts"], s["missed"], s["false"], s["undecided"], s["toc_error"],
+                                                s["ms"]["total"]["best"], s["ms"]["total"]["median"], s["ratio"]["low"],
+                                                s["ratio"]["median"], s["ratio"]["high"], s["rounds"]])))
+    order = ["fast", "conservative 1e-3", "conservative 1e-6", "conservative 1e-9", "exact 2^-10", "exact 2^-32", "exact 2^-52"]
+    rows.sort(key=lambda r: (r["scene"], order.index(r["setting"])))
+    return rows, details
+
+
+def with_fcl(details, pairs):
+    """A row a scene: FCL's elementary tests in the place of ours, behind the same filters."""
+    rows = []
+    for scene, settings in details.items():
+        exact = settings["exact 2^-32"]
+        mine = [r for r in pairs if r["source"] == scene + " survivors" and r["rung"] == "FCL"]
+        if not mine:
+            continue
+        tests_ms = sum(int(r["pairs"]) * float(r["median_ns"]) * 1e-6 for r in mine)
+        rows.append({"scene": scene, "setting": "FCL's tests", "missed": sum(int(r["missed"]) for r in mine),
+                     "false": sum(int(r["false_contacts"]) for r in mine), "toc_error": max(float(r["max_toc_error"]) for r in mine),
+                     "median_ms": exact["ms"]["total"]["median"] - exact["ms"]["elementary"]["median"] + tests_ms})
+    return rows
 
 
 def per_pair(tools, queries, scenes, repeat):
@@ -127,67 +116,96 @@ def write_csv(path, rows):
         writer.writerows(rows)
 
 
-def plot_steps(axes, steps):
-    """A line a rung and scene: from the best run to the median one; what is wrong stands beside it."""
-    rungs = list(dict.fromkeys(r["rung"] for r in steps))
-    scenes = list(dict.fromkeys(r["scene"] for r in steps))
-    for k, scene in enumerate(scenes):
-        for r in (r for r in steps if r["scene"] == scene):
-            y = rungs.index(r["rung"]) + 0.28 * (k - 0.5 * (len(scenes) - 1))
-            first = r["rung"] == rungs[0]
-            axes.plot([r["best_ms"], r["median_ms"]], [y, y], color="C%d" % k, marker="|", linewidth=4, solid_capstyle="butt",
-                      label=scene if first else None)
-            wrong = ["%d missed" % r["missed"]] * (r["missed"] > 0) + ["%d false" % r["false"]] * (r["false"] > 0)
-            wrong += ["all undecided"] * (r["undecided"] == r["reported"] > 0)
-            axes.annotate(", ".join(wrong + ["TOC to %.0e" % max(r["max_toc_error"], 2.0 ** -52)]), (r["median_ms"], y), xytext=(6, -3),
-                          textcoords="offset points", fontsize=7, color="firebrick" if wrong else "dimgray")
-    axes.set_yticks(range(len(rungs)), rungs)
-    axes.invert_yaxis()
-    low, high = min(r["best_ms"] for r in steps), max(r["median_ms"] for r in steps)
-    axes.set(xscale="log", xlim=(0.85 * low, 2.1 * high), xlabel="whole step, one thread: best to median [ms]",
-             title="A step with 92,230 and one with 146,480 triangles")
-    axes.legend(fontsize=8, loc="lower right")
+def front(rows):
+    """Those that nobody beats in both time and error, of those that get nothing wrong."""
+    best, kept = float("inf"), []
+    for r in sorted((r for r in rows if not r["missed"] and not r["false"] and not r.get("undecided")), key=lambda r: r["median_ms"]):
+        if r["toc_error"] < best:
+            best = r["toc_error"]
+            kept.append(r)
+    return kept
 
 
-def plot_pairs(axes, pairs):
-    rungs = list(dict.fromkeys(r["rung"] for r in pairs))
-    for k, source in enumerate(dict.fromkeys(r["source"] for r in pairs)):
-        for kind, marker in (("VF", "^"), ("EE", "o")):
-            mine = [r for r in pairs if r["source"] == source and r["kind"] == kind]
-            wrong = [int(r["missed"]) + int(r["false_contacts"]) for r in mine]
-            x, y = [float(r["median_ns"]) for r in mine], [rungs.index(r["rung"]) for r in mine]
-            axes.plot(x, y, color="C%d" % k, marker=marker, linestyle="none", fillstyle="none", label="%s, %s" % (source, kind))
-            axes.plot([v for v, n in zip(x, wrong) if n], [v for v, n in zip(y, wrong) if n], color="C%d" % k, marker=marker,
-                      linestyle="none")
-    axes.set_yticks(range(len(rungs)), rungs)
-    axes.invert_yaxis()
-    axes.set(xscale="log", xlabel="elementary test, median of a pair [ns]", title="Filled: some answers are wrong")
-    axes.legend(fontsize=7, loc="upper right")
+def plot_errors(axes, steps, fcl):
+    """Time across, error up. A mark a setting; crossed where answers are missing, ringed where some are false."""
+    for k, scene in enumerate(dict.fromkeys(r["scene"] for r in steps)):
+        mine = [r for r in steps if r["scene"] == scene]
+        line = front(mine)
+        axes.plot([r["median_ms"] for r in line], [r["toc_error"] for r in line], color="C%d" % k, linewidth=0.8, drawstyle="steps-post")
+        for r in mine + [r for r in fcl if r["scene"] == scene]:
+            ours = r["setting"].startswith("exact")
+            axes.plot(r["median_ms"], r["toc_error"], color="C%d" % k, linestyle="none", markersize=6,
+                      marker="o" if ours else "s" if r["setting"].startswith("conservative") else "D" if r["setting"] == "fast" else "^",
+                      label=scene if r is mine[0] else None)
+            if r["missed"]:
+                axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="x", markersize=13, markeredgewidth=1.5)
+            if r["false"]:
+                axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="o", markersize=15, fillstyle="none")
+            axes.annotate(r["setting"], (r["median_ms"], r["toc_error"]), xytext=(9, 3), textcoords="offset points", fontsize=7)
+    axes.set(yscale="log", ylabel="largest error of a time of contact [step]",
+             title="What accuracy costs: cross = contacts missed, ring = contacts invented, line = the front")
+    axes.legend(fontsize=8, loc="center right")
 
 
-def plot(steps, pairs, folder):
+def plot_wrong(axes, steps, fcl):
+    """The same times against the number of wrong answers, with what others were measured at."""
+    for k, scene in enumerate(dict.fromkeys(r["scene"] for r in steps)):
+        for r in [r for r in steps + fcl if r["scene"] == scene]:
+            for what, marker in (("missed", "x"), ("false", "o")):
+                axes.plot(r["median_ms"], r[what], color="C%d" % k, marker=marker, fillstyle="none", linestyle="none")
+        for name, seconds, false in APART.get(scene, []):
+            if false is None:
+                continue
+            axes.plot(1e3 * seconds, false, color="C%d" % k, marker="o", fillstyle="none", linestyle="none", alpha=0.5)
+            axes.annotate(name + ", measured apart", (1e3 * seconds, false), xytext=(-6, -11), ha="right", textcoords="offset points", fontsize=7)
+    for r in fcl:
+        axes.annotate("FCL's tests", (r["median_ms"], max(r["missed"], r["false"])), xytext=(7, 0), textcoords="offset points", fontsize=7)
+    axes.set_yscale("symlog", linthresh=1)
+    axes.set_ylim(bottom=-0.3)
+    axes.set(xscale="log", xlabel="whole step, one thread, median [ms]", ylabel="x missed, o invented")
+
+
+def plot(steps, fcl, folder):
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.8))
-    plot_steps(left, steps)
-    plot_pairs(right, pairs)
-    for axes in (left, right):
+    figure, (upper, lower) = plt.subplots(2, 1, figsize=(9, 8), sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    plot_errors(upper, steps, fcl)
+    plot_wrong(lower, steps, fcl)
+    for axes in (upper, lower):
         axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
-        axes.grid(True, axis="x", linewidth=0.3)
+        axes.grid(True, linewidth=0.3)
     figure.tight_layout()
     for ending in ("svg", "png"):
         figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=130)
 
 
-def markdown(rows):
-    lines = ["| scene | rung | reported | missed | false | undecided | worst TOC error | ms, best | ms, median |",
+def markdown(rows, bags, pairs):
+    """The tables of doc/accuracy.md."""
+    lines = ["| scene | setting | contacts | missed | false | undecided | error of the TOC up to | median ms | ratio, 95 % |",
              "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
     for r in rows:
-        lines.append("| %s | %s | %d | %d | %d | %d | %.1e | %.1f | %.1f |" % tuple(r[c] for c in STEP_COLUMNS))
+        lines.append("| %s | `%s` | %d | %d | %d | %d | %.0e | %.1f | %.3f [%.3f, %.3f] |" %
+                     tuple(r[c] for c in ("scene", "setting", "contacts", "missed", "false", "undecided", "toc_error", "median_ms",
+                                          "ratio", "ratio_low", "ratio_high")))
+    if bags:
+        lines += ["", "| recording | rung | steps | contacts | missed | false | undecided | median ms | 95 % ms |",
+                  "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
+    for r in bags:
+        lines.append("| %s | %s | %d | %d | %d | %d | %d | %.2f | %.2f |" %
+                     tuple(r[c] for c in ("recording", "rung", "steps", "contacts", "missed", "false", "undecided", "median_ms", "p95_ms")))
+    columns = [(s, k) for s in dict.fromkeys(r["source"] for r in pairs) for k in ("VF", "EE")]
+    lines += ["", "| ns | " + " | ".join("%s, %s" % c for c in columns) + " |", "|---|" + "--:|" * len(columns)]
+    for rung in dict.fromkeys(r["rung"] for r in pairs):
+        cells = []
+        for column in columns:
+            r = next(r for r in pairs if (r["source"], r["kind"], r["rung"]) == (*column, rung))
+            wrong = int(r["missed"]) + int(r["false_contacts"])
+            cells.append("%.0f" % float(r["median_ns"]) + (" (%s wrong)" % format(wrong, ",") if wrong else ""))
+        lines.append("| %s | %s |" % (rung, " | ".join(cells)))
     return "\n".join(lines) + "\n"
 
 
@@ -197,23 +215,25 @@ def main():
     parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
     parser.add_argument("--bag", action="append", default=[], help="a recording, repeatable; needs analyze_bag among the tools")
     parser.add_argument("--out", required=True, help="folder for the results")
-    parser.add_argument("--repeat", type=int, default=15)
+    parser.add_argument("--repeat", type=int, default=15, help="of the elementary tests alone")
+    parser.add_argument("--rounds", type=int, default=60, help="at most, of the whole step; fewer where the ratios are known to 2 %%")
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
     scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
-    steps, stages = whole_steps(a.tools, scenes, a.repeat)
+    steps, details = whole_steps(a.tools, scenes, a.rounds)
     bags = recordings(a.tools, a.bag)
     pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
+    fcl = with_fcl(details, pairs)
     write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
     write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
     if bags:
         write_csv(os.path.join(a.out, "accuracy_recordings.csv"), bags)
     with open(os.path.join(a.out, "accuracy.json"), "w") as f:
-        json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "stages": stages,
+        json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "fcl": fcl, "stages": details,
                    "recordings": bags, "pairs": pairs}, f, indent=1)
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
-        f.write(markdown(steps))
-    plot(steps, pairs, a.out)
+        f.write(markdown(steps, bags, pairs))
+    plot(steps, fcl, a.out)
     print("results: " + a.out)
 
 

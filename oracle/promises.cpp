@@ -46,8 +46,8 @@ std::string brokenPromise(const AccuracyOptions& options, const Query& query, st
     return isCellOf(*toc, result, options.toc_bits) ? "" : "not the cell of the time of contact";
   }
   if (toc && tocError(*toc, result.toc_lower) < 0) return "the contact is reported late";
-  const bool claims_nearness = options.rung == Accuracy::CONSERVATIVE && result.verdict == Verdict::CONTACT;
-  if (claims_nearness && !isWithin(query.kind, query.motion, result.toc_lower, options.tolerance_m)) {
+  if (result.verdict == Verdict::CONTACT &&
+      !isWithin(query.kind, query.motion, result.toc_lower, options.tolerance_m)) {
     return "at the reported time the features are more than the tolerance apart";
   }
   return "";

@@ -13,8 +13,9 @@ namespace test {
 
 /// What the rung promised for this pair and did not keep; empty where it kept everything. `toc` is the oracle's.
 ///   every rung    times finite and within the step
-///   screen        no contact missed, no bound late
-///   conservative  the same, and where it says CONTACT the features are at most the tolerance apart at toc_lower
+///   conservative  no contact missed, no bound late; where it says CONTACT the features are at most the tolerance apart
+///   at
+///                 toc_lower
 ///   exact         the oracle's verdict and the cell of its time
 std::string brokenPromise(const AccuracyOptions& options, const Query& query, std::optional<Root>& toc,
                           const ElementaryResult& result);

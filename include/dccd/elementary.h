@@ -1,5 +1,5 @@
 // The elementary test: do two moving features meet during the step, and when first? One interface for
-// every rung of the accuracy ladder (screen has no elementary test: its answer is the filters').
+// every rung of the accuracy ladder.
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@ enum class PairKind : std::uint8_t {
   FACE_VOXEL_CORNER = 4   ///< indices: the face's three
 };
 
-/// Rungs of the accuracy ladder, cheapest first.
-enum class Accuracy : std::uint8_t { SCREEN = 0, FAST = 1, CONSERVATIVE = 2, EXACT = 3 };
+/// Rungs of the accuracy ladder, cheapest first. Recordings hold the values; 0 was one that decided nothing.
+enum class Accuracy : std::uint8_t { FAST = 1, CONSERVATIVE = 2, EXACT = 3 };
 
 struct AccuracyOptions {
   Accuracy rung = Accuracy::EXACT;
@@ -100,8 +100,7 @@ class DCCD_EXPORT Rung {
   virtual void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const = 0;
 };
 
-/// The rung for the options. Throws std::invalid_argument naming the option and value when one is out of range,
-/// or for SCREEN, which has no elementary test.
+/// The rung for the options. Throws std::invalid_argument naming the option and value when one is out of range.
 DCCD_EXPORT std::unique_ptr<Rung> makeRung(const AccuracyOptions& options);
 
 /// Convenience for single pairs (tests, tools): one PairMotion through the same code as run().
@@ -110,7 +109,7 @@ DCCD_EXPORT ElementaryResult testPair(const Rung& test, PairKind kind, const Pai
 DCCD_EXPORT const char* toString(PairKind kind);
 DCCD_EXPORT const char* toString(Accuracy rung);
 DCCD_EXPORT const char* toString(Tier tier);
-/// Parses "screen", "fast", "conservative", "exact". Throws std::invalid_argument naming the text.
+/// Parses "fast", "conservative", "exact". Throws std::invalid_argument naming the text.
 DCCD_EXPORT Accuracy accuracyFromString(const char* text);
 
 }  // namespace dccd

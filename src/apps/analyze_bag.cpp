@@ -224,7 +224,7 @@ int main(int argc, char** argv) {
       app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
   app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")
       ->excludes(octomap);
-  app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact");
+  app.add_option("--accuracy", a.accuracy, "conservative or exact");
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);

@@ -11,15 +11,19 @@
 #include "dccd/detect.h"
 #include "dccd/simd_target.h"
 #include "input/mesh_file.h"
+#include "report/accuracy_settings.h"
 
 namespace {
 
 using namespace dccd;
 
+constexpr int MOST_ROUNDS = 60, LEAST_ROUNDS = 8;
+constexpr double NARROW = 0.02;  // the interval of a ratio is narrow enough within this of its median
+
 constexpr int NOT_PROVED = 3;  // CLI11 and this program's own errors have others
 
 struct Arguments {
-  std::string frame_0, frame_1, contacts, stats;
+  std::string frame_0, frame_1, contacts, stats, truth;
   std::string accuracy = "exact", broad_phase = "clustered", simd = "auto";
   double tolerance_m = 1e-6, budget_ms = 0;
   int toc_bits = 32, threads = 1, repeat = 1;
@@ -30,9 +34,9 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
   app.add_option("FRAME_0", a.frame_0, "mesh at t=0 (.ply, .obj)")->required();
   app.add_option("FRAME_1", a.frame_1, "mesh at t=1, same faces")->required();
-  app.add_option("--contacts", a.contacts, "write the contacts as CSV");
+  app.add_option("--contacts", a.contacts, "write the contacts as CSV; with --accuracy all a file for each setting");
   app.add_option("--stats", a.stats, "write pairs and milliseconds per stage as JSON");
-  app.add_option("--accuracy", a.accuracy, "screen, fast, conservative or exact; all: one after the other, as a table")
+  app.add_option("--accuracy", a.accuracy, "fast, conservative or exact; all: all settings in turns, as a table")
       ->capture_default_str();
   app.add_option("--tolerance", a.tolerance_m, "of conservative [m]")->capture_default_str();
   app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
@@ -42,13 +46,19 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
       ->capture_default_str();
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
-  app.add_option("--repeat", a.repeat, "run the step this often for the times")
+  app.add_option("--truth", a.truth,
+                 "with --accuracy all: the contacts that there are, 'VF|EE v0 v1 v2 v3 [toc]' a line, to hold the "
+                 "answers against; else exact 2^-52 is taken for it");
+  app.add_option("--repeat", a.repeat,
+                 "run the step this often for the times; with --accuracy all at most this often (else 60 times)")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
   app.add_flag("--no-start-state", a.no_start_state, "leave out whether surfaces cross at t=0: then nothing is proved");
   app.add_flag("--earliest-only", a.earliest_only, "only the first contacts");
   app.parse(argc, argv);
+  if (a.accuracy == "all" && app.count("--repeat") == 0) a.repeat = MOST_ROUNDS;
+  if (a.accuracy != "all" && !a.truth.empty()) throw std::runtime_error("--truth goes with --accuracy all");
   return a;
 }
 
@@ -68,51 +78,43 @@ void writeContacts(const std::string& path, const Outcome& result) {
 struct Times {
   std::vector<double> ms;
   double best() const { return *std::min_element(ms.begin(), ms.end()); }
-  double median() const {
-    std::vector<double> sorted = ms;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() / 2];
-  }
+  double median() const { return medianOf(ms).median; }
   nlohmann::json json() const { return {{"best", best()}, {"median", median()}}; }
 };
 
+/// One way to answer the step, as often as it was run.
 struct Run {
+  std::string name;
+  Options options;
+  History history;
   Outcome result;
   std::map<std::string, Times> times;
+
+  void once(const Step& step) {
+    result = detect(step, options, history);
+    const StepStats& stats = result.stats;
+    for (std::size_t s = 0; s < stats.stages.size(); ++s) {
+      times[toString(static_cast<Stage>(s))].ms.push_back(stats.stages[s].ms);
+    }
+    times["total"].ms.push_back(stats.total_ms);
+  }
 };
 
-Run runStep(const Arguments& a, const std::string& accuracy, const std::shared_ptr<const Topology>& topology,
-            const Positions& t0, const Positions& t1) {
-  Options options;
+Run runOf(const Arguments& a, const std::string& name, const AccuracyOptions& accuracy) {
+  Run run;
+  run.name = name;
+  Options& options = run.options;
   options.keep_bounds = false;  // the same step again and again
-  options.accuracy.rung = accuracyFromString(accuracy.c_str());
-  options.accuracy.tolerance_m = a.tolerance_m;
-  options.accuracy.toc_bits = a.toc_bits;
+  options.accuracy = accuracy;
   options.num_threads = a.threads;
   options.step_budget_ms = a.budget_ms;
   options.earliest_only = a.earliest_only;
   options.check_start_state = !a.no_start_state;
   options.broad_phase = a.broad_phase == "clustered" ? BroadPhase::CLUSTERED : BroadPhase::BRUTE_FORCE;
-  Step step;
-  step.bodies.resize(1);
-  step.bodies[0].name = a.frame_0;
-  step.bodies[0].topology = topology;
-  step.bodies[0].t0 = share(t0);
-  step.bodies[0].t1 = share(t1);
-  History history;
-  Run run;
-  for (int i = 0; i < a.repeat; ++i) {
-    run.result = detect(step, options, history);
-    const StepStats& stats = run.result.stats;
-    for (std::size_t s = 0; s < stats.stages.size(); ++s) {
-      run.times[toString(static_cast<Stage>(s))].ms.push_back(stats.stages[s].ms);
-    }
-    run.times["total"].ms.push_back(stats.total_ms);
-  }
   return run;
 }
 
-nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const Run& run) {
+nlohmann::json statsJson(const Arguments& a, const Run& run) {
   nlohmann::json j;
   for (std::size_t s = 0; s < run.result.stats.stages.size(); ++s) {
     const StageStats& stage = run.result.stats.stages[s];
@@ -124,7 +126,7 @@ nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const 
   }
   j["threads"] = a.threads;
   j["simd_target"] = simdTarget();
-  j["accuracy"] = accuracy;
+  j["accuracy"] = run.name;
   j["contacts"] = run.result.contacts.size();
   j["undecided"] = run.result.stats.undecided;
   j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
@@ -139,14 +141,12 @@ nlohmann::json statsJson(const Arguments& a, const std::string& accuracy, const 
   return j;
 }
 
-void print(const std::string& accuracy, const Run& run, bool header) {
-  if (header) {
-    std::cout << std::left << std::setw(14) << "accuracy" << std::right << std::setw(10) << "contacts" << std::setw(11)
-              << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
-              << "median ms" << '\n';
-  }
+void print(const Run& run) {
+  std::cout << std::left << std::setw(14) << "accuracy" << std::right << std::setw(10) << "contacts" << std::setw(11)
+            << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
+            << "median ms" << '\n';
   const double earliest = run.result.earliest_toc;
-  std::cout << std::left << std::setw(14) << accuracy << std::right << std::setw(10) << run.result.contacts.size()
+  std::cout << std::left << std::setw(14) << run.name << std::right << std::setw(10) << run.result.contacts.size()
             << std::setw(11) << run.result.stats.undecided << std::setw(14);
   if (earliest <= 1)
     std::cout << earliest;
@@ -156,8 +156,7 @@ void print(const std::string& accuracy, const Run& run, bool header) {
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
 
-int checkStep(const Arguments& a) {
-  setSimdTarget(a.simd);
+Step stepOf(const Arguments& a) {
   const MeshFile m0 = loadMeshFile(a.frame_0), m1 = loadMeshFile(a.frame_1);
   if (m0.positions.size() != m1.positions.size() || m0.faces != m1.faces) {
     throw std::runtime_error(a.frame_1 + ": not the topology of " + a.frame_0 + " (" +
@@ -165,28 +164,118 @@ int checkStep(const Arguments& a) {
                              " faces, expected " + std::to_string(m0.positions.size()) + " and " +
                              std::to_string(m0.faces.size()) + ", the same ones)");
   }
-  const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(m0.positions.size(), m0.faces));
-  const std::vector<std::string> rungs = a.accuracy == "all"
-                                             ? std::vector<std::string>{"screen", "fast", "conservative", "exact"}
-                                             : std::vector<std::string>{a.accuracy};
-  nlohmann::json all;
-  std::string words;
-  bool proved = false;
-  for (std::size_t i = 0; i < rungs.size(); ++i) {
-    const Run run = runStep(a, rungs[i], topology, m0.positions, m1.positions);
-    print(rungs[i], run, i == 0);
-    const Assurance assurance = assuranceOf(run.result);
-    proved = assurance.proved;  // of several rungs the last and most accurate one's
-    words += rungs[i] + ": " + describe(assurance) + '\n';
-    const nlohmann::json j = statsJson(a, rungs[i], run);
-    if (rungs.size() == 1)
-      all = j;
-    else
-      all[rungs[i]] = j;
-    // With all rungs the file holds the last and most accurate one's.
-    if (!a.contacts.empty() && i + 1 == rungs.size()) writeContacts(a.contacts, run.result);
+  Step step;
+  step.bodies.resize(1);
+  step.bodies[0].name = a.frame_0;
+  step.bodies[0].topology = share(Topology::fromTriangles(m0.positions.size(), m0.faces));
+  step.bodies[0].t0 = share(m0.positions);
+  step.bodies[0].t1 = share(m1.positions);
+  return step;
+}
+
+/// Times of the same rounds, divided: what slows the machine down slows both.
+MedianInterval ratioOf(const Run& run, const Run& to) {
+  const std::vector<double>&ms = run.times.at("total").ms, &other = to.times.at("total").ms;
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < ms.size(); ++i) ratios.push_back(ms[i] / other[i]);
+  return medianOf(std::move(ratios));
+}
+
+/// All of them in turns, each round beginning with another, until the ratios are known or the rounds are over.
+void runInTurns(const Step& step, std::size_t most, std::vector<Run>& runs, const Run& usual) {
+  for (std::size_t round = 0; round < most; ++round) {
+    for (std::size_t i = 0; i < runs.size(); ++i) runs[(round + i) % runs.size()].once(step);
+    const bool narrow = std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
+      const MedianInterval ratio = ratioOf(run, usual);
+      return ratio.high <= ratio.median * (1 + NARROW) && ratio.low >= ratio.median * (1 - NARROW);
+    });
+    if (round + 1 >= LEAST_ROUNDS && narrow) break;
   }
-  std::cout << words;
+}
+
+/// "contacts.csv" and "exact 2^-32" to "contacts-exact-2^-32.csv".
+std::string fileOf(const std::string& path, std::string name) {
+  std::replace(name.begin(), name.end(), ' ', '-');
+  const std::size_t dot = path.find_last_of("./");
+  const std::size_t end = dot == std::string::npos || path[dot] == '/' ? path.size() : dot;
+  return path.substr(0, end) + '-' + name + path.substr(end);
+}
+
+void printRow(const Run& run, const AccuracyErrors& errors, const MedianInterval& ratio) {
+  std::cout << std::left << std::setw(18) << run.name << std::right << std::setw(9) << run.result.contacts.size()
+            << std::setw(8) << errors.missed << std::setw(7) << errors.false_contacts << std::setw(10)
+            << errors.undecided << std::setw(11) << std::scientific << std::setprecision(1) << errors.toc_error
+            << std::fixed << std::setprecision(2) << std::setw(9) << run.times.at("total").median()
+            << std::setprecision(3) << std::setw(8) << ratio.median << " [" << ratio.low << ", " << ratio.high << "]"
+            << std::setprecision(1);
+  for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY, Stage::SORT}) {
+    std::cout << std::setw(12) << run.times.at(toString(stage)).median();
+  }
+  std::cout << std::defaultfloat << std::setprecision(6) << '\n';
+}
+
+nlohmann::json compareSettings(const Arguments& a, std::vector<Run>& runs, const Run& usual) {
+  const KnownContacts finest = KnownContacts::fromOutcome(runs.back().result);
+  const KnownContacts truth = a.truth.empty() ? finest : KnownContacts::fromFile(a.truth);
+  const std::size_t rounds = usual.times.at("total").ms.size();
+  std::cout << rounds << " rounds in turns; ms: medians; ratio: to " << usual.name
+            << " in the same round, median and 95 % interval"
+            << "\nmissed and false: against "
+            << (a.truth.empty() ? runs.back().name + ", for want of --truth" : a.truth) << '\n'
+            << std::left << std::setw(18) << "setting" << std::right << std::setw(9) << "contacts" << std::setw(8)
+            << "missed" << std::setw(7) << "false" << std::setw(10) << "undecided" << std::setw(11) << "TOC error"
+            << std::setw(9) << "ms" << std::setw(8) << "ratio" << std::setw(18) << "95 %";
+  for (const char* stage : {"broad phase", "planar", "elementary", "sort"}) std::cout << std::setw(12) << stage;
+  std::cout << '\n';
+  nlohmann::json all;
+  std::size_t timed_by_truth = 0;
+  for (const Run& run : runs) {
+    const AccuracyErrors errors = errorsOf(run.result, truth, finest);
+    const MedianInterval ratio = ratioOf(run, usual);
+    printRow(run, errors, ratio);
+    nlohmann::json j = statsJson(a, run);
+    j["missed"] = errors.missed;
+    j["false"] = errors.false_contacts;
+    j["undecided"] = errors.undecided;
+    j["toc_error"] = errors.toc_error;
+    j["rounds"] = rounds;
+    j["ratio"] = {{"to", usual.name}, {"low", ratio.low}, {"median", ratio.median}, {"high", ratio.high}};
+    all[run.name] = std::move(j);
+    timed_by_truth = errors.timed_by_truth;
+    if (!a.contacts.empty()) writeContacts(fileOf(a.contacts, run.name), run.result);
+  }
+  std::cout << "TOC error: of either end of the interval, in steps; " << timed_by_truth
+            << " times are the truth's, the others' the cells of " << runs.back().name << '\n';
+  return all;
+}
+
+int checkStep(const Arguments& a) {
+  setSimdTarget(a.simd);
+  const Step step = stepOf(a);
+  nlohmann::json all;
+  std::vector<Run> runs;
+  if (a.accuracy == "all") {
+    for (const AccuracySetting& setting : accuracySettings()) runs.push_back(runOf(a, setting.name, setting.accuracy));
+    const Run& usual = *std::find_if(runs.begin(), runs.end(), [](const Run& r) { return r.name == DEFAULT_SETTING; });
+    runInTurns(step, static_cast<std::size_t>(a.repeat), runs, usual);
+    all = compareSettings(a, runs, usual);
+  } else {
+    AccuracyOptions accuracy;
+    accuracy.rung = accuracyFromString(a.accuracy.c_str());
+    accuracy.tolerance_m = a.tolerance_m;
+    accuracy.toc_bits = a.toc_bits;
+    runs.push_back(runOf(a, a.accuracy, accuracy));
+    for (int i = 0; i < a.repeat; ++i) runs[0].once(step);
+    print(runs[0]);
+    all = statsJson(a, runs[0]);
+    if (!a.contacts.empty()) writeContacts(a.contacts, runs[0].result);
+  }
+  bool proved = false;
+  for (const Run& run : runs) {
+    const Assurance assurance = assuranceOf(run.result);
+    proved = assurance.proved;  // of several settings the last and most accurate one's
+    std::cout << run.name << ": " << describe(assurance) << '\n';
+  }
   if (!a.stats.empty()) {
     std::ofstream out(a.stats);
     out << all.dump(2) << '\n';

@@ -20,30 +20,11 @@
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
 #include "oracle/query_file.h"
-#include "projection/toc_bound.h"
-#include "simd/fused_filter.h"
 
 namespace dccd {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// The filters alone, as the step runs them: what they cannot reject is undecided, with the linear filter's bound.
-class ScreenRung : public Rung {
- public:
-  void run(const PairBatch& batch, ElementaryResult* results, TierCounters&) const override {
-    for (std::size_t i = 0; i < batch.count; ++i) {
-      const double bound = linearTocBound(batch.kind, batch.vertices, batch.pairs[i], 0);
-      std::uint32_t kept;
-      const bool separated =
-          bound > 1 || simd::fusedFilter(batch.vertices->t0, batch.pairs[i].data(), 1,
-                                         batch.kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, &kept) == 0;
-      results[i] = ElementaryResult{};
-      results[i].toc_lower = std::min(bound, 1.0);
-      if (separated) results[i].verdict = Verdict::NO_CONTACT;
-    }
-  }
-};
 
 /// What one rung did on one family and kind.
 struct Row {
@@ -165,11 +146,7 @@ std::vector<JudgedRung> makeRungs(const std::string& accuracy, const AccuracyOpt
     JudgedRung rung;
     rung.options = options;
     rung.options.rung = each;
-    if (each == Accuracy::SCREEN) {
-      rung.test = std::make_unique<ScreenRung>();
-    } else {
-      rung.test = makeRung(rung.options);
-    }
+    rung.test = makeRung(rung.options);
     rungs.push_back(std::move(rung));
   }
   return rungs;
@@ -276,7 +253,7 @@ int main(int argc, char** argv) {
   dccd::AccuracyOptions options;
   app.add_option("DIR", dirs, "folders of query files")->required();
   app.add_option("--accuracy", accuracy, "rung")
-      ->check(CLI::IsMember({"screen", "fast", "conservative", "exact", "all"}))
+      ->check(CLI::IsMember({"fast", "conservative", "exact", "all"}))
       ->capture_default_str();
   app.add_option("--format", format, "output")->check(CLI::IsMember({"csv", "table"}))->capture_default_str();
   app.add_option("--tolerance", options.tolerance_m, "conservative: tolerance [m]")->capture_default_str();

@@ -14,16 +14,20 @@ using Kind = ParameterTree::Kind;
 
 namespace {
 
-std::vector<std::string> rungNames() {
-  std::vector<std::string> names;
-  for (const Accuracy rung : allRungs()) names.push_back(toString(rung));
-  return names;
+Accuracy readRung(ParameterReader& reader) {
+  std::vector<std::string> names, refused = {"screen"};
+  for (const Accuracy rung : allRungs()) (provesAnswers(rung) ? names : refused).push_back(toString(rung));
+  const std::string asked = reader.text("accuracy", "exact");
+  if (std::find(refused.begin(), refused.end(), asked) != refused.end()) {
+    reader.fail("accuracy", "is '" + asked + "', which proves nothing and is no setting of a monitor; write exact, " +
+                                "which takes about as long");
+  }
+  return accuracyFromString(reader.choice("accuracy", "exact", names).c_str());
 }
 
 void readAccuracy(ParameterReader& reader, MonitorConfig& config) {
   Options& detector = config.monitor.detector;
-  const std::string rung = reader.choice("accuracy", "exact", rungNames());
-  detector.accuracy.rung = accuracyFromString(rung.c_str());
+  detector.accuracy.rung = readRung(reader);
   detector.accuracy.tolerance_m = reader.number("tolerance_m", detector.accuracy.tolerance_m, 1e-12, 1);
   detector.accuracy.toc_bits = reader.integer("toc_bits", detector.accuracy.toc_bits, 10, 52);
   detector.accuracy.max_subdivisions = reader.integer("max_subdivisions", detector.accuracy.max_subdivisions, 1, MANY);
@@ -49,7 +53,7 @@ std::string distanceAskedBy(const std::string& path, const MonitorConfig& config
   return "";
 }
 
-/// Only conservative and screen hold a distance. Without a choice by the user it is conservative.
+/// Only conservative holds a distance. Without a choice by the user it is that.
 void settleAccuracy(ParameterReader& reader, MonitorConfig& config) {
   Accuracy& rung = config.monitor.detector.accuracy.rung;
   if (!config.holdsDistance() || dccd::holdsDistance(rung)) return;

@@ -86,6 +86,8 @@ struct Reconfigure::Impl {
     MonitorOptions options = start.monitor;
     MarkerConfig markers = start.markers;
     fromLive(live, options, markers);
+    const Accuracy rung = options.detector.accuracy.rung;
+    if (rung == Accuracy::FAST) return "fast proves nothing and is no setting of a monitor; write exact";
     try {
       check(options.detector, bodies);
       const MeshStore store(options.store);
@@ -97,7 +99,7 @@ struct Reconfigure::Impl {
 
   /// Each value by itself: a bad one is refused alone. The server has clamped them to their ranges, which a NaN passes.
   void apply(Live& live) {
-    // The only rungs that hold a distance are this and screen.
+    // The only rung that holds a distance.
     if (start.holdsDistance() && !holdsDistance(static_cast<Accuracy>(live.accuracy))) {
       live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);
     }

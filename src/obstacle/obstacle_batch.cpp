@@ -99,20 +99,16 @@ void ObstacleBatch::add(const ObstaclePair& pair, const VertexMotion* points, do
 void ObstacleBatch::flush() {
   const std::size_t count = pairs_.size();
   if (count == 0) return;
-  if (test_ != nullptr) {
-    PairBatch batch;
-    batch.kind = kind_;
-    batch.vertices = points_.data();
-    batch.pairs = quads_.data();
-    batch.count = count;
-    if (any_separation_) batch.minimum_separation_m = separations_.data();
-    if (deadline_.canEnd()) batch.deadline = &deadline_;
-    test_->run(batch, results_.data(), tiers_);
-    for (std::size_t i = 0; i < count; ++i) {
-      if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);
-    }
-  } else {
-    for (std::size_t i = 0; i < count; ++i) append(i, {toc_bounds_[i], 1.0, Verdict::UNDECIDED, Tier::DOUBLE_BATCH});
+  PairBatch batch;
+  batch.kind = kind_;
+  batch.vertices = points_.data();
+  batch.pairs = quads_.data();
+  batch.count = count;
+  if (any_separation_) batch.minimum_separation_m = separations_.data();
+  if (deadline_.canEnd()) batch.deadline = &deadline_;
+  test_->run(batch, results_.data(), tiers_);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);
   }
   pairs_.clear();
   toc_bounds_.clear();

@@ -30,7 +30,7 @@ std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options) {
     throw std::invalid_argument(std::string("minimum_separation_m above 0 cannot be had with accuracy ") +
                                 toString(rung) + "; use conservative");
   }
-  return rung == Accuracy::SCREEN ? nullptr : makeRung(options.accuracy);
+  return makeRung(options.accuracy);
 }
 
 bool ObstacleCheck::Impl::reachesSurface(const Run& run) const {

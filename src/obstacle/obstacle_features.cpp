@@ -110,10 +110,6 @@ void ObstacleCheck::Impl::setTime(Contact& contact, const CrossingTime& time) {
     contact.toc_lower = k * 0x1p-52;
     contact.toc_upper = (k + 1) * 0x1p-52;
   }
-  if (options.accuracy.rung == Accuracy::SCREEN) {
-    contact.certainty = Certainty::UNDECIDED;
-    contact.toc_upper = 1;
-  }
 }
 
 void ObstacleCheck::Impl::findLeaves(const Run& run, const KeyBox& box) {

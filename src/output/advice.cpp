@@ -125,12 +125,12 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
       if (reason.compare(0, 21, "parameter vertex_mask") == 0) return "the vertices are numbered from 0";
       return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
     case StepStatus::DEADLINE:
-      return "raise step_budget_ms or num_threads, or take a cheaper accuracy";
+      return "raise step_budget_ms or num_threads, or send fewer vertices";
     case StepStatus::TRUNCATED:
       return "raise max_contacts to see all; where the work was cut, see what lies in one place, or raise "
              "max_memory_mb";
     case StepStatus::QUEUE_FULL:
-      return "raise num_threads, or take a cheaper accuracy or fewer vertices";
+      return "raise num_threads, or send fewer vertices";
     default:
       return {};
   }

@@ -91,8 +91,7 @@ class PairExplanation : Explanation {
       return lines_;
     }
     // As it is; then with the pair alone and nothing culled, so that every stage is asked.
-    Options whole = plain(options_);
-    if (whole.accuracy.rung == Accuracy::SCREEN) whole.accuracy.rung = Accuracy::CONSERVATIVE;  // it has no result
+    const Options whole = plain(options_);
     const auto seen = observe(step_, whole);
     Step pair = alone(step_, features_);
     pair.map = ObstacleMap();
@@ -103,7 +102,7 @@ class PairExplanation : Explanation {
     const auto conservative = observe(pair, all);
     removeDistances(pair);
     std::map<Accuracy, std::map<std::size_t, Watch::Seen>> rungs;
-    for (const Accuracy rung : testedRungs()) {
+    for (const Accuracy rung : allRungs()) {
       all.accuracy.rung = rung;
       rungs[rung] = observe(pair, all);
     }
@@ -111,7 +110,7 @@ class PairExplanation : Explanation {
       say("rules", Says::KEPT, "a pair that the step asks about");
       tellStages(seen.at(part_), conservative.at(part_), linearBound(conservative.at(part_).separation.total_m));
       const bool held = conservative.at(part_).separation.total_m > 0;
-      for (const Accuracy rung : testedRungs()) {
+      for (const Accuracy rung : allRungs()) {
         if (!held) tellRung(rung, rungs.at(rung).at(part_));
         if (held && rung == Accuracy::CONSERVATIVE) tellRung(rung, conservative.at(part_));
       }

@@ -77,12 +77,6 @@ void removeDistances(Step& step) {
   }
 }
 
-std::vector<Accuracy> testedRungs() {
-  std::vector<Accuracy> rungs = allRungs();
-  rungs.erase(std::remove(rungs.begin(), rungs.end(), Accuracy::SCREEN), rungs.end());
-  return rungs;
-}
-
 Options plain(Options options) {
   options.num_threads = 1;
   options.step_budget_ms = 0;

@@ -27,9 +27,6 @@ Step alone(const Step& step, const std::vector<Feature>& features);
 /// Takes away all that would hold features apart before they touch; `exact` holds no distance.
 void removeDistances(Step& step);
 
-/// All rungs that have an elementary test.
-std::vector<Accuracy> testedRungs();
-
 /// The step as it is asked for, without what changes no answer but its time.
 Options plain(Options options);
 

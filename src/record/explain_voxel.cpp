@@ -50,7 +50,7 @@ class VoxelExplanation : Explanation {
     Step single = feature;
     single.map.surface = VoxelSurface::build(step_.map.surface->resolution(), {*leaf});
     for (part_ = 0; part_ < parts_; ++part_) tellBounds(*leaf);
-    for (const Accuracy rung : testedRungs()) {
+    for (const Accuracy rung : allRungs()) {
       if (distance_m_ > 0 && rung != Accuracy::CONSERVATIVE) continue;
       Options options = plain(options_);
       options.accuracy.rung = rung;

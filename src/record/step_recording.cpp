@@ -45,6 +45,11 @@ template <typename Archive, typename Options>
 void visitOptions(Archive& a, Options& o) {
   std::size_t reserved = 0;
   a.choice(o.accuracy.rung, allRungs().back());
+  if constexpr (Archive::READS) {
+    if (o.accuracy.rung < allRungs().front()) {
+      a.fail("it was made with accuracy screen, which decided nothing and is no rung any more");
+    }
+  }
   a.number(o.accuracy.tolerance_m);
   a.number(o.accuracy.toc_bits);
   a.number(o.accuracy.max_subdivisions);

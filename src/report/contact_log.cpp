@@ -1,7 +1,6 @@
 #include "report/contact_log.h"
 
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 #include "report/quantile.h"
@@ -24,7 +23,7 @@ void ContactLog::add(const Outcome& outcome) {
                   std::uint64_t{c.voxel.x} << 32 | std::uint64_t{c.voxel.y} << 16 | c.voxel.z,
                   std::uint64_t{c.leaving}};
     static_assert(std::tuple_size<Key>::value == LEAVING + 1, "the flag is the key's last word");
-    step[key] = {c.toc_lower, c.certainty == Certainty::CERTAIN};
+    step[key] = {{c.toc_lower, c.toc_upper}, c.certainty == Certainty::CERTAIN};
   }
 }
 
@@ -52,8 +51,8 @@ RungCost ContactLog::against(const ContactLog& exact, const std::string& rung) c
       cost.undecided += !entry.certain;
       if (match == truth.end()) {
         cost.false_contacts += entry.certain;
-      } else {
-        cost.max_toc_error = std::max(cost.max_toc_error, std::abs(match->second.toc_lower - entry.toc_lower));
+      } else if (entry.certain) {
+        cost.max_toc_error = std::max(cost.max_toc_error, tocError(entry.cell, match->second.cell));
       }
     }
     for (const auto& [key, entry] : truth) cost.missed += !covers(found, key);

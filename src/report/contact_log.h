@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "dccd/outcome.h"
+#include "report/accuracy_settings.h"
 
 namespace dccd {
 
-/// One rung over the whole run, for the table of what accuracy costs. Missed and false are against the run with
-/// `exact`.
+/// One rung over the whole run, for the table of what accuracy costs. Missed, false and the error of the time of
+/// contact (tocError(), over what is certain) are against the run with `exact`.
 struct RungCost {
   std::string rung;
   std::size_t steps = 0, contacts = 0, missed = 0, false_contacts = 0, undecided = 0;
@@ -28,7 +29,7 @@ class ContactLog {
 
  private:
   struct Entry {
-    double toc_lower;
+    TimeCell cell;
     bool certain;
   };
   using Key = std::array<std::uint64_t, 5>;

@@ -112,8 +112,9 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
     say(StepStatus::NO_MAP, step.map.problem + "; checked without it");
   }
   // Neither changes the status: the step was computed as it was asked for.
-  if (options.accuracy.rung == Accuracy::FAST) {
-    outcome.unproved.push_back("accuracy fast misses contacts and proves nothing");
+  if (!provesAnswers(options.accuracy.rung)) {
+    outcome.unproved.push_back(std::string("accuracy ") + toString(options.accuracy.rung) +
+                               " misses contacts and proves nothing");
   }
   if (outcome.start_state == StartState::NOT_CHECKED && outcome.start_state_complete) {
     outcome.unproved.push_back("whether surfaces cross at the start was not checked");
@@ -212,7 +213,7 @@ void check(const Options& options, const std::vector<Body>& bodies) {
   require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
   require(options.max_substeps >= 1, "max_substeps must be 1 or more");
   for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
-  if (options.accuracy.rung != Accuracy::SCREEN) makeRung(options.accuracy);
+  makeRung(options.accuracy);
   const double separation_m = largestSeparation(bodies);
   if (separation_m > 0) checkHoldsDistance(options, "minimum_separation_m = " + std::to_string(separation_m));
 }

@@ -121,8 +121,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
 void History::Impl::setOptions(const Options& wanted) {
   if (options && *options == wanted) return;
   check(wanted);
-  std::unique_ptr<Rung> rung;
-  if (wanted.accuracy.rung != Accuracy::SCREEN) rung = makeRung(wanted.accuracy);
+  std::unique_ptr<Rung> rung = makeRung(wanted.accuracy);
   if (!arena || wanted.num_threads != options->num_threads) arena.emplace(wanted.num_threads);
   elementary = std::move(rung);
   scene.setKeepBounds(wanted.keep_bounds);

@@ -176,7 +176,7 @@ void PairWorker::flush() {
   // Which pairs are late depends on which were looked at first: no pair is left out where they are counted.
   const bool counts = context_->found && context_->found->isSet();
   if (context_->earliest_only && !counts) dropLate();
-  if (!context_->elementary || context_->timeIsUp()) {
+  if (context_->timeIsUp()) {
     keepUndecided();
   } else {
     decide();

@@ -48,7 +48,7 @@ struct TaskHits {
 /// What all workers share during a step.
 struct StepContext {
   const SceneArrays* scene = nullptr;
-  const Rung* elementary = nullptr;  ///< null: screen
+  const Rung* elementary = nullptr;
   Deadline deadline;
   std::atomic<bool> expired{false};
   bool earliest_only = false;

@@ -203,15 +203,6 @@ class StateTest(LiveNodeTest):
                 self.assertFalse(self.clear[-1].data)
                 stream.end()
 
-    def test_fast_proves_nothing(self):
-        self.start_node('fast', accuracy='fast')
-        stream = self.stream(Sheet())
-        wait_for(lambda: sum(c.answered for c in self.contacts) > 5, 20, 'answers')
-        stream.end()
-        self.assertFalse(any(s.proved for s in self.states))
-        self.assertFalse(any(c.data for c in self.clear))
-        self.assertIn('accuracy fast', self.states[-1].reason)
-
     def test_a_mesh_that_is_not_wholly_used(self):
         """Faces that name a vertex twice, none at all, and a second list of triangles."""
         self.start_node('dropped')

@@ -122,18 +122,18 @@ class LaunchTest(unittest.TestCase):
         for preset in PRESETS:
             own = CHECKOUT / 'config/presets' / (preset.stem + '.yaml')
             with self.subTest(preset.name):
-                plain = self.parameters(preset, 'accuracy:=fast', 'num_threads:=2')
-                self.assertLessEqual({'accuracy': 'fast', 'num_threads': 2}.items(), plain.items())
+                plain = self.parameters(preset, 'accuracy:=conservative', 'num_threads:=2')
+                self.assertLessEqual({'accuracy': 'conservative', 'num_threads': 2}.items(), plain.items())
                 self.assertIn('config/presets/' + own.name, preset.read_text())
-                added = self.parameters(preset, self.file('max_step_s: 7.0\n'), 'accuracy:=fast', 'num_threads:=2')
+                added = self.parameters(preset, self.file('max_step_s: 7.0\n'), 'accuracy:=conservative', 'num_threads:=2')
                 self.assertEqual(added, {**plain, 'max_step_s': 7.0})
 
     def test_demo(self):
         shown = {'markers/mesh': True, 'markers/obstacle_m': 1.0}
         found = self.parameters('demo.launch')
         self.assertLessEqual(set(shown.items()) | {('fixed_frame', 'world')}, set(found.items()))
-        found = self.parameters('demo.launch', self.file(BODIES), 'accuracy:=screen')
-        self.assertLessEqual(set(shown.items()) | {('bodies/felt/topic', '/felt'), ('accuracy', 'screen')}, set(found.items()))
+        found = self.parameters('demo.launch', self.file(BODIES), 'accuracy:=conservative')
+        self.assertLessEqual(set(shown.items()) | {('bodies/felt/topic', '/felt'), ('accuracy', 'conservative')}, set(found.items()))
         self.assertNotIn('topic', found)
 
     def test_a_monitor_starts_with_bodies_from_a_file(self):

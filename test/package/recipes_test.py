@@ -33,7 +33,8 @@ RUNG = {
     'src/elementary/toy.cpp': (None, TOY_RUNG),
     'src/elementary/elementary.cpp': [
         ('\nnamespace {\n', '\nstd::unique_ptr<Rung> makeToyRung(const AccuracyOptions& options);\n\nnamespace {\n'),
-        ('{"exact", makeExactRung, false},\n', '{"exact", makeExactRung, false},\n    {"toy", makeToyRung, false},\n')],
+        ('{"exact", makeExactRung, false, true},\n',
+         '{"exact", makeExactRung, false, true},\n    {"toy", makeToyRung, false, false},\n')],
 }
 EFFECT = {
     'include/dccd/outcome.h': (r'contacts' + '\n  COUNT\n', 'contacts\n  TOY,\n  COUNT\n'),

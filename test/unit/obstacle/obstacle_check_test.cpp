@@ -157,18 +157,6 @@ TEST(ObstacleCheck, FeaturesOnInactiveVerticesAreLeftOut) {
   EXPECT_EQ(run(*surface, TRIANGLE, broken, t1).contacts.size(), 2u) << "not finite is as good as inactive";
 }
 
-TEST(ObstacleCheck, ScreenSaysUndecidedWithALowerBound) {
-  const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
-  ObstacleOptions options;
-  options.accuracy.rung = Accuracy::SCREEN;
-  const Answer answer = run(*surface, ROPE, {{0.5, -1, 2}, {0.75, 3, 2}}, {{0.5, -1, 0}, {0.75, 3, 0}}, options);
-  ASSERT_EQ(answer.contacts.size(), 1u);
-  EXPECT_EQ(answer.contacts[0].certainty, Certainty::UNDECIDED);
-  EXPECT_LE(answer.contacts[0].toc_lower, 0.5);
-  EXPECT_GT(answer.contacts[0].toc_lower, 0.49);
-  EXPECT_EQ(answer.contacts[0].toc_upper, 1.0);
-}
-
 TEST(ObstacleCheck, ReusedItGivesTheSameAnswer) {
   const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
   ObstacleCheck test({});

@@ -118,6 +118,12 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
     std::function<void(XmlRpcValue&)> set;
   };
   const Case cases[] = {
+      {"~accuracy is 'fast', which proves nothing and is no setting of a monitor; write exact",
+       [](XmlRpcValue& t) { t["accuracy"] = "fast"; }},
+      {"~accuracy is 'screen', which proves nothing and is no setting of a monitor; write exact",
+       [](XmlRpcValue& t) { t["accuracy"] = "screen"; }},
+      {"~accuracy is 'exactly', it must be one of conservative, exact; nearest is 'exact'",
+       [](XmlRpcValue& t) { t["accuracy"] = "exactly"; }},
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
       {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
        "separation: write accuracy: conservative",
@@ -132,7 +138,7 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        }},
       {"~minimum_separation_pairs asks for",
        [](XmlRpcValue& t) {
-         t["accuracy"] = "fast";
+         t["accuracy"] = "exact";
          t["minimum_separation_pairs"][0] = separationPair("mesh", "octomap", 0.01);
        }},
       {"~uncertainty asks for an uncertainty radius: write accuracy: conservative",

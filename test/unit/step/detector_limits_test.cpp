@@ -283,25 +283,6 @@ TEST(DetectorLimits, TheBudgetHoldsForTheMapToo) {
   }
 }
 
-TEST(DetectorLimits, ScreenReportsBoundsOfItsPairs) {
-  const TestStep step = crossing();
-  Options options;
-  const Outcome exact = runOnce(step, options);
-  options.accuracy.rung = Accuracy::SCREEN;
-  const Outcome screen = runOnce(step, options);
-  ASSERT_FALSE(exact.contacts.empty());
-  for (const Contact& c : exact.contacts) {
-    const auto same = std::find_if(screen.contacts.begin(), screen.contacts.end(), [&](const Contact& s) {
-      return s.kind == c.kind && s.body == c.body && s.vertex == c.vertex;
-    });
-    ASSERT_NE(same, screen.contacts.end());
-    EXPECT_EQ(same->certainty, Certainty::UNDECIDED);
-    EXPECT_LE(same->toc_lower, c.toc_lower);
-    EXPECT_GT(same->toc_lower, 0);
-  }
-  EXPECT_EQ(screen.stats.undecided, screen.contacts.size());
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd
