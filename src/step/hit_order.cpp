@@ -9,6 +9,8 @@ namespace dccd {
 namespace {
 constexpr int BITS = 12;
 constexpr std::size_t BUCKETS = std::size_t{1} << BITS;
+// Below this the passes over the buckets take longer than comparing; most steps of a stream find few or none.
+constexpr std::size_t FEW = 1024;
 }  // namespace
 
 // Stable, so that sorting by the key first and by the bodies then sorts by both.
@@ -51,8 +53,14 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
       bodies_and &= h.bodies;
     }
   }
-  b_.resize(a_.size());
   most_ = std::max(most_, a_.size());
+  if (a_.size() < FEW) {
+    std::sort(a_.begin(), a_.end(), [](const Entry& x, const Entry& y) {
+      return x.hit->bodies != y.hit->bodies ? x.hit->bodies < y.hit->bodies : x.key < y.key;
+    });
+    return sorted();
+  }
+  b_.resize(a_.size());
   // The ranks fill few of their 32 bits; side by side they need fewer digits.
   int low_bits = 0;
   while (low_bits < 32 && (key_or & 0xffffffffu) >> low_bits) ++low_bits;
@@ -60,10 +68,14 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
   for (Entry& e : a_) e.key = packed(e.key);
   sortByKey(packed(key_or) ^ packed(key_and));
   // Ranks go through all bodies, so that the first feature's body is in order already; the second's may not be.
-  if (!a_.empty() && bodies_or != bodies_and) {
+  if (bodies_or != bodies_and) {
     for (Entry& e : a_) e.key = e.hit->bodies;
     sortByKey(bodies_or ^ bodies_and);
   }
+  return sorted();
+}
+
+const std::vector<const Hit*>& HitOrder::sorted() {
   sorted_.resize(a_.size());
   for (std::size_t i = 0; i < a_.size(); ++i) sorted_[i] = a_[i].hit;
   return sorted_;

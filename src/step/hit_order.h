@@ -8,7 +8,8 @@
 
 namespace dccd {
 
-/// Sorts hits by bodies, then by key (radix sort on the digits in use; no two are equal in both). Keeps its buffers.
+/// Sorts hits by bodies, then by key (many by a radix sort on the digits in use; no two are equal in both). Keeps its
+/// buffers.
 class HitOrder {
  public:
   /// The result is valid until the next call; its elements point into the workers' vectors.
@@ -22,6 +23,7 @@ class HitOrder {
     const Hit* hit;
   };
   void sortByKey(std::uint64_t differing_bits);
+  const std::vector<const Hit*>& sorted();
   std::vector<Entry> a_, b_;
   std::vector<const Hit*> sorted_;
   std::size_t most_ = 0;  // hits of a call since beginStep()
