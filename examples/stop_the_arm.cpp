@@ -1,9 +1,10 @@
 // A client of the monitor in a page: says when an arm must stop. It publishes ~stop (std_msgs/Bool) twenty times a
 // second; connect it to whatever stops your arm, and let that stop, too, when ~stop itself falls silent.
 //
-// Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~state is not proved or
-// something touches, and when either is old: what is not known to be clear is not clear. This is no safety function;
-// see doc/guarantees.md.
+// Stop when a new contact is predicted nearer in time than the arm needs to stand still, when one has begun, when
+// ~state is not proved, and when either is old: what is not known is not clear. What is expected to touch, and what
+// lasts, is no reason to stop; after a new contact the arm stays for hold_s. This is no safety function; see
+// doc/guarantees.md.
 #include <algorithm>
 #include <string>
 
@@ -19,6 +20,7 @@ class StopTheArm {
     // and braking. The monitor's look_ahead_s must be longer.
     stopping_time_s_ = node_.param("stopping_time_s", 0.3);
     max_age_s_ = node_.param("max_age_s", 0.2);
+    hold_s_ = node_.param("hold_s", 0.5);
     const std::string monitor = node_.param<std::string>("monitor", "/collision_monitor");
     stop_ = node_.advertise<std_msgs::Bool>("stop", 1, true);
     state_ = node_.subscribe(monitor + "/state", 1, &StopTheArm::onState, this);
@@ -29,7 +31,7 @@ class StopTheArm {
  private:
   void onState(const deformable_ccd::State& message) {
     proved_ = message.proved;
-    touches_ = message.touching != deformable_ccd::State::NONE;
+    if (message.touching == deformable_ccd::State::NEW) hold("something touches anew");
     // What is latched may be as old as the frame that it ends with; that it came just now says nothing.
     const bool newer = message.holds_until != holds_until_;
     holds_until_ = message.holds_until;
@@ -43,17 +45,21 @@ class StopTheArm {
     predicted_at_ = ros::SteadyTime::now();
   }
 
+  void hold(const std::string& reason) {
+    held_at_ = ros::SteadyTime::now();
+    held_for_ = reason;
+  }
+
   /// Empty: the arm may move.
-  std::string reasonToStop() const {
+  std::string reasonToStop() {
     const ros::SteadyTime now = ros::SteadyTime::now();
     const double state_age_s = (now - state_at_).toSec(), prediction_age_s = (now - predicted_at_).toSec();
     if (state_at_.isZero() || state_age_s > max_age_s_) return "no news from the monitor";
     if (!proved_) return "nothing is proved";
-    if (touches_) return "something touches";
     if (predicted_at_.isZero() || prediction_age_s > max_age_s_) return "no prediction; is look_ahead_s set?";
     if (!answered_) return "a prediction without an answer";
-    if (contact_in_s_ - prediction_age_s <= stopping_time_s_) return "contact within the stopping time";
-    return "";
+    if (contact_in_s_ - prediction_age_s <= stopping_time_s_) hold("a new contact within the stopping time");
+    return !held_at_.isZero() && (now - held_at_).toSec() <= hold_s_ ? held_for_ : "";
   }
 
   void decide() {
@@ -66,14 +72,16 @@ class StopTheArm {
   }
 
   ros::NodeHandle node_;
-  double stopping_time_s_ = 0, max_age_s_ = 0;
+  double stopping_time_s_ = 0, max_age_s_ = 0, hold_s_ = 0;
   ros::Publisher stop_;
   ros::Subscriber state_, prediction_;
   ros::SteadyTimer timer_;
-  bool proved_ = false, touches_ = false, answered_ = false;
+  bool proved_ = false, answered_ = false;
   double contact_in_s_ = 0;
   ros::Time holds_until_;
-  ros::SteadyTime state_at_, predicted_at_;  // the steady clock: no replay and no clock change can make old news fresh
+  // The steady clock: no replay and no clock change can make old news fresh.
+  ros::SteadyTime state_at_, predicted_at_, held_at_;
+  std::string held_for_;
   std::string told_ = "?";
 };
 

@@ -103,8 +103,14 @@ TEST_P(StopTheArm, InTime) {
   expectStop(true, "not proved, as across a seam");
   monitor.proved = true;
   monitor.touching = deformable_ccd::State::NEW;
-  expectStop(true, "proved, and something touches");
+  expectStop(true, "proved, and something touches anew");
+  monitor.touching = deformable_ccd::State::LASTING;
+  expectStop(false, "it lasts, and nothing new is in sight");
+  monitor.contact_in_s = 0.1;
+  expectStop(true, "another one is");
+  monitor.contact_in_s = std::numeric_limits<double>::infinity();
   monitor.touching = deformable_ccd::State::NONE;
+  expectStop(false, "neither came");
   monitor.answered = false;
   expectStop(true, "no answer is not \"no contact\"");
 }

@@ -1,0 +1,144 @@
+#include "output/patch_messages.h"
+
+#include <algorithm>
+#include <set>
+
+#include "dccd/new_contacts.h"
+#include "output/output_messages.h"
+
+namespace dccd {
+namespace {
+
+using EventMessage = deformable_ccd::PatchEvent;
+using PatchMessage = deformable_ccd::Patch;
+
+static_assert(static_cast<int>(PatchBeginning::MAP_CHANGED) == static_cast<int>(PatchMessage::MAP_CHANGED));
+static_assert(static_cast<int>(PatchEventKind::ENDED) == static_cast<int>(EventMessage::ENDED));
+static_assert(static_cast<int>(PatchEventKind::SPLIT) == static_cast<int>(EventMessage::SPLIT));
+static_assert(static_cast<int>(PatchEventKind::MERGED) == static_cast<int>(EventMessage::MERGED));
+
+std::string nameOf(std::uint16_t body, const std::vector<Body>& bodies) {
+  return body == OBSTACLE_BODY ? "octomap" : bodies.at(body).name;
+}
+
+template <class Names>
+void fillNames(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies, Names& out) {
+  for (std::size_t side = 0; side < 2; ++side) out[side] = nameOf(body[side], bodies);
+}
+
+ros::Time knownTime(StampNs stamp_ns) { return stamp_ns == UNKNOWN_NS ? ros::Time() : toRosTime(stamp_ns); }
+
+template <class Message>
+void fill(const Vec3& from, Message& to) {
+  to.x = from.x();
+  to.y = from.y();
+  to.z = from.z();
+}
+
+PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
+  PatchMessage out;
+  out.id = patch.id;
+  fillNames(patch.body, bodies, out.bodies);
+  out.expected = patch.expected;
+  out.beginning = static_cast<std::uint8_t>(patch.beginning);
+  out.began_from = knownTime(patch.began_from_ns);
+  out.began_to = knownTime(patch.began_to_ns);
+  out.contacts = static_cast<std::uint32_t>(patch.contacts);
+  out.certain = static_cast<std::uint32_t>(patch.certain);
+  out.initial = static_cast<std::uint32_t>(patch.initial);
+  out.crossings = static_cast<std::uint32_t>(patch.crossings);
+  out.toc_lower = patch.toc_lower;
+  out.toc_upper = patch.toc_upper;
+  out.area = patch.area_m2;
+  fill(patch.centroid, out.centroid);
+  fill(patch.normal, out.normal);
+  if (!patch.box.empty()) {
+    fill(patch.box.min, out.box_min);
+    fill(patch.box.max, out.box_max);
+  }
+  return out;
+}
+
+/// "cloth and itself".
+std::string pairOf(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies) {
+  return nameOf(body[0], bodies) + " and " + (body[0] == body[1] ? "itself" : nameOf(body[1], bodies));
+}
+
+std::string listOf(const std::vector<std::uint64_t>& ids) {
+  std::string text;
+  for (const std::uint64_t id : ids) text += (text.empty() ? "" : ", ") + std::to_string(id);
+  return text;
+}
+
+std::string summaryOf(const PatchEvent& event, const std::vector<Body>& bodies) {
+  const std::string name = "patch " + std::to_string(event.id) + " of " + pairOf(event.body, bodies);
+  switch (event.kind) {
+    case PatchEventKind::BEGAN:
+      if (event.beginning == PatchBeginning::INITIAL) return name + " touched already when it was first looked at";
+      if (event.beginning == PatchBeginning::MAP_CHANGED) return name + " began where the map changed";
+      return name + " began" + (event.expected ? ", as expected" : "");
+    case PatchEventKind::ENDED:
+      return name + (event.to_ns == UNKNOWN_NS ? " was lost sight of" : " ended");
+    case PatchEventKind::SPLIT:
+      return name + " split: " + listOf(event.others) + " came off";
+    case PatchEventKind::MERGED:
+      return name + " merged: " + listOf(event.others) + " went into it";
+  }
+  return name;
+}
+
+}  // namespace
+
+deformable_ccd::PatchArray toPatchArray(const Outcome& outcome, const std::vector<Body>& bodies,
+                                        const std::string& frame) {
+  deformable_ccd::PatchArray out;
+  out.header = headerOf(outcome.stamp_ns, frame);
+  out.status = static_cast<std::uint8_t>(outcome.status);
+  out.answered = outcome.answered;
+  for (const Patch& patch : outcome.patches) out.patches.push_back(toMessage(patch, bodies));
+  return out;
+}
+
+std::vector<EventMessage> toPatchEvents(const Outcome& outcome, const std::vector<Body>& bodies,
+                                        const std::string& frame) {
+  std::vector<EventMessage> all;
+  for (const PatchEvent& event : outcome.patch_events) {
+    EventMessage out;
+    out.header = headerOf(outcome.stamp_ns, frame);
+    out.kind = static_cast<std::uint8_t>(event.kind);
+    out.id = event.id;
+    out.others = event.others;
+    fillNames(event.body, bodies, out.bodies);
+    out.expected = event.expected;
+    out.beginning = static_cast<std::uint8_t>(event.beginning);
+    out.earliest = knownTime(event.from_ns);
+    out.latest = knownTime(event.to_ns);
+    out.summary = summaryOf(event, bodies);
+    all.push_back(std::move(out));
+  }
+  return all;
+}
+
+std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, const std::vector<Body>& bodies) {
+  std::vector<deformable_ccd::PairContact> all;
+  for (const NewContact& one : newContacts(outcome)) {
+    deformable_ccd::PairContact out;
+    fillNames(one.body, bodies, out.bodies);
+    out.patch = one.patch;
+    out.contact = toContact(outcome, one.contact);
+    out.earliest = timeBefore(outcome, one.contact.toc_lower);
+    out.latest = timeAfter(outcome, one.contact.toc_upper);
+    all.push_back(std::move(out));
+  }
+  return all;
+}
+
+std::size_t lastingPatches(const Outcome& outcome) {
+  std::set<std::uint64_t> ids;
+  for (const Patch& patch : outcome.patches) {
+    if (patch.id != 0 && !patch.expected && !isNew(outcome, patch)) ids.insert(patch.id);
+  }
+  return ids.size();
+}
+
+}  // namespace dccd
