@@ -86,6 +86,8 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   const Clock::time_point called = Clock::now();
   setOptions(wanted);
   setBodies(step);
+  if (!expected_known) expected.set(options->expected, step.bodies);
+  expected_known = true;
   useMap(step.map);
   // What is made once for many steps is not taken from the time of the first.
   if (!deadline.isNever()) deadline = deadline.movedTo(deadline.at() + (Clock::now() - called));
@@ -103,7 +105,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   begins_at = nullptr;
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
-  conclude(*options, step, needed, outcome);
+  conclude(*options, expected, step, needed, outcome);
   return outcome;
 }
 
@@ -116,6 +118,7 @@ void History::Impl::setOptions(const Options& wanted) {
   elementary = std::move(rung);
   scene.setKeepBounds(wanted.keep_bounds);
   obstacle_checks.clear();
+  expected_known = false;
   map_given = nullptr;  // other boxes may be excluded
   options = wanted;
 }
@@ -130,6 +133,7 @@ void History::Impl::setBodies(const Step& step) {
   unfolded.clear();
   for (const SceneBody& body : scene.bodies()) unfolded.emplace_back(body);
   obstacle_checks.clear();
+  expected_known = false;
   findLeftOut(step);
 }
 

@@ -16,6 +16,7 @@
 #include "culling/scene_arrays.h"
 #include "culling/unfolded.h"
 #include "dccd/detect.h"
+#include "step/expected_contacts.h"
 #include "step/float_mode.h"
 #include "step/fork_join.h"
 #include "step/hit_order.h"
@@ -124,6 +125,8 @@ struct History::Impl {
   Eigen::Isometry3d map_pose = Eigen::Isometry3d::Identity();  // with which
   std::uint64_t excluded_voxels = 0;
   std::vector<std::unique_ptr<ObstacleCheck>> obstacle_checks;
+  ExpectedContacts expected;
+  bool expected_known = false;  // it is of these options and bodies
 
   // Buffers of a part.
   tbb::enumerable_thread_specific<PairWorker> workers;
