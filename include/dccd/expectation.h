@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "dccd/body.h"
+#include "dccd/export.h"
 #include "dccd/types.h"
 
 namespace dccd {
@@ -29,5 +31,9 @@ struct Expectation {
     return a.partners == b.partners && a.phase == b.phase;
   }
 };
+
+/// A sentence for each: "cloth ('hem', 30 vertices) with finger in phase 'carry'".
+DCCD_EXPORT std::vector<std::string> describe(const std::vector<Expectation>& expected,
+                                              const std::vector<Body>& bodies);
 
 }  // namespace dccd

@@ -45,15 +45,16 @@ DCCD_EXPORT bool isSeam(StepStatus status);
 
 /// The stages of the flow, in order. Names by toString().
 enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
-/// What a scene can call for, and a user can set (doc/interface.md). Names by toString().
+/// What a scene can call for, and a user can set (doc/interface.md). Names by toString(). Each pair and each moment
+/// counts for one of them alone.
 enum class Effect : std::uint8_t {
   SELF_COLLISION,
   BODY_BODY,
   OCTOMAP,
   START_STATE,
-  RIGID_BODIES,        ///< those of BODY_BODY with a rigid body; ms: also the split of the step
+  RIGID_BODIES,        ///< in: bodies that turn, out: how often one was placed for a part of the step
   UNKNOWN_SPACE,       ///< in: voxels that the step sweeps, out: those that the map does not know
-  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test
+  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test, and no uncertainty
   TRACKER_NOISE,       ///< pairs whose vertices bring an uncertainty radius
   LOOK_AHEAD,          ///< the last prediction: pairs past the filters, contacts
   COUNT

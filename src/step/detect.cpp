@@ -93,9 +93,9 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (!deadline.isNever()) deadline = deadline.movedTo(deadline.at() + (Clock::now() - called));
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
-  const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
-  const std::size_t parts = std::min(needed, options->max_substeps);
   Outcome outcome;
+  const std::size_t needed = neededParts(step, outcome.stats);
+  const std::size_t parts = std::min(needed, options->max_substeps);
   outcome.start_ns = step.start_ns;
   outcome.stamp_ns = step.stamp_ns;
   outcome.sequence = step.sequence;
@@ -154,6 +154,18 @@ void History::Impl::useMap(const ObstacleMap& map) {
   map_pose = map.map_from_fixed;
 }
 
+/// How often the step is to be cut for the bodies that turn, and how many these are.
+std::size_t History::Impl::neededParts(const Step& step, StepStats& stats) const {
+  const auto turning =
+      std::count_if(step.bodies.begin(), step.bodies.end(), [](const Body& body) { return body.turns; });
+  if (turning == 0) return 1;
+  const Clock::time_point start = Clock::now();
+  const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
+  stats[Effect::RIGID_BODIES] = {static_cast<std::uint64_t>(turning), 0, msSince(start)};
+  stats.total_ms += stats[Effect::RIGID_BODIES].ms;
+  return needed;
+}
+
 bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome) {
   bool reached_end = true;
   if (parts == 1) {
@@ -172,6 +184,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
       advance(step, i + 1, parts, part);
       const double place_ms = msSince(start);
       outcome.stats[Effect::RIGID_BODIES].ms += place_ms;
+      outcome.stats[Effect::RIGID_BODIES].out += outcome.stats[Effect::RIGID_BODIES].in;
       outcome.stats.total_ms += place_ms;
       runPart({part, i, parts, i > 0 || continues, deadline}, outcome);
     }

@@ -43,7 +43,4 @@ class ExpectedContacts {
 
 /// Throws std::invalid_argument unless each names two of the bodies, or a body and then the map.
 void checkPartners(const std::vector<Expectation>& expected, std::size_t bodies);
-/// A sentence for each.
-std::vector<std::string> describe(const std::vector<Expectation>& expected, const std::vector<Body>& bodies);
-
 }  // namespace dccd

@@ -76,6 +76,7 @@ struct History::Impl {
   void listLeftOut(std::size_t body, PairKind kind);
   bool needsReference(std::size_t body) const;
 
+  std::size_t neededParts(const Step& step, StepStats& stats) const;
   bool runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome);
   void runPart(const Part& part, Outcome& outcome);
   void fill(const Part& part);
