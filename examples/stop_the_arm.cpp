@@ -2,8 +2,8 @@
 // second; connect it to whatever stops your arm, and let that stop, too, when ~stop itself falls silent.
 //
 // Stop when the predicted contact is nearer in time than the arm needs to stand still, when ~state is not proved or
-// something touches, and when either is old: what is not known to be clear is not clear. This is no safety function;
-// see doc/guarantees.md.
+// something touches that is not expected to, and when either is old: what is not known to be clear is not clear. This
+// is no safety function; see doc/guarantees.md.
 #include <algorithm>
 #include <string>
 
@@ -29,7 +29,9 @@ class StopTheArm {
  private:
   void onState(const deformable_ccd::State& message) {
     proved_ = message.proved;
-    touches_ = message.touching != deformable_ccd::State::NONE;
+    // What is expected to touch in this phase of the task is no reason to stop.
+    using deformable_ccd::State;
+    touches_ = message.touching != State::NONE && message.touching != State::EXPECTED;
     // What is latched may be as old as the frame that it ends with; that it came just now says nothing.
     const bool newer = message.holds_until != holds_until_;
     holds_until_ = message.holds_until;

@@ -2,7 +2,8 @@
 """A client of the monitor in a page: says when an arm must stop. As stop_the_arm.cpp, which says more.
 
 Publishes ~stop (std_msgs/Bool) twenty times a second: true when the predicted contact is nearer in time than the arm
-needs to stand still, when ~state is not proved or something touches, and when either is old. This is no safety function.
+needs to stand still, when ~state is not proved or something touches that is not expected to, and when either is old.
+This is no safety function.
 """
 import time
 
@@ -42,7 +43,8 @@ class StopTheArm:
             return 'no news from the monitor'
         if not state.proved:
             return 'nothing is proved'
-        if state.touching != State.NONE:
+        # What is expected to touch in this phase of the task is no reason to stop.
+        if state.touching not in (State.NONE, State.EXPECTED):
             return 'something touches'
         if now - predicted_at > self.max_age_s:
             return 'no prediction; is look_ahead_s set?'

@@ -104,6 +104,10 @@ TEST_P(StopTheArm, InTime) {
   monitor.proved = true;
   monitor.touching = deformable_ccd::State::NEW;
   expectStop(true, "proved, and something touches");
+  monitor.touching = deformable_ccd::State::EXPECTED;
+  expectStop(false, "what is expected to touch is no reason to stop");
+  monitor.touching = deformable_ccd::State::LASTING;
+  expectStop(true, "what lasts and is not expected is one");
   monitor.touching = deformable_ccd::State::NONE;
   monitor.answered = false;
   expectStop(true, "no answer is not \"no contact\"");
