@@ -71,7 +71,7 @@ std::unique_ptr<Monitor> monitorFor(const Recorded& scene, const EffectSettings&
   described.bodies[0].name = "flag";
   described.bodies[0].topology = scene.topology;
   described.map_source = "the map";
-  described.map_seen = true;
+  described.map_seen = described.map_used = true;
   const EffectPlan plan(described, settings);
   MonitorOptions options;
   options.store.max_vertex_step_m = 0;

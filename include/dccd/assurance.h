@@ -14,10 +14,12 @@ struct Assurance {
   Touching touching = Touching::NONE;  ///< as far as known, where it is not proved
   std::vector<std::string> missing;    ///< what of the list was not shown, a sentence each; empty exactly when proved
   std::vector<std::string> excluded;   ///< what was left out by choice, a sentence each; takes nothing from `proved`
+  std::vector<std::string> expected;   ///< which contacts are expected, a sentence each; nor does this
 
   /// What stands in the way besides; none changes nothing.
   DCCD_EXPORT void hinder(const std::vector<std::string>& faults);
-  /// What simple clients ask for.
+  /// What simple clients ask for. An expected contact is a contact: where one is no reason to stop, ask for
+  /// `touching` NONE or EXPECTED.
   bool clear() const { return proved && touching == Touching::NONE; }
 };
 

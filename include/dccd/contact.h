@@ -36,8 +36,9 @@ struct Contact {
   std::uint32_t voxel_size = 0;             ///< octomap pairs: edge length of the occupied leaf in finest voxels
   PairKind kind = PairKind::VERTEX_FACE;
   Certainty certainty = Certainty::CERTAIN;
-  bool initial = false;  ///< in contact or inside at t=0
-  bool leaving = false;  ///< crossing outwards of what started inside an obstacle
+  bool initial = false;   ///< in contact or inside at t=0
+  bool leaving = false;   ///< crossing outwards of what started inside an obstacle
+  bool expected = false;  ///< by one of Options::expected: no alarm
 };
 
 /// The canonical order of contacts: kind, bodies, vertex indices, voxel; independent of threads and targets.

@@ -9,6 +9,7 @@
 #include "dccd/assurance.h"
 #include "dccd/deadline.h"
 #include "dccd/elementary.h"
+#include "dccd/expectation.h"
 #include "dccd/export.h"
 #include "dccd/outcome.h"
 #include "dccd/step.h"
@@ -36,16 +37,18 @@ struct Options {
   /// A step is split until straight paths are this close to a rotation's arc [m].
   double rigid_tolerance_m = tolerance::RIGID_PATH_M;
   std::size_t max_substeps = 64;
-  std::size_t max_contacts = std::numeric_limits<std::size_t>::max();  ///< the earliest are kept, status TRUNCATED
+  /// The earliest are kept, unexpected ones first; status TRUNCATED.
+  std::size_t max_contacts = std::numeric_limits<std::size_t>::max();
   /// A step that finds more than this, contacts and what meets when it begins each by itself, stops looking: status
   /// TRUNCATED, not complete. The same for any number of threads and SIMD target. 0: no limit.
   std::size_t max_found = 0;
   /// The same for each vertex, edge and face of the bodies, but max_contacts at the least: what coincides makes pairs
   /// by the square. 0: no limit.
   std::size_t max_found_per_feature = 0;
-  bool suppress_initial = false;   ///< leave initial obstacle contacts out of the list (they still count)
-  std::vector<Box> exclude_boxes;  ///< [m], fixed frame: voxels with their centre inside count as free
-  bool obstacle_expected = false;  ///< without a map the status is NO_MAP
+  bool suppress_initial = false;      ///< leave initial obstacle contacts out of the list (they still count)
+  std::vector<Box> exclude_boxes;     ///< [m], fixed frame: voxels with their centre inside count as free
+  bool obstacle_expected = false;     ///< without a map the status is NO_MAP
+  std::vector<Expectation> expected;  ///< in force for this step; not with earliest_only, which may find nothing else
   /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
   /// answer.
   std::vector<std::string> excluded;

@@ -45,15 +45,16 @@ DCCD_EXPORT bool isSeam(StepStatus status);
 
 /// The stages of the flow, in order. Names by toString().
 enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
-/// What a scene can call for, and a user can set (doc/interface.md). Names by toString().
+/// What a scene can call for, and a user can set (doc/interface.md). Names by toString(). Each pair and each moment
+/// counts for one of them alone.
 enum class Effect : std::uint8_t {
   SELF_COLLISION,
   BODY_BODY,
   OCTOMAP,
   START_STATE,
-  RIGID_BODIES,        ///< those of BODY_BODY with a rigid body; ms: also the split of the step
+  RIGID_BODIES,        ///< in: bodies that turn, out: how often one was placed for a part of the step
   UNKNOWN_SPACE,       ///< in: voxels that the step sweeps, out: those that the map does not know
-  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test
+  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test, and no uncertainty
   TRACKER_NOISE,       ///< pairs whose vertices bring an uncertainty radius
   LOOK_AHEAD,          ///< the last prediction: pairs past the filters, contacts
   COUNT
@@ -121,11 +122,13 @@ constexpr StepCounter STEP_COUNTERS[] = {
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };
 DCCD_EXPORT const char* toString(StartState state);
 
-/// Whether anything touches in a step. What could not be ruled out counts as touching.
+/// Whether anything touches in a step. What could not be ruled out counts as touching. Of several the first that holds
+/// in the order NEW, LASTING, EXPECTED, NONE.
 enum class Touching : std::uint8_t {
   NONE = 0,
-  LASTING = 1,  ///< all that touches did so when the step began, or crossed then
-  NEW = 2,
+  LASTING = 1,   ///< something unexpected touches, and did so when the step began, or crossed then
+  NEW = 2,       ///< something unexpected touches that did not when the step began
+  EXPECTED = 3,  ///< all that touches, or crossed when the step began, is expected
 };
 DCCD_EXPORT const char* toString(Touching touching);
 
@@ -135,6 +138,7 @@ DCCD_EXPORT const char* toString(Touching touching);
 struct StartIntersection {
   std::array<std::uint16_t, 2> body{0, 0};
   std::array<Index, 5> vertex{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};
+  bool expected = false;  ///< as of a contact
 };
 
 /// A pair of features of one body from which the separation is left out, because it is closer in the reference frame
@@ -150,7 +154,10 @@ struct LeftOutPair {
 struct ContactCounts {
   std::size_t certain = 0, undecided = 0;
   std::size_t initial = 0, leaving = 0;
-  std::size_t mesh = 0, obstacle = 0;  ///< with a body, with the map
+  std::size_t mesh = 0, obstacle = 0;              ///< with a body, with the map
+  std::size_t expected = 0, expected_initial = 0;  ///< the latter: both at once
+  std::size_t unexpectedNew() const { return certain + undecided - initial - (expected - expected_initial); }
+  std::size_t unexpectedInitial() const { return initial - expected_initial; }
 };
 
 /// What became of a step, or of a frame that made none. Shares what it names: it may be kept.
@@ -175,7 +182,8 @@ struct Outcome {
   bool cut = false;  ///< there was more to find than Options::max_found
   /// Pairs were left out, none of which can touch before this; otherwise infinity.
   double unchecked_toc_lower = std::numeric_limits<double>::infinity();
-  double earliest_toc = std::numeric_limits<double>::infinity();  ///< over contacts and what was left out
+  double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
+  double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
   StepStats stats;
   double unknown_fraction = 0;  ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
   std::size_t substeps = 0;     ///< parts that the step was cut into
@@ -183,6 +191,7 @@ struct Outcome {
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
   std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not
   std::vector<std::string> excluded;  ///< what was left out by choice
+  std::vector<std::string> expected;  ///< which contacts are expected, whether or not there are any
 
   std::shared_ptr<const Step> step;              ///< what it answers; null where nothing was answered
   std::shared_ptr<const VoxelSurface> obstacle;  ///< of the step's map, what exclude_boxes left; null: none

@@ -37,8 +37,16 @@ void readDepthImage(ParameterReader& section, MeshInputConfig& input) {
   if (is_image && input.rows) section.fail("rows", "has no meaning for a depth image, which brings its own; remove it");
 }
 
+void readSets(ParameterReader section, BodyConfig& body) {
+  for (const std::string& name : section.names()) {
+    body.sets[name] = section.indices(name);
+    if (body.sets[name].empty()) section.fail(name, "is empty; list the vertices of the set, or remove it");
+  }
+}
+
 void readTopology(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
+  readSets(section.section("sets"), body);
   input.source = topologySource(section);
   input.rows = static_cast<std::size_t>(section.integer("rows", 0, 0, 100000));
   input.cols = static_cast<std::size_t>(section.integer("cols", 0, 0, 100000));
@@ -108,6 +116,7 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
                   "must be static with topology/source depth_image: no point of a cloud has a path to the next");
     }
     if (!body.body.vertex_mask.empty()) reader.fail("vertex_mask", "has no meaning for a depth image; remove it");
+    if (!body.sets.empty()) reader.fail("topology/sets", "have no meaning for a depth image; remove them");
   }
   if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
   readUncertainty(reader.section("uncertainty"), body);
@@ -136,26 +145,13 @@ using NamedPair = std::pair<std::uint16_t, std::uint16_t>;
 /// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
 /// `before` are the pairs of the entries before it.
 void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vector<NamedPair>& before) {
-  const std::string octomap = "octomap";
-  std::vector<std::string> known{octomap};
-  for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
-  std::vector<std::uint16_t> pair;
-  for (const ParameterTree& name : entry.list("between")) {
-    const std::string& text = name.text;
-    const auto at = std::find(known.begin(), known.end(), text);
-    if (at == known.end()) {
-      entry.fail("between", "names '" + text + "', which is no body and not octomap; nearest is '" +
-                                nearestName(text, known) + "'");
-    }
-    pair.push_back(at == known.begin() ? OBSTACLE_BODY : static_cast<std::uint16_t>(at - known.begin() - 1));
-  }
-  if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
-  if (pair[0] == OBSTACLE_BODY) std::swap(pair[0], pair[1]);
-  if (pair[0] == OBSTACLE_BODY) entry.fail("between", "names octomap twice; name a body and octomap");
+  const std::array<std::uint16_t, 2> pair = readPartners(entry, config);
   const NamedPair named = std::minmax(pair[0], pair[1]);
   const auto twice = std::find(before.begin(), before.end(), named);
   if (twice != before.end()) {
-    const auto nameOf = [&](std::uint16_t body) { return body == OBSTACLE_BODY ? octomap : known[body + 1u]; };
+    const auto nameOf = [&](std::uint16_t body) {
+      return body == OBSTACLE_BODY ? "octomap" : config.bodies[body].body.name;
+    };
     entry.fail("between", "names " + nameOf(pair[0]) + " and " + nameOf(pair[1]) + ", as minimum_separation_pairs[" +
                               std::to_string(twice - before.begin()) + "] does; remove one of the two");
   }
@@ -167,6 +163,30 @@ void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vecto
 }
 
 }  // namespace
+
+std::array<std::uint16_t, 2> readPartners(ParameterReader& entry, const MonitorConfig& config) {
+  constexpr std::uint16_t SELF = OBSTACLE_BODY - 1;
+  std::vector<std::string> known{"octomap", "self"};
+  for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
+  std::vector<std::uint16_t> pair;
+  for (const ParameterTree& name : entry.list("between")) {
+    const auto at = std::find(known.rbegin(), known.rend(), name.text);  // a body may be called self
+    if (at == known.rend()) {
+      entry.fail("between", "names '" + name.text + "', which is no body and not octomap; nearest is '" +
+                                nearestName(name.text, known) + "'");
+    }
+    const std::ptrdiff_t place = known.rend() - at - 1;
+    pair.push_back(place == 0 ? OBSTACLE_BODY : place == 1 ? SELF : static_cast<std::uint16_t>(place - 2));
+  }
+  if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
+  if (pair[0] >= SELF) std::swap(pair[0], pair[1]);
+  if (pair[0] == OBSTACLE_BODY && pair[1] == OBSTACLE_BODY) {
+    entry.fail("between", "names octomap twice; name a body and octomap");
+  }
+  if (pair[0] >= SELF) entry.fail("between", "names self without a body; name the body first");
+  if (pair[1] == SELF) pair[1] = pair[0];
+  return {pair[0], pair[1]};
+}
 
 void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
   std::vector<NamedPair> before;

@@ -1,6 +1,8 @@
 // The part of the configuration that is about bodies: what they are, where they come from, what they keep apart from.
 #pragma once
 
+#include <array>
+
 #include "config/monitor_config.h"
 
 namespace dccd {
@@ -11,9 +13,14 @@ constexpr int MANY = 1000000000;
 
 /// minimum_separation_m of the section [m], or the fallback.
 double separationOf(ParameterReader& reader, double fallback);
+/// The two that an entry names under `between`: bodies, "octomap", which comes second then, and "self" for the other
+/// one again.
+std::array<std::uint16_t, 2> readPartners(ParameterReader& entry, const MonitorConfig& config);
 /// The bodies, and which of them is the clock. After the separation that is for all of them.
 void readBodies(ParameterReader& reader, MonitorConfig& config);
 /// minimum_separation_pairs. After the bodies.
 void readSeparationPairs(ParameterReader& reader, MonitorConfig& config);
+/// expected_contacts and phase. After the bodies.
+void readExpectedContacts(ParameterReader& reader, MonitorConfig& config);
 
 }  // namespace dccd

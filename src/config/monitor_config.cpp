@@ -180,6 +180,17 @@ void removeRigidBodies(MonitorConfig& config) {
     }
     config.bodies[b].body.separations = std::move(separations);
   }
+  std::vector<Expectation> expected;
+  for (Expectation& one : config.expected_contacts) {
+    bool gone = false;
+    for (ExpectedPartner& partner : one.partners) {
+      if (partner.body == OBSTACLE_BODY) continue;
+      partner.body = moved_to[partner.body];
+      gone = gone || partner.body == OBSTACLE_BODY;
+    }
+    if (!gone) expected.push_back(std::move(one));
+  }
+  config.expected_contacts = std::move(expected);
 }
 
 /// What an effect that is off takes away before a step is made, so that no body of a step tells of it. What bodies tell
@@ -313,7 +324,7 @@ std::uint64_t MonitorConfig::hash() const {
     text << ' ' << value;
   }
   text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.detector.max_contacts << ' '
-       << monitor.detector.suppress_initial << ' ' << markers.mesh;
+       << monitor.detector.suppress_initial << ' ' << markers.mesh << ' ' << phase;
   return hashOf(text.str());
 }
 
@@ -330,6 +341,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
   readSeparationPairs(reader, config);
+  readExpectedContacts(reader, config);
   readLimits(reader, config);
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();

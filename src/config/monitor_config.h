@@ -23,6 +23,8 @@ struct BodyConfig {
   bool topic_named = false;  ///< by a parameter; the node knows of remappings, too (node/named_inputs.h)
   MeshInputConfig input;
   std::string topology_file;
+  /// Vertices by name: topology/sets, and, once files are loaded, the groups of an OBJ.
+  std::map<std::string, std::vector<Index>> sets;
   // Rigid bodies: no topic, but a mesh file that a tf frame carries.
   std::string mesh_file;
   std::string tf_frame;
@@ -50,6 +52,9 @@ struct MonitorConfig {
   MonitorOptions monitor;
   EffectSettings effects;
   double minimum_separation_m = 0;  ///< of bodies that name none
+  /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
+  std::vector<Expectation> expected_contacts;
+  std::string phase;  ///< of the task, in force; empty: none
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
@@ -69,6 +74,12 @@ struct MonitorConfig {
   std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
   /// The bodies as the monitor is given them.
   std::vector<Body> monitorBodies() const;
+  /// Those that expected_contacts names, each once, in order.
+  std::vector<std::string> phases() const;
+  /// "known phases are 'carry' and 'grasp', and '' for none".
+  std::string phasesInWords() const;
+  /// What is expected in that phase.
+  std::vector<Expectation> expectedIn(const std::string& some_phase) const;
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
   /// A separation or an uncertainty is asked for, so that only conservative and screen will do.

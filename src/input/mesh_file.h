@@ -1,8 +1,10 @@
 // Mesh files: PLY by PCL's reader (ASCII, binary of either byte order), OBJ by our own (obj_file.h).
 #pragma once
 
+#include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dccd/types.h"
@@ -13,9 +15,13 @@ struct MeshFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Named parts of a mesh: ranges [first, last) of its faces.
+using FaceGroups = std::map<std::string, std::vector<std::pair<std::size_t, std::size_t>>>;
+
 struct MeshFile {
   Positions positions;      ///< [m], in the file's frame; float or double coordinates are taken exactly
   std::vector<Face> faces;  ///< polygons with more than three corners as fans
+  FaceGroups groups;        ///< of an OBJ
 };
 
 /// PLY or OBJ: vertices keep their numbers, their order and every bit of their coordinates, as frames and topologies

@@ -1,6 +1,7 @@
 #include "input/mesh_resource.h"
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 #include <ros/package.h>
@@ -43,11 +44,13 @@ MeshResource loadMeshResource(const std::string& address, double scale) {
       p *= scale;
       if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
     }
-    mesh.faces.erase(std::remove_if(mesh.faces.begin(), mesh.faces.end(),
-                                    [](const Face& f) { return f[0] == f[1] || f[1] == f[2] || f[0] == f[2]; }),
-                     mesh.faces.end());
-    resource.topology = std::make_shared<const Topology>(Topology::fromTriangles(mesh.positions.size(), mesh.faces));
+    std::vector<Face> faces;
+    std::copy_if(mesh.faces.begin(), mesh.faces.end(), std::back_inserter(faces),
+                 [](const Face& f) { return f[0] != f[1] && f[1] != f[2] && f[0] != f[2]; });
+    resource.topology = std::make_shared<const Topology>(Topology::fromTriangles(mesh.positions.size(), faces));
     resource.positions = std::move(mesh.positions);
+    resource.file_faces = std::move(mesh.faces);
+    resource.groups = std::move(mesh.groups);
   } catch (const MeshFileError& error) {
     throw std::invalid_argument(error.what());
   } catch (const TopologyError& error) {
@@ -57,11 +60,25 @@ MeshResource loadMeshResource(const std::string& address, double scale) {
   return resource;
 }
 
-std::shared_ptr<const Topology> loadTopologyFile(const std::string& address) {
+std::vector<Index> MeshResource::verticesOf(const std::string& group) const {
+  std::vector<Index> vertices;
+  const auto found = groups.find(group);
+  if (found == groups.end()) return vertices;
+  for (const auto& range : found->second) {
+    for (std::size_t f = range.first; f < range.second; ++f) {
+      vertices.insert(vertices.end(), file_faces[f].begin(), file_faces[f].end());
+    }
+  }
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
+}
+
+MeshResource loadTopologyFile(const std::string& address) {
   if (fileEnding(address) == "dae") {
     throw std::invalid_argument(address + ": a DAE does not number its vertices as a tracker does");
   }
-  return loadMeshResource(address, 1).topology;
+  return loadMeshResource(address, 1);
 }
 
 }  // namespace dccd

@@ -5,12 +5,18 @@
 #include <string>
 
 #include "dccd/topology.h"
+#include "input/mesh_file.h"
 
 namespace dccd {
 
 struct MeshResource {
   std::shared_ptr<const Topology> topology;
-  Positions positions;  ///< [m], after scaling
+  Positions positions;           ///< [m], after scaling
+  std::vector<Face> file_faces;  ///< as the file has them, which the groups count
+  FaceGroups groups;
+
+  /// The vertices of a group's faces, each once, in order; empty where there is no such group.
+  std::vector<Index> verticesOf(const std::string& group) const;
 };
 
 /// The mesh of a rigid body: PLY, OBJ, STL or DAE. The triangles of the last two are welded by exact coordinates.
@@ -19,6 +25,6 @@ MeshResource loadMeshResource(const std::string& address, double scale);
 
 /// The faces over the points that a tracker sends: PLY, OBJ or STL. A DAE is refused, for its vertices are numbered by
 /// the library that reads it. Throws as above.
-std::shared_ptr<const Topology> loadTopologyFile(const std::string& address);
+MeshResource loadTopologyFile(const std::string& address);
 
 }  // namespace dccd

@@ -2,6 +2,8 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <set>
+#include <sstream>
 
 namespace dccd {
 
@@ -16,10 +18,12 @@ class ObjReader {
   MeshFile read(std::istream& in) {
     for (std::string line; std::getline(in, line);) {
       ++line_;
+      if (line[0] == 'g' && (line.size() == 1 || isBlank(line[1]))) readGroups(line);
       if (line.size() < 2 || !isBlank(line[1])) continue;
       if (line[0] == 'v') readVertex(line);
       if (line[0] == 'f') readFace(line);
     }
+    endGroups();
     // Faces may name vertices that come after them.
     for (const Face& face : mesh_.faces) {
       for (const Index v : face) {
@@ -48,6 +52,23 @@ class ObjReader {
       at = end;
     }
     mesh_.positions.push_back(p);
+  }
+
+  /// Each name of the line is a group; none: the faces that follow belong to no group.
+  void readGroups(const std::string& line) {
+    endGroups();
+    std::istringstream words(line.substr(1));
+    for (std::string name; words >> name;) groups_.insert(name);
+  }
+
+  /// The faces since the last `g` are what its groups get.
+  void endGroups() {
+    for (const std::string& name : groups_) {
+      auto& ranges = mesh_.groups[name];
+      if (mesh_.faces.size() > begin_) ranges.emplace_back(begin_, mesh_.faces.size());
+    }
+    groups_.clear();
+    begin_ = mesh_.faces.size();
   }
 
   void readFace(const std::string& line) {
@@ -82,6 +103,8 @@ class ObjReader {
   const std::string& path_;
   std::size_t line_ = 0;
   MeshFile mesh_;
+  std::set<std::string> groups_;  // of the faces since begin_
+  std::size_t begin_ = 0;
 };
 
 }  // namespace

@@ -114,6 +114,7 @@ struct BagReplay::Run {
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
       : sink(to), predictions(predictions_to), bag(r.path_), pipeline(r.config_, transforms) {
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
+    pipeline.effects().hearPredictions(look_ahead.has_value());
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
       const std::string topic = r.config_.bodies[b].isRigid() ? "" : absolute(r.config_.bodies[b].topic);
       summary.mesh_topics.push_back(topic);

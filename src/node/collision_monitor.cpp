@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include <deformable_ccd/SetPhase.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
@@ -105,6 +106,7 @@ void CollisionMonitor::Impl::subscribe() {
 void CollisionMonitor::Impl::advertiseServices() {
   using Trigger = std_srvs::Trigger;
   using SetBool = std_srvs::SetBool;
+  using deformable_ccd::SetPhase;
   ros::NodeHandle service(private_node);
   service.setCallbackQueue(&service_callbacks);
   const auto advertise = [&](const char* name, const std::function<Reply()>& run, const char* asks = nullptr) {
@@ -141,6 +143,21 @@ void CollisionMonitor::Impl::advertiseServices() {
         const auto run = [this, on = request.data] {
           resetNow(StepStatus::DISABLED);
           return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
+        };
+        const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+        response.success = reply.success;
+        response.message = reply.message;
+        return true;
+      }));
+  services.push_back(service.advertiseService<SetPhase::Request, SetPhase::Response>(
+      "set_phase", [this](SetPhase::Request& request, SetPhase::Response& response) {
+        const auto run = [this, phase = request.phase] {
+          try {
+            pipeline.setPhase(phase);
+          } catch (const ParameterError& error) {
+            return Reply{false, error.what() + std::string("; in force is ") + pipeline.phaseInWords()};
+          }
+          return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
         };
         const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
         response.success = reply.success;

@@ -45,6 +45,10 @@ void EffectTracker::expectMap() {
   plan_ = EffectPlan(scene_, settings_);
 }
 
+void EffectTracker::hearPredictions(bool heard) {
+  if (std::exchange(scene_.predictions_heard, heard) != heard) plan_ = EffectPlan(scene_, settings_);
+}
+
 bool EffectTracker::decide(MonitorOptions& options) const {
   return std::exchange(options.detector.obstacle_expected, mapExpected()) != mapExpected();
 }
@@ -53,6 +57,8 @@ void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {
   if (!outcome.answered) return;
   bool changed = scene_.left_out_pairs != monitor.leftOut().size();
   scene_.left_out_pairs = monitor.leftOut().size();
+  const bool has_map = outcome.obstacle != nullptr;
+  changed = std::exchange(scene_.map_used, has_map) != has_map || changed;
   for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
     const auto& topology = outcome.step->bodies[b].topology;
     std::shared_ptr<const Topology>& known = scene_.bodies[b].topology;

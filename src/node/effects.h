@@ -23,9 +23,11 @@ class EffectTracker {
   bool mapSeen() const { return scene_.map_seen; }
   /// A map has come, or somebody is there who publishes maps.
   void expectMap();
+  /// Whether anybody subscribes to predictions, or they are asked for otherwise.
+  void hearPredictions(bool heard);
   /// Sets what the plan decides of a monitor's options. False: they are so already.
   bool decide(MonitorOptions& options) const;
-  /// Learns topologies and what is left out from the outcome.
+  /// Learns topologies, whether there is a map and what is left out from the outcome.
   void learn(const Outcome& outcome, const Monitor& monitor);
   /// True when the plan has changed since the last call, or at the first one.
   bool takeNewPlan();

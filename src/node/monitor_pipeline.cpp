@@ -4,6 +4,7 @@
 #include <chrono>
 #include <limits>
 #include <new>
+#include <set>
 #include <utility>
 
 #include "input/mesh_resource.h"
@@ -26,6 +27,24 @@ auto loadFile(const BodyConfig& body, const std::string& parameter, const std::s
   }
 }
 
+/// The groups of an OBJ are sets of the body; the vertices only of those that are wanted.
+void addGroups(const MeshResource& mesh, const std::string& file, const std::set<std::string>& wanted,
+               BodyConfig& body) {
+  for (const auto& group : mesh.groups) {
+    if (body.sets.count(group.first) > 0) {
+      throw ParameterError("parameter topology/sets/" + group.first + " of body '" + body.body.name + "': " + file +
+                           " has a group of this name, too; rename one of the two");
+    }
+    body.sets[group.first] = wanted.count(group.first) > 0 ? mesh.verticesOf(group.first) : std::vector<Index>();
+  }
+}
+
+std::string setsOf(const BodyConfig& body) {
+  std::string text;
+  for (const auto& set : body.sets) text += (text.empty() ? "'" : ", '") + set.first + "'";
+  return text.empty() ? "it has none; give them under topology/sets" : "it has " + text;
+}
+
 void checkGrid(const BodyConfig& body) {
   const std::size_t rows = body.input.rows, cols = body.input.cols, points = body.input.file_topology->vertexCount();
   if (rows == 0 || rows * cols == points) return;
@@ -43,12 +62,14 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transfor
       fixed_frame_(config_.fixed_frame) {
   hints_.resize(config_.bodies.size());
   loadFiles();
+  findSets();
+  config_.monitor.detector.expected = config_.expectedIn(config_.phase);
   monitor_ = std::make_unique<Monitor>(config_.monitor, config_.monitorBodies());
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
   placed_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
-  hinted_.resize(config_.bodies.size());
+  checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
 }
 
@@ -57,18 +78,71 @@ void MonitorPipeline::loadFiles() {
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     BodyConfig& body = config_.bodies[b];
     if (!body.topology_file.empty()) {
-      body.input.file_topology =
+      const MeshResource file =
           loadFile(body, "topology/file", "an STL, OBJ or PLY", [&] { return loadTopologyFile(body.topology_file); });
+      body.input.file_topology = file.topology;
+      addGroups(file, body.topology_file, setsNamed(b), body);
       checkGrid(body);
     }
     if (!body.isRigid()) continue;
     MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
                                  [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
+    addGroups(mesh, body.mesh_file, setsNamed(b), body);
     hints_[b] = rigidHint(body.mesh_file, mesh.positions, body.mesh_scale);
     rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
-    if (const std::string problem = maskProblem(b, *mesh.topology); !problem.empty()) throw ParameterError(problem);
     if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
   }
+}
+
+std::set<std::string> MonitorPipeline::setsNamed(std::size_t body) const {
+  std::set<std::string> names;
+  for (const Expectation& one : config_.expected_contacts) {
+    for (const ExpectedPartner& partner : one.partners) {
+      if (partner.body == body && !partner.set.empty()) names.insert(partner.set);
+    }
+  }
+  return names;
+}
+
+void MonitorPipeline::findSets() {
+  for (std::size_t e = 0; e < config_.expected_contacts.size(); ++e) {
+    for (ExpectedPartner& partner : config_.expected_contacts[e].partners) {
+      if (partner.set.empty()) continue;
+      const BodyConfig& body = config_.bodies[partner.body];
+      const auto found = body.sets.find(partner.set);
+      if (found == body.sets.end()) {
+        throw ParameterError("parameter expected_contacts[" + std::to_string(e) + "]/vertices names '" + partner.set +
+                             "', which is no set of body '" + body.body.name + "'; " + setsOf(body));
+      }
+      if (found->second.empty()) {
+        throw ParameterError("parameter expected_contacts[" + std::to_string(e) + "]/vertices names '" + partner.set +
+                             "' of body '" + body.body.name + "', a group without faces");
+      }
+      partner.vertices = found->second;
+    }
+  }
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
+    const Topology* known = rigid_[b] ? rigid_[b]->topology.get() : config_.bodies[b].input.file_topology.get();
+    const std::string problem = known ? indexProblem(b, *known) : "";
+    if (!problem.empty()) throw ParameterError(problem);
+  }
+}
+
+void MonitorPipeline::setPhase(const std::string& phase) {
+  const std::vector<std::string> known = config_.phases();
+  if (!phase.empty() && std::find(known.begin(), known.end(), phase) == known.end()) {
+    throw ParameterError("phase '" + phase + "' is unknown; " + config_.phasesInWords());
+  }
+  reconfigure([&](MonitorOptions& options, MarkerConfig&) { options.detector.expected = config_.expectedIn(phase); });
+  config_.phase = phase;
+}
+
+std::string MonitorPipeline::phaseInWords() const {
+  std::string text = config_.phase.empty() ? "no phase" : "phase '" + config_.phase + "'";
+  const std::vector<std::string> expected = describe(config_.monitor.detector.expected, config_.monitorBodies());
+  if (expected.empty()) return text + ", no contact is expected";
+  for (std::size_t i = 0; i < expected.size(); ++i) text += (i == 0 ? ", expected: " : "; ") + expected[i];
+  return text;
 }
 
 void MonitorPipeline::measureUnknown(Outcome& outcome) const {
@@ -111,12 +185,22 @@ void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns
   if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
 }
 
-std::string MonitorPipeline::maskProblem(std::size_t body, const Topology& topology) const {
-  const std::vector<Index>& mask = config_.bodies[body].body.vertex_mask;
-  const auto largest = std::max_element(mask.begin(), mask.end());
-  if (largest == mask.end() || *largest < topology.vertexCount()) return {};
-  return "parameter vertex_mask of body '" + config_.bodies[body].body.name + "' names vertex " +
-         std::to_string(*largest) + ", but the mesh has " + std::to_string(topology.vertexCount());
+std::string MonitorPipeline::indexProblem(std::size_t body, const Topology& topology) const {
+  const auto problem = [&](const std::string& parameter, const std::vector<Index>& vertices) -> std::string {
+    const auto largest = std::max_element(vertices.begin(), vertices.end());
+    if (largest == vertices.end() || *largest < topology.vertexCount()) return {};
+    return "parameter " + parameter + " of body '" + config_.bodies[body].body.name + "' names vertex " +
+           std::to_string(*largest) + ", but the mesh has " + std::to_string(topology.vertexCount());
+  };
+  std::string found = problem("vertex_mask", config_.bodies[body].body.vertex_mask);
+  for (std::size_t e = 0; e < config_.expected_contacts.size(); ++e) {
+    for (const ExpectedPartner& partner : config_.expected_contacts[e].partners) {
+      if (!found.empty() || partner.body != body) continue;
+      const std::string set = partner.set.empty() ? "" : " (set '" + partner.set + "')";
+      found = problem("expected_contacts[" + std::to_string(e) + "]/vertices" + set, partner.vertices);
+    }
+  }
+  return found;
 }
 
 DecodedMesh MonitorPipeline::decode(std::size_t body, const MeshMessage& message) {
@@ -146,12 +230,14 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     return refuse(StepStatus::BAD_MESSAGE,
                   "there is not enough memory for this message of " + std::to_string(message.size()) + " bytes");
   }
-  if (const std::string problem = maskProblem(body, *waiting.mesh.topology); !problem.empty()) {
+  // Of a mesh that is the last one's, all is known.
+  const bool is_new = checked_[body] != waiting.mesh.topology;
+  if (const std::string problem = is_new ? indexProblem(body, *waiting.mesh.topology) : ""; !problem.empty()) {
     monitor_->countReceived(body);
     return skip(body, StepStatus::VERTEX_COUNT, message.receipt_ns, message.arrival_ns, problem);
   }
-  if (hinted_[body] != waiting.mesh.topology) {
-    hinted_[body] = waiting.mesh.topology;
+  checked_[body] = waiting.mesh.topology;
+  if (is_new) {
     hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;

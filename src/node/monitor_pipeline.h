@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,12 @@ class MonitorPipeline {
   /// Changes what can be changed while it runs. Throws std::invalid_argument naming the option; all then stays.
   void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
 
+  /// The phase of the task that is on from the next step on. Throws ParameterError naming those that there are; all
+  /// then stays.
+  void setPhase(const std::string& phase);
+  /// Which contacts are expected in the phase that is on, in words.
+  std::string phaseInWords() const;
+
   /// The body's newest frame holds at all times. Safe to call from any thread.
   bool isStatic(std::size_t body) const { return config_.bodies[body].body.motion == BodyMotionKind::STATIC; }
   Monitor& monitor() { return *monitor_; }
@@ -105,7 +112,7 @@ class MonitorPipeline {
   std::vector<bool> placed_;  // a static body of which the monitor has a frame
   std::vector<std::optional<RigidMesh>> rigid_;
   std::vector<std::string> complaints_, hints_;
-  std::vector<std::shared_ptr<const Topology>> hinted_;  // the topology that the hint is about
+  std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   std::optional<LoadedMap> unplaced_map_;
   std::shared_ptr<const KnownSpace> known_;  // of the map in use
   std::int64_t unplaced_since_ns_ = 0;
@@ -120,11 +127,15 @@ class MonitorPipeline {
   bool finishing_ = false;
 
   void loadFiles();
+  /// Of the body, by expected_contacts.
+  std::set<std::string> setsNamed(std::size_t body) const;
+  /// The vertices of the sets that expected_contacts names. Throws ParameterError.
+  void findSets();
   /// Throws MeshError.
   DecodedMesh decode(std::size_t body, const MeshMessage& message);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
-  /// What of the body's vertex_mask the mesh has not; empty: it has all.
-  std::string maskProblem(std::size_t body, const Topology& topology) const;
+  /// What of the body's vertex_mask and of its expected contacts the mesh has not; empty: it has all.
+  std::string indexProblem(std::size_t body, const Topology& topology) const;
   /// A fixed frame that was learnt is forgotten, and with it where things were in it; frames of streams are counted
   /// under the status.
   void learnAnew(StepStatus status);

@@ -199,6 +199,7 @@ void CollisionMonitor::Impl::work() {
 bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& commands) {
   for (const auto& command : commands) carryOut(command);
   if (map_publisher_seen) pipeline.expectMap();
+  pipeline.effects().hearPredictions(outputs.wantsPrediction());
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
   if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();

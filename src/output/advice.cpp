@@ -122,7 +122,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     case StepStatus::DUPLICATE:
       return "the publisher must stamp every frame anew";
     case StepStatus::VERTEX_COUNT:
-      if (reason.compare(0, 21, "parameter vertex_mask") == 0) return "the vertices are numbered from 0";
+      if (reason.compare(0, 10, "parameter ") == 0) return "the vertices are numbered from 0";
       return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
     case StepStatus::DEADLINE:
       return "raise step_budget_ms or num_threads, or send fewer vertices";

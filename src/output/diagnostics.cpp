@@ -116,7 +116,9 @@ std::string describe(const Outcome& outcome) {
   text << toString(outcome.status);
   if (!outcome.reason.empty()) text << " (" << outcome.reason << ")";
   if (!outcome.answered) return text.str();
-  text << ": " << outcome.total_contacts << " contacts, start state " << toString(outcome.start_state);
+  text << ": " << outcome.total_contacts << " contacts";
+  if (outcome.counts.expected > 0) text << " (" << outcome.counts.expected << " expected)";
+  text << ", start state " << toString(outcome.start_state);
   if (std::isfinite(outcome.earliest_toc)) text << ", earliest toc " << outcome.earliest_toc;
   text << "; " << describe(assuranceOf(outcome));
   return text.str();

@@ -23,6 +23,7 @@ static_assert(static_cast<int>(StartState::NOT_CHECKED) == static_cast<int>(defo
 static_assert(static_cast<int>(PairKind::FACE_VOXEL_CORNER) == static_cast<int>(ContactMessage::FACE_VOXEL_CORNER));
 static_assert(static_cast<int>(Touching::LASTING) == static_cast<int>(deformable_ccd::State::LASTING));
 static_assert(static_cast<int>(Touching::NEW) == static_cast<int>(deformable_ccd::State::NEW));
+static_assert(static_cast<int>(Touching::EXPECTED) == static_cast<int>(deformable_ccd::State::EXPECTED));
 static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
 std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
@@ -65,6 +66,7 @@ std::string noContact(const Outcome& outcome) {
   for (const std::string& sentence : outcome.unproved) {
     if (sentence != outcome.reason) text += sentence + ", ";
   }
+  if (outcome.counts.expected > 0) text += std::to_string(outcome.counts.expected) + " expected ones, ";
   if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
   return text + start;
 }
@@ -72,10 +74,12 @@ std::string noContact(const Outcome& outcome) {
 /// A line for people; `first` is null where nothing known touches.
 std::string summaryOf(const Outcome& outcome, const Contact* first, const std::vector<Body>& bodies) {
   if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
-  const std::string start = std::string(", starts ") + toString(outcome.start_state);
-  if (!std::isfinite(outcome.earliest_toc)) return noContact(outcome);
+  if (!std::isfinite(outcome.earliest_unexpected_toc)) return noContact(outcome);
+  const std::string besides =
+      outcome.counts.expected > 0 ? ", besides " + std::to_string(outcome.counts.expected) + " expected ones" : "";
+  const std::string start = besides + ", starts " + toString(outcome.start_state);
   char when[64];
-  std::snprintf(when, sizeof when, "%.6f s into the step", outcome.earliest_toc * outcome.duration_s());
+  std::snprintf(when, sizeof when, "%.6f s into the step", outcome.earliest_unexpected_toc * outcome.duration_s());
   if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + start;
   if (first->certainty != Certainty::CERTAIN) {
     return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + start;
@@ -91,6 +95,7 @@ ContactMessage toMessage(const Outcome& outcome, const Contact& contact) {
   out.certainty = static_cast<std::uint8_t>(contact.certainty);
   out.initial = contact.initial;
   out.leaving = contact.leaving;
+  out.expected = contact.expected;
   std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
   std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
   out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
@@ -139,6 +144,7 @@ void fillContacts(const Outcome& outcome, StatsMessage& out) {
   out.contacts_leaving = static_cast<std::uint32_t>(outcome.counts.leaving);
   out.contacts_mesh = static_cast<std::uint32_t>(outcome.counts.mesh);
   out.contacts_obstacle = static_cast<std::uint32_t>(outcome.counts.obstacle);
+  out.contacts_expected = static_cast<std::uint32_t>(outcome.counts.expected);
   out.suppressed = static_cast<std::uint32_t>(outcome.suppressed);
   out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
   out.earliest_toc = outcome.earliest_toc;
@@ -170,8 +176,9 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.body_body_in = stats[Effect::BODY_BODY].in;
   out.body_body_out = stats[Effect::BODY_BODY].out;
   out.body_body_ms = stats[Effect::BODY_BODY].ms;
-  out.obstacle_in = stats[Effect::OCTOMAP].in;
-  out.obstacle_out = stats[Effect::OCTOMAP].out;
+  out.octomap_in = stats[Effect::OCTOMAP].in;
+  out.octomap_out = stats[Effect::OCTOMAP].out;
+  out.octomap_ms = stats[Effect::OCTOMAP].ms;
   out.start_state_in = stats[Effect::START_STATE].in;
   out.start_state_out = stats[Effect::START_STATE].out;
   out.rigid_bodies_in = stats[Effect::RIGID_BODIES].in;
@@ -226,6 +233,7 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
   out.complete = outcome.complete;
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
+  out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
   for (const Body& body : bodies) out.bodies.push_back(body.name);
   out.contacts.reserve(outcome.contacts.size());
@@ -234,6 +242,7 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
     deformable_ccd::Intersection message;
     std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
     std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
+    message.expected = crossing.expected;
     out.intersections.push_back(message);
   }
   return out;
@@ -246,19 +255,20 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
   out.status = static_cast<std::uint8_t>(outcome.status);
   out.start_state = static_cast<std::uint8_t>(outcome.start_state);
   out.answered = outcome.answered;
-  out.contact = std::isfinite(outcome.earliest_toc);
-  out.toc = outcome.earliest_toc;
-  out.seconds_from_start = outcome.earliest_toc;
+  const double toc = outcome.earliest_unexpected_toc;
+  out.contact = std::isfinite(toc);
+  out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
+  out.toc = out.seconds_from_start = toc;
   const Contact* first = nullptr;
   for (const Contact& contact : outcome.contacts) {
-    if (contact.toc_lower != outcome.earliest_toc) continue;
+    if (contact.expected || contact.toc_lower != toc) continue;
     const bool certain = contact.certainty == Certainty::CERTAIN;
     if (!first || (certain && !out.certain)) first = &contact;
     out.certain |= certain;
   }
   if (out.contact) {
-    out.time_of_contact = timeOf(outcome, outcome.earliest_toc);
-    out.seconds_from_start = outcome.earliest_toc * outcome.duration_s();
+    out.time_of_contact = timeOf(outcome, toc);
+    out.seconds_from_start = toc * outcome.duration_s();
   }
   out.summary = summaryOf(outcome, first, bodies);
   return out;
@@ -290,6 +300,7 @@ void fillState(const Assurance& assurance, deformable_ccd::State& message) {
   message.reason = describe(assurance);
   message.missing = assurance.missing;
   message.excluded = assurance.excluded;
+  message.expected = assurance.expected;
 }
 
 StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
@@ -344,8 +355,9 @@ deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double 
   out.start_state = static_cast<std::uint8_t>(prediction.start_state);
   out.answered = prediction.answered;
   out.horizon = horizon_s;
-  out.contact = std::isfinite(prediction.earliest_toc);
-  out.seconds = prediction.earliest_toc * horizon_s;
+  out.contact = std::isfinite(prediction.earliest_unexpected_toc);
+  out.expected_contacts = static_cast<std::uint32_t>(prediction.counts.expected);
+  out.seconds = prediction.earliest_unexpected_toc * horizon_s;
   return out;
 }
 

@@ -29,7 +29,8 @@ constexpr std::size_t MAX_BODIES = 65534;
 enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1 };
 
 // The least bytes that one item of a list takes.
-constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24;
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24,
+                      EXPECTATION_BYTES = 32;
 
 template <typename Archive, typename Pose>
 void visitPose(Archive& a, Pose& pose) {
@@ -224,11 +225,35 @@ void visitVerdict(Archive& a, Recording& r) {
     a.flag(body.shell);
     a.number(body.dropped_faces);
   }
-  a.choice(r.answer.touching, Touching::NEW);
+  a.choice(r.answer.touching, Touching::EXPECTED);
   for (auto* sentences : {&r.answer.unproved, &r.answer.excluded}) {
     a.count(*sentences, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
     for (auto& sentence : *sentences) a.text(sentence);
   }
+}
+
+template <typename Archive, typename Recording>
+void visitExpectations(Archive& a, Recording& r) {
+  a.count(r.options.expected, EXPECTATION_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& one : r.options.expected) {
+    for (auto& partner : one.partners) {
+      a.number(partner.body);
+      a.array(partner.vertices);
+      a.text(partner.set);
+    }
+    a.text(one.phase);
+  }
+}
+
+/// What version 4 added: which contacts are expected.
+template <typename Archive, typename Recording>
+void visitExpected(Archive& a, Recording& r) {
+  visitExpectations(a, r);
+  for (auto& contact : r.answer.contacts) a.flag(contact.expected);
+  for (auto& crossing : r.answer.intersections) a.flag(crossing.expected);
+  a.number(r.answer.earliest_unexpected_toc);
+  a.count(r.answer.expected, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& sentence : r.answer.expected) a.text(sentence);
 }
 
 /// The file's fields in their order, for both directions.
@@ -271,6 +296,7 @@ void RecordingImage::build(const StepRecording& recording) {
   visit(writer, recording);
   visitDistances(writer, recording);
   visitVerdict(writer, recording);
+  visitExpected(writer, recording);
 }
 
 bool RecordingImage::write(int descriptor) const noexcept {
@@ -352,6 +378,7 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   visit(reader, recording);
   if (version >= 2) visitDistances(reader, recording);
   if (version >= 3) visitVerdict(reader, recording);
+  if (version >= 4) visitExpected(reader, recording);
   recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;

@@ -22,7 +22,8 @@ bool knowsInitial(const Contact& c, std::uint32_t version) { return version >= 3
 
 bool sameContact(const Contact& a, const Contact& b, std::uint32_t version) {
   return samePair(a, b) && sameBits(a.toc_lower, b.toc_lower) && sameBits(a.toc_upper, b.toc_upper) &&
-         a.certainty == b.certainty && (a.initial == b.initial || !knowsInitial(a, version)) && a.leaving == b.leaving;
+         a.certainty == b.certainty && (a.initial == b.initial || !knowsInitial(a, version)) &&
+         a.leaving == b.leaving && (a.expected == b.expected || version < 4);
 }
 
 std::string pairText(const Contact& c) {
@@ -102,10 +103,14 @@ std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& 
     out.field("touching", std::string(toString(recorded.touching)), std::string(toString(replayed.touching)));
     if (recorded.unproved != replayed.unproved) out.add("what was not shown differs");
   }
-  const bool same = std::equal(
-      recorded.intersections.begin(), recorded.intersections.end(), replayed.intersections.begin(),
-      replayed.intersections.end(),
-      [](const StartIntersection& a, const StartIntersection& b) { return a.body == b.body && a.vertex == b.vertex; });
+  if (version >= 4) {
+    out.field("earliest unexpected toc", recorded.earliest_unexpected_toc, replayed.earliest_unexpected_toc);
+  }
+  const bool same =
+      std::equal(recorded.intersections.begin(), recorded.intersections.end(), replayed.intersections.begin(),
+                 replayed.intersections.end(), [&](const StartIntersection& a, const StartIntersection& b) {
+                   return a.body == b.body && a.vertex == b.vertex && (a.expected == b.expected || version < 4);
+                 });
   if (!same) out.add("the intersections at t=0 differ");
   return out.take();
 }

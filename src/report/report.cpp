@@ -6,6 +6,7 @@
 #include <iomanip>
 #include <limits>
 #include <sstream>
+#include <tuple>
 
 #include "dccd/assurance.h"
 #include "report/flat_layout.h"
@@ -51,7 +52,8 @@ Report::Report(const std::string& folder) : folder_(folder) {
   open(timing_, "timing.csv");
   contacts_
       << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
-         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step\n";
+         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step,"
+         "expected\n";
   steps_
       << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
          "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,"
@@ -79,7 +81,7 @@ void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodi
               << c.leaving << ',' << c.toc_lower << ',' << c.toc_upper << ','
               << static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9 + c.toc_lower * outcome.duration_s() << ','
               << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y()
-              << ',' << g.normal.z() << ',' << g.approach_speed << '\n';
+              << ',' << g.normal.z() << ',' << g.approach_speed << ',' << c.expected << '\n';
   }
 }
 
@@ -140,9 +142,11 @@ void Report::addRow(const Outcome& o) {
 }
 
 void Report::addFirstContact(const Outcome& o, const std::vector<Body>& bodies) {
-  if (!first_contact_.empty() || o.contacts.empty()) return;
-  const auto first = std::min_element(o.contacts.begin(), o.contacts.end(),
-                                      [](const auto& a, const auto& b) { return a.toc_lower < b.toc_lower; });
+  if (!first_contact_.empty()) return;
+  const auto first = std::min_element(o.contacts.begin(), o.contacts.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.expected, a.toc_lower) < std::tie(b.expected, b.toc_lower);
+  });
+  if (first == o.contacts.end() || first->expected) return;
   first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
   std::ostringstream text;
   text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
@@ -173,7 +177,8 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   addProof(o);
   if (!o.answered) return;
   ++answered_;
-  with_contact_ += o.total_contacts > 0;
+  with_contact_ += o.total_contacts > o.counts.expected;
+  with_expected_ += o.counts.expected > 0;
   writeContacts(o, bodies);
   addHeat(o, bodies);
   addFirstContact(o, bodies);
@@ -214,8 +219,10 @@ std::string Report::headline() const {
   } else if (answered_ == 0) {
     text << "No answer";
   } else {
-    text << (proved && lasting_.empty() ? "No contact in " : "No contact found in ") << answered_ << " answered steps";
+    text << (with_expected_ > 0 ? "No unexpected contact " : "No contact ")
+         << (proved && lasting_.empty() ? "in " : "found in ") << answered_ << " answered steps";
   }
+  if (with_expected_ > 0) text << "; expected contacts in " << with_expected_ << " of them";
   const char* separator = "; surfaces touched from the start of a step (";
   for (const auto& [what, steps] : lasting_) {
     text << separator << what << ' ' << steps;

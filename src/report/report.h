@@ -73,7 +73,9 @@ class Report {
   /// Frames that are not proved, by status, or by the first sentence of what an OK one lacks: the reason of the first
   /// of them, and how many.
   std::map<std::string, std::pair<std::string, std::size_t>> unproved_;
-  std::size_t frames_ = 0, answered_ = 0, with_contact_ = 0;
+  std::size_t frames_ = 0, answered_ = 0;
+  std::size_t with_contact_ = 0,
+              with_expected_ = 0;  // steps; with contacts that are not expected, and with such that are
   double first_contact_s_ = 0;
   std::string first_contact_;
   nlohmann::json rows_ = nlohmann::json::array();

@@ -22,6 +22,7 @@ Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& fa
   if (outcome.answered) {
     assurance.missing = outcome.unproved;
     assurance.excluded = outcome.excluded;
+    assurance.expected = outcome.expected;
   } else {
     assurance.missing.push_back(std::string("no answer, ") + toString(outcome.status) +
                                 (outcome.reason.empty() ? "" : ": " + outcome.reason));
@@ -33,17 +34,18 @@ Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& fa
 
 std::string describe(const Assurance& assurance) {
   static const char* const TOUCHING[] = {"nothing touches", "what touches did so when the step began",
-                                         "something touches anew"};
+                                         "something touches anew", "what touches is expected"};
   std::string text = assurance.proved ? "proved, " : "not proved: " + joined(assurance.missing);
   if (assurance.proved || assurance.touching != Touching::NONE) {
     text += (assurance.proved ? "" : "; ") + std::string(TOUCHING[static_cast<std::size_t>(assurance.touching)]);
   }
+  if (!assurance.expected.empty()) text += " (expected: " + joined(assurance.expected) + ")";
   if (!assurance.excluded.empty()) text += " (left out by choice: " + joined(assurance.excluded) + ")";
   return text;
 }
 
 const char* toString(Touching touching) {
-  static const char* const NAMES[] = {"NONE", "LASTING", "NEW"};
+  static const char* const NAMES[] = {"NONE", "LASTING", "NEW", "EXPECTED"};
   return NAMES[static_cast<std::size_t>(touching)];
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <tuple>
 
 #include "dccd/accuracy.h"
 
@@ -28,14 +29,18 @@ ContactCounts countsOf(const std::vector<Contact>& contacts) {
     ++(contact.body[1] == OBSTACLE_BODY ? counts.obstacle : counts.mesh);
     counts.initial += contact.initial;
     counts.leaving += contact.leaving;
+    counts.expected += contact.expected;
+    counts.expected_initial += contact.expected && contact.initial;
   }
   return counts;
 }
 
+/// Unexpected ones first: an alarm must not be crowded out by what rests where it is meant to.
 void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   if (contacts.size() <= count) return;
-  std::stable_sort(contacts.begin(), contacts.end(),
-                   [](const Contact& a, const Contact& b) { return a.toc_lower < b.toc_lower; });
+  std::stable_sort(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) {
+    return std::tie(a.expected, a.toc_lower) < std::tie(b.expected, b.toc_lower);
+  });
   contacts.resize(count);
   contacts.shrink_to_fit();
   std::sort(contacts.begin(), contacts.end(), canonicalLess);
@@ -140,11 +145,27 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
   return excluded;
 }
 
-Touching touchingOf(const Outcome& outcome) {
-  if (outcome.counts.initial < outcome.total_contacts) return Touching::NEW;
-  const bool lasting =
-      outcome.total_contacts > 0 || outcome.suppressed > 0 || outcome.start_state == StartState::INTERSECTING;
-  return lasting ? Touching::LASTING : Touching::NONE;
+/// What the start state is INTERSECTING for is an intersection that is listed or an initial contact with the map.
+Touching touchingOf(const Outcome& outcome, std::size_t suppressed_unexpected) {
+  const ContactCounts& counts = outcome.counts;
+  if (counts.unexpectedNew() > 0) return Touching::NEW;
+  const bool crosses = std::any_of(outcome.intersections.begin(), outcome.intersections.end(),
+                                   [](const StartIntersection& one) { return !one.expected; });
+  if (counts.unexpectedInitial() > 0 || suppressed_unexpected > 0 || crosses) return Touching::LASTING;
+  const bool touches = outcome.total_contacts > 0 || outcome.suppressed > 0 || !outcome.intersections.empty();
+  return touches ? Touching::EXPECTED : Touching::NONE;
+}
+
+/// Those with the map that are initial out of the list. How many of them are unexpected.
+std::size_t suppressInitial(Outcome& outcome) {
+  auto& contacts = outcome.contacts;
+  const auto goes = [](const Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; };
+  const auto unexpected =
+      std::count_if(contacts.begin(), contacts.end(), [&](const Contact& c) { return goes(c) && !c.expected; });
+  const auto kept = std::remove_if(contacts.begin(), contacts.end(), goes);
+  outcome.suppressed = static_cast<std::size_t>(contacts.end() - kept);
+  contacts.erase(kept, contacts.end());
+  return static_cast<std::size_t>(unexpected);
 }
 
 }  // namespace
@@ -213,6 +234,9 @@ void check(const Options& options, const std::vector<Body>& bodies) {
   require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
   require(options.max_substeps >= 1, "max_substeps must be 1 or more");
   for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
+  require(!options.earliest_only || options.expected.empty(),
+          "earliest_only with expected contacts: the first may be an expected one, which would hide all others");
+  if (!bodies.empty()) checkPartners(options.expected, bodies.size());
   makeRung(options.accuracy);
   const double separation_m = largestSeparation(bodies);
   if (separation_m > 0) checkHoldsDistance(options, "minimum_separation_m = " + std::to_string(separation_m));
@@ -224,7 +248,7 @@ bool operator==(const Options& a, const Options& b) {
                     o.broad_phase, o.num_threads, o.step_budget_ms, o.max_compute_ms, o.earliest_only,
                     o.check_start_state, o.keep_bounds, o.unfolded_test, o.rigid_tolerance_m, o.max_substeps,
                     o.max_contacts, o.max_found, o.max_found_per_feature, o.suppress_initial, o.obstacle_expected,
-                    o.excluded);
+                    o.expected, o.excluded);
   };
   return values(a) == values(b) &&
          std::equal(a.exclude_boxes.begin(), a.exclude_boxes.end(), b.exclude_boxes.begin(), b.exclude_boxes.end(),
@@ -255,22 +279,24 @@ const char* toString(StartState state) {
   return NAMES[static_cast<std::size_t>(state)];
 }
 
-void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
+void conclude(const Options& options, const ExpectedContacts& expected, const Step& step, std::size_t needed_parts,
+              Outcome& outcome) {
   auto& contacts = outcome.contacts;
-  if (options.suppress_initial) {
-    const auto kept = std::remove_if(contacts.begin(), contacts.end(),
-                                     [](const Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; });
-    outcome.suppressed = static_cast<std::size_t>(contacts.end() - kept);
-    contacts.erase(kept, contacts.end());
-  }
+  expected.mark(outcome);
+  const std::size_t suppressed_unexpected = options.suppress_initial ? suppressInitial(outcome) : 0;
   outcome.total_contacts = contacts.size();
   outcome.counts = countsOf(contacts);
-  outcome.earliest_toc = outcome.unchecked_toc_lower;
-  for (const Contact& contact : contacts) outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
+  outcome.earliest_toc = outcome.earliest_unexpected_toc = outcome.unchecked_toc_lower;
+  for (const Contact& contact : contacts) {
+    outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
+    if (contact.expected) continue;
+    outcome.earliest_unexpected_toc = std::min(outcome.earliest_unexpected_toc, contact.toc_lower);
+  }
   keepEarliest(options.max_contacts, contacts);
   judge(options, step, needed_parts, outcome);
   outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);
-  outcome.touching = touchingOf(outcome);
+  outcome.expected = describe(options.expected, step.bodies);
+  outcome.touching = touchingOf(outcome, suppressed_unexpected);
   outcome.answered = true;
 }
 

@@ -89,15 +89,17 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   const Clock::time_point called = Clock::now();
   setOptions(wanted);
   setBodies(step);
+  if (!expected_known) expected.set(options->expected, step.bodies);
+  expected_known = true;
   useMap(step.map);
   // What is made once for many steps is not taken from the time of the first.
   const Clock::time_point begun = Clock::now();
   deadline = deadline.movedBy(begun - called);
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
-  const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
-  const std::size_t parts = std::min(needed, options->max_substeps);
   Outcome outcome;
+  const std::size_t needed = neededParts(step, outcome.stats);
+  const std::size_t parts = std::min(needed, options->max_substeps);
   outcome.start_ns = step.start_ns;
   outcome.stamp_ns = step.stamp_ns;
   outcome.sequence = step.sequence;
@@ -108,7 +110,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
-  conclude(*options, step, needed, outcome);
+  conclude(*options, expected, step, needed, outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
     const double others_ms = outcome.stats[Stage::OBSTACLE].ms + outcome.stats[Stage::START_STATE].ms;
@@ -126,6 +128,7 @@ void History::Impl::setOptions(const Options& wanted) {
   elementary = std::move(rung);
   scene.setKeepBounds(wanted.keep_bounds);
   obstacle_checks.clear();
+  expected_known = false;
   map_given = nullptr;  // other boxes may be excluded
   options = wanted;
 }
@@ -140,6 +143,7 @@ void History::Impl::setBodies(const Step& step) {
   unfolded.clear();
   for (const SceneBody& body : scene.bodies()) unfolded.emplace_back(body);
   obstacle_checks.clear();
+  expected_known = false;
   findLeftOut(step);
 }
 
@@ -160,6 +164,18 @@ void History::Impl::useMap(const ObstacleMap& map) {
   map_pose = map.map_from_fixed;
 }
 
+/// How often the step is to be cut for the bodies that turn, and how many these are.
+std::size_t History::Impl::neededParts(const Step& step, StepStats& stats) const {
+  const auto turning =
+      std::count_if(step.bodies.begin(), step.bodies.end(), [](const Body& body) { return body.turns; });
+  if (turning == 0) return 1;
+  const Clock::time_point start = Clock::now();
+  const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
+  stats[Effect::RIGID_BODIES] = {static_cast<std::uint64_t>(turning), 0, msSince(start)};
+  stats.total_ms += stats[Effect::RIGID_BODIES].ms;
+  return needed;
+}
+
 bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome) {
   bool reached_end = true;
   if (parts == 1) {
@@ -178,6 +194,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
       advance(step, i + 1, parts, part);
       const double place_ms = msSince(start);
       outcome.stats[Effect::RIGID_BODIES].ms += place_ms;
+      outcome.stats[Effect::RIGID_BODIES].out += outcome.stats[Effect::RIGID_BODIES].in;
       outcome.stats.total_ms += place_ms;
       runPart({part, i, parts, i > 0 || continues, deadline}, outcome);
     }

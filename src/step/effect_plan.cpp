@@ -15,7 +15,10 @@ struct Finding {
   bool wanted = false;
   bool possible = true;
   std::string reason;
+  bool idle = false;  ///< there is nothing to do as things stand, whatever the user asks for
 };
+
+Finding idle(const std::string& reason) { return {false, true, reason, true}; }
 
 std::string metres(double value) {
   std::ostringstream text;
@@ -43,9 +46,8 @@ Finding selfCollision(const EffectScene& scene) {
   }
   if (can.empty()) {
     const bool all_rigid = std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.rigid; });
-    return {false, !all_rigid,
-            all_rigid ? (scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid")
-                      : "it is switched off for every body that deforms"};
+    if (!all_rigid) return idle("it is switched off for every body that deforms");
+    return {false, false, scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid"};
   }
   can += deforming == 1 ? " deforms" : " deform";
   return {true, true, can + (rope.empty() ? "" : "; of " + rope + " only edges, a polyline has no faces")};
@@ -56,14 +58,18 @@ Finding bodyBody(const EffectScene& scene) {
   if (bodies.size() < 2) return {false, false, "there is only one body"};
   std::size_t able = 0;
   for (const Body& body : bodies) able += meet(body, body);
-  if (able < 2) return {false, true, "against_bodies is false for all of them but " + std::to_string(able)};
+  if (able < 2) return idle("against_bodies is false for all of them but " + std::to_string(able));
   return {true, true, "there are " + std::to_string(able) + " bodies"};
 }
 
+constexpr const char* NOBODY_MEETS_MAP = "against_obstacle is false for every body";
+
+bool nobodyMeetsMap(const EffectScene& scene) {
+  return std::none_of(scene.bodies.begin(), scene.bodies.end(), meetsMap);
+}
+
 Finding octomap(const EffectScene& scene) {
-  if (std::none_of(scene.bodies.begin(), scene.bodies.end(), meetsMap)) {
-    return {false, true, "against_obstacle is false for every body"};
-  }
+  if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
   if (scene.map_seen) return {true, true, "the map comes from " + scene.map_source};
   if (scene.map_named) {
     return {true, true, "octomap_topic names " + scene.map_source + ", from which no map has come"};
@@ -89,8 +95,8 @@ std::string notSolid(const EffectScene& scene) {
 }
 
 Finding startState(const EffectScene& scene) {
-  if (ropesOnly(scene) && !scene.map_seen && !scene.map_named) {
-    return {false, true, "edges alone cannot be inside of anything"};
+  if (ropesOnly(scene) && !scene.map_used) {
+    return idle("edges alone cannot be inside of anything, and there is no map");
   }
   return {true, true,
           "surfaces that cross already at the start are invisible to continuous detection" + notSolid(scene)};
@@ -104,6 +110,8 @@ Finding rigidBodies(const EffectScene& scene) {
 
 Finding unknownSpace(const EffectScene& scene) {
   if (!scene.unknown_space_counts) return {false, false, "unknown_space is free; set it to occupied or report"};
+  if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
+  if (!scene.map_used) return idle("unknown_space is not free, but there is no map that could know it");
   return {true, true, "unknown_space is not free"};
 }
 
@@ -130,6 +138,7 @@ Finding trackerNoise(const EffectScene& scene) {
 
 Finding lookAhead(const EffectScene& scene) {
   if (!(scene.look_ahead_s > 0)) return {false, false, "look_ahead_s is 0; set it above"};
+  if (!scene.predictions_heard) return idle("nobody subscribes to predictions");
   return {true, true, "predictions reach " + metres(scene.look_ahead_s) + " s ahead"};
 }
 
@@ -164,6 +173,7 @@ EffectDecision decide(const std::string& name, EffectSetting setting, const Find
     throw std::invalid_argument("effects/" + name + " is on, but " + finding.reason + "; or write effects/" + name +
                                 ": auto");
   }
+  if (finding.idle) return {name, setting, false, finding.reason};
   return {name, setting, true, finding.wanted ? finding.reason : "switched on by effects/" + name};
 }
 

@@ -16,6 +16,7 @@
 #include "culling/scene_arrays.h"
 #include "culling/unfolded.h"
 #include "dccd/detect.h"
+#include "step/expected_contacts.h"
 #include "step/float_mode.h"
 #include "step/fork_join.h"
 #include "step/hit_order.h"
@@ -75,6 +76,7 @@ struct History::Impl {
   void listLeftOut(std::size_t body, PairKind kind);
   bool needsReference(std::size_t body) const;
 
+  std::size_t neededParts(const Step& step, StepStats& stats) const;
   bool runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome);
   void runPart(const Part& part, Outcome& outcome);
   void fill(const Part& part);
@@ -124,6 +126,8 @@ struct History::Impl {
   Eigen::Isometry3d map_pose = Eigen::Isometry3d::Identity();  // with which
   std::uint64_t excluded_voxels = 0;
   std::vector<std::unique_ptr<ObstacleCheck>> obstacle_checks;
+  ExpectedContacts expected;
+  bool expected_known = false;  // it is of these options and bodies
 
   // Buffers of a part.
   tbb::enumerable_thread_specific<PairWorker> workers;

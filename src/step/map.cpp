@@ -41,8 +41,10 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
                                              body.uncertain ? moving.radius_m->data() : nullptr, deadline, room);
   if (obstacle_checks[b]->isFull()) result.cut = true;
   const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(start)};
-  if (scene.separation(b, OBSTACLE_BODY) > 0) result.stats[Effect::MINIMUM_SEPARATION] += of_body;
-  if (body.uncertain) result.stats[Effect::TRACKER_NOISE] += of_body;
+  const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
+                        : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
+                                                                 : Effect::OCTOMAP;
+  result.stats[effect] += of_body;
   return whole;
 }
 
@@ -64,7 +66,6 @@ void History::Impl::runMap(const Part& part) {
     std::sort(first, result.contacts.end(), canonicalLess);
   }
   result.stats[Stage::OBSTACLE] = {pairsIn(total), result.contacts.size() - before, msSince(start)};
-  result.stats[Effect::OCTOMAP] = result.stats[Stage::OBSTACLE];
   for (std::size_t i = before; i < result.contacts.size(); ++i) {
     const Contact& c = result.contacts[i];
     result.stats.initial += c.initial;

@@ -45,11 +45,6 @@ void PairWorker::beginStep() {
   unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
 }
 
-void PairWorker::addMs(double ms) {
-  stats_[effect()].ms += ms;
-  if (rigid()) stats_[Effect::RIGID_BODIES].ms += ms;
-}
-
 Clock::time_point PairWorker::lap(Stage stage, Clock::time_point start) {
   const Clock::time_point now = Clock::now();
   stats_[stage].ms += std::chrono::duration<double, std::milli>(now - start).count();
@@ -74,6 +69,7 @@ void PairWorker::begin(StepContext& context, const PairTask& task, std::size_t i
                   ? &(*context.left_out)[task.body_a]
                   : nullptr;
   count_ = 0;
+  separated_ms_ = 0;
 }
 
 void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
@@ -97,7 +93,7 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::
   }
   take(slots, n);
   flush();
-  addMs(msSince(whole));
+  stats_[effect()].ms += msSince(whole) - separated_ms_;
 }
 
 void PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
@@ -124,7 +120,7 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   }
   lap(Stage::BROAD_PHASE, start);
   flush();
-  addMs(msSince(whole));
+  stats_[effect()].ms += msSince(whole) - separated_ms_;
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
 }
@@ -156,7 +152,6 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
   stats_[Stage::BROAD_PHASE].out += n - count_;
   stats_[effect()].in += n - count_;
-  if (rigid()) stats_[Effect::RIGID_BODIES].in += n - count_;
   if (context_->observer) {
     context_->observer->onPairs(Stage::BROAD_PHASE, task_->kind, quads_.data() + count_, n - count_);
   }
@@ -183,9 +178,11 @@ void PairWorker::flush() {
   }
   context_->hits += hits.size() - before;
   if (counts) enough_ = !context_->found->add(task_index_, hits.size() - before) || enough_;
-  const double ms = msSince(start);
-  if (rule_.bodies_m > 0) stats_[Effect::MINIMUM_SEPARATION].ms += ms;
-  if (rule_.uncertain) stats_[Effect::TRACKER_NOISE].ms += ms;
+  if (separated_) {
+    const double ms = msSince(start);
+    stats_[rule_.uncertain ? Effect::TRACKER_NOISE : Effect::MINIMUM_SEPARATION].ms += ms;
+    separated_ms_ += ms;
+  }
   count_ = 0;
 }
 
@@ -230,17 +227,14 @@ void PairWorker::setSeparations() {
     separations_[i] = pair.total_m;
     if (context_->observer) context_->observer->onSeparation(task_->kind, quads_[i], pair);
     stats_.left_out_met += pair.left_out;
-    stats_[Effect::MINIMUM_SEPARATION].in += rule_.bodies_m > 0 && !pair.left_out;
-    stats_[Effect::TRACKER_NOISE].in += pair.noise_m > 0;
+    --stats_[effect()].in;
+    ++stats_[effectOf(pair.total_m, pair.noise_m)].in;
   }
 }
 
 void PairWorker::countOut(std::size_t i) {
-  ++stats_[effect()].out;
-  if (rigid()) ++stats_[Effect::RIGID_BODIES].out;
-  if (!separated_) return;
-  stats_[Effect::MINIMUM_SEPARATION].out += rule_.bodies_m > 0 && separations_[i] > 0;
-  stats_[Effect::TRACKER_NOISE].out += separations_[i] > rule_.bodies_m;
+  const double separation_m = separationOf(i);
+  ++stats_[effectOf(separation_m, separation_m - rule_.bodies_m)].out;
 }
 
 void PairWorker::dropLate() {

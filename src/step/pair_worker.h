@@ -98,11 +98,13 @@ class PairWorker {
   double boundOf(std::size_t i, double distance_m);
   void dropLate();
   Effect effect() const { return task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY; }
-  bool rigid() const { return !task_->self && (a_->setup.rigid || b_->setup.rigid); }
+  /// What a pair counts for whose elementary test carries a distance, or none.
+  Effect effectOf(double separation_m, double noise_m) const {
+    return noise_m > 0 ? Effect::TRACKER_NOISE : separation_m > 0 ? Effect::MINIMUM_SEPARATION : effect();
+  }
   void setSeparations();
   double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
   void countOut(std::size_t i);
-  void addMs(double ms);
   Deadline::Clock::time_point lap(Stage stage, Deadline::Clock::time_point start);
 
   StepContext* context_ = nullptr;
@@ -123,6 +125,7 @@ class PairWorker {
   std::size_t count_ = 0;
   std::size_t bounds_ = 0;  // that were asked for in this step
   bool late_ = false;       // there is no time for more
+  double separated_ms_ = 0;  // of the task, that count for a separation or an uncertainty
   std::vector<Hit> hits_[2];
   StepStats stats_;
   double unchecked_toc_lower_ = std::numeric_limits<double>::infinity();  // workers may be made during a step

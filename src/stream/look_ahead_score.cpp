@@ -20,7 +20,10 @@ double quantile(const std::vector<double>& sorted, double q) {
 StageStats lookAheadStats(const Outcome& prediction) {
   const StepStats& stats = prediction.stats;
   StageStats sum;
-  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP}) sum += stats[effect];
+  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP, Effect::MINIMUM_SEPARATION,
+                              Effect::TRACKER_NOISE}) {
+    sum += stats[effect];
+  }
   sum.ms = stats.total_ms;
   return sum;
 }

@@ -104,6 +104,8 @@ TEST_P(StopTheArm, InTime) {
   monitor.proved = true;
   monitor.touching = deformable_ccd::State::NEW;
   expectStop(true, "proved, and something touches anew");
+  monitor.touching = deformable_ccd::State::EXPECTED;
+  expectStop(false, "what is expected to touch is no reason to stop");
   monitor.touching = deformable_ccd::State::LASTING;
   expectStop(false, "it lasts, and nothing new is in sight");
   monitor.contact_in_s = 0.1;

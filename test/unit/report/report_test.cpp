@@ -56,5 +56,13 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
             "misses contacts and proves nothing (1).");
 }
 
+TEST(Headline, ExpectedContactsAreToldApart) {
+  Outcome quiet = nothingFound(StepStatus::OK, StartState::CLEAR);
+  quiet.total_contacts = quiet.counts.certain = quiet.counts.expected = 3;
+  quiet.touching = Touching::EXPECTED;
+  EXPECT_EQ(headlineOf({quiet, nothingFound(StepStatus::OK, StartState::CLEAR)}),
+            "No unexpected contact in 2 answered steps; expected contacts in 1 of them.");
+}
+
 }  // namespace
 }  // namespace dccd

@@ -42,6 +42,92 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");
 }
 
+// Its cost stands in ~stats under the name that its decision has in ~effects.
+TEST(Stats, EachEffectHasARowOfItsName) {
+  const std::string definition = ros::message_traits::definition<deformable_ccd::StepStats>();
+  for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
+    const std::string name = toString(static_cast<Effect>(e));
+    for (const char* field : {"uint64 %_in", "uint64 %_out", "float64 %_ms"}) {
+      std::string line = std::string("\n") + field;
+      line.replace(line.find('%'), 1, name);
+      EXPECT_NE(definition.find(line), std::string::npos) << line;
+    }
+  }
+}
+
+/// A step in which an expected contact is at toc 0 and, if asked for, an unexpected one at 0.5.
+Outcome resting(bool alarm) {
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  auto step = std::make_shared<Step>();
+  Body cloth, finger;
+  cloth.name = "cloth";
+  finger.name = "finger";
+  const auto triangle = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  for (Body* body : {&cloth, &finger}) {
+    body->topology = triangle;
+    body->t0 = body->t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    step->bodies.push_back(*body);
+  }
+  outcome.step = step;
+  outcome.stamp_ns = 1000000000;
+  Contact contact;
+  contact.toc_lower = contact.toc_upper = 0;
+  contact.vertex = {0, 0, 1, 2};
+  contact.body = {0, 1};
+  contact.initial = contact.expected = true;
+  outcome.contacts.push_back(contact);
+  outcome.earliest_toc = 0;
+  outcome.touching = Touching::EXPECTED;
+  outcome.expected = {"cloth with finger in phase 'carry'"};
+  outcome.counts.certain = outcome.counts.mesh = outcome.counts.initial = 1;
+  outcome.counts.expected = outcome.counts.expected_initial = 1;
+  if (alarm) {
+    contact.toc_lower = contact.toc_upper = outcome.earliest_unexpected_toc = 0.5;
+    contact.vertex = {1, 0, 1, 2};
+    contact.initial = contact.expected = false;
+    outcome.contacts.push_back(contact);
+    ++outcome.counts.certain;
+    ++outcome.counts.mesh;
+    outcome.touching = Touching::NEW;
+  }
+  outcome.total_contacts = outcome.contacts.size();
+  return outcome;
+}
+
+TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
+  const Outcome quiet = resting(false);
+  const std::vector<Body>& bodies = quiet.step->bodies;
+  const auto array = toContactArray(quiet, bodies, "world");
+  ASSERT_EQ(array.contacts.size(), 1u) << "listed";
+  EXPECT_TRUE(array.contacts[0].expected);
+  EXPECT_EQ(array.expected_contacts, 1u);
+  const auto none = toFirstContact(quiet, bodies, "world");
+  EXPECT_FALSE(none.contact);
+  EXPECT_EQ(none.expected_contacts, 1u);
+  EXPECT_EQ(none.summary, "no contact found, but 1 expected ones, starts CLEAR");
+  const auto later = toTimeToContact(quiet, 2, "world");
+  EXPECT_FALSE(later.contact);
+  EXPECT_EQ(later.expected_contacts, 1u);
+
+  const Outcome alarm = resting(true);
+  const auto first = toFirstContact(alarm, bodies, "world");
+  EXPECT_TRUE(first.contact && first.certain);
+  EXPECT_EQ(first.toc, 0.5);
+  EXPECT_EQ(first.time_of_contact, ros::Time(0, 500000000));
+  EXPECT_EQ(first.expected_contacts, 1u);
+  EXPECT_EQ(first.summary,
+            "contact 0.500000 s into the step: vertex 1 of cloth and face 0-1-2 of finger, besides 1 expected ones, "
+            "starts CLEAR");
+  EXPECT_EQ(toTimeToContact(alarm, 2, "world").seconds, 1);
+
+  deformable_ccd::State state = toState(quiet, "world");
+  fillState(assuranceOf(quiet), state);
+  EXPECT_TRUE(state.proved);
+  EXPECT_FALSE(state.clear);
+  EXPECT_EQ(state.touching, deformable_ccd::State::EXPECTED);
+  EXPECT_EQ(state.expected, quiet.expected);
+}
+
 TEST(Times, WhatRosCannotHoldIsTheNearestThatItCan) {
   EXPECT_EQ(toRosTime(1500000000), ros::Time(1, 500000000));
   EXPECT_EQ(toRosTime(-1), ros::Time(0, 0));
@@ -54,7 +140,7 @@ TEST(Times, WhatRosCannotHoldIsTheNearestThatItCan) {
 TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
   Outcome cut = nothingFound(StepStatus::TRUNCATED, StartState::CLEAR);
   cut.total_contacts = 7;
-  cut.counts = {5, 2, 3, 1, 4, 3};
+  cut.counts = {5, 2, 3, 1, 4, 3, 6, 2};
   cut.stats.unfolded_bodies = 2;
   const auto stats = toStepStats(cut, {}, "world");
   EXPECT_EQ(stats.unfolded_bodies, 2u);
@@ -65,6 +151,7 @@ TEST(Stats, ContactsAreCountedBeforeTheCutToMaxContacts) {
   EXPECT_EQ(stats.contacts_leaving, 1u);
   EXPECT_EQ(stats.contacts_mesh, 4u);
   EXPECT_EQ(stats.contacts_obstacle, 3u);
+  EXPECT_EQ(stats.contacts_expected, 6u);
 }
 
 }  // namespace

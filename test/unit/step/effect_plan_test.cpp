@@ -61,12 +61,53 @@ TEST(EffectPlan, AMapThatIsNamedIsWantedBeforeItComes) {
   const EffectPlan before(scene, {});
   EXPECT_TRUE(before.running(Effect::OCTOMAP));
   EXPECT_EQ(reason(before, "octomap"), "octomap_topic names /table, from which no map has come");
-  scene.bodies[0].topology = share(Topology::polyline(3));
-  EXPECT_TRUE(EffectPlan(scene, {}).running(Effect::START_STATE)) << "a rope may begin inside of the map";
   scene.map_seen = true;
   EXPECT_EQ(reason(EffectPlan(scene, {}), "octomap"), "the map comes from /table");
   scene.bodies[0].against_obstacle = false;
   EXPECT_FALSE(EffectPlan(scene, {}).running(Effect::OCTOMAP)) << "nobody could meet it";
+}
+
+// Whatever the user asks for: there is nothing to look at, to know, or nobody to tell.
+TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
+  const auto on = [](const EffectScene& scene, Effect effect) {
+    return EffectPlan(scene, {{effect, EffectSetting::ON}});
+  };
+  EffectScene rope = cloth();
+  rope.bodies[0].topology = share(Topology::polyline(3));
+  EXPECT_FALSE(EffectPlan(rope, {}).running(Effect::START_STATE));
+  EXPECT_FALSE(on(rope, Effect::START_STATE).running(Effect::START_STATE));
+  EXPECT_EQ(reason(on(rope, Effect::START_STATE), "start_state"),
+            "edges alone cannot be inside of anything, and there is no map");
+  rope.map_named = rope.map_seen = true;
+  EXPECT_FALSE(on(rope, Effect::START_STATE).running(Effect::START_STATE)) << "no map has come yet";
+  rope.map_used = true;
+  EXPECT_TRUE(EffectPlan(rope, {}).running(Effect::START_STATE)) << "a rope may begin inside of the map";
+
+  EffectScene unknown = cloth();
+  unknown.unknown_space_counts = true;
+  EXPECT_FALSE(EffectPlan(unknown, {}).running(Effect::UNKNOWN_SPACE));
+  EXPECT_EQ(reason(on(unknown, Effect::UNKNOWN_SPACE), "unknown_space"),
+            "unknown_space is not free, but there is no map that could know it");
+  EXPECT_FALSE(on(unknown, Effect::UNKNOWN_SPACE).running(Effect::UNKNOWN_SPACE));
+  unknown.map_used = true;
+  EXPECT_TRUE(EffectPlan(unknown, {}).running(Effect::UNKNOWN_SPACE));
+  unknown.bodies[0].against_obstacle = false;
+  EXPECT_FALSE(on(unknown, Effect::UNKNOWN_SPACE).running(Effect::UNKNOWN_SPACE));
+
+  EffectScene ahead = cloth();
+  ahead.look_ahead_s = 0.5;
+  EXPECT_FALSE(on(ahead, Effect::LOOK_AHEAD).running(Effect::LOOK_AHEAD));
+  EXPECT_EQ(reason(EffectPlan(ahead, {}), "look_ahead"), "nobody subscribes to predictions");
+  ahead.predictions_heard = true;
+  EXPECT_EQ(reason(EffectPlan(ahead, {}), "look_ahead"), "predictions reach 0.5 s ahead");
+  EXPECT_TRUE(EffectPlan(ahead, {}).running(Effect::LOOK_AHEAD));
+
+  EffectScene alone = cloth();
+  alone.bodies.push_back(body("table"));
+  for (Body& one : alone.bodies) one.against_bodies = one.against_obstacle = one.self_collision = false;
+  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP}) {
+    EXPECT_FALSE(on(alone, effect).running(effect)) << toString(effect);
+  }
 }
 
 TEST(EffectPlan, RigidBodiesMeetOthersOnly) {

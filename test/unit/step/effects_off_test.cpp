@@ -161,5 +161,43 @@ TEST(EffectsOff, AllocateNothingAndShowZeros) {
   }
 }
 
+std::uint64_t pairsIn(const StepStats& stats) {
+  std::uint64_t sum = 0;
+  for (const Effect effect :
+       {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::MINIMUM_SEPARATION, Effect::TRACKER_NOISE}) {
+    sum += stats[effect].in;
+  }
+  return sum;
+}
+
+/// Each pair is in one row alone, and so is the time.
+TEST(EffectRows, CountNothingTwice) {
+  Scene scene = bare();
+  scene.second = scene.second_is_rigid = true;
+  scene.body.self_collision = scene.body.against_bodies = true;
+  const auto check = [&](const char* what) {
+    const StepStats stats = costOf(scene).stats;
+    EXPECT_EQ(pairsIn(stats), stats[Stage::BROAD_PHASE].out) << what;
+    double ms = 0;
+    for (const StageStats& effect : stats.effects) ms += effect.ms;
+    EXPECT_LE(ms, stats.total_ms * (1 + 1e-9)) << what;  // sums are rounded
+    EXPECT_EQ(stats[Effect::RIGID_BODIES].in, 1u) << what << ": the body that turns";
+    return stats;
+  };
+  const StepStats plain = check("plain");
+  EXPECT_EQ(plain[Effect::MINIMUM_SEPARATION].in + plain[Effect::TRACKER_NOISE].in, 0u);
+  scene.body.minimum_separation_m = 0.02;
+  const StepStats separated = check("with a separation");
+  EXPECT_GT(separated[Effect::MINIMUM_SEPARATION].in, 0u);
+  scene.radius_m.assign(64, 0.0);
+  scene.radius_m[5] = 0.01;
+  const StepStats noisy = check("with one uncertain vertex");
+  EXPECT_GT(noisy[Effect::TRACKER_NOISE].in, 0u);
+  EXPECT_GT(noisy[Effect::MINIMUM_SEPARATION].in, 0u);
+  std::uint64_t hits = 0;
+  for (const StageStats& effect : noisy.effects) hits += effect.out;
+  EXPECT_EQ(hits - noisy[Effect::RIGID_BODIES].out, noisy[Stage::ELEMENTARY].out);
+}
+
 }  // namespace
 }  // namespace dccd

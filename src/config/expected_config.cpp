@@ -1,0 +1,79 @@
+// expected_contacts: which contacts a task brings about, and in which of its phases.
+#include <algorithm>
+
+#include "config/body_config.h"
+
+namespace dccd {
+namespace {
+
+/// A list of indices, or the name of a set, whose vertices are not known before the files are loaded.
+void readVertices(ParameterReader& section, const std::string& name, ExpectedPartner& partner) {
+  if (section.raw(name).kind == ParameterTree::Kind::TEXT) {
+    partner.set = section.text(name);
+    return;
+  }
+  partner.vertices = section.indices(name);
+  if (partner.vertices.empty()) section.fail(name, "names no vertex; list some, or remove it for the whole body");
+}
+
+/// One entry: {between: [cloth, finger], vertices: {cloth: hem, finger: [3, 4]}, phase: carry}. Of a body with itself
+/// the body's own name stands for both sides, unless `self` names the other one.
+Expectation readExpectation(ParameterReader entry, const MonitorConfig& config) {
+  const std::array<std::uint16_t, 2> bodies = readPartners(entry, config);
+  Expectation one;
+  for (std::size_t side = 0; side < 2; ++side) one.partners[side].body = bodies[side];
+  const bool itself = bodies[0] == bodies[1];
+  ParameterReader vertices = entry.section("vertices");
+  for (std::size_t side = 0; side < 2; ++side) {
+    ExpectedPartner& partner = one.partners[side];
+    if (partner.body == OBSTACLE_BODY) continue;
+    const BodyConfig& body = config.bodies[partner.body];
+    const std::string name = itself && side == 1 && vertices.has("self") ? "self" : body.body.name;
+    if (!vertices.has(name)) continue;
+    if (body.isDepthImage()) vertices.fail(name, "has no meaning for a depth image; remove it");
+    readVertices(vertices, name, partner);
+  }
+  vertices.finish();
+  one.phase = entry.get("phase", std::string());
+  entry.finish();
+  return one;
+}
+
+}  // namespace
+
+void readExpectedContacts(ParameterReader& reader, MonitorConfig& config) {
+  for (const ParameterReader& entry : reader.sections("expected_contacts")) {
+    config.expected_contacts.push_back(readExpectation(entry, config));
+  }
+  config.phase = reader.get("phase", std::string());
+  const std::vector<std::string> known = config.phases();
+  if (!config.phase.empty() && std::find(known.begin(), known.end(), config.phase) == known.end()) {
+    reader.fail("phase", "is '" + config.phase + "', which expected_contacts does not name; " + config.phasesInWords());
+  }
+}
+
+std::vector<std::string> MonitorConfig::phases() const {
+  std::vector<std::string> names;
+  for (const Expectation& one : expected_contacts) {
+    if (!one.phase.empty()) names.push_back(one.phase);
+  }
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+std::string MonitorConfig::phasesInWords() const {
+  std::string text;
+  for (const std::string& name : phases()) text += (text.empty() ? "'" : ", '") + name + "'";
+  return "known phases are " + (text.empty() ? "'' for none alone" : text + ", and '' for none");
+}
+
+std::vector<Expectation> MonitorConfig::expectedIn(const std::string& some_phase) const {
+  std::vector<Expectation> expected;
+  for (const Expectation& one : expected_contacts) {
+    if (one.phase.empty() || one.phase == some_phase) expected.push_back(one);
+  }
+  return expected;
+}
+
+}  // namespace dccd

@@ -1,0 +1,115 @@
+#include "step/expected_contacts.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace dccd {
+namespace {
+
+std::string nameOf(const ExpectedPartner& partner, const std::vector<Body>& bodies) {
+  if (partner.body == OBSTACLE_BODY) return "the map";
+  const std::string& name = bodies[partner.body].name;
+  if (partner.vertices.empty()) return name;
+  const std::string count = std::to_string(partner.vertices.size()) + " vertices";
+  return name + (partner.set.empty() ? " (" + count + ")" : " ('" + partner.set + "', " + count + ")");
+}
+
+/// How many of a contact's vertices are those of its first feature.
+std::size_t firstSize(PairKind kind) {
+  switch (kind) {
+    case PairKind::VERTEX_FACE:
+    case PairKind::VERTEX_VOXEL_FACE:
+      return 1;
+    case PairKind::EDGE_EDGE:
+    case PairKind::EDGE_VOXEL_EDGE:
+      return 2;
+    case PairKind::FACE_VOXEL_CORNER:
+      break;
+  }
+  return 3;
+}
+
+}  // namespace
+
+void checkPartners(const std::vector<Expectation>& expected, std::size_t bodies) {
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const auto fail = [&](std::size_t side, const std::string& what) {
+      throw std::invalid_argument("expected[" + std::to_string(i) + "]: partner " + std::to_string(side) + " " + what);
+    };
+    for (std::size_t side = 0; side < 2; ++side) {
+      const ExpectedPartner& partner = expected[i].partners[side];
+      const bool map = partner.body == OBSTACLE_BODY;
+      if (map && side == 0) fail(side, "is the map; it comes second");
+      if (map && !partner.vertices.empty()) fail(side, "is the map, which has no vertices");
+      if (!map && partner.body >= bodies) {
+        fail(side, "is body " + std::to_string(partner.body) + " of " + std::to_string(bodies));
+      }
+    }
+  }
+}
+
+std::vector<std::string> describe(const std::vector<Expectation>& expected, const std::vector<Body>& bodies) {
+  std::vector<std::string> sentences;
+  for (const Expectation& one : expected) {
+    const ExpectedPartner &first = one.partners[0], &second = one.partners[1];
+    const std::string other = first == second ? "itself" : nameOf(second, bodies);
+    sentences.push_back(nameOf(first, bodies) + " with " + other +
+                        (one.phase.empty() ? "" : " in phase '" + one.phase + "'"));
+  }
+  return sentences;
+}
+
+void ExpectedContacts::set(const std::vector<Expectation>& expected, const std::vector<Body>& bodies) {
+  checkPartners(expected, bodies.size());
+  const auto partnerOf = [&](const ExpectedPartner& from) {
+    Partner to{from.body, from.vertices.empty(), {}};
+    if (to.anywhere) return to;
+    to.holds.assign(bodies[from.body].topology->vertexCount(), 0);
+    for (const Index v : from.vertices) {
+      if (v >= to.holds.size()) {
+        throw std::invalid_argument("expected contacts of body '" + bodies[from.body].name + "' name vertex " +
+                                    std::to_string(v) + ", but the mesh has " + std::to_string(to.holds.size()));
+      }
+      to.holds[v] = 1;
+    }
+    return to;
+  };
+  std::vector<Pair> pairs;
+  for (const Expectation& one : expected) pairs.push_back({partnerOf(one.partners[0]), partnerOf(one.partners[1])});
+  pairs_ = std::move(pairs);
+}
+
+bool ExpectedContacts::Partner::has(const Feature& feature) const {
+  if (feature.body != body) return false;
+  if (anywhere) return true;
+  return feature.whole && std::all_of(feature.begin, feature.end, [&](Index v) { return holds[v] != 0; });
+}
+
+bool ExpectedContacts::isExpected(const Feature& a, const Feature& b) const {
+  return std::any_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
+    return (pair.first.has(a) && pair.second.has(b)) || (pair.first.has(b) && pair.second.has(a));
+  });
+}
+
+bool ExpectedContacts::isExpected(const Contact& contact) const {
+  const Index *begin = contact.vertex.data(), *second = begin + firstSize(contact.kind);
+  const Index* end = contact.body[1] == OBSTACLE_BODY ? second : begin + contact.vertex.size();
+  return isExpected({contact.body[0], begin, second, true}, {contact.body[1], second, end, true});
+}
+
+/// Of a piece inside of a body only the first vertex is told, and of the body around it none.
+bool ExpectedContacts::isExpected(const StartIntersection& start) const {
+  const bool with_map = start.body[1] == OBSTACLE_BODY;
+  const bool crossing = !with_map && start.vertex[1] != NO_INDEX;
+  const Index *begin = start.vertex.data(), *second = begin + (crossing ? 2 : 1);
+  const Index* end = crossing ? begin + start.vertex.size() : second;
+  return isExpected({start.body[0], begin, second, crossing || with_map}, {start.body[1], second, end, crossing});
+}
+
+void ExpectedContacts::mark(Outcome& outcome) const {
+  if (pairs_.empty()) return;
+  for (Contact& contact : outcome.contacts) contact.expected = isExpected(contact);
+  for (StartIntersection& start : outcome.intersections) start.expected = isExpected(start);
+}
+
+}  // namespace dccd

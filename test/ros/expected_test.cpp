@@ -1,0 +1,176 @@
+// Expected contacts through the live node: no alarm in their phase, but found, listed, counted, marked and said.
+#include <deformable_ccd/EffectArray.h>
+#include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/SetPhase.h>
+#include <deformable_ccd/State.h>
+#include <deformable_ccd/TimeToContact.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
+
+#include "ros/support/live_tests.h"
+#include "ros/support/monitor_fixture.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+using deformable_ccd::ContactArray;
+using deformable_ccd::State;
+
+struct Expected : MonitorTest {
+  explicit Expected(const std::string& name) : MonitorTest(name) {}
+  ros::Publisher mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, name_ + "/mesh");
+  Probe<State> state{node, name_ + "/state"};
+  Probe<deformable_ccd::FirstContact> first{node, name_ + "/first_contact"};
+
+  deformable_ccd::SetPhase::Response setPhase(const std::string& phase) {
+    deformable_ccd::SetPhase call;
+    call.request.phase = phase;
+    EXPECT_TRUE(ros::service::call(name_ + "/set_phase", call));
+    return call.response;
+  }
+  /// What ~state said first of the step with this end; later it says that no more frames come.
+  bool saidAt(const ros::Time& end) {
+    for (const State& one : state.all()) {
+      if (one.holds_until != end) continue;
+      said = one;
+      return true;
+    }
+    return false;
+  }
+  State said;
+
+  /// The tip from one height to another one, after a reset.
+  ContactArray move(double from_z, double to_z, double stamp_s) {
+    EXPECT_TRUE(trigger("reset").success);
+    send(mesh, meshStamped(tipAbove(from_z), stamp_s));
+    const ContactArray outcome = send(mesh, meshStamped(tipAbove(to_z), stamp_s + 0.1));
+    const ros::Time end(stamp_s + 0.1);
+    EXPECT_TRUE(waitUntil([&] { return saidAt(end); }));
+    EXPECT_TRUE(waitUntil([&] { return first.count() > 0 && first.last().header.stamp == end; }));
+    EXPECT_TRUE(waitUntil([&] { return stats.count() > 0 && stats.last().header.stamp == end; }));
+    return outcome;
+  }
+};
+
+struct Pressing : Expected {
+  Pressing() : Expected("/pressing") {}
+};
+
+// The first case of this monitor: nobody has listened to its predictions.
+TEST_F(Pressing, NoEffectIsOnThatNobodyListensTo) {
+  Probe<deformable_ccd::EffectArray> effects(node, "/pressing/effects");
+  const auto lookAhead = [&] {
+    deformable_ccd::EffectState found;
+    for (const auto& effect : effects.last().effects) {
+      if (effect.name == "look_ahead") found = effect;
+    }
+    return found;
+  };
+  ASSERT_TRUE(waitUntil([&] { return effects.count() > 0; }));
+  EXPECT_FALSE(lookAhead().running);
+  EXPECT_EQ(lookAhead().reason, "nobody subscribes to predictions");
+  {
+    Probe<deformable_ccd::TimeToContact> prediction(node, "/pressing/time_to_contact");
+    EXPECT_TRUE(waitUntil([&] { return static_cast<bool>(lookAhead().running); })) << lookAhead().reason;
+  }
+  EXPECT_TRUE(waitUntil([&] { return !lookAhead().running; })) << "the subscriber has gone";
+}
+
+TEST_F(Pressing, InAnotherPhaseAContactIsAnAlarm) {
+  EXPECT_TRUE(setPhase("").success);
+  const ContactArray outcome = move(0.1, -0.01, 100);
+  ASSERT_EQ(outcome.contacts.size(), 1u) << outcome.reason;
+  EXPECT_FALSE(outcome.contacts[0].expected);
+  EXPECT_EQ(outcome.expected_contacts, 0u);
+  EXPECT_EQ(said.touching, State::NEW);
+  EXPECT_TRUE(said.expected.empty());
+  EXPECT_TRUE(first.last().contact);
+}
+
+TEST_F(Pressing, AnUnknownPhaseIsRefusedWithTheKnownOnes) {
+  EXPECT_TRUE(setPhase("press").success);
+  const auto reply = setPhase("prss");
+  EXPECT_FALSE(reply.success);
+  EXPECT_NE(reply.message.find("known phases are 'press'"), std::string::npos) << reply.message;
+  EXPECT_NE(reply.message.find("in force is phase 'press'"), std::string::npos) << reply.message;
+}
+
+TEST_F(Pressing, InItsPhaseItIsFoundListedCountedMarkedAndNoAlarm) {
+  const auto reply = setPhase("press");
+  EXPECT_TRUE(reply.success);
+  const std::string words = "mesh ('tip', 1 vertices) with mesh ('table', 3 vertices) in phase 'press'";
+  EXPECT_EQ(reply.message, "from the next step on: phase 'press', expected: " + words);
+  const ContactArray outcome = move(0.1, -0.01, 200);  // after ~reset, over which the phase stays
+  ASSERT_EQ(outcome.status, ContactArray::OK) << outcome.reason;
+  ASSERT_EQ(outcome.contacts.size(), 1u);
+  EXPECT_TRUE(outcome.contacts[0].expected);
+  EXPECT_EQ(outcome.expected_contacts, 1u);
+  EXPECT_EQ(stats.last().contacts_expected, 1u);
+  EXPECT_TRUE(said.proved) << said.reason;
+  EXPECT_EQ(said.touching, State::EXPECTED);
+  EXPECT_FALSE(said.clear) << "an expected contact is a contact";
+  EXPECT_EQ(said.expected, std::vector<std::string>{words});
+  EXPECT_NE(said.reason.find("what touches is expected"), std::string::npos) << said.reason;
+  EXPECT_FALSE(first.last().contact);
+  EXPECT_EQ(first.last().expected_contacts, 1u);
+  move(0.1, 0.08, 210);
+  EXPECT_EQ(said.touching, State::NONE);
+  EXPECT_EQ(said.expected, std::vector<std::string>{words}) << "said also where nothing touches";
+  EXPECT_TRUE(said.clear);
+}
+
+TEST_F(Pressing, APredictionIsAboutWhatIsNotExpected) {
+  Probe<deformable_ccd::TimeToContact> prediction(node, "/pressing/time_to_contact");
+  const auto predicted = [&](double stamp_s) {
+    // 2 cm in 0.1 s, 4 cm above: it arrives after 0.2 s.
+    move(0.06, 0.04, stamp_s);
+    const ros::Time at(stamp_s + 0.1);
+    EXPECT_TRUE(waitUntil([&] { return prediction.count() > 0 && prediction.last().header.stamp == at; }));
+    return prediction.last();
+  };
+  EXPECT_TRUE(setPhase("").success);
+  const auto alarm = predicted(300);
+  EXPECT_TRUE(alarm.contact);
+  EXPECT_NEAR(alarm.seconds, 0.2, 1e-3);
+  EXPECT_EQ(alarm.expected_contacts, 0u);
+  EXPECT_TRUE(setPhase("press").success);
+  const auto quiet = predicted(310);
+  EXPECT_TRUE(quiet.answered);
+  EXPECT_GE(quiet.expected_contacts, 1u) << "found and counted";
+  EXPECT_GT(quiet.seconds, alarm.seconds + 0.01) << "the tip's own arrival is no alarm";
+}
+
+struct Beyond : Expected {
+  Beyond() : Expected("/beyond") {}
+};
+
+TEST_F(Beyond, AnIndexThatTheMeshHasNotIsCountedAndSaid) {
+  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
+  const ContactArray outcome = send(mesh, meshStamped(tipAbove(0.1), 100));
+  EXPECT_EQ(outcome.status, ContactArray::VERTEX_COUNT);
+  const std::string reason =
+      "parameter expected_contacts[0]/vertices of body 'mesh' names vertex 60, but the mesh has 6";
+  EXPECT_EQ(outcome.reason, reason);
+  EXPECT_TRUE(waitUntil([&] { return stats.count() > 0 && stats.last().skipped_vertex_count > 0; }));
+  double stamp_s = 100;
+  const auto isDiagnosed = [&] {
+    for (const auto& array : diagnostics.all()) {
+      for (const auto& status : array.status) {
+        if (status.name == "/beyond: steps" && status.message.find(reason) != std::string::npos) return true;
+      }
+    }
+    return false;
+  };
+  EXPECT_TRUE(waitUntil(
+      [&] {
+        send(mesh, meshStamped(tipAbove(0.1), stamp_s += 0.1));
+        return isDiagnosed();
+      },
+      10));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
+
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "expected_test"); }
