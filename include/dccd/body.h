@@ -59,7 +59,7 @@ struct Body {
   bool turns = false;  ///< moves from pose_t0 to pose_t1 along the rotation, not straight
   Eigen::Isometry3d pose_t0 = Eigen::Isometry3d::Identity(), pose_t1 = Eigen::Isometry3d::Identity();
   /// Uncertainty radius per vertex during the whole step [m], finite and 0 or more; null: none. A pair's separation
-  /// grows by the largest radius of each of its two features. Needs accuracy conservative or screen.
+  /// grows by the largest radius of each of its two features. Needs accuracy conservative.
   std::shared_ptr<const std::vector<double>> radius_m;
 };
 

@@ -74,7 +74,7 @@ struct ObstacleOptions {
 ///   again.
 /// - `leaving`: a feature that touched some leaf at t=0 meets another one's face, edge or corner from within.
 /// Rungs: vertices are always decided exactly (the path of a point through a box is linear); edges and corners by the
-/// elementary test. `screen` calls all but initial contacts undecided.
+/// elementary test.
 /// Reusable scratch inside: after warm-up a run
 /// allocates nothing that grows with the number of steps. Not thread-safe; one per thread or body.
 class DCCD_EXPORT ObstacleCheck {
@@ -84,7 +84,7 @@ class DCCD_EXPORT ObstacleCheck {
   /// Appends contacts (body index in Contact::body[0], OBSTACLE_BODY in [1]) in canonical order.
   /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
   /// vertex_radius_m: uncertainty per vertex, 0 or more; null means none. A feature's largest one adds to the
-  /// separation, so that rungs other than conservative and screen cannot hold it. deadline: features that have not been
+  /// separation, so that rungs other than conservative cannot hold it. deadline: features that have not been
   /// begun by then are left out, and false is returned. most_found: so many contacts at most are appended; of more,
   /// those found first, and false is returned.
   bool run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,

@@ -82,7 +82,7 @@ struct MonitorConfig {
   std::vector<Expectation> expectedIn(const std::string& some_phase) const;
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
-  /// A separation or an uncertainty is asked for, so that only conservative and screen will do.
+  /// A separation or an uncertainty is asked for, so that only conservative will do.
   bool holdsDistance() const;
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
   std::uint64_t hash() const;

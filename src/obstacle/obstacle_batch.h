@@ -20,7 +20,7 @@ struct ObstaclePair {
 /// Collects pairs of one elementary kind and appends what the rung finds to a vector of contacts. Reuses its memory.
 class ObstacleBatch {
  public:
-  /// kind: VERTEX_FACE or EDGE_EDGE. test: null for the rung `screen`, whose answer is `undecided`.
+  /// kind: VERTEX_FACE or EDGE_EDGE. test: the rung.
   ObstacleBatch(PairKind kind, const Rung* test);
 
   /// Drops whatever an earlier run left behind. What the tests of the next run have not ended by the deadline is

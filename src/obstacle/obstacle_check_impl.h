@@ -27,7 +27,7 @@ enum VertexState : std::uint8_t {
 
 struct MovingBounds;
 
-/// The rung of the options; null for `screen`. Throws std::invalid_argument for a separation that it cannot have.
+/// The rung of the options. Throws std::invalid_argument for a separation that it cannot have.
 std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options);
 
 struct ObstacleCheck::Impl {
