@@ -45,6 +45,7 @@ struct Options {
   std::size_t max_found_per_feature = 0;
   bool suppress_initial = false;   ///< leave initial obstacle contacts out of the list (they still count)
   std::vector<Box> exclude_boxes;  ///< [m], fixed frame: voxels with their centre inside count as free
+  bool patches = false;            ///< say which contacts belong together: Outcome::patches
   bool obstacle_expected = false;  ///< without a map the status is NO_MAP
   /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
   /// answer.

@@ -103,8 +103,19 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   begins_at = nullptr;
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
+  if (options->patches) findPatches(outcome);
   conclude(*options, step, needed, outcome);
+  if (options->patches) patches.list(outcome);
   return outcome;
+}
+
+void History::Impl::findPatches(Outcome& outcome) {
+  const ScopedFloatMode mode;
+  const Clock::time_point start = Clock::now();
+  patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);
+  StageStats& stats = outcome.stats[Effect::PATCHES];
+  stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
+  outcome.stats.total_ms += stats.ms;
 }
 
 void History::Impl::setOptions(const Options& wanted) {
