@@ -11,6 +11,7 @@
 #include "dccd/contact.h"
 #include "dccd/elementary.h"
 #include "dccd/export.h"
+#include "dccd/patch.h"
 #include "dccd/step.h"
 
 namespace dccd {
@@ -57,6 +58,7 @@ enum class Effect : std::uint8_t {
   MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test, and no uncertainty
   TRACKER_NOISE,       ///< pairs whose vertices bring an uncertainty radius
   LOOK_AHEAD,          ///< the last prediction: pairs past the filters, contacts
+  PATCHES,             ///< in: contacts and edges through faces at the start, out: patches
   COUNT
 };
 DCCD_EXPORT const char* toString(Stage stage);
@@ -168,11 +170,14 @@ struct Outcome {
   std::uint64_t sequence = 0;  ///< of the clock body's frames that were pushed or skipped, from 1
   bool answered = false;       ///< the fields below hold a result
 
-  std::vector<Contact> contacts;      ///< canonical order, filtered and cut as the options say; toc of the whole step
-  std::size_t total_contacts = 0;     ///< before the cut to max_contacts; with `cut` there are at least so many
-  ContactCounts counts;               ///< of all of these
-  std::size_t suppressed = 0;         ///< initial contacts left out by choice
-  std::uint64_t excluded_voxels = 0;  ///< finest voxels of the map taken out by exclude_boxes
+  std::vector<Contact> contacts;        ///< canonical order, filtered and cut as the options say; toc of the whole step
+  std::size_t total_contacts = 0;       ///< before the cut to max_contacts; with `cut` there are at least so many
+  ContactCounts counts;                 ///< of all of these
+  std::vector<Patch> patches;           ///< of all that was found, by its first contact; with Options::patches
+  std::vector<std::uint32_t> patch_of;  ///< per listed contact its patch; empty without Options::patches
+  std::vector<PatchEvent> patch_events;  ///< in a stream, in order; also of an outcome without a result, at a seam
+  std::size_t suppressed = 0;            ///< initial contacts left out by choice
+  std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   StartState start_state = StartState::NOT_CHECKED;
   std::vector<StartIntersection> intersections;
   bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at

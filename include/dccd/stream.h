@@ -30,6 +30,9 @@ struct MonitorOptions {
   /// map; 0: never. (Where none is expected, leaving a map out would go unsaid: it is used whatever its age.)
   double octomap_timeout_s = 0;
   double look_ahead_s = 0;  ///< horizon of predictions; 0: none
+  /// A patch that comes back within this is the same one; of steps that were answered whole. With
+  /// detector.patches.
+  double patch_gap_s = tolerance::PATCH_GAP_S;
 
   MonitorOptions() { detector.max_contacts = 10000; }
 };

@@ -20,6 +20,9 @@ constexpr double RIGID_PATH_M = 1e-3;
 constexpr double LONGEST_STEP_S = 0.5;
 /// [m] A vertex that moves further in a step is a teleport, no motion: trackers lose a mesh and find it elsewhere.
 constexpr double FARTHEST_VERTEX_STEP_M = 0.5;
+/// [s] A contact that is let go for less is the same one when it comes back. Larger: noise lets go less often, ends are
+/// told later.
+constexpr double PATCH_GAP_S = 0.25;
 /// [m] Edge lengths of voxels that a map may have: their planes' coordinates, up to 2^16 of them, neither overflow nor
 /// vanish. Wider: such a map is no longer refused, and answers about it may be wrong.
 constexpr double SMALLEST_RESOLUTION_M = 1e-290, LARGEST_RESOLUTION_M = 1e290;

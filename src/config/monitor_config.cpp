@@ -236,6 +236,7 @@ void applyEffects(MonitorConfig& config) {
   }
   if (off(Effect::START_STATE)) config.monitor.detector.check_start_state = false;
   if (off(Effect::LOOK_AHEAD)) config.monitor.look_ahead_s = 0;
+  config.monitor.detector.patches = !off(Effect::PATCHES);
   if (off(Effect::UNKNOWN_SPACE)) config.unknown_space = UnknownSpace::FREE;
 }
 

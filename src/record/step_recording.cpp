@@ -256,6 +256,30 @@ void visitExpected(Archive& a, Recording& r) {
   for (auto& sentence : r.answer.expected) a.text(sentence);
 }
 
+constexpr std::size_t PATCH_BYTES = 200;
+
+template <typename Archive, typename Vector>
+void visitVector(Archive& a, Vector& v) {
+  for (int i = 0; i < 3; ++i) a.number(v[i]);
+}
+
+/// What version 5 added: patches. Which of them last is a matter of the stream, not of a step.
+template <typename Archive, typename Recording>
+void visitPatches(Archive& a, Recording& r) {
+  a.flag(r.options.patches);
+  a.count(r.answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& patch : r.answer.patches) {
+    for (auto& body : patch.body) a.number(body);
+    for (auto* count : {&patch.contacts, &patch.certain, &patch.initial, &patch.crossings}) a.size(*count);
+    a.number(patch.toc_lower);
+    a.number(patch.toc_upper);
+    visitContact(a, patch.earliest);
+    a.number(patch.area_m2);
+    for (auto* vector : {&patch.centroid, &patch.normal, &patch.box.min, &patch.box.max}) visitVector(a, *vector);
+  }
+  a.array(r.answer.patch_of);
+}
+
 /// The file's fields in their order, for both directions.
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
@@ -297,6 +321,7 @@ void RecordingImage::build(const StepRecording& recording) {
   visitDistances(writer, recording);
   visitVerdict(writer, recording);
   visitExpected(writer, recording);
+  visitPatches(writer, recording);
 }
 
 bool RecordingImage::write(int descriptor) const noexcept {
@@ -379,6 +404,7 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   if (version >= 2) visitDistances(reader, recording);
   if (version >= 3) visitVerdict(reader, recording);
   if (version >= 4) visitExpected(reader, recording);
+  if (version >= 5) visitPatches(reader, recording);
   recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;

@@ -38,6 +38,18 @@ std::string pairText(const Contact& c) {
   return text.str();
 }
 
+bool samePatch(const Patch& a, const Patch& b, std::uint32_t version) {
+  const auto places = [](const Patch& p) {
+    return std::array<double, 13>{p.area_m2,    p.centroid[0], p.centroid[1], p.centroid[2], p.normal[0],
+                                  p.normal[1],  p.normal[2],   p.box.min[0],  p.box.min[1],  p.box.min[2],
+                                  p.box.max[0], p.box.max[1],  p.box.max[2]};
+  };
+  const auto counts = [](const Patch& p) { return std::tie(p.body, p.contacts, p.certain, p.initial, p.crossings); };
+  const std::array<double, 13> x = places(a), y = places(b);
+  return counts(a) == counts(b) && sameBits(a.toc_lower, b.toc_lower) && sameBits(a.toc_upper, b.toc_upper) &&
+         sameContact(a.earliest, b.earliest, version) && std::equal(x.begin(), x.end(), y.begin(), sameBits);
+}
+
 class Differences {
  public:
   template <typename T>
@@ -105,6 +117,12 @@ std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& 
   }
   if (version >= 4) {
     out.field("earliest unexpected toc", recorded.earliest_unexpected_toc, replayed.earliest_unexpected_toc);
+  }
+  if (version >= 5) {
+    const auto same_patch = [&](const Patch& a, const Patch& b) { return samePatch(a, b, version); };
+    const bool same = std::equal(recorded.patches.begin(), recorded.patches.end(), replayed.patches.begin(),
+                                 replayed.patches.end(), same_patch);
+    if (!same || recorded.patch_of != replayed.patch_of) out.add("the patches differ");
   }
   const bool same =
       std::equal(recorded.intersections.begin(), recorded.intersections.end(), replayed.intersections.begin(),

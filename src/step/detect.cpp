@@ -110,7 +110,9 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
+  if (options->patches) findPatches(outcome);
   conclude(*options, expected, step, needed, outcome);
+  if (options->patches) patches.list(outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
     const double others_ms = outcome.stats[Stage::OBSTACLE].ms + outcome.stats[Stage::START_STATE].ms;
@@ -118,6 +120,15 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
     per_hit = std::chrono::nanoseconds(static_cast<std::int64_t>(1.5e6 * after_ms / static_cast<double>(hits)));
   }
   return outcome;
+}
+
+void History::Impl::findPatches(Outcome& outcome) {
+  const ScopedFloatMode mode;
+  const Clock::time_point start = Clock::now();
+  patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);
+  StageStats& stats = outcome.stats[Effect::PATCHES];
+  stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
+  outcome.stats.total_ms += stats.ms;
 }
 
 void History::Impl::setOptions(const Options& wanted) {

@@ -142,6 +142,8 @@ Finding lookAhead(const EffectScene& scene) {
   return {true, true, "predictions reach " + metres(scene.look_ahead_s) + " s ahead"};
 }
 
+Finding patches(const EffectScene&) { return {true, true, "contacts that belong together are told as one"}; }
+
 /// By Effect: its name, and what a scene says of it.
 struct EffectRow {
   const char* name;
@@ -157,6 +159,7 @@ constexpr EffectRow EFFECTS[] = {
     {"minimum_separation", minimumSeparation},
     {"tracker_noise", trackerNoise},
     {"look_ahead", lookAhead},
+    {"patches", patches},
 };
 static_assert(std::size(EFFECTS) == static_cast<std::size_t>(Effect::COUNT), "a row for each effect");
 

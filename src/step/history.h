@@ -23,6 +23,7 @@
 #include "step/inside.h"
 #include "step/left_out.h"
 #include "step/pair_worker.h"
+#include "step/patches.h"
 #include "step/start_state.h"
 
 namespace dccd {
@@ -106,6 +107,7 @@ struct History::Impl {
   /// all_pairs: no pair of meshes was left out.
   void runStartState(const Part& part, Deadline::Clock::time_point begin, bool all_pairs);
   bool listStart(const Part& part, const StartStateSearch::IsOver& is_over, std::vector<StartIntersection>& met);
+  void findPatches(Outcome& outcome);
   template <class Function>
   void parallel(std::size_t n, std::size_t piece, const Function& function);
 
@@ -145,6 +147,7 @@ struct History::Impl {
   Positions map_t0, map_t1;
   HitOrder order;
   PartResult result;
+  PatchMaker patches;
 };
 
 template <class Function>

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "step/history.h"
 #include "stream/monitor_impl.h"
 #include "stream/seam_reason.h"
 
@@ -22,6 +23,8 @@ void checkStream(const MonitorOptions& options, std::size_t bodies) {
   require(options.octomap_timeout_s >= 0, "octomap_timeout_s must be 0 (never) or more");
   require(options.look_ahead_s >= 0 && std::isfinite(options.look_ahead_s),
           "look_ahead_s must be finite and 0 (off) or more, is " + std::to_string(options.look_ahead_s));
+  require(options.patch_gap_s >= 0 && std::isfinite(options.patch_gap_s),
+          "patch_gap_s must be finite and 0 or more, is " + std::to_string(options.patch_gap_s));
 }
 
 }  // namespace
@@ -185,6 +188,7 @@ void Monitor::reset(StepStatus status) {
   }
   if (status == StepStatus::RESET) m.forgetReferences();
   m.forgetLast();
+  m.tracker.seam();
 }
 
 void Monitor::Impl::forgetLast() {
@@ -196,12 +200,26 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   const Step step = place(pending);
   // Interpolated ends repeat bit for bit as long as every body stays in its run.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
+  for (std::size_t b = 0; b < last_runs.size(); ++b) {
+    if (last_runs[b] != runs[b]) tracker.seam(b);
+  }
   last = nullptr;  // until this one is done
   if (listener) listener->onStep(step, options.detector);
   Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;
+  follow(outcome);
   return outcome;
+}
+
+/// Which of its patches are those of the step before.
+void Monitor::Impl::follow(Outcome& outcome) {
+  if (!options.detector.patches) return tracker.seam();
+  const auto start = Deadline::Clock::now();
+  tracker.follow(history.impl().patches, options.patch_gap_s, outcome);
+  const double ms = msSince(start);
+  outcome.stats[Effect::PATCHES].ms += ms;
+  outcome.stats.total_ms += ms;
 }
 
 bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
@@ -226,10 +244,15 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
       without(StepStatus::INTERNAL_ERROR, error.what());
       m.forgetLast();
     }
+    m.tracker.tell(outcome);
     if (m.listener) m.listener->onOutcome(outcome);
   } else {
     without(step.status, step.reason);
-    if (isSeam(step.status)) m.forgetLast();
+    if (isSeam(step.status)) {
+      m.forgetLast();
+      if (!step.to) m.tracker.seam();  // else it is another body's, which runStep() sees
+    }
+    m.tracker.tell(outcome);
   }
   m.counters[m.options.clock_body].count(outcome.status);
   m.pending.pop_front();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "dccd/stream.h"
+#include "stream/patch_tracker.h"
 
 namespace dccd {
 
@@ -54,7 +55,8 @@ struct Monitor::Impl {
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
   ObstacleMap map;
-  History history, side_history;     // of steps; of predictions and checks
+  History history, side_history;  // of steps; of predictions and checks
+  PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
   References references;
   std::vector<std::uint64_t> runs, last_runs;
@@ -90,6 +92,7 @@ struct Monitor::Impl {
   bool separates(const Body& body) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;
   Outcome runStep(const Pending& pending, const Deadline& deadline);
+  void follow(Outcome& outcome);
 };
 
 }  // namespace dccd

@@ -1,6 +1,7 @@
 // What is asked between steps: is anything in contact now, and what would be next if all went on as it does?
 #include <cmath>
 
+#include "step/history.h"
 #include "stream/monitor_impl.h"
 
 namespace dccd {
@@ -26,7 +27,9 @@ Outcome Monitor::checkNow() {
   step.map = m.usableMap(step.stamp_ns);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
-  return detect(step, m.options.detector, m.side_history, Deadline().orWhen(m.cancelled));
+  Outcome outcome = detect(step, m.options.detector, m.side_history, Deadline().orWhen(m.cancelled));
+  if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
+  return outcome;
 }
 
 Outcome Monitor::predict() {
@@ -64,7 +67,9 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   m.side_history.beginAt(m.history);
-  return detect(step, m.options.detector, m.side_history, deadline);
+  Outcome outcome = detect(step, m.options.detector, m.side_history, deadline);
+  if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
+  return outcome;
 }
 
 }  // namespace dccd

@@ -16,6 +16,7 @@
 #include "simd/cluster_kernels.h"
 #include "simd/fused_filter.h"
 #include "support/data.h"
+#include "support/patch_oracle.h"
 #include "support/scene_data.h"
 #include "support/step_support.h"
 
@@ -125,6 +126,19 @@ TEST_P(StepScenes, StartStateIsCarriedOver) {
       EXPECT_TRUE(trulyMeet(x[v[0]], x[v[1]], x[v[2]], x[v[3]], x[v[4]])) << "pair " << k << " does not meet";
     }
   }
+}
+
+TEST_P(StepScenes, PatchesAreThoseOfTheDefinition) {
+  const Scene scene(GetParam());
+  Options options;
+  options.patches = true;
+  const Outcome one = scene.run(options);
+  EXPECT_EQ(patchProblem(one, true), "");
+  for (const int threads : {2, 3}) {
+    options.num_threads = threads;
+    EXPECT_EQ(patchDifference(one, scene.run(options)), "") << threads << " threads";
+  }
+  std::cout << GetParam() << ": " << one.contacts.size() << " contacts in " << one.patches.size() << " patches\n";
 }
 
 INSTANTIATE_TEST_SUITE_P(Truth, StepScenes, testing::Values("cloth-ball", "n-body"), [](const auto& info) {

@@ -139,6 +139,30 @@ TEST(StepReplay, OneBitIsADifference) {
   EXPECT_FALSE(replayStep(r).differences.empty());
 }
 
+TEST(StepReplay, PatchesAreRecordedAndMadeAgain) {
+  MonitorOptions options;
+  options.detector.patches = true;
+  StepRecording r = recordScene(options);
+  ASSERT_FALSE(r.answer.patches.empty());
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
+  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_TRUE(read.options.patches);
+  EXPECT_EQ(read.answer.patch_of, r.answer.patch_of);
+  EXPECT_TRUE(replayStep(read).differences.empty());
+  read.answer.patches.back().area_m2 = std::nextafter(read.answer.patches.back().area_m2, 1);
+  EXPECT_EQ(replayStep(read).differences.size(), 1u);
+}
+
+TEST(StepRecording, AFileOfTheVersionBeforePatchesIsRead) {
+  std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
+  bytes[8] = 3;
+  bytes.resize(bytes.size() - 17);  // a flag and two empty lists
+  const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(read.version, 3u);
+  EXPECT_FALSE(read.options.patches);
+  EXPECT_TRUE(replayStep(read).differences.empty());
+}
+
 TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
   StepRecording r = recordScene();
   r.answer.complete = false;

@@ -129,6 +129,8 @@ std::vector<Case> cases() {
          s.options.look_ahead_s = 0.1;
          s.predicts = true;
        }},
+      {Effect::PATCHES, [](Scene& s) { s.body.self_collision = true; },
+       [](Scene& s) { s.options.detector.patches = true; }},
       {Effect::MINIMUM_SEPARATION, [](Scene& s) { s.body.self_collision = true; },
        [](Scene& s) { s.body.minimum_separation_m = 0.2; }},
       {Effect::TRACKER_NOISE, [](Scene& s) { s.body.self_collision = true; },

@@ -1,0 +1,299 @@
+#include "stream/patch_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace dccd {
+namespace {
+
+// What touched is forgotten early where it is this many times what touches now, and more than so many.
+constexpr std::size_t TRACE_PER_TOUCH = 8, TRACE_ALWAYS = 1 << 16;
+
+/// Not later, not earlier, than the time of contact.
+StampNs stampBefore(const Outcome& outcome, double toc) {
+  return outcome.start_ns +
+         static_cast<StampNs>(std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns)));
+}
+StampNs stampAfter(const Outcome& outcome, double toc) {
+  return std::min(outcome.stamp_ns,
+                  outcome.start_ns + 1 +
+                      static_cast<StampNs>(std::ceil(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns))));
+}
+
+bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
+  return body == PatchTracker::ALL || partners[0] == body || partners[1] == body;
+}
+
+}  // namespace
+
+PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
+  const Living& living = living_.at(id);
+  PatchEvent event;
+  event.kind = kind;
+  event.id = id;
+  event.body = living.body;
+  event.beginning = living.beginning;
+  return event;
+}
+
+void PatchTracker::seam(std::size_t body) {
+  for (auto at = living_.begin(); at != living_.end();) {
+    if (!isOf(at->second.body, body)) {
+      ++at;
+      continue;
+    }
+    waiting_.push_back(eventOf(PatchEventKind::ENDED, at->first));
+    waiting_.back().from_ns = at->second.touched_ns;
+    waiting_.back().to_ns = at->second.released_ns;  // where it had been let go before
+    at = living_.erase(at);
+  }
+  const auto gone = [&](const Trace& t) { return isOf(t.touch.body, body); };
+  trace_.erase(std::remove_if(trace_.begin(), trace_.end(), gone), trace_.end());
+  if (body == ALL) has_last_ = false;
+}
+
+void PatchTracker::tell(Outcome& outcome) {
+  outcome.patch_events.insert(outcome.patch_events.begin(), waiting_.begin(), waiting_.end());
+  waiting_.clear();
+}
+
+void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  bool same = graph_.bodyCount() == bodies.size();
+  for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
+  if (!same) seam();
+  graph_.setBodies(bodies);
+  merge(found.touches());
+  findParts(found, outcome);
+  keepIdentities(outcome);
+  begin(outcome);
+  goOn(outcome);
+  remember(gap_s, outcome);
+  endWhatIsGone(outcome);
+  name(found, outcome);
+  for (PatchEvent& event : outcome.patch_events) {
+    const auto has_id = [&](const Patch& patch) { return patch.id == event.id; };
+    const auto patch = std::find_if(outcome.patches.begin(), outcome.patches.end(), has_id);
+    if (patch != outcome.patches.end()) event.patch = static_cast<std::uint32_t>(patch - outcome.patches.begin());
+  }
+  has_last_ = true;
+  last_map_ = outcome.obstacle;
+  last_map_pose_ = outcome.step->map.map_from_fixed;
+}
+
+void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  if (graph_.bodyCount() != bodies.size()) return;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!graph_.sameMesh(b, bodies[b])) return;
+  }
+  merge(found.touches());
+  findParts(found, outcome);
+  for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
+  name(found, outcome);
+}
+
+/// The step's patches get the identities of their parts.
+void PatchTracker::name(const PatchMaker& found, Outcome& outcome) const {
+  const std::vector<std::uint32_t>& part_of = graph_.lastComponents();
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    if (current_[i] == NO_PATCH) continue;
+    Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
+    const std::uint64_t id = parts_[part_of[i]].id;
+    if (id == 0 || patch.id == id) continue;
+    const Living& living = living_.at(id);
+    patch.id = id;
+    patch.beginning = living.beginning;
+    patch.began_from_ns = living.began_from_ns;
+    patch.began_to_ns = living.began_to_ns;
+  }
+}
+
+/// By the time that this step was looked at.
+void PatchTracker::goOn(const Outcome& outcome) {
+  mesh_seen_ = outcome.complete && !outcome.cut;
+  map_seen_ = mesh_seen_ && outcome.status != StepStatus::NO_MAP;
+  const std::int64_t duration_ns = outcome.stamp_ns - outcome.start_ns;
+  if (mesh_seen_) mesh_clock_ns_ += duration_ns;
+  if (map_seen_) map_clock_ns_ += duration_ns;
+}
+
+/// What touches and what did, each once, by key.
+void PatchTracker::merge(const std::vector<Touch>& touches) {
+  all_.clear();
+  touches_.clear();
+  current_.clear();
+  const bool burst = trace_.size() > std::max(TRACE_PER_TOUCH * touches.size(), TRACE_ALWAYS);
+  auto past = trace_.begin();
+  const auto past_end = burst ? trace_.begin() : trace_.end();
+  std::uint32_t now = 0;
+  while (past != past_end || now < touches.size()) {
+    const bool has_now = now < touches.size(), has_past = past != past_end;
+    const bool takes_now = has_now && (!has_past || !(past->touch.key() < touches[now].key()));
+    const bool takes_past = has_past && (!has_now || !(touches[now].key() < past->touch.key()));
+    all_.push_back(takes_past ? *past : Trace());
+    if (takes_now) all_.back().touch = touches[now];
+    touches_.push_back(all_.back().touch);
+    current_.push_back(takes_now ? now : NO_PATCH);
+    past += takes_past;
+    now += takes_now;
+  }
+}
+
+bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
+  if (!has_last_ || last_map_ == outcome.obstacle) return false;
+  if (!last_map_) return true;
+  const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, touch.level);
+  const VoxelKey key = touch.voxel();
+  const Vec3 center(voxelPlane(key.x, resolution_m) + half, voxelPlane(key.y, resolution_m) + half,
+                    voxelPlane(key.z, resolution_m) + half);
+  return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
+}
+
+void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
+  const std::vector<std::uint32_t>& part_of = graph_.components(touches_);
+  parts_.assign(graph_.componentCount(), Part());
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    Part& part = parts_[part_of[i]];
+    const Touch& touch = touches_[i];
+    part.body = touch.body;
+    if (part.body[0] > part.body[1]) std::swap(part.body[0], part.body[1]);
+    if (all_[i].id != 0 && (part.before.empty() || part.before.back() != all_[i].id)) part.before.push_back(all_[i].id);
+    if (current_[i] == NO_PATCH) continue;
+    ++part.size;
+    part.touches = true;
+    const Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
+    part.toc_lower = std::min(part.toc_lower, patch.toc_lower);
+    part.toc_upper = std::min(part.toc_upper, patch.toc_upper);
+    part.initial = part.initial || touch.initial;
+  }
+  for (Part& part : parts_) {
+    std::sort(part.before.begin(), part.before.end());
+    part.before.erase(std::unique(part.before.begin(), part.before.end()), part.before.end());
+  }
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    Part& part = parts_[part_of[i]];
+    const Touch& touch = touches_[i];
+    if (current_[i] == NO_PATCH || !part.before.empty() || part.map_changed || !touch.initial || !touch.onMap())
+      continue;
+    part.map_changed = isNewOnMap(touch, outcome);
+  }
+}
+
+/// Of each identity the largest part keeps it; of several in a part the oldest stays.
+void PatchTracker::keepIdentities(Outcome& outcome) {
+  std::map<std::uint64_t, std::vector<Part*>> parts_of;
+  for (Part& part : parts_) {
+    if (!part.touches) continue;
+    for (const std::uint64_t id : part.before) parts_of[id].push_back(&part);
+  }
+  std::map<Part*, std::vector<std::uint64_t>> kept_by;
+  for (auto& [id, parts] : parts_of) {
+    const auto largest =
+        std::max_element(parts.begin(), parts.end(), [](const Part* a, const Part* b) { return a->size < b->size; });
+    kept_by[*largest].push_back(id);
+    if ((*largest)->id == 0) (*largest)->id = id;
+  }
+  for (auto& [id, parts] : parts_of) {
+    std::vector<std::uint64_t> others;
+    for (Part* part : parts) {
+      if (part->id == 0) {
+        part->id = next_id_++;
+        living_[part->id] = living_.at(id);
+      }
+      if (std::find(kept_by[part].begin(), kept_by[part].end(), id) == kept_by[part].end()) others.push_back(part->id);
+    }
+    if (others.empty()) continue;
+    outcome.patch_events.push_back(eventOf(PatchEventKind::SPLIT, id));
+    outcome.patch_events.back().others = others;
+  }
+  for (Part& part : parts_) {
+    const auto kept = kept_by.find(&part);
+    if (kept == kept_by.end() || kept->second.size() < 2) continue;
+    outcome.patch_events.push_back(eventOf(PatchEventKind::MERGED, part.id));
+    outcome.patch_events.back().others.assign(kept->second.begin() + 1, kept->second.end());
+  }
+  for (PatchEvent& event : outcome.patch_events) {
+    event.from_ns = outcome.start_ns;
+    event.to_ns = outcome.stamp_ns;
+  }
+}
+
+/// What touches and is of no living patch, in the order of the first touches.
+void PatchTracker::begin(Outcome& outcome) {
+  std::vector<Part*> fresh;
+  for (Part& part : parts_) {
+    if (part.touches && part.id == 0) fresh.push_back(&part);
+  }
+  std::stable_sort(fresh.begin(), fresh.end(),
+                   [](const Part* a, const Part* b) { return a->toc_lower < b->toc_lower; });
+  for (Part* part : fresh) {
+    part->id = next_id_++;
+    Living& living = living_[part->id];
+    living.body = part->body;
+    if (part->initial) {
+      living.beginning = part->map_changed ? PatchBeginning::MAP_CHANGED : PatchBeginning::INITIAL;
+      living.began_to_ns = outcome.start_ns;
+    } else {
+      living.began_from_ns = stampBefore(outcome, part->toc_lower);
+      living.began_to_ns = stampAfter(outcome, part->toc_upper);
+    }
+    outcome.patch_events.push_back(eventOf(PatchEventKind::BEGAN, part->id));
+    outcome.patch_events.back().from_ns = living.began_from_ns;
+    outcome.patch_events.back().to_ns = living.began_to_ns;
+  }
+}
+
+/// The step becomes the trace, without what has not touched for longer than the gap.
+void PatchTracker::remember(double gap_s, const Outcome& outcome) {
+  const std::vector<std::uint32_t>& part_of = graph_.lastComponents();
+  trace_.clear();
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    Trace trace = all_[i];
+    const std::int64_t clock_ns = trace.touch.onMap() ? map_clock_ns_ : mesh_clock_ns_;
+    if (current_[i] != NO_PATCH) trace.last_ns = clock_ns;
+    if (static_cast<double>(clock_ns - trace.last_ns) > gap_s * 1e9) continue;
+    const Part& part = parts_[part_of[i]];
+    if (part.touches) trace.id = part.id;
+    trace_.push_back(trace);
+  }
+  for (auto& [id, living] : living_) {
+    const bool seen = living.body[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
+    if (seen && living.released_ns == UNKNOWN_NS) living.released_ns = outcome.start_ns;
+  }
+  for (const Part& part : parts_) {
+    if (!part.touches) continue;
+    Living& living = living_.at(part.id);
+    living.touched_ns = std::max(living.touched_ns, stampBefore(outcome, part.toc_lower));
+    living.released_ns = UNKNOWN_NS;
+  }
+}
+
+void PatchTracker::endWhatIsGone(Outcome& outcome) {
+  std::vector<std::uint64_t> alive;
+  for (const Trace& trace : trace_) {
+    if (alive.empty() || alive.back() != trace.id) alive.push_back(trace.id);
+  }
+  std::sort(alive.begin(), alive.end());
+  std::vector<std::uint64_t> merged;
+  for (const PatchEvent& event : outcome.patch_events) {
+    if (event.kind == PatchEventKind::MERGED) merged.insert(merged.end(), event.others.begin(), event.others.end());
+  }
+  std::vector<PatchEvent> ends;
+  for (auto at = living_.begin(); at != living_.end();) {
+    if (std::binary_search(alive.begin(), alive.end(), at->first)) {
+      ++at;
+      continue;
+    }
+    if (std::find(merged.begin(), merged.end(), at->first) == merged.end()) {
+      ends.push_back(eventOf(PatchEventKind::ENDED, at->first));
+      ends.back().from_ns = at->second.touched_ns;
+      ends.back().to_ns = at->second.released_ns;
+    }
+    at = living_.erase(at);
+  }
+  outcome.patch_events.insert(outcome.patch_events.begin(), ends.begin(), ends.end());
+}
+
+}  // namespace dccd

@@ -1,0 +1,386 @@
+// Identities and events of patches in a stream: scenes of which it is known what begins, ends, merges and splits.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "dccd/stream.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr StampNs PERIOD_NS = 33000000;
+
+/// The table's top is the plane z = 0.
+std::shared_ptr<const VoxelSurface> table(double resolution_m) {
+  std::vector<OccupiedLeaf> leaves;
+  const int n = static_cast<int>(std::ceil(1.0 / resolution_m));
+  for (int x = -n; x < n; ++x) {
+    for (int y = -n; y < n; ++y) {
+      leaves.push_back(
+          {{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), std::uint16_t{32767}}, 1});
+    }
+  }
+  return VoxelSurface::build(resolution_m, leaves);
+}
+
+/// A strip of cloth along x; height(column) [m].
+template <class Height>
+Positions strip(std::size_t rows, std::size_t cols, double cell_m, const Height& height) {
+  Positions x;
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < cols; ++c) {
+      x.emplace_back(cell_m * static_cast<double>(c) + 0.003, cell_m * static_cast<double>(r) + 0.004, height(c));
+    }
+  }
+  return x;
+}
+
+class Stream {
+ public:
+  explicit Stream(std::vector<std::shared_ptr<const Topology>> topologies, MonitorOptions options = {})
+      : topologies_(std::move(topologies)), options_(options) {
+    options_.detector.patches = true;
+    std::vector<Body> bodies(topologies_.size());
+    for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].name = "body_" + std::to_string(b);
+    monitor_ = std::make_unique<Monitor>(options_, bodies);
+  }
+  Monitor& monitor() { return *monitor_; }
+  MonitorOptions& options() { return options_; }
+  void setMap(std::shared_ptr<const VoxelSurface> surface) {
+    monitor_->setMap({std::move(surface), 1, Eigen::Isometry3d::Identity(), {}});
+  }
+  StampNs now() const { return stamp_ns_; }
+  void wait(StampNs ns) { stamp_ns_ += ns; }
+
+  /// The next frame of each body, and what comes of it.
+  Outcome feed(const std::vector<Positions>& positions) {
+    stamp_ns_ += PERIOD_NS;
+    for (std::size_t b = positions.size(); b-- > 0;) {
+      MeshFrame frame;
+      frame.stamp_ns = stamp_ns_;
+      frame.topology = topologies_[b];
+      frame.positions = positions[b];
+      monitor_->push(b, std::move(frame), 0);
+    }
+    Outcome outcome;
+    EXPECT_TRUE(monitor_->next(0, outcome));
+    take(outcome);
+    return outcome;
+  }
+  void take(const Outcome& outcome) {
+    for (const PatchEvent& event : outcome.patch_events) {
+      text_ += (text_.empty() ? "" : ", ") + std::string(toString(event.kind)) + " " + std::to_string(event.id);
+      for (const std::uint64_t other : event.others) text_ += "+" + std::to_string(other);
+      if (event.kind == PatchEventKind::BEGAN && event.beginning != PatchBeginning::NEW) {
+        text_ += std::string(" ") + toString(event.beginning);
+      }
+      if (event.kind == PatchEventKind::ENDED && event.to_ns == UNKNOWN_NS) text_ += " unknown";
+      events_.push_back(event);
+    }
+  }
+  /// All events, in words.
+  const std::string& text() const { return text_; }
+  const std::vector<PatchEvent>& events() const { return events_; }
+
+ private:
+  std::vector<std::shared_ptr<const Topology>> topologies_;
+  MonitorOptions options_;
+  std::unique_ptr<Monitor> monitor_;
+  StampNs stamp_ns_ = 1000000000;
+  std::string text_;
+  std::vector<PatchEvent> events_;
+};
+
+std::shared_ptr<const Topology> grid(std::size_t rows, std::size_t cols) { return share(Topology::grid(rows, cols)); }
+
+TEST(PatchTracker, AClothLaidDownInTwoPlacesThatGrowTogether) {
+  Stream stream({grid(5, 41)});
+  stream.setMap(table(0.05));
+  std::vector<StampNs> stamps;
+  std::vector<std::size_t> sizes;
+  for (int k = 0; k < 20; ++k) {
+    const Outcome outcome = stream.feed({strip(5, 41, 0.02, [&](std::size_t c) {
+      const double left = std::abs(static_cast<double>(c) - 8) / 12;
+      const double right = std::abs(static_cast<double>(c) - 32) / 12 + 0.25;
+      return std::max(0.0, 0.01 + 0.05 * std::min(left, right) - 0.004 * k);
+    })});
+    stamps.push_back(stream.now());
+    for (const Patch& patch : outcome.patches) EXPECT_NE(patch.id, 0u);
+    sizes.push_back(outcome.patches.size());
+  }
+  EXPECT_EQ(stream.text(), "BEGAN 1, BEGAN 2, MERGED 1+2");
+  // 0.01 - 0.004 k is 0 from k = 3 on, in the straight step from 2 to 3 at its end.
+  ASSERT_EQ(stream.events().size(), 3u);
+  EXPECT_LE(stream.events()[0].from_ns, stamps[3]);
+  EXPECT_GT(stream.events()[0].from_ns, stamps[2]);
+  EXPECT_EQ(stream.events()[0].to_ns, stamps[3]);
+  EXPECT_EQ(stream.events()[0].body, (std::array<std::uint16_t, 2>{0, OBSTACLE_BODY}));
+  EXPECT_EQ(*std::max_element(sizes.begin(), sizes.end()), 2u);
+  EXPECT_EQ(sizes.back(), 1u);
+}
+
+/// One sheet of 3 x 43 points, folded in the middle; the upper layer is this far above the lower one.
+Positions folded(double gap_m) {
+  Positions x;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 43; ++c) {
+      const bool upper = c > 21;
+      const double fold = c == 21 ? 0.5 * gap_m : 0;
+      x.emplace_back(0.02 * (upper ? 41.6 - c : c), 0.02 * r + (upper ? 0.007 : 0), (upper ? gap_m : 0) + fold);
+    }
+  }
+  return x;
+}
+
+TEST(PatchTracker, AFoldThatClosesAndOpens) {
+  Stream stream({grid(3, 43)});
+  std::vector<StampNs> stamps;
+  for (int k = 0; k < 24; ++k) {
+    stream.feed({folded(0.01 * std::abs(k - 3) + 0.0002)});
+    stamps.push_back(stream.now());
+  }
+  EXPECT_EQ(stream.text(), "");
+  for (int k = 0; k < 24; ++k) {
+    // Through and back: the layers change sides for one frame.
+    stream.feed({folded(k == 3 ? -0.0002 : 0.01 * std::abs(k - 3) + 0.0002)});
+    stamps.push_back(stream.now());
+  }
+  EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1");
+  ASSERT_EQ(stream.events().size(), 2u);
+  EXPECT_GT(stream.events()[0].from_ns, stamps[24 + 2]);
+  EXPECT_LE(stream.events()[0].to_ns, stamps[24 + 3]);
+  EXPECT_EQ(stream.events()[0].body, (std::array<std::uint16_t, 2>{0, 0}));
+  // It crossed at frame 3 and was apart at frame 4.
+  EXPECT_GE(stream.events()[1].from_ns, stamps[24 + 3]);
+  EXPECT_EQ(stream.events()[1].to_ns, stamps[24 + 4]);
+}
+
+TEST(PatchTracker, ARopePulledThroughARingStaysOne) {
+  // Of the ring only the piece that the rope lies on is touched: three faces of a prism.
+  const auto ring = share(Topology::fromTriangles(4, {{0, 1, 2}, {1, 3, 2}}));
+  const Positions edge = {Vec3(0.1, -1, -0.01), Vec3(0.11, 0, 0), Vec3(0.11, 1, -0.01), Vec3(0.12, 0, -1)};
+  Stream stream({share(Topology::polyline(60)), ring});
+  for (int k = 0; k < 100; ++k) {
+    Positions rope;
+    for (int i = 0; i < 60; ++i) {
+      const double x = 0.02 * i - 0.5 + 0.004 * k;
+      // Straight down on both sides of the ring, from frame 80 on lifted off.
+      rope.emplace_back(x, 0.001 * std::sin(9 * x), (k < 3 || k > 80 ? 0.05 : 0.0) - 0.05 * std::abs(x - 0.11));
+    }
+    stream.feed({rope, edge});
+  }
+  EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1");
+}
+
+TEST(PatchTracker, ASplitIsToldOnceTheGapIsOverAndTheLargerPartKeepsTheIdentity) {
+  Stream stream({grid(3, 41)});
+  stream.setMap(table(0.05));
+  std::vector<std::uint64_t> ids;
+  for (int k = 0; k < 40; ++k) {
+    const Outcome outcome = stream.feed({strip(3, 41, 0.02, [&](std::size_t c) {
+      const bool lifted = k >= 10 && c >= 10 && c < 20;
+      return k == 0 ? 0.01 : lifted ? 0.05 : 0.0;
+    })});
+    ids.clear();
+    for (const Patch& patch : outcome.patches) ids.push_back(patch.id);
+    if (k >= 12 && k < 16) {
+      EXPECT_EQ(ids, (std::vector<std::uint64_t>{1, 1})) << "apart for a moment";
+    }
+  }
+  EXPECT_EQ(stream.text(), "BEGAN 1, SPLIT 1+2");
+  EXPECT_EQ(ids, (std::vector<std::uint64_t>{2, 1})) << "columns 0 to 9, and the larger part beyond 20";
+}
+
+TEST(PatchTracker, NoiseOnARestingClothBeginsNothing) {
+  for (const bool on_map : {true, false}) {
+    Stream stream(on_map ? std::vector<std::shared_ptr<const Topology>>{grid(21, 21)}
+                         : std::vector<std::shared_ptr<const Topology>>{grid(21, 21), grid(12, 12)});
+    if (on_map) stream.setMap(table(0.02));
+    Positions below;
+    for (int i = 0; i < 144; ++i) below.emplace_back(0.05 * (i % 12) - 0.07, 0.05 * (i / 12) - 0.06, 0.0);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> noise(-0.001, 0.001);
+    std::size_t first = 0, contacts = 0;
+    for (int k = 0; k < 300; ++k) {
+      Positions x = strip(21, 21, 0.02, [](std::size_t) { return 0.0; });
+      for (Vec3& p : x) p += Vec3(noise(random), noise(random), noise(random));
+      const Outcome outcome = stream.feed(on_map ? std::vector<Positions>{x} : std::vector<Positions>{x, below});
+      contacts += outcome.total_contacts;
+      if (k == 1) first = stream.events().size();
+    }
+    EXPECT_GT(contacts, 300u * 100);
+    EXPECT_GT(first, 0u);
+    for (std::size_t i = first; i < stream.events().size(); ++i) {
+      EXPECT_NE(stream.events()[i].kind, PatchEventKind::BEGAN) << stream.text();
+      EXPECT_NE(stream.events()[i].kind, PatchEventKind::ENDED) << stream.text();
+    }
+  }
+}
+
+TEST(PatchTracker, AVoxelThatAppearsUnderARestingCloth) {
+  Stream stream({grid(5, 5)});
+  const Positions x = strip(5, 5, 0.02, [](std::size_t) { return 0.01; });
+  stream.setMap(table(0.05));
+  for (int k = 0; k < 5; ++k) stream.feed({x});
+  EXPECT_EQ(stream.text(), "");
+  std::vector<OccupiedLeaf> leaves = table(0.05)->leaves();
+  leaves.push_back({{32768, 32768, 32768}, 1});
+  stream.setMap(VoxelSurface::build(0.05, leaves));
+  for (int k = 0; k < 5; ++k) stream.feed({x});
+  EXPECT_EQ(stream.text(), "BEGAN 1 MAP_CHANGED");
+  // The same map once more, and one with other voxels elsewhere.
+  stream.setMap(VoxelSurface::build(0.05, leaves));
+  for (int k = 0; k < 5; ++k) stream.feed({x});
+  leaves.push_back({{32000, 32000, 32000}, 1});
+  stream.setMap(VoxelSurface::build(0.05, leaves));
+  for (int k = 0; k < 5; ++k) stream.feed({x});
+  EXPECT_EQ(stream.text(), "BEGAN 1 MAP_CHANGED");
+  // No map at all is no reason for an end as long as one is expected.
+  stream.options().detector.obstacle_expected = true;
+  stream.monitor().setOptions(stream.options());
+  stream.setMap(nullptr);
+  for (int k = 0; k < 15; ++k) stream.feed({x});
+  stream.setMap(VoxelSurface::build(0.05, leaves));
+  for (int k = 0; k < 15; ++k) stream.feed({x});
+  EXPECT_EQ(stream.text(), "BEGAN 1 MAP_CHANGED");
+}
+
+TEST(PatchTracker, ASeamEndsAllThatLivesAndWhatTouchesThenIsInitial) {
+  Stream stream({grid(5, 5)});
+  stream.setMap(table(0.05));
+  const Positions above = strip(5, 5, 0.02, [](std::size_t) { return 0.01; });
+  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
+  stream.feed({above});
+  for (int k = 0; k < 5; ++k) stream.feed({resting});
+  EXPECT_EQ(stream.text(), "BEGAN 1");
+  const StampNs last_ns = stream.now();
+  stream.wait(2000000000);
+  const Outcome gap = stream.feed({resting});
+  EXPECT_EQ(gap.status, StepStatus::GAP);
+  EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1 unknown");
+  EXPECT_EQ(stream.events().back().from_ns, last_ns - PERIOD_NS) << "at the beginning of the last step it touched";
+  const Outcome after = stream.feed({resting});
+  EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1 unknown, BEGAN 2 INITIAL");
+  EXPECT_EQ(stream.events().back().from_ns, UNKNOWN_NS);
+  EXPECT_EQ(stream.events().back().to_ns, after.start_ns);
+  ASSERT_EQ(after.patches.size(), 1u);
+  EXPECT_EQ(after.patches[0].beginning, PatchBeginning::INITIAL);
+  EXPECT_EQ(stream.events().back().patch, 0u);
+  // A reset is one as well.
+  stream.monitor().reset();
+  stream.feed({resting});
+  stream.feed({resting});
+  EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1 unknown, BEGAN 2 INITIAL, ENDED 2 unknown, BEGAN 3 INITIAL");
+}
+
+TEST(PatchTracker, ASeamOfOneBodyEndsWhatItTouches) {
+  Stream stream({grid(5, 5), grid(5, 5)});
+  stream.setMap(table(0.05));
+  const auto at = [](double x, double z) {
+    Positions out = strip(5, 5, 0.02, [z](std::size_t) { return z; });
+    for (Vec3& p : out) p.x() += x;
+    return out;
+  };
+  stream.feed({at(0, 0.01), at(0.5, 0.01)});
+  for (int k = 0; k < 5; ++k) stream.feed({at(0, 0), at(0.5, 0)});
+  EXPECT_EQ(stream.text(), "BEGAN 1, BEGAN 2");
+  // The second body is found elsewhere, as trackers do; the clock body goes on.
+  for (int k = 0; k < 5; ++k) {
+    stream.wait(0);
+    stream.feed({at(0, 0), at(-0.5, 0)});
+  }
+  EXPECT_EQ(stream.text(), "BEGAN 1, BEGAN 2, ENDED 2 unknown, BEGAN 3 INITIAL");
+}
+
+TEST(PatchTracker, AStepWithoutAnAnswerOrCutEndsNothing) {
+  Stream stream({grid(9, 9)});
+  stream.setMap(table(0.05));
+  const Positions above = strip(9, 9, 0.02, [](std::size_t) { return 0.01; });
+  const Positions resting = strip(9, 9, 0.02, [](std::size_t) { return 0.0; });
+  stream.feed({above});
+  for (int k = 0; k < 5; ++k) stream.feed({resting});
+  const auto run = [&](const std::function<void(Options&)>& change, StepStatus status) {
+    const MonitorOptions before = stream.options();
+    change(stream.options().detector);
+    stream.monitor().setOptions(stream.options());
+    for (int k = 0; k < 20; ++k) EXPECT_EQ(stream.feed({resting}).status, status);
+    stream.options() = before;
+    stream.monitor().setOptions(before);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(stream.feed({resting}).status, StepStatus::OK);
+    EXPECT_EQ(stream.text(), "BEGAN 1") << toString(status);
+  };
+  run([](Options& o) { o.max_found = 1; }, StepStatus::TRUNCATED);
+  run([](Options& o) { o.step_budget_ms = 1e-6; }, StepStatus::DEADLINE);
+  // A cut list is none of this: all contacts were found.
+  run([](Options& o) { o.max_contacts = 1; }, StepStatus::TRUNCATED);
+  for (int k = 0; k < 20; ++k) {
+    stream.monitor().skip(0, StepStatus::NO_TRANSFORM, stream.now() + 1000 * k, "no transform");
+    Outcome outcome;
+    ASSERT_TRUE(stream.monitor().next(0, outcome));
+    stream.take(outcome);
+  }
+  for (int k = 0; k < 3; ++k) stream.feed({resting});
+  EXPECT_EQ(stream.text(), "BEGAN 1");
+  // And a whole answer without the contact does.
+  for (int k = 0; k < 12; ++k) stream.feed({above});
+  EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1");
+}
+
+TEST(PatchTracker, WhatComesBackWithinTheGapIsTheSame) {
+  for (const double gap_s : {0.0, 0.1, 1.0}) {
+    MonitorOptions options;
+    options.patch_gap_s = gap_s;
+    Stream stream({grid(5, 5)}, options);
+    stream.setMap(table(0.05));
+    // Up for 5 frames, 0.165 s.
+    for (int k = 0; k < 30; ++k) {
+      stream.feed({strip(5, 5, 0.02, [&](std::size_t) { return k == 0 || (k >= 10 && k < 15) ? 0.01 : 0.0; })});
+    }
+    EXPECT_EQ(stream.text(), gap_s > 0.165 ? "BEGAN 1" : "BEGAN 1, ENDED 1, BEGAN 2") << gap_s;
+  }
+}
+
+TEST(PatchTracker, PredictionsAndChecksLeaveItAloneAndKnowWhatLives) {
+  const auto run = [](bool asks) {
+    MonitorOptions options;
+    options.look_ahead_s = 0.2;
+    Stream stream({grid(5, 5), share(Topology::fromTriangles(3, {{0, 1, 2}}))}, options);
+    stream.setMap(table(0.05));
+    std::size_t known = 0, fresh = 0;
+    for (int k = 0; k < 30; ++k) {
+      Positions falling = {Vec3(0.02, 0.02, 0.1), Vec3(0.05, 0.02, 0.2), Vec3(0.02, 0.05, 0.2)};
+      for (Vec3& p : falling) p.z() -= 0.004 * k;
+      const Positions cloth = strip(5, 5, 0.02, [&](std::size_t) { return k == 0 ? 0.004 : k == 1 ? 0.001 : 0.0; });
+      if (!stream.feed({cloth, falling}).answered || !asks) continue;
+      for (const Patch& patch : stream.monitor().predict().patches) ++(patch.id == 0 ? fresh : known);
+      for (const Patch& patch : stream.monitor().checkNow().patches) EXPECT_NE(patch.id, 0u);
+    }
+    if (asks) {
+      EXPECT_GT(known, 0u);
+      EXPECT_GT(fresh, 0u) << "the triangle's contact is seen to come";
+    }
+    return stream.text();
+  };
+  EXPECT_EQ(run(true), run(false));
+  EXPECT_NE(run(false).find("BEGAN 2"), std::string::npos) << run(false);
+}
+
+TEST(PatchTracker, SwitchedOffItForgets) {
+  Stream stream({grid(5, 5)});
+  stream.setMap(table(0.05));
+  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
+  for (int k = 0; k < 3; ++k) stream.feed({resting});
+  stream.options().detector.patches = false;
+  stream.monitor().setOptions(stream.options());
+  EXPECT_TRUE(stream.feed({resting}).patches.empty());
+  EXPECT_EQ(stream.text(), "BEGAN 1 INITIAL, ENDED 1 unknown");
+  MonitorOptions bad;
+  bad.patch_gap_s = -1;
+  EXPECT_THROW(stream.monitor().setOptions(bad), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
