@@ -17,13 +17,11 @@ struct NewContact {
   Contact contact;
 };
 
-/// Whether the patch, one of the outcome's, is news: not expected, and it began in this step or, where the outcome is a
-/// prediction, would begin. What touched when it was first looked at is none, nor what a change of the map brought
-/// about.
-DCCD_EXPORT bool isNew(const Outcome& outcome, const Patch& patch);
-
-/// One for each pair of partners, the earliest first; of one time in canonical order. Without Options::patches every
-/// contact that is not expected counts.
+/// One for each pair of partners, the earliest first; of one time in canonical order. Of patches that are new
+/// (Patch::is_new) or, where none are tracked, of all contacts that are not expected.
 DCCD_EXPORT std::vector<NewContact> newContacts(const Outcome& outcome);
+
+/// Not after the first of them, nor after what was left unchecked: [1] of the step; infinity: neither is there.
+DCCD_EXPORT double earliestNewToc(const Outcome& outcome);
 
 }  // namespace dccd

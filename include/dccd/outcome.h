@@ -175,6 +175,7 @@ struct Outcome {
   ContactCounts counts;                 ///< of all of these
   std::vector<Patch> patches;           ///< of all that was found, by its first contact; with Options::patches
   std::vector<std::uint32_t> patch_of;  ///< per listed contact its patch; empty without Options::patches
+  bool tracked = false;                 ///< patches have identities: it is of a stream, or a prediction of one
   std::vector<PatchEvent> patch_events;  ///< in a stream, in order; also of an outcome without a result, at a seam
   std::size_t suppressed = 0;            ///< initial contacts left out by choice
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
@@ -190,9 +191,9 @@ struct Outcome {
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
   StepStats stats;
-  double unknown_fraction = 0;  ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
-  std::size_t substeps = 0;     ///< parts that the step was cut into
-  Touching touching = Touching::NONE;
+  double unknown_fraction = 0;         ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
+  std::size_t substeps = 0;            ///< parts that the step was cut into
+  Touching touching = Touching::NONE;  ///< of this step alone; assuranceOf() knows what lasts
   // What assuranceOf() judges by (dccd/assurance.h), a sentence each.
   std::vector<std::string> unproved;  ///< of what an answer has to show, what it does not
   std::vector<std::string> excluded;  ///< what was left out by choice

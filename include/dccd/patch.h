@@ -31,10 +31,13 @@ struct Patch {
   std::array<std::uint16_t, 2> body{0, 0};  ///< ascending; equal: with itself; [1] may be OBSTACLE_BODY
   std::size_t contacts = 0, certain = 0, initial = 0;
   std::size_t crossings = 0;
+  std::size_t expected = 0;  ///< of its contacts and crossings, those that are expected (dccd/expectation.h)
   /// [0,1] of the step: the first touch of any of its contacts is in between, if any of them is certain. 0 and 0 where
   /// surfaces cross already.
   double toc_lower = 1, toc_upper = 1;
-  Contact earliest;              ///< smallest toc_lower, of these the first in canonical order; unset without contacts
+  /// Smallest toc_lower of those that are not expected or, where all are, of all; of equal ones the first in canonical
+  /// order. Unset without contacts.
+  Contact earliest;
   double area_m2 = 0;            ///< [m^2] of the side that has less; 0 with a rope
   Vec3 centroid = Vec3::Zero();  ///< [m] mean of the points of contact, fixed frame
   Vec3 normal = Vec3::Zero();    ///< unit, mean at the step's start, from body[1] to body[0]; 0 where there is none
@@ -45,13 +48,19 @@ struct Patch {
   PatchBeginning beginning = PatchBeginning::NEW;
   /// It began between these. from UNKNOWN_NS: before `to`, nobody knows when.
   StampNs began_from_ns = UNKNOWN_NS, began_to_ns = UNKNOWN_NS;
+  /// Its first contact that is not expected is one of this step, or of this prediction, and did not touch when that
+  /// began.
+  bool is_new = false;
+
+  bool isExpected() const { return expected == contacts + crossings; }
 };
 
 enum class PatchEventKind : std::uint8_t {
   BEGAN = 0,
-  ENDED = 1,   ///< told when patch_gap_s is over
-  SPLIT = 2,   ///< its parts have been apart for patch_gap_s; the largest keeps the identity
-  MERGED = 3,  ///< the oldest identity stays
+  ENDED = 1,       ///< told when patch_gap_s is over
+  SPLIT = 2,       ///< its parts have been apart for patch_gap_s; the largest keeps the identity
+  MERGED = 3,      ///< the oldest identity stays
+  UNEXPECTED = 4,  ///< all of it was expected, and now something is not
 };
 DCCD_EXPORT const char* toString(PatchEventKind kind);
 
@@ -61,6 +70,7 @@ struct PatchEvent {
   std::vector<std::uint64_t> others;        ///< SPLIT: of the parts that came off; MERGED: that are part of it now
   std::array<std::uint16_t, 2> body{0, 0};  ///< as in Patch
   PatchBeginning beginning = PatchBeginning::NEW;  ///< of the patch `id`
+  bool expected = false;                           ///< all of it was, as long as it lasted or until now
   /// Between which times it was. BEGAN, but not NEW: from is UNKNOWN_NS, at `to` it was there. ENDED by a seam: to is
   /// UNKNOWN_NS, at `from` it was still there.
   StampNs from_ns = UNKNOWN_NS, to_ns = UNKNOWN_NS;

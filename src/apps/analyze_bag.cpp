@@ -1,5 +1,6 @@
 // analyze_bag IN.bag [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a master.
 #include "output/output_messages.h"
+#include "output/patch_messages.h"
 
 #include <rosbag/bag.h>
 #include <std_msgs/Bool.h>
@@ -80,6 +81,12 @@ class ResultBag {
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
     bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
+    if (pipeline.config().monitor.detector.patches) {
+      bag_.write("/collision_monitor/patches", at, toPatchArray(outcome, pipeline.monitor().bodies(), frame));
+      for (const auto& event : toPatchEvents(outcome, pipeline.monitor().bodies(), frame)) {
+        bag_.write("/collision_monitor/events", at, event);
+      }
+    }
     deformable_ccd::State state = toState(outcome, frame);
     state.header.stamp = at;
     fillState(assuranceOf(outcome), state);
@@ -97,7 +104,8 @@ class ResultBag {
     look_ahead_.predict(prediction);
     bag_.write("/collision_monitor/predicted_contacts", at,
                toContactArray(prediction, pipeline.monitor().bodies(), frame));
-    bag_.write("/collision_monitor/time_to_contact", at, toTimeToContact(prediction, horizon_s, frame));
+    bag_.write("/collision_monitor/time_to_contact", at,
+               toTimeToContact(prediction, horizon_s, pipeline.monitor().bodies(), frame));
   }
 
  private:

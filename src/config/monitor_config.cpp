@@ -68,6 +68,7 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   MonitorOptions& monitor = config.monitor;
   monitor.store.max_step_s = reader.number("max_step_s", monitor.store.max_step_s, 1e-6, LARGE);
   monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
+  monitor.patch_gap_s = reader.number("patch_gap_s", monitor.patch_gap_s, 0, LARGE);
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
   monitor.detector.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
   monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "dccd/new_contacts.h"
+#include "output/patch_messages.h"
+
 namespace dccd {
 
 namespace {
@@ -26,19 +29,6 @@ static_assert(static_cast<int>(Touching::NEW) == static_cast<int>(deformable_ccd
 static_assert(static_cast<int>(Touching::EXPECTED) == static_cast<int>(deformable_ccd::State::EXPECTED));
 static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
-std_msgs::Header header(StampNs stamp_ns, const std::string& frame) {
-  std_msgs::Header out;
-  out.stamp = toRosTime(stamp_ns);
-  out.frame_id = frame;
-  return out;
-}
-
-/// Never after the true time: the sum is rounded down to a nanosecond.
-ros::Time timeOf(const Outcome& outcome, double toc) {
-  const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
-  return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
-}
-
 std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
   static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
   static const std::size_t SIZES[][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}};
@@ -55,63 +45,45 @@ std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
   return text;
 }
 
+/// What there is besides what is new.
+std::string besides(const Outcome& outcome) {
+  std::string text;
+  const std::size_t lasting = lastingPatches(outcome);
+  if (lasting > 0) text += std::to_string(lasting) + (lasting == 1 ? " patch lasts, " : " patches last, ");
+  if (outcome.counts.expected > 0) text += std::to_string(outcome.counts.expected) + " expected ones, ";
+  if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
+  return text;
+}
+
 /// "No contact" is said of clear steps alone; of others, what stands in the way of it.
 std::string noContact(const Outcome& outcome) {
   const std::string start = std::string("starts ") + toString(outcome.start_state);
-  if (assuranceOf(outcome).clear()) return "no contact, " + start;
-  std::string text = "no contact found, but ";
+  const Assurance assurance = assuranceOf(outcome);
+  if (assurance.clear()) return "no contact, " + start;
+  std::string text = outcome.tracked && assurance.proved ? "no new contact, " : "no contact found, but ";
   if (outcome.status != StepStatus::OK) {
     text += toString(outcome.status) + (outcome.reason.empty() ? "" : " (" + outcome.reason + ")") + ", ";
   }
   for (const std::string& sentence : outcome.unproved) {
     if (sentence != outcome.reason) text += sentence + ", ";
   }
-  if (outcome.counts.expected > 0) text += std::to_string(outcome.counts.expected) + " expected ones, ";
-  if (outcome.suppressed > 0) text += std::to_string(outcome.suppressed) + " initial ones suppressed, ";
-  return text + start;
+  return text + besides(outcome) + start;
 }
 
 /// A line for people; `first` is null where nothing known touches.
-std::string summaryOf(const Outcome& outcome, const Contact* first, const std::vector<Body>& bodies) {
+std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, const std::vector<Body>& bodies) {
   if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
-  if (!std::isfinite(outcome.earliest_unexpected_toc)) return noContact(outcome);
-  const std::string besides =
-      outcome.counts.expected > 0 ? ", besides " + std::to_string(outcome.counts.expected) + " expected ones" : "";
-  const std::string start = besides + ", starts " + toString(outcome.start_state);
+  if (!std::isfinite(toc)) return noContact(outcome);
+  const std::string start = ", besides " + besides(outcome) + "starts " + toString(outcome.start_state);
+  const std::string rest = besides(outcome).empty() ? std::string(", starts ") + toString(outcome.start_state) : start;
   char when[64];
-  std::snprintf(when, sizeof when, "%.6f s into the step", outcome.earliest_unexpected_toc * outcome.duration_s());
-  if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + start;
+  std::snprintf(when, sizeof when, "%.6f s into the step", toc * outcome.duration_s());
+  if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + rest;
   if (first->certainty != Certainty::CERTAIN) {
-    return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + start;
+    return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + rest;
   }
   return std::string(first->initial ? "in contact from the start" : "contact " + std::string(when)) + ": " +
-         nameOf(*first, bodies) + start;
-}
-
-ContactMessage toMessage(const Outcome& outcome, const Contact& contact) {
-  const ContactGeometry geometry = contactGeometry(outcome, contact);
-  ContactMessage out;
-  out.kind = static_cast<std::uint8_t>(contact.kind);
-  out.certainty = static_cast<std::uint8_t>(contact.certainty);
-  out.initial = contact.initial;
-  out.leaving = contact.leaving;
-  out.expected = contact.expected;
-  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
-  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
-  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
-  out.voxel_size = contact.voxel_size;
-  out.toc_lower = contact.toc_lower;
-  out.toc_upper = contact.toc_upper;
-  out.time_of_contact = timeOf(outcome, contact.toc_lower);
-  out.point.x = geometry.point.x();
-  out.point.y = geometry.point.y();
-  out.point.z = geometry.point.z();
-  out.normal.x = geometry.normal.x();
-  out.normal.y = geometry.normal.y();
-  out.normal.z = geometry.normal.z();
-  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
-  out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
-  return out;
+         nameOf(*first, bodies) + rest;
 }
 
 void fillFrames(const FrameCounters& frames, StatsMessage& out) {
@@ -213,6 +185,50 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
 
 }  // namespace
 
+std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
+  std_msgs::Header out;
+  out.stamp = toRosTime(stamp_ns);
+  out.frame_id = frame;
+  return out;
+}
+
+ros::Time timeBefore(const Outcome& outcome, double toc) {
+  const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
+  return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
+}
+
+ros::Time timeAfter(const Outcome& outcome, double toc) {
+  const double offset_ns = std::ceil(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
+  return toRosTime(std::min(outcome.stamp_ns, outcome.start_ns + 1 + static_cast<StampNs>(offset_ns)));
+}
+
+ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch) {
+  const ContactGeometry geometry = contactGeometry(outcome, contact);
+  ContactMessage out;
+  out.kind = static_cast<std::uint8_t>(contact.kind);
+  out.certainty = static_cast<std::uint8_t>(contact.certainty);
+  out.initial = contact.initial;
+  out.leaving = contact.leaving;
+  out.expected = contact.expected;
+  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
+  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
+  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
+  out.voxel_size = contact.voxel_size;
+  out.patch = patch;
+  out.toc_lower = contact.toc_lower;
+  out.toc_upper = contact.toc_upper;
+  out.time_of_contact = timeBefore(outcome, contact.toc_lower);
+  out.point.x = geometry.point.x();
+  out.point.y = geometry.point.y();
+  out.point.z = geometry.point.z();
+  out.normal.x = geometry.normal.x();
+  out.normal.y = geometry.normal.y();
+  out.normal.z = geometry.normal.z();
+  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
+  out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
+  return out;
+}
+
 ros::Time toRosTime(StampNs stamp_ns) {
   // Beyond this ros::Time throws; a message may bring such a stamp, or one so late that a prediction leads there.
   constexpr StampNs LAST_NS = 4294967295999999999;
@@ -224,7 +240,7 @@ ros::Time toRosTime(StampNs stamp_ns) {
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::ContactArray out;
-  out.header = header(outcome.stamp_ns, frame);
+  out.header = headerOf(outcome.stamp_ns, frame);
   out.start = toRosTime(outcome.start_ns);
   out.status = static_cast<std::uint8_t>(outcome.status);
   out.reason = outcome.reason;
@@ -237,7 +253,11 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
   for (const Body& body : bodies) out.bodies.push_back(body.name);
   out.contacts.reserve(outcome.contacts.size());
-  for (const Contact& contact : outcome.contacts) out.contacts.push_back(toMessage(outcome, contact));
+  for (std::size_t i = 0; i < outcome.contacts.size(); ++i) {
+    const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
+    const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
+    out.contacts.push_back(toContact(outcome, outcome.contacts[i], patch));
+  }
   for (const StartIntersection& crossing : outcome.intersections) {
     deformable_ccd::Intersection message;
     std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
@@ -251,32 +271,35 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::FirstContact out;
-  out.header = header(outcome.stamp_ns, frame);
+  out.header = headerOf(outcome.stamp_ns, frame);
   out.status = static_cast<std::uint8_t>(outcome.status);
   out.start_state = static_cast<std::uint8_t>(outcome.start_state);
   out.answered = outcome.answered;
-  const double toc = outcome.earliest_unexpected_toc;
+  const double toc = earliestNewToc(outcome);
   out.contact = std::isfinite(toc);
+  out.pairs = toPairContacts(outcome, bodies);
+  out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(outcome));
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
   out.toc = out.seconds_from_start = toc;
   const Contact* first = nullptr;
-  for (const Contact& contact : outcome.contacts) {
-    if (contact.expected || contact.toc_lower != toc) continue;
-    const bool certain = contact.certainty == Certainty::CERTAIN;
-    if (!first || (certain && !out.certain)) first = &contact;
+  const std::vector<NewContact> found = newContacts(outcome);
+  for (const NewContact& one : found) {
+    if (one.contact.toc_lower != toc) continue;
+    const bool certain = one.contact.certainty == Certainty::CERTAIN;
+    if (!first || (certain && !out.certain)) first = &one.contact;
     out.certain |= certain;
   }
   if (out.contact) {
-    out.time_of_contact = timeOf(outcome, toc);
+    out.time_of_contact = timeBefore(outcome, toc);
     out.seconds_from_start = toc * outcome.duration_s();
   }
-  out.summary = summaryOf(outcome, first, bodies);
+  out.summary = summaryOf(outcome, toc, first, bodies);
   return out;
 }
 
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) {
   deformable_ccd::State out;
-  out.header = header(outcome.stamp_ns, frame);
+  out.header = headerOf(outcome.stamp_ns, frame);
   if (!outcome.answered) return out;
   const std::vector<Body>& bodies = outcome.step->bodies;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -305,7 +328,7 @@ void fillState(const Assurance& assurance, deformable_ccd::State& message) {
 
 StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
   StatsMessage out;
-  out.header = header(outcome.stamp_ns, frame);
+  out.header = headerOf(outcome.stamp_ns, frame);
   out.status = static_cast<std::uint8_t>(outcome.status);
   out.start_state = static_cast<std::uint8_t>(outcome.start_state);
   out.answered = outcome.answered;
@@ -337,7 +360,7 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
 deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,
                                             StampNs stamp_ns, const std::string& frame) {
   deformable_ccd::LeftOutPairs out;
-  out.header = header(stamp_ns, frame);
+  out.header = headerOf(stamp_ns, frame);
   for (const Body& body : bodies) out.bodies.push_back(body.name);
   out.pairs.resize(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -348,16 +371,20 @@ deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pair
   return out;
 }
 
-deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s, const std::string& frame) {
+deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
+                                              const std::vector<Body>& bodies, const std::string& frame) {
   deformable_ccd::TimeToContact out;
-  out.header = header(prediction.start_ns, frame);
+  out.header = headerOf(prediction.start_ns, frame);
   out.status = static_cast<std::uint8_t>(prediction.status);
   out.start_state = static_cast<std::uint8_t>(prediction.start_state);
   out.answered = prediction.answered;
   out.horizon = horizon_s;
-  out.contact = std::isfinite(prediction.earliest_unexpected_toc);
+  const double toc = earliestNewToc(prediction);
+  out.contact = std::isfinite(toc);
+  out.pairs = toPairContacts(prediction, bodies);
+  out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(prediction));
   out.expected_contacts = static_cast<std::uint32_t>(prediction.counts.expected);
-  out.seconds = prediction.earliest_unexpected_toc * horizon_s;
+  out.seconds = toc * horizon_s;
   return out;
 }
 

@@ -1,6 +1,7 @@
 // An outcome as messages. Used by the node and by analyze_bag, so that both write the same.
 #pragma once
 
+#include <deformable_ccd/Contact.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/FirstContact.h>
 #include <deformable_ccd/LeftOutPairs.h>
@@ -17,6 +18,12 @@ namespace dccd {
 
 /// The nearest that a message can hold: 0 to 2^32 s.
 ros::Time toRosTime(StampNs stamp_ns);
+std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame);
+/// A time within the step [1] as an absolute one that is not after it, not before it.
+ros::Time timeBefore(const Outcome& outcome, double toc);
+ros::Time timeAfter(const Outcome& outcome, double toc);
+/// With its geometry; `patch`: identity of its patch, 0 for none.
+deformable_ccd::Contact toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch);
 
 /// What the statistics say beyond the outcome itself.
 struct StatsContext {
@@ -43,6 +50,7 @@ deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext
 deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,
                                             StampNs stamp_ns, const std::string& frame);
 /// From a prediction (Monitor::predict) over horizon_s.
-deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s, const std::string& frame);
+deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
+                                              const std::vector<Body>& bodies, const std::string& frame);
 
 }  // namespace dccd

@@ -1,6 +1,7 @@
 #include "output/outputs.h"
 
 #include "output/markers.h"
+#include "output/patch_messages.h"
 
 namespace dccd {
 
@@ -8,10 +9,11 @@ namespace {
 
 // Deep enough for a subscriber that stalls for a second at camera rate; a slower one loses messages, not the node time.
 constexpr std::uint32_t QUEUE = 32;
+constexpr std::uint32_t EVENT_QUEUE = 4096;  // many may come of one step, a message each
 
 }  // namespace
 
-Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
+Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates, bool patches) {
   contacts_ = node.advertise<deformable_ccd::ContactArray>("contacts", QUEUE);
   first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", QUEUE);
   stats_ = node.advertise<deformable_ccd::StepStats>("stats", QUEUE);
@@ -21,12 +23,20 @@ Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates) {
     predicted_ = node.advertise<deformable_ccd::ContactArray>("predicted_contacts", QUEUE);
     time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", QUEUE);
   }
+  if (patches) {
+    patches_ = node.advertise<deformable_ccd::PatchArray>("patches", QUEUE);
+    events_ = node.advertise<deformable_ccd::PatchEvent>("events", EVENT_QUEUE);
+  }
   if (separates) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
   if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
+  if (patches_ && patches_.getNumSubscribers() > 0) patches_.publish(toPatchArray(outcome, bodies, frame));
+  if (events_ && events_.getNumSubscribers() > 0) {
+    for (const auto& event : toPatchEvents(outcome, bodies, frame)) events_.publish(event);
+  }
 }
 
 void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
@@ -52,7 +62,7 @@ void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, con
                                 const std::string& frame) {
   if (predicted_.getNumSubscribers() > 0) predicted_.publish(toContactArray(prediction, bodies, frame));
   if (time_to_contact_.getNumSubscribers() > 0) {
-    time_to_contact_.publish(toTimeToContact(prediction, horizon_s, frame));
+    time_to_contact_.publish(toTimeToContact(prediction, horizon_s, bodies, frame));
   }
 }
 

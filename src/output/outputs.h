@@ -17,9 +17,9 @@ namespace dccd {
 
 class Outputs {
  public:
-  Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates);
+  Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates, bool patches);
 
-  /// What a robot waits for, before all that is only looked at: first contact, contacts.
+  /// What a robot waits for, before all that is only looked at: first contact, contacts, patches and their events.
   void publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);
   void publishMarkers(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& markers,
                       const std::string& frame);
@@ -37,7 +37,8 @@ class Outputs {
   void publishNothing(const std::string& frame);
 
  private:
-  ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_;
+  ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_,
+      patches_, events_;
   std::uint64_t markers_built_ = 0;
 };
 

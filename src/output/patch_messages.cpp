@@ -1,6 +1,5 @@
 #include "output/patch_messages.h"
 
-#include <algorithm>
 #include <set>
 
 #include "dccd/new_contacts.h"
@@ -15,7 +14,7 @@ using PatchMessage = deformable_ccd::Patch;
 static_assert(static_cast<int>(PatchBeginning::MAP_CHANGED) == static_cast<int>(PatchMessage::MAP_CHANGED));
 static_assert(static_cast<int>(PatchEventKind::ENDED) == static_cast<int>(EventMessage::ENDED));
 static_assert(static_cast<int>(PatchEventKind::SPLIT) == static_cast<int>(EventMessage::SPLIT));
-static_assert(static_cast<int>(PatchEventKind::MERGED) == static_cast<int>(EventMessage::MERGED));
+static_assert(static_cast<int>(PatchEventKind::UNEXPECTED) == static_cast<int>(EventMessage::UNEXPECTED));
 
 std::string nameOf(std::uint16_t body, const std::vector<Body>& bodies) {
   return body == OBSTACLE_BODY ? "octomap" : bodies.at(body).name;
@@ -39,7 +38,8 @@ PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
   PatchMessage out;
   out.id = patch.id;
   fillNames(patch.body, bodies, out.bodies);
-  out.expected = patch.expected;
+  out.is_new = patch.is_new;
+  out.expected = static_cast<std::uint32_t>(patch.expected);
   out.beginning = static_cast<std::uint8_t>(patch.beginning);
   out.began_from = knownTime(patch.began_from_ns);
   out.began_to = knownTime(patch.began_to_ns);
@@ -83,6 +83,8 @@ std::string summaryOf(const PatchEvent& event, const std::vector<Body>& bodies) 
       return name + " split: " + listOf(event.others) + " came off";
     case PatchEventKind::MERGED:
       return name + " merged: " + listOf(event.others) + " went into it";
+    case PatchEventKind::UNEXPECTED:
+      return name + " is no longer as expected";
   }
   return name;
 }
@@ -125,7 +127,7 @@ std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, 
     deformable_ccd::PairContact out;
     fillNames(one.body, bodies, out.bodies);
     out.patch = one.patch;
-    out.contact = toContact(outcome, one.contact);
+    out.contact = toContact(outcome, one.contact, one.patch);
     out.earliest = timeBefore(outcome, one.contact.toc_lower);
     out.latest = timeAfter(outcome, one.contact.toc_upper);
     all.push_back(std::move(out));
@@ -136,7 +138,7 @@ std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, 
 std::size_t lastingPatches(const Outcome& outcome) {
   std::set<std::uint64_t> ids;
   for (const Patch& patch : outcome.patches) {
-    if (patch.id != 0 && !patch.expected && !isNew(outcome, patch)) ids.insert(patch.id);
+    if (patch.id != 0 && !patch.isExpected() && !patch.is_new) ids.insert(patch.id);
   }
   return ids.size();
 }

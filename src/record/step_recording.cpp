@@ -270,7 +270,8 @@ void visitPatches(Archive& a, Recording& r) {
   a.count(r.answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
   for (auto& patch : r.answer.patches) {
     for (auto& body : patch.body) a.number(body);
-    for (auto* count : {&patch.contacts, &patch.certain, &patch.initial, &patch.crossings}) a.size(*count);
+    for (auto* count : {&patch.contacts, &patch.certain, &patch.initial, &patch.crossings, &patch.expected})
+      a.size(*count);
     a.number(patch.toc_lower);
     a.number(patch.toc_upper);
     visitContact(a, patch.earliest);

@@ -44,7 +44,9 @@ bool samePatch(const Patch& a, const Patch& b, std::uint32_t version) {
                                   p.normal[1],  p.normal[2],   p.box.min[0],  p.box.min[1],  p.box.min[2],
                                   p.box.max[0], p.box.max[1],  p.box.max[2]};
   };
-  const auto counts = [](const Patch& p) { return std::tie(p.body, p.contacts, p.certain, p.initial, p.crossings); };
+  const auto counts = [](const Patch& p) {
+    return std::tie(p.body, p.contacts, p.certain, p.initial, p.crossings, p.expected);
+  };
   const std::array<double, 13> x = places(a), y = places(b);
   return counts(a) == counts(b) && sameBits(a.toc_lower, b.toc_lower) && sameBits(a.toc_upper, b.toc_upper) &&
          sameContact(a.earliest, b.earliest, version) && std::equal(x.begin(), x.end(), y.begin(), sameBits);

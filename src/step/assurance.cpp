@@ -1,5 +1,7 @@
 #include "dccd/assurance.h"
 
+#include <algorithm>
+
 namespace dccd {
 namespace {
 
@@ -7,6 +9,13 @@ std::string joined(const std::vector<std::string>& sentences) {
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : "; ") + sentence;
   return text;
+}
+
+/// Beside what lasts, a contact that is of the same patch is not new.
+Touching touchingOf(const Outcome& outcome) {
+  const bool any_new =
+      std::any_of(outcome.patches.begin(), outcome.patches.end(), [](const Patch& p) { return p.is_new; });
+  return outcome.touching == Touching::NEW && outcome.tracked && !any_new ? Touching::LASTING : outcome.touching;
 }
 
 }  // namespace
@@ -18,7 +27,7 @@ void Assurance::hinder(const std::vector<std::string>& faults) {
 
 Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults) {
   Assurance assurance;
-  assurance.touching = outcome.touching;
+  assurance.touching = touchingOf(outcome);
   if (outcome.answered) {
     assurance.missing = outcome.unproved;
     assurance.excluded = outcome.excluded;

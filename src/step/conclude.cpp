@@ -279,10 +279,8 @@ const char* toString(StartState state) {
   return NAMES[static_cast<std::size_t>(state)];
 }
 
-void conclude(const Options& options, const ExpectedContacts& expected, const Step& step, std::size_t needed_parts,
-              Outcome& outcome) {
+void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
   auto& contacts = outcome.contacts;
-  expected.mark(outcome);
   const std::size_t suppressed_unexpected = options.suppress_initial ? suppressInitial(outcome) : 0;
   outcome.total_contacts = contacts.size();
   outcome.counts = countsOf(contacts);

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "step/expected_contacts.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -19,8 +18,7 @@ void addPart(std::size_t part, std::size_t parts, const PartResult& result, Outc
 /// Contacts of several parts into canonical order, a pair once.
 void joinParts(std::vector<Contact>& contacts);
 /// What of the raw contacts is reported, and what the step may be called.
-void conclude(const Options& options, const ExpectedContacts& expected, const Step& step, std::size_t needed_parts,
-              Outcome& outcome);
+void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome);
 
 /// Throws std::invalid_argument unless the rung can hold a distance; `what` asks for one.
 void checkHoldsDistance(const Options& options, const std::string& what);

@@ -110,8 +110,9 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
+  expected.mark(outcome);
   if (options->patches) findPatches(outcome);
-  conclude(*options, expected, step, needed, outcome);
+  conclude(*options, step, needed, outcome);
   if (options->patches) patches.list(outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
@@ -128,7 +129,6 @@ void History::Impl::findPatches(Outcome& outcome) {
   patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);
   StageStats& stats = outcome.stats[Effect::PATCHES];
   stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
-  outcome.stats.total_ms += stats.ms;
 }
 
 void History::Impl::setOptions(const Options& wanted) {

@@ -26,8 +26,10 @@ Vec3 throughPlane(const Vec3& p, const Vec3& q, const Vec3& corner, const Vec3& 
   return std::isfinite(share) ? Vec3(p + std::clamp(share, 0.0, 1.0) * (q - p)) : Vec3(0.5 * (p + q));
 }
 
-/// Index of the earliest, ties by the canonical order.
-bool isEarlier(const Contact& a, const Contact& b) { return a.toc_lower < b.toc_lower; }
+/// Ties stay in the canonical order.
+bool isEarlier(const Contact& a, const Contact& b) {
+  return a.expected != b.expected ? b.expected : a.toc_lower < b.toc_lower;
+}
 
 }  // namespace
 
@@ -37,7 +39,7 @@ const char* toString(PatchBeginning beginning) {
 }
 
 const char* toString(PatchEventKind kind) {
-  static const char* const NAMES[] = {"BEGAN", "ENDED", "SPLIT", "MERGED"};
+  static const char* const NAMES[] = {"BEGAN", "ENDED", "SPLIT", "MERGED", "UNEXPECTED"};
   return NAMES[static_cast<std::size_t>(kind)];
 }
 
@@ -106,6 +108,7 @@ void PatchMaker::make(Outcome& outcome) {
     // Of a body with itself neither side is the first: all are turned to the side of the first one.
     const bool turned = touch.body[0] == touch.body[1] ? !first && patch.normal.dot(at.normal) < 0 : swapped;
     patch.normal += turned ? Vec3(-at.normal) : at.normal;
+    patch.expected += touch.expected;
     if (touch.kind == Touch::CROSSING) {
       ++patch.crossings;
       patch.toc_lower = patch.toc_upper = 0;

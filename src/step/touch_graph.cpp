@@ -62,6 +62,7 @@ Touch TouchGraph::touchOf(const Contact& contact) const {
   touch.kind = kindOf(contact.kind);
   touch.body = contact.body;
   touch.initial = contact.initial;
+  touch.expected = contact.expected;
   touch.certain = contact.certainty == Certainty::CERTAIN;
   const int first = SIZES[touch.kind][0], all = touch.onMap() ? first : 4;
   for (int i = 0; i < all; ++i) touch.point[i] = vertex_begin_[contact.body[i < first ? 0 : 1]] + contact.vertex[i];
@@ -77,6 +78,7 @@ Touch TouchGraph::touchOf(const StartIntersection& crossing) const {
   Touch touch;
   touch.body = crossing.body;
   touch.initial = true;
+  touch.expected = crossing.expected;
   for (int i = 0; i < 5; ++i) touch.point[i] = vertex_begin_[crossing.body[i < 2 ? 0 : 1]] + crossing.vertex[i];
   return touch;
 }

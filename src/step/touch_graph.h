@@ -24,6 +24,7 @@ struct Touch {
   std::uint8_t level = 0;  ///< the leaf's edge is 2^level finest voxels
   bool initial = false;
   bool certain = true;
+  bool expected = false;
 
   bool onMap() const { return body[1] == OBSTACLE_BODY; }
   VoxelKey voxel() const {

@@ -34,6 +34,7 @@ PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
   event.id = id;
   event.body = living.body;
   event.beginning = living.beginning;
+  event.expected = !living.unexpected;
   return event;
 }
 
@@ -66,12 +67,14 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
   graph_.setBodies(bodies);
   merge(found.touches());
   findParts(found, outcome);
+  findNews();
   keepIdentities(outcome);
   begin(outcome);
   goOn(outcome);
   remember(gap_s, outcome);
   endWhatIsGone(outcome);
   name(found, outcome);
+  tellNews(outcome);
   for (PatchEvent& event : outcome.patch_events) {
     const auto has_id = [&](const Patch& patch) { return patch.id == event.id; };
     const auto patch = std::find_if(outcome.patches.begin(), outcome.patches.end(), has_id);
@@ -90,6 +93,7 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
   }
   merge(found.touches());
   findParts(found, outcome);
+  findNews();
   for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
   name(found, outcome);
 }
@@ -100,13 +104,41 @@ void PatchTracker::name(const PatchMaker& found, Outcome& outcome) const {
   for (std::size_t i = 0; i < all_.size(); ++i) {
     if (current_[i] == NO_PATCH) continue;
     Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
-    const std::uint64_t id = parts_[part_of[i]].id;
+    const Part& part = parts_[part_of[i]];
+    patch.is_new = part.is_new && !patch.isExpected();
+    const std::uint64_t id = part.id;
     if (id == 0 || patch.id == id) continue;
     const Living& living = living_.at(id);
     patch.id = id;
     patch.beginning = living.beginning;
     patch.began_from_ns = living.began_from_ns;
     patch.began_to_ns = living.began_to_ns;
+  }
+  outcome.tracked = true;
+}
+
+/// A living patch has one first contact that is not expected; what did touch when the step began is none.
+void PatchTracker::findNews() {
+  for (Part& part : parts_) {
+    const bool known = std::any_of(part.before.begin(), part.before.end(),
+                                   [&](std::uint64_t id) { return living_.at(id).unexpected; });
+    part.is_new = part.unexpected_new && !part.unexpected_initial && !known;
+  }
+}
+
+/// Of patches that began before, and were as expected until now.
+void PatchTracker::tellNews(Outcome& outcome) const {
+  for (const Part& part : parts_) {
+    if (!part.is_new || part.before.empty()) continue;
+    outcome.patch_events.push_back(eventOf(PatchEventKind::UNEXPECTED, part.id));
+    PatchEvent& event = outcome.patch_events.back();
+    for (const Patch& patch : outcome.patches) {
+      if (patch.id != part.id || !patch.is_new) continue;
+      const StampNs from_ns = stampBefore(outcome, patch.earliest.toc_lower);
+      if (event.from_ns != UNKNOWN_NS && event.from_ns <= from_ns) continue;
+      event.from_ns = from_ns;
+      event.to_ns = stampAfter(outcome, patch.earliest.toc_upper);
+    }
   }
 }
 
@@ -167,6 +199,7 @@ void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
     part.toc_lower = std::min(part.toc_lower, patch.toc_lower);
     part.toc_upper = std::min(part.toc_upper, patch.toc_upper);
     part.initial = part.initial || touch.initial;
+    if (!touch.expected) (touch.initial ? part.unexpected_initial : part.unexpected_new) = true;
   }
   for (Part& part : parts_) {
     std::sort(part.before.begin(), part.before.end());
@@ -232,6 +265,7 @@ void PatchTracker::begin(Outcome& outcome) {
     part->id = next_id_++;
     Living& living = living_[part->id];
     living.body = part->body;
+    living.unexpected = part->unexpected_new || part->unexpected_initial;
     if (part->initial) {
       living.beginning = part->map_changed ? PatchBeginning::MAP_CHANGED : PatchBeginning::INITIAL;
       living.began_to_ns = outcome.start_ns;
@@ -257,6 +291,10 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
     const Part& part = parts_[part_of[i]];
     if (part.touches) trace.id = part.id;
     trace_.push_back(trace);
+  }
+  for (auto& [id, living] : living_) living.unexpected = false;
+  for (const Trace& trace : trace_) {
+    if (!trace.touch.expected) living_.at(trace.id).unexpected = true;
   }
   for (auto& [id, living] : living_) {
     const bool seen = living.body[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;

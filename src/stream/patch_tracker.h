@@ -38,6 +38,7 @@ class PatchTracker {
     StampNs began_from_ns = UNKNOWN_NS, began_to_ns = UNKNOWN_NS;
     StampNs touched_ns = UNKNOWN_NS;   // it was still there
     StampNs released_ns = UNKNOWN_NS;  // it no longer was; UNKNOWN_NS: it was not seen apart since
+    bool unexpected = false;           // something of it that lasts is not expected
   };
   /// Something that touched, of a living patch.
   struct Trace {
@@ -53,6 +54,8 @@ class PatchTracker {
     std::vector<std::uint64_t> before;  // identities of its touches, ascending, each once
     double toc_lower = 1, toc_upper = 1;
     bool initial = false, map_changed = false;
+    bool unexpected_new = false, unexpected_initial = false;  // something not expected: came in this step, was there
+    bool is_new = false;
     std::array<std::uint16_t, 2> body{0, 0};
   };
 
@@ -62,6 +65,8 @@ class PatchTracker {
   void keepIdentities(Outcome& outcome);
   void name(const PatchMaker& found, Outcome& outcome) const;
   void begin(Outcome& outcome);
+  void findNews();
+  void tellNews(Outcome& outcome) const;
   void goOn(const Outcome& outcome);
   void remember(double gap_s, const Outcome& outcome);
   void endWhatIsGone(Outcome& outcome);

@@ -1,0 +1,51 @@
+#include "dccd/new_contacts.h"
+
+#include <algorithm>
+
+namespace dccd {
+namespace {
+
+bool isBefore(const NewContact& a, const NewContact& b) {
+  return a.contact.toc_lower != b.contact.toc_lower ? a.contact.toc_lower < b.contact.toc_lower
+                                                    : canonicalLess(a.contact, b.contact);
+}
+
+/// One for each pair of partners.
+void take(const NewContact& one, std::vector<NewContact>& earliest) {
+  const auto same =
+      std::find_if(earliest.begin(), earliest.end(), [&](const NewContact& other) { return other.body == one.body; });
+  if (same == earliest.end()) {
+    earliest.push_back(one);
+  } else if (isBefore(one, *same)) {
+    *same = one;
+  }
+}
+
+}  // namespace
+
+std::vector<NewContact> newContacts(const Outcome& outcome) {
+  std::vector<NewContact> earliest;
+  if (outcome.tracked) {
+    for (const Patch& patch : outcome.patches) {
+      if (patch.is_new) take({patch.body, patch.id, patch.earliest}, earliest);
+    }
+  } else {
+    for (const Contact& contact : outcome.contacts) {
+      const auto [low, high] = std::minmax(contact.body[0], contact.body[1]);
+      if (!contact.expected) take({{low, high}, 0, contact}, earliest);
+    }
+  }
+  std::sort(earliest.begin(), earliest.end(), isBefore);
+  return earliest;
+}
+
+double earliestNewToc(const Outcome& outcome) {
+  if (!outcome.tracked) return outcome.earliest_unexpected_toc;
+  double toc = outcome.unchecked_toc_lower;
+  for (const Patch& patch : outcome.patches) {
+    if (patch.is_new) toc = std::min(toc, patch.earliest.toc_lower);
+  }
+  return toc;
+}
+
+}  // namespace dccd
