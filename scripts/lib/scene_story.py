@@ -7,6 +7,10 @@ StoryContact = collections.namedtuple('StoryContact', 'time_s initial what')
 # A step between two frames [s]; `clear`: answered, nothing crosses at its start, and it has no contact.
 StoryStep = collections.namedtuple('StoryStep', 'start_s end_s start_clear clear contacts')
 
+# What became of a patch: 'BEGAN', 'ENDED', 'SPLIT', 'MERGED', 'UNEXPECTED'; its partners as above; identities; between which times
+# [s] (None: unknown); how it began.
+StoryEvent = collections.namedtuple('StoryEvent', 'kind what patch others earliest_s latest_s beginning')
+
 Story = collections.namedtuple('Story', 'clear_until_s first_s new last_s clear_since_s share_clear')
 
 
@@ -97,16 +101,56 @@ def broken_clear(expected, steps, story):
     return broken
 
 
-def broken_facts(expect, steps):
-    """Of a scene's `expect` block, the facts that do not hold of these steps, each a line; none when all hold."""
+def living_patches(events):
+    """The identities that have not ended."""
+    alive = set()
+    for event in events:
+        if event.kind in ('BEGAN', 'SPLIT'):
+            alive.update([event.patch, *event.others])
+        elif event.kind == 'MERGED':
+            alive.difference_update(event.others)
+        elif event.kind == 'ENDED':
+            alive.discard(event.patch)
+    return alive
+
+
+def broken_patches(name, what, expected, events):
+    """Begins with the first contact, and ends, or lasts, as the page says."""
+    mine = [event for event in events if event.what == what]
+    if expected == 'none':
+        return ['%s: patch %d, where none is expected' % (name, mine[0].patch)] if mine else []
+    first = next((event for event in mine if event.kind == 'BEGAN' and event.beginning == 'NEW'), None)
+    low, high = expected['first_contact_s']
+    if first is None:
+        return ['%s: no patch begins' % name]
+    broken = []
+    if not low <= first.earliest_s <= first.latest_s <= high + 1e-6:
+        broken.append('%s: the first patch begins from %.4f to %.4f s, expected from %g to %g s' % (
+            name, first.earliest_s, first.latest_s, low, high))
+    alive = living_patches(mine)
+    if expected.get('lasts') and not alive:
+        broken.append('%s: no patch lasts to the end' % name)
+    if 'ends_s' in expected:
+        low, high = expected['ends_s']
+        ends = [event.latest_s for event in mine if event.kind == 'ENDED' and event.latest_s is not None]
+        if alive or not ends or not low <= max(ends) <= high:
+            broken.append('%s: %s, expected to have ended from %g to %g s' % (
+                name, 'patches %s last' % sorted(alive) if alive else 'the last patch ends at %s s' % max(ends, default=None), low, high))
+    return broken
+
+
+def broken_facts(expect, steps, events=None):
+    """Of a scene's `expect` block, the facts that do not hold of these steps and, where given, of the patches' events, each a
+    line; none when all hold."""
     if not steps:
         return ['no step was answered']
     story, broken = tell(steps), []
     for name, expected in expect.items():
         if name == 'clear':
             broken += broken_clear(expected, steps, story)
-        elif name == 'body':
-            broken += broken_contact(name, frozenset(expected['names']), expected, story)
-        else:
-            broken += broken_contact(name, name, expected, story)
+            continue
+        what = frozenset(expected['names']) if name == 'body' else name
+        broken += broken_contact(name, what, expected, story)
+        if events is not None:
+            broken += broken_patches(name, what, expected, events)
     return broken

@@ -4,6 +4,7 @@
 #include <map>
 #include <sstream>
 
+#include "dccd/accuracy.h"
 #include "projection/toc_bound.h"
 #include "record/explain_parts.h"
 #include "step/history.h"

@@ -4,7 +4,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "dccd/accuracy.h"
 #include "step/parts.h"
 
 namespace dccd {

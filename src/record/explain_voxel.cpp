@@ -4,6 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "dccd/accuracy.h"
 #include "obstacle/excluded_leaves.h"
 #include "record/explain_parts.h"
 #include "step/history.h"

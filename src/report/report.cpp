@@ -50,6 +50,8 @@ Report::Report(const std::string& folder) : folder_(folder) {
   open(contacts_, "contacts.csv");
   open(steps_, "steps.csv");
   open(timing_, "timing.csv");
+  open(patches_, "patches.csv");
+  open(events_, "events.csv");
   contacts_
       << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
          "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step,"
@@ -58,6 +60,10 @@ Report::Report(const std::string& folder) : folder_(folder) {
       << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
          "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,"
          "elementary_pairs,obstacle_pairs\n";
+  patches_
+      << "step,stamp_ns,patch,body_0,body_1,beginning,is_new,contacts,certain,initial,crossings,expected,toc_lower,"
+         "toc_upper,area_m2,centroid_x,centroid_y,centroid_z,normal_x,normal_y,normal_z\n";
+  events_ << "step,stamp_ns,event,patch,others,body_0,body_1,beginning,expected,earliest_s,latest_s\n";
   timing_ << "step,total_ms";
   for (std::size_t s = 0; s < stage_ms_.size(); ++s) timing_ << ',' << toString(static_cast<Stage>(s)) << "_ms";
   timing_ << '\n';
@@ -82,6 +88,31 @@ void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodi
               << static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9 + c.toc_lower * outcome.duration_s() << ','
               << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y()
               << ',' << g.normal.z() << ',' << g.approach_speed << ',' << c.expected << '\n';
+  }
+}
+
+void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodies) {
+  const auto place = [](std::ofstream& file, const Vec3& v) { file << ',' << v.x() << ',' << v.y() << ',' << v.z(); };
+  for (const Patch& p : outcome.patches) {
+    patches_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << p.id << ','
+             << csvField(bodyName(p.body[0], bodies)) << ',' << csvField(bodyName(p.body[1], bodies)) << ','
+             << toString(p.beginning) << ',' << p.is_new << ',' << p.contacts << ',' << p.certain << ',' << p.initial
+             << ',' << p.crossings << ',' << p.expected << ',' << p.toc_lower << ',' << p.toc_upper << ',' << p.area_m2;
+    place(patches_, p.centroid);
+    place(patches_, p.normal);
+    patches_ << '\n';
+  }
+  for (const PatchEvent& e : outcome.patch_events) {
+    std::string others;
+    for (const std::uint64_t id : e.others) others += (others.empty() ? "" : " ") + std::to_string(id);
+    events_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << toString(e.kind) << ',' << e.id << ',' << others
+            << ',' << csvField(bodyName(e.body[0], bodies)) << ',' << csvField(bodyName(e.body[1], bodies)) << ','
+            << toString(e.beginning) << ',' << e.expected;
+    for (const StampNs when_ns : {e.from_ns, e.to_ns}) {
+      events_ << ',';
+      if (when_ns != UNKNOWN_NS) events_ << static_cast<double>(when_ns - origin_ns_) * 1e-9;
+    }
+    events_ << '\n';
   }
 }
 
@@ -175,6 +206,7 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   any_ = true;
   addRow(o);
   addProof(o);
+  writePatches(o, bodies);  // a seam without an answer has events, too
   if (!o.answered) return;
   ++answered_;
   with_contact_ += o.total_contacts > o.counts.expected;
@@ -357,7 +389,7 @@ void Report::finish() {
   std::string text = data.dump(-1, ' ', false, REPLACE);
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
   page << reportPage(text);
-  for (std::ofstream* file : {&contacts_, &steps_, &timing_, &json_file, &page}) {
+  for (std::ofstream* file : {&contacts_, &steps_, &patches_, &events_, &timing_, &json_file, &page}) {
     if (file->is_open()) file->close();
     if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
   }

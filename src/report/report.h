@@ -18,9 +18,9 @@
 
 namespace dccd {
 
-/// Writes into a folder: contacts.csv and steps.csv (the same bytes for any number of threads), timing.csv,
-/// left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json and report.html.
-/// Outcomes are added in order; nothing but their summaries is kept.
+/// Writes into a folder: contacts.csv, steps.csv, patches.csv and events.csv (the same bytes for any number of
+/// threads), timing.csv, left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json
+/// and report.html. Outcomes are added in order; nothing but their summaries is kept.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
@@ -60,13 +60,14 @@ class Report {
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
   void addTimes(const Outcome& outcome);
   void writeContacts(const Outcome& outcome, const std::vector<Body>& bodies);
+  void writePatches(const Outcome& outcome, const std::vector<Body>& bodies);
   nlohmann::json heatJson() const;
   nlohmann::json effectsJson() const;
   nlohmann::json lookAheadJson() const;
   nlohmann::json json() const;
 
   std::string folder_;
-  std::ofstream contacts_, steps_, timing_;
+  std::ofstream contacts_, steps_, patches_, events_, timing_;
   StampNs origin_ns_ = 0;
   bool any_ = false;
   std::map<std::string, std::size_t> lasting_;  // steps without a contact in which something touched, by what it was

@@ -13,7 +13,7 @@ import unittest
 import yaml
 
 from checkout import CHECKOUT, TOOLS
-from scene_story import StoryContact, StoryStep, broken_facts, lines, tell, what_met
+from scene_story import StoryContact, StoryEvent, StoryStep, broken_facts, lines, tell, what_met
 
 OBSTACLE = 'octomap'
 
@@ -30,7 +30,7 @@ def analyse(scene, folder):
     report = folder / scene.stem
     analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet', '--no-accuracy-table')
     assert analysed.returncode == 0, analysed.stderr
-    return steps_of(report), json.loads((report / 'report.json').read_text())
+    return steps_of(report), events_of(report), json.loads((report / 'report.json').read_text())
 
 
 def rows_of(path):
@@ -53,6 +53,15 @@ def steps_of(report):
         start_s, end_s = (1e-9 * (int(row[name]) - first_ns) for name in ('start_ns', 'stamp_ns'))
         steps.append(StoryStep(start_s, end_s, start_clear, start_clear and not found, found))
     return steps
+
+
+def events_of(report):
+    """The rows of a report's events.csv."""
+    seconds = lambda text: float(text) if text else None
+    return [StoryEvent(row['event'], what_met(*(None if row[body] == OBSTACLE else row[body] for body in ('body_0', 'body_1'))),
+                       int(row['patch']), [int(i) for i in row['others'].split()], seconds(row['earliest_s']),
+                       seconds(row['latest_s']), row['beginning'])
+            for row in rows_of(report / 'events.csv')]
 
 
 class SceneFactsTest(unittest.TestCase):
@@ -86,16 +95,16 @@ class SceneFactsTest(unittest.TestCase):
         self.assertGreaterEqual(len(scenes), 6)
         for scene in scenes:
             with self.subTest(scene=scene.stem):
-                steps, report = analyse(scene, self.folder)
+                steps, events, report = analyse(scene, self.folder)
                 text = yaml.safe_load(scene.read_text())
                 self.assertTrue(text['expect'])
-                self.assertEqual(broken_facts(text['expect'], steps), [])
+                self.assertEqual(broken_facts(text['expect'], steps, events), [])
                 self.check_effects(text['monitor'], report)
 
     def test_the_demo_tells_its_story_and_wrong_facts_of_it_are_told(self):
         """Clear, contact with the table, with itself, clear again; and each kind of fact fails once it is wrong."""
         scene = CHECKOUT / 'config/scenes/table_edge.yaml'
-        steps, _ = analyse(scene, self.folder)
+        steps, events, _ = analyse(scene, self.folder)
         expect = yaml.safe_load(scene.read_text())['expect']
         told = [line[11:] for line in lines(tell(steps))]
         self.assertEqual(told, ['clear of everything until then', 'first contact with the octomap',
@@ -120,6 +129,15 @@ class SceneFactsTest(unittest.TestCase):
                 broken = broken_facts(facts, steps)
                 self.assertEqual(len(broken), 1, broken)
                 self.assertRegex(broken[0], message)
+        wrong_ends = [
+            ('octomap', {'first_contact_s': [0.85, 1.1], 'lasts': True}, 'octomap: no patch lasts'),
+            ('octomap', {'first_contact_s': [0.85, 1.1], 'ends_s': [0.9, 1.0]}, 'octomap: the last patch ends at'),
+            ('self', {'first_contact_s': [2.0, 2.4], 'ends_s': [3.0, 3.5]}, 'self: the last patch ends at'),
+        ]
+        for name, fact, message in wrong_ends:
+            with self.subTest(name=name, fact=fact):
+                self.assertRegex(' '.join(broken_facts({**expect, name: fact}, steps, events)), message)
+        self.assertRegex(' '.join(broken_facts(expect, steps, [])), 'octomap: no patch begins')
         # A step that starts where surfaces cross, though nothing was found to meet before.
         crossing = [s._replace(start_clear=False, clear=False) if i == 10 else s for i, s in enumerate(steps)]
         self.assertRegex(' '.join(broken_facts({'clear': {'until_s': 0.2}}, crossing)), 'the first contact comes at')

@@ -6,7 +6,7 @@
 namespace dccd::scene {
 namespace {
 
-/// When a first contact may come: seconds from the first frame.
+/// When something may come: seconds from the first frame.
 struct Window {
   double low_s = 0.0;
   double high_s = 0.0;
@@ -14,10 +14,18 @@ struct Window {
 
 double lastFrame(const SceneSpec& spec) { return (spec.frames - 1) / spec.frame_rate_hz; }
 
-Window readWindow(ParameterReader& map, const SceneSpec& spec) {
-  const Vec3 numbers = map.numbers("first_contact_s", 2, 0.0, lastFrame(spec));
-  if (numbers[0] > numbers[1]) map.fail("first_contact_s", "must be the earliest time, then the latest");
+Window readWindow(ParameterReader& map, const std::string& name, const SceneSpec& spec) {
+  const Vec3 numbers = map.numbers(name, 2, 0.0, lastFrame(spec));
+  if (numbers[0] > numbers[1]) map.fail(name, "must be the earliest time, then the latest");
   return {numbers[0], numbers[1]};
+}
+
+/// What becomes of the patches: when the last one ends, or that one lasts to the end.
+void readEnd(ParameterReader& map, const Window& begin, const SceneSpec& spec) {
+  const bool lasts = map.get("lasts", false);
+  if (!map.has("ends_s")) return;
+  if (lasts) map.fail("lasts", "contradicts ends_s; remove one of the two");
+  if (readWindow(map, "ends_s", spec).high_s < begin.low_s) map.fail("ends_s", "is before first_contact_s");
 }
 
 void checkNames(ParameterReader& map, const SceneSpec& spec) {
@@ -37,7 +45,8 @@ std::optional<Window> readContact(ParameterReader& expect, const std::string& wh
   ParameterReader map = expect.section(what);
   if (what == "octomap" && !spec.obstacle) expect.fail(what, "has no meaning without an obstacle; remove this line");
   if (what == "body") checkNames(map, spec);
-  const Window window = readWindow(map, spec);
+  const Window window = readWindow(map, "first_contact_s", spec);
+  readEnd(map, window, spec);
   map.integer("contacts_at_least", 1, 1, 1000000000);
   map.finish();
   return window;

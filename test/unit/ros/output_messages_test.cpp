@@ -105,7 +105,7 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_FALSE(none.contact);
   EXPECT_EQ(none.expected_contacts, 1u);
   EXPECT_EQ(none.summary, "no contact found, but 1 expected ones, starts CLEAR");
-  const auto later = toTimeToContact(quiet, 2, {}, "world");
+  const auto later = toTimeToContact(quiet, 2, bodies, "world");
   EXPECT_FALSE(later.contact);
   EXPECT_EQ(later.expected_contacts, 1u);
 
@@ -118,7 +118,7 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_EQ(first.summary,
             "contact 0.500000 s into the step: vertex 1 of cloth and face 0-1-2 of finger, besides 1 expected ones, "
             "starts CLEAR");
-  EXPECT_EQ(toTimeToContact(alarm, 2, {}, "world").seconds, 1);
+  EXPECT_EQ(toTimeToContact(alarm, 2, bodies, "world").seconds, 1);
 
   deformable_ccd::State state = toState(quiet, "world");
   fillState(assuranceOf(quiet), state);

@@ -132,6 +132,10 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
                  "  clear: {until_s: 0.05, again_s: 0.1, share_at_least: 0.5}\n"),
             "accepted");
   EXPECT_EQ(with("  clear: {share_at_least: 1}\n"), "accepted");
+  EXPECT_EQ(with("  self: {first_contact_s: [0, 0.1], ends_s: [0.1, 0.13]}\n"), "accepted");
+  EXPECT_EQ(with("  self: {first_contact_s: [0, 0.1], lasts: true}\n"), "accepted");
+  expectTold("  self: {first_contact_s: [0, 0.1], ends_s: [0.1, 0.13], lasts: true}\n", "lasts contradicts ends_s");
+  expectTold("  self: {first_contact_s: [0.1, 0.12], ends_s: [0.01, 0.05]}\n", "ends_s is before first_contact_s");
 
   expectTold("  selv: none\n", "s.yaml:7: expect/selv is not known; nearest is expect/self");
   expectTold("  {}\n", "expect needs at least one fact");
