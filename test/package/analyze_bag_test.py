@@ -1,6 +1,7 @@
 """analyze_bag as people use it: the same output for any number of threads, maps wherever they are, a bag of results."""
 import collections
 import copy
+import csv
 import io
 import json
 import pathlib
@@ -334,6 +335,34 @@ class AnalyzeBagTest(unittest.TestCase):
         self.assertGreater(score['compared'], 0)
         self.assertEqual(stats[-1].look_ahead_compared, min(score['compared'], 1000))
         self.assertLess(stats[0].look_ahead_compared, stats[-1].look_ahead_compared)
+
+    def test_contacts_that_are_expected_in_the_phase_of_the_bag(self):
+        """The cloth on its map: found as before, marked, and no alarm; in another phase it is one."""
+        expected = 'expected_contacts: [{between: [mesh, octomap], phase: lay}, {between: [mesh, self], phase: fold}]\n'
+        found = {}
+        for phase in ('lay', 'fold'):
+            out = self.folder / (phase + '.bag')
+            self.analyze(phase, self.bag, *self.params(expected + 'phase: %s\n' % phase), '-o', out)
+            marks, plain = (list(csv.DictReader((folder / 'contacts.csv').read_text().splitlines()))
+                            for folder in (self.folder / phase, self.plain))
+            partner = 'octomap' if phase == 'lay' else 'mesh'
+            self.assertEqual([c['expected'] == '1' for c in marks], [c['body_1'] == partner for c in marks])
+            self.assertEqual([{**c, 'expected': '0'} for c in marks], plain, 'nothing changes but the mark')
+            states, firsts = [], []
+            for topic, message, _ in messages_of(out):
+                if topic == OWN + 'state':
+                    states.append(message)
+                elif topic == OWN + 'first_contact':
+                    firsts.append(message)
+            self.assertTrue(all(len(s.expected) == 1 for s in states[1:]), 'said of each answer')
+            self.assertEqual(sum(f.expected_contacts for f in firsts), sum(c['expected'] == '1' for c in marks))
+            found[phase] = sum(f.contact for f in firsts), sum(s.touching == s.EXPECTED for s in states)
+        self.assertGreater(found['fold'][0], found['lay'][0], 'steps with an alarm')
+        self.assertGreater(found['lay'][1], found['fold'][1], 'steps in which all that touches is expected')
+        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(self.bag), '--report', str(self.folder / 'no'), '--quiet',
+                              *map(str, self.params(expected + 'phase: lie\n'))], capture_output=True, text=True, check=False)
+        self.assertEqual(ran.returncode, 1)
+        self.assertIn("phase is 'lie', which expected_contacts does not name; known phases are 'fold', 'lay'", ran.stderr)
 
     def test_a_bag_that_was_recorded_beside_monitors(self):
         """As `rosbag record -a` does: their markers, of a mesh type, come before the tracker's topic."""
