@@ -168,6 +168,9 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.look_ahead_in = stats[Effect::LOOK_AHEAD].in;
   out.look_ahead_out = stats[Effect::LOOK_AHEAD].out;
   out.look_ahead_ms = stats[Effect::LOOK_AHEAD].ms;
+  out.patches_in = stats[Effect::PATCHES].in;
+  out.patches_out = stats[Effect::PATCHES].out;
+  out.patches_ms = stats[Effect::PATCHES].ms;
   out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
   out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
   out.unfolded_bodies = static_cast<std::uint32_t>(stats.unfolded_bodies);

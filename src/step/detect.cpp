@@ -183,7 +183,6 @@ std::size_t History::Impl::neededParts(const Step& step, StepStats& stats) const
   const Clock::time_point start = Clock::now();
   const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
   stats[Effect::RIGID_BODIES] = {static_cast<std::uint64_t>(turning), 0, msSince(start)};
-  stats.total_ms += stats[Effect::RIGID_BODIES].ms;
   return needed;
 }
 
