@@ -14,6 +14,8 @@ namespace exact {
 constexpr int FIXED_INTEGER_LIMBS = 64;
 constexpr int FIXED_INTEGER_MAX_BITS = (64 * FIXED_INTEGER_LIMBS - 66) / 18;
 
+PairMotion motionOf(const VertexMotion* vertices, const Quad& quad);
+
 /// The result that says contact in cell k of the 2^-toc_bits grid; k = 2^toc_bits means a TOC of exactly 1.
 ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier);
 ElementaryResult noContact(Tier tier);
@@ -31,6 +33,9 @@ ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int
 /// FIXED_INTEGER: undecided for more than FIXED_INTEGER_MAX_BITS bits. BIG_INTEGER: always decides.
 ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
 ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
+
+/// What DOUBLE_BATCH left, by the tiers after it; always decides.
+ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits);
 
 /// One tier alone, for tests and for measuring what each is worth. Throws std::invalid_argument for a tier that does
 /// not exist or a kind that is not VERTEX_FACE or EDGE_EDGE.
