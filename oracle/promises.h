@@ -22,8 +22,9 @@ std::string brokenPromise(const AccuracyOptions& options, const Query& query, st
 
 /// The same for `conservative` with a minimum separation: contact begins where the features come that close. Judged by
 /// witnesses: times at which the exact distance is known. A time of contact between them that the samples miss is not
-/// judged; what is reported as broken is broken. Where it says CONTACT, the features are within the separation at toc_upper
-/// and the interval is at most 2^-20 of the step wide, or they are within the tolerance of the separation all the while.
+/// judged; what is reported as broken is broken. Where it says CONTACT, the features are within the separation at
+/// toc_upper and the interval is at most 2^-20 of the step wide, or they are within the tolerance of the separation all
+/// the while.
 std::string brokenSeparationPromise(const AccuracyOptions& options, const Query& query, double minimum_separation_m,
                                     const ElementaryResult& result);
 

@@ -10,6 +10,7 @@
 #include "dccd/elementary.h"
 #include "elementary/conservative_advance.h"
 #include "elementary/exact_tiers.h"
+#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {
@@ -72,6 +73,7 @@ ElementaryResult ConservativeRung::sharpened(const PairBatch& batch, std::size_t
 }
 
 void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  const ScopedFloatMode mode;
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("conservative test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");

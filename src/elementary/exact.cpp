@@ -8,6 +8,7 @@
 #include "dccd/elementary.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
+#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {
@@ -37,6 +38,7 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
 }  // namespace
 
 void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  const ScopedFloatMode mode;
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("exact test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");
