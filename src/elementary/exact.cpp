@@ -28,6 +28,8 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
                         int toc_bits) {
   const PairMotion pair = exact::motionOf(batch.vertices, batch.pairs[pair_index]);
   if (output.verdict[i] == simd::BATCH_YES_BRACKET) {
+    const ElementaryResult simple = exact::contactAtSimpleTime(batch.kind, pair, output.lo[i], output.hi[i], toc_bits);
+    if (simple.verdict == Verdict::CONTACT) return simple;
     const exact::CoplanarityCubic f(batch.kind, pair);
     const std::int64_t cell = exact::cellOfRoot(f, output.lo[i], output.hi[i], toc_bits);
     if (cell >= 0) return exact::contactInCell(cell, toc_bits, Tier::DOUBLE_DOUBLE);
