@@ -33,6 +33,29 @@ std::optional<double> witnessOfContact(const Query& query, double d) {
   return std::nullopt;
 }
 
+/// What a certain contact's interval says of where the contact begins, held against exact distances at its ends and at
+/// SAMPLES - 1 times within: that it is narrow and the features certainly come within d in it, or else that they are
+/// within the tolerance of d all the while.
+std::string brokenInterval(const AccuracyOptions& options, const Query& query, double d,
+                           const ElementaryResult& result) {
+  constexpr int SAMPLES = 4;
+  constexpr double NARROW = 0x1p-20;
+  if (result.toc_lower > result.toc_upper) return "the interval ends before it begins";
+  const Rational most = Rational(d) + Rational(options.tolerance_m),
+                 least = Rational(d) - Rational(options.tolerance_m);
+  const auto square_at = [&](double t) { return squaredDistanceAt(query.kind, query.motion, t); };
+  if (square_at(result.toc_upper) > most * most) return "beyond the tolerance at the interval's end";
+  const double width = result.toc_upper - result.toc_lower;
+  if (width <= NARROW && d > 0 && isWithin(query.kind, query.motion, result.toc_upper, d)) return "";
+  for (int i = 0; i <= SAMPLES; ++i) {
+    const Rational square = square_at(result.toc_lower + width * i / SAMPLES);
+    if (square > most * most || (least > 0 && square < least * least)) {
+      return "a wide interval in which the distance is not within the tolerance of the separation";
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string brokenPromise(const AccuracyOptions& options, const Query& query, std::optional<Root>& toc,
@@ -50,7 +73,9 @@ std::string brokenPromise(const AccuracyOptions& options, const Query& query, st
       !isWithin(query.kind, query.motion, result.toc_lower, options.tolerance_m)) {
     return "at the reported time the features are more than the tolerance apart";
   }
-  return "";
+  if (!claims_nearness) return "";
+  if (toc && tocError(*toc, result.toc_upper) > 0) return "the contact comes after the interval";
+  return brokenInterval(options, query, 0, result);
 }
 
 std::string brokenSeparationPromise(const AccuracyOptions& options, const Query& query, double minimum_separation_m,
@@ -63,7 +88,8 @@ std::string brokenSeparationPromise(const AccuracyOptions& options, const Query&
   if (result.verdict != Verdict::CONTACT) return "";
   const Rational bound = Rational(minimum_separation_m) + Rational(options.tolerance_m);
   const bool apart = squaredDistanceAt(query.kind, query.motion, result.toc_lower) > bound * bound;
-  return apart ? "at the reported time the features are more than minimum separation and tolerance apart" : "";
+  if (apart) return "at the reported time the features are more than minimum separation and tolerance apart";
+  return brokenInterval(options, query, minimum_separation_m, result);
 }
 
 ElementaryResult testQuery(const Rung& test, const Query& query, double minimum_separation_m) {

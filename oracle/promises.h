@@ -14,15 +14,16 @@ namespace test {
 /// What the rung promised for this pair and did not keep; empty where it kept everything. `toc` is the oracle's.
 ///   every rung    times finite and within the step
 ///   conservative  no contact missed, no bound late; where it says CONTACT the features are at most the tolerance apart
-///   at
-///                 toc_lower
+///                 from toc_lower to toc_upper, and their first contact, if they have one, is in between
 ///   exact         the oracle's verdict and the cell of its time
 std::string brokenPromise(const AccuracyOptions& options, const Query& query, std::optional<Root>& toc,
                           const ElementaryResult& result);
 
 /// The same for `conservative` with a minimum separation: contact begins where the features come that close. Judged by
 /// witnesses: times at which the exact distance is known. A time of contact between them that the samples miss is not
-/// judged; what is reported as broken is broken.
+/// judged; what is reported as broken is broken. Where it says CONTACT, the features are within the separation at
+/// toc_upper and the interval is at most 2^-20 of the step wide, or they are within the tolerance of the separation all
+/// the while.
 std::string brokenSeparationPromise(const AccuracyOptions& options, const Query& query, double minimum_separation_m,
                                     const ElementaryResult& result);
 

@@ -92,7 +92,8 @@ struct TierCounters {
   }
 };
 
-/// A rung. Stateless and safe to call from several threads; one virtual call per chunk, none per pair.
+/// A rung. Stateless and safe to call from several threads; one virtual call per chunk, none per pair. run() rounds to
+/// nearest with denormals whatever mode the caller's thread is in, and leaves that as it was.
 /// All coordinates must be finite (the caller leaves out unchecked vertices).
 class DCCD_EXPORT Rung {
  public:

@@ -1,6 +1,7 @@
 // The rung `conservative`: never misses, never late; false positives only closer than the tolerance. Without a minimum
 // separation the batched certified test (exact tier T1) answers nearly every pair, more sharply than asked; the rest,
-// and every pair with a minimum separation, goes through conservative advancement.
+// and every pair with a minimum separation, goes through conservative advancement. What that finds near without a
+// minimum separation the exact tiers decide.
 #include <algorithm>
 #include <cstring>
 #include <stdexcept>
@@ -8,6 +9,8 @@
 
 #include "dccd/elementary.h"
 #include "elementary/conservative_advance.h"
+#include "elementary/exact_tiers.h"
+#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {
@@ -30,6 +33,8 @@ class ConservativeRung : public Rung {
  private:
   ElementaryResult fromBatch(PairKind kind, const conservative::Corners& corners, const BlockOutput& output,
                              std::size_t i) const;
+  ElementaryResult sharpened(const PairBatch& batch, std::size_t i, const conservative::Corners& corners,
+                             const ElementaryResult& near) const;
 
   AccuracyOptions options_;
 };
@@ -56,7 +61,19 @@ ElementaryResult ConservativeRung::fromBatch(PairKind kind, const conservative::
   return result;
 }
 
+/// What features that come nearer than the tolerance truly do: distances cannot say when they meet, signs can.
+ElementaryResult ConservativeRung::sharpened(const PairBatch& batch, std::size_t i,
+                                             const conservative::Corners& corners, const ElementaryResult& near) const {
+  constexpr int TOC_BITS = 52;
+  const PairMotion motion = exact::motionOf(batch.vertices, batch.pairs[i]);
+  const ElementaryResult result = exact::decideUncertain(batch.kind, motion, TOC_BITS);
+  const double moved = conservative::closingSpeed(batch.kind, corners) * (0x1p-52 * (1 + 0x1p-50));
+  if (result.verdict == Verdict::NO_CONTACT || moved <= options_.tolerance_m) return result;
+  return {near.toc_lower, 1, Verdict::UNDECIDED, near.tier};
+}
+
 void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  const ScopedFloatMode mode;
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("conservative test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");
@@ -84,6 +101,9 @@ void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, Ti
                                            options_.max_subdivisions, batch.deadline};
       if (limits.minimum_separation_m == 0) result = fromBatch(batch.kind, corners, output, i);
       if (result.verdict == Verdict::UNDECIDED) result = conservative::advance(batch.kind, corners, limits);
+      if (result.verdict == Verdict::CONTACT && limits.minimum_separation_m == 0 && result.tier != Tier::DOUBLE_BATCH) {
+        result = sharpened(batch, begin + i, corners, result);
+      }
       ++counters.settled[static_cast<std::size_t>(result.tier)];
     }
   }

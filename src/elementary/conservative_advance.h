@@ -17,10 +17,11 @@ struct Limits {
   const Deadline* deadline = nullptr;         ///< then, too
 };
 
-/// Advances from t = 0 as long as the features are certainly more than the minimum separation apart.
-/// NO_CONTACT: certain, toc_lower is 1. CONTACT: at toc_lower the features are certainly at most minimum separation
-/// plus tolerance apart, and more than the minimum separation before it. UNDECIDED: the latter only. toc_upper is 1.
-/// Kind VERTEX_FACE or EDGE_EDGE; coordinates finite.
+/// Advances from t = 0 as long as the features are certainly more than the minimum separation d apart.
+/// NO_CONTACT: certain, toc_lower is 1. CONTACT: more than d apart before toc_lower, at most d plus tolerance at it.
+/// With d = 0 toc_upper is 1. Else they are at most d apart at toc_upper, as far as doubles can tell, and within the
+/// tolerance of d all the while, unless the interval is shorter than that can be said of. UNDECIDED: more than d apart
+/// before toc_lower; toc_upper is 1. Kind VERTEX_FACE or EDGE_EDGE; coordinates finite.
 ElementaryResult advance(PairKind kind, const Corners& corners, const Limits& limits);
 
 /// Upper bound on how fast the distance of the two features changes, in metres per step: the largest relative speed

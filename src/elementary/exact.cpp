@@ -2,35 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 
 #include "dccd/elementary.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
+#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {
 namespace {
-
-PairMotion gather(const VertexMotion* vertices, const Quad& quad) {
-  PairMotion pair;
-  for (int i = 0; i < 4; ++i) {
-    std::memcpy(pair.x[0][i], vertices[quad[i]].t0, sizeof pair.x[0][i]);
-    std::memcpy(pair.x[1][i], vertices[quad[i]].t1, sizeof pair.x[1][i]);
-  }
-  return pair;
-}
-
-/// Pairs that the batched double tier left, by the tiers after it.
-ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
-  ElementaryResult result = exact::decideByCoincidence(kind, pair, toc_bits);
-  if (result.verdict == Verdict::UNDECIDED) result = exact::decideBySubdivision(kind, pair);
-  if (result.verdict == Verdict::UNDECIDED) result = exact::decideByDoubleDouble(kind, pair, toc_bits);
-  if (result.verdict == Verdict::UNDECIDED) result = exact::decideByFixedIntegers(kind, pair, toc_bits);
-  return result.verdict == Verdict::UNDECIDED ? exact::decideByBigIntegers(kind, pair, toc_bits) : result;
-}
 
 constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched tier lie on the stack at once
 
@@ -50,18 +32,21 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
                         int toc_bits) {
   // A pair takes up to a fifth of a millisecond from here on, and the clock some forty nanoseconds.
   if (batch.deadline && batch.deadline->isOver()) return exact::undecided(Tier::DOUBLE_BATCH);
-  const PairMotion pair = gather(batch.vertices, batch.pairs[pair_index]);
+  const PairMotion pair = exact::motionOf(batch.vertices, batch.pairs[pair_index]);
   if (output.verdict[i] == simd::BATCH_YES_BRACKET) {
+    const ElementaryResult simple = exact::contactAtSimpleTime(batch.kind, pair, output.lo[i], output.hi[i], toc_bits);
+    if (simple.verdict == Verdict::CONTACT) return simple;
     const exact::CoplanarityCubic f(batch.kind, pair);
     const std::int64_t cell = exact::cellOfRoot(f, output.lo[i], output.hi[i], toc_bits);
     if (cell >= 0) return exact::contactInCell(cell, toc_bits, Tier::DOUBLE_DOUBLE);
   }
-  return decideUncertain(batch.kind, pair, toc_bits);
+  return exact::decideUncertain(batch.kind, pair, toc_bits);
 }
 
 }  // namespace
 
 void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  const ScopedFloatMode mode;
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("exact test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");

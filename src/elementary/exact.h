@@ -5,7 +5,7 @@
 
 namespace dccd {
 
-/// Needs rounding to nearest and denormals. Allocates only for coordinates that span more than
+/// Allocates only for coordinates that span more than
 /// exact::FIXED_INTEGER_MAX_BITS bits. run() throws std::invalid_argument for a kind other than VERTEX_FACE or
 /// EDGE_EDGE and where a minimum separation is asked for (the rung `conservative` has that).
 class ExactRung : public Rung {

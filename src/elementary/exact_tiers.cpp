@@ -10,6 +10,15 @@
 namespace dccd {
 namespace exact {
 
+PairMotion motionOf(const VertexMotion* vertices, const Quad& quad) {
+  PairMotion pair;
+  for (int i = 0; i < 4; ++i) {
+    std::copy(vertices[quad[i]].t0, vertices[quad[i]].t0 + 3, pair.x[0][i]);
+    std::copy(vertices[quad[i]].t1, vertices[quad[i]].t1 + 3, pair.x[1][i]);
+  }
+  return pair;
+}
+
 ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier) {
   const double width = std::ldexp(1.0, -toc_bits);
   ElementaryResult result;
@@ -61,6 +70,15 @@ ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bi
   if (verdict == simd::BATCH_NO) return noContact(Tier::DOUBLE_BATCH);
   if (verdict != simd::BATCH_YES) return undecided(Tier::DOUBLE_BATCH);
   return contactInCell(static_cast<std::int64_t>(cell), toc_bits, Tier::DOUBLE_BATCH);
+}
+
+ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
+  ElementaryResult result = decideByCoincidence(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideAtSimpleTime(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideBySubdivision(kind, pair);
+  if (result.verdict == Verdict::UNDECIDED) result = decideByDoubleDouble(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideByFixedIntegers(kind, pair, toc_bits);
+  return result.verdict == Verdict::UNDECIDED ? decideByBigIntegers(kind, pair, toc_bits) : result;
 }
 
 ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair, int toc_bits) {

@@ -14,6 +14,8 @@ namespace exact {
 constexpr int FIXED_INTEGER_LIMBS = 64;
 constexpr int FIXED_INTEGER_MAX_BITS = (64 * FIXED_INTEGER_LIMBS - 66) / 18;
 
+PairMotion motionOf(const VertexMotion* vertices, const Quad& quad);
+
 /// The result that says contact in cell k of the 2^-toc_bits grid; k = 2^toc_bits means a TOC of exactly 1.
 ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier);
 ElementaryResult noContact(Tier tier);
@@ -28,9 +30,17 @@ ElementaryResult decideBySubdivision(PairKind kind, const PairMotion& pair);
 /// DOUBLE_DOUBLE: roots bracketed within 2^-52; undecided where f is zero, or nearly, at an end of the step or an
 /// extremum, and where a feature's border is hit exactly.
 ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int toc_bits);
+/// FIXED_INTEGER, where integers of one or two words and one look at a rational time p/q with a small q are enough:
+/// both features at rest, or the first root of f is such a time. Undecided otherwise.
+ElementaryResult decideAtSimpleTime(PairKind kind, const PairMotion& pair, int toc_bits);
+/// The contact at the only root of f in (low, high), where that is such a time; else undecided.
+ElementaryResult contactAtSimpleTime(PairKind kind, const PairMotion& pair, double low, double high, int toc_bits);
 /// FIXED_INTEGER: undecided for more than FIXED_INTEGER_MAX_BITS bits. BIG_INTEGER: always decides.
 ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
 ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int toc_bits);
+
+/// What DOUBLE_BATCH left, by the tiers after it; always decides.
+ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits);
 
 /// One tier alone, for tests and for measuring what each is worth. Throws std::invalid_argument for a tier that does
 /// not exist or a kind that is not VERTEX_FACE or EDGE_EDGE.

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "dccd/elementary.h"
+#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
 
 namespace dccd {
@@ -18,6 +19,7 @@ class FastRung : public Rung {
 };
 
 void FastRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  const ScopedFloatMode mode;
   if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
     throw std::invalid_argument(std::string("fast test: kind ") + toString(batch.kind) +
                                 " is not vertex-face or edge-edge");

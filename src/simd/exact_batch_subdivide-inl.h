@@ -6,6 +6,8 @@ namespace HWY_NAMESPACE {
 
 constexpr int MAX_INTERVALS = 48;  ///< looked at per pair
 constexpr double SMALLEST_INTERVAL = tolerance::BATCH_SMALLEST_INTERVAL;
+constexpr double SMALLEST_INTERVAL_AT_ENDS = 0.25;  ///< where f is uncertain at an end of the step
+constexpr double NARROW_BRACKET = 0x1p-30;          ///< in which the inside test is as sharp as any interval's
 
 /// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4,
 /// where f would stay uncertain at every level.
@@ -75,6 +77,21 @@ HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
   return result;
 }
 
+/// Where subdivision ends. An interval at an end of the step at which f is uncertain can only be free because the
+/// features are apart there, which wide intervals show as well; for features at rest all intervals are alike.
+HWY_INLINE V smallestInterval(const RootBlock& pairs, std::size_t i) {
+  const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
+  M rests = hn::FirstN(Tag(), lanes());
+  for (int k = 0; k < 3; ++k) {
+    rests = hn::And(rests, hn::Eq(load(pairs.motion[U_T0 + k], i), load(pairs.motion[U_T1 + k], i)));
+    rests = hn::And(rests, hn::Eq(load(pairs.motion[V_T0 + k], i), load(pairs.motion[V_T1 + k], i)));
+    rests = hn::And(rests, hn::Eq(load(pairs.motion[W_T0 + k], i), load(pairs.motion[W_T1 + k], i)));
+  }
+  const M uncertain = hn::Or(hn::Le(hn::Abs(f0), error), hn::Le(hn::Abs(f3), error));
+  return choose(rests, constant(1),
+                choose(uncertain, constant(SMALLEST_INTERVAL_AT_ENDS), constant(SMALLEST_INTERVAL)));
+}
+
 /// One vector, intervals from left to right: each is proved free (no root, or the features apart), or holds one root,
 /// which is refined, or is halved. Stops at the first certain contact.
 template <BatchKind KIND>
@@ -83,6 +100,7 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
   const V one = constant(1), zero = hn::Zero(d), third = constant(1.0 / 3), half = constant(0.5);
   const V f0 = load(pairs.coefficient[0], i), f3 = load(pairs.coefficient[3], i), error = load(pairs.error, i);
   const V f1 = hn::Mul(load(pairs.coefficient[1], i), third), f2 = hn::Mul(load(pairs.coefficient[2], i), third);
+  const V smallest = smallestInterval(pairs, i);
   V from = zero, width = one, result = constant(ROOT_PENDING), kept_lo = zero, kept_hi = zero;
   for (int k = 0; k < MAX_INTERVALS; ++k) {
     const M active = hn::Eq(result, constant(ROOT_PENDING));
@@ -103,6 +121,11 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
           hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
       free = hn::Or(free, hn::Eq(outcome, constant(ROOT_NO_CONTACT)));
       result = choose(contact, outcome, result);
+      // What stays uncertain in a narrow bracket stays so in every interval around it.
+      const M stuck =
+          hn::And(hn::And(has_root, hn::Eq(outcome, constant(ROOT_UNCERTAIN))),
+                  hn::Le(hn::Sub(load(pairs.root_hi, i), load(pairs.root_lo, i)), constant(NARROW_BRACKET)));
+      result = choose(stuck, constant(ROOT_UNCERTAIN), result);
       kept_lo = choose(contact, load(pairs.root_lo, i), kept_lo);
       kept_hi = choose(contact, load(pairs.root_hi, i), kept_hi);
     }
@@ -112,8 +135,8 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
     result = choose(hn::And(still, hn::And(free, hn::Ge(next, one))), constant(ROOT_NO_CONTACT), result);
     from = choose(free, next, from);
     width = choose(free, choose(ascend, wider, width), hn::Mul(half, width));
-    result = choose(hn::And(hn::Eq(result, constant(ROOT_PENDING)), hn::Lt(width, constant(SMALLEST_INTERVAL))),
-                    constant(ROOT_UNCERTAIN), result);
+    result = choose(hn::And(hn::Eq(result, constant(ROOT_PENDING)), hn::Lt(width, smallest)), constant(ROOT_UNCERTAIN),
+                    result);
   }
   store(choose(hn::Eq(result, constant(ROOT_PENDING)), constant(ROOT_UNCERTAIN), result), pairs.outcome, i);
   store(kept_lo, pairs.root_lo, i);

@@ -8,6 +8,7 @@
 #include "dccd/elementary.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
+#include "support/flush_to_zero.h"
 #include "support/generators.h"
 #include "support/query_property.h"
 
@@ -71,6 +72,29 @@ TEST(ElementaryExact, NoOrderAxisOrScaleChangesTheAnswer) {
       if (!wrong.empty()) return wrong + ", exponent " + std::to_string(exponent);
     }
     return {};
+  });
+}
+
+// The rung brings the floating-point mode that its proofs assume, and leaves the caller's as it was.
+TEST(ElementaryExact, FlushToZeroSetBySomebodyElseChangesNothing) {
+  const auto exact = makeRung(exactOptions(32));
+  AccuracyOptions options;
+  options.rung = Accuracy::CONSERVATIVE;
+  const auto conservative = makeRung(options);
+  const auto flushed = [](const Rung& rung, const Query& query, ElementaryResult& result) {
+    const FlushToZero mode;
+    result = testQuery(rung, query);
+    return mode.isInForce();
+  };
+  const std::size_t runs = longRun() ? 300000 : 10000;
+  checkHardQueries("flush-to-zero", runs, [&](const Query& query) -> std::string {
+    std::optional<Root> toc = firstContact(query.kind, query.motion);
+    ElementaryResult result;
+    if (!flushed(*exact, query, result)) return "the caller's mode was not restored";
+    const std::string broken = brokenPromise(exactOptions(32), query, toc, result);
+    if (!broken.empty()) return broken + ": " + described(result);
+    if (!flushed(*conservative, query, result)) return "conservative: the caller's mode was not restored";
+    return sameAnswer(result, testQuery(*conservative, query)) ? "" : "conservative: another answer";
   });
 }
 

@@ -31,7 +31,7 @@ ObstacleScene randomScene(std::mt19937_64& random) {
 TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
   std::mt19937_64 random(11);
   const int scenes = test::longRun() ? 20000 : 400;
-  int within = 0, apart = 0;
+  int within = 0, apart = 0, certain = 0, wide = 0;
   ObstacleOptions options;
   options.accuracy.rung = Accuracy::CONSERVATIVE;
   options.accuracy.tolerance_m = 1e-6;
@@ -60,10 +60,17 @@ TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
       if (contact.certainty != Certainty::CERTAIN) continue;
       ASSERT_LE(test::distanceToBoxes(scene, contact.toc_lower), options.minimum_separation_m + 1.1e-6)
           << test::describe(scene);
+      ASSERT_LE(test::distanceToBoxes(scene, contact.toc_upper), options.minimum_separation_m + 1.1e-6)
+          << test::describe(scene);
+      // A wide interval begins and ends within the tolerance of the separation: at 0.15 m a step it is a thousandth.
+      ++certain;
+      wide += contact.toc_upper - contact.toc_lower > 1e-3;
     }
     ++(close ? within : apart);
   }
   std::cout << scenes << " scenes, closer than the separation " << within << ", apart " << apart << "\n";
+  std::cout << certain << " certain contacts, " << wide << " of them longer than a thousandth of the step\n";
+  EXPECT_LT(wide, certain / 20);
   EXPECT_GT(within, scenes / 10);
   EXPECT_GT(apart, scenes / 10);
 }

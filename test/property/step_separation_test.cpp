@@ -111,9 +111,26 @@ void forEachPair(const TestStep& step, const Visit& visit) {
   }
 }
 
+/// Empty, or what is wrong with a certain contact's interval: it is to be narrow, or within the tolerance all the
+/// while.
+std::string wideInterval(const NoisyStep& noisy, const Contact& c) {
+  const double width = c.toc_upper - c.toc_lower;
+  if (width <= 0x1p-20) return "";
+  const PairMotion motion = motionOf(noisy.step, c);
+  const double separation_m = separationOf(noisy, c);
+  const double rounding_m = 1e-12 * separation_m;  // the separations are sums
+  for (int i = 0; i <= 4; ++i) {
+    const double t = c.toc_lower + width * i / 4;
+    const bool beyond = !isWithin(c.kind, motion, t, separation_m + TOLERANCE_M + rounding_m);
+    const double least = separation_m - TOLERANCE_M - rounding_m;
+    if (beyond || (least > 0 && isWithin(c.kind, motion, t, least))) return "wide at " + std::to_string(t);
+  }
+  return "";
+}
+
 TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
   const int steps = longRun() ? 6000 : 600;
-  std::uint64_t pairs = 0, within = 0, noisy_within = 0;
+  std::uint64_t pairs = 0, within = 0, noisy_within = 0, certain = 0, undecided = 0, initial = 0;
   for (int seed = 0; seed < steps; ++seed) {
     const Draw draw = drawFrom(4200 + static_cast<std::uint64_t>(seed));
     const NoisyStep noisy = randomNoisyStep(draw);
@@ -122,7 +139,10 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
     std::map<Key, const Contact*> found;
     for (const Contact& c : result.contacts) {
       found[{c.kind, c.body, c.vertex}] = &c;
+      ++(c.certainty == Certainty::CERTAIN ? certain : undecided);
       if (c.certainty != Certainty::CERTAIN) continue;
+      initial += c.toc_upper == 0;
+      ASSERT_EQ(wideInterval(noisy, c), "") << "seed " << seed << describe(c);
       const double reach = (separationOf(noisy, c) + TOLERANCE_M) * (1 + 1e-12);
       ASSERT_TRUE(isWithin(c.kind, motionOf(noisy.step, c), c.toc_lower, reach)) << "seed " << seed << describe(c);
     }
@@ -146,6 +166,9 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
   }
   std::cout << pairs << " pairs, " << within << " came within their separation, " << noisy_within
             << " of them with noise\n";
+  std::cout << certain << " certain contacts, " << initial << " of them at t = 0, " << undecided << " undecided\n";
+  EXPECT_GT(certain, initial + 1000) << "too few that begin within the step";
+  EXPECT_LT(undecided, certain / 50);
   EXPECT_GT(within, pairs / 100);
   EXPECT_GT(noisy_within, within / 10);
 }

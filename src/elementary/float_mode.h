@@ -1,5 +1,5 @@
-// Round to nearest, denormals on: what every proof of a rounding margin assumes. Set on each worker for the time of
-// its work and restored after it (doc/algorithm.md, last section).
+// Round to nearest, denormals on: what every proof of a rounding margin assumes. Set by each rung for a batch, on each
+// worker of a step for the time of its work, and restored after it (doc/algorithm.md, last section).
 #pragma once
 
 #include <cfenv>

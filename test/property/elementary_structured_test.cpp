@@ -1,0 +1,75 @@
+// The exact rung on ordinary input that is degenerate everywhere (meshes on grids, at rest, in one plane, meeting at
+// round times), and on the same input with its last bits changed: the oracle's answers, from tiers that do not cost a
+// hundred times more.
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <memory>
+
+#include "elementary/exact_tiers.h"
+#include "oracle/oracle.h"
+#include "oracle/promises.h"
+#include "support/query_property.h"
+#include "support/structured_pairs.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+std::string described(const ElementaryResult& result) {
+  char text[120];
+  std::snprintf(text, sizeof text, "verdict %d [%.17g, %.17g] tier %s", static_cast<int>(result.verdict),
+                result.toc_lower, result.toc_upper, toString(result.tier));
+  return text;
+}
+
+void holdAgainstOracle(const StructuredPairs& set, const std::string& which, std::size_t stride) {
+  AccuracyOptions options;
+  const auto exact = makeRung(options);
+  for (std::size_t i = 0; i < set.pairs.size(); i += stride) {
+    Query query;
+    query.kind = set.kind;
+    query.motion = motionOf(set, i);
+    std::optional<Root> toc = firstContact(query.kind, query.motion);
+    const ElementaryResult result = testQuery(*exact, query);
+    const std::string broken = brokenPromise(options, query, toc, result);
+    ASSERT_EQ(broken, "") << set.family << which << ", " << toString(set.kind) << ", pair " << i << ": "
+                          << described(result);
+  }
+}
+
+TEST(ElementaryStructured, VerdictAndCellAreTheOracles) {
+  const std::size_t stride = longRun() ? 1 : 13;
+  std::uint64_t seed = 0;
+  for (const StructuredPairs& set : structuredPairs(longRun() ? 20 : 9)) {
+    ASSERT_GT(set.pairs.size(), 100u) << set.family;
+    holdAgainstOracle(set, "", stride);
+    holdAgainstOracle(perturbed(set, ++seed), " perturbed", stride);
+    if (HasFatalFailure()) return;
+  }
+}
+
+// A cliff is a pair that needs integers of any length although a few words would do. Coplanar motion is the one family
+// in which the contact is not at the root of a cubic.
+TEST(ElementaryStructured, FewWordsAreEnough) {
+  constexpr int TOC_BITS = 32;
+  for (const StructuredPairs& set : structuredPairs(9)) {
+    if (set.family == "sliding in one plane") continue;
+    std::size_t settled = 0, left = 0;
+    for (std::size_t i = 0; i < set.pairs.size(); ++i) {
+      const PairMotion pair = motionOf(set, i);
+      const bool batch = exact::decideByBatch(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
+      const bool known = batch || exact::decideByCoincidence(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||
+                         exact::decideBySubdivision(set.kind, pair).verdict != Verdict::UNDECIDED ||
+                         exact::decideAtSimpleTime(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||
+                         exact::decideByDoubleDouble(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
+      ++(known ? settled : left);
+    }
+    EXPECT_LE(left, settled / 20) << set.family << ", " << toString(set.kind) << ": " << left << " of "
+                                  << set.pairs.size() << " pairs need more";
+  }
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

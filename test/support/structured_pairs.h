@@ -1,0 +1,32 @@
+// Pairs as people and simulators make them: meshes on grids, at rest, in one plane, moving by round numbers. Ordinary
+// input that is degenerate everywhere. Free of any test framework: tests and benchmarks draw from here.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dccd/elementary.h"
+
+namespace dccd {
+namespace test {
+
+/// Two surfaces' pairs of one kind whose boxes meet.
+struct StructuredPairs {
+  std::string family;
+  PairKind kind = PairKind::VERTEX_FACE;
+  std::vector<VertexMotion> vertices;
+  std::vector<Quad> pairs;
+};
+
+/// All families, vertex-face and edge-edge of each. Two sheets of cells x cells quads each.
+std::vector<StructuredPairs> structuredPairs(int cells);
+
+/// The same with each coordinate that is not 0 moved by up to two units in the last place.
+StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed);
+
+/// One of its pairs.
+PairMotion motionOf(const StructuredPairs& pairs, std::size_t i);
+
+}  // namespace test
+}  // namespace dccd
