@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <utility>
 
 #include <ros/console.h>
@@ -59,11 +60,22 @@ void MeshSubscription::close() {
   typed.shutdown();
 }
 
+/// Nothing may get out of a callback: the thread would end, and the process with it.
+template <class Take>
+void MeshSubscription::guarded(Take take) {
+  try {
+    take();
+  } catch (const std::exception& error) {
+    ROS_WARN_STREAM_THROTTLE(5, topic_ << ": a message was lost: " << error.what());
+  }
+}
+
 void MeshSubscription::open(const MeshType* type) {
   close();
   ros::SubscribeOptions options;
   options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
-      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onAny(event); });
+      topic_, SUBSCRIBER_QUEUE,
+      [this](const ros::MessageEvent<const ShapeShifter>& event) { guarded([&] { onAny(event); }); });
   if (type) {
     options.md5sum = type->md5;
     options.datatype = type->datatype;
@@ -133,7 +145,11 @@ void MeshSubscription::deliver(const ShapeShifter& bytes) {
   MeshMessage message;
   message.datatype = bytes.getDataType();
   message.md5 = bytes.getMD5Sum();
-  message.bytes = bytesOf(bytes);
+  if (hasMemoryFor(bytes.size())) {
+    message.bytes = bytesOf(bytes);
+  } else {
+    message.no_memory = bytes.size();
+  }
   callback_(std::move(message));
 }
 
@@ -148,7 +164,8 @@ void MeshSubscription::deliver(TypedMesh object) {
 void MeshSubscription::narrowTo(const MeshType& type) {
   narrowed_at_ = ros::SteadyTime::now();
   ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
-  options.helper = type.callbackHelper(type, [this](TypedMesh message) { onTyped(std::move(message)); });
+  options.helper =
+      type.callbackHelper(type, [this](TypedMesh message) { guarded([&] { onTyped(std::move(message)); }); });
   options.transport_hints = ros::TransportHints().tcpNoDelay();
   typed_ = node_.subscribe(options);
 }

@@ -132,13 +132,17 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     return refuse(StepStatus::BAD_MESSAGE, "a message of " + std::to_string(message.too_large) +
                                                " bytes is more than the quarter of max_memory_mb that queues may hold");
   }
+  const auto noMemory = [&](std::size_t bytes) {
+    refuse(StepStatus::BAD_MESSAGE,
+           "there is not enough memory for this message of " + std::to_string(bytes) + " bytes");
+  };
+  if (message.no_memory > 0) return noMemory(message.no_memory);
   try {
     waiting.mesh = decode(body, message);
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {
-    return refuse(StepStatus::BAD_MESSAGE,
-                  "there is not enough memory for this message of " + std::to_string(message.size()) + " bytes");
+    return noMemory(message.size());
   }
   if (const std::string problem = maskProblem(body, *waiting.mesh.topology); !problem.empty()) {
     monitor_->countReceived(body);

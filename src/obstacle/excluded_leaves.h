@@ -1,12 +1,16 @@
 // What of a map is left when the voxels in some boxes are taken out of it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "dccd/voxel_surface.h"
 
 namespace dccd {
+
+/// What splitting adds at most.
+constexpr std::size_t MAX_ADDED_LEAVES = std::size_t{1} << 18;
 
 struct RemainingLeaves {
   std::vector<OccupiedLeaf> leaves;
@@ -15,8 +19,8 @@ struct RemainingLeaves {
 
 /// Leaves without the finest voxels whose centre lies in one of the boxes (closed, in the fixed frame [m]). A leaf that
 /// a box cuts is split. Taken out of the map, not of its contacts: what lies behind an excluded voxel is exposed by
-/// that. Bounded work: after 2^24 cubes that were looked at, leaves are kept whole, so that nothing is hidden that
-/// should not be.
+/// that. Bounded: when MAX_ADDED_LEAVES parts have been looked at, leaves are kept whole, so that nothing is hidden
+/// that should not be.
 RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double resolution_m,
                               const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes);
 

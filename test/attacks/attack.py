@@ -74,6 +74,22 @@ def cloud_of(index, points, rows, cols):
     return cloud.message(1000 + 0.03 * index)
 
 
+def checkerboard(depth):
+    """An octree's bytes in which every other voxel of a cube of 2^(depth + 1) is occupied and the rest is free."""
+    # Two bits a child: 00 unknown, 01 free, 10 occupied, 11 has children.
+    leaves = sum((0b10 if bin(child).count('1') % 2 else 0b01) << (2 * child) for child in range(8))
+    data = struct.pack('<H', leaves)
+    for _ in range(depth):
+        data = struct.pack('<H', 0xffff) + 8 * data
+    # From the root down to the cube one child each: the tree is 16 levels deep.
+    return (15 - depth) * struct.pack('<H', 0b11) + data
+
+
+def checkerboard_file(path, depth):
+    with open(path, 'wb') as file:
+        file.write(b'# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0.01\ndata\n' + checkerboard(depth))
+
+
 def publish_stream(topic, make, kind, rate=30.0):
     """The main of a publisher's process: publishes until it is killed."""
     rospy.init_node('publisher', anonymous=True)
