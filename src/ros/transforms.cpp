@@ -78,7 +78,7 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
   bool cleared = false;
   for (const auto& transform : message.transforms) {
     if (!isUsable(transform) || !hasRoomFor(transform)) continue;
-    if (!is_static) {
+    if (!static_.emplace(transform.child_frame_id, is_static).first->second) {
       if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
         clear();
         cleared = true;

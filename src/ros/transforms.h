@@ -38,6 +38,7 @@ class TransformFeed {
   std::unordered_map<std::string, std::set<StampNs>> kept_;  // stamps that the buffer holds, per child frame
   std::size_t kept_count_ = 0;
   std::unordered_set<std::string> names_;
+  std::unordered_map<std::string, bool> static_;  // per child frame: as tf2 takes it, for good, from what came first
 
   bool goesBack(const geometry_msgs::TransformStamped& transform) const;
   bool hasRoomFor(const geometry_msgs::TransformStamped& transform);

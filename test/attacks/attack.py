@@ -18,6 +18,14 @@ from ros_process import SLOW, wait_for  # noqa: F401
 ROWS, COLS = 20, 30
 
 
+def peak_kb(pid):
+    """The largest resident size that the process ever had."""
+    for line in pathlib.Path('/proc/%d/status' % pid).read_text().splitlines():
+        if line.startswith('VmHWM:'):
+            return int(line.split()[1])
+    raise AssertionError('no VmHWM')
+
+
 class AttackTest(LiveNodeTest):
     """A node whose log is read. What follows an attack is asserted in outcomes: the status within one step, recovery within two."""
 

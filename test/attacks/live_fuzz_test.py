@@ -17,7 +17,7 @@ import dynamic_reconfigure.msg
 import dynamic_reconfigure.srv
 import genpy
 import rospy
-from attack import SLOW, AttackTest, checkerboard, cloud_of, resident_kb, wait_for
+from attack import SLOW, AttackTest, checkerboard, cloud_of, peak_kb, resident_kb, wait_for
 from deformable_ccd.msg import ContactArray, MeshStamped
 from geometry_msgs.msg import Point, TransformStamped
 from octomap_msgs.msg import Octomap
@@ -313,7 +313,7 @@ class LiveFuzzTest(AttackTest):
 
     def look(self):
         self.assertIsNone(self.node.poll(), 'the node has ended')
-        grown = (resident_kb(self.node.pid) - self.started_kb) / 1024
+        grown = (peak_kb(self.node.pid) - self.started_kb) / 1024
         self.most = max(self.most, grown)
         if SLOW == 1:
             # Beyond both limits roscpp holds the message that it reads, the one that it hands over, and one for the map's topic.
@@ -339,16 +339,23 @@ class LiveFuzzTest(AttackTest):
         self.quiet()
         self.call('reset', Trigger)
         self.source.stamp_s += 1000
-        begin, statuses = time.monotonic(), []
-        for i in range(2):
-            self.source.stamp_s += 0.03
-            message = cloud_of(0, [(0.01 * (k % COLS), 0.01 * (k // COLS), 5.0) for k in range(ROWS * COLS)], ROWS, COLS)
-            message.header.stamp = rospy.Time.from_sec(round(self.source.stamp_s, 3))
-            self.meshes.publish(message)
-            wait_for(lambda: message.header.stamp in self.watch.outcomes, ANSWER_S, 'the answer to a good frame')
-            statuses.append(self.watch.outcomes[message.header.stamp])
+        begin = time.monotonic()
+        while not self.good_frame(0.5):  # the first ones may meet a subscription that is just being renewed
+            self.assertLess(time.monotonic() - begin, ANSWER_S, 'locked out')
+        second = self.good_frame(ANSWER_S)
         self.slowest = max(self.slowest, time.monotonic() - begin)
-        self.assertTrue(statuses[1].answered, [(s.status, s.reason) for s in statuses])
+        self.assertTrue(second and second.answered, second and (second.status, second.reason))
+
+    def good_frame(self, seconds):
+        """Its outcome, or None."""
+        self.source.stamp_s += 0.03
+        message = cloud_of(0, [(0.01 * (k % COLS), 0.01 * (k // COLS), 5.0) for k in range(ROWS * COLS)], ROWS, COLS)
+        message.header.stamp = rospy.Time.from_sec(round(self.source.stamp_s, 3))
+        self.meshes.publish(message)
+        end = time.monotonic() + seconds
+        while message.header.stamp not in self.watch.outcomes and time.monotonic() < end:
+            time.sleep(0.005)
+        return self.watch.outcomes.get(message.header.stamp)
 
     def quiet(self):
         """What waits has been worked on."""
