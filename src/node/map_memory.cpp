@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "dccd/map_limits.h"
 #include "dccd/tolerances.h"
-#include "obstacle/excluded_leaves.h"
 
 namespace dccd {
 namespace {

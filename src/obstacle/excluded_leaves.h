@@ -5,12 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "dccd/map_limits.h"
 #include "dccd/voxel_surface.h"
 
 namespace dccd {
-
-/// What splitting adds at most.
-constexpr std::size_t MAX_ADDED_LEAVES = std::size_t{1} << 18;
 
 struct RemainingLeaves {
   std::vector<OccupiedLeaf> leaves;

@@ -235,6 +235,8 @@ class LiveFuzzTest(AttackTest):
             ('contacts', ContactArray, self.watch.contacts), ('stats', StepStats, self.watch.counts), ('state', State, self.watch.state),
             ('markers', MarkerArray, lambda m: None), ('prediction/contacts', ContactArray, lambda m: None))]
         wait_for(lambda: all(s.get_num_connections() for s in self.subscribers[:3]), 30, 'the topics of ' + self.name)
+        for service in ('reset', 'live/set_parameters'):
+            rospy.wait_for_service('/%s/%s' % (self.name, service), 30)
         self.started_kb, self.started = resident_kb(self.node.pid), time.monotonic()
         self.largest = 0
         self.said = ['%s: %s %s' % (self.name, parameters, self.lists)]
@@ -299,7 +301,8 @@ class LiveFuzzTest(AttackTest):
         elif action == 'configure':
             self.configure()
         elif action == 'parameter':
-            rospy.set_param('/%s/%s' % (self.name, r.choice(['max_contacts', 'accuracy', 'odd', 'bodies/x/topic'])), r.choice([1, 'x', -1.5, []]))
+            key = r.choice(['max_contacts', 'accuracy', 'odd', 'bodies/x/topic'])
+            rospy.set_param('/%s/%s' % (self.name, key), r.choice([1, 'x', -1.5, []]))
         elif action == 'large':
             self.send(self.meshes, raw(self.kind, bytes_of(self.source.mesh(self.kind)) + bytes(r.choice([5, 20, 40]) * 1000000)))
         elif action == 'wrong map':
