@@ -48,7 +48,7 @@ struct OctomapLimits {
   std::size_t max_leaves = 20'000'000;  ///< occupied and free together; 12 bytes each
   bool free_leaves = true;              ///< false: they are counted and left out
   /// Asked last, with what was counted; what it throws ends the decoding. Null: all is well.
-  std::function<void(const OctomapCounts& counts)> accept;
+  std::function<void(const OctomapCounts& counts)> accept = nullptr;
 };
 
 /// Throws OctomapError for an unknown id, a resolution out of range, a stream that ends early, goes deeper than 16

@@ -203,14 +203,16 @@ void MeshSubscription::renew(const std::map<std::string, std::string>& published
     lost = has_type_ && publishers_ == 0;
   }
   try {
+    // What was tried before a message came tells nothing about what comes after it: a type may be back, and pauses that
+    // had grown by then would lock it out.
+    if (lost || !heard.empty()) attempts_ = 0;
+    if (lost || heard == type) acted_on_.clear();
     if (lost) {
-      attempts_ = 0;
       open(nullptr);
     } else if (heard.empty()) {
       attempt(type);
     } else if (!type.empty() && type != heard && type != acted_on_) {
       acted_on_ = type;
-      attempts_ = 0;
       open(findMeshType(type));
     }
   } catch (const ros::Exception& error) {  // another nodelet holds the topic with another type
