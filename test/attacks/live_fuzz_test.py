@@ -176,7 +176,8 @@ class Watch:
 
     def contacts(self, message):
         self.steps += 1
-        self.outcomes[message.header.stamp] = message
+        if message.answered or message.header.stamp not in self.outcomes:  # a duplicate takes no answer back
+            self.outcomes[message.header.stamp] = message
         if len(self.outcomes) > 300:
             self.outcomes.popitem(last=False)
         if len(message.reason) > 2000:
