@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -35,10 +36,19 @@ struct DecodedOctomap {
   std::vector<OccupiedLeaf> free;
 };
 
+/// What a stream holds: leaves, and the nodes of the trees that are built of the occupied ones and of all.
+struct OctomapCounts {
+  std::size_t occupied = 0, free = 0;
+  std::size_t occupied_nodes = 0, known_nodes = 0;
+};
+
 /// What a map may cost. Counted before anything is allocated.
 struct OctomapLimits {
   std::size_t max_bytes = std::size_t{256} << 20;
   std::size_t max_leaves = 20'000'000;  ///< occupied and free together; 12 bytes each
+  bool free_leaves = true;              ///< false: they are counted and left out
+  /// Asked last, with what was counted; what it throws ends the decoding. Null: all is well.
+  std::function<void(const OctomapCounts& counts)> accept = nullptr;
 };
 
 /// Throws OctomapError for an unknown id, a resolution out of range, a stream that ends early, goes deeper than 16

@@ -115,6 +115,16 @@ constexpr unsigned long long BYTES_PER_CONTACT = 1024;
 /// into a ball has 0.4, layers within a distance of several edges some tens; a mesh that collapses has half as many as
 /// it has features.
 constexpr unsigned long long CONTACTS_PER_FEATURE = 2, CONTACTS_PER_FEATURE_WITH_DISTANCE = 32;
+/// [bytes] What a leaf of a map takes in a list; in a tree while leaves are sorted (its list included), while nodes are
+/// made (included, too) and from then on; in a surface from then on. src/obstacle/voxel_tree.cpp asserts them.
+constexpr unsigned long long MAP_LEAF_LISTED = 12, MAP_LEAF_SORTING = 48, MAP_LEAF_BUILDING = 32, MAP_LEAF_IN_TREE = 12,
+                             MAP_LEAF_IN_SURFACE = 16;
+/// [bytes] The same of a node, a block of 4^3 cells that is not all alike: while a tree is built, and from then on.
+constexpr unsigned long long MAP_NODE_BUILDING = 86, MAP_NODE = 70;
+/// [bytes] What a cube takes that comes into a map while it is used (unknown space, what exclude_boxes cut), its share
+/// of nodes included, of which it needs at most one of three: a list that grows, three times; a tree that is built and
+/// two surfaces.
+constexpr unsigned long long MAP_LEAF_ADDED = 200;
 
 }  // namespace tolerance
 }  // namespace dccd

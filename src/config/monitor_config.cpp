@@ -122,7 +122,8 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   }
   config.octomap_file = reader.get("octomap_file", std::string());
   config.octomap_frame = reader.get("octomap_frame", std::string());
-  config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 4096)) << 20;
+  config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 1 << 20)) << 20;
+  if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
   config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
   const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
   config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
@@ -299,6 +300,7 @@ std::uint64_t hashOf(const std::string& text) {  // FNV-1a: the same on every ma
 void limitLive(MonitorConfig& config) {
   limitMemory(config);
   limitTime(config);
+  if (config.max_map_bytes == NO_MAP_LIMIT) config.max_map_bytes = MonitorConfig().max_map_bytes;
 }
 
 std::vector<Body> MonitorConfig::monitorBodies() const {

@@ -43,6 +43,8 @@ struct MarkerConfig {
   double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
 };
 
+constexpr std::size_t NO_MAP_LIMIT = std::size_t{1} << 50;
+
 /// Where a map is looked for that nobody named.
 constexpr const char* DEFAULT_OCTOMAP_TOPIC = "octomap_binary";
 
@@ -58,8 +60,8 @@ struct MonitorConfig {
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
-  bool octomap_topic_named = false;  ///< as BodyConfig::topic_named
-  std::size_t max_map_bytes = std::size_t{512} << 20;
+  bool octomap_topic_named = false;                       ///< as BodyConfig::topic_named
+  std::size_t max_map_bytes = std::size_t{512} << 20;     ///< see limitLive(); NO_MAP_LIMIT: none
   std::size_t max_memory_bytes = std::size_t{512} << 20;  ///< see limitLive()
   std::size_t max_queue_bytes = 0;                        ///< a quarter of it where it holds; 0: no limit
   double max_compute_s = 0.5;
@@ -91,8 +93,8 @@ struct MonitorConfig {
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
 MonitorConfig readConfig(const ParameterTree& tree, const std::string& path);
-/// What bounds a live node's steps, from max_memory_mb and max_compute_s, defaults included. Elsewhere a limit that was
-/// not given is none, so that no answer depends on a clock.
+/// What bounds a live node's steps, from max_memory_mb, max_map_mb and max_compute_s, defaults included. Elsewhere a
+/// limit that was not given is none, so that no answer depends on a clock.
 void limitLive(MonitorConfig& config);
 
 }  // namespace dccd

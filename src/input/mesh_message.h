@@ -18,6 +18,7 @@ struct MeshMessage {
   std::string md5 = "*";            ///< of the type as the publisher knows it
   TypedMesh object = {};
   std::size_t too_large = 0;  ///< bytes that it had; it was emptied, since no queue has room for it
+  std::size_t no_memory = 0;  ///< bytes that it had; there was not the memory to take them over
 
   std::size_t size() const { return object.type ? object.type->size(object.message.get()) : bytes.size(); }
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <utility>
 
 #include <ros/console.h>
@@ -59,11 +60,22 @@ void MeshSubscription::close() {
   typed.shutdown();
 }
 
+/// Nothing may get out of a callback: the thread would end, and the process with it.
+template <class Take>
+void MeshSubscription::guarded(Take take) {
+  try {
+    take();
+  } catch (const std::exception& error) {
+    ROS_WARN_STREAM_THROTTLE(5, topic_ << ": a message was lost: " << error.what());
+  }
+}
+
 void MeshSubscription::open(const MeshType* type) {
   close();
   ros::SubscribeOptions options;
   options.initByFullCallbackType<const ros::MessageEvent<const ShapeShifter>&>(
-      topic_, SUBSCRIBER_QUEUE, [this](const ros::MessageEvent<const ShapeShifter>& event) { onAny(event); });
+      topic_, SUBSCRIBER_QUEUE,
+      [this](const ros::MessageEvent<const ShapeShifter>& event) { guarded([&] { onAny(event); }); });
   if (type) {
     options.md5sum = type->md5;
     options.datatype = type->datatype;
@@ -133,7 +145,11 @@ void MeshSubscription::deliver(const ShapeShifter& bytes) {
   MeshMessage message;
   message.datatype = bytes.getDataType();
   message.md5 = bytes.getMD5Sum();
-  message.bytes = bytesOf(bytes);
+  if (hasMemoryFor(bytes.size())) {
+    message.bytes = bytesOf(bytes);
+  } else {
+    message.no_memory = bytes.size();
+  }
   callback_(std::move(message));
 }
 
@@ -148,7 +164,8 @@ void MeshSubscription::deliver(TypedMesh object) {
 void MeshSubscription::narrowTo(const MeshType& type) {
   narrowed_at_ = ros::SteadyTime::now();
   ros::SubscribeOptions options(topic_, SUBSCRIBER_QUEUE, type.md5, type.datatype);
-  options.helper = type.callbackHelper(type, [this](TypedMesh message) { onTyped(std::move(message)); });
+  options.helper =
+      type.callbackHelper(type, [this](TypedMesh message) { guarded([&] { onTyped(std::move(message)); }); });
   options.transport_hints = ros::TransportHints().tcpNoDelay();
   typed_ = node_.subscribe(options);
 }
@@ -186,14 +203,16 @@ void MeshSubscription::renew(const std::map<std::string, std::string>& published
     lost = has_type_ && publishers_ == 0;
   }
   try {
+    // What was tried before a message came tells nothing about what comes after it: a type may be back, and pauses that
+    // had grown by then would lock it out.
+    if (lost || !heard.empty()) attempts_ = 0;
+    if (lost || heard == type) acted_on_.clear();
     if (lost) {
-      attempts_ = 0;
       open(nullptr);
     } else if (heard.empty()) {
       attempt(type);
     } else if (!type.empty() && type != heard && type != acted_on_) {
       acted_on_ = type;
-      attempts_ = 0;
       open(findMeshType(type));
     }
   } catch (const ros::Exception& error) {  // another nodelet holds the topic with another type

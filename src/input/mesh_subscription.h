@@ -71,6 +71,8 @@ class MeshSubscription {
   void open(const MeshType* type);
   void close();
   void attempt(const std::string& published_type);
+  template <class Take>
+  void guarded(Take take);
   void onAny(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
   void onTyped(TypedMesh message);
   void narrowTo(const MeshType& type);

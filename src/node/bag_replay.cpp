@@ -34,10 +34,10 @@ const ros::Duration SEAM(1.0);
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
 /// As the node takes it: without a stamp of its own the map is of the time at which it came.
-LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config) {
+LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& config, const MapMemory& memory) {
   LoadedMap map;
   map.problem = mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config);
-  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config);
+  if (map.problem.empty()) map = decodeMapMessage(bytesOf(message), config, &memory);
   if (map.stamp_ns == 0) map.stamp_ns = static_cast<StampNs>(message.getTime().toNSec());
   return map;
 }
@@ -255,6 +255,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   Run run(*this, sink, predictions);
   const std::string& map_topic = config_.octomap_topic;
   const bool may_use_map = run.pipeline.effects().mayUseMap();
+  const MapMemory memory(config_);
   const bool bag_maps = config_.octomap_file.empty() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
 
@@ -262,7 +263,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   if (all.size() == 0) return run.summary;
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
   if (!config_.octomap_file.empty() && may_use_map) {
-    run.setMap(loadMapFile(config_.octomap_file, config_), 0);
+    run.setMap(loadMapFile(config_.octomap_file, config_, &memory), 0);
   }
 
   rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
@@ -271,7 +272,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
     const rosbag::MessageInstance& first = *at_first;
     first_map = first.getTime();
-    run.setMap(readMap(first, config_), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
+    run.setMap(readMap(first, config_, memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
   }
 
   TransformWindow transforms(run.bag, run.feed);
@@ -291,7 +292,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     if (is_mesh) {
       for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
     } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
-      run.setMap(readMap(m, config_), static_cast<std::int64_t>(at.toNSec()));
+      run.setMap(readMap(m, config_, memory), static_cast<std::int64_t>(at.toNSec()));
     }
     progress.advance();
   }

@@ -71,8 +71,20 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
   const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
   if (!problem.empty()) return maps->refuse(problem);  // before its bytes are copied
+  if (!hasMemoryFor(message->size())) {
+    return maps->refuse("there is not enough memory for a map of " + std::to_string(message->size()) + " bytes");
+  }
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
   state.mapCame();  // after it: the worker, which may take the map before, says again and again that none is on its way
+}
+
+/// Nothing may get out of a callback: the thread would end, and the process with it.
+void CollisionMonitor::Impl::guarded(const std::string& topic, const std::function<void()>& take) {
+  try {
+    take();
+  } catch (const std::exception& error) {
+    ROS_WARN_STREAM_THROTTLE(5, topic << ": a message was lost: " << error.what());
+  }
 }
 
 void CollisionMonitor::Impl::subscribe() {
@@ -86,18 +98,21 @@ void CollisionMonitor::Impl::subscribe() {
         input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, false); },
+      "/tf", SUBSCRIBER_QUEUE,
+      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { feed.add(*m, false); }); },
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { feed.add(*m, true); });
+      "/tf_static", SUBSCRIBER_QUEUE,
+      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { feed.add(*m, true); }); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
   if (!config.octomap_file.empty()) {
     maps->submitFile(config.octomap_file);
   } else {
-    map_subscriber =
-        input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
+    map_subscriber = input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) {
+      guarded(config.octomap_topic, [&] { onMap(m); });
+    });
   }
 }
 

@@ -72,6 +72,7 @@ struct CollisionMonitor::Impl {
 
   // Input thread.
   void subscribe();
+  void guarded(const std::string& topic, const std::function<void()>& take);
   void onMesh(std::size_t body, MeshMessage message);
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
 

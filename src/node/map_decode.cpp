@@ -1,5 +1,8 @@
 // octomap_msgs/Octomap as bytes, and map files, to surfaces.
+#include <algorithm>
 #include <exception>
+#include <limits>
+#include <new>
 
 #include "dccd/known_space.h"
 #include "dccd/octomap_decode.h"
@@ -14,24 +17,53 @@ namespace dccd {
 
 namespace {
 
-OctomapLimits limitsOf(const MonitorConfig& config) {
+constexpr std::size_t MAX_UNKNOWN_LEAVES = 2'000'000;
+
+/// `unknown`: how many cubes of unknown space there is room for, where `memory` is what counts.
+OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std::size_t& unknown) {
   OctomapLimits limits;
-  limits.max_bytes = config.max_map_bytes;
+  limits.max_bytes = largestMapMessage(config);
+  limits.free_leaves = config.unknown_space != UnknownSpace::FREE;
+  if (!memory) return limits;
+  limits.max_leaves = std::numeric_limits<std::size_t>::max();
+  limits.accept = [&unknown, memory](const OctomapCounts& counts) { unknown = memory->accept(counts); };
   return limits;
 }
 
-void build(DecodedOctomap decoded, const MonitorConfig& config, LoadedMap& map) {
-  std::vector<OccupiedLeaf> known;
+/// Each list ends before the next is made: what they take together is what MapMemory reckons with.
+void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, std::size_t max_unknown,
+           LoadedMap& map) {
+  const auto counted = [memory](auto made) { return memory ? memory->counted(std::move(made)) : made; };
   if (config.unknown_space != UnknownSpace::FREE) {
-    known = decoded.occupied;
+    std::vector<OccupiedLeaf> known;
+    known.reserve(decoded.occupied.size() + decoded.free.size());
+    known.assign(decoded.occupied.begin(), decoded.occupied.end());
     known.insert(known.end(), decoded.free.begin(), decoded.free.end());
-    map.known = KnownSpace::build(decoded.resolution_m, known);
+    std::vector<OccupiedLeaf>().swap(decoded.free);
+    map.known = counted(KnownSpace::build(decoded.resolution_m, known));
   }
   if (config.unknown_space == UnknownSpace::OCCUPIED) {
-    const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box);
+    const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, max_unknown);
     decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
   }
-  map.surface = VoxelSurface::build(decoded.resolution_m, std::move(decoded.occupied));
+  map.surface = counted(VoxelSurface::build(decoded.resolution_m, std::move(decoded.occupied)));
+}
+
+/// What `decode` makes of the limits, as a map; never throws.
+template <class Decode>
+void load(const MonitorConfig& config, const MapMemory* memory, LoadedMap& map, Decode decode) {
+  try {
+    std::size_t max_unknown = MAX_UNKNOWN_LEAVES;
+    DecodedOctomap decoded = decode(limitsOf(config, memory, max_unknown));
+    build(std::move(decoded), config, memory, std::min(max_unknown, MAX_UNKNOWN_LEAVES), map);
+  } catch (const std::bad_alloc&) {
+    map.problem = "there is not enough memory for this map";
+  } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
+    map.problem = shortText(error.what());
+  }
+  if (map.problem.empty()) return;
+  map.surface = nullptr;
+  map.known = nullptr;
 }
 
 }  // namespace
@@ -39,13 +71,15 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, LoadedMap& map) 
 std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
                               const MonitorConfig& config) {
   const std::string problem = mapTypeProblem(datatype, md5);
-  if (!problem.empty() || size <= config.max_map_bytes) return problem;
-  return std::to_string(size) + " bytes are more than max_map_mb";
+  if (!problem.empty() || size <= largestMapMessage(config)) return problem;
+  return std::to_string(size) + " bytes are more than the eighth of max_map_mb " +
+         std::to_string(config.max_map_bytes >> 20) + " that a message may have";
 }
 
-LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config) {
+LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config,
+                           const MapMemory* memory) {
   LoadedMap map;
-  try {
+  load(config, memory, map, [&](const OctomapLimits& limits) {
     WireReader wire(bytes.data(), bytes.size());
     const HeaderView header = readHeader(wire);
     map.stamp_ns = header.stamp_ns;
@@ -62,23 +96,15 @@ LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const Monitor
     const WireSpan<std::uint8_t> data = wire.readArray<std::uint8_t>("data");
     fields.data = data.data;
     fields.size = data.size;
-    build(decodeOctomap(fields, limitsOf(config)), config, map);
-  } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
-    map.surface = nullptr;
-    map.problem = shortText(error.what());
-  }
+    return decodeOctomap(fields, limits);
+  });
   return map;
 }
 
-LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config) {
+LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, const MapMemory* memory) {
   LoadedMap map;
   map.frame_id = config.octomap_frame;
-  try {
-    build(readOctomapFile(file, limitsOf(config)), config, map);
-  } catch (const std::exception& error) {
-    map.surface = nullptr;
-    map.problem = error.what();
-  }
+  load(config, memory, map, [&](const OctomapLimits& limits) { return readOctomapFile(file, limits); });
   return map;
 }
 

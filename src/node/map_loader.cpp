@@ -34,8 +34,8 @@ void MapLoader::submitFile(const std::string& file) { put({{}, file, 0, {}}); }
 void MapLoader::refuse(const std::string& problem) { put({{}, {}, 0, problem}); }
 
 LoadedMap MapLoader::load(const Job& job) const {
-  if (!job.file.empty()) return loadMapFile(job.file, config_);
-  if (job.problem.empty()) return decodeMapMessage(job.bytes, config_);
+  if (!job.file.empty()) return loadMapFile(job.file, config_, &memory_);
+  if (job.problem.empty()) return decodeMapMessage(job.bytes, config_, &memory_);
   LoadedMap refused;
   refused.problem = job.problem;
   return refused;

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "node/map_memory.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
@@ -20,9 +21,11 @@ namespace dccd {
 std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
                               const MonitorConfig& config);
 /// A serialised octomap_msgs/Octomap to a map; never throws: what is wrong is in LoadedMap::problem.
-LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config);
+/// `memory`: what it must fit in; null: no limit but that of the message.
+LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config,
+                           const MapMemory* memory = nullptr);
 /// A .bt or .ot file. Never throws.
-LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config);
+LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, const MapMemory* memory = nullptr);
 
 class MapLoader {
  public:
@@ -55,6 +58,7 @@ class MapLoader {
     std::string problem;  // not empty: refused
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
+  const MapMemory memory_{config_};
   std::function<void()> ready_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -1,6 +1,7 @@
 #include "node/master_watch.h"
 
 #include <chrono>
+#include <new>
 #include <utility>
 
 #include "ros/master_question.h"
@@ -44,7 +45,10 @@ void MasterWatch::loop() {
   std::unique_lock<std::mutex> lock(mutex_);
   while (!ended_.wait_for(lock, PERIOD, [this] { return stopping_; })) {
     lock.unlock();
-    look();
+    try {
+      look();
+    } catch (const std::bad_alloc&) {  // it looks again
+    }
     lock.lock();
   }
 }

@@ -222,13 +222,17 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
     return refuse(StepStatus::BAD_MESSAGE, "a message of " + std::to_string(message.too_large) +
                                                " bytes is more than the quarter of max_memory_mb that queues may hold");
   }
+  const auto noMemory = [&](std::size_t bytes) {
+    refuse(StepStatus::BAD_MESSAGE,
+           "there is not enough memory for this message of " + std::to_string(bytes) + " bytes");
+  };
+  if (message.no_memory > 0) return noMemory(message.no_memory);
   try {
     waiting.mesh = decode(body, message);
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {
-    return refuse(StepStatus::BAD_MESSAGE,
-                  "there is not enough memory for this message of " + std::to_string(message.size()) + " bytes");
+    return noMemory(message.size());
   }
   // Of a mesh that is the last one's, all is known.
   const bool is_new = checked_[body] != waiting.mesh.topology;

@@ -1,6 +1,7 @@
 #include "node/state_reporter.h"
 
 #include <chrono>
+#include <new>
 #include <utility>
 
 #include <ros/time.h>
@@ -116,7 +117,13 @@ void StateReporter::stop() {
 
 void StateReporter::watch() {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (!ended_.wait_for(lock, PERIOD, [this] { return stopped_; })) say(false);
+  while (!ended_.wait_for(lock, PERIOD, [this] { return stopped_; })) {
+    try {
+      say(false);
+    } catch (const std::bad_alloc&) {  // for want of memory: the next period has its turn
+      hinders_.clear();
+    }
+  }
 }
 
 void StateReporter::say(bool always) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "node/crash_handler.h"
+#include "node/map_memory.h"
 
 namespace dccd {
 
@@ -31,7 +32,8 @@ StepRecorder::StepRecorder(const MonitorConfig& config, Monitor& monitor, const 
     : folder_(config.record_folder.empty() ? rosHome() + "/deformable_ccd" : config.record_folder),
       owner_(inFileName(node)) {
   if (config.record_steps == 0) return;
-  recorder_ = std::make_unique<FlightRecorder>(config.record_steps, folder_, &crashImage(), owner_);
+  recorder_ =
+      std::make_unique<FlightRecorder>(config.record_steps, folder_, &crashImage(), owner_, recordedMaps(config));
   monitor.setListener(recorder_.get());
 }
 

@@ -5,8 +5,6 @@
 namespace dccd {
 namespace {
 
-constexpr std::size_t MAX_VISITS = std::size_t{1} << 24;
-
 class Splitter {
  public:
   Splitter(double resolution_m, const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes)
@@ -24,7 +22,7 @@ class Splitter {
     const bool near = any([&](const Box& box) {
       return ((centre + reach).array() >= box.min.array()).all() && ((centre - reach).array() <= box.max.array()).all();
     });
-    if (!near || ++visits_ > MAX_VISITS) {
+    if (!near) {
       remaining_.leaves.push_back(leaf);
       return;
     }
@@ -36,17 +34,19 @@ class Splitter {
     });
     if (inside) {
       remaining_.excluded_voxels += std::uint64_t{leaf.size} * leaf.size * leaf.size;
-    } else if (leaf.size == 1) {
+    } else if (leaf.size == 1 || parts_ + 8 > MAX_ADDED_LEAVES) {
       remaining_.leaves.push_back(leaf);
     } else {
       split(leaf);
     }
   }
 
+  void reserve(std::size_t leaves) { remaining_.leaves.reserve(leaves); }
   RemainingLeaves take() { return std::move(remaining_); }
 
  private:
   void split(const OccupiedLeaf& leaf) {
+    parts_ += 8;
     const std::size_t first = remaining_.leaves.size();
     const std::uint64_t before = remaining_.excluded_voxels;
     const std::uint32_t half = leaf.size / 2;
@@ -68,7 +68,7 @@ class Splitter {
   Vec3 reach_;  // of a cube's half edge along the fixed frame's axes
   const std::vector<Box>& boxes_;
   RemainingLeaves remaining_;
-  std::size_t visits_ = 0;
+  std::size_t parts_ = 0;
 };
 
 }  // namespace
@@ -76,6 +76,7 @@ class Splitter {
 RemainingLeaves leavesOutside(const std::vector<OccupiedLeaf>& leaves, double resolution_m,
                               const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes) {
   Splitter splitter(resolution_m, fixed_from_map, boxes);
+  splitter.reserve(leaves.size() + MAX_ADDED_LEAVES);  // a list that grows would take three times as much
   for (const OccupiedLeaf& leaf : leaves) splitter.add(leaf);
   return splitter.take();
 }

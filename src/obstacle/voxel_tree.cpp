@@ -5,15 +5,10 @@
 #include <string>
 #include <utility>
 
+#include "dccd/tolerances.h"
+
 namespace dccd {
 namespace {
-
-/// The level whose nodes have leaves of this size: 4^level or 2 * 4^level; the root leaf fills a root node.
-int levelOfSize(std::uint32_t size) {
-  int log2 = 0;
-  while ((std::uint32_t{1} << log2) < size) ++log2;
-  return std::min(log2 / 2, VoxelTree::LEVELS - 1);
-}
 
 std::string describe(const OccupiedLeaf& leaf) {
   return "leaf at key (" + std::to_string(leaf.min.x) + ", " + std::to_string(leaf.min.y) + ", " +
@@ -34,6 +29,20 @@ struct CodedLeaf {
   std::uint64_t code;
   std::uint32_t index;
 };
+
+// What is allocated below, leaf by leaf and node by node. While leaves are sorted: the list, the order (twice while the
+// radix sort runs, then codes and sorted leaves instead); then list, codes and leaves. A node: itself, its cell, a
+// table of two to four entries, and the codes of two levels while it is built.
+static_assert(tolerance::MAP_LEAF_LISTED == sizeof(OccupiedLeaf), "");
+static_assert(tolerance::MAP_LEAF_SORTING >= 2 * sizeof(OccupiedLeaf) + sizeof(CodedLeaf) + sizeof(std::uint64_t) &&
+                  tolerance::MAP_LEAF_SORTING >= sizeof(OccupiedLeaf) + 2 * sizeof(CodedLeaf),
+              "");
+static_assert(tolerance::MAP_LEAF_BUILDING >= 2 * sizeof(OccupiedLeaf) + sizeof(std::uint64_t), "");
+static_assert(tolerance::MAP_LEAF_IN_TREE == sizeof(OccupiedLeaf), "");
+static_assert(tolerance::MAP_NODE >=
+                  sizeof(VoxelTree::Node) + sizeof(std::array<std::uint16_t, 3>) + 4 * sizeof(std::uint32_t),
+              "");
+static_assert(tolerance::MAP_NODE_BUILDING >= tolerance::MAP_NODE + 2 * sizeof(std::uint64_t), "");
 
 /// Least significant digit first, 12 bits a pass: the 48 bits of a code take four.
 void radixSort(std::vector<CodedLeaf>& items) {
@@ -96,6 +105,23 @@ void VoxelTree::sortLeaves(const std::vector<OccupiedLeaf>& leaves, std::vector<
   }
 }
 
+std::size_t VoxelTree::countNodes(int level, const std::vector<std::uint64_t>& codes,
+                                  const std::vector<std::uint64_t>& prefixes) const {
+  const int shift = 6 * (level + 1);
+  std::uint32_t leaf = first_leaf_of_level_[level];
+  std::size_t child = 0, count = 0;
+  for (std::uint64_t last = ~std::uint64_t{0}; leaf < first_leaf_of_level_[level + 1] || child < prefixes.size();) {
+    const std::uint64_t of_leaf = leaf < first_leaf_of_level_[level + 1] ? codes[leaf] >> shift : ~std::uint64_t{0};
+    const std::uint64_t of_child = child < prefixes.size() ? prefixes[child] >> 6 : ~std::uint64_t{0};
+    const std::uint64_t prefix = std::min(of_leaf, of_child);
+    count += prefix != last;
+    last = prefix;
+    leaf += of_leaf == prefix;
+    child += of_child == prefix;
+  }
+  return count;
+}
+
 void VoxelTree::buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes) {
   // Merge this level's leaves with the nodes below (prefixes: their codes), both sorted by code.
   Level& l = levels_[level];
@@ -104,7 +130,10 @@ void VoxelTree::buildLevel(int level, const std::vector<std::uint64_t>& codes, s
   std::uint32_t leaf = first_leaf_of_level_[level];
   std::size_t child = 0;
   std::vector<std::uint64_t> own;
-  l.nodes.reserve(prefixes.size() / 2 + (leaf_end - leaf) / 4 + 1);
+  const std::size_t count = countNodes(level, codes, prefixes);  // lists that grow would take three times as much
+  l.nodes.reserve(count);
+  l.cells.reserve(count);
+  own.reserve(count);
   while (leaf < leaf_end || child < prefixes.size()) {
     std::uint64_t prefix = leaf < leaf_end ? codes[leaf] >> shift : ~std::uint64_t{0};
     if (child < prefixes.size()) prefix = std::min(prefix, prefixes[child] >> 6);
@@ -127,8 +156,6 @@ void VoxelTree::buildLevel(int level, const std::vector<std::uint64_t>& codes, s
                        static_cast<std::uint16_t>(gatherBits(prefix >> 2))});
     own.push_back(prefix);
   }
-  l.nodes.shrink_to_fit();
-  l.cells.shrink_to_fit();
   if (level > 0) buildTable(l);
   prefixes.swap(own);
 }

@@ -21,6 +21,12 @@ struct KeyBox {
 class VoxelTree {
  public:
   static constexpr int LEVELS = 8;
+  /// The level whose nodes have leaves of this size: 4^level or 2 * 4^level; the root leaf fills a root node.
+  static int levelOfSize(std::uint32_t size) {
+    int log2 = 0;
+    while ((std::uint32_t{1} << log2) < size) ++log2;
+    return std::min(log2 / 2, LEVELS - 1);
+  }
   static constexpr std::int32_t KEYS = 65536;
   static constexpr std::uint32_t NONE = 0xffffffffu;
 
@@ -88,6 +94,8 @@ class VoxelTree {
   };
 
   void sortLeaves(const std::vector<OccupiedLeaf>& leaves, std::vector<std::uint64_t>& codes);
+  std::size_t countNodes(int level, const std::vector<std::uint64_t>& codes,
+                         const std::vector<std::uint64_t>& prefixes) const;
   void buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);
 

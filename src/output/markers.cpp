@@ -93,16 +93,22 @@ Box boundsInMap(const Outcome& outcome) {
 }
 
 /// The map around the bodies: cubes a little smaller than the voxels, so that those that were hit show.
+/// More are not drawn: a map may have millions, and a marker of so many is of no use to anybody.
+constexpr std::size_t MAX_VOXELS_SHOWN = 200000;
+
 void addObstacle(const Outcome& outcome, double within_m, const std::string& frame, MarkerArray& out) {
   if (!outcome.obstacle || within_m <= 0) return;
   const Box bodies = boundsInMap(outcome);
   const double resolution = outcome.obstacle->resolution();
   VoxelLists by_size;
+  std::size_t shown = 0;
   for (const OccupiedLeaf& leaf : outcome.obstacle->leaves()) {
+    if (shown == MAX_VOXELS_SHOWN) break;
     const double edge = leaf.size * resolution;
     const Vec3 min = voxelMin(leaf.min, resolution), max = min + Vec3::Constant(edge);
     if ((min.array() > bodies.max.array() + within_m).any()) continue;
     if ((max.array() < bodies.min.array() - within_m).any()) continue;
+    ++shown;
     voxelList(outcome, frame, "obstacle", leaf.size, 0.97, color(0.62, 0.62, 0.6), by_size)
         .points.push_back(point(min + Vec3::Constant(0.5 * edge)));
   }

@@ -36,8 +36,13 @@ std::string surpriseIn(const Outcome& outcome, const Options& options) {
   return {};
 }
 
-FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image, std::string owner)
-    : ring_(steps), folder_(std::move(folder)), owner_(std::move(owner)), newest_image_(newest_image) {
+FlightRecorder::FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image, std::string owner,
+                               std::size_t max_map_bytes)
+    : ring_(steps),
+      max_map_bytes_(max_map_bytes),
+      folder_(std::move(folder)),
+      owner_(std::move(owner)),
+      newest_image_(newest_image) {
   if (steps == 0) throw std::invalid_argument("a flight recorder keeps at least 1 step");
 }
 
@@ -54,10 +59,24 @@ void FlightRecorder::onStep(const Step& step, const Options& options) {
   newest().options = options;
   newest().has_answer = false;
   newest().answer = Outcome();
+  forgetOldMaps();
   if (!newest_image_) return;
   newest().note = "written by the crash handler";
   image_.build(newest());
   *newest_image_ = &image_;
+}
+
+void FlightRecorder::forgetOldMaps() {
+  std::size_t bytes = 0;
+  const VoxelSurface* last = newest().step.map.surface.get();
+  for (std::size_t age = 1; age < count_; ++age) {
+    const VoxelSurface* map = kept(age).step.map.surface.get();
+    if (map && map != last) bytes += map->memoryBytes();
+    if (map) last = map;
+    if (bytes <= max_map_bytes_) continue;
+    for (std::size_t older = age; older < count_; ++older) kept(older) = StepRecording();
+    count_ = age;
+  }
 }
 
 void FlightRecorder::onOutcome(const Outcome& outcome) {
@@ -92,7 +111,7 @@ std::string FlightRecorder::write(StepRecording& recording, const std::string& k
 std::vector<std::string> FlightRecorder::writeAll(const std::string& note) {
   std::vector<std::string> files;
   for (std::size_t i = 0; i < count_; ++i) {
-    StepRecording& recording = ring_[(next_ + 2 * ring_.size() - 1 - i) % ring_.size()];
+    StepRecording& recording = kept(i);
     try {
       files.push_back(write(recording, "step", note));
     } catch (const std::runtime_error& error) {

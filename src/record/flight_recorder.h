@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,10 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
   using NewestImage = std::atomic<const RecordingImage*>;
 
   /// steps >= 1. The folder is created when a file is written. newest_image: kept up to date, must outlive this.
-  /// `owner`: a part of each file's name, for a folder that several share.
-  FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image = nullptr, std::string owner = {});
+  /// `owner`: a part of each file's name, for a folder that several share. max_map_bytes: steps are forgotten whose
+  /// maps, other than the newest step's, take more than this together.
+  FlightRecorder(std::size_t steps, std::string folder, NewestImage* newest_image = nullptr, std::string owner = {},
+                 std::size_t max_map_bytes = std::numeric_limits<std::size_t>::max());
   ~FlightRecorder() override;
   FlightRecorder(const FlightRecorder&) = delete;
   FlightRecorder& operator=(const FlightRecorder&) = delete;
@@ -47,11 +50,15 @@ class DCCD_EXPORT FlightRecorder : public StepListener {
   std::string takeSurprise();
 
  private:
-  StepRecording& newest() { return ring_[(next_ + ring_.size() - 1) % ring_.size()]; }
+  StepRecording& newest() { return kept(0); }
+  /// The step that was kept `age` steps before the newest.
+  StepRecording& kept(std::size_t age) { return ring_[(next_ + 2 * ring_.size() - 1 - age) % ring_.size()]; }
+  void forgetOldMaps();
   std::string write(StepRecording& recording, const std::string& kind, const std::string& note);
 
   std::vector<StepRecording> ring_;
   std::size_t next_ = 0, count_ = 0, surprises_ = 0;
+  const std::size_t max_map_bytes_;
   std::string folder_, owner_, surprise_;
   NewestImage* newest_image_;
   RecordingImage image_;  // of the newest step without its answer, for the crash handler

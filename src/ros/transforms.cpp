@@ -36,8 +36,37 @@ std::string frameNameProblem(const std::string& name) {
 }
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
-  const auto known = newest_.find(transform.child_frame_id);
-  return known != newest_.end() && static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second - JUMP_BACK_NS;
+  const auto known = kept_.find(transform.child_frame_id);
+  return known != kept_.end() &&
+         static_cast<StampNs>(transform.header.stamp.toNSec()) < *known->second.rbegin() - JUMP_BACK_NS;
+}
+
+bool TransformFeed::hasRoomFor(const geometry_msgs::TransformStamped& transform) {
+  for (const std::string* name : {&transform.header.frame_id, &transform.child_frame_id}) {
+    if (names_.count(*name) > 0) continue;
+    if (names_.size() >= MAX_FRAMES) return false;
+    names_.insert(*name);
+  }
+  return true;
+}
+
+/// Else its stamp is noted, and those are forgotten that the buffer forgets with it.
+bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform) {
+  const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
+  std::set<StampNs>& kept = kept_[transform.child_frame_id];
+  if (!kept.insert(stamp_ns).second) return true;
+  const auto old = kept.lower_bound(*kept.rbegin() - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
+  const std::size_t before = kept.size();
+  kept.erase(kept.begin(), old);
+  kept_count_ += 1 + kept.size() - before;
+  return false;
+}
+
+/// Keeps static transforms.
+void TransformFeed::clear() {
+  buffer_.clear();
+  kept_.clear();
+  kept_count_ = 0;
 }
 
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {
@@ -48,15 +77,13 @@ bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) c
 bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
   bool cleared = false;
   for (const auto& transform : message.transforms) {
-    if (!isUsable(transform)) continue;
-    if (!is_static) {
-      if (goesBack(transform)) {
-        buffer_.clear();  // keeps static transforms
-        newest_.clear();
+    if (!isUsable(transform) || !hasRoomFor(transform)) continue;
+    if (!static_.emplace(transform.child_frame_id, is_static).first->second) {
+      if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
+        clear();
         cleared = true;
       }
-      StampNs& newest = newest_[transform.child_frame_id];
-      newest = std::max(newest, static_cast<StampNs>(transform.header.stamp.toNSec()));
+      if (isRepeated(transform)) continue;
     }
     buffer_.setTransform(transform, "tf", is_static);
   }

@@ -1,8 +1,11 @@
 // Transforms: what arrives on /tf goes into one buffer; what is asked for comes out at exactly the stamp asked.
 #pragma once
 
+#include <cstddef>
+#include <set>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
@@ -15,9 +18,15 @@ namespace dccd {
 constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
 /// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
-/// the end would otherwise be taken for ones of the beginning. Not thread-safe; tf2::BufferCore itself is.
+/// the end would otherwise be taken for ones of the beginning. Leaves out what tf2 would write a line to the console
+/// for, each time: repeated stamps above all. Not thread-safe; tf2::BufferCore itself is.
 class TransformFeed {
  public:
+  /// tf2 forgets no name; further frames are left out.
+  static constexpr std::size_t MAX_FRAMES = 16384;
+  /// In the 10 s that tf2 keeps, of all frames together: 26,000 a second. Where more come all are forgotten.
+  static constexpr std::size_t MAX_KEPT = std::size_t{1} << 18;
+
   explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
   /// Whether add() would clear the buffer.
   bool clears(const tf2_msgs::TFMessage& message, bool is_static) const;
@@ -26,9 +35,15 @@ class TransformFeed {
 
  private:
   tf2::BufferCore& buffer_;
-  std::unordered_map<std::string, StampNs> newest_;  // per child frame
+  std::unordered_map<std::string, std::set<StampNs>> kept_;  // stamps that the buffer holds, per child frame
+  std::size_t kept_count_ = 0;
+  std::unordered_set<std::string> names_;
+  std::unordered_map<std::string, bool> static_;  // per child frame: as tf2 takes it, for good, from what came first
 
   bool goesBack(const geometry_msgs::TransformStamped& transform) const;
+  bool hasRoomFor(const geometry_msgs::TransformStamped& transform);
+  bool isRepeated(const geometry_msgs::TransformStamped& transform);
+  void clear();
 };
 
 /// Empty when tf2 takes the name; else what is wrong with it, in a few words. tf2 itself writes a line to the console

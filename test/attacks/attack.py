@@ -18,6 +18,14 @@ from ros_process import SLOW, wait_for  # noqa: F401
 ROWS, COLS = 20, 30
 
 
+def peak_kb(pid):
+    """The largest resident size that the process ever had."""
+    for line in pathlib.Path('/proc/%d/status' % pid).read_text().splitlines():
+        if line.startswith('VmHWM:'):
+            return int(line.split()[1])
+    raise AssertionError('no VmHWM')
+
+
 class AttackTest(LiveNodeTest):
     """A node whose log is read. What follows an attack is asserted in outcomes: the status within one step, recovery within two."""
 
@@ -72,6 +80,22 @@ def cloud_of(index, points, rows, cols):
     cloud.rows, cloud.cols = rows, cols
     cloud.variants = [b''.join(struct.pack('<3d', *p) for p in points)]
     return cloud.message(1000 + 0.03 * index)
+
+
+def checkerboard(depth):
+    """An octree's bytes in which every other voxel of a cube of 2^(depth + 1) is occupied and the rest is free."""
+    # Two bits a child: 00 unknown, 01 free, 10 occupied, 11 has children.
+    leaves = sum((0b10 if bin(child).count('1') % 2 else 0b01) << (2 * child) for child in range(8))
+    data = struct.pack('<H', leaves)
+    for _ in range(depth):
+        data = struct.pack('<H', 0xffff) + 8 * data
+    # From the root down to the cube one child each: the tree is 16 levels deep.
+    return (15 - depth) * struct.pack('<H', 0b11) + data
+
+
+def checkerboard_file(path, depth):
+    with open(path, 'wb') as file:
+        file.write(b'# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0.01\ndata\n' + checkerboard(depth))
 
 
 def publish_stream(topic, make, kind, rate=30.0):

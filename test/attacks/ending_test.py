@@ -1,13 +1,12 @@
 """What must not hold the node up: a master that hangs, and a step or a map that is computed while it is told to end."""
 import os
 import signal
-import struct
 import subprocess
 import time
 import unittest
 
 import rospy
-from attack import COLS, ROWS, SLOW, AttackTest, cloud_of, flat_cloud, wait_for
+from attack import COLS, ROWS, SLOW, AttackTest, checkerboard_file, cloud_of, flat_cloud, wait_for
 
 # The promise is a second; what is asserted is that nothing hangs.
 HANGS_S = 10
@@ -61,31 +60,13 @@ class EndingTest(AttackTest):
     def test_a_map_that_is_being_decoded(self):
         """A checkerboard: 8.4 million leaves in 4.8 MB; a file, so that it is there at once."""
         path = os.path.join(self.folder, 'board.bt')
-        checkerboard(path, 7)
+        checkerboard_file(path, 7)
         node = subprocess.Popen([str(self.tool('collision_monitor_node')), '__name:=board', '_fixed_frame:=world',
                                  '_octomap_file:=' + path, '_unknown_space:=report'])
         self.addCleanup(self.end, node)
         time.sleep(0.5)
         self.assertIsNone(node.poll())
         self.ends(node, signal.SIGINT, 'a map that is being decoded')
-
-
-def checkerboard(path, depth):
-    """An octree file in which every other voxel of a cube of 2^(depth + 1) is occupied."""
-    # Two bits a child: 00 unknown, 01 free, 10 occupied, 11 has children.
-    leaves = sum((0b10 if bin(child).count('1') % 2 else 0b01) << (2 * child) for child in range(8))
-
-    def node(level):
-        if level == 0:
-            return struct.pack('<H', leaves)
-        return struct.pack('<H', 0xffff) + 8 * node(level - 1)
-
-    # From the root down to the cube one child each: the tree is 16 levels deep.
-    data = node(depth)
-    for _ in range(15 - depth):
-        data = struct.pack('<H', 0b11) + data
-    with open(path, 'wb') as file:
-        file.write(b'# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0.01\ndata\n' + data)
 
 
 if __name__ == '__main__':

@@ -123,6 +123,16 @@ class MessagesTest(AttackTest):
                 transform.header.frame_id, transform.header.stamp = parent, stamped(i)
                 transform.transform.translation.x, transform.transform.rotation.w = x, w
                 tf.publish(TFMessage([transform]))
+        good = TransformStamped(child_frame_id='camera')
+        good.header.frame_id, good.transform.rotation.w = 'world', 1.0
+        static = rospy.Publisher('/tf_static', TFMessage, queue_size=100)
+        self.addCleanup(static.unregister)
+        wait_for(lambda: static.get_num_connections() == 1, 20, 'the node to listen')
+        for i in range(3):
+            good.header.stamp = stamped(i)
+            tf.publish(TFMessage([good] * 200))  # the same stamp again and again
+            time.sleep(0.1)
+            static.publish(TFMessage([good] * 200))  # and as if it were static, which tf2 no longer believes
         self.outcomes_of(self.publisher, [flat_cloud(i) for i in range(2)])
         self.assertTrue(self.contacts[-1].answered)
         self.assert_quiet(time.monotonic() - begin, 4)

@@ -10,12 +10,12 @@ GTEST = re.compile(r'\b(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)')
 
 
 def rows():
-    """Of each row: the promise, the names in its last two columns (the proof's are files), and the last column."""
+    """Of each row: the promise, the attack, the names in its last two columns (the proof's are files), and the last column."""
     for line in PAGE.read_text().splitlines():
         cells = [cell.strip() for cell in line.strip('|').split('|')] if line.startswith('|') else []
-        if len(cells) == 4 and not set(cells[0]) <= set('-: ') and cells[0] != 'promise':
-            proof, test = (re.findall(r'`([^`]+)`', cell) for cell in cells[2:])
-            yield cells[0], [name for name in proof if '/' in name] + test, cells[3]
+        if len(cells) == 5 and not set(cells[0]) <= set('-: ') and cells[0] != 'promise':
+            proof, test = (re.findall(r'`([^`]+)`', cell) for cell in cells[3:])
+            yield cells[0], cells[1], [name for name in proof if '/' in name] + test, cells[4]
 
 
 class Tests:
@@ -44,13 +44,16 @@ class Tests:
 class GuaranteesTest(unittest.TestCase):
     def test_every_name_is_there(self):
         tests = Tests()
-        named = [(promise, name) for promise, names, _ in rows() for name in names]
+        named = [(promise, name) for promise, _, names, _ in rows() for name in names]
         self.assertGreater(len(named), 40, 'the table was not read')
         missing = ['%s (%s)' % (name, promise) for promise, name in named if not tests.knows(name)]
         self.assertEqual(missing, [])
 
     def test_every_promise_has_a_test(self):
-        self.assertEqual([promise for promise, _, test in rows() if not test], [])
+        self.assertEqual([promise for promise, _, _, test in rows() if not test], [])
+
+    def test_every_promise_has_an_attack(self):
+        self.assertEqual([promise for promise, attack, _, _ in rows() if len(attack) < 10], [])
 
     def test_a_name_that_is_not_there_is_seen(self):
         tests = Tests()

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <limits>
 #include <random>
+#include <set>
 #include <sstream>
 #include <tuple>
 
@@ -38,6 +39,17 @@ Leaves leavesOf(const Tree& tree, bool occupied) {
   }
   std::sort(list.begin(), list.end());
   return list;
+}
+
+/// Blocks of 4^1, 4^2, … 4^8 voxels a side that hold a leaf which is smaller.
+std::size_t nodesOf(const std::vector<OccupiedLeaf>& leaves) {
+  std::set<std::tuple<int, int, int, int>> nodes;
+  for (const OccupiedLeaf& leaf : leaves) {
+    for (int shift = 2; shift <= 16; shift += 2) {
+      if (1u << shift > leaf.size) nodes.emplace(shift, leaf.min.x >> shift, leaf.min.y >> shift, leaf.min.z >> shift);
+    }
+  }
+  return nodes.size();
 }
 
 /// A ball on a floor: pruned leaves of several sizes, free and occupied, both signs of coordinates.
@@ -226,6 +238,32 @@ TEST(OctomapDecode, HostileStreamsAreRefusedSoon) {
   EXPECT_EQ(errorOf({"OcTree", 0.1, true, std::string("\xaa\xaa", 2)}, {100, 8}), "");
   // A log-odds that is not a number.
   EXPECT_NE(errorOf({"OcTree", 0.1, false, std::string("\xff\xff\xff\xff\0", 5)}).find("log-odds"), std::string::npos);
+}
+
+// What is counted in the stream is what the trees are then built of.
+TEST(OctomapDecode, CountsAreThoseOfTheTrees) {
+  octomap::OcTree tree(0.05);
+  paint(tree, 5);
+  std::ostringstream stream;
+  tree.writeBinaryData(stream);
+  OctomapCounts counts;
+  OctomapLimits limits;
+  limits.accept = [&](const OctomapCounts& counted) { counts = counted; };
+  const std::string bytes = stream.str();
+  const DecodedOctomap map = decodeOctomap({"OcTree", 0.05, true, bytes.data(), bytes.size()}, limits);
+  EXPECT_EQ(counts.occupied, map.occupied.size());
+  EXPECT_EQ(counts.free, map.free.size());
+  std::vector<OccupiedLeaf> known = map.occupied;
+  known.insert(known.end(), map.free.begin(), map.free.end());
+  EXPECT_GT(counts.occupied_nodes, 50u);
+  EXPECT_EQ(counts.occupied_nodes, nodesOf(map.occupied));
+  EXPECT_EQ(counts.known_nodes, nodesOf(known));
+  // Whoever refuses them does so before there are any; free ones can be left out.
+  limits.accept = [](const OctomapCounts&) { throw OctomapError("too many"); };
+  EXPECT_THROW(decodeOctomap({"OcTree", 0.05, true, bytes.data(), bytes.size()}, limits), OctomapError);
+  limits.accept = nullptr;
+  limits.free_leaves = false;
+  EXPECT_TRUE(decodeOctomap({"OcTree", 0.05, true, bytes.data(), bytes.size()}, limits).free.empty());
 }
 
 TEST(OctomapDecode, ARootWithoutChildrenSaysNothing) {

@@ -257,7 +257,7 @@ TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
   }
   EXPECT_EQ(loader.received(), 4u);
   EXPECT_EQ(loader.refused(), 2u);
-  EXPECT_EQ(mapMessageProblem("octomap_msgs/Octomap", "*", std::size_t{1} << 20, driven.config), "");
+  EXPECT_EQ(mapMessageProblem("octomap_msgs/Octomap", "*", std::size_t{1} << 17, driven.config), "");
 }
 
 TEST(Map, OneFromTheFutureIsNoMap) {
