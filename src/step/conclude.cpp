@@ -34,11 +34,20 @@ ContactCounts countsOf(const std::vector<Contact>& contacts) {
 
 void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   if (contacts.size() <= count) return;
-  std::stable_sort(contacts.begin(), contacts.end(),
-                   [](const Contact& a, const Contact& b) { return a.toc_lower < b.toc_lower; });
-  contacts.resize(count);
+  std::vector<std::pair<double, std::size_t>> times;  // and places: of equal times the first are kept
+  times.reserve(contacts.size());
+  for (const Contact& contact : contacts) times.push_back({contact.toc_lower, times.size()});
+  const auto first_left_out = times.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(times.begin(), first_left_out, times.end());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (std::make_pair(contacts[i].toc_lower, i) < *first_left_out) contacts[kept++] = contacts[i];
+  }
+  contacts.resize(kept);
   contacts.shrink_to_fit();
-  std::sort(contacts.begin(), contacts.end(), canonicalLess);
+  if (!std::is_sorted(contacts.begin(), contacts.end(), canonicalLess)) {
+    std::sort(contacts.begin(), contacts.end(), canonicalLess);
+  }
 }
 
 /// Vertices that were sent, but are part of no surface and no line. A mesh file's are of no interest.
