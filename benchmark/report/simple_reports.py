@@ -139,6 +139,18 @@ def write_octomap(folder, result):
     return save(folder, "octomap", "# Mesh against octomap\n\n" + table(header, rows))
 
 
+def write_budget(folder, result):
+    header = ["input", "without, ms", "budget ms", "cut", "p50", "p95", "p99", "max", "allowed"]
+    rows = []
+    for r in result["runs"]:
+        over = r["over_ms"]
+        rows.append([r["input"], "%.0f" % r["whole_ms"], "%g" % r["budget_ms"], "%d of %d" % (r["cut"], r["steps"])] +
+                    ["%.2f" % over[q] for q in ("p50", "p95", "p99", "max")] + ["%g" % max(1, 0.1 * r["budget_ms"])])
+    write_rows(os.path.join(folder, "budget.csv"), header, rows)
+    return save(folder, "budget", "# How far a step runs over its budget\n\nProcessor time of the step's thread after the end of its "
+                "budget [ms].\n\n" + table(header, rows))
+
+
 def write_culling(folder, result):
     header = ["case", "triangles", "contacts", "certified", "without, median ms", "with, median ms", "ratio (quartiles)"]
     rows = []

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 
 namespace dccd {
 
@@ -25,6 +26,13 @@ class Deadline {
     both.cancelled_ = &cancelled;
     return both;
   }
+  /// Over at the look that finds none left, which it counts down: with it a test counts the work between two looks at
+  /// the clock. The number must outlive it.
+  static Deadline afterLooks(std::atomic<std::int64_t>& left) {
+    Deadline counted(Clock::now() + std::chrono::hours(24));
+    counted.looks_left_ = &left;
+    return counted;
+  }
   /// At another time; the flag stays.
   Deadline movedTo(Clock::time_point at) const {
     Deadline moved = *this;
@@ -38,6 +46,7 @@ class Deadline {
   /// No time is set.
   bool isNever() const { return at_ == Clock::time_point::max(); }
   bool isOver() const {
+    if (looks_left_ && looks_left_->fetch_sub(1, std::memory_order_relaxed) <= 0) return true;
     return (cancelled_ && cancelled_->load(std::memory_order_relaxed)) || (!isNever() && Clock::now() >= at_);
   }
   Clock::time_point at() const { return at_; }
@@ -45,6 +54,7 @@ class Deadline {
  private:
   Clock::time_point at_ = Clock::time_point::max();
   const std::atomic<bool>* cancelled_ = nullptr;
+  std::atomic<std::int64_t>* looks_left_ = nullptr;
 };
 
 }  // namespace dccd

@@ -28,38 +28,53 @@ double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::
   return latest;
 }
 
+// A time that is not 0 is worth so many bounds; the rest of what is left out when time is up may touch at once.
+constexpr std::size_t BOUNDS_IN_ANY_CASE = 4096;
+
+/// Of pairs of groups from `first` on.
+double tocBoundOfRest(const TreePair& trees, std::size_t level, const std::vector<std::uint32_t>& pairs,
+                      std::size_t first, bool late) {
+  const std::size_t count = pairs.size() / 2;
+  if (late && count > first + BOUNDS_IN_ANY_CASE) return 0;
+  double bound = std::numeric_limits<double>::infinity();
+  for (; first < count; ++first) {
+    bound = std::min(bound, tocBound(trees, level, pairs[2 * first], pairs[2 * first + 1]));
+  }
+  return bound;
+}
+
 }  // namespace
 
 double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch,
-                         std::size_t max_pairs) {
+                         std::size_t max_pairs, const std::function<bool()>& is_over) {
   double left_out = std::numeric_limits<double>::infinity();
+  bool late = false;
   pairs.assign({0, 0});
   for (std::size_t l = trees.a->height() - 1; l > 1; --l) {
     scratch.clear();
     std::size_t done = 0;
     const std::size_t count = pairs.size() / 2;
     while (done < count) {
-      if (scratch.size() / 2 > max_pairs) {
-        for (; done < count; ++done) {
-          left_out = std::min(left_out, tocBound(trees, l, pairs[2 * done], pairs[2 * done + 1]));
-        }
+      late = late || (done > 0 && is_over && is_over());
+      if ((late && done > 0) || scratch.size() / 2 > max_pairs) {
+        left_out = std::min(left_out, tocBoundOfRest(trees, l, pairs, done, late));
         break;
       }
-      constexpr std::size_t STEP = 16 * simd::GROUP * simd::GROUP;
+      constexpr std::size_t STEP = 16 * simd::GROUP * simd::GROUP, PAIRS_PER_LOOK_AT_THE_CLOCK = 512;
       const std::size_t used = scratch.size();
       scratch.resize(used + 2 * STEP);
       std::size_t consumed = 0;
       const std::size_t found = simd::testGroupPairs(
-          trees.a->level(l).view(), trees.b->level(l).view(), pairs.data() + 2 * done, count - done, trees.self,
-          simd::Diagonal::UPPER_WITH_DIAGONAL, trees.t0_only, scratch.data() + used, STEP, &consumed);
+          trees.a->level(l).view(), trees.b->level(l).view(), pairs.data() + 2 * done,
+          std::min(count - done, PAIRS_PER_LOOK_AT_THE_CLOCK), trees.self, simd::Diagonal::UPPER_WITH_DIAGONAL,
+          trees.t0_only, scratch.data() + used, STEP, &consumed);
       scratch.resize(used + 2 * found);
       done += consumed;
     }
     std::swap(pairs, scratch);
-    for (std::size_t p = max_pairs; p < pairs.size() / 2; ++p) {
-      left_out = std::min(left_out, tocBound(trees, l - 1, pairs[2 * p], pairs[2 * p + 1]));
-    }
-    if (pairs.size() / 2 > max_pairs) pairs.resize(2 * max_pairs);
+    if (pairs.size() / 2 <= max_pairs) continue;
+    left_out = std::min(left_out, tocBoundOfRest(trees, l - 1, pairs, max_pairs, late));
+    pairs.resize(2 * max_pairs);
   }
   return left_out;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -19,9 +20,10 @@ struct TreePair {
 
 /// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads. Of more than max_pairs
 /// that many are kept, the first in the trees' order. Returns a time before which nothing of the rest can touch, as
-/// superclusterTocBound() does; infinity when all were kept.
+/// superclusterTocBound() does; infinity when all were kept. is_over ends the search as max_pairs does; null: never.
 double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch,
-                         std::size_t max_pairs = std::numeric_limits<std::size_t>::max());
+                         std::size_t max_pairs = std::numeric_limits<std::size_t>::max(),
+                         const std::function<bool()>& is_over = {});
 
 /// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
 /// overlap (to two record units) in all 8 directions at t=0. 1 when they never meet during the step.

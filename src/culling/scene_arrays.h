@@ -86,6 +86,9 @@ class SceneArrays {
     bounds_valid_ = true;
   }
 
+  /// After a refit() that left pieces out: nothing is kept of it.
+  void forgetBounds() { bounds_valid_ = false; }
+
   const std::vector<SceneBody>& bodies() const { return bodies_; }
   const VertexMotion* vertices() const { return vertices_.get(); }
   /// The RECORD values of an internal vertex, after refit().

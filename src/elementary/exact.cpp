@@ -18,7 +18,7 @@ constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched tier
 
 /// What is left when time is up still goes through the batched tier, which knows most of it at once, but not for longer
 /// than this: denormal numbers are slow.
-constexpr std::chrono::microseconds TIME_FOR_BATCHES(250);
+constexpr std::chrono::microseconds TIME_FOR_BATCHES(100);
 
 /// The batched tier's outputs for one block.
 struct BlockOutput {

@@ -87,7 +87,7 @@ void uniteBlocks(std::vector<TouchedBlock>& blocks) {
   blocks.resize(kept);
 }
 
-constexpr std::chrono::nanoseconds BLOCK_TIME(100);  // to sort a block among a million, and to count its voxels
+constexpr std::chrono::nanoseconds BLOCK_TIME(300);  // to sort a block among a million, and to count its voxels
 constexpr std::size_t FEATURES_PER_LOOK_AT_THE_CLOCK = 32;
 
 /// How many can be sorted and counted until then.
@@ -201,7 +201,9 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   std::size_t features = 0;
   // Up to twice as many are held, and sorted and counted in the end.
   const std::size_t most_blocks = deadline.isNever() ? limit : std::min(limit, blocksUntil(deadline) / 2);
-  const auto isLate = [&] { return !deadline.isNever() && blocksUntil(deadline) < blocks.size(); };
+  const auto isLate = [&] {
+    return deadline.isOver() || (!deadline.isNever() && blocksUntil(deadline) < blocks.size());
+  };
   const auto add = [&](const auto& feature) {
     if (swept.complete && features++ % FEATURES_PER_LOOK_AT_THE_CLOCK == 0) swept.complete = !isLate();
     if (!swept.complete) return;

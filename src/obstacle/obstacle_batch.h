@@ -32,6 +32,7 @@ class ObstacleBatch {
   void flush();
 
   std::vector<Contact>& contacts() { return contacts_; }
+  const std::vector<Contact>& contacts() const { return contacts_; }
   const TierCounters& tiers() const { return tiers_; }
 
  private:

@@ -100,7 +100,7 @@ std::uint8_t ObstacleCheck::Impl::nearBits(const Run& run, const KeyLanes& swept
 void ObstacleCheck::Impl::markNearFaces(const Run& run) {
   near_faces.clear();
   const std::vector<Face>& faces = run.topology->faces();
-  for (std::size_t f = 0; f < faces.size(); ++f) {
+  for (std::size_t f = 0; f < faces.size() && !isLate(run); ++f) {
     const Face& face = faces[f];
     // The other features of a face with an inactive vertex are looked at themselves.
     std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
@@ -118,6 +118,7 @@ void ObstacleCheck::Impl::markNearFaces(const Run& run) {
 void ObstacleCheck::Impl::markNearEdges(const Run& run) {
   near_faces.clear();
   for (const Edge& edge : run.topology->edges()) {
+    if (isLate(run)) return;
     std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
     bool corner = false;
     if (state[edge[0]] & state[edge[1]] & ACTIVE) {
@@ -130,18 +131,17 @@ void ObstacleCheck::Impl::markNearEdges(const Run& run) {
 /// A feature and a leaf may meet in a dozen places, which are joined now and then. A contact that was settled and one
 /// that was tested may still be the same: hence twice the number.
 bool ObstacleCheck::Impl::foundTooMuch(const Run& run) {
-  if (run.most_found == NO_LIMIT) return false;
-  std::vector<Contact>* const lists[] = {&vertex_contacts,         &edge_contacts,         &face_contacts,
-                                         &vertex_batch.contacts(), &edge_batch.contacts(), &corner_batch.contacts()};
-  const auto count = [&] {
-    std::size_t sum = 0;
-    for (const auto* list : lists) sum += list->size();
-    return sum;
-  };
-  if (count() <= 2 * std::max(run.most_found, joined)) return false;
-  for (auto* list : lists) sortAndJoin(*list);
-  joined = count();
+  if (run.most_found == NO_LIMIT || foundCount() <= 2 * std::max(run.most_found, joined)) return false;
+  for (auto* list : {&vertex_contacts, &edge_contacts, &face_contacts}) sortAndJoin(*list);
+  for (ObstacleBatch* batch : {&vertex_batch, &edge_batch, &corner_batch}) sortAndJoin(batch->contacts());
+  joined = foundCount();
   return joined > 2 * run.most_found;
+}
+
+std::size_t ObstacleCheck::Impl::foundCount() const {
+  std::size_t sum = vertex_contacts.size() + edge_contacts.size() + face_contacts.size();
+  for (const ObstacleBatch* batch : {&vertex_batch, &edge_batch, &corner_batch}) sum += batch->contacts().size();
+  return sum;
 }
 
 void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found,

@@ -71,8 +71,11 @@ struct ObstacleCheck::Impl {
   bool isLate(const Run& run) {
     if (late || run.isUnlimited() || (looked_at++ & 31) != 0) return late;
     full = full || foundTooMuch(run);
-    return late = full || run.deadline.isOver();
+    return late = full || run.deadline.movedBy(-LISTING_A_CONTACT * static_cast<std::int64_t>(foundCount())).isOver();
   }
+  /// Contacts so far, of which some may be the same.
+  std::size_t foundCount() const;
+  static constexpr std::chrono::nanoseconds LISTING_A_CONTACT{300};  ///< sorting, joining and copying one of 100,000
   /// Certainly more than most_found are left when collect() has joined what belongs to one feature and leaf.
   bool foundTooMuch(const Run& run);
 
@@ -128,7 +131,12 @@ struct ObstacleCheck::Impl {
   void findLeaves(const Run& run, const KeyBox& box);
   /// Of a run that is limited not more than this, 4 MB, are near a feature; of more the run is full.
   static constexpr std::size_t MOST_NEAR_LEAVES = std::size_t{1} << 20;
+  static constexpr std::chrono::nanoseconds SORTING_A_LEAF{100};  ///< one of a million
+  static constexpr std::size_t LEAVES_PER_LOOK_AT_THE_CLOCK = 4096;
   bool addNear(const Run& run, std::uint32_t leaf) {
+    if (near_leaves.size() % LEAVES_PER_LOOK_AT_THE_CLOCK == LEAVES_PER_LOOK_AT_THE_CLOCK - 1) {
+      late = late || run.deadline.movedBy(-SORTING_A_LEAF * static_cast<std::int64_t>(near_leaves.size())).isOver();
+    }
     if (run.most_found != NO_LIMIT && near_leaves.size() == MOST_NEAR_LEAVES) {
       full = late = true;
     } else {

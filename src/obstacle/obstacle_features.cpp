@@ -115,7 +115,7 @@ void ObstacleCheck::Impl::setTime(Contact& contact, const CrossingTime& time) {
 void ObstacleCheck::Impl::findLeaves(const Run& run, const KeyBox& box) {
   near_leaves.clear();
   run.surface->tree.visitLeaves(box, [&](std::uint32_t leaf) { return addNear(run, leaf); });
-  if (!full) sortLeaves(*run.surface, near_leaves);
+  if (!late) sortLeaves(*run.surface, near_leaves);
 }
 
 void ObstacleCheck::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list) {

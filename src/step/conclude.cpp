@@ -38,12 +38,21 @@ ContactCounts countsOf(const std::vector<Contact>& contacts) {
 /// Unexpected ones first: an alarm must not be crowded out by what rests where it is meant to.
 void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   if (contacts.size() <= count) return;
-  std::stable_sort(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) {
-    return std::tie(a.expected, a.toc_lower) < std::tie(b.expected, b.toc_lower);
-  });
-  contacts.resize(count);
+  std::vector<std::tuple<bool, double, std::size_t>> times;  // and places: of equal times the first are kept
+  times.reserve(contacts.size());
+  const auto timeOf = [&](std::size_t i) { return std::make_tuple(contacts[i].expected, contacts[i].toc_lower, i); };
+  for (std::size_t i = 0; i < contacts.size(); ++i) times.push_back(timeOf(i));
+  const auto first_left_out = times.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(times.begin(), first_left_out, times.end());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (timeOf(i) < *first_left_out) contacts[kept++] = contacts[i];
+  }
+  contacts.resize(kept);
   contacts.shrink_to_fit();
-  std::sort(contacts.begin(), contacts.end(), canonicalLess);
+  if (!std::is_sorted(contacts.begin(), contacts.end(), canonicalLess)) {
+    std::sort(contacts.begin(), contacts.end(), canonicalLess);
+  }
 }
 
 /// Vertices that were sent, but are part of no surface and no line. A mesh file's are of no interest.

@@ -20,9 +20,11 @@ using Clock = Deadline::Clock;
 
 constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
 constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
-constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(200);  // sorting and copying one of half a million
+constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
+constexpr double MOST_NS_PER_HIT = 2000;                          // more is what the operating system took
 constexpr std::size_t FEWEST_TO_MEASURE = 1000;                   // hits of a step that tell what one takes
-constexpr std::size_t PIECE = 256;                                // groups or vertices x 16 in a unit of refitting
+constexpr std::size_t PIECE = 256;             // groups or vertices in a unit of refitting, before a look at the clock
+constexpr std::size_t PIECES_IN_ANY_CASE = 8;  // so that a budget too small for anything still bounds a small mesh
 
 /// Erases what cannot be the first contact: it begins after another one has certainly happened. How wide a bracket is
 /// says nothing: `conservative` may find the first contact at once, in [0, 1], and a later one in a narrow bracket.
@@ -118,7 +120,8 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
     const double others_ms = outcome.stats[Stage::OBSTACLE].ms + outcome.stats[Stage::START_STATE].ms;
     const double after_ms = std::max(0.0, msSince(hits_done) - others_ms);
-    per_hit = std::chrono::nanoseconds(static_cast<std::int64_t>(1.5e6 * after_ms / static_cast<double>(hits)));
+    const double measured_ns = std::min(MOST_NS_PER_HIT, 1.5e6 * after_ms / static_cast<double>(hits));
+    per_hit = std::max(per_hit * 7 / 8, std::chrono::nanoseconds(static_cast<std::int64_t>(measured_ns)));
   }
   return outcome;
 }
@@ -205,7 +208,6 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
       const double place_ms = msSince(start);
       outcome.stats[Effect::RIGID_BODIES].ms += place_ms;
       outcome.stats[Effect::RIGID_BODIES].out += outcome.stats[Effect::RIGID_BODIES].in;
-      outcome.stats.total_ms += place_ms;
       runPart({part, i, parts, i > 0 || continues, deadline}, outcome);
     }
     joinParts(outcome.contacts);
@@ -232,7 +234,11 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   result.cut = false;
   result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
   result.stats = StepStats();
-  fill(part);
+  if (!fill(part)) {
+    leaveOutPart(part);
+    addPart(part.index, part.count, result, outcome);
+    return;
+  }
   found_limit = foundLimit();
   if (found_limit != FoundLimit::NONE) found_limit -= std::min(found_limit, outcome.contacts.size());
   StepContext context;
@@ -255,12 +261,22 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   rememberApart(all_pairs && !options->earliest_only && options->accuracy.rung != Accuracy::FAST);
   if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
   runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
-  result.stats.total_ms = msSince(begin);
   addPart(part.index, part.count, result, outcome);
 }
 
+/// There was no time for its bounds: of the part nothing is known, and of its end neither.
+void History::Impl::leaveOutPart(const Part& part) {
+  scene.forgetBounds();
+  result.contacts.clear();
+  leaveOutAt(0, false);
+  result.start_state_complete = !checksStartState(part);
+  carried.apart.clear();
+  carried.start_state.clear();
+  carried.inside.clear();
+}
+
 /// The part's positions into the scene's arrays, and what of it needs bounds.
-void History::Impl::fill(const Part& part) {
+bool History::Impl::fill(const Part& part) {
   StepStats& stats = result.stats;
   Clock::time_point start = Clock::now();
   scene.record(part.step, stats);
@@ -271,8 +287,19 @@ void History::Impl::fill(const Part& part) {
   chooseSelfTests(part);
   stats[Stage::BROAD_PHASE].ms += msSince(start);
   start = Clock::now();
-  if (needsTrees(part)) scene.refit([&](std::size_t n, const auto& f) { parallel(n, PIECE, f); }, stats);
+  std::atomic<std::size_t> done{0};
+  std::atomic<bool> late{false};
+  const auto inPieces = [&](std::size_t n, const auto& refit) {
+    parallel(n, PIECE, [&](std::size_t first, std::size_t last) {
+      for (; first < last; first += PIECE) {
+        if (++done > PIECES_IN_ANY_CASE && (late || (late = part.deadline.isOver()))) return;
+        refit(first, std::min(first + PIECE, last));
+      }
+    });
+  };
+  if (needsTrees(part)) scene.refit(inPieces, stats);
   stats[Stage::BOUNDS].ms = msSince(start);
+  return !late;
 }
 
 /// Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
@@ -349,8 +376,8 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
       // Later parts need as much time for their pairs; what is over that is shared.
       const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
       const Clock::duration slack = deadline.at() - start - later * (start - begin);
-      // Contacts are still to be joined, counted and cut: half of what one takes after the pairs.
-      const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size()) / 2;
+      // Contacts are still to be joined, counted and cut.
+      const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size());
       deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
     }
     is_over = [this, deadline] {

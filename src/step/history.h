@@ -80,7 +80,9 @@ struct History::Impl {
   std::size_t neededParts(const Step& step, StepStats& stats) const;
   bool runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome);
   void runPart(const Part& part, Outcome& outcome);
-  void fill(const Part& part);
+  /// False: there was no time for it.
+  bool fill(const Part& part);
+  void leaveOutPart(const Part& part);
   void chooseSelfTests(const Part& part);
   bool staysApart(std::size_t body) const;
   bool isUnfolded(std::size_t body);
@@ -94,8 +96,8 @@ struct History::Impl {
   void cutHits();
   /// What may be found in a whole step with these options and bodies; FoundLimit::NONE: no limit.
   std::size_t foundLimit() const;
-  /// More was there to be found; nothing of what was left out touches before this.
-  void cutAt(double toc);
+  /// More was there to be found, by a limit (by_count) or a deadline; nothing of what was left out touches before this.
+  void leaveOutAt(double toc, bool by_count);
   void collect(const Step& step, const Deadline& deadline);
   void writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& contact) const;
   bool meetAtStart(const Step& step, const Contact& contact) const;
@@ -137,8 +139,8 @@ struct History::Impl {
   std::vector<TaskHits> task_hits;             // per task
   FoundLimit found;                            // by the tasks
   std::size_t found_limit = FoundLimit::NONE;  // what the part may find
-  std::chrono::nanoseconds per_hit{
-      400};  // half as much again as a hit took, after the pairs, in the last step with many
+  /// Half as much again as a hit took, after the pairs, in the last steps with many.
+  std::chrono::nanoseconds per_hit{400};
   Deadline::Clock::time_point hits_done;  // when the last part's pairs ended
   std::vector<std::uint32_t> group_pairs, found_groups, scratch, body_pairs;
   std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc;  // and place, pair of groups

@@ -35,7 +35,7 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
   const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1);
   const std::size_t room =
       found_limit == FoundLimit::NONE ? FoundLimit::NONE : found_limit - std::min(found_limit, result.contacts.size());
-  const Deadline deadline = part.deadline.movedBy(-per_hit * static_cast<std::int64_t>(result.contacts.size()) / 2);
+  const Deadline deadline = part.deadline.movedBy(-per_hit * static_cast<std::int64_t>(result.contacts.size()));
   const bool whole = obstacle_checks[b]->run(*map_reduced, *body.setup.topology, t0, t1, active,
                                              static_cast<std::uint16_t>(b), result.contacts, total,
                                              body.uncertain ? moving.radius_m->data() : nullptr, deadline, room);

@@ -16,8 +16,8 @@ constexpr std::size_t CHUNK = 2048;  // pairs that stay in the first-level cache
 constexpr std::size_t CAPACITY = CHUNK + ClusterPairStream::CHUNK;
 
 // What is undecided when time is up still gets its bound, but not for longer than this: denormal numbers are slow.
-constexpr std::chrono::microseconds TIME_FOR_BOUNDS(250);
-constexpr std::size_t BOUNDS_PER_LOOK_AT_THE_CLOCK = 64;
+constexpr std::chrono::microseconds TIME_FOR_BOUNDS(100);
+constexpr std::size_t BOUNDS_PER_LOOK_AT_THE_CLOCK = 64, BOUNDS_IN_ANY_CASE = 1024;
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
@@ -112,17 +112,22 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
           return goesOn();
         });
     if (whole_pair) continue;
-    // Of what was not looked at here all that is known is when the groups can meet.
-    for (; p < task.last; ++p) {
-      unchecked_toc_lower_ =
-          std::min(unchecked_toc_lower_, superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]));
-    }
+    leaveOut(trees, pairs, p);
+    break;
   }
   lap(Stage::BROAD_PHASE, start);
   flush();
   stats_[effect()].ms += msSince(whole) - separated_ms_;
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
+}
+
+/// Of what was not looked at here all that is known is when the groups can meet.
+void PairWorker::leaveOut(const TreePair& trees, const std::vector<std::uint32_t>& pairs, std::size_t first) {
+  for (std::size_t p = first; p < (task_->by_bound ? first + 1 : task_->last); ++p) {
+    const double bound = isTooLateForBounds() ? 0 : superclusterTocBound(trees, pairs[2 * p], pairs[2 * p + 1]);
+    unchecked_toc_lower_ = std::min(unchecked_toc_lower_, bound);
+  }
 }
 
 void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
@@ -254,12 +259,17 @@ void PairWorker::dropLate() {
   count_ = n;
 }
 
-/// 0 where there is no time for a better one.
-double PairWorker::boundOf(std::size_t i, double distance_m) {
-  if (bounds_++ % BOUNDS_PER_LOOK_AT_THE_CLOCK == 0) {
+/// So far so many may be asked for in any case.
+bool PairWorker::isTooLateForBounds() {
+  if (bounds_++ % BOUNDS_PER_LOOK_AT_THE_CLOCK == 0 && bounds_ > BOUNDS_IN_ANY_CASE) {
     late_ = late_ || context_->deadline.movedBy(TIME_FOR_BOUNDS).isOver();
   }
-  return late_ ? 0 : linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance_m);
+  return late_;
+}
+
+/// 0 where there is no time for a better one.
+double PairWorker::boundOf(std::size_t i, double distance_m) {
+  return isTooLateForBounds() ? 0 : linearTocBound(task_->kind, context_->scene->vertices(), quads_[i], distance_m);
 }
 
 void PairWorker::keepUndecided() {

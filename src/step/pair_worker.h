@@ -35,6 +35,11 @@ struct PairTask {
   std::uint16_t body_a, body_b;
   bool self;
   std::uint32_t first, last;  ///< supercluster pairs in the step's list
+  bool by_bound;              ///< which are in the order in which they can touch, from task to task
+  /// The other is the task before it, and nothing here can touch before what is there.
+  bool follows(const PairTask& other) const {
+    return by_bound && kind == other.kind && body_a == other.body_a && body_b == other.body_b;
+  }
 };
 
 class PairWorker;
@@ -96,6 +101,8 @@ class PairWorker {
   void decide();
   void keepUndecided();
   double boundOf(std::size_t i, double distance_m);
+  bool isTooLateForBounds();
+  void leaveOut(const TreePair& trees, const std::vector<std::uint32_t>& pairs, std::size_t first);
   void dropLate();
   Effect effect() const { return task_->self ? Effect::SELF_COLLISION : Effect::BODY_BODY; }
   /// What a pair counts for whose elementary test carries a distance, or none.

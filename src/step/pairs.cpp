@@ -10,7 +10,8 @@ using Clock = Deadline::Clock;
 
 namespace {
 
-constexpr std::size_t TASK_SUPERCLUSTERS = 16;  // supercluster pairs in a unit of work: about a millisecond
+constexpr std::size_t TASK_SUPERCLUSTERS = 16;            // supercluster pairs in a unit of work: about a millisecond
+constexpr std::chrono::nanoseconds ORDERING_A_PAIR(200);  // its bound, and its share of sorting ten thousand
 
 }  // namespace
 
@@ -18,7 +19,7 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
   const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
   if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
   const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
-  PairTask task{kind, a, b, a == b, 0, 0};
+  PairTask task{kind, a, b, a == b, 0, 0, false};
   if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
     tasks.push_back(task);
     return;
@@ -26,9 +27,16 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
   const TreePair trees{&ta, &tb, same_tree, false};
   const bool limited = foundLimit() != FoundLimit::NONE;
   const std::size_t room = limited ? MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
-  const double left_out_toc = superclusterPairs(trees, found_groups, scratch, room);
-  if (left_out_toc <= 1) cutAt(left_out_toc);
-  if (limited || !context.deadline.isNever()) orderByBound(trees);
+  bool late = false;
+  const double left_out_toc = superclusterPairs(trees, found_groups, scratch, room, [&] {
+    late = late || context.deadline.isOver();
+    return late;
+  });
+  if (left_out_toc <= 1) leaveOutAt(left_out_toc, !late);
+  const auto ordering = ORDERING_A_PAIR * static_cast<std::int64_t>(found_groups.size() / 2);
+  late = late || (found_groups.size() / 2 > TASK_SUPERCLUSTERS && context.deadline.movedBy(-ordering).isOver());
+  task.by_bound = (limited || context.deadline.canEnd()) && !late;
+  if (task.by_bound) orderByBound(trees);
   const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);
   const std::uint32_t count = static_cast<std::uint32_t>(found_groups.size() / 2);
   group_pairs.insert(group_pairs.end(), found_groups.begin(), found_groups.end());
@@ -231,9 +239,9 @@ std::size_t History::Impl::foundLimit() const {
   return limit;
 }
 
-void History::Impl::cutAt(double toc) {
+void History::Impl::leaveOutAt(double toc, bool by_count) {
   result.complete = false;
-  result.cut = true;
+  result.cut = result.cut || by_count;
   result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, toc);
 }
 
@@ -267,13 +275,14 @@ void History::Impl::cutHits() {
     // A worker's later tasks lie behind in its list, and so go with the first.
     task_hits[t].worker->dropHits(task.kind, task_hits[t].begin + (t == cut ? listed : 0));
     if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
-      cutAt(0);
+      leaveOutAt(0, true);
       continue;
     }
+    if (t > cut && task.follows(tasks[t - 1])) continue;
     const TreePair trees{&scene.bodies()[task.body_a].tree(firstKind(task.kind)),
                          &scene.bodies()[task.body_b].tree(secondKind(task.kind)), task.self, false};
-    for (std::size_t p = task.first; p < task.last; ++p) {
-      cutAt(superclusterTocBound(trees, group_pairs[2 * p], group_pairs[2 * p + 1]));
+    for (std::size_t p = task.first; p < (task.by_bound ? task.first + 1 : task.last); ++p) {
+      leaveOutAt(superclusterTocBound(trees, group_pairs[2 * p], group_pairs[2 * p + 1]), true);
     }
   }
 }

@@ -179,6 +179,49 @@ TEST(ClusterPairs, EveryTargetStreamsTheSameInTheSameOrder) {
   forEachSimdTarget([&](const std::string& target) { EXPECT_EQ(streamed(trees), expected) << target; });
 }
 
+// What is kept of a search that is cut are the first pairs of the whole list, and nothing else touches before the
+// bound.
+TEST(ClusterPairs, ASearchThatIsCutKeepsTheFirstAndBoundsTheRest) {
+  const Scene scene(crumpled(4, 1, 90));
+  const ClusterTree& edges = scene.arrays.bodies()[0].tree(FeatureKind::EDGE);
+  TreePair trees;
+  trees.a = trees.b = &edges;
+  trees.self = true;
+  ASSERT_GT(edges.height(), 2u);
+  std::vector<std::uint32_t> all, scratch;
+  const double none_left = superclusterPairs(trees, all, scratch);
+  EXPECT_EQ(none_left, std::numeric_limits<double>::infinity());
+  const std::size_t count = all.size() / 2;
+  ASSERT_GT(count, 200u);
+  const auto expectBounded = [&](const std::vector<std::uint32_t>& kept, double bound, const std::string& what) {
+    ASSERT_LE(kept.size(), all.size()) << what;
+    EXPECT_TRUE(std::equal(kept.begin(), kept.end(), all.begin())) << what;
+    EXPECT_EQ(kept.size() == all.size(), bound == none_left) << what;
+    for (std::size_t p = kept.size() / 2; p < count; ++p) {
+      ASSERT_LE(bound, superclusterTocBound(trees, all[2 * p], all[2 * p + 1])) << what << ", pair " << p;
+    }
+  };
+  std::vector<std::uint32_t> kept;
+  std::size_t positive = 0;
+  for (const std::size_t most : {std::size_t{0}, std::size_t{1}, std::size_t{17}, count / 2, count - 1, count}) {
+    const double bound = superclusterPairs(trees, kept, scratch, most);
+    EXPECT_LE(kept.size(), 2 * most);
+    expectBounded(kept, bound, "at most " + std::to_string(most));
+    positive += most > 0 && !kept.empty();
+  }
+  EXPECT_EQ(positive, 5u);
+  EXPECT_EQ(kept, all);
+  // Time that is up ends it as well, at any look at the clock.
+  int looks = 0;
+  superclusterPairs(trees, kept, scratch, count, [&] { return ++looks < 0; });
+  EXPECT_EQ(kept, all);
+  for (int last = 1; last <= looks; ++last) {
+    int look = 0;
+    const double bound = superclusterPairs(trees, kept, scratch, count, [&] { return ++look >= last; });
+    expectBounded(kept, bound, "cut at look " + std::to_string(last));
+  }
+}
+
 // superclusterTocBound: never after the first contact of any pair of features in the groups.
 TEST(ClusterPairs, BoundsOfGroupsAreNeverLate) {
   std::size_t contacts = 0, positive = 0;

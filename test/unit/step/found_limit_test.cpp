@@ -18,12 +18,12 @@ namespace {
 constexpr std::size_t MIB = std::size_t{1} << 20;
 
 /// A tracked cloth, all of it in one place at the times that are named.
-Step collapsed(std::size_t size, bool at_start, bool at_end) {
+Step collapsed(std::size_t size, bool at_start, bool at_end, const Vec3& at = Vec3(0.1, 0.2, 0.3)) {
   Positions flat;
   for (std::size_t i = 0; i < size * size; ++i) {
     flat.emplace_back(0.01 * static_cast<double>(i % size), 0.012 * static_cast<double>(i / size), 0.0);
   }
-  const Positions point(size * size, Vec3(0.1, 0.2, 0.3));
+  const Positions point(size * size, at);
   Body cloth;
   cloth.name = "cloth";
   cloth.topology = std::make_shared<const Topology>(Topology::grid(size, size));
@@ -52,6 +52,8 @@ void expectCut(const Outcome& outcome, std::size_t limit) {
   EXPECT_NE(outcome.reason.find("at least " + std::to_string(outcome.total_contacts) + " contacts"), std::string::npos)
       << outcome.reason;
 }
+
+Outcome runOnceWith(const Options& options, const Step& step) { return Detector(options).run(step); }
 
 void expectSameAnswer(const Outcome& x, const Outcome& y) {
   EXPECT_EQ(difference(x.contacts, y.contacts), "");
@@ -85,6 +87,34 @@ TEST(FoundLimit, ATrackerThatCollapsesDoesNotCostTheSquare) {
     EXPECT_EQ(outcome.start_state, at_start ? StartState::INTERSECTING : StartState::CLEAR);
     EXPECT_EQ(outcome.start_state_complete, !at_start);
     EXPECT_LT(heapInUse() - before, 30 * MIB);
+  }
+}
+
+// Zeros, more vertices than any that was tried, and two bodies that are the same.
+TEST(FoundLimit, WhateverCoincidesDoesNotCostTheSquare) {
+  std::vector<Step> steps = {collapsed(40, true, true), collapsed(30, false, true, Vec3::Zero()),
+                             collapsed(30, true, true, Vec3::Zero())};
+  Step twins = collapsed(40, false, false);
+  twins.bodies.push_back(twins.bodies[0]);
+  twins.bodies[1].name = "twin";
+  for (Body& body : twins.bodies) {
+    Positions moved = *body.t0;
+    for (Vec3& x : moved) x += Vec3(0.001, 0.002, 0.003);
+    body.t1 = share(moved);
+  }
+  steps.push_back(twins);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    std::size_t limit = 0;
+    for (const Body& body : steps[i].bodies) limit += 2 * features(*body.topology);
+    const std::size_t before = heapInUse();
+    const Outcome outcome = runOnceWith(limited(2), steps[i]);
+    SCOPED_TRACE(i);
+    expectCut(outcome, limit);
+    EXPECT_EQ(outcome.total_contacts, limit);
+    EXPECT_LE(outcome.unchecked_toc_lower, i == 1 ? 1 : 0) << "everything else touches as early";
+    EXPECT_LE(outcome.stats[Stage::ELEMENTARY].in, limit + 4096);
+    EXPECT_LE(outcome.stats[Stage::START_STATE].in, limit + 4096);
+    EXPECT_LT(heapInUse() - before, 60 * MIB);
   }
 }
 

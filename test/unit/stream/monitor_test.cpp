@@ -104,6 +104,29 @@ TEST(StreamLimits, AStepWithoutABudgetEndsAtMaxCompute) {
   }
 }
 
+/// A step and the prediction after it share the time that a step may take.
+TEST(StreamLimits, APredictionHasItsShareOfTheTime) {
+  MonitorOptions options = loose();
+  const auto stepMs = [&] { return Monitor(options, {named("cloth")}).stepMs(); };
+  EXPECT_EQ(stepMs(), 0);
+  options.detector.max_compute_ms = 400;
+  EXPECT_EQ(stepMs(), 400);
+  options.look_ahead_s = 0.1;
+  EXPECT_EQ(stepMs(), 300);
+  options.detector.step_budget_ms = 2e-6;
+  EXPECT_EQ(stepMs(), 1.5e-6);
+  Monitor monitor(options, {named("cloth")});
+  for (const double z : {1.0, -3.0}) {
+    monitor.countReceived(0);
+    monitor.push(0, pair(z > 0 ? 100 * MS : 200 * MS, z), NOW);
+  }
+  Outcome outcome;
+  while (monitor.next(NOW, outcome)) {
+  }
+  EXPECT_EQ(outcome.status, StepStatus::DEADLINE);
+  EXPECT_EQ(monitor.predict().status, StepStatus::DEADLINE);
+}
+
 TEST_F(OneBody, ClearOnlyWhenNothingIsLeftOpen) {
   EXPECT_FALSE(assuranceOf(feed(pair(100 * MS, 1))).clear()) << "one frame is no answer";
   EXPECT_TRUE(assuranceOf(feed(pair(200 * MS, 0.9))).clear());

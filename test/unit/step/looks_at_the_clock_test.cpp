@@ -1,0 +1,161 @@
+// The work between two looks at the clock, counted: the deadline of these tests is over at a look, not at a time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "dccd/detect.h"
+#include "dccd/known_space.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr std::int64_t MANY = std::int64_t{1} << 40;
+
+Outcome runFor(std::int64_t looks, const Step& step, const Options& options, History& history) {
+  std::atomic<std::int64_t> left{looks};
+  return detect(step, options, history, Deadline::afterLooks(left));
+}
+
+Outcome runFor(std::int64_t looks, const Step& step, const Options& options) {
+  History history;
+  return runFor(looks, step, options, history);
+}
+
+std::int64_t looksOf(const Step& step, const Options& options) {
+  std::atomic<std::int64_t> left{MANY};
+  History history;
+  detect(step, options, history, Deadline::afterLooks(left));
+  return MANY - left;
+}
+
+Step cloth(std::size_t side, const std::function<Vec3(std::size_t)>& t0, const std::function<Vec3(std::size_t)>& t1) {
+  Body body;
+  body.name = "cloth";
+  body.topology = std::make_shared<const Topology>(Topology::grid(side, side));
+  Positions from, to;
+  for (std::size_t i = 0; i < side * side; ++i) {
+    from.push_back(t0(i));
+    to.push_back(t1(i));
+  }
+  return stepOf(body, from, to);
+}
+
+/// Coordinates from the smallest denormal double to 0.1 m.
+Step anySize(std::size_t side) {
+  const Draw draw = drawFrom(8);
+  const auto any = [&](std::size_t) {
+    Vec3 x;
+    for (int axis = 0; axis < 3; ++axis) x[axis] = std::ldexp(draw(-999, 999) / 1000.0, draw(-1074, -4));
+    return x;
+  };
+  return cloth(side, any, any);
+}
+
+Step collapse(std::size_t side) {
+  const auto flat = [side](std::size_t i) {
+    return Vec3(0.01 * static_cast<double>(i % side), 0.012 * static_cast<double>(i / side), 0);
+  };
+  return cloth(side, flat, [](std::size_t) { return Vec3(0.1, 0.2, 0.3); });
+}
+
+Step inACheckerboard() {
+  std::vector<OccupiedLeaf> leaves;
+  for (std::uint16_t i = 0; i < 24 * 24 * 24; ++i) {
+    const auto x = static_cast<std::uint16_t>(i % 24), y = static_cast<std::uint16_t>(i / 24 % 24),
+               z = static_cast<std::uint16_t>(i / 24 / 24);
+    if ((x + y + z) % 2 == 0) {
+      leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y),
+                         static_cast<std::uint16_t>(32768 + z)},
+                        1});
+    }
+  }
+  Body triangle;
+  triangle.name = "triangle";
+  triangle.topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
+  Step step = stepOf(triangle, {{-1, -1, -1}, {25, -1, 0}, {0, 25, 1}}, {{-1, -1, 24}, {25, -1, 25}, {0, 25, 26}});
+  step.map.surface = VoxelSurface::build(1.0, leaves);
+  return step;
+}
+
+/// What takes time, and how much of it may lie between two looks: less than half a millisecond.
+std::map<std::string, std::pair<std::uint64_t, std::uint64_t>> workOf(const StepStats& stats) {
+  std::uint64_t slow = 0;
+  for (std::size_t tier = 0; tier < stats.tiers.settled.size(); ++tier) {
+    if (static_cast<Tier>(tier) != Tier::DOUBLE_BATCH) slow += stats.tiers.settled[tier];
+  }
+  return {{"clusters against clusters", {stats[Stage::BROAD_PHASE].in / 256, 2048}},
+          {"pairs in the planar filter", {stats[Stage::PLANAR].in, 4096}},
+          {"pairs in the elementary test", {stats[Stage::ELEMENTARY].in, 4096}},
+          {"pairs that the batch leaves", {slow, 1}},
+          {"pairs with the map", {stats[Stage::OBSTACLE].in, 8192}},
+          {"tests of the start state", {stats[Stage::START_STATE].in, 1024 + 64}}};
+}
+
+TEST(LooksAtTheClock, BetweenTwoLiesLittleWork) {
+  const std::pair<std::string, Step> attacks[] = {{"coordinates of any size", anySize(6)},
+                                                  {"a cloth that collapses", collapse(10)},
+                                                  {"crumpled sheets", crumpled(3, 2, 20).motion()},
+                                                  {"a checkerboard", inACheckerboard()}};
+  constexpr int SAMPLES = 24;
+  for (const auto& [name, step] : attacks) {
+    const Options options;
+    const std::int64_t looks = looksOf(step, options);
+    ASSERT_GT(looks, 2 * SAMPLES) << name;
+    for (int sample = 0; sample < SAMPLES; ++sample) {
+      const std::int64_t at = looks * sample / SAMPLES + sample % 3;
+      const Outcome before = runFor(at, step, options), after = runFor(at + 1, step, options);
+      EXPECT_FALSE(before.complete) << name << ", look " << at << " of " << looks;
+      const auto work_before = workOf(before.stats);
+      for (const auto& [what, done] : workOf(after.stats)) {
+        const std::uint64_t least = std::min(done.first, work_before.at(what).first);
+        EXPECT_LE(done.first - least, done.second) << name << ", look " << at << " of " << looks << ": " << what;
+      }
+    }
+  }
+}
+
+// A mesh so large that its bounds alone take longer than a budget: no pair is looked at, and the next step knows that.
+TEST(LooksAtTheClock, BoundsOfALargeMeshAreMadeInPieces) {
+  const TestStep whole = crumpled(2, 1, 150);
+  const Step step = whole.motion();
+  std::size_t groups = 0;
+  for (const std::size_t features :
+       {step.bodies[0].topology->edges().size(), step.bodies[0].topology->faces().size()}) {
+    groups += features / 16;
+  }
+  const auto looks = static_cast<std::int64_t>(groups / 256);
+  ASSERT_GT(looks, 20);
+  Options options;
+  options.check_start_state = false;
+  History history;
+  const Outcome cut = runFor(looks, step, options, history);
+  EXPECT_EQ(cut.status, StepStatus::DEADLINE);
+  EXPECT_FALSE(cut.complete);
+  EXPECT_EQ(cut.unchecked_toc_lower, 0);
+  EXPECT_TRUE(cut.contacts.empty());
+  EXPECT_EQ(cut.stats[Stage::BROAD_PHASE].in, 0u);
+  // Nothing of bounds that were not made is kept.
+  const Outcome again = runFor(MANY, step, options, history), fresh = runFor(MANY, step, options);
+  EXPECT_TRUE(again.complete);
+  ASSERT_GT(fresh.contacts.size(), 1000u);
+  EXPECT_EQ(difference(again.contacts, fresh.contacts), "");
+}
+
+// A budget that is over before the step begins still bounds a small mesh.
+TEST(LooksAtTheClock, ASmallMeshIsBoundedInAnyCase) {
+  TestStep step = crumpled(2, 2, 12);
+  for (Vec3& x : step.bodies[1].t0) x[2] += 8;
+  for (StepBody& body : step.bodies) body.self_collision = false;
+  const Outcome cut = runFor(0, step.motion(), Options());
+  EXPECT_FALSE(cut.complete);
+  EXPECT_GT(cut.earliest_toc, 0.1);
+  EXPECT_LE(cut.earliest_toc, runOnce(step, Options()).earliest_toc);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
