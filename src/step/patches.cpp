@@ -41,13 +41,15 @@ const char* toString(PatchEventKind kind) {
   return NAMES[static_cast<std::size_t>(kind)];
 }
 
-void PatchMaker::collect(const Outcome& outcome) {
+void PatchMaker::begin(const Outcome& outcome) {
   releaseBurst(touches_);
-  releaseBurst(points_);
+  releaseBurst(places_);
   graph_.setBodies(outcome.step->bodies);
-  touches_.clear();
   contacts_ = outcome.contacts.size();
-  for (const Contact& contact : outcome.contacts) touches_.push_back(graph_.touchOf(contact));
+  touches_.resize(contacts_);
+}
+
+void PatchMaker::connect(const Outcome& outcome) {
   for (const StartIntersection& crossing : outcome.intersections) {
     // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
     if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
@@ -55,10 +57,7 @@ void PatchMaker::collect(const Outcome& outcome) {
   std::sort(touches_.begin() + static_cast<std::ptrdiff_t>(contacts_), touches_.end(),
             [](const Touch& a, const Touch& b) { return a.key() < b.key(); });
   patch_of_ = &graph_.components(touches_);
-}
-
-void PatchMaker::place(const Outcome& outcome, std::size_t first, std::size_t last) {
-  for (std::size_t t = first; t < last; ++t) points_[t] = placeOf(outcome, t);
+  places_.resize(touches_.size());
 }
 
 PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) const {
@@ -99,7 +98,7 @@ void PatchMaker::make(Outcome& outcome) {
     const bool swapped = touch.body[0] > touch.body[1], first = patch.contacts + patch.crossings == 0;
     patch.body = touch.body;
     if (swapped) std::swap(patch.body[0], patch.body[1]);
-    const Place& at = points_[t];
+    const Place& at = places_[t];
     patch.centroid += at.point;
     patch.box.min = patch.box.min.cwiseMin(at.point);
     patch.box.max = patch.box.max.cwiseMax(at.point);
