@@ -43,6 +43,7 @@ class PatchMaker {
   void begin(const Outcome& outcome);
   void connect(const Outcome& outcome);
   Place placeOf(const Outcome& outcome, std::size_t touch) const;
+  Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void make(Outcome& outcome);
   void addAreas(const Outcome& outcome, std::vector<Patch>& patches);
   void findVertexAreas(const Step& step);
