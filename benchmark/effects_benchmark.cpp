@@ -1,5 +1,5 @@
-// What effects cost that a scene does not call for, and what a rope costs: the flag in the wind with every effect
-// `auto` against only self-collision, and a rope of 500 points against itself and a map of 50,000 voxels.
+// What effects cost that a scene does not call for, what patches cost, and what a rope costs: the flag in the wind with
+// every effect `auto` against only self-collision, and a rope of 500 points against itself and a map of 50,000 voxels.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,9 @@
 #include "dccd/stream.h"
 #include "scene/physics/scene_file.h"
 #include "scene/physics/simulation.h"
+#include "support/data.h"
+#include "support/detector.h"
+#include "support/scene_data.h"
 #include "support/timing.h"
 
 namespace dccd {
@@ -77,6 +80,7 @@ std::unique_ptr<Monitor> monitorFor(const Recorded& scene, const EffectSettings&
   options.store.max_vertex_step_m = 0;
   options.detector.obstacle_expected = plan.running(Effect::OCTOMAP);
   options.detector.check_start_state = plan.running(Effect::START_STATE);
+  options.detector.patches = plan.running(Effect::PATCHES);
   Body body;
   body.name = "flag";
   body.self_collision = plan.running(Effect::SELF_COLLISION);
@@ -87,7 +91,7 @@ std::unique_ptr<Monitor> monitorFor(const Recorded& scene, const EffectSettings&
 }
 
 struct Run {
-  double ms = 0;
+  double ms = 0, patches_ms = 0;
   std::size_t contacts = 0, steps = 0;
 };
 
@@ -102,6 +106,7 @@ void feed(Monitor& monitor, const Recorded& scene, std::size_t k, Run& run) {
   monitor.next(0, outcome);
   run.ms += watch.milliseconds();
   run.contacts += outcome.total_contacts;
+  run.patches_ms += outcome.stats[Effect::PATCHES].ms;
   run.steps += outcome.answered;
 }
 
@@ -143,6 +148,80 @@ nlohmann::json measureFlag(const std::string& scene_file, int rounds) {
   return {{"ratio", medianWithInterval(ratios)}, {"auto_ms", spread(auto_ms)},
           {"self_only_ms", spread(self_ms)},     {"vertices", scene.topology->vertexCount()},
           {"voxels", scene.map->leafCount()},    {"required_ratio", 1.05}};
+}
+
+/// What patches and their identities add to the steps of a scene: the same frames with and without, by turns.
+nlohmann::json measurePatchesOfScene(const std::string& scene_file, int rounds) {
+  const Recorded scene = record(scene_file);
+  std::vector<double> ratios, on_ms, off_ms, effect_ms;
+  for (int r = 0; r < rounds + 1; ++r) {
+    const auto with = monitorFor(scene, {}), without = monitorFor(scene, {{Effect::PATCHES, EffectSetting::OFF}});
+    Run on, off;
+    for (std::size_t k = 0; k < scene.frames.size(); ++k) {
+      const bool first = (k + static_cast<std::size_t>(r)) % 2 == 0;
+      if (first) feed(*with, scene, k, on);
+      feed(*without, scene, k, off);
+      if (!first) feed(*with, scene, k, on);
+    }
+    if (on.contacts == 0 || on.contacts != off.contacts) throw std::runtime_error("the scene's contacts are not there");
+    if (r == 0) continue;  // warm-up
+    ratios.push_back(on.ms / off.ms);
+    on_ms.push_back(on.ms / static_cast<double>(on.steps));
+    off_ms.push_back(off.ms / static_cast<double>(off.steps));
+    effect_ms.push_back(on.patches_ms / static_cast<double>(on.steps));
+  }
+  return {{"ratio", medianWithInterval(ratios)},
+          {"on_ms", spread(on_ms)},
+          {"off_ms", spread(off_ms)},
+          {"effect_ms", spread(effect_ms)},
+          {"required_ratio", 1.1}};
+}
+
+/// The same for the one step of a real scene.
+nlohmann::json measurePatchesOfStep(const std::string& name, int rounds) {
+  const test::SceneData data = test::readScene(name);
+  Positions t0, t1;
+  for (const VertexMotion& v : data.vertices) {
+    t0.emplace_back(v.t0[0], v.t0[1], v.t0[2]);
+    t1.emplace_back(v.t1[0], v.t1[1], v.t1[2]);
+  }
+  Body body;
+  body.name = "mesh";
+  body.topology = share(Topology::fromTriangles(t0.size(), data.faces));
+  const dccd::Step step = test::stepOf(body, t0, t1);
+  Options options;
+  options.num_threads = 2;
+  options.keep_bounds = false;
+  test::Detector off(options);
+  options.patches = true;
+  test::Detector on(options);
+  std::vector<double> differences, off_ms, effect_ms;
+  std::size_t contacts = 0, patches = 0;
+  for (int r = 0; r < rounds + 1; ++r) {
+    double ms[2] = {0, 0};
+    for (int k = 0; k < 2; ++k) {
+      const bool with = (k + r) % 2 == 0;
+      test::Detector& detector = with ? on : off;
+      detector.history().clear();
+      const Stopwatch watch;
+      const Outcome outcome = detector.run(step);
+      ms[with] = watch.milliseconds();
+      if (!with) continue;
+      contacts = outcome.contacts.size();
+      patches = outcome.patches.size();
+      if (r > 0) effect_ms.push_back(outcome.stats[Effect::PATCHES].ms);
+    }
+    if (r == 0) continue;  // warm-up
+    differences.push_back(ms[1] - ms[0]);
+    off_ms.push_back(ms[0]);
+  }
+  return {{"difference_ms", medianWithInterval(differences)},
+          {"off_ms", spread(off_ms)},
+          {"effect_ms", spread(effect_ms)},
+          {"contacts", contacts},
+          {"patches", patches},
+          {"threads", 2},
+          {"required_ms", 8}};
 }
 
 /// A rope in a figure of eight over an uneven floor, dragged a little in each step; it lies on itself where it crosses.
@@ -209,17 +288,23 @@ nlohmann::json measureRope(int repeat) {
 
 int main(int argc, char** argv) {
   std::string out, scene = std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/flag_in_wind.yaml";
+  std::string touching = std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/table_edge.yaml";
   int rounds = 41;
   CLI::App app("Times effects that a scene does not call for, and a rope.");
   app.add_option("--out", out, "JSON file to write")->required();
   app.add_option("--scene", scene, "scene of one sheet that touches nothing")->check(CLI::ExistingFile);
+  app.add_option("--touching", touching, "scene of one sheet, for the cost of patches")->check(CLI::ExistingFile);
   app.add_option("--rounds", rounds, "interleaved rounds over the scene")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
     nlohmann::json result{{"machine", dccd::benchmarks::machine()},
                           {"flag", dccd::benchmarks::measureFlag(scene, rounds)},
-                          {"rope", dccd::benchmarks::measureRope(40 * rounds)}};
-    std::cerr << result["flag"].dump() << '\n' << result["rope"].dump() << '\n';
+                          {"rope", dccd::benchmarks::measureRope(40 * rounds)},
+                          {"patches", {{"demo", dccd::benchmarks::measurePatchesOfScene(touching, rounds)}}}};
+    if (!dccd::test::dataDir().empty()) {
+      result["patches"]["cloth-ball"] = dccd::benchmarks::measurePatchesOfStep("cloth-ball", rounds);
+    }
+    for (const char* part : {"flag", "rope", "patches"}) std::cerr << result[part].dump() << '\n';
     std::ofstream(out) << result.dump(1) << '\n';
   } catch (const std::exception& e) {
     std::cerr << "effects_benchmark: " << e.what() << '\n';

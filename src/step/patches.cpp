@@ -43,13 +43,15 @@ const char* toString(PatchEventKind kind) {
   return NAMES[static_cast<std::size_t>(kind)];
 }
 
-void PatchMaker::collect(const Outcome& outcome) {
+void PatchMaker::begin(const Outcome& outcome) {
   releaseBurst(touches_);
-  releaseBurst(points_);
+  releaseBurst(places_);
   graph_.setBodies(outcome.step->bodies);
-  touches_.clear();
   contacts_ = outcome.contacts.size();
-  for (const Contact& contact : outcome.contacts) touches_.push_back(graph_.touchOf(contact));
+  touches_.resize(contacts_);
+}
+
+void PatchMaker::connect(const Outcome& outcome) {
   for (const StartIntersection& crossing : outcome.intersections) {
     // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
     if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
@@ -57,10 +59,7 @@ void PatchMaker::collect(const Outcome& outcome) {
   std::sort(touches_.begin() + static_cast<std::ptrdiff_t>(contacts_), touches_.end(),
             [](const Touch& a, const Touch& b) { return a.key() < b.key(); });
   patch_of_ = &graph_.components(touches_);
-}
-
-void PatchMaker::place(const Outcome& outcome, std::size_t first, std::size_t last) {
-  for (std::size_t t = first; t < last; ++t) points_[t] = placeOf(outcome, t);
+  places_.resize(touches_.size());
 }
 
 PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) const {
@@ -74,7 +73,8 @@ PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) con
     return {throughPlane((*a.t0)[local(0, 0)], (*a.t0)[local(1, 0)], f0, (f1 - f0).cross(f2 - f0)), Vec3::Zero()};
   }
   const Contact& contact = outcome.contacts[t];
-  if (touch.onMap() || outcome.substeps > 1) {
+  if (touch.onMap() && outcome.substeps == 1) return placeOnMap(outcome, contact);
+  if (outcome.substeps > 1) {
     const ContactGeometry geometry = contactGeometry(outcome, contact);
     return {geometry.point, geometry.normal};
   }
@@ -92,6 +92,36 @@ PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) con
   return {0.5 * (closest.on_first + closest.on_second), towards((a1 - a0).cross(b1 - b0), a0 - b0)};
 }
 
+/// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.
+PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& contact) const {
+  const Eigen::Isometry3d& map_from_fixed = outcome.step->map.map_from_fixed;
+  const Body& body = outcome.step->bodies[contact.body[0]];
+  const auto at = [&](int i) -> Vec3 { return map_from_fixed * along(body, contact.vertex[i], contact.toc_lower); };
+  const double resolution_m = outcome.obstacle->resolution(), half_m = 0.5 * contact.voxel_size * resolution_m;
+  const Vec3 center = Vec3(voxelPlane(contact.voxel.x, resolution_m), voxelPlane(contact.voxel.y, resolution_m),
+                           voxelPlane(contact.voxel.z, resolution_m)) +
+                      Vec3::Constant(half_m);
+  Vec3 point = at(0), normal;
+  if (contact.kind == PairKind::VERTEX_VOXEL_FACE) {
+    int axis = 0;
+    (point - center).cwiseAbs().maxCoeff(&axis);
+    normal = (point[axis] < center[axis] ? -1 : 1) * Vec3::Unit(axis);
+  } else if (contact.kind == PairKind::EDGE_VOXEL_EDGE) {
+    const Closest closest = closestOnSegments(point, at(1), center, center);
+    normal = unitOr(closest.on_first - center, Vec3::Zero());
+    point = closest.on_first;
+  } else {
+    const Vec3 corner = point;
+    normal = unitOr((at(1) - corner).cross(at(2) - corner), Vec3::Zero());
+    const double above = normal.dot(corner - center);
+    point = center + above * normal;
+    if (above < 0) normal = -normal;
+  }
+  point = point.cwiseMax(center - Vec3::Constant(half_m)).cwiseMin(center + Vec3::Constant(half_m));
+  const Eigen::Matrix3d turn = map_from_fixed.linear().transpose();
+  return {turn * (point - map_from_fixed.translation()), turn * normal};
+}
+
 void PatchMaker::make(Outcome& outcome) {
   std::vector<Patch>& patches = outcome.patches;
   patches.resize(graph_.componentCount());
@@ -101,7 +131,7 @@ void PatchMaker::make(Outcome& outcome) {
     const bool swapped = touch.body[0] > touch.body[1], first = patch.contacts + patch.crossings == 0;
     patch.body = touch.body;
     if (swapped) std::swap(patch.body[0], patch.body[1]);
-    const Place& at = points_[t];
+    const Place& at = places_[t];
     patch.centroid += at.point;
     patch.box.min = patch.box.min.cwiseMin(at.point);
     patch.box.max = patch.box.max.cwiseMax(at.point);

@@ -16,9 +16,14 @@ class PatchMaker {
   /// made; parallel(n, piece, f) calls f(first, last) over [0, n).
   template <class Parallel>
   void run(const Parallel& parallel, Outcome& outcome) {
-    collect(outcome);
-    points_.resize(touches_.size());
-    parallel(touches_.size(), PIECE, [&](std::size_t first, std::size_t last) { place(outcome, first, last); });
+    begin(outcome);
+    parallel(contacts_, PIECE, [&](std::size_t first, std::size_t last) {
+      for (std::size_t c = first; c < last; ++c) touches_[c] = graph_.touchOf(outcome.contacts[c]);
+    });
+    connect(outcome);
+    parallel(touches_.size(), PIECE, [&](std::size_t first, std::size_t last) {
+      for (std::size_t t = first; t < last; ++t) places_[t] = placeOf(outcome, t);
+    });
     make(outcome);
   }
   /// Of the contacts that are listed in the end, which are some of those before: to which patch each belongs.
@@ -35,9 +40,10 @@ class PatchMaker {
     Vec3 point, normal;
   };
 
-  void collect(const Outcome& outcome);
-  void place(const Outcome& outcome, std::size_t first, std::size_t last);
+  void begin(const Outcome& outcome);
+  void connect(const Outcome& outcome);
   Place placeOf(const Outcome& outcome, std::size_t touch) const;
+  Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void make(Outcome& outcome);
   void addAreas(const Outcome& outcome, std::vector<Patch>& patches);
   void findVertexAreas(const Step& step);
@@ -45,7 +51,7 @@ class PatchMaker {
   TouchGraph graph_;
   std::vector<Touch> touches_;
   const std::vector<std::uint32_t>* patch_of_ = nullptr;
-  std::vector<Place> points_;
+  std::vector<Place> places_;
   std::vector<double> vertex_area_;  // per vertex of all bodies: a third of the faces around it [m^2]
   std::vector<double> areas_;        // two sides a patch
   std::vector<std::uint32_t> last_point_;

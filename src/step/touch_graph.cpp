@@ -107,15 +107,6 @@ void TouchGraph::join(std::uint32_t a, std::uint32_t b) {
   if (a != b) parent_[std::max(a, b)] = std::min(a, b);
 }
 
-/// All touches at the point are in one set.
-bool TouchGraph::joined(std::size_t point) {
-  const std::uint32_t first = root(entries_[begin_[point]] >> 1);
-  for (std::uint32_t i = begin_[point] + 1; i < begin_[point + 1]; ++i) {
-    if (root(entries_[i] >> 1) != first) return false;
-  }
-  return true;
-}
-
 void TouchGraph::numberLeaves() {
   const std::vector<Touch>& touches = *touches_;
   const auto is_before = [](std::uint8_t kind) { return [kind](const Touch& t) { return t.kind < kind; }; };
@@ -152,61 +143,95 @@ void TouchGraph::listByPoint() {
   }
 }
 
-std::uint32_t TouchGraph::nextTag() {
+void TouchGraph::beginPlace() {
   if (tag_ == std::numeric_limits<std::uint32_t>::max()) {
     std::fill(marks_.begin(), marks_.end(), Mark());
+    std::fill(seen_.begin(), seen_.end(), Mark());
     tag_ = 0;
   }
+  ++tag_;
   marked_.clear();
-  return ++tag_;
+  sets_.clear();
 }
 
-/// The touch is at the point, as far as the present tag goes.
-void TouchGraph::mark(Index point, std::uint32_t touch) {
+/// The number, at this place, of the set that the touch is in: there are few, and they lie together.
+std::uint32_t TouchGraph::setOf(std::uint32_t touch) {
+  const std::uint32_t r = root(touch);
+  Mark& seen = seen_[r];
+  if (seen.tag != tag_) {
+    seen = {tag_, static_cast<std::uint32_t>(sets_.size())};
+    sets_.push_back({seen.set, r});
+  }
+  return seen.set;
+}
+
+void TouchGraph::joinSets(std::uint32_t a, std::uint32_t b) {
+  while (sets_[a].parent != a) a = sets_[a].parent = sets_[sets_[a].parent].parent;
+  while (sets_[b].parent != b) b = sets_[b].parent = sets_[sets_[b].parent].parent;
+  sets_[std::max(a, b)].parent = std::min(a, b);
+}
+
+/// What was joined at this place.
+void TouchGraph::endPlace() {
+  for (const Set& set : sets_) join(set.root, sets_[set.parent].root);
+}
+
+/// Something of the set is at the point.
+void TouchGraph::mark(Index point, std::uint32_t set) {
   Mark& mark = marks_[point];
-  if (mark.tag == tag_) return join(mark.touch, touch);
-  mark = {tag_, touch};
-  marked_.push_back(point);
-}
-
-/// The touch is at the point, and some of the marked ones at its neighbours.
-void TouchGraph::joinNeighbours(Index point, std::uint32_t touch) {
-  const Span near = neighbours(point);
-  if (near.size() <= marked_.size()) {
-    for (const Index other : near) {
-      if (marks_[other].tag == tag_) join(touch, marks_[other].touch);
-    }
-  } else {  // a vertex in the middle of many
-    for (const Index other : marked_) {
-      if (std::binary_search(near.begin(), near.end(), other)) join(touch, marks_[other].touch);
-    }
+  if (mark.tag != tag_) {
+    mark = {tag_, set};
+    marked_.push_back(point);
+  } else if (mark.set != set) {
+    joinSets(mark.set, set);
   }
 }
 
+/// Marked points that an edge joins.
 void TouchGraph::joinMarked() {
-  for (const Index point : marked_) joinNeighbours(point, marks_[point].touch);
+  for (const Index point : marked_) {
+    const Span near = neighbours(point);
+    const std::uint32_t set = marks_[point].set;
+    if (near.size() <= marked_.size()) {
+      for (const Index other : near) {
+        if (other > point) break;  // that one comes to this
+        if (marks_[other].tag == tag_ && marks_[other].set != set) joinSets(set, marks_[other].set);
+      }
+    } else {  // a vertex in the middle of many
+      for (const Index other : marked_) {
+        if (marks_[other].set != set && std::binary_search(near.begin(), near.end(), other)) {
+          joinSets(set, marks_[other].set);
+        }
+      }
+    }
+  }
 }
 
 /// Between meshes, of what shares the vertex on one side: what shares a vertex, or an edge, on the other.
 void TouchGraph::joinAtVertex(Index vertex) {
-  if (begin_[vertex + 1] - begin_[vertex] < 2 || joined(vertex)) return;
-  nextTag();
+  if (begin_[vertex + 1] - begin_[vertex] < 2) return;
+  beginPlace();
+  at_place_.clear();
   for (std::uint32_t i = begin_[vertex]; i < begin_[vertex + 1]; ++i) {
-    const std::uint32_t touch = entries_[i] >> 1;
-    if ((*touches_)[touch].onMap()) continue;
-    for (const Index other : side(touch, 1 - static_cast<int>(entries_[i] & 1))) mark(other, touch);
+    if (!(*touches_)[entries_[i] >> 1].onMap()) at_place_.push_back({entries_[i], setOf(entries_[i] >> 1)});
+  }
+  if (sets_.size() < 2) return;
+  for (const auto& [entry, set] : at_place_) {
+    for (const Index other : side(entry >> 1, 1 - static_cast<int>(entry & 1))) mark(other, set);
   }
   joinMarked();
+  endPlace();
 }
 
 /// With the map: what shares a vertex, or an edge, of the mesh. Its leaves come and go, and a cloth that is coarser
 /// than they are meets few of those below it.
 void TouchGraph::joinOnMap() {
-  nextTag();
+  beginPlace();
   for (std::uint32_t t = map_begin_; t < map_end_; ++t) {
-    for (const Index vertex : side(t, 0)) mark(vertex, t);
+    for (const Index vertex : side(t, 0)) mark(vertex, setOf(t));
   }
   joinMarked();
+  endPlace();
 }
 
 const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch>& touches) {
@@ -215,6 +240,7 @@ const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch
   numberLeaves();
   listByPoint();
   parent_.resize(count);
+  seen_.assign(count, Mark());
   for (std::uint32_t t = 0; t < count; ++t) parent_[t] = t;
   joinOnMap();
   for (Index vertex = 0; vertex < vertexCount(); ++vertex) joinAtVertex(vertex);

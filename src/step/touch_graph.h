@@ -76,19 +76,23 @@ class TouchGraph {
     std::size_t size() const { return static_cast<std::size_t>(last - first); }
   };
   struct Mark {
-    std::uint32_t tag = 0, touch = 0;
+    std::uint32_t tag = 0, set = 0;
+  };
+  struct Set {
+    std::uint32_t parent, root;
   };
 
   Span side(std::uint32_t touch, int side) const;
   Span neighbours(Index vertex) const;
   std::uint32_t root(std::uint32_t touch);
   void join(std::uint32_t a, std::uint32_t b);
-  bool joined(std::size_t point);
   void numberLeaves();
   void listByPoint();
-  std::uint32_t nextTag();
-  void mark(Index point, std::uint32_t touch);
-  void joinNeighbours(Index point, std::uint32_t touch);
+  void beginPlace();
+  std::uint32_t setOf(std::uint32_t touch);
+  void joinSets(std::uint32_t a, std::uint32_t b);
+  void endPlace();
+  void mark(Index point, std::uint32_t set);
   void joinMarked();
   void joinOnMap();
   void joinAtVertex(Index vertex);
@@ -103,7 +107,10 @@ class TouchGraph {
   std::uint32_t map_begin_ = 0, map_end_ = 0;
   std::vector<std::uint32_t> begin_, entries_;  // by point: touch << 1 | the side that the point is on
   std::vector<std::uint32_t> parent_;
-  std::vector<Mark> marks_;
+  // Of one place, with its tag: sets of touches that meet there, and where they are on the other side.
+  std::vector<Mark> marks_, seen_;  // per point; per root
+  std::vector<Set> sets_;
+  std::vector<std::array<std::uint32_t, 2>> at_place_;  // entry, set
   std::vector<Index> marked_;
   std::uint32_t tag_ = 0;
   std::vector<std::uint32_t> component_;
