@@ -126,7 +126,9 @@ nlohmann::json medianWithInterval(std::vector<double> values) {
 
 nlohmann::json measureFlag(const std::string& scene_file, int rounds) {
   const Recorded scene = record(scene_file);
-  const EffectSettings only_self = {{Effect::OCTOMAP, EffectSetting::OFF}, {Effect::START_STATE, EffectSetting::OFF}};
+  const EffectSettings only_self = {{Effect::OCTOMAP, EffectSetting::OFF},
+                                    {Effect::START_STATE, EffectSetting::OFF},
+                                    {Effect::PATCHES, EffectSetting::OFF}};
   std::vector<double> ratios, auto_ms, self_ms;
   for (int r = 0; r < rounds + 1; ++r) {
     const auto everything = monitorFor(scene, {}), self = monitorFor(scene, only_self);

@@ -37,11 +37,11 @@ RUNG = {
          '{"exact", makeExactRung, false, true},\n    {"toy", makeToyRung, false, false},\n')],
 }
 EFFECT = {
-    'include/dccd/outcome.h': (r'contacts' + '\n  COUNT\n', 'contacts\n  TOY,\n  COUNT\n'),
+    'include/dccd/outcome.h': (r'patches' + '\n  COUNT\n', 'patches\n  TOY,\n  COUNT\n'),
     'src/step/effect_plan.cpp': [
         ('/// By Effect:', 'Finding toy(const EffectScene& scene) {\n  return {scene.bodies.size() > 1, true, "toys like company"};\n}\n\n'
                           '/// By Effect:'),
-        ('{"look_ahead", lookAhead},\n', '{"look_ahead", lookAhead},\n    {"toy", toy},\n')],
+        ('{"patches", patches},\n', '{"patches", patches},\n    {"toy", toy},\n')],
 }
 USER = r'''
 #include <dccd/accuracy.h>
