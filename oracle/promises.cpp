@@ -69,11 +69,10 @@ std::string brokenPromise(const AccuracyOptions& options, const Query& query, st
     return isCellOf(*toc, result, options.toc_bits) ? "" : "not the cell of the time of contact";
   }
   if (toc && tocError(*toc, result.toc_lower) < 0) return "the contact is reported late";
-  if (result.verdict == Verdict::CONTACT &&
-      !isWithin(query.kind, query.motion, result.toc_lower, options.tolerance_m)) {
+  if (result.verdict != Verdict::CONTACT) return "";
+  if (!isWithin(query.kind, query.motion, result.toc_lower, options.tolerance_m)) {
     return "at the reported time the features are more than the tolerance apart";
   }
-  if (!claims_nearness) return "";
   if (toc && tocError(*toc, result.toc_upper) > 0) return "the contact comes after the interval";
   return brokenInterval(options, query, 0, result);
 }
