@@ -128,7 +128,7 @@ def main():
     lines = (hard_page(result, pictures) if "hard" in result else []) + (cliffs_page(result) if "cliffs" in result else [])
     path = os.path.join(arguments.out, "hard_cases.md")
     with open(path, "w") as out:
-        out.write("\n".join(lines).strip() + "\n")
+        out.write("\n".join(lines).strip().replace("**  |", "** |") + "\n")
     print(path)
 
 
