@@ -177,8 +177,8 @@ nlohmann::json exampleOf(const StructuredPairs& set) {
 
 int run(int argc, char** argv) {
   CLI::App app{"What hard pairs cost, which tier answers, and what the usual methods make of them"};
-  int cells = 60, repeats = 9;
-  std::size_t judge = 300, count = 2000;
+  int cells = 30, repeats = 9;
+  std::size_t judge = 100, count = 1000;
   std::string out;
   bool cliffs = false, hard = false;
   app.add_flag("--cliffs", cliffs, "structured input against the same perturbed");

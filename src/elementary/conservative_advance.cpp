@@ -301,7 +301,7 @@ class Advancement {
     const double slack = 2 * point_error_ + 4 * LENGTH_ERROR * near_;
     bool apart = true;
     const auto parted = [&] { return Approach{t, apart ? Verdict::NO_CONTACT : Verdict::CONTACT}; };
-    while (goesOn()) {
+    do {  // the first step is that of run()
       if (atMost(points.vector) <= d) return {t, Verdict::CONTACT};
       const Path path = {points.vector, pathAt(points, 1) - points.vector};
       if (!isNear(points.vector)) return parted();
@@ -320,7 +320,7 @@ class Advancement {
       if (atMost(vector) <= d) return {t, Verdict::CONTACT};
       if (t >= 1) return parted();
       points = connectionAt(t);
-    }
+    } while (goesOn());
     return {t, Verdict::UNDECIDED};
   }
 

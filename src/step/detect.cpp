@@ -27,7 +27,7 @@ constexpr std::size_t PIECE = 256;             // groups or vertices in a unit o
 constexpr std::size_t PIECES_IN_ANY_CASE = 8;  // so that a budget too small for anything still bounds a small mesh
 
 /// Erases what cannot be the first contact: it begins after another one has certainly happened. How wide a bracket is
-/// says nothing: `conservative` may find the first contact at once, in [0, 1], and a later one in a narrow bracket.
+/// says nothing: the first contact may begin in a wide one, and a later one in a narrow bracket.
 /// cells: the brackets are cells that do not overlap, and where one ends, the next begins (the last, [1, 1], as well).
 void keepFirst(bool cells, std::vector<Contact>& contacts) {
   double lower = 2, upper = 2;

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstdlib>
+#include <iostream>
 #include <memory>
 #include <sstream>
 
@@ -11,6 +13,7 @@
 #include "support/flush_to_zero.h"
 #include "support/generators.h"
 #include "support/query_property.h"
+#include "support/simd_targets.h"
 
 namespace dccd {
 namespace test {
@@ -125,48 +128,92 @@ TEST(ElementaryExact, CellsOfAllWidthsContainEachOther) {
   });
 }
 
+/// A chunk of pairs of one kind, as a batch wants them.
+struct Chunk {
+  std::vector<Query> queries;
+  std::vector<VertexMotion> vertices;
+  std::vector<Quad> quads;
+
+  void add(const Query& query) {
+    Quad quad;
+    for (int i = 0; i < 4; ++i) {
+      VertexMotion vertex{};
+      std::copy_n(query.motion.x[0][i], 3, vertex.t0);
+      std::copy_n(query.motion.x[1][i], 3, vertex.t1);
+      quad[i] = static_cast<Index>(vertices.size());
+      vertices.push_back(vertex);
+    }
+    quads.push_back(quad);
+    queries.push_back(query);
+  }
+
+  std::vector<ElementaryResult> run(const Rung& rung, TierCounters& counters) const {
+    PairBatch batch;
+    batch.kind = queries.front().kind;
+    batch.vertices = vertices.data();
+    batch.pairs = quads.data();
+    batch.count = quads.size();
+    std::vector<ElementaryResult> results(quads.size());
+    rung.run(batch, results.data(), counters);
+    return results;
+  }
+};
+
+Chunk hardChunk(RandomSource& random, PairKind kind, std::size_t count) {
+  Chunk chunk;
+  while (chunk.queries.size() < count) chunk.add(hardQuery(random, kind));
+  return chunk;
+}
+
+// The oracle's answer once, every target's against it. With --long ten million pairs, and as many as
+// DEFORMABLE_CCD_HARD_PAIRS says where that is set.
+TEST(ElementaryExact, EveryTargetGivesTheOraclesAnswers) {
+  constexpr std::size_t CHUNK = 500;
+  const char* asked = std::getenv("DEFORMABLE_CCD_HARD_PAIRS");
+  const std::size_t pairs = asked ? std::strtoull(asked, nullptr, 10) : longRun() ? 10000000 : 10000;
+
+  RandomSource random(propertySeed());
+  const auto test = makeRung(exactOptions(32));
+  std::size_t judged = 0, contacts = 0;
+  for (int round = 0; judged < pairs; ++round) {
+    const Chunk chunk = hardChunk(random, round % 2 ? PairKind::EDGE_EDGE : PairKind::VERTEX_FACE, CHUNK);
+    std::vector<std::optional<Root>> truth;
+    for (const Query& query : chunk.queries) truth.push_back(firstContact(query.kind, query.motion));
+    forEachTarget([&](const std::string& target) {
+      TierCounters counters;
+      const std::vector<ElementaryResult> results = chunk.run(*test, counters);
+      for (std::size_t i = 0; i < results.size(); ++i) {
+        const std::string broken = brokenPromise(exactOptions(32), chunk.queries[i], truth[i], results[i]);
+        ASSERT_EQ(broken, "") << target << ": " << described(results[i]) << "\nreplay: run_queries "
+                              << writeReplayFile("exact-targets", chunk.queries[i]);
+      }
+    });
+    if (HasFatalFailure()) return;
+    judged += chunk.queries.size();
+    for (const auto& toc : truth) contacts += toc.has_value();
+    if (judged % 100000 == 0) std::cout << judged << " pairs judged, " << contacts << " contacts" << std::endl;
+  }
+  std::cout << judged << " hard pairs on " << simdTargets().size() << " targets, " << contacts << " contacts\n";
+}
+
 // Lanes must not disturb each other, whatever stands beside a pair and wherever in the batch it stands.
 TEST(ElementaryExact, BatchesAnswerLikeSinglePairs) {
   const auto test = makeRung(exactOptions(32));
   RandomSource random(11);
   const int rounds = longRun() ? 2000 : 60;
   for (int round = 0; round < rounds; ++round) {
-    const PairKind kind = round % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
-    std::vector<Query> queries;
     const std::size_t count = 1 + random() % 600;
-    while (queries.size() < count) {
-      const Query query = hardQuery(random);
-      if (query.kind == kind) queries.push_back(query);
-    }
-    std::vector<VertexMotion> vertices;
-    std::vector<Quad> quads;
-    for (const Query& query : queries) {
-      Quad quad;
-      for (int i = 0; i < 4; ++i) {
-        VertexMotion vertex{};
-        std::copy_n(query.motion.x[0][i], 3, vertex.t0);
-        std::copy_n(query.motion.x[1][i], 3, vertex.t1);
-        quad[i] = static_cast<Index>(vertices.size());
-        vertices.push_back(vertex);
-      }
-      quads.push_back(quad);
-    }
-    PairBatch batch;
-    batch.kind = kind;
-    batch.vertices = vertices.data();
-    batch.pairs = quads.data();
-    batch.count = quads.size();
-    std::vector<ElementaryResult> results(count);
+    const Chunk chunk = hardChunk(random, round % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE, count);
     TierCounters counters;
-    test->run(batch, results.data(), counters);
+    const std::vector<ElementaryResult> results = chunk.run(*test, counters);
     std::uint64_t settled = 0;
     for (std::uint64_t tier : counters.settled) settled += tier;
     EXPECT_EQ(settled, count) << "every pair is settled by one tier";
     for (std::size_t i = 0; i < count; ++i) {
-      const ElementaryResult single = testQuery(*test, queries[i]);
+      const ElementaryResult single = testQuery(*test, chunk.queries[i]);
       ASSERT_TRUE(sameAnswer(results[i], single) && results[i].tier == single.tier)
           << "pair " << i << " of " << count << ": " << described(results[i]) << ", alone " << described(single)
-          << "\nreplay: run_queries " << writeReplayFile("exact-batch", queries[i]);
+          << "\nreplay: run_queries " << writeReplayFile("exact-batch", chunk.queries[i]);
     }
   }
 }
