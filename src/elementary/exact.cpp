@@ -8,8 +8,8 @@
 #include "dccd/elementary.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
-#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
+#include "simd/float_mode.h"
 
 namespace dccd {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "dccd/elementary.h"
-#include "elementary/float_mode.h"
 #include "simd/exact_batch.h"
+#include "simd/float_mode.h"
 
 namespace dccd {
 namespace {

@@ -16,7 +16,7 @@
 #include "culling/scene_arrays.h"
 #include "culling/unfolded.h"
 #include "dccd/detect.h"
-#include "elementary/float_mode.h"
+#include "simd/float_mode.h"
 #include "step/expected_contacts.h"
 #include "step/fork_join.h"
 #include "step/hit_order.h"
