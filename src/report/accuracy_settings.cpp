@@ -23,7 +23,11 @@ std::optional<Line> parse(std::string text) {
   if (kind != "VF" && kind != "EE") throw std::runtime_error("'" + kind + "' is neither VF nor EE");
   std::array<Index, 4> vertices{};
   for (Index& vertex : vertices) {
-    if (!(in >> vertex)) throw std::runtime_error("four vertices are needed");
+    long long number = -1;
+    if (!(in >> number) || number < 0 || number >= NO_INDEX) {
+      throw std::runtime_error("four vertices are needed, numbered from 0");
+    }
+    vertex = static_cast<Index>(number);
   }
   Line line{KnownContacts::pairOf(kind == "VF" ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE, vertices), std::nullopt};
   TimeCell cell{};

@@ -153,12 +153,14 @@ TEST(StepReplay, PatchesAreRecordedAndMadeAgain) {
   EXPECT_EQ(replayStep(read).differences.size(), 1u);
 }
 
+constexpr std::size_t PATCHES_SIZE = 17;  // of a recording without any: a flag and two empty lists
+
 TEST(StepRecording, AFileOfTheVersionBeforePatchesIsRead) {
   std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
-  bytes[8] = 3;
-  bytes.resize(bytes.size() - 17);  // a flag and two empty lists
+  bytes[8] = 4;
+  bytes.resize(bytes.size() - PATCHES_SIZE);
   const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
-  EXPECT_EQ(read.version, 3u);
+  EXPECT_EQ(read.version, 4u);
   EXPECT_FALSE(read.options.patches);
   EXPECT_TRUE(replayStep(read).differences.empty());
 }
@@ -219,7 +221,7 @@ TEST(StepRecording, WhatIsExpectedIsKeptAndReplayed) {
 TEST(StepRecording, AFileWithoutExpectedContactsIsReadAndReplayed) {
   const StepRecording r = recordScene();
   std::vector<std::uint8_t> bytes = recordingBytes(r);
-  bytes.resize(bytes.size() - (8 + r.answer.contacts.size() + r.answer.intersections.size() + 8 + 8));
+  bytes.resize(bytes.size() - PATCHES_SIZE - (8 + r.answer.contacts.size() + r.answer.intersections.size() + 8 + 8));
   bytes[8] = 3;
   const StepRecording old = readRecording(bytes.data(), bytes.size(), "FILE");
   EXPECT_EQ(old.version, 3u);

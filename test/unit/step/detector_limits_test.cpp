@@ -45,11 +45,11 @@ TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
   }
 }
 
-// The brackets of `conservative` are as wide as the way to them was short: a contact found at once ends at 1, and is
-// the first all the same.
+// Where a distance stays within the tolerance of the separation, no time says more than another: the bracket ends at 1,
+// and the contact is the first all the same.
 TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
   TestStep step = crossing();      // body 1 meets body 0 at 0.5, in a narrow bracket
-  StepBody near = step.bodies[0];  // too close to body 0 from the start: the bracket is [0, 1]
+  StepBody near = step.bodies[0];  // all the while as far from body 0 as the separation: the bracket is [0, 1]
   for (Positions* x : {&near.t0, &near.t1}) {
     for (Vec3& p : *x) p.z() -= 0.05;
   }
@@ -59,10 +59,12 @@ TEST(DetectorLimits, EarliestOnlyKeepsTheFirstOfUnequalBrackets) {
   options.check_start_state = false;
   Step motion = step.motion();
   for (Body& body : motion.bodies) body.self_collision = false;
-  motion.bodies[2].separations = {{0, 0.1}};
+  motion.bodies[2].separations = {{0, 0.05}};
   const auto run = [&] { return Detector(options).run(motion); };
   const Outcome full = run();
   ASSERT_EQ(full.earliest_toc, 0);
+  ASSERT_TRUE(std::any_of(full.contacts.begin(), full.contacts.end(),
+                          [](const Contact& c) { return c.toc_lower == 0 && c.toc_upper == 1; }));
   const auto narrow = [](const Contact& c) { return c.toc_lower > 0.49 && c.toc_upper < 0.51; };
   ASSERT_TRUE(std::any_of(full.contacts.begin(), full.contacts.end(), narrow)) << "nothing to take for the first";
   options.earliest_only = true;
