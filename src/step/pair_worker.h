@@ -130,8 +130,8 @@ class PairWorker {
   bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
   const LeftOutOfBody* left_out_ = nullptr;
   std::size_t count_ = 0;
-  std::size_t bounds_ = 0;  // that were asked for in this step
-  bool late_ = false;       // there is no time for more
+  std::size_t bounds_ = 0;   // that were asked for in this step
+  bool late_ = false;        // there is no time for more
   double separated_ms_ = 0;  // of the task, that count for a separation or an uncertainty
   std::vector<Hit> hits_[2];
   StepStats stats_;
