@@ -37,6 +37,7 @@ struct Attack {
 Options asInTheNode() {
   Options options;
   options.max_contacts = 10000;
+  options.patches = true;
   options.max_found = (std::size_t{512} << 20) / 4 / tolerance::BYTES_PER_CONTACT;
   options.max_found_per_feature = tolerance::CONTACTS_PER_FEATURE;
   return options;

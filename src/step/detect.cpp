@@ -18,6 +18,7 @@ namespace {
 
 using Clock = Deadline::Clock;
 
+constexpr double PATCHES_SHARE = 0.4;         // of a step's time at most
 constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
 constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
 constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
@@ -97,6 +98,12 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   // What is made once for many steps is not taken from the time of the first.
   const Clock::time_point begun = Clock::now();
   deadline = deadline.movedBy(begun - called);
+  if (options->patches && !deadline.isNever()) {
+    // Patches come after all else and are not cut: what they took last time is kept for them, up to a share.
+    const auto share = std::chrono::duration_cast<Clock::duration>(PATCHES_SHARE * (deadline.at() - begun));
+    deadline =
+        deadline.movedBy(-std::clamp(patches_took, Clock::duration::zero(), std::max(share, Clock::duration::zero())));
+  }
   const bool continues = carried.isContinuedBy(step);
   if (!continues) carried.clear();
   Outcome outcome;
@@ -131,6 +138,7 @@ void History::Impl::findPatches(Outcome& outcome) {
   const Clock::time_point start = Clock::now();
   patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);
   StageStats& stats = outcome.stats[Effect::PATCHES];
+  patches_took = Clock::now() - start;
   stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
 }
 

@@ -150,6 +150,7 @@ struct History::Impl {
   HitOrder order;
   PartResult result;
   PatchMaker patches;
+  Deadline::Clock::duration patches_took{0};  // in the last step
 };
 
 template <class Function>
