@@ -1,0 +1,84 @@
+"""A step budget is kept as a time, live: latency is printed, and asserted only against a hang, ten times what is promised."""
+import math
+import struct
+import time
+import unittest
+
+import rospy
+from attack import AttackTest, checkerboard, cloud_of, flat_cloud, wait_for
+from deformable_ccd.msg import ContactArray
+from octomap_msgs.msg import Octomap
+
+
+class BudgetTest(AttackTest):
+    def run_frames(self, budget_ms, messages):
+        """All are answered, the steps cut; the longest step [ms]."""
+        outcomes = self.outcomes_of(self.publisher, messages)
+        wait_for(lambda: self.stats[-1].header.stamp == messages[-1].header.stamp, 20, 'the last statistics')
+        steps = [s for s in self.stats if s.header.stamp >= messages[0].header.stamp]
+        longest = max(s.total_ms for s in steps)
+        print('%s: at most %.1f ms with a budget of %g ms, statuses %s' % (
+            self.id().split('.')[-1], longest, budget_ms, sorted({o.status for o in outcomes})))
+        self.assertLessEqual(longest, 10 * (budget_ms + max(1, 0.1 * budget_ms)))
+        self.assertTrue(all(o.answered for o in outcomes[1:]))
+        return outcomes
+
+    def recovers(self, first, rows, cols):
+        outcomes = self.outcomes_of(self.publisher, [flat_cloud(first + i, rows, cols) for i in range(3)])
+        self.assertEqual(outcomes[2].status, ContactArray.OK, outcomes[2].reason)
+        self.assert_adds_up(self.stats[-1])
+
+    def test_doubles_from_denormal_to_a_decimetre(self):
+        self.start_node('doubles', step_budget_ms=10)
+        rows, cols = 16, 16
+        messages = []
+        for i in range(20):
+            points = [tuple(math.ldexp(((7 * k + 13 * a + i) % 31 - 15) / 16, -3 - (k * 37 + a * 11 + i * 5) % 1070) for a in range(3))
+                      for k in range(rows * cols)]
+            messages.append(cloud_of(i, points, rows, cols))
+        outcomes = self.run_frames(10, messages)
+        self.assertFalse(any(s.clear for s in self.states[1:]))
+        self.assertIn(ContactArray.DEADLINE, [o.status for o in outcomes])
+        self.recovers(30, rows, cols)
+
+    def test_random_bytes(self):
+        self.start_node('bytes', step_budget_ms=10)
+        rows, cols = 16, 16
+        state, messages = 12345, []
+        for i in range(10):
+            values = []
+            while len(values) < 3 * rows * cols:
+                state = (1103515245 * state + 12345) % 2**32
+                [value] = struct.unpack('<f', struct.pack('<I', state))
+                if math.isfinite(value):
+                    values.append(value)
+            messages.append(cloud_of(i, list(zip(*[iter(values)] * 3)), rows, cols))
+        self.run_frames(10, messages)
+        self.assertFalse(any(s.clear for s in self.states[1:]))
+
+    def test_unknown_space_that_a_large_cloth_sweeps(self):
+        self.start_node('unknown', step_budget_ms=5, unknown_space='report', **{'effects/octomap': 'on', 'octomap_topic': '/unknown/map'})
+        maps = rospy.Publisher('/unknown/map', Octomap, queue_size=1, latch=True)
+        self.addCleanup(maps.unregister)
+        wait_for(lambda: maps.get_num_connections() == 1, 20, 'the node to want a map')
+        data = checkerboard(2)
+        message = Octomap(binary=True, id='OcTree', resolution=0.01, data=struct.unpack('<%db' % len(data), data))
+        message.header.frame_id = 'world'
+        message.header.stamp = rospy.Time(1000)
+        maps.publish(message)
+        rows, cols = 20, 30
+        sheet = lambda z: [(5.0 / cols * c - 2.5, 5.0 / rows * r - 2.5, z) for r in range(rows) for c in range(cols)]
+        self.outcomes_of(self.publisher, [cloud_of(0, sheet(2.0), rows, cols)])
+        index = 1
+        while not self.stats[-1].map_present:
+            self.assertLess(index, 200, 'the map was never taken')
+            self.outcomes_of(self.publisher, [cloud_of(index, sheet(2.0), rows, cols)])
+            index += 1
+            time.sleep(0.03)
+        self.run_frames(5, [cloud_of(index + i, sheet(2.0 + i % 2), rows, cols) for i in range(10)])
+        self.assertGreater(self.stats[-1].unknown_space_in, 0)
+        self.assertLessEqual(self.stats[-1].unknown_space_ms, self.stats[-1].total_ms, 'it is part of the step')
+
+
+if __name__ == '__main__':
+    unittest.main()
