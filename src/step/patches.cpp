@@ -125,6 +125,7 @@ PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& 
 void PatchMaker::make(Outcome& outcome) {
   std::vector<Patch>& patches = outcome.patches;
   patches.resize(graph_.componentCount());
+  if (patches.empty()) return;
   for (std::size_t t = 0; t < touches_.size(); ++t) {
     const Touch& touch = touches_[t];
     Patch& patch = patches[(*patch_of_)[t]];

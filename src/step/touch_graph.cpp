@@ -237,6 +237,9 @@ void TouchGraph::joinOnMap() {
 const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch>& touches) {
   touches_ = &touches;
   const auto count = static_cast<std::uint32_t>(touches.size());
+  component_.clear();
+  component_count_ = 0;
+  if (touches.empty()) return component_;  // most steps of a stream
   numberLeaves();
   listByPoint();
   parent_.resize(count);
@@ -245,7 +248,6 @@ const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch
   joinOnMap();
   for (Index vertex = 0; vertex < vertexCount(); ++vertex) joinAtVertex(vertex);
   component_.resize(count);
-  component_count_ = 0;
   for (std::uint32_t t = 0; t < count; ++t) {
     const std::uint32_t r = root(t);  // not after t
     component_[t] = r == t ? component_count_++ : component_[r];
