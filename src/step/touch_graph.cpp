@@ -114,11 +114,9 @@ void TouchGraph::numberLeaves() {
   const auto map_end = std::partition_point(map_begin, touches.end(), is_before(Touch::CROSSING));
   map_begin_ = static_cast<std::uint32_t>(map_begin - touches.begin());
   map_end_ = static_cast<std::uint32_t>(map_end - touches.begin());
-  leaves_.clear();
   for (auto touch = map_begin; touch != map_end; ++touch) leaves_.push_back(packed(touch->voxel(), touch->level));
   std::sort(leaves_.begin(), leaves_.end());
   leaves_.erase(std::unique(leaves_.begin(), leaves_.end()), leaves_.end());
-  leaf_of_.clear();
   for (auto touch = map_begin; touch != map_end; ++touch) {
     const auto leaf = std::lower_bound(leaves_.begin(), leaves_.end(), packed(touch->voxel(), touch->level));
     leaf_of_.push_back(static_cast<Index>(vertexCount() + static_cast<std::size_t>(leaf - leaves_.begin())));
@@ -234,11 +232,17 @@ void TouchGraph::joinOnMap() {
   endPlace();
 }
 
+/// Forgets the last run, and what a burst made of the buffers before it.
+void TouchGraph::beginRun() {
+  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
+  empty(leaves_, leaf_of_, entries_, parent_, seen_, sets_, at_place_, marked_, component_);
+  component_count_ = 0;
+}
+
 const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch>& touches) {
   touches_ = &touches;
   const auto count = static_cast<std::uint32_t>(touches.size());
-  component_.clear();
-  component_count_ = 0;
+  beginRun();
   if (touches.empty()) return component_;  // most steps of a stream
   numberLeaves();
   listByPoint();

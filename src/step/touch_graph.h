@@ -86,6 +86,7 @@ class TouchGraph {
   Span neighbours(Index vertex) const;
   std::uint32_t root(std::uint32_t touch);
   void join(std::uint32_t a, std::uint32_t b);
+  void beginRun();
   void numberLeaves();
   void listByPoint();
   void beginPlace();

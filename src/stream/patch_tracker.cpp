@@ -4,6 +4,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "obstacle/burst.h"
+
 namespace dccd {
 namespace {
 
@@ -153,9 +155,8 @@ void PatchTracker::goOn(const Outcome& outcome) {
 
 /// What touches and what did, each once, by key.
 void PatchTracker::merge(const std::vector<Touch>& touches) {
-  all_.clear();
-  touches_.clear();
-  current_.clear();
+  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
+  empty(all_, touches_, current_);
   const bool burst = trace_.size() > std::max(TRACE_PER_TOUCH * touches.size(), TRACE_ALWAYS);
   auto past = trace_.begin();
   const auto past_end = burst ? trace_.begin() : trace_.end();
@@ -185,6 +186,7 @@ bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const 
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
   const std::vector<std::uint32_t>& part_of = graph_.components(touches_);
+  releaseBurst(parts_);
   parts_.assign(graph_.componentCount(), Part());
   for (std::size_t i = 0; i < all_.size(); ++i) {
     Part& part = parts_[part_of[i]];
@@ -282,6 +284,7 @@ void PatchTracker::begin(Outcome& outcome) {
 /// The step becomes the trace, without what has not touched for longer than the gap.
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   const std::vector<std::uint32_t>& part_of = graph_.lastComponents();
+  releaseBurst(trace_);
   trace_.clear();
   for (std::size_t i = 0; i < all_.size(); ++i) {
     Trace trace = all_[i];

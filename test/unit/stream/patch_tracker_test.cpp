@@ -9,6 +9,7 @@
 #include "dccd/assurance.h"
 #include "dccd/new_contacts.h"
 #include "dccd/stream.h"
+#include "support/heap.h"
 
 namespace dccd {
 namespace test {
@@ -383,6 +384,25 @@ TEST(PatchTracker, SwitchedOffItForgets) {
   MonitorOptions bad;
   bad.patch_gap_s = -1;
   EXPECT_THROW(stream.monitor().setOptions(bad), std::invalid_argument);
+}
+
+TEST(PatchTracker, WhatABurstMadeLargeIsGivenBack) {
+  if (heapInUse() == 0) GTEST_SKIP() << "a sanitizer's heap does not tell";
+  constexpr std::size_t SIZE = 14;
+  Stream stream({grid(SIZE, SIZE)});
+  const Positions flat = strip(SIZE, SIZE, 0.02, [](std::size_t) { return 0.0; });
+  for (int k = 0; k < 3; ++k) stream.feed({flat});
+  const std::size_t before = heapInUse();
+  std::size_t found = 0;
+  {
+    // A tracker that collapses: every feature meets all others.
+    const Positions point(SIZE * SIZE, Vec3(0.1, 0.1, 0));
+    for (const Positions* x : {&point, &flat}) found = std::max(found, stream.feed({*x}).total_contacts);
+  }
+  EXPECT_GT(found, 100000u);
+  EXPECT_GT(heapInUse() - before, std::size_t{10} << 20);
+  for (int k = 0; k < 20; ++k) stream.feed({flat});
+  EXPECT_LT(heapInUse(), before + (std::size_t{4} << 20));
 }
 
 // --- what of it is an alarm ------------------------------------------------------------------------------------------
