@@ -25,8 +25,9 @@ enum class PatchBeginning : std::uint8_t {
 };
 DCCD_EXPORT const char* toString(PatchBeginning beginning);
 
-/// A connected set of contacts, and of edges through faces at t=0 (`crossings`), of the same two partners. Of all that
-/// a step finds: also what max_contacts and suppress_initial keep out of the list.
+/// All contacts, and edges through faces at t=0 (`crossings`), between the same two areas of two partners
+/// (doc/algorithm.md, "Patches"). Of all that a step finds: also what max_contacts and suppress_initial keep out of the
+/// list.
 struct Patch {
   std::array<std::uint16_t, 2> body{0, 0};  ///< ascending; equal: with itself; [1] may be OBSTACLE_BODY
   std::size_t contacts = 0, certain = 0, initial = 0;
@@ -38,10 +39,11 @@ struct Patch {
   /// Smallest toc_lower of those that are not expected or, where all are, of all; of equal ones the first in canonical
   /// order. Unset without contacts.
   Contact earliest;
-  double area_m2 = 0;            ///< [m^2] of the side that has less; 0 with a rope
-  Vec3 centroid = Vec3::Zero();  ///< [m] mean of the points of contact, fixed frame
-  Vec3 normal = Vec3::Zero();    ///< unit, mean at the step's start, from body[1] to body[0]; 0 where there is none
-  Box box;                       ///< [m] of the points of contact
+  double area_m2 = 0;  ///< [m^2] of the side that has less; 0 with a rope
+  Vec3 centroid =
+      Vec3::Zero();  ///< [m] mean of the points of contact, fixed frame; of the crossings where nothing else touches
+  Vec3 normal = Vec3::Zero();  ///< unit, mean at the step's start, from body[1] to body[0]; 0 where there is none
+  Box box;                     ///< [m] of the same points
 
   // In a stream (dccd/stream.h). Patches that came apart less than patch_gap_s ago have the same.
   std::uint64_t id = 0;  ///< lasts from step to step; 0: none (of no stream; of a prediction: it would be a new one)

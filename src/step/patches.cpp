@@ -45,9 +45,13 @@ const char* toString(PatchEventKind kind) {
 
 void PatchMaker::begin(const Outcome& outcome) {
   releaseBurst(touches_);
-  releaseBurst(places_);
+  releaseBurst(order_);
+  releaseBurst(parts_);
+  unexpected_.clear();
+  spots_are_touches_ = true;
   graph_.setBodies(outcome.step->bodies);
   contacts_ = outcome.contacts.size();
+  touches_.reserve(contacts_ + outcome.intersections.size());
   touches_.resize(contacts_);
 }
 
@@ -56,10 +60,29 @@ void PatchMaker::connect(const Outcome& outcome) {
     // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
     if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
   }
-  std::sort(touches_.begin() + static_cast<std::ptrdiff_t>(contacts_), touches_.end(),
-            [](const Touch& a, const Touch& b) { return a.key() < b.key(); });
+  sortCrossings();
   patch_of_ = &graph_.components(touches_);
-  places_.resize(touches_.size());
+  const std::size_t count = graph_.componentCount();
+  begin_.assign(count + 2, 0);
+  for (const std::uint32_t p : *patch_of_) ++begin_[p + 2];
+  for (std::size_t p = 1; p < begin_.size(); ++p) begin_[p] += begin_[p - 1];
+  order_.resize(touches_.size());
+  for (std::uint32_t t = 0; t < touches_.size(); ++t) order_[begin_[(*patch_of_)[t] + 1]++] = t;
+  parts_.assign(count + pieces(), Part());
+}
+
+/// Of one body they come by their edges, and only those of an edge have to be sorted.
+void PatchMaker::sortCrossings() {
+  const auto isBefore = [](const Touch& a, const Touch& b) { return a.key() < b.key(); };
+  const auto first = touches_.begin() + static_cast<std::ptrdiff_t>(contacts_);
+  for (auto begin = first, end = first; begin != touches_.end(); begin = end) {
+    const auto hasOtherEdge = [&](const Touch& t) {
+      return t.point[0] != begin->point[0] || t.point[1] != begin->point[1];
+    };
+    end = std::find_if(begin, touches_.end(), hasOtherEdge);
+    std::sort(begin, end, isBefore);
+  }
+  if (!std::is_sorted(first, touches_.end(), isBefore)) std::sort(first, touches_.end(), isBefore);
 }
 
 PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) const {
@@ -122,54 +145,87 @@ PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& 
   return {turn * (point - map_from_fixed.translation()), turn * normal};
 }
 
+void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
+  const std::size_t end = std::min(touches_.size(), (piece + 1) * PIECE);
+  std::uint32_t p = NO_PATCH;
+  Vec3 first_normal = Vec3::Zero();
+  for (std::size_t i = piece * PIECE; i < end; ++i) {
+    const std::uint32_t t = order_[i];
+    const Touch& touch = touches_[t];
+    if ((*patch_of_)[t] != p) {
+      p = (*patch_of_)[t];
+      first_normal = placeOf(outcome, order_[begin_[p]]).normal;
+    }
+    Part& part = parts_[piece + p];
+    part.expected += touch.expected;
+    if (!touch.expected) (touch.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
+    if (touch.kind == Touch::CROSSING) {
+      ++part.crossings;
+      part.toc_lower = part.toc_upper = 0;
+      if (touches_[order_[begin_[p]]].kind != Touch::CROSSING) continue;  // the contacts say where the patch is
+    }
+    const Place at = placeOf(outcome, t);
+    part.centroid += at.point;
+    part.box.min = part.box.min.cwiseMin(at.point);
+    part.box.max = part.box.max.cwiseMax(at.point);
+    // Of a body with itself neither side is the first: all are turned to the side of the first one.
+    const bool self = touch.body[0] == touch.body[1];
+    const bool turned = self ? first_normal.dot(at.normal) < 0 : touch.body[0] > touch.body[1];
+    part.normal += turned ? Vec3(-at.normal) : at.normal;
+    if (touch.kind == Touch::CROSSING) continue;
+    const Contact& contact = outcome.contacts[t];
+    if (part.contacts == 0 || isEarlier(contact, part.earliest)) part.earliest = contact;
+    ++part.contacts;
+    part.certain += touch.certain;
+    part.initial += touch.initial;
+    part.toc_lower = std::min(part.toc_lower, contact.toc_lower);
+    part.toc_upper = std::min(part.toc_upper, contact.toc_upper);
+  }
+}
+
 void PatchMaker::make(Outcome& outcome) {
   std::vector<Patch>& patches = outcome.patches;
   patches.resize(graph_.componentCount());
-  if (patches.empty()) return;
-  for (std::size_t t = 0; t < touches_.size(); ++t) {
-    const Touch& touch = touches_[t];
-    Patch& patch = patches[(*patch_of_)[t]];
-    const bool swapped = touch.body[0] > touch.body[1], first = patch.contacts + patch.crossings == 0;
-    patch.body = touch.body;
-    if (swapped) std::swap(patch.body[0], patch.body[1]);
-    const Place& at = places_[t];
-    patch.centroid += at.point;
-    patch.box.min = patch.box.min.cwiseMin(at.point);
-    patch.box.max = patch.box.max.cwiseMax(at.point);
-    // Of a body with itself neither side is the first: all are turned to the side of the first one.
-    const bool turned = touch.body[0] == touch.body[1] ? !first && patch.normal.dot(at.normal) < 0 : swapped;
-    patch.normal += turned ? Vec3(-at.normal) : at.normal;
-    patch.expected += touch.expected;
-    if (touch.kind == Touch::CROSSING) {
-      ++patch.crossings;
-      patch.toc_lower = patch.toc_upper = 0;
-      continue;
+  unexpected_.assign(patches.size(), Unexpected());
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    Patch& patch = patches[p];
+    patch.body = touches_[order_[begin_[p]]].body;
+    if (patch.body[0] > patch.body[1]) std::swap(patch.body[0], patch.body[1]);
+    for (std::size_t piece = begin_[p] / PIECE; piece * PIECE < begin_[p + 1]; ++piece) {
+      const Part& part = parts_[piece + p];
+      if (part.contacts > 0 && (patch.contacts == 0 || isEarlier(part.earliest, patch.earliest))) {
+        patch.earliest = part.earliest;
+      }
+      unexpected_[p].is_new |= part.unexpected.is_new;
+      unexpected_[p].is_initial |= part.unexpected.is_initial;
+      patch.contacts += part.contacts;
+      patch.certain += part.certain;
+      patch.initial += part.initial;
+      patch.crossings += part.crossings;
+      patch.expected += part.expected;
+      patch.toc_lower = std::min(patch.toc_lower, part.toc_lower);
+      patch.toc_upper = std::min(patch.toc_upper, part.toc_upper);
+      patch.centroid += part.centroid;
+      patch.normal += part.normal;
+      patch.box.min = patch.box.min.cwiseMin(part.box.min);
+      patch.box.max = patch.box.max.cwiseMax(part.box.max);
     }
-    const Contact& contact = outcome.contacts[t];
-    if (patch.contacts == 0 || isEarlier(contact, patch.earliest)) patch.earliest = contact;
-    ++patch.contacts;
-    patch.certain += touch.certain;
-    patch.initial += touch.initial;
-    patch.toc_lower = std::min(patch.toc_lower, contact.toc_lower);
-    patch.toc_upper = std::min(patch.toc_upper, contact.toc_upper);
-  }
-  for (Patch& patch : patches) {
-    patch.centroid /= static_cast<double>(patch.contacts + patch.crossings);
+    patch.centroid /= static_cast<double>(patch.contacts > 0 ? patch.contacts : patch.crossings);
     patch.normal = unitOr(patch.normal, Vec3::Zero());
+    const bool self = patch.body[0] == patch.body[1];
+    patch.area_m2 = self ? areas_[2 * p] / 2 : std::min(areas_[2 * p], areas_[2 * p + 1]);
   }
-  addAreas(outcome, patches);
 }
 
 /// Of the faces that have a vertex that touches something; where it is when the step begins.
 void PatchMaker::findVertexAreas(const Step& step) {
   vertex_area_.assign(graph_.vertexCount(), 0);
+  const auto isTouched = [&](Index vertex) { return seen_[vertex] != NO_PATCH; };
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     const Index base = graph_.firstVertex(b);
     const Positions& x = *step.bodies[b].t0;
     for (const Face& face : step.bodies[b].topology->faces()) {
-      if (!graph_.isTouched(base + face[0]) && !graph_.isTouched(base + face[1]) && !graph_.isTouched(base + face[2])) {
-        continue;
-      }
+      if (!isTouched(base + face[0]) && !isTouched(base + face[1]) && !isTouched(base + face[2])) continue;
       const double third = (x[face[1]] - x[face[0]]).cross(x[face[2]] - x[face[0]]).norm() / 6;
       if (!std::isfinite(third)) continue;
       for (const Index v : face) vertex_area_[base + v] += third;
@@ -177,29 +233,81 @@ void PatchMaker::findVertexAreas(const Step& step) {
   }
 }
 
-void PatchMaker::addAreas(const Outcome& outcome, std::vector<Patch>& patches) {
+void PatchMaker::findAreas(const Outcome& outcome) {
+  const auto forVertices = [&](const auto& function) {
+    for (std::size_t i = 0; i < order_.size(); ++i) {
+      const Touch& touch = touches_[order_[i]];
+      const int first = touch.firstSize(), all = first + touch.secondSize();
+      for (int k = 0; k < all; ++k) function(touch.point[k], (*patch_of_)[order_[i]], touch.body[k < first ? 0 : 1]);
+    }
+  };
+  seen_.assign(graph_.vertexCount(), NO_PATCH);
+  forVertices([&](Index vertex, std::uint32_t patch, std::uint16_t) { seen_[vertex] = patch; });
   findVertexAreas(*outcome.step);
-  const double resolution_m = outcome.obstacle ? outcome.obstacle->resolution() : 0;
-  areas_.assign(2 * patches.size(), 0);
-  last_point_.assign(patches.size(), NO_INDEX);
-  std::size_t body = 0;
-  for (std::size_t point = 0; point < graph_.pointCount(); ++point) {
-    if (!graph_.isTouched(point)) continue;
-    const bool leaf = point >= graph_.vertexCount();
-    while (!leaf && point >= graph_.firstVertex(body + 1)) ++body;
-    const double edge_m = leaf ? graph_.leaf(point).size * resolution_m : 0;
-    const double area_m2 = leaf ? edge_m * edge_m : vertex_area_[point];
-    graph_.forTouchesAt(point, [&](std::uint32_t touch) {
-      const std::uint32_t p = (*patch_of_)[touch];
-      if (last_point_[p] == point) return;
-      last_point_[p] = static_cast<std::uint32_t>(point);
-      areas_[2 * p + (leaf || body != patches[p].body[0])] += area_m2;
-    });
+  areas_.assign(2 * graph_.componentCount(), 0);
+  seen_.assign(graph_.vertexCount(), NO_PATCH);
+  forVertices([&](Index vertex, std::uint32_t patch, std::uint16_t body) {
+    if (seen_[vertex] == patch) return;
+    seen_[vertex] = patch;
+    const auto& bodies = touches_[order_[begin_[patch]]].body;
+    areas_[2 * patch + (body != std::min(bodies[0], bodies[1]))] += vertex_area_[vertex];
+  });
+  for (std::uint32_t p = 0; p < graph_.componentCount(); ++p) {
+    if (touches_[order_[begin_[p]]].onMap()) areas_[2 * p + 1] = leafArea(p, outcome.obstacle->resolution());
   }
-  for (std::size_t p = 0; p < patches.size(); ++p) {
-    const bool self = patches[p].body[0] == patches[p].body[1];
-    patches[p].area_m2 = self ? areas_[2 * p] / 2 : std::min(areas_[2 * p], areas_[2 * p + 1]);
+}
+
+/// Each leaf that the patch touches counts once.
+double PatchMaker::leafArea(std::uint32_t patch, double resolution_m) {
+  leaves_.clear();
+  for (std::uint32_t i = begin_[patch]; i < begin_[patch + 1]; ++i) {
+    const Touch& touch = touches_[order_[i]];
+    leaves_.push_back(std::uint64_t{touch.level} << 48 | std::uint64_t{touch.point[3]} << 16 | touch.point[4]);
   }
+  std::sort(leaves_.begin(), leaves_.end());
+  leaves_.erase(std::unique(leaves_.begin(), leaves_.end()), leaves_.end());
+  double area_m2 = 0;
+  for (const std::uint64_t leaf : leaves_) {
+    const double edge_m = std::ldexp(resolution_m, static_cast<int>(leaf >> 48));
+    area_m2 += edge_m * edge_m;
+  }
+  return area_m2;
+}
+
+void PatchMaker::findSpots() {
+  const auto on_map = [](const Touch& touch) { return touch.onMap(); };
+  const auto first = std::find_if(touches_.begin(), touches_.end(), on_map);
+  spots_are_touches_ = first == touches_.end();
+  if (spots_are_touches_) return;
+  const auto last = std::find_if_not(first, touches_.end(), on_map);
+  const auto begin = static_cast<std::size_t>(first - touches_.begin()),
+             end = static_cast<std::size_t>(last - touches_.begin());
+  releaseBurst(spots_);
+  releaseBurst(patch_of_spot_);
+  spots_.assign(touches_.begin(), first);
+  patch_of_spot_.assign(patch_of_->begin(), patch_of_->begin() + static_cast<std::ptrdiff_t>(begin));
+  seen_.assign(graph_.vertexCount(), NO_PATCH);
+  expected_.assign(graph_.vertexCount(), true);
+  for (std::size_t t = begin; t < end; ++t) {
+    for (int i = 0; i < touches_[t].firstSize(); ++i) {
+      seen_[touches_[t].point[i]] = (*patch_of_)[t];
+      expected_[touches_[t].point[i]] &= touches_[t].expected;
+    }
+  }
+  Touch spot;
+  spot.kind = static_cast<std::uint8_t>(PairKind::VERTEX_VOXEL_FACE);
+  for (std::size_t b = 0; b < graph_.bodyCount(); ++b) {
+    spot.body = {static_cast<std::uint16_t>(b), OBSTACLE_BODY};
+    for (Index v = graph_.firstVertex(b); v < graph_.firstVertex(b + 1); ++v) {
+      if (seen_[v] == NO_PATCH) continue;
+      spot.point[0] = v;
+      spot.expected = expected_[v] != 0;
+      spots_.push_back(spot);
+      patch_of_spot_.push_back(seen_[v]);
+    }
+  }
+  spots_.insert(spots_.end(), last, touches_.end());
+  patch_of_spot_.insert(patch_of_spot_.end(), patch_of_->begin() + static_cast<std::ptrdiff_t>(end), patch_of_->end());
 }
 
 void PatchMaker::list(Outcome& outcome) const {

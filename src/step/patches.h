@@ -21,8 +21,10 @@ class PatchMaker {
       for (std::size_t c = first; c < last; ++c) touches_[c] = graph_.touchOf(outcome.contacts[c]);
     });
     connect(outcome);
-    parallel(touches_.size(), PIECE, [&](std::size_t first, std::size_t last) {
-      for (std::size_t t = first; t < last; ++t) places_[t] = placeOf(outcome, t);
+    if (touches_.empty()) return;
+    // The first piece of work is of another kind, and as long as several of the others.
+    parallel(pieces() + 1, 1, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) i == 0 ? findAreas(outcome) : measure(outcome, i - 1);
     });
     make(outcome);
   }
@@ -33,6 +35,18 @@ class PatchMaker {
   const std::vector<Touch>& touches() const { return touches_; }
   const std::vector<std::uint32_t>& patchOf() const { return *patch_of_; }
 
+  /// What a patch leaves from step to step: the touches between meshes and, for those with the map, the vertices that
+  /// they have: there, leaves make no difference. Made by findSpots().
+  void findSpots();
+  const std::vector<Touch>& spots() const { return spots_are_touches_ ? touches_ : spots_; }
+  const std::vector<std::uint32_t>& patchOfSpot() const { return spots_are_touches_ ? *patch_of_ : patch_of_spot_; }
+
+  /// Per patch: has it touches that are not expected, and came in this step, or were there when it began?
+  struct Unexpected {
+    bool is_new = false, is_initial = false;
+  };
+  const std::vector<Unexpected>& unexpected() const { return unexpected_; }
+
  private:
   static constexpr std::size_t PIECE = 4096;
   /// Where features touch, and the normal of the touch: towards the first feature, as the step begins.
@@ -42,19 +56,36 @@ class PatchMaker {
 
   void begin(const Outcome& outcome);
   void connect(const Outcome& outcome);
+  void sortCrossings();
+  std::size_t pieces() const { return (touches_.size() + PIECE - 1) / PIECE; }
   Place placeOf(const Outcome& outcome, std::size_t touch) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
-  void make(Outcome& outcome);
-  void addAreas(const Outcome& outcome, std::vector<Patch>& patches);
+  void measure(const Outcome& outcome, std::size_t piece);
+  void findAreas(const Outcome& outcome);
   void findVertexAreas(const Step& step);
+  double leafArea(std::uint32_t patch, double resolution_m);
+  void make(Outcome& outcome);
 
   TouchGraph graph_;
   std::vector<Touch> touches_;
   const std::vector<std::uint32_t>* patch_of_ = nullptr;
-  std::vector<Place> places_;
-  std::vector<double> vertex_area_;  // per vertex of all bodies: a third of the faces around it [m^2]
-  std::vector<double> areas_;        // two sides a patch
-  std::vector<std::uint32_t> last_point_;
+  std::vector<std::uint32_t> order_;  // the touches, patch by patch, each patch's ascending
+  std::vector<std::uint32_t> begin_;  // per patch, in order_
+  struct Part : Patch {
+    Unexpected unexpected;
+  };
+  /// What a piece of order_ gives to a patch: that of piece i to patch p is at i + p, since in order_ with each of them
+  /// either i or p goes on.
+  std::vector<Part> parts_;
+  std::vector<Unexpected> unexpected_;
+  std::vector<Touch> spots_;
+  std::vector<std::uint32_t> patch_of_spot_;
+  bool spots_are_touches_ = true;
+  std::vector<double> vertex_area_;     // per vertex of all bodies: a third of the faces around it [m^2]
+  std::vector<std::uint32_t> seen_;     // per vertex: the last patch that had it
+  std::vector<std::uint8_t> expected_;  // per vertex: all of its touches with the map are
+  std::vector<std::uint64_t> leaves_;   // of a patch
+  std::vector<double> areas_;           // two sides a patch
   std::size_t contacts_ = 0;
 };
 

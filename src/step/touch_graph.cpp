@@ -1,24 +1,14 @@
 #include "step/touch_graph.h"
 
 #include <algorithm>
-#include <limits>
+#include <tuple>
 
 #include "obstacle/burst.h"
 
 namespace dccd {
 namespace {
 
-// By kind: points on the first and on the second side; a leaf is one.
-constexpr std::uint8_t SIZES[6][2] = {{1, 3}, {2, 2}, {1, 1}, {2, 1}, {3, 1}, {2, 3}};
-
 constexpr std::uint8_t kindOf(PairKind kind) { return static_cast<std::uint8_t>(kind); }
-constexpr std::uint8_t FIRST_ON_MAP = kindOf(PairKind::VERTEX_VOXEL_FACE);
-
-std::uint64_t packed(const VoxelKey& min, std::uint8_t level) {
-  return std::uint64_t{level} << 48 | std::uint64_t{min.x} << 32 | std::uint64_t{min.y} << 16 | min.z;
-}
-std::uint32_t levelOf(std::uint64_t leaf) { return static_cast<std::uint32_t>(leaf >> 48); }
-std::int64_t axisOf(std::uint64_t leaf, int axis) { return static_cast<std::uint16_t>(leaf >> (32 - 16 * axis)); }
 
 }  // namespace
 
@@ -54,7 +44,7 @@ void TouchGraph::setBodies(const std::vector<Body>& bodies) {
   for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) {
     neighbours_[--neighbours_begin_[(*edge)[1]]] = (*edge)[0];
   }
-  marks_.assign(vertexCount(), Mark());
+  place_.assign(vertexCount(), NO_INDEX);
 }
 
 Touch TouchGraph::touchOf(const Contact& contact) const {
@@ -64,7 +54,7 @@ Touch TouchGraph::touchOf(const Contact& contact) const {
   touch.initial = contact.initial;
   touch.expected = contact.expected;
   touch.certain = contact.certainty == Certainty::CERTAIN;
-  const int first = SIZES[touch.kind][0], all = touch.onMap() ? first : 4;
+  const int first = touch.firstSize(), all = first + touch.secondSize();
   for (int i = 0; i < all; ++i) touch.point[i] = vertex_begin_[contact.body[i < first ? 0 : 1]] + contact.vertex[i];
   if (touch.onMap()) {
     touch.point[3] = std::uint32_t{contact.voxel.x} << 16 | contact.voxel.y;
@@ -83,186 +73,100 @@ Touch TouchGraph::touchOf(const StartIntersection& crossing) const {
   return touch;
 }
 
-TouchGraph::Span TouchGraph::side(std::uint32_t t, int side) const {
-  const Touch& touch = (*touches_)[t];
-  const std::uint8_t* sizes = SIZES[touch.kind];
-  const Index* first = touch.point.data() + (side == 0 ? 0 : sizes[0]);
-  if (side == 1 && touch.onMap()) first = &leaf_of_[t - map_begin_];
-  return {first, first + sizes[side]};
-}
-
-TouchGraph::Span TouchGraph::neighbours(Index vertex) const {
-  return {neighbours_.data() + neighbours_begin_[vertex], neighbours_.data() + neighbours_begin_[vertex + 1]};
-}
-
-std::uint32_t TouchGraph::root(std::uint32_t t) {
-  while (parent_[t] != t) t = parent_[t] = parent_[parent_[t]];
-  return t;
-}
-
-/// The smallest touch of a set is its root, whatever the order in which sets are joined.
-void TouchGraph::join(std::uint32_t a, std::uint32_t b) {
-  a = root(a);
-  b = root(b);
-  if (a != b) parent_[std::max(a, b)] = std::min(a, b);
-}
-
-void TouchGraph::numberLeaves() {
-  const std::vector<Touch>& touches = *touches_;
-  const auto is_before = [](std::uint8_t kind) { return [kind](const Touch& t) { return t.kind < kind; }; };
-  const auto map_begin = std::partition_point(touches.begin(), touches.end(), is_before(FIRST_ON_MAP));
-  const auto map_end = std::partition_point(map_begin, touches.end(), is_before(Touch::CROSSING));
-  map_begin_ = static_cast<std::uint32_t>(map_begin - touches.begin());
-  map_end_ = static_cast<std::uint32_t>(map_end - touches.begin());
-  for (auto touch = map_begin; touch != map_end; ++touch) leaves_.push_back(packed(touch->voxel(), touch->level));
-  std::sort(leaves_.begin(), leaves_.end());
-  leaves_.erase(std::unique(leaves_.begin(), leaves_.end()), leaves_.end());
-  for (auto touch = map_begin; touch != map_end; ++touch) {
-    const auto leaf = std::lower_bound(leaves_.begin(), leaves_.end(), packed(touch->voxel(), touch->level));
-    leaf_of_.push_back(static_cast<Index>(vertexCount() + static_cast<std::size_t>(leaf - leaves_.begin())));
-  }
-}
-
-void TouchGraph::listByPoint() {
-  const auto count = static_cast<std::uint32_t>(touches_->size());
-  begin_.assign(pointCount() + 2, 0);
-  std::size_t entries = 0;
-  for (std::uint32_t t = 0; t < count; ++t) {
-    for (int s = 0; s < 2; ++s) {
-      for (const Index point : side(t, s)) ++begin_[point + 2], ++entries;
+void TouchGraph::findGroups(const std::vector<Touch>& touches) {
+  groups_.clear();
+  for (std::uint32_t t = 0; t < touches.size(); ++t) {
+    const Touch& touch = touches[t];
+    if (t == 0 || touch.kind != touches[t - 1].kind || touch.body != touches[t - 1].body) {
+      const auto [low, high] = std::minmax(touch.body[0], touch.body[1]);
+      groups_.push_back({{low, high}, t, t});
     }
+    groups_.back().last = t + 1;
   }
-  for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
-  entries_.resize(entries);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    for (int s = 0; s < 2; ++s) {
-      for (const Index point : side(t, s)) entries_[begin_[point + 1]++] = t << 1 | static_cast<std::uint32_t>(s);
-    }
-  }
+  std::sort(groups_.begin(), groups_.end(), [](const Group& a, const Group& b) {
+    return std::tie(a.partners, a.first) < std::tie(b.partners, b.first);
+  });
 }
 
-void TouchGraph::beginPlace() {
-  if (tag_ == std::numeric_limits<std::uint32_t>::max()) {
-    std::fill(marks_.begin(), marks_.end(), Mark());
-    std::fill(seen_.begin(), seen_.end(), Mark());
-    tag_ = 0;
-  }
-  ++tag_;
-  marked_.clear();
-  sets_.clear();
+std::uint32_t TouchGraph::areaRoot(std::uint32_t place) {
+  while (area_[place] != place) place = area_[place] = area_[area_[place]];
+  return place;
 }
 
-/// The number, at this place, of the set that the touch is in: there are few, and they lie together.
-std::uint32_t TouchGraph::setOf(std::uint32_t touch) {
-  const std::uint32_t r = root(touch);
-  Mark& seen = seen_[r];
-  if (seen.tag != tag_) {
-    seen = {tag_, static_cast<std::uint32_t>(sets_.size())};
-    sets_.push_back({seen.set, r});
-  }
-  return seen.set;
-}
-
-void TouchGraph::joinSets(std::uint32_t a, std::uint32_t b) {
-  while (sets_[a].parent != a) a = sets_[a].parent = sets_[sets_[a].parent].parent;
-  while (sets_[b].parent != b) b = sets_[b].parent = sets_[sets_[b].parent].parent;
-  sets_[std::max(a, b)].parent = std::min(a, b);
-}
-
-/// What was joined at this place.
-void TouchGraph::endPlace() {
-  for (const Set& set : sets_) join(set.root, sets_[set.parent].root);
-}
-
-/// Something of the set is at the point.
-void TouchGraph::mark(Index point, std::uint32_t set) {
-  Mark& mark = marks_[point];
-  if (mark.tag != tag_) {
-    mark = {tag_, set};
-    marked_.push_back(point);
-  } else if (mark.set != set) {
-    joinSets(mark.set, set);
-  }
-}
-
-/// Marked points that an edge joins.
-void TouchGraph::joinMarked() {
-  for (const Index point : marked_) {
-    const Span near = neighbours(point);
-    const std::uint32_t set = marks_[point].set;
-    if (near.size() <= marked_.size()) {
-      for (const Index other : near) {
-        if (other > point) break;  // that one comes to this
-        if (marks_[other].tag == tag_ && marks_[other].set != set) joinSets(set, marks_[other].set);
-      }
-    } else {  // a vertex in the middle of many
-      for (const Index other : marked_) {
-        if (marks_[other].set != set && std::binary_search(near.begin(), near.end(), other)) {
-          joinSets(set, marks_[other].set);
-        }
+/// The vertices that touch the partner, joined where an edge of the mesh joins them.
+void TouchGraph::findAreas(const std::vector<Touch>& touches, const Group* first, const Group* last) {
+  for (const Group* group = first; group != last; ++group) {
+    const int size = touches[group->first].firstSize() + touches[group->first].secondSize();
+    for (std::uint32_t t = group->first; t < group->last; ++t) {
+      for (int i = 0; i < size; ++i) {
+        std::uint32_t& place = place_[touches[t].point[i]];
+        if (place != NO_INDEX) continue;
+        place = static_cast<std::uint32_t>(touched_.size());
+        touched_.push_back(touches[t].point[i]);
+        area_.push_back(place);
       }
     }
   }
+  for (std::uint32_t i = 0; i < touched_.size(); ++i) {
+    const Index vertex = touched_[i];
+    for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
+      const Index other = neighbours_[n];
+      if (other > vertex) break;  // that one comes to this
+      if (place_[other] == NO_INDEX) continue;
+      const std::uint32_t a = areaRoot(i), b = areaRoot(place_[other]);
+      area_[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  // No place is before the first one of its area.
+  for (std::uint32_t& area : area_) area = area_[area];
 }
 
-/// Between meshes, of what shares the vertex on one side: what shares a vertex, or an edge, on the other.
-void TouchGraph::joinAtVertex(Index vertex) {
-  if (begin_[vertex + 1] - begin_[vertex] < 2) return;
-  beginPlace();
-  at_place_.clear();
-  for (std::uint32_t i = begin_[vertex]; i < begin_[vertex + 1]; ++i) {
-    if (!(*touches_)[entries_[i] >> 1].onMap()) at_place_.push_back({entries_[i], setOf(entries_[i] >> 1)});
+/// Touches between the same two areas are one component.
+void TouchGraph::nameComponents(const std::vector<Touch>& touches, const Group* first, const Group* last) {
+  by_areas_.clear();
+  std::uint64_t last_areas = 0;
+  std::uint32_t component = 0;
+  for (const Group* group = first; group != last; ++group) {
+    const Touch& any = touches[group->first];
+    const int second = any.onMap() ? 0 : any.firstSize();
+    for (std::uint32_t t = group->first; t < group->last; ++t) {
+      const auto [low, high] = std::minmax(area_[place_[touches[t].point[0]]], area_[place_[touches[t].point[second]]]);
+      const std::uint64_t areas = std::uint64_t{low} << 32 | high;
+      if (by_areas_.empty() || areas != last_areas) {
+        const auto [at, is_new] = by_areas_.emplace(areas, component_count_);
+        component_count_ += is_new;
+        component = at->second;
+        last_areas = areas;
+      }
+      component_[t] = component;
+    }
   }
-  if (sets_.size() < 2) return;
-  for (const auto& [entry, set] : at_place_) {
-    for (const Index other : side(entry >> 1, 1 - static_cast<int>(entry & 1))) mark(other, set);
-  }
-  joinMarked();
-  endPlace();
-}
-
-/// With the map: what shares a vertex, or an edge, of the mesh. Its leaves come and go, and a cloth that is coarser
-/// than they are meets few of those below it.
-void TouchGraph::joinOnMap() {
-  beginPlace();
-  for (std::uint32_t t = map_begin_; t < map_end_; ++t) {
-    for (const Index vertex : side(t, 0)) mark(vertex, setOf(t));
-  }
-  joinMarked();
-  endPlace();
-}
-
-/// Forgets the last run, and what a burst made of the buffers before it.
-void TouchGraph::beginRun() {
-  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
-  empty(leaves_, leaf_of_, entries_, parent_, seen_, sets_, at_place_, marked_, component_);
-  component_count_ = 0;
 }
 
 const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch>& touches) {
-  touches_ = &touches;
-  const auto count = static_cast<std::uint32_t>(touches.size());
-  beginRun();
+  // What a burst made of the buffers in the last run is given back.
+  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
+  empty(component_, number_);
+  component_count_ = 0;
   if (touches.empty()) return component_;  // most steps of a stream
-  numberLeaves();
-  listByPoint();
-  parent_.resize(count);
-  seen_.assign(count, Mark());
-  for (std::uint32_t t = 0; t < count; ++t) parent_[t] = t;
-  joinOnMap();
-  for (Index vertex = 0; vertex < vertexCount(); ++vertex) joinAtVertex(vertex);
-  component_.resize(count);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    const std::uint32_t r = root(t);  // not after t
-    component_[t] = r == t ? component_count_++ : component_[r];
+  component_.resize(touches.size());
+  findGroups(touches);
+  const Group* const end = groups_.data() + groups_.size();
+  for (const Group *first = groups_.data(), *last = first; first != end; first = last) {
+    last = std::find_if(first, end, [&](const Group& group) { return group.partners != first->partners; });
+    empty(touched_, area_);
+    findAreas(touches, first, last);
+    nameComponents(touches, first, last);
+    for (const Index vertex : touched_) place_[vertex] = NO_INDEX;
+  }
+  // In the order of their first touches.
+  number_.assign(component_count_, NO_INDEX);
+  std::uint32_t count = 0;
+  for (std::uint32_t& component : component_) {
+    if (number_[component] == NO_INDEX) number_[component] = count++;
+    component = number_[component];
   }
   return component_;
-}
-
-Leaf TouchGraph::leaf(std::size_t point) const {
-  const std::uint64_t leaf = leaves_[point - vertexCount()];
-  const auto axis = [&](int a) { return static_cast<std::uint16_t>(axisOf(leaf, a)); };
-  return {{axis(0), axis(1), axis(2)}, std::uint32_t{1} << levelOf(leaf)};
 }
 
 }  // namespace dccd

@@ -10,7 +10,7 @@ namespace dccd {
 namespace {
 
 // What touched is forgotten early where it is this many times what touches now, and more than so many.
-constexpr std::size_t TRACE_PER_TOUCH = 8, TRACE_ALWAYS = 1 << 16;
+constexpr std::size_t TRACE_PER_SPOT = 8, TRACE_ALWAYS = 1 << 16;
 
 /// Not later, not earlier, than the time of contact.
 StampNs stampBefore(const Outcome& outcome, double toc) {
@@ -28,6 +28,13 @@ bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
 }
 
 }  // namespace
+
+void PatchTracker::Trace::clear() {
+  releaseBurst(spots);
+  releaseBurst(known);
+  spots.clear();
+  known.clear();
+}
 
 PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
   const Living& living = living_.at(id);
@@ -51,8 +58,11 @@ void PatchTracker::seam(std::size_t body) {
     waiting_.back().to_ns = at->second.released_ns;  // where it had been let go before
     at = living_.erase(at);
   }
-  const auto gone = [&](const Trace& t) { return isOf(t.touch.body, body); };
-  trace_.erase(std::remove_if(trace_.begin(), trace_.end(), gone), trace_.end());
+  std::swap(trace_, all_);
+  trace_.clear();
+  for (std::size_t i = 0; i < all_.spots.size(); ++i) {
+    if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
+  }
   if (body == ALL) has_last_ = false;
 }
 
@@ -61,13 +71,14 @@ void PatchTracker::tell(Outcome& outcome) {
   waiting_.clear();
 }
 
-void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
+void PatchTracker::follow(PatchMaker& found, double gap_s, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   bool same = graph_.bodyCount() == bodies.size();
   for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
   if (!same) seam();
   graph_.setBodies(bodies);
-  merge(found.touches());
+  found.findSpots();
+  merge(found.spots());
   findParts(found, outcome);
   findNews();
   keepIdentities(outcome);
@@ -75,7 +86,7 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
   goOn(outcome);
   remember(gap_s, outcome);
   endWhatIsGone(outcome);
-  name(found, outcome);
+  name(outcome);
   tellNews(outcome);
   for (PatchEvent& event : outcome.patch_events) {
     const auto has_id = [&](const Patch& patch) { return patch.id == event.id; };
@@ -87,31 +98,29 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
   last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
-void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
+void PatchTracker::recognise(PatchMaker& found, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   if (graph_.bodyCount() != bodies.size()) return;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
-  merge(found.touches());
+  found.findSpots();
+  merge(found.spots());
   findParts(found, outcome);
   findNews();
   for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
-  name(found, outcome);
+  name(outcome);
 }
 
 /// The step's patches get the identities of their parts.
-void PatchTracker::name(const PatchMaker& found, Outcome& outcome) const {
-  const std::vector<std::uint32_t>& part_of = graph_.lastComponents();
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    if (current_[i] == NO_PATCH) continue;
-    Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
-    const Part& part = parts_[part_of[i]];
+void PatchTracker::name(Outcome& outcome) const {
+  for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
+    Patch& patch = outcome.patches[p];
+    const Part& part = parts_[part_of_patch_[p]];
     patch.is_new = part.is_new && !patch.isExpected();
-    const std::uint64_t id = part.id;
-    if (id == 0 || patch.id == id) continue;
-    const Living& living = living_.at(id);
-    patch.id = id;
+    if (part.id == 0) continue;
+    const Living& living = living_.at(part.id);
+    patch.id = part.id;
     patch.beginning = living.beginning;
     patch.began_from_ns = living.began_from_ns;
     patch.began_to_ns = living.began_to_ns;
@@ -154,20 +163,19 @@ void PatchTracker::goOn(const Outcome& outcome) {
 }
 
 /// What touches and what did, each once, by key.
-void PatchTracker::merge(const std::vector<Touch>& touches) {
-  const auto empty = [](auto&... buffers) { ((releaseBurst(buffers), buffers.clear()), ...); };
-  empty(all_, touches_, current_);
-  const bool burst = trace_.size() > std::max(TRACE_PER_TOUCH * touches.size(), TRACE_ALWAYS);
-  auto past = trace_.begin();
-  const auto past_end = burst ? trace_.begin() : trace_.end();
+void PatchTracker::merge(const std::vector<Touch>& spots) {
+  all_.clear();
+  releaseBurst(current_);
+  current_.clear();
+  const std::vector<Touch>& before = trace_.spots;
+  const bool burst = before.size() > std::max(TRACE_PER_SPOT * spots.size(), TRACE_ALWAYS);
+  std::size_t past = burst ? before.size() : 0;
   std::uint32_t now = 0;
-  while (past != past_end || now < touches.size()) {
-    const bool has_now = now < touches.size(), has_past = past != past_end;
-    const bool takes_now = has_now && (!has_past || !(past->touch.key() < touches[now].key()));
-    const bool takes_past = has_past && (!has_now || !(touches[now].key() < past->touch.key()));
-    all_.push_back(takes_past ? *past : Trace());
-    if (takes_now) all_.back().touch = touches[now];
-    touches_.push_back(all_.back().touch);
+  while (past < before.size() || now < spots.size()) {
+    const bool has_now = now < spots.size(), has_past = past < before.size();
+    const bool takes_now = has_now && (!has_past || !(before[past].key() < spots[now].key()));
+    const bool takes_past = has_past && (!takes_now || before[past].key() == spots[now].key());
+    all_.push(takes_now ? spots[now] : before[past], takes_past ? trace_.known[past] : Known());
     current_.push_back(takes_now ? now : NO_PATCH);
     past += takes_past;
     now += takes_now;
@@ -175,7 +183,6 @@ void PatchTracker::merge(const std::vector<Touch>& touches) {
 }
 
 bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
-  if (!has_last_ || last_map_ == outcome.obstacle) return false;
   if (!last_map_) return true;
   const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, touch.level);
   const VoxelKey key = touch.voxel();
@@ -185,34 +192,46 @@ bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const 
 }
 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
-  const std::vector<std::uint32_t>& part_of = graph_.components(touches_);
+  // Where all that touched still does, the patches of the step are the parts.
+  const bool same = all_.spots.size() == found.spots().size();
+  part_of_ = same ? &found.patchOfSpot() : &graph_.components(all_.spots);
   releaseBurst(parts_);
-  parts_.assign(graph_.componentCount(), Part());
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    Part& part = parts_[part_of[i]];
-    const Touch& touch = touches_[i];
-    part.body = touch.body;
-    if (part.body[0] > part.body[1]) std::swap(part.body[0], part.body[1]);
-    if (all_[i].id != 0 && (part.before.empty() || part.before.back() != all_[i].id)) part.before.push_back(all_[i].id);
-    if (current_[i] == NO_PATCH) continue;
-    ++part.size;
+  parts_.assign(same ? outcome.patches.size() : graph_.componentCount(), Part());
+  part_of_patch_.assign(outcome.patches.size(), 0);
+  for (std::size_t i = 0; i < current_.size(); ++i) {
+    const std::uint32_t part = (*part_of_)[i];
+    const std::uint64_t id = all_.known[i].id;
+    std::vector<std::uint64_t>& before = parts_[part].before;
+    if (id != 0 && (before.empty() || before.back() != id)) before.push_back(id);
+    if (current_[i] != NO_PATCH) part_of_patch_[found.patchOfSpot()[current_[i]]] = part;
+  }
+  for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
+    const Patch& patch = outcome.patches[p];
+    Part& part = parts_[part_of_patch_[p]];
+    part.body = patch.body;
+    part.size += patch.contacts + patch.crossings;
     part.touches = true;
-    const Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
     part.toc_lower = std::min(part.toc_lower, patch.toc_lower);
     part.toc_upper = std::min(part.toc_upper, patch.toc_upper);
-    part.initial = part.initial || touch.initial;
-    if (!touch.expected) (touch.initial ? part.unexpected_initial : part.unexpected_new) = true;
+    part.initial = part.initial || patch.initial + patch.crossings > 0;
+    part.unexpected_new = part.unexpected_new || found.unexpected()[p].is_new;
+    part.unexpected_initial = part.unexpected_initial || found.unexpected()[p].is_initial;
   }
   for (Part& part : parts_) {
     std::sort(part.before.begin(), part.before.end());
     part.before.erase(std::unique(part.before.begin(), part.before.end()), part.before.end());
   }
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    Part& part = parts_[part_of[i]];
-    const Touch& touch = touches_[i];
-    if (current_[i] == NO_PATCH || !part.before.empty() || part.map_changed || !touch.initial || !touch.onMap())
-      continue;
-    part.map_changed = isNewOnMap(touch, outcome);
+  findChangesOfTheMap(found, outcome);
+}
+
+/// Of parts of which nothing touched before.
+void PatchTracker::findChangesOfTheMap(const PatchMaker& found, const Outcome& outcome) {
+  if (!has_last_ || last_map_ == outcome.obstacle) return;
+  for (std::size_t t = 0; t < found.touches().size(); ++t) {
+    const Touch& touch = found.touches()[t];
+    if (!touch.initial || !touch.onMap()) continue;
+    Part& part = parts_[part_of_patch_[found.patchOf()[t]]];
+    if (part.before.empty() && !part.map_changed) part.map_changed = isNewOnMap(touch, outcome);
   }
 }
 
@@ -283,21 +302,24 @@ void PatchTracker::begin(Outcome& outcome) {
 
 /// The step becomes the trace, without what has not touched for longer than the gap.
 void PatchTracker::remember(double gap_s, const Outcome& outcome) {
-  const std::vector<std::uint32_t>& part_of = graph_.lastComponents();
-  releaseBurst(trace_);
   trace_.clear();
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    Trace trace = all_[i];
-    const std::int64_t clock_ns = trace.touch.onMap() ? map_clock_ns_ : mesh_clock_ns_;
-    if (current_[i] != NO_PATCH) trace.last_ns = clock_ns;
-    if (static_cast<double>(clock_ns - trace.last_ns) > gap_s * 1e9) continue;
-    const Part& part = parts_[part_of[i]];
-    if (part.touches) trace.id = part.id;
-    trace_.push_back(trace);
-  }
+  alive_.clear();
   for (auto& [id, living] : living_) living.unexpected = false;
-  for (const Trace& trace : trace_) {
-    if (!trace.touch.expected) living_.at(trace.id).unexpected = true;
+  for (std::size_t i = 0; i < current_.size(); ++i) {
+    const Touch& spot = all_.spots[i];
+    Known known = all_.known[i];
+    const std::int64_t clock_ns = spot.onMap() ? map_clock_ns_ : mesh_clock_ns_;
+    if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
+    if (static_cast<double>(clock_ns - known.last_ns) > gap_s * 1e9) continue;
+    Part& part = parts_[(*part_of_)[i]];
+    if (part.touches) {
+      known.id = part.id;
+      part.lasts_unexpected = part.lasts_unexpected || !spot.expected;
+    } else {
+      if (alive_.empty() || alive_.back() != known.id) alive_.push_back(known.id);
+      if (!spot.expected) living_.at(known.id).unexpected = true;
+    }
+    trace_.push(spot, known);
   }
   for (auto& [id, living] : living_) {
     const bool seen = living.body[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
@@ -308,22 +330,20 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
     Living& living = living_.at(part.id);
     living.touched_ns = std::max(living.touched_ns, stampBefore(outcome, part.toc_lower));
     living.released_ns = UNKNOWN_NS;
+    living.unexpected = living.unexpected || part.lasts_unexpected;
+    alive_.push_back(part.id);
   }
+  std::sort(alive_.begin(), alive_.end());
 }
 
 void PatchTracker::endWhatIsGone(Outcome& outcome) {
-  std::vector<std::uint64_t> alive;
-  for (const Trace& trace : trace_) {
-    if (alive.empty() || alive.back() != trace.id) alive.push_back(trace.id);
-  }
-  std::sort(alive.begin(), alive.end());
   std::vector<std::uint64_t> merged;
   for (const PatchEvent& event : outcome.patch_events) {
     if (event.kind == PatchEventKind::MERGED) merged.insert(merged.end(), event.others.begin(), event.others.end());
   }
   std::vector<PatchEvent> ends;
   for (auto at = living_.begin(); at != living_.end();) {
-    if (std::binary_search(alive.begin(), alive.end(), at->first)) {
+    if (std::binary_search(alive_.begin(), alive_.end(), at->first)) {
       ++at;
       continue;
     }

@@ -12,7 +12,7 @@
 
 namespace dccd {
 
-/// Keeps what touched within the last patch_gap_s. What is connected through that is one living patch, so that one
+/// Keeps what touched within the last patch_gap_s. What belongs together by that is one living patch, so that one
 /// which noise takes apart, or lets go of, for a moment stays one. Its memory is what touched in that time.
 class PatchTracker {
  public:
@@ -22,14 +22,14 @@ class PatchTracker {
   void seam(std::size_t body = ALL);
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:
   /// what detect() found in it.
-  void follow(const PatchMaker& found, double gap_s, Outcome& outcome);
+  void follow(PatchMaker& found, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
-  void recognise(const PatchMaker& found, Outcome& outcome);
+  void recognise(PatchMaker& found, Outcome& outcome);
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
 
   std::size_t livingCount() const { return living_.size(); }
-  std::size_t traceSize() const { return trace_.size(); }
+  std::size_t traceSize() const { return trace_.spots.size(); }
 
  private:
   struct Living {
@@ -40,16 +40,26 @@ class PatchTracker {
     StampNs released_ns = UNKNOWN_NS;  // it no longer was; UNKNOWN_NS: it was not seen apart since
     bool unexpected = false;           // something of it that lasts is not expected
   };
-  /// Something that touched, of a living patch.
-  struct Trace {
-    Touch touch;
+  /// What is known of a spot of a living patch.
+  struct Known {
     std::uint64_t id = 0;
     std::int64_t last_ns = 0;  // by the clock of its partner
   };
-  /// A connected set of what touches and what did.
+  /// Spots that touched, by key.
+  struct Trace {
+    std::vector<Touch> spots;
+    std::vector<Known> known;
+    void clear();
+    void push(const Touch& spot, const Known& is) {
+      spots.push_back(spot);
+      known.push_back(is);
+    }
+  };
+  /// What touches and what did, between the same areas.
   struct Part {
     std::uint64_t id = 0;
-    bool touches = false;  // in this step
+    bool touches = false;           // in this step
+    bool lasts_unexpected = false;  // a spot of it that is remembered is not expected
     std::size_t size = 0;
     std::vector<std::uint64_t> before;  // identities of its touches, ascending, each once
     double toc_lower = 1, toc_upper = 1;
@@ -59,11 +69,12 @@ class PatchTracker {
     std::array<std::uint16_t, 2> body{0, 0};
   };
 
-  void merge(const std::vector<Touch>& touches);
+  void merge(const std::vector<Touch>& spots);
   void findParts(const PatchMaker& found, const Outcome& outcome);
+  void findChangesOfTheMap(const PatchMaker& found, const Outcome& outcome);
   bool isNewOnMap(const Touch& touch, const Outcome& outcome) const;
   void keepIdentities(Outcome& outcome);
-  void name(const PatchMaker& found, Outcome& outcome) const;
+  void name(Outcome& outcome) const;
   void begin(Outcome& outcome);
   void findNews();
   void tellNews(Outcome& outcome) const;
@@ -73,7 +84,7 @@ class PatchTracker {
   PatchEvent eventOf(PatchEventKind kind, std::uint64_t id) const;
 
   std::map<std::uint64_t, Living> living_;
-  std::vector<Trace> trace_;  // by key
+  Trace trace_;
   std::uint64_t next_id_ = 1;
   // Time that was seen whole, with the map and without: nothing ends in what was not.
   std::int64_t mesh_clock_ns_ = 0, map_clock_ns_ = 0;
@@ -85,10 +96,12 @@ class PatchTracker {
 
   // Buffers of a step.
   TouchGraph graph_;
-  std::vector<Touch> touches_;          // trace and step together, by key
-  std::vector<Trace> all_;              // the same with what is known of each
-  std::vector<std::uint32_t> current_;  // per one of these its touch of the step; NO_PATCH: none
+  Trace all_;                                            // trace and step together
+  std::vector<std::uint32_t> current_;                   // per one of these its spot in the step; NO_PATCH: none
+  const std::vector<std::uint32_t>* part_of_ = nullptr;  // per one of these
+  std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
+  std::vector<std::uint64_t> alive_;  // ascending
 };
 
 }  // namespace dccd

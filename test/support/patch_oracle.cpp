@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <functional>
 #include <map>
-#include <numeric>
+#include <set>
 #include <sstream>
+#include <tuple>
 
 namespace dccd {
 namespace test {
@@ -26,7 +26,7 @@ PatchOracle::PatchOracle(const Outcome& outcome) : outcome_(outcome) {
     for (int i = 0; i < 4; ++i) {
       if (c.vertex[i] == NO_INDEX) continue;
       const int side = i < first ? 0 : 1;
-      m.side[side].push_back({c.body[side], c.vertex[i]});
+      m.side[side].emplace_back(c.body[side], c.vertex[i]);
     }
     members_.push_back(m);
   }
@@ -37,87 +37,55 @@ PatchOracle::PatchOracle(const Outcome& outcome) : outcome_(outcome) {
     if (s.vertex[4] == NO_INDEX) continue;
     Member m;
     std::copy_n(s.body.begin(), 2, m.body);
-    for (int i = 0; i < 5; ++i) m.side[i < 2 ? 0 : 1].push_back({s.body[i < 2 ? 0 : 1], s.vertex[i]});
+    for (int i = 0; i < 5; ++i) m.side[i < 2 ? 0 : 1].emplace_back(s.body[i < 2 ? 0 : 1], s.vertex[i]);
     members_.push_back(m);
   }
 }
 
-bool PatchOracle::share(const std::vector<Vertex>& a, const std::vector<Vertex>& b) const {
-  for (const Vertex& x : a) {
-    for (const Vertex& y : b) {
-      if (x.body == y.body && x.vertex == y.vertex) return true;
-    }
+/// The area of each vertex that a contact of the two partners has, by a flood along the edges between such vertices.
+std::map<PatchOracle::Vertex, std::size_t> PatchOracle::areasOf(const Partners& partners) const {
+  std::set<Vertex> touched;
+  for (const Member& m : members_) {
+    if (m.partners() != partners) continue;
+    for (const auto& side : m.side) touched.insert(side.begin(), side.end());
   }
-  return false;
-}
-
-bool PatchOracle::near(const std::vector<Vertex>& a, const std::vector<Vertex>& b) const {
-  if (share(a, b)) return true;
-  for (const Vertex& x : a) {
-    const auto& ends = joined_[x.body][x.vertex];
-    for (const Vertex& y : b) {
-      if (x.body == y.body && std::find(ends.begin(), ends.end(), y.vertex) != ends.end()) return true;
-    }
-  }
-  return false;
-}
-
-bool PatchOracle::neighbours(const Member& a, const Member& b) const {
-  if ((a.body[1] == OBSTACLE_BODY) != (b.body[1] == OBSTACLE_BODY)) return false;
-  if (a.body[1] == OBSTACLE_BODY) return near(a.side[0], b.side[0]);
-  for (int turn = 0; turn < 2; ++turn) {
-    const auto &one = b.side[turn], &other = b.side[1 - turn];
-    if (share(a.side[0], one) && near(a.side[1], other)) return true;
-    if (near(a.side[0], one) && share(a.side[1], other)) return true;
-  }
-  return false;
-}
-
-std::vector<std::uint32_t> PatchOracle::patches(bool by_vertex) const {
-  std::vector<std::size_t> parent(members_.size());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const std::function<std::size_t(std::size_t)> root = [&](std::size_t i) {
-    while (parent[i] != i) i = parent[i];
-    return i;
-  };
-  const auto look = [&](std::size_t i, std::size_t j) {
-    const std::size_t a = root(i), b = root(j);
-    if (a != b && neighbours(members_[i], members_[j])) parent[std::max(a, b)] = std::min(a, b);
-  };
-  if (by_vertex) {
-    std::map<std::pair<std::uint16_t, Index>, std::vector<std::size_t>> at;
-    std::vector<std::size_t> map;
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      for (const auto& side : members_[i].side) {
-        for (const Vertex& v : side) at[{v.body, v.vertex}].push_back(i);
-      }
-      if (members_[i].body[1] == OBSTACLE_BODY) map.push_back(i);
-    }
-    for (const auto& [vertex, list] : at) {
-      for (const std::size_t i : list) {
-        for (const std::size_t j : list) look(i, j);
+  std::map<Vertex, std::size_t> area;
+  for (const Vertex& start : touched) {
+    if (!area.emplace(start, area.size()).second) continue;
+    const std::size_t number = area.at(start);
+    std::vector<Vertex> flood{start};
+    while (!flood.empty()) {
+      const auto [body, vertex] = flood.back();
+      flood.pop_back();
+      for (const Index other : joined_[body][vertex]) {
+        if (touched.count({body, other}) && area.emplace(Vertex(body, other), number).second) {
+          flood.emplace_back(body, other);
+        }
       }
     }
-    for (const std::size_t i : map) {
-      for (const std::size_t j : map) look(i, j);
-    }
-  } else {
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) look(i, j);
-    }
   }
-  std::vector<std::uint32_t> numbers(members_.size());
-  std::uint32_t count = 0;
-  for (std::size_t i = 0; i < members_.size(); ++i) {
-    const std::size_t r = root(i);
-    numbers[i] = r == i ? count++ : numbers[r];
-  }
-  return numbers;
+  return area;
 }
 
-std::string patchProblem(const Outcome& outcome, bool by_vertex) {
+std::vector<std::uint32_t> PatchOracle::patches() const {
+  std::map<Partners, std::map<Vertex, std::size_t>> areas;
+  std::map<std::tuple<Partners, std::size_t, std::size_t>, std::uint32_t> numbers;
+  std::vector<std::uint32_t> patches;
+  for (const Member& m : members_) {
+    const auto [of_pair, is_new] = areas.try_emplace(m.partners());
+    if (is_new) of_pair->second = areasOf(m.partners());
+    const std::size_t a = of_pair->second.at(m.side[0][0]);
+    const std::size_t b = m.side[1].empty() ? a : of_pair->second.at(m.side[1][0]);
+    const auto next = static_cast<std::uint32_t>(numbers.size());
+    patches.push_back(
+        numbers.emplace(std::make_tuple(m.partners(), std::min(a, b), std::max(a, b)), next).first->second);
+  }
+  return patches;
+}
+
+std::string patchProblem(const Outcome& outcome) {
   std::ostringstream text;
-  const std::vector<std::uint32_t> truth = PatchOracle(outcome).patches(by_vertex);
+  const std::vector<std::uint32_t> truth = PatchOracle(outcome).patches();
   const std::size_t count = truth.empty() ? 0 : 1 + *std::max_element(truth.begin(), truth.end());
   if (outcome.patches.size() != count) {
     text << outcome.patches.size() << " patches instead of " << count;
