@@ -47,8 +47,9 @@ void PatchMaker::begin(const Outcome& outcome) {
   releaseBurst(touches_);
   releaseBurst(order_);
   releaseBurst(parts_);
+  releaseBurst(spots_);
+  spots_.clear();
   unexpected_.clear();
-  spots_are_touches_ = true;
   graph_.setBodies(outcome.step->bodies);
   contacts_ = outcome.contacts.size();
   touches_.reserve(contacts_ + outcome.intersections.size());
@@ -60,7 +61,6 @@ void PatchMaker::connect(const Outcome& outcome) {
     // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
     if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
   }
-  sortCrossings();
   patch_of_ = &graph_.components(touches_);
   const std::size_t count = graph_.componentCount();
   begin_.assign(count + 2, 0);
@@ -69,20 +69,6 @@ void PatchMaker::connect(const Outcome& outcome) {
   order_.resize(touches_.size());
   for (std::uint32_t t = 0; t < touches_.size(); ++t) order_[begin_[(*patch_of_)[t] + 1]++] = t;
   parts_.assign(count + pieces(), Part());
-}
-
-/// Of one body they come by their edges, and only those of an edge have to be sorted.
-void PatchMaker::sortCrossings() {
-  const auto isBefore = [](const Touch& a, const Touch& b) { return a.key() < b.key(); };
-  const auto first = touches_.begin() + static_cast<std::ptrdiff_t>(contacts_);
-  for (auto begin = first, end = first; begin != touches_.end(); begin = end) {
-    const auto hasOtherEdge = [&](const Touch& t) {
-      return t.point[0] != begin->point[0] || t.point[1] != begin->point[1];
-    };
-    end = std::find_if(begin, touches_.end(), hasOtherEdge);
-    std::sort(begin, end, isBefore);
-  }
-  if (!std::is_sorted(first, touches_.end(), isBefore)) std::sort(first, touches_.end(), isBefore);
 }
 
 PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) const {
@@ -220,7 +206,7 @@ void PatchMaker::make(Outcome& outcome) {
 /// Of the faces that have a vertex that touches something; where it is when the step begins.
 void PatchMaker::findVertexAreas(const Step& step) {
   vertex_area_.assign(graph_.vertexCount(), 0);
-  const auto isTouched = [&](Index vertex) { return seen_[vertex] != NO_PATCH; };
+  const auto isTouched = [&](Index vertex) { return seen_[vertex].patch != NO_PATCH; };
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     const Index base = graph_.firstVertex(b);
     const Positions& x = *step.bodies[b].t0;
@@ -234,26 +220,41 @@ void PatchMaker::findVertexAreas(const Step& step) {
 }
 
 void PatchMaker::findAreas(const Outcome& outcome) {
-  const auto forVertices = [&](const auto& function) {
-    for (std::size_t i = 0; i < order_.size(); ++i) {
-      const Touch& touch = touches_[order_[i]];
-      const int first = touch.firstSize(), all = first + touch.secondSize();
-      for (int k = 0; k < all; ++k) function(touch.point[k], (*patch_of_)[order_[i]], touch.body[k < first ? 0 : 1]);
-    }
-  };
-  seen_.assign(graph_.vertexCount(), NO_PATCH);
-  forVertices([&](Index vertex, std::uint32_t patch, std::uint16_t) { seen_[vertex] = patch; });
+  findSpots();
   findVertexAreas(*outcome.step);
   areas_.assign(2 * graph_.componentCount(), 0);
-  seen_.assign(graph_.vertexCount(), NO_PATCH);
-  forVertices([&](Index vertex, std::uint32_t patch, std::uint16_t body) {
-    if (seen_[vertex] == patch) return;
-    seen_[vertex] = patch;
-    const auto& bodies = touches_[order_[begin_[patch]]].body;
-    areas_[2 * patch + (body != std::min(bodies[0], bodies[1]))] += vertex_area_[vertex];
-  });
+  for (const Spot& spot : spots_) areas_[2 * spot.patch + spot.side] += vertex_area_[spot.vertex];
   for (std::uint32_t p = 0; p < graph_.componentCount(); ++p) {
     if (touches_[order_[begin_[p]]].onMap()) areas_[2 * p + 1] = leafArea(p, outcome.obstacle->resolution());
+  }
+}
+
+void PatchMaker::findSpots() {
+  seen_.assign(graph_.vertexCount(), {NO_PATCH, 0});
+  std::uint32_t patch = NO_PATCH;
+  bool some_expected = false;  // of the patch's spots
+  for (const std::uint32_t t : order_) {
+    const Touch& touch = touches_[t];
+    if ((*patch_of_)[t] != patch) {
+      patch = (*patch_of_)[t];
+      some_expected = false;
+    }
+    const int first = touch.firstSize(), all = first + touch.secondSize();
+    for (int i = 0; i < all; ++i) {
+      const Index vertex = touch.point[i];
+      Seen& seen = seen_[vertex];
+      if (seen.patch == patch) {
+        if (some_expected && !touch.expected) spots_[seen.spot].expected = false;
+        continue;
+      }
+      seen = {patch, static_cast<std::uint32_t>(spots_.size())};
+      some_expected = some_expected || touch.expected;
+      const bool is_first = i < first;
+      const Index across = touch.onMap() ? NO_INDEX : touch.point[is_first ? first : 0];
+      const auto side =
+          static_cast<std::uint8_t>(touch.body[is_first ? 0 : 1] != std::min(touch.body[0], touch.body[1]));
+      spots_.push_back({vertex, across, patch, side, touch.expected});
+    }
   }
 }
 
@@ -272,42 +273,6 @@ double PatchMaker::leafArea(std::uint32_t patch, double resolution_m) {
     area_m2 += edge_m * edge_m;
   }
   return area_m2;
-}
-
-void PatchMaker::findSpots() {
-  const auto on_map = [](const Touch& touch) { return touch.onMap(); };
-  const auto first = std::find_if(touches_.begin(), touches_.end(), on_map);
-  spots_are_touches_ = first == touches_.end();
-  if (spots_are_touches_) return;
-  const auto last = std::find_if_not(first, touches_.end(), on_map);
-  const auto begin = static_cast<std::size_t>(first - touches_.begin()),
-             end = static_cast<std::size_t>(last - touches_.begin());
-  releaseBurst(spots_);
-  releaseBurst(patch_of_spot_);
-  spots_.assign(touches_.begin(), first);
-  patch_of_spot_.assign(patch_of_->begin(), patch_of_->begin() + static_cast<std::ptrdiff_t>(begin));
-  seen_.assign(graph_.vertexCount(), NO_PATCH);
-  expected_.assign(graph_.vertexCount(), true);
-  for (std::size_t t = begin; t < end; ++t) {
-    for (int i = 0; i < touches_[t].firstSize(); ++i) {
-      seen_[touches_[t].point[i]] = (*patch_of_)[t];
-      expected_[touches_[t].point[i]] &= touches_[t].expected;
-    }
-  }
-  Touch spot;
-  spot.kind = static_cast<std::uint8_t>(PairKind::VERTEX_VOXEL_FACE);
-  for (std::size_t b = 0; b < graph_.bodyCount(); ++b) {
-    spot.body = {static_cast<std::uint16_t>(b), OBSTACLE_BODY};
-    for (Index v = graph_.firstVertex(b); v < graph_.firstVertex(b + 1); ++v) {
-      if (seen_[v] == NO_PATCH) continue;
-      spot.point[0] = v;
-      spot.expected = expected_[v] != 0;
-      spots_.push_back(spot);
-      patch_of_spot_.push_back(seen_[v]);
-    }
-  }
-  spots_.insert(spots_.end(), last, touches_.end());
-  patch_of_spot_.insert(patch_of_spot_.end(), patch_of_->begin() + static_cast<std::ptrdiff_t>(end), patch_of_->end());
 }
 
 void PatchMaker::list(Outcome& outcome) const {

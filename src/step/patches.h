@@ -35,11 +35,15 @@ class PatchMaker {
   const std::vector<Touch>& touches() const { return touches_; }
   const std::vector<std::uint32_t>& patchOf() const { return *patch_of_; }
 
-  /// What a patch leaves from step to step: the touches between meshes and, for those with the map, the vertices that
-  /// they have: there, leaves make no difference. Made by findSpots().
-  void findSpots();
-  const std::vector<Touch>& spots() const { return spots_are_touches_ ? touches_ : spots_; }
-  const std::vector<std::uint32_t>& patchOfSpot() const { return spots_are_touches_ ? *patch_of_ : patch_of_spot_; }
+  /// A vertex that carries a feature of a patch's touches, once a patch: what the tracker keeps from step to step.
+  struct Spot {
+    Index vertex;
+    Index across;  ///< a vertex of the other side that it touches; NO_INDEX with the map
+    std::uint32_t patch;
+    std::uint8_t side;  ///< 0: of Patch::body[0]
+    bool expected;      ///< all of the patch's touches there are
+  };
+  const std::vector<Spot>& spots() const { return spots_; }
 
   /// Per patch: has it touches that are not expected, and came in this step, or were there when it began?
   struct Unexpected {
@@ -56,12 +60,12 @@ class PatchMaker {
 
   void begin(const Outcome& outcome);
   void connect(const Outcome& outcome);
-  void sortCrossings();
   std::size_t pieces() const { return (touches_.size() + PIECE - 1) / PIECE; }
   Place placeOf(const Outcome& outcome, std::size_t touch) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void measure(const Outcome& outcome, std::size_t piece);
   void findAreas(const Outcome& outcome);
+  void findSpots();
   void findVertexAreas(const Step& step);
   double leafArea(std::uint32_t patch, double resolution_m);
   void make(Outcome& outcome);
@@ -78,14 +82,15 @@ class PatchMaker {
   /// either i or p goes on.
   std::vector<Part> parts_;
   std::vector<Unexpected> unexpected_;
-  std::vector<Touch> spots_;
-  std::vector<std::uint32_t> patch_of_spot_;
-  bool spots_are_touches_ = true;
-  std::vector<double> vertex_area_;     // per vertex of all bodies: a third of the faces around it [m^2]
-  std::vector<std::uint32_t> seen_;     // per vertex: the last patch that had it
-  std::vector<std::uint8_t> expected_;  // per vertex: all of its touches with the map are
-  std::vector<std::uint64_t> leaves_;   // of a patch
-  std::vector<double> areas_;           // two sides a patch
+  std::vector<double> vertex_area_;  // per vertex of all bodies: a third of the faces around it [m^2]
+  std::vector<Spot> spots_;          // patch by patch
+  /// Per vertex: the last patch that had it, and its spot there.
+  struct Seen {
+    std::uint32_t patch, spot;
+  };
+  std::vector<Seen> seen_;
+  std::vector<std::uint64_t> leaves_;  // of a patch
+  std::vector<double> areas_;          // two sides a patch
   std::size_t contacts_ = 0;
 };
 

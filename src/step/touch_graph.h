@@ -16,8 +16,10 @@ namespace dccd {
 
 /// A contact, or an edge through a face, as the graph looks at it. Vertices are numbered through all bodies.
 struct Touch {
-  static constexpr std::uint8_t CROSSING = 5;  ///< beside the values of PairKind
-  static constexpr std::uint8_t SIZES[6][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}, {2, 3}};
+  // Kinds beside the values of PairKind.
+  static constexpr std::uint8_t CROSSING = 5;
+  static constexpr std::uint8_t VERTICES = 6;  ///< one of each side, of something that touched
+  static constexpr std::uint8_t SIZES[7][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}, {2, 3}, {1, 1}};
 
   std::array<Index, 5> point{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< the leaf's key is in the last two
   std::array<std::uint16_t, 2> body{0, 0};
@@ -50,8 +52,8 @@ class TouchGraph {
   Touch touchOf(const Contact& contact) const;
   Touch touchOf(const StartIntersection& crossing) const;
 
-  /// Per touch the patch that it belongs to, numbered in the order of their first touches. The touches' order is by
-  /// key().
+  /// Per touch the patch that it belongs to, numbered in the order of their first touches. They may come in any order;
+  /// those of one kind and the same bodies should lie together.
   const std::vector<std::uint32_t>& components(const std::vector<Touch>& touches);
   std::uint32_t componentCount() const { return component_count_; }
 

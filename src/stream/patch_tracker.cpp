@@ -71,14 +71,13 @@ void PatchTracker::tell(Outcome& outcome) {
   waiting_.clear();
 }
 
-void PatchTracker::follow(PatchMaker& found, double gap_s, Outcome& outcome) {
+void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   bool same = graph_.bodyCount() == bodies.size();
   for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
   if (!same) seam();
   graph_.setBodies(bodies);
-  found.findSpots();
-  merge(found.spots());
+  merge(found, outcome);
   findParts(found, outcome);
   findNews();
   keepIdentities(outcome);
@@ -98,14 +97,13 @@ void PatchTracker::follow(PatchMaker& found, double gap_s, Outcome& outcome) {
   last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
-void PatchTracker::recognise(PatchMaker& found, Outcome& outcome) {
+void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   if (graph_.bodyCount() != bodies.size()) return;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
-  found.findSpots();
-  merge(found.spots());
+  merge(found, outcome);
   findParts(found, outcome);
   findNews();
   for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
@@ -162,24 +160,40 @@ void PatchTracker::goOn(const Outcome& outcome) {
   if (map_seen_) map_clock_ns_ += duration_ns;
 }
 
-/// What touches and what did, each once, by key.
-void PatchTracker::merge(const std::vector<Touch>& spots) {
+/// What touches and what did, each pair of vertices once.
+void PatchTracker::merge(const PatchMaker& found, const Outcome& outcome) {
+  const std::vector<PatchMaker::Spot>& spots = found.spots();
   all_.clear();
+  releaseBurst(before_);
+  before_.clear();
+  last_at_.resize(graph_.vertexCount(), NO_INDEX);
+  const auto add = [&](const Touch& spot, const Known& known) {
+    std::uint32_t& last = last_at_[spot.point[0]];
+    before_.push_back(last);
+    last = static_cast<std::uint32_t>(all_.spots.size());
+    all_.push(spot, known);
+  };
+  const bool burst = trace_.spots.size() > std::max(TRACE_PER_SPOT * spots.size(), TRACE_ALWAYS);
+  for (std::size_t i = 0; !burst && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
   releaseBurst(current_);
-  current_.clear();
-  const std::vector<Touch>& before = trace_.spots;
-  const bool burst = before.size() > std::max(TRACE_PER_SPOT * spots.size(), TRACE_ALWAYS);
-  std::size_t past = burst ? before.size() : 0;
-  std::uint32_t now = 0;
-  while (past < before.size() || now < spots.size()) {
-    const bool has_now = now < spots.size(), has_past = past < before.size();
-    const bool takes_now = has_now && (!has_past || !(before[past].key() < spots[now].key()));
-    const bool takes_past = has_past && (!takes_now || before[past].key() == spots[now].key());
-    all_.push(takes_now ? spots[now] : before[past], takes_past ? trace_.known[past] : Known());
-    current_.push_back(takes_now ? now : NO_PATCH);
-    past += takes_past;
-    now += takes_now;
+  current_.assign(all_.spots.size(), NO_PATCH);
+  for (const PatchMaker::Spot& spot : spots) {
+    std::uint32_t at = last_at_[spot.vertex];
+    while (at != NO_INDEX && all_.spots[at].point[1] != spot.across) at = before_[at];
+    if (at == NO_INDEX) {
+      Touch touch;
+      touch.body = outcome.patches[spot.patch].body;
+      touch.kind = touch.onMap() ? static_cast<std::uint8_t>(PairKind::VERTEX_VOXEL_FACE) : Touch::VERTICES;
+      touch.point[0] = spot.vertex;
+      touch.point[1] = spot.across;
+      at = static_cast<std::uint32_t>(all_.spots.size());
+      add(touch, Known());
+      current_.push_back(NO_PATCH);
+    }
+    all_.spots[at].expected = spot.expected;
+    current_[at] = spot.patch;
   }
+  for (const Touch& spot : all_.spots) last_at_[spot.point[0]] = NO_INDEX;
 }
 
 bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
@@ -194,7 +208,7 @@ bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const 
 void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
   // Where all that touched still does, the patches of the step are the parts.
   const bool same = all_.spots.size() == found.spots().size();
-  part_of_ = same ? &found.patchOfSpot() : &graph_.components(all_.spots);
+  part_of_ = same ? &current_ : &graph_.components(all_.spots);
   releaseBurst(parts_);
   parts_.assign(same ? outcome.patches.size() : graph_.componentCount(), Part());
   part_of_patch_.assign(outcome.patches.size(), 0);
@@ -203,7 +217,7 @@ void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
     const std::uint64_t id = all_.known[i].id;
     std::vector<std::uint64_t>& before = parts_[part].before;
     if (id != 0 && (before.empty() || before.back() != id)) before.push_back(id);
-    if (current_[i] != NO_PATCH) part_of_patch_[found.patchOfSpot()[current_[i]]] = part;
+    if (current_[i] != NO_PATCH) part_of_patch_[current_[i]] = part;
   }
   for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
     const Patch& patch = outcome.patches[p];

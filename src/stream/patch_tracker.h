@@ -22,9 +22,9 @@ class PatchTracker {
   void seam(std::size_t body = ALL);
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:
   /// what detect() found in it.
-  void follow(PatchMaker& found, double gap_s, Outcome& outcome);
+  void follow(const PatchMaker& found, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
-  void recognise(PatchMaker& found, Outcome& outcome);
+  void recognise(const PatchMaker& found, Outcome& outcome);
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
 
@@ -40,12 +40,12 @@ class PatchTracker {
     StampNs released_ns = UNKNOWN_NS;  // it no longer was; UNKNOWN_NS: it was not seen apart since
     bool unexpected = false;           // something of it that lasts is not expected
   };
-  /// What is known of a spot of a living patch.
+  /// What is known of a spot (PatchMaker::Spot) of a living patch.
   struct Known {
     std::uint64_t id = 0;
     std::int64_t last_ns = 0;  // by the clock of its partner
   };
-  /// Spots that touched, by key.
+  /// Spots that touched; each pair of vertices is there once.
   struct Trace {
     std::vector<Touch> spots;
     std::vector<Known> known;
@@ -69,7 +69,7 @@ class PatchTracker {
     std::array<std::uint16_t, 2> body{0, 0};
   };
 
-  void merge(const std::vector<Touch>& spots);
+  void merge(const PatchMaker& found, const Outcome& outcome);
   void findParts(const PatchMaker& found, const Outcome& outcome);
   void findChangesOfTheMap(const PatchMaker& found, const Outcome& outcome);
   bool isNewOnMap(const Touch& touch, const Outcome& outcome) const;
@@ -96,9 +96,11 @@ class PatchTracker {
 
   // Buffers of a step.
   TouchGraph graph_;
-  Trace all_;                                            // trace and step together
-  std::vector<std::uint32_t> current_;                   // per one of these its spot in the step; NO_PATCH: none
+  Trace all_;                                            // the trace, then what is new in the step
+  std::vector<std::uint32_t> current_;                   // per one of these its patch in the step; NO_PATCH: none
   const std::vector<std::uint32_t>* part_of_ = nullptr;  // per one of these
+  std::vector<std::uint32_t> last_at_;                   // per vertex: the last one of these there; NO_INDEX
+  std::vector<std::uint32_t> before_;                    // per one of these: the one before it at the same vertex
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
   std::vector<std::uint64_t> alive_;  // ascending

@@ -30,10 +30,7 @@ PatchOracle::PatchOracle(const Outcome& outcome) : outcome_(outcome) {
     }
     members_.push_back(m);
   }
-  std::vector<StartIntersection> crossings = outcome.intersections;
-  std::sort(crossings.begin(), crossings.end(),
-            [](const auto& a, const auto& b) { return std::tie(a.body, a.vertex) < std::tie(b.body, b.vertex); });
-  for (const StartIntersection& s : crossings) {
+  for (const StartIntersection& s : outcome.intersections) {
     if (s.vertex[4] == NO_INDEX) continue;
     Member m;
     std::copy_n(s.body.begin(), 2, m.body);

@@ -17,8 +17,8 @@ namespace test {
 class PatchOracle {
  public:
   explicit PatchOracle(const Outcome& outcome);
-  /// Numbers of the patches in the order of their first members: contacts, then crossings in the order of their kind,
-  /// bodies and vertices.
+  /// Numbers of the patches in the order of their first members: contacts, then crossings, as they
+  /// are listed.
   std::vector<std::uint32_t> patches() const;
 
  private:
