@@ -208,6 +208,24 @@ TEST(PatchTracker, ARopePulledThroughARingStaysOne) {
   EXPECT_EQ(stream.text(), "BEGAN 1, ENDED 1");
 }
 
+TEST(PatchTracker, WhatTouchesASheetFromBothSidesAtOneVertexIsTwo) {
+  const auto tip = share(Topology::fromTriangles(4, {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}}));
+  const auto tipAt = [](double side, double gap_m) {
+    Positions x = {Vec3(0.043, 0.044, 0), Vec3(0.05, 0.04, 0.03), Vec3(0.04, 0.05, 0.03), Vec3(0.035, 0.035, 0.03)};
+    // Beside each other, so that they do not touch, on faces of one vertex.
+    for (Vec3& p : x) p += Vec3(0.002 * side, 0.001 * side, 0), p.z() = side * (p.z() + gap_m);
+    return x;
+  };
+  Stream stream({grid(5, 5), tip, tip});
+  const Positions sheet = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
+  for (int k = 0; k < 40; ++k) {
+    const double above = k >= 3 && k < 12 ? -0.001 : 0.01, below = k >= 6 && k < 24 ? -0.001 : 0.01;
+    stream.feed({sheet, tipAt(1, above), tipAt(-1, below)});
+  }
+  EXPECT_EQ(stream.text(), "BEGAN 1, BEGAN 2, ENDED 1, ENDED 2");
+  EXPECT_EQ(stream.events()[2].body, (std::array<std::uint16_t, 2>{0, 1}));
+}
+
 TEST(PatchTracker, ASplitIsToldOnceTheGapIsOverAndTheLargerPartKeepsTheIdentity) {
   Stream stream({grid(3, 41)});
   stream.setMap(table(0.05));
@@ -504,6 +522,26 @@ TEST(NewContacts, WhatIsExpectedIsNoneUntilItGrowsBeyondThat) {
   ASSERT_EQ(outcome.patches.size(), 1u);
   EXPECT_GT(outcome.patches[0].expected, 0u);
   EXPECT_FALSE(outcome.patches[0].isExpected());
+}
+
+TEST(NewContacts, WhatIsNotExpectedIsRememberedWhereExpectedThingsTouchAsWell) {
+  // Each end of the rope may touch the sheet, but no expectation holds its edge.
+  MonitorOptions options;
+  for (Index v = 0; v < 2; ++v) {
+    Expectation end;
+    end.partners[0].vertices = {v};
+    end.partners[1].body = 1;
+    options.detector.expected.push_back(end);
+  }
+  Stream stream({share(Topology::polyline(2)), grid(2, 2)}, options);  // across the edge between two triangles
+  const Positions sheet = strip(2, 2, 0.1, [](std::size_t) { return 0.0; });
+  std::vector<std::size_t> news;
+  for (int k = 0; k < 9; ++k) {
+    const double z = k % 3 == 2 ? -0.001 : 0.01;  // down every third frame, well within the gap
+    news.push_back(newContacts(stream.feed({{Vec3(0.02, 0.05, z), Vec3(0.09, 0.06, z)}, sheet})).size());
+  }
+  EXPECT_EQ(news, (std::vector<std::size_t>{0, 0, 1, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(stream.text(), "BEGAN 1");
 }
 
 TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsNone) {
