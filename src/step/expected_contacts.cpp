@@ -6,6 +6,9 @@
 namespace dccd {
 namespace {
 
+constexpr std::size_t BITS = 64;
+constexpr std::uint64_t FIRST_PARTNERS = 0x5555555555555555;
+
 std::string nameOf(const ExpectedPartner& partner, const std::vector<Body>& bodies) {
   if (partner.body == OBSTACLE_BODY) return "the map";
   const std::string& name = bodies[partner.body].name;
@@ -61,34 +64,46 @@ std::vector<std::string> describe(const std::vector<Expectation>& expected, cons
 
 void ExpectedContacts::set(const std::vector<Expectation>& expected, const std::vector<Body>& bodies) {
   checkPartners(expected, bodies.size());
-  const auto partnerOf = [&](const ExpectedPartner& from) {
-    Partner to{from.body, from.vertices.empty(), {}};
-    if (to.anywhere) return to;
-    to.holds.assign(bodies[from.body].topology->vertexCount(), 0);
-    for (const Index v : from.vertices) {
-      if (v >= to.holds.size()) {
-        throw std::invalid_argument("expected contacts of body '" + bodies[from.body].name + "' name vertex " +
-                                    std::to_string(v) + ", but the mesh has " + std::to_string(to.holds.size()));
-      }
-      to.holds[v] = 1;
+  std::vector<Masks> masks(bodies.size() + 1);
+  const std::size_t words = (2 * expected.size() + BITS - 1) / BITS;
+  for (Masks& of_body : masks) of_body.anywhere.assign(words, 0);
+  for (std::size_t bit = 0; bit < 2 * expected.size(); ++bit) {
+    const ExpectedPartner& partner = expected[bit / 2].partners[bit % 2];
+    const std::size_t word = bit / BITS;
+    const Word one = Word{1} << bit % BITS;
+    Masks& of_body = masks[partner.body == OBSTACLE_BODY ? bodies.size() : partner.body];
+    if (partner.vertices.empty()) {
+      of_body.anywhere[word] |= one;
+      continue;
     }
-    return to;
-  };
-  std::vector<Pair> pairs;
-  for (const Expectation& one : expected) pairs.push_back({partnerOf(one.partners[0]), partnerOf(one.partners[1])});
-  pairs_ = std::move(pairs);
+    const std::size_t count = bodies[partner.body].topology->vertexCount();
+    of_body.vertices.resize(words * count, 0);
+    for (const Index v : partner.vertices) {
+      if (v >= count) {
+        throw std::invalid_argument("expected contacts of body '" + bodies[partner.body].name + "' name vertex " +
+                                    std::to_string(v) + ", but the mesh has " + std::to_string(count));
+      }
+      of_body.vertices[words * v + word] |= one;
+    }
+  }
+  masks_ = std::move(masks);
+  words_ = words;
 }
 
-bool ExpectedContacts::Partner::has(const Feature& feature) const {
-  if (feature.body != body) return false;
-  if (anywhere) return true;
-  return feature.whole && std::all_of(feature.begin, feature.end, [&](Index v) { return holds[v] != 0; });
+/// Bits of the partners that hold all of the feature.
+ExpectedContacts::Word ExpectedContacts::heldBy(const Feature& feature, std::size_t word) const {
+  const Masks& masks = masksOf(feature.body);
+  Word held = masks.vertices.empty() || !feature.whole || feature.begin == feature.end ? 0 : ~Word{0};
+  for (const Index* v = feature.begin; held != 0 && v != feature.end; ++v) held &= masks.vertices[words_ * *v + word];
+  return held | masks.anywhere[word];
 }
 
 bool ExpectedContacts::isExpected(const Feature& a, const Feature& b) const {
-  return std::any_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
-    return (pair.first.has(a) && pair.second.has(b)) || (pair.first.has(b) && pair.second.has(a));
-  });
+  for (std::size_t word = 0; word < words_; ++word) {
+    const Word by_a = heldBy(a, word), by_b = heldBy(b, word);
+    if (((by_a & by_b >> 1) | (by_b & by_a >> 1)) & FIRST_PARTNERS) return true;
+  }
+  return false;
 }
 
 bool ExpectedContacts::isExpected(const Contact& contact) const {
@@ -107,7 +122,7 @@ bool ExpectedContacts::isExpected(const StartIntersection& start) const {
 }
 
 void ExpectedContacts::mark(Outcome& outcome) const {
-  if (pairs_.empty()) return;
+  if (words_ == 0) return;
   for (Contact& contact : outcome.contacts) contact.expected = isExpected(contact);
   for (StartIntersection& start : outcome.intersections) start.expected = isExpected(start);
 }

@@ -1,5 +1,5 @@
-// Which of a step's contacts are expected: masks over the bodies' vertices, made once for many steps, so that marking
-// is linear and allocates nothing.
+// Which of a step's contacts are expected: a bit for each partner at each vertex, made once for many steps, so that
+// marking looks at 32 expectations at once and allocates nothing.
 #pragma once
 
 #include <string>
@@ -25,16 +25,17 @@ class ExpectedContacts {
     const Index *begin, *end;
     bool whole;  // all of its vertices are named
   };
-  struct Partner {
-    std::uint16_t body;
-    bool anywhere;
-    std::vector<std::uint8_t> holds;  // per vertex of the body
-    bool has(const Feature& feature) const;
+  /// Which partners hold what: bit 2*i + k for the k-th partner of expectation i, from word to word.
+  using Word = std::uint64_t;
+  struct Masks {
+    std::vector<Word> anywhere;  // of partners that name the whole body
+    std::vector<Word> vertices;  // per vertex, of those that name vertices of it; empty: none does
   };
-  struct Pair {
-    Partner first, second;
-  };
-  std::vector<Pair> pairs_;
+  const Masks& masksOf(std::uint16_t body) const { return masks_[body == OBSTACLE_BODY ? masks_.size() - 1 : body]; }
+  Word heldBy(const Feature& feature, std::size_t word) const;
+
+  std::vector<Masks> masks_;  // per body, then the map
+  std::size_t words_ = 0;     // of a mask; 0: nothing is expected
 
   bool isExpected(const Feature& a, const Feature& b) const;
   bool isExpected(const Contact& contact) const;

@@ -130,6 +130,36 @@ TEST(ExpectedContacts, OfSeveralExpectationsOneMustHoldAll) {
   EXPECT_GT(outcome.counts.expected, 0u);
 }
 
+TEST(ExpectedContacts, AreTheSameForHoweverManyExpectations) {
+  // Pairs of neighbouring vertices of the upper sheet, and of each the lower sheet's left or right half.
+  const auto halfOf = [](bool right) {
+    std::vector<Index> half;
+    for (Index v = 0; v < 16; ++v) {
+      if ((v % 4 >= 2) == right) half.push_back(v);
+    }
+    return half;
+  };
+  for (const std::size_t count : {31u, 32u, 33u, 64u, 100u}) {
+    Falling falling;
+    std::vector<std::pair<std::vector<Index>, bool>> wanted;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto v = static_cast<Index>((5 * (count - 1 - i)) % 15);
+      wanted.push_back({{v, v + 1, static_cast<Index>((v + 4) % 16)}, i % 3 == 0});
+      const ExpectedPartner upper = only(UPPER, wanted.back().first), lower = only(LOWER, halfOf(wanted.back().second));
+      i % 2 == 0 ? falling.expect(upper, lower) : falling.expect(lower, upper);
+    }
+    const Outcome outcome = falling.answer();
+    for (const Contact& c : outcome.contacts) {
+      const bool by_one = std::any_of(wanted.begin(), wanted.end(), [&](const auto& one) {
+        return within(sideOf(c, UPPER), one.first) && within(sideOf(c, LOWER), halfOf(one.second));
+      });
+      ASSERT_EQ(c.expected, by_one) << count << " expectations: " << describe(c);
+    }
+    EXPECT_GT(outcome.counts.expected, 0u) << count;
+    EXPECT_LT(outcome.counts.expected, outcome.contacts.size()) << count;
+  }
+}
+
 /// A strip that is folded onto itself: its ends meet.
 TEST(ExpectedContacts, OfABodyWithItselfEitherSideMayComeFirst) {
   Falling falling;
