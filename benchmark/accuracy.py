@@ -109,6 +109,37 @@ def recordings(tools, bags):
     return rows
 
 
+def studies(tools, bags, out):
+    """What fewer frames, triangles and voxels do to first contacts; analyze_bag keeps each run, so that what was stopped goes on."""
+    found = {}
+    for given in bags:
+        bag, _, params = given.partition(":")
+        name = os.path.splitext(os.path.basename(bag))[0]
+        folder = os.path.join(out, name)
+        command = [os.path.join(tools, "analyze_bag"), bag, "--report", folder, "--no-accuracy-table", "--accuracy-study"]
+        done = subprocess.run(command + (["--params", params] if params else []), stdout=subprocess.DEVNULL)
+        if done.returncode not in (0, 3):  # 3: not all of the recording is proved
+            sys.exit("analyze_bag ended with %d" % done.returncode)
+        with open(os.path.join(folder, "report.json")) as f:
+            found[name] = json.load(f)["study"]
+        print("%s: %s" % (name, found[name]["sentence"]), flush=True)
+    return found
+
+
+def study_tables(found):
+    lines = []
+    for name, study in found.items():
+        lines += ["", "*%s.* %s" % (name, study["sentence"]), "",
+                  "| varied | | ms a second | time | patches missed, invented | error, median | 95 % | early, late | vertices missed, invented | "
+                  "error, median | 95 % |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]
+        for r in study["rows"]:
+            lines.append("| %s | %s | %.3g | %.0f %% | %d, %d of %d | %.2g | %.3g | %.3g, %.3g | %d, %d of %d | %.2g | %.3g |" % (
+                r["varied"], r["setting"], r["ms_per_s"], 100 * r["share_of_time"], r["patches_missed"], r["patches_invented"],
+                r["patches_touched"], r["patches_median_ms"], r["patches_p95_ms"], r["patches_early_ms"], r["patches_late_ms"],
+                r["vertices_missed"], r["vertices_invented"], r["vertices_touched"], r["vertices_median_ms"], r["vertices_p95_ms"]))
+    return "\n".join(lines) + "\n" if lines else ""
+
+
 def write_csv(path, rows):
     with open(path, "w", newline="") as f:
         writer = csv.DictWriter(f, fieldnames=list(rows[0]))
@@ -214,6 +245,8 @@ def main():
     parser.add_argument("--tools", required=True, help="folder of check_step and accuracy_pairs")
     parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
     parser.add_argument("--bag", action="append", default=[], help="a recording, repeatable; needs analyze_bag among the tools")
+    parser.add_argument("--study", action="append", default=[],
+                        help="a recording, or RECORDING:PARAMETERS, to study with fewer frames, vertices and voxels; repeatable")
     parser.add_argument("--out", required=True, help="folder for the results")
     parser.add_argument("--repeat", type=int, default=15, help="of the elementary tests alone")
     parser.add_argument("--rounds", type=int, default=60, help="at most, of the whole step; fewer where the ratios are known to 2 %%")
@@ -224,15 +257,16 @@ def main():
     bags = recordings(a.tools, a.bag)
     pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
     fcl = with_fcl(details, pairs)
+    found = studies(a.tools, a.study, a.out)
     write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
     write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
     if bags:
         write_csv(os.path.join(a.out, "accuracy_recordings.csv"), bags)
     with open(os.path.join(a.out, "accuracy.json"), "w") as f:
         json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "fcl": fcl, "stages": details,
-                   "recordings": bags, "pairs": pairs}, f, indent=1)
+                   "recordings": bags, "pairs": pairs, "studies": found}, f, indent=1)
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
-        f.write(markdown(steps, bags, pairs))
+        f.write(markdown(steps, bags, pairs) + study_tables(found))
     plot(steps, fcl, a.out)
     print("results: " + a.out)
 
