@@ -20,6 +20,9 @@ STEP_COLUMNS = ["scene", "setting", "contacts", "missed", "false", "undecided", 
 # Measured apart, on a machine of this kind: one core, the same steps, all contacts. Seconds and false contacts.
 APART = {"cloth-ball": [("additive CCD (ipc-toolkit)", 3.3, 137872), ("Tight-Inclusion 1e-6", 47.0, 20)],
          "n-body": [("additive CCD (ipc-toolkit)", 2.0, None), ("Tight-Inclusion 1e-6", 29.9, None)]}
+# The same of hard queries: microseconds a pair, wrong answers of 7,279.
+APART_HARD = [("additive CCD (ipc-toolkit)", 3.4, 573), ("Tight-Inclusion 1e-3", 65.0, 454), ("Tight-Inclusion 1e-6", 4570.0, 222)]
+HARD_QUERIES_APART = 7279
 
 
 def write_truth(scene_dir, path):
@@ -196,15 +199,35 @@ def plot_wrong(axes, steps, fcl):
     axes.set(xscale="log", xlabel="whole step, one thread, median [ms]", ylabel="x missed, o invented")
 
 
-def plot(steps, fcl, folder):
+def plot_hard(axes, pairs):
+    """One pair at a time, of those that are made to be hard: microseconds against the share of wrong answers."""
+    mine = [r for r in pairs if r["source"] == "hard queries"]
+    for rung in dict.fromkeys(r["rung"] for r in mine):
+        rows = [r for r in mine if r["rung"] == rung]
+        count = sum(int(r["pairs"]) for r in rows)
+        us = sum(int(r["pairs"]) * float(r["median_ns"]) for r in rows) / count * 1e-3
+        wrong = sum(int(r["missed"]) + int(r["false_contacts"]) for r in rows) / count
+        axes.plot(us, wrong, color="C2", marker="o" if rung.startswith("exact") else "^" if rung == "FCL" else "s", linestyle="none")
+        axes.annotate(rung, (us, wrong), xytext=(6, 3), textcoords="offset points", fontsize=7, rotation=25)
+    for name, us, wrong in APART_HARD:
+        axes.plot(us, wrong / HARD_QUERIES_APART, color="C2", marker="o", fillstyle="none", linestyle="none", alpha=0.5)
+        axes.annotate(name + ", measured apart", (us, wrong / HARD_QUERIES_APART), xytext=(-6, -11), ha="right", textcoords="offset points", fontsize=7)
+    axes.set_yscale("symlog", linthresh=1e-3)
+    axes.set_ylim(bottom=-3e-4)
+    axes.set(xscale="log", xlabel="one pair of the hard queries [us]", ylabel="share of wrong answers")
+
+
+def plot(steps, fcl, pairs, folder):
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(9, 8), sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    figure, (upper, lower, hard) = plt.subplots(3, 1, figsize=(9, 11), gridspec_kw={"height_ratios": (2, 1, 1)})
+    lower.sharex(upper)
     plot_errors(upper, steps, fcl)
     plot_wrong(lower, steps, fcl)
-    for axes in (upper, lower):
+    plot_hard(hard, pairs)
+    for axes in (upper, lower, hard):
         axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
@@ -267,7 +290,7 @@ def main():
                    "recordings": bags, "pairs": pairs, "studies": found}, f, indent=1)
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
         f.write(markdown(steps, bags, pairs) + study_tables(found))
-    plot(steps, fcl, a.out)
+    plot(steps, fcl, pairs, a.out)
     print("results: " + a.out)
 
 

@@ -194,15 +194,13 @@ class AccuracyStudyTest(unittest.TestCase):
         for row in rows:
             self.assertTrue(0 <= float(row['pairs_share']) <= 1.5 and 0 <= float(row['bound']) <= 1, row)
 
-    def test_the_sentence_is_of_a_row_that_loses_nothing(self):
+    def test_the_sentence_is_of_the_row_that_saves_time_and_gets_the_least_wrong(self):
         study = json.loads((self.folder / 'study/report.json').read_text())['study']
         self.assertIn('what accuracy costs: %s\n' % study['sentence'], self.ran.stdout)
-        right = [r for r in study['rows'] if not r['patches_missed'] and not r['patches_invented'] and not r['timed'] and
-                 r['share_of_time'] < 1]
-        if right:
-            best = min(right, key=lambda r: r['ms_per_s'])
+        saves = [r for r in study['rows'] if not r['timed'] and r['varied'] != 'reference' and r['share_of_time'] <= 0.9]
+        if saves:  # else the machine was too busy to tell
+            best = min(saves, key=lambda r: (r['patches_missed'] + r['patches_invented'], r['ms_per_s']))
             self.assertTrue(study['sentence'].startswith('%s %s: ' % (best['varied'], best['setting'])), study['sentence'])
-            self.assertIn('no patch of 2 missed or invented', study['sentence'])
         self.assertEqual([(r['varied'], r['setting']) for r in study['rows']], list(self.rows))
 
     def test_the_same_input_gives_the_same_answers(self):
