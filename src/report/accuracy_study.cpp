@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iomanip>
+#include <numeric>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -12,7 +13,7 @@
 namespace dccd {
 namespace {
 
-constexpr double WORTH_IT = 0.9;  // of the time; what saves less may be the machine's noise
+constexpr double WORTH_IT = 0.9;  // of the reference's least time; what saves less may be the machine's noise
 
 /// Of a row, by name: the columns of the CSV and the fields of the JSON, in order.
 template <class Visit>
@@ -70,24 +71,28 @@ void AccuracyStudy::add(const std::string& varied, const std::string& setting, c
   rows_.push_back(std::move(row));
 }
 
-double AccuracyStudy::shareOfTime(const StudyRow& row) const {
-  double sum = 0;
-  int count = 0;
-  for (const StudyRow& one : rows_) {
-    if (one.varied != REFERENCE) continue;
-    sum += one.ms_per_s;
-    ++count;
+std::vector<double> AccuracyStudy::referenceTimes() const {
+  std::vector<double> ms_per_s;
+  for (const StudyRow& row : rows_) {
+    if (row.varied == REFERENCE) ms_per_s.push_back(row.ms_per_s);
   }
-  return sum > 0 ? row.ms_per_s * count / sum : 1;
+  return ms_per_s;
+}
+
+double AccuracyStudy::shareOfTime(const StudyRow& row) const {
+  const std::vector<double> times = referenceTimes();
+  const double sum = std::accumulate(times.begin(), times.end(), 0.0);
+  return sum > 0 ? row.ms_per_s * static_cast<double>(times.size()) / sum : 1;
 }
 
 std::string AccuracyStudy::sentence() const {
   if (reference_.steps == 0) return "No step was answered: there is nothing to compare.";
   if (reference_.patches.empty()) return "Nothing touches in this recording: there is no first contact to compare.";
   const auto wrong = [](const StudyRow& row) { return row.errors.patches.missed + row.errors.patches.invented; };
+  const double enough_ms = WORTH_IT * quantile(referenceTimes(), 0);
   const StudyRow* best = nullptr;
   for (const StudyRow& row : rows_) {
-    if (row.timed || row.varied == REFERENCE || shareOfTime(row) > WORTH_IT) continue;
+    if (row.timed || row.varied == REFERENCE || row.ms_per_s > enough_ms) continue;
     if (!best || std::make_pair(wrong(row), row.ms_per_s) < std::make_pair(wrong(*best), best->ms_per_s)) best = &row;
   }
   if (!best) return "Nothing that was tried saves a tenth of the time.";

@@ -43,6 +43,7 @@ class AccuracyStudy {
   RunRecord reference_;
   std::vector<StudyRow> rows_;
 
+  std::vector<double> referenceTimes() const;     // [ms per s]
   double shareOfTime(const StudyRow& row) const;  // of the mean of the reference's runs
 };
 

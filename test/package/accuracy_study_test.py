@@ -197,7 +197,8 @@ class AccuracyStudyTest(unittest.TestCase):
     def test_the_sentence_is_of_the_row_that_saves_time_and_gets_the_least_wrong(self):
         study = json.loads((self.folder / 'study/report.json').read_text())['study']
         self.assertIn('what accuracy costs: %s\n' % study['sentence'], self.ran.stdout)
-        saves = [r for r in study['rows'] if not r['timed'] and r['varied'] != 'reference' and r['share_of_time'] <= 0.9]
+        enough = 0.9 * min(r['ms_per_s'] for r in study['rows'] if r['varied'] == 'reference')
+        saves = [r for r in study['rows'] if not r['timed'] and r['varied'] != 'reference' and r['ms_per_s'] <= enough]
         if saves:  # else the machine was too busy to tell
             best = min(saves, key=lambda r: (r['patches_missed'] + r['patches_invented'], r['ms_per_s']))
             self.assertTrue(study['sentence'].startswith('%s %s: ' % (best['varied'], best['setting'])), study['sentence'])

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
@@ -91,6 +92,101 @@ TEST(FirstContacts, WhatGrewTogetherIsNotMissed) {
   EXPECT_DOUBLE_EQ(parted.patches.late_ms, 10);
 }
 
+/// A step of 100 ms of a square with two faces.
+Outcome step(int number) {
+  Step step;
+  step.bodies.resize(1);
+  step.bodies[0].topology = share(Topology::grid(2, 2));
+  step.bodies[0].t0 = step.bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  Outcome outcome;
+  outcome.answered = true;
+  outcome.start_ns = (1000 + 100 * number) * MS;
+  outcome.stamp_ns = outcome.start_ns + 100 * MS;
+  outcome.step = share(std::move(step));
+  outcome.stats.total_ms = 0.5;
+  return outcome;
+}
+
+Patch patchOf(std::uint64_t id, double x_m) {
+  Patch patch;
+  patch.id = id;
+  patch.box = {Vec3(x_m, 0, 0), Vec3(x_m, 1, 0)};
+  return patch;
+}
+
+TEST(RunRecorder, FirstTimesAreTheEarliestOfAllFeaturesOnAVertex) {
+  RunRecorder recorder;
+  recorder.add(Outcome());
+  Outcome outcome = step(0);
+  Contact contact;
+  contact.kind = PairKind::VERTEX_VOXEL_FACE;
+  contact.body = {0, OBSTACLE_BODY};
+  contact.vertex = {3, NO_INDEX, NO_INDEX, NO_INDEX};
+  contact.toc_lower = 0.5;
+  contact.toc_upper = 0.75;
+  outcome.contacts = {contact};
+  contact.kind = PairKind::EDGE_VOXEL_EDGE;
+  contact.vertex = {1, 3, NO_INDEX, NO_INDEX};
+  contact.toc_lower = 0.25;
+  contact.toc_upper = 1;
+  outcome.contacts.push_back(contact);
+  recorder.add(outcome);
+  Outcome next = step(1);
+  next.contacts = outcome.contacts;
+  recorder.add(next);
+  const RunRecord record = recorder.take();
+  EXPECT_EQ(record.steps, 2u);
+  EXPECT_DOUBLE_EQ(record.msPerSecond(), 5);
+  ASSERT_EQ(record.bodies.size(), 1u);
+  const RunRecord::BodyRecord& body = record.bodies[0];
+  EXPECT_EQ(body.vertices.size(), 4u);
+  EXPECT_DOUBLE_EQ(body.edge_m, (4 + std::sqrt(2.0)) / 5);
+  ASSERT_EQ(body.first.size(), 2u);
+  EXPECT_EQ(body.first.at(3).from_ns, 1025 * MS);
+  EXPECT_EQ(body.first.at(3).to_ns, 1075 * MS);
+  EXPECT_EQ(body.first.at(1).to_ns, 1100 * MS);
+  EXPECT_TRUE(body.comparable);
+}
+
+TEST(RunRecorder, WhatComesOffAPatchIsStillIt) {
+  RunRecorder recorder;
+  Outcome first = step(0), second = step(1), third = step(2);
+  first.patches = {patchOf(1, 0)};
+  first.patches[0].began_to_ns = 1000 * MS;  // it touched when it was first looked at
+  second.patches = {patchOf(1, 0), patchOf(2, 5)};
+  second.patches[1].began_from_ns = second.patches[1].began_to_ns = 1000 * MS;
+  PatchEvent split;
+  split.kind = PatchEventKind::SPLIT;
+  split.id = 1;
+  split.others = {2};
+  second.patch_events = {split};
+  third.patches = {patchOf(3, 7), patchOf(2, 5)};
+  third.patches[0].began_from_ns = 1210 * MS;
+  third.patches[0].began_to_ns = 1211 * MS;
+  for (const Outcome& outcome : {first, second, third}) recorder.add(outcome);
+  const RunRecord record = recorder.take();
+  ASSERT_EQ(record.patches.size(), 2u);
+  const PatchLife& life = record.patches[0];
+  EXPECT_EQ(life.began.from_ns, 1000 * MS);
+  EXPECT_EQ(life.began.to_ns, 1000 * MS);
+  ASSERT_EQ(life.seen.size(), 3u) << "as long as a part of it touches";
+  EXPECT_EQ(life.seen[1].box.max.x(), 5);
+  EXPECT_EQ(life.seen[1].box.min.x(), 0);
+  EXPECT_EQ(record.patches[1].began.from_ns, 1210 * MS);
+}
+
+TEST(RunRecorder, AMeshThatChangesHasNoCommonVertices) {
+  RunRecorder recorder;
+  Outcome other = step(1);
+  Step changed = *other.step;
+  changed.bodies[0].topology = share(Topology::fromTriangles(4, {{0, 1, 2}}));
+  other.step = share(std::move(changed));
+  recorder.add(step(0));
+  recorder.add(step(1));
+  recorder.add(other);
+  EXPECT_FALSE(recorder.take().bodies[0].comparable);
+}
+
 TEST(FirstContacts, ARunIsTheSameFromItsFile) {
   RunRecord record = run({patch(110, 300, 1.0 / 3)});
   record.bodies[0].first = {{2, {1234567890123456789, 1234567890123456790}}};
@@ -109,7 +205,7 @@ TEST(AccuracyStudy, TheSentenceIsOfTheFastestThatLosesNothing) {
   RunRecord again = study.reference(), nearly = study.reference(), half = run({patch(118, 300, 0)}), wrong = run(),
             budget = run({patch(110, 300, 0)});
   again.ms = 3;
-  nearly.ms = 2.4;
+  nearly.ms = 1.9;  // much less than the mean of the two, and nearly the lesser
   half.ms = 1.15;
   wrong.ms = 0.1;
   budget.ms = 0.2;
