@@ -20,6 +20,9 @@ STEP_COLUMNS = ["scene", "setting", "contacts", "missed", "false", "undecided", 
 # Measured apart, on a machine of this kind: one core, the same steps, all contacts. Seconds and false contacts.
 APART = {"cloth-ball": [("additive CCD (ipc-toolkit)", 3.3, 137872), ("Tight-Inclusion 1e-6", 47.0, 20)],
          "n-body": [("additive CCD (ipc-toolkit)", 2.0, None), ("Tight-Inclusion 1e-6", 29.9, None)]}
+# The same of hard queries: microseconds a pair, wrong answers of 7,279.
+APART_HARD = [("additive CCD (ipc-toolkit)", 3.4, 573), ("Tight-Inclusion 1e-3", 65.0, 454), ("Tight-Inclusion 1e-6", 4570.0, 222)]
+HARD_QUERIES_APART = 7279
 
 
 def write_truth(scene_dir, path):
@@ -67,6 +70,15 @@ def whole_steps(tools, scenes, repeat):
     return rows, details
 
 
+def add_second_run(rows, again):
+    """What the same settings took in another process, and whether both runs' intervals of the ratio have a value in common."""
+    for row, other in zip(rows, again):
+        row.update({"again_" + name: other[name] for name in ("median_ms", "ratio_low", "ratio", "ratio_high")})
+        row["agree"] = row["ratio_low"] <= other["ratio_high"] and other["ratio_low"] <= row["ratio_high"]
+        if not row["agree"]:
+            print("%s on %s: the two runs do not agree" % (row["setting"], row["scene"]), flush=True)
+
+
 def with_fcl(details, pairs):
     """A row a scene: FCL's elementary tests in the place of ours, behind the same filters."""
     rows = []
@@ -107,6 +119,37 @@ def recordings(tools, bags):
                   % (name, r["rung"], r["steps"], r["contacts"], r["missed"], r["false"], r["undecided"], r["max_toc_error"],
                      r["median_ms"], r["p95_ms"]), flush=True)
     return rows
+
+
+def studies(tools, bags, out):
+    """What fewer frames, triangles and voxels do to first contacts; analyze_bag keeps each run, so that what was stopped goes on."""
+    found = {}
+    for given in bags:
+        bag, _, params = given.partition(":")
+        name = os.path.splitext(os.path.basename(bag))[0]
+        folder = os.path.join(out, name)
+        command = [os.path.join(tools, "analyze_bag"), bag, "--report", folder, "--no-accuracy-table", "--accuracy-study"]
+        done = subprocess.run(command + (["--params", params] if params else []), stdout=subprocess.DEVNULL)
+        if done.returncode not in (0, 3):  # 3: not all of the recording is proved
+            sys.exit("analyze_bag ended with %d" % done.returncode)
+        with open(os.path.join(folder, "report.json")) as f:
+            found[name] = json.load(f)["study"]
+        print("%s: %s" % (name, found[name]["sentence"]), flush=True)
+    return found
+
+
+def study_tables(found):
+    lines = []
+    for name, study in found.items():
+        lines += ["", "*%s.* %s" % (name, study["sentence"]), "",
+                  "| varied | | ms a second | time | patches missed, invented | error, median | 95 % | early, late | vertices missed, invented | "
+                  "error, median | 95 % |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]
+        for r in study["rows"]:
+            lines.append("| %s | %s | %.3g | %.0f %% | %d, %d of %d | %.2g | %.3g | %.3g, %.3g | %d, %d of %d | %.2g | %.3g |" % (
+                r["varied"], r["setting"], r["ms_per_s"], 100 * r["share_of_time"], r["patches_missed"], r["patches_invented"],
+                r["patches_touched"], r["patches_median_ms"], r["patches_p95_ms"], r["patches_early_ms"], r["patches_late_ms"],
+                r["vertices_missed"], r["vertices_invented"], r["vertices_touched"], r["vertices_median_ms"], r["vertices_p95_ms"]))
+    return "\n".join(lines) + "\n" if lines else ""
 
 
 def write_csv(path, rows):
@@ -165,15 +208,35 @@ def plot_wrong(axes, steps, fcl):
     axes.set(xscale="log", xlabel="whole step, one thread, median [ms]", ylabel="x missed, o invented")
 
 
-def plot(steps, fcl, folder):
+def plot_hard(axes, pairs):
+    """One pair at a time, of those that are made to be hard: microseconds against the share of wrong answers."""
+    mine = [r for r in pairs if r["source"] == "hard queries"]
+    for rung in dict.fromkeys(r["rung"] for r in mine):
+        rows = [r for r in mine if r["rung"] == rung]
+        count = sum(int(r["pairs"]) for r in rows)
+        us = sum(int(r["pairs"]) * float(r["median_ns"]) for r in rows) / count * 1e-3
+        wrong = sum(int(r["missed"]) + int(r["false_contacts"]) for r in rows) / count
+        axes.plot(us, wrong, color="C2", marker="o" if rung.startswith("exact") else "^" if rung == "FCL" else "s", linestyle="none")
+        axes.annotate(rung, (us, wrong), xytext=(6, 3), textcoords="offset points", fontsize=7, rotation=25)
+    for name, us, wrong in APART_HARD:
+        axes.plot(us, wrong / HARD_QUERIES_APART, color="C2", marker="o", fillstyle="none", linestyle="none", alpha=0.5)
+        axes.annotate(name + ", measured apart", (us, wrong / HARD_QUERIES_APART), xytext=(-6, -11), ha="right", textcoords="offset points", fontsize=7)
+    axes.set_yscale("symlog", linthresh=1e-3)
+    axes.set_ylim(bottom=-3e-4)
+    axes.set(xscale="log", xlabel="one pair of the hard queries [us]", ylabel="share of wrong answers")
+
+
+def plot(steps, fcl, pairs, folder):
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(9, 8), sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    figure, (upper, lower, hard) = plt.subplots(3, 1, figsize=(9, 11), gridspec_kw={"height_ratios": (2, 1, 1)})
+    lower.sharex(upper)
     plot_errors(upper, steps, fcl)
     plot_wrong(lower, steps, fcl)
-    for axes in (upper, lower):
+    plot_hard(hard, pairs)
+    for axes in (upper, lower, hard):
         axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
@@ -185,12 +248,13 @@ def plot(steps, fcl, folder):
 
 def markdown(rows, bags, pairs):
     """The tables of doc/accuracy.md."""
-    lines = ["| scene | setting | contacts | missed | false | undecided | error of the TOC up to | median ms | ratio, 95 % |",
-             "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
+    lines = ["| scene | setting | contacts | missed | false | undecided | error of the TOC up to | median ms | ratio, 95 % | again: ms | ratio, 95 % |",
+             "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]
     for r in rows:
-        lines.append("| %s | `%s` | %d | %d | %d | %d | %.0e | %.1f | %.3f [%.3f, %.3f] |" %
+        lines.append("| %s | `%s` | %d | %d | %d | %d | %.0e | %.1f | %.3f [%.3f, %.3f] | %.1f | %.3f [%.3f, %.3f] |" %
                      tuple(r[c] for c in ("scene", "setting", "contacts", "missed", "false", "undecided", "toc_error", "median_ms",
-                                          "ratio", "ratio_low", "ratio_high")))
+                                          "ratio", "ratio_low", "ratio_high", "again_median_ms", "again_ratio", "again_ratio_low",
+                                          "again_ratio_high")))
     if bags:
         lines += ["", "| recording | rung | steps | contacts | missed | false | undecided | median ms | 95 % ms |",
                   "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
@@ -214,6 +278,8 @@ def main():
     parser.add_argument("--tools", required=True, help="folder of check_step and accuracy_pairs")
     parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
     parser.add_argument("--bag", action="append", default=[], help="a recording, repeatable; needs analyze_bag among the tools")
+    parser.add_argument("--study", action="append", default=[],
+                        help="a recording, or RECORDING:PARAMETERS, to study with fewer frames, vertices and voxels; repeatable")
     parser.add_argument("--out", required=True, help="folder for the results")
     parser.add_argument("--repeat", type=int, default=15, help="of the elementary tests alone")
     parser.add_argument("--rounds", type=int, default=60, help="at most, of the whole step; fewer where the ratios are known to 2 %%")
@@ -221,19 +287,21 @@ def main():
     os.makedirs(a.out, exist_ok=True)
     scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
     steps, details = whole_steps(a.tools, scenes, a.rounds)
+    add_second_run(steps, whole_steps(a.tools, scenes, a.rounds)[0])
     bags = recordings(a.tools, a.bag)
     pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
     fcl = with_fcl(details, pairs)
+    found = studies(a.tools, a.study, a.out)
     write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
     write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
     if bags:
         write_csv(os.path.join(a.out, "accuracy_recordings.csv"), bags)
     with open(os.path.join(a.out, "accuracy.json"), "w") as f:
         json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "fcl": fcl, "stages": details,
-                   "recordings": bags, "pairs": pairs}, f, indent=1)
+                   "recordings": bags, "pairs": pairs, "studies": found}, f, indent=1)
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
-        f.write(markdown(steps, bags, pairs))
-    plot(steps, fcl, a.out)
+        f.write(markdown(steps, bags, pairs) + study_tables(found))
+    plot(steps, fcl, pairs, a.out)
     print("results: " + a.out)
 
 

@@ -11,6 +11,7 @@
 #include <memory>
 #include <sstream>
 
+#include "apps/analyze_bag/study_runner.h"
 #include "dccd/accuracy.h"
 #include "dccd/simd_target.h"
 #include "input/known_types.h"
@@ -28,7 +29,7 @@ struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh;
   double look_ahead_s = 0;
   int threads = 0;
-  bool without_map = false, no_rungs = false, quiet = false;
+  bool without_map = false, no_rungs = false, study = false, quiet = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -120,11 +121,8 @@ std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config
     if (!config.holdsDistance() || holdsDistance(rung)) names.push_back(toString(rung));
   }
   const auto run = [&](const std::string& name) {
-    MonitorConfig one = config;
+    MonitorConfig one = unlimited(config);
     one.monitor.detector.accuracy.rung = accuracyFromString(name.c_str());
-    one.monitor.detector.step_budget_ms = 0;
-    one.monitor.look_ahead_s = 0;
-    one.monitor.detector.max_contacts = std::numeric_limits<std::size_t>::max();
     if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
     ContactLog log;
     BagReplay(a.bag, one, options)
@@ -206,10 +204,19 @@ int analyze(const Arguments& a) {
     report.setRungs(otherRungs(a, config, options));
     report.finish();
   }
+  std::string study_line;
+  if (a.study) {
+    out.reset();
+    const AccuracyStudy study = runStudy(a.bag, config, options, a.report + "/study");
+    study.write(a.report + "/study.csv");
+    report.setStudy(study.json());
+    report.finish();
+    study_line = "what accuracy costs: " + study.sentence() + '\n';
+  }
   std::cout << report.headline() << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
-            << lookAheadLine(summary) << "octomap: " << summary.map_source << "\nreport: " << a.report
+            << lookAheadLine(summary) << study_line << "octomap: " << summary.map_source << "\nreport: " << a.report
             << "/report.html\n";
   for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: " << c << '\n';
   const std::string unproved = report.unproved();
@@ -232,11 +239,14 @@ int main(int argc, char** argv) {
       app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
   app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")
       ->excludes(octomap);
-  app.add_option("--accuracy", a.accuracy, "conservative or exact");
+  app.add_option("--accuracy", a.accuracy, "exact, or conservative for distances");
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
+  app.add_flag("--accuracy-study", a.study,
+               "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
+               "does to first contacts; what was stopped goes on");
   app.add_flag("--quiet", a.quiet, "no progress");
   app.footer(
       "Exit status:\n"

@@ -19,6 +19,8 @@ int main(int argc, char** argv) {
   app.add_option("bag", bag_path, "Bag to write")->required();
   app.add_option("--frames", options.frames, "Frames to record instead of the scene's own number")
       ->check(CLI::Range(2, 1000000));
+  app.add_option("--rate", options.rate_hz, "Frames a second instead of the scene's own number, over the same time")
+      ->check(CLI::Range(0.1, 1000.0));
   app.add_option("--seed", options.seed, "Seed of the start's and the tracker's noise")->capture_default_str();
   app.add_option("--output", options.output, "Message type of every body, instead of the scene's own")
       ->check(CLI::IsMember({"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}));

@@ -12,6 +12,7 @@
 
 #include "dccd/regular_file.h"
 #include "input/known_types.h"
+#include "octomap/coarser.h"
 #include "report/progress_bar.h"
 #include "ros/message_bytes.h"
 #include "ros/transforms.h"
@@ -102,17 +103,24 @@ class TransformWindow {
 struct BagReplay::Run {
   const Sink& sink;
   const Sink& predictions;
+  const Variation& variation;
   rosbag::Bag bag;
   tf2::BufferCore transforms{TF_KEPT + TF_AHEAD};
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
   std::optional<LookAheadScore> look_ahead;
   std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one message
+  std::map<std::string, std::size_t> frames_of_topic;
   BagReplaySummary summary;
   std::set<std::string> complained;
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
-      : sink(to), predictions(predictions_to), bag(r.path_), pipeline(r.config_, transforms) {
+      : sink(to),
+        predictions(predictions_to),
+        variation(r.options_.variation),
+        bag(r.path_),
+        pipeline(r.config_, transforms) {
+    pipeline.setTopologyFilter(variation.topology);
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
@@ -143,6 +151,7 @@ struct BagReplay::Run {
 
   void setMap(LoadedMap map, std::int64_t now_ns) {
     ++summary.maps;
+    if (map.surface && variation.voxels > 1) map.surface = coarser(*map.surface, variation.voxels);
     if (!map.surface) {
       ++summary.maps_refused;
       complain("octomap refused: " + map.problem);
@@ -282,7 +291,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     at = m.getTime();
     if (messages) messages(m);
     const auto bodies = run.bodies_of_topic.find(m.getTopic());
-    const bool is_mesh = bodies != run.bodies_of_topic.end();
+    const bool is_mesh = bodies != run.bodies_of_topic.end() &&
+                         run.frames_of_topic[m.getTopic()]++ % options_.variation.every_nth_frame == 0;
     std::vector<std::uint8_t> bytes;
     if (is_mesh) {
       bytes = bytesOf(m);

@@ -16,9 +16,17 @@
 
 namespace dccd {
 
+/// A bag replayed as if less had been recorded.
+struct Variation {
+  std::size_t every_nth_frame = 1;  ///< of each mesh topic, from the first one on
+  std::size_t voxels = 1;           ///< the map's are this many times as large: a power of two
+  TopologyFilter topology;          ///< null: as it came
+};
+
 struct BagReplayOptions {
   std::string octomap_file;  ///< instead of the bag's maps; empty: none
   bool show_progress = false;
+  Variation variation;
 };
 
 /// What a replay met besides outcomes.

@@ -229,6 +229,9 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   if (message.no_memory > 0) return noMemory(message.no_memory);
   try {
     waiting.mesh = decode(body, message);
+    if (topology_filter_) {
+      waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
+    }
   } catch (const MeshError& error) {
     return refuse(error.status, error.what());
   } catch (const std::bad_alloc&) {

@@ -30,6 +30,11 @@ struct LoadedMap {
   std::string problem;
 };
 
+/// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
+/// are those of the frame, in its own frame of reference.
+using TopologyFilter = std::function<std::shared_ptr<const Topology>(
+    std::size_t body, const std::shared_ptr<const Topology>& topology, const Positions& positions)>;
+
 class MonitorPipeline {
  public:
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file, or the
@@ -43,6 +48,8 @@ class MonitorPipeline {
   /// Counts, decodes and keeps one message of an idle body. One that is refused is counted, too, and the clock body's
   /// yields an outcome.
   void take(std::size_t body, const MeshMessage& message);
+  /// From the next message on. Null: meshes are taken as they come. Rigid bodies' files always are.
+  void setTopologyFilter(TopologyFilter filter) { topology_filter_ = std::move(filter); }
   void setMap(LoadedMap map, std::int64_t now_ns);
   /// A map that was set has no place yet: its transform has not come.
   bool mapWaits() const { return unplaced_map_.has_value(); }
@@ -108,6 +115,7 @@ class MonitorPipeline {
   tf2::BufferCore& transforms_;
   std::unique_ptr<Monitor> monitor_;
   std::vector<MeshDecoder> decoders_;
+  TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
   std::vector<bool> placed_;  // a static body of which the monitor has a frame
   std::vector<std::optional<RigidMesh>> rigid_;

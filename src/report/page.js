@@ -91,6 +91,42 @@ table('facts', null, R.facts);
     el('title', {}, bar, `${b.steps} steps of up to ${upper}`);
     if (i % every == 0 && i + 1 < bins.length) el('text', { x: LEFT + (i + 1) * w, y: floor + 18, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg, upper); }); }
 
+// Points {x, y, name, group, missed, invented}: time across, error up, both logarithmic. Errors below `least` are drawn there.
+const COLOURS = ['#1c2430', '#2a6fb0', '#f0a030', '#3d9a50', '#8e5bb0', '#b71c1c', '#7a8794'];
+function frontPlot(id, all, xlabel, ylabel, least) {
+  const H = 400, floor = H - 46, box = document.getElementById(id), points = all.filter(p => p.x > 0 && p.y !== null).map(p => ({ ...p, y: Math.max(p.y, least) }));
+  if (!points.length) { box.remove(); return; }
+  const range = (values, room) => { const low = Math.log10(Math.min(...values)), high = Math.log10(Math.max(...values)), pad = room * Math.max(high - low, 0.3);
+    return [low - pad, high + pad]; };
+  const [x0, x1] = range(points.map(p => p.x), 0.12), [y0, y1] = range(points.map(p => p.y), 0.08);
+  const x = v => LEFT + 20 + (W - LEFT - RIGHT - 150) * (Math.log10(v) - x0) / (x1 - x0), y = v => floor - (floor - TOP - 24) * (Math.log10(v) - y0) / (y1 - y0);
+  const svg = el('svg', { viewBox: `0 0 ${W} ${H}` }, box);
+  const label = (x, y, text, more) => el('text', { x, y, 'font-size': 12, fill: '#556', ...more }, svg, text);
+  const logTicks = (low, high, steps) => { const out = [];
+    for (let d = Math.floor(low); d <= high; ++d) for (const k of steps) if (d + Math.log10(k) >= low && d + Math.log10(k) <= high) out.push(k * 10 ** d);
+    return out; };
+  logTicks(x0, x1, x1 - x0 < 2 ? [1, 2, 5] : [1]).forEach(v => {
+    el('line', { x1: x(v), x2: x(v), y1: TOP, y2: floor, stroke: '#eef1f5' }, svg); label(x(v), floor + 18, short(v), { 'text-anchor': 'middle' }); });
+  logTicks(y0, y1, y1 - y0 < 2 ? [1, 2, 5] : [1]).forEach(v => {
+    el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#eef1f5' }, svg);
+    label(LEFT - 6, y(v) + 4, v <= least ? '0' : v < 1e-2 ? v.toExponential(0) : +v.toPrecision(2), { 'text-anchor': 'end' }); });
+  label((W + LEFT) / 2, H - 8, xlabel, { 'text-anchor': 'middle' });
+  label(14, H / 2, ylabel, { transform: `rotate(-90 14 ${H / 2})`, 'text-anchor': 'middle' });
+  let best = Infinity;
+  const front = points.filter(p => !p.missed && !p.invented).sort((a, b) => a.x - b.x || a.y - b.y).filter(p => p.y < best && (best = p.y, true));
+  el('polyline', { points: front.map((p, i) => (i ? `${x(p.x)},${y(front[i - 1].y)} ` : '') + `${x(p.x)},${y(p.y)}`).join(' '), fill: 'none', stroke: '#9aa4b0' }, svg);
+  const groups = [...new Set(points.map(p => p.group))], taken = [];
+  if (groups.length > 1) groups.forEach((g, k) => { el('circle', { cx: W - 120, cy: 20 + 16 * k, r: 5, fill: COLOURS[k % COLOURS.length] }, svg); label(W - 110, 24 + 16 * k, g); });
+  [...front, ...points.filter(p => !front.includes(p))].forEach(p => {
+    const cx = x(p.x), cy = y(p.y), mark = el('circle', { cx, cy, r: 5, fill: COLOURS[groups.indexOf(p.group) % COLOURS.length] }, svg);
+    el('title', {}, mark, `${p.group} ${p.name}: ${short(p.x)}, ${+p.y.toPrecision(3)}; ${p.missed} missed, ${p.invented} invented`);
+    if (p.missed) el('path', { d: `M${cx - 8},${cy - 8}l16,16m-16,0l16,-16`, stroke: '#b71c1c', 'stroke-width': 2 }, svg);
+    if (p.invented) el('circle', { cx, cy, r: 10, fill: 'none', stroke: '#b71c1c', 'stroke-width': 2 }, svg);
+    const end = cx + 15 + 6.5 * p.name.length, covers = (a, b) => a > cx && a < end && Math.abs(b - cy) < 13;
+    if (taken.some(([a, b, to]) => a < end && to > cx && Math.abs(b - cy) < 13) || points.some(q => q !== p && covers(x(q.x) + 5, y(q.y)))) return;
+    taken.push([cx, cy, end]); label(cx + 13, cy - (front.includes(p) ? 4 : -4), p.name); });
+}
+
 const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
 const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
   return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
@@ -150,8 +186,18 @@ document.getElementById('effects_note').textContent =
 { const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
   [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);
   else document.getElementById('look_ahead').textContent = 'Off: look_ahead_s is 0.'; }
+frontPlot('rungs_plot', R.rungs.map(r => ({ x: r.median_ms, y: r.max_toc_error, name: r.rung, group: 'rung', missed: r.missed, invented: r.false })),
+  'a step, median [ms]', 'largest error of a time [step]', 1e-12);
 { const most = longest(R.rungs.map(r => r.median_ms));
   table('rungs', ['rung', 'steps', 'contacts', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '', '95 % ms'],
     R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, bar(r.median_ms / most), r.p95_ms])); }
+{ const rows = R.study ? R.study.rows : [], percent = v => `${(100 * v).toFixed(v < 0.0995 ? 1 : 0)} %`;
+  document.getElementById('study_sentence').textContent = R.study ? R.study.sentence : 'Not asked for: --accuracy-study runs it.';
+  frontPlot('study_plot', rows.map(r => ({ x: r.ms_per_s, y: r.patches_missed < r.patches_touched ? r.patches_p95_ms : null, name: r.setting, group: r.varied, missed: r.patches_missed, invented: r.patches_invented })),
+    'milliseconds of computing a second of recording', 'first contact of a patch, 95 % within [ms]', 1e-6);
+  table('study', ['varied', '', 'ms a second', 'time', 'patches', 'missed', 'invented', 'median ms', '95 %', 'early', 'late', 'vertices', 'missed', 'invented', 'median ms', '95 %', 'early', 'late',
+    'pairs tested', 'steps cut', 'bound of the rest'], rows.map(r => [r.varied, r.setting, short(r.ms_per_s), percent(r.share_of_time), ...['patches', 'vertices'].flatMap(of =>
+      ['touched', 'missed', 'invented', 'median_ms', 'p95_ms', 'early_ms', 'late_ms'].map(what => r[of + '_' + what])),
+      percent(r.pairs_share), r.cut_steps, r.cut_steps ? r.bound : null])); }
 { const tiers = Object.entries(R.tiers), most = longest(tiers.map(t => t[1]));
   table('tiers', ['tier', 'pairs settled', ''], tiers.map(([name, n]) => [name, n, bar(n / most)])); }

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "dccd/assurance.h"
+#include "report/contact_vertices.h"
 #include "report/flat_layout.h"
 #include "report/quantile.h"
 
@@ -131,14 +132,12 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
   }
   const double start_s = static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9;
   for (const Contact& c : outcome.contacts) {
-    const int n = meshPoints(c), first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
-    for (int i = 0; i < n; ++i) {
-      const std::uint16_t body = c.body[c.body[1] == OBSTACLE_BODY || i < first ? 0 : 1];
-      if (body >= heat_.size() || c.vertex[i] >= heat_[body].contacts.size()) continue;
-      ++heat_[body].contacts[c.vertex[i]];
-      double& when = heat_[body].first_s[c.vertex[i]];
+    forContactVertices(c, [&](std::uint16_t body, Index v) {
+      if (body >= heat_.size() || v >= heat_[body].contacts.size()) return;
+      ++heat_[body].contacts[v];
+      double& when = heat_[body].first_s[v];
       when = std::min(when, start_s + c.toc_lower * outcome.duration_s());
-    }
+    });
   }
 }
 
@@ -375,6 +374,7 @@ nlohmann::json Report::json() const {
                           {"p95_ms", r.p95_ms},
                           {"max_toc_error", r.max_toc_error}});
   }
+  j["study"] = study_;
   j["bodies"] = heatJson();
   return j;
 }

@@ -32,6 +32,8 @@ class Report {
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
   void setRungs(const std::vector<RungCost>& rungs) { rungs_ = rungs; }
+  /// AccuracyStudy::json().
+  void setStudy(nlohmann::json study) { study_ = std::move(study); }
   /// Facts for the head of the page: name -> value, in the order given.
   void setFacts(std::vector<std::pair<std::string, std::string>> facts) { facts_ = std::move(facts); }
   void setCounters(const FrameCounters& counters) { counters_ = counters; }
@@ -91,6 +93,7 @@ class Report {
   LatencyHistogram step_times_;
   EffectPlan plan_;
   std::vector<RungCost> rungs_;
+  nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
   FrameCounters counters_;
 };

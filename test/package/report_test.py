@@ -17,7 +17,7 @@ class ReportPageTest(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, True)
         scene, bag = CHECKOUT / 'config/scenes/table_edge.yaml', self.folder / 'scene.bag'
         for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', '80', '--quiet'],
-                        [TOOLS / 'analyze_bag', bag, '--report', self.folder, '--quiet']):
+                        [TOOLS / 'analyze_bag', bag, '--report', self.folder, '--accuracy-study', '--quiet']):
             ran = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
             self.assertEqual(ran.returncode, 0, ran.stderr)
         self.page = self.folder / 'report.html'
@@ -36,15 +36,16 @@ class ReportPageTest(unittest.TestCase):
         self.assertNotRegex(ran.stderr, r'CONSOLE.*(?:Error|error)')
         dom = ran.stdout
         body = dom[:dom.index('<script>')]
-        for name, least in (('contacts', 10), ('toc', 10)):
+        for name, least in (('contacts', 10), ('toc', 10), ('rungs_plot', 2), ('study_plot', 15)):
             drawn = body[body.index('id="%s"' % name):].split('</svg>')[0]
             self.assertGreater(len(re.findall(r'<(?:rect|circle)\b', drawn)), least, name)
         self.assertIn('<polyline', body)
         self.assertGreaterEqual(body.count('<canvas'), 2, 'how often, and when first')
-        for name in ('seams', 'stages', 'effects', 'rungs', 'tiers'):
+        for name in ('seams', 'stages', 'effects', 'rungs', 'study', 'tiers'):
             rows = body[body.index('id="%s"' % name):].split('</table>')[0].count('<tr')
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
+        self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
 
 
 if __name__ == '__main__':

@@ -1,5 +1,6 @@
 #include "apps/make_scene_bag/recorder.h"
 
+#include <cmath>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -87,6 +88,16 @@ void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& a
   }
 }
 
+/// The same time in frames of another length; physics takes no longer steps than before.
+void overrideRate(scene::SceneSpec& spec, double rate_hz) {
+  const double steps_hz = spec.frame_rate_hz * spec.substeps, duration_s = (spec.frames - 1) / spec.frame_rate_hz;
+  spec.frames = static_cast<int>(std::lround(duration_s * rate_hz)) + 1;
+  if (spec.frames < 2)
+    throw std::runtime_error("--rate is too low for a scene of " + std::to_string(duration_s) + " s");
+  spec.substeps = static_cast<int>(std::ceil(steps_hz / rate_hz));
+  spec.frame_rate_hz = rate_hz;
+}
+
 void overrideOutput(scene::SceneSpec& spec, const std::string& output) {
   if (output.empty()) return;
   for (scene::Body& body : spec.bodies) {
@@ -120,6 +131,7 @@ std::string summary(const scene::SceneSpec& spec, const scene::Simulation& simul
 std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& bag_path,
                         const RecorderOptions& options) {
   scene::SceneSpec spec = scene_spec;
+  if (options.rate_hz > 0) overrideRate(spec, options.rate_hz);
   if (options.frames > 0) spec.frames = options.frames;
   overrideOutput(spec, options.output);
   scene::Simulation simulation(spec, options.seed);

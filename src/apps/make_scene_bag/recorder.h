@@ -9,7 +9,8 @@
 namespace dccd {
 
 struct RecorderOptions {
-  int frames = 0;  ///< 0: the scene's own number
+  int frames = 0;      ///< 0: the scene's own number
+  double rate_hz = 0;  ///< frames a second; 0: the scene's own number
   std::uint64_t seed = 1;
   std::string output;  ///< message type of every body; empty: the scene's own
   bool full_octomap = false;

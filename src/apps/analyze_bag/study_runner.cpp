@@ -1,0 +1,233 @@
+#include "apps/analyze_bag/study_runner.h"
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "apps/analyze_bag/thinned_mesh.h"
+#include "dccd/accuracy.h"
+#include "report/accuracy_settings.h"
+#include "report/quantile.h"
+
+namespace dccd {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int FORMAT = 1;  // of the kept runs
+constexpr std::size_t FRAMES[] = {2, 4, 8}, ROWS[] = {2, 4}, VOXELS[] = {2, 4, 8};
+constexpr double NOISE_M[] = {0.001, 0.003};
+constexpr int BUDGETS[] = {1, 2, 4};  // parts of what 95 % of the reference's steps keep to
+
+struct Variant {
+  std::string varied, setting;
+  MonitorConfig config;
+  Variation variation;
+  bool timed = false;
+};
+
+std::string ordinal(std::size_t n) { return std::to_string(n) + (n == 2 ? "nd" : n == 3 ? "rd" : "th"); }
+
+/// Two digits.
+std::string text(double value) {
+  std::ostringstream out;
+  if (value >= 10) {
+    out << std::lround(value);
+  } else {
+    out << std::setprecision(2) << value;
+  }
+  return out.str();
+}
+
+AccuracyOptions finest(const MonitorConfig& config) {
+  AccuracyOptions accuracy = config.monitor.detector.accuracy;
+  if (config.holdsDistance()) {
+    accuracy.rung = Accuracy::CONSERVATIVE;
+    accuracy.tolerance_m = std::min(accuracy.tolerance_m, 1e-9);
+    return accuracy;
+  }
+  accuracy.rung = Accuracy::EXACT;
+  accuracy.toc_bits = 52;
+  return accuracy;
+}
+
+std::string nameOf(const AccuracyOptions& accuracy) {
+  const std::string rung = toString(accuracy.rung);
+  if (accuracy.rung == Accuracy::EXACT) return rung + " 2^-" + std::to_string(accuracy.toc_bits);
+  return rung + ' ' + text(accuracy.tolerance_m);
+}
+
+std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& reference) {
+  std::vector<Variant> variants{whole};
+  variants.back().setting = "the same again";  // what the machine's noise is, and that answers do not change
+  const auto add = [&](const std::string& varied, const std::string& setting) -> Variant& {
+    variants.push_back(whole);
+    variants.back().varied = varied;
+    variants.back().setting = setting;
+    return variants.back();
+  };
+  for (const std::size_t n : FRAMES) {
+    Variant& one = add("frames", "every " + ordinal(n));
+    one.variation.every_nth_frame = n;
+    // Steps are as much longer, and none of them is to be taken for a gap.
+    one.config.monitor.store.max_step_s *= static_cast<double>(n);
+    one.config.monitor.store.max_vertex_step_m *= static_cast<double>(n);
+  }
+  std::vector<bool> thin;
+  for (const BodyConfig& body : whole.config.bodies) thin.push_back(!body.isRigid() && !body.isDepthImage());
+  for (const std::size_t n : ROWS) {
+    add("mesh", "every " + ordinal(n) + " row and column").variation.topology = ThinnedMeshes(n, thin);
+  }
+  for (const std::size_t n : VOXELS) {
+    if (reference.voxel_m > 0) add("map", std::to_string(n) + " times the voxel").variation.voxels = n;
+  }
+  for (const AccuracySetting& setting : accuracySettings()) {
+    if (whole.config.holdsDistance() && setting.accuracy.rung != Accuracy::CONSERVATIVE) continue;
+    AccuracyOptions accuracy = whole.config.monitor.detector.accuracy;
+    if (setting.name == nameOf(accuracy)) continue;
+    accuracy.rung = setting.accuracy.rung;
+    accuracy.toc_bits = setting.accuracy.toc_bits;
+    accuracy.tolerance_m = setting.accuracy.tolerance_m;
+    add("rung", setting.name).config.monitor.detector.accuracy = accuracy;
+  }
+  for (const double noise_m : NOISE_M) {
+    Variant& one = add("tracker noise", text(1000 * noise_m) + " mm");
+    for (BodyConfig& body : one.config.bodies) {
+      if (!body.isRigid()) body.input.noise_radius_m += noise_m;
+    }
+    one.config.monitor.detector.accuracy.rung = Accuracy::CONSERVATIVE;
+  }
+  for (const int part : BUDGETS) {
+    const std::string ms = text(quantile(reference.step_ms, 0.95) / part);
+    if (!(std::stod(ms) > 0)) continue;
+    Variant& one = add("step budget", ms + " ms");
+    one.config.monitor.detector.step_budget_ms = std::stod(ms);
+    one.timed = true;
+  }
+  return variants;
+}
+
+/// A file is known by its size and its time.
+nlohmann::json identityOf(const std::string& file) {
+  if (file.empty()) return nullptr;
+  return {fs::file_size(file), fs::last_write_time(file).time_since_epoch().count()};
+}
+
+class StudyRunner {
+ public:
+  StudyRunner(const std::string& bag, const BagReplayOptions& options, const std::string& folder)
+      : bag_(bag), options_(options), folder_(folder) {
+    fs::create_directories(folder_);
+  }
+
+  /// The kept run, or a new one, which is kept; `left`: how many come after it.
+  RunRecord run(const Variant& variant, std::size_t left) {
+    const std::string name = variant.varied + ' ' + variant.setting;
+    const nlohmann::json key{{"format", FORMAT},
+                             {"bag", identityOf(bag_)},
+                             {"octomap", identityOf(options_.octomap_file)},
+                             {"parameters", variant.config.hash()},
+                             {"variant", name}};
+    const fs::path file = folder_ / (fileName(name) + ".json");
+    if (std::optional<RunRecord> kept = read(file, key)) return *std::move(kept);
+    if (options_.show_progress) std::cerr << "accuracy study: " << name << timeLeft(left + 1) << '\n';
+    const Clock::time_point start = Clock::now();
+    BagReplayOptions options = options_;
+    options.variation = variant.variation;
+    RunRecorder recorder;
+    BagReplay(bag_, variant.config, options)
+        .run([&](const Outcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { recorder.add(o); });
+    const RunRecord record = recorder.take();
+    spent_s_ += std::chrono::duration<double>(Clock::now() - start).count();
+    ++runs_;
+    write(file, key, record);
+    return record;
+  }
+
+ private:
+  static std::string fileName(std::string name) {
+    std::replace_if(
+        name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '-'; }, '_');
+    return name;
+  }
+
+  std::string timeLeft(std::size_t runs) const {
+    const std::string count = ", " + std::to_string(runs) + (runs == 1 ? " run left" : " runs left");
+    if (runs_ == 0) return count;
+    const double left_s = spent_s_ / static_cast<double>(runs_) * static_cast<double>(runs);
+    return count + ", about " + std::to_string(std::lround(std::ceil(left_s))) + " s";
+  }
+
+  static std::optional<RunRecord> read(const fs::path& file, const nlohmann::json& key) {
+    std::ifstream in(file);
+    if (!in) return std::nullopt;
+    try {
+      const nlohmann::json kept = nlohmann::json::parse(in);
+      if (kept.at("key") == key) return RunRecord::fromJson(kept.at("run"));
+    } catch (const nlohmann::json::exception&) {  // of another version, or by another's hand: it is run anew
+    }
+    return std::nullopt;
+  }
+
+  /// Under its name when it is whole.
+  static void write(const fs::path& file, const nlohmann::json& key, const RunRecord& record) {
+    const fs::path unfinished = file.string() + ".part";
+    std::ofstream out(unfinished);
+    out << nlohmann::json{{"key", key}, {"run", record.json()}} << '\n';
+    out.close();
+    if (!out) throw std::runtime_error(unfinished.string() + ": cannot be written");
+    fs::rename(unfinished, file);
+  }
+
+  std::string bag_;
+  BagReplayOptions options_;
+  fs::path folder_;
+  double spent_s_ = 0;
+  std::size_t runs_ = 0;
+};
+
+}  // namespace
+
+MonitorConfig unlimited(MonitorConfig config) {
+  Options& detector = config.monitor.detector;
+  detector.step_budget_ms = detector.max_compute_ms = 0;
+  detector.max_contacts = std::numeric_limits<std::size_t>::max();
+  detector.max_found = detector.max_found_per_feature = 0;
+  config.monitor.look_ahead_s = 0;
+  config.effects.erase(Effect::LOOK_AHEAD);
+  return config;
+}
+
+AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options,
+                       const std::string& folder) {
+  Variant whole{REFERENCE, "", unlimited(config), {}, false};
+  Options& detector = whole.config.monitor.detector;
+  detector.accuracy = finest(config);
+  detector.patches = true;
+  detector.suppress_initial = false;
+  detector.earliest_only = false;
+  whole.setting = nameOf(detector.accuracy);
+  StudyRunner runner(bag, options, folder);
+  constexpr std::size_t ABOUT = 20;  // how many runs there are is known once the reference is
+  AccuracyStudy study(runner.run(whole, ABOUT));
+  study.add(whole.varied, whole.setting, study.reference());
+  const std::vector<Variant> variants = coarserThings(whole, study.reference());
+  for (std::size_t i = 0; i < variants.size(); ++i) {
+    const Variant& one = variants[i];
+    study.add(one.varied, one.setting, runner.run(one, variants.size() - 1 - i), one.timed);
+  }
+  return study;
+}
+
+}  // namespace dccd
