@@ -41,6 +41,7 @@ PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
 }
 
 void PatchTracker::seam(std::size_t body) {
+  if (log_) return log_->seam(body);
   for (auto at = living_.begin(); at != living_.end();) {
     if (!isOf(at->second.body, body)) {
       ++at;
@@ -57,25 +58,39 @@ void PatchTracker::seam(std::size_t body) {
 }
 
 void PatchTracker::tell(Outcome& outcome) {
+  if (log_) return log_->tell(outcome);
   outcome.patch_events.insert(outcome.patch_events.begin(), waiting_.begin(), waiting_.end());
   waiting_.clear();
 }
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
+  findNewVoxels(found.touches(), outcome);
+  knowMap(outcome);
+  if (log_) return log_->follow(found.touches(), found.patchOf(), on_new_voxel_, outcome);
+  follow(found.touches(), found.patchOf(), on_new_voxel_, gap_s, outcome);
+}
+
+void PatchTracker::knowMap(const Outcome& before) {
+  last_map_ = before.obstacle;
+  last_map_pose_ = before.step->map.map_from_fixed;
+}
+
+void PatchTracker::follow(const std::vector<Touch>& touches, const std::vector<std::uint32_t>& patch_of,
+                          const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   bool same = graph_.bodyCount() == bodies.size();
   for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
   if (!same) seam();
   graph_.setBodies(bodies);
-  merge(found.touches());
-  findParts(found, outcome);
+  merge(touches);
+  findParts(patch_of, on_new_voxel, outcome);
   findNews();
   keepIdentities(outcome);
   begin(outcome);
   goOn(outcome);
   remember(gap_s, outcome);
   endWhatIsGone(outcome);
-  name(found, outcome);
+  name(patch_of, outcome);
   tellNews(outcome);
   for (PatchEvent& event : outcome.patch_events) {
     const auto has_id = [&](const Patch& patch) { return patch.id == event.id; };
@@ -83,8 +98,6 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
     if (patch != outcome.patches.end()) event.patch = static_cast<std::uint32_t>(patch - outcome.patches.begin());
   }
   has_last_ = true;
-  last_map_ = outcome.obstacle;
-  last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
 void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
@@ -94,18 +107,18 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
   merge(found.touches());
-  findParts(found, outcome);
+  findParts(found.patchOf(), {}, outcome);
   findNews();
   for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
-  name(found, outcome);
+  name(found.patchOf(), outcome);
 }
 
 /// The step's patches get the identities of their parts.
-void PatchTracker::name(const PatchMaker& found, Outcome& outcome) const {
+void PatchTracker::name(const std::vector<std::uint32_t>& patch_of, Outcome& outcome) const {
   const std::vector<std::uint32_t>& part_of = graph_.lastComponents();
   for (std::size_t i = 0; i < all_.size(); ++i) {
     if (current_[i] == NO_PATCH) continue;
-    Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
+    Patch& patch = outcome.patches[patch_of[current_[i]]];
     const Part& part = parts_[part_of[i]];
     patch.is_new = part.is_new && !patch.isExpected();
     const std::uint64_t id = part.id;
@@ -174,8 +187,16 @@ void PatchTracker::merge(const std::vector<Touch>& touches) {
   }
 }
 
+/// Only where the map is another one than in the step before.
+void PatchTracker::findNewVoxels(const std::vector<Touch>& touches, const Outcome& outcome) {
+  on_new_voxel_.clear();
+  if (last_map_ == outcome.obstacle) return;
+  for (const Touch& touch : touches) {
+    on_new_voxel_.push_back(touch.initial && touch.onMap() && isNewOnMap(touch, outcome));
+  }
+}
+
 bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
-  if (!has_last_ || last_map_ == outcome.obstacle) return false;
   if (!last_map_) return true;
   const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, touch.level);
   const VoxelKey key = touch.voxel();
@@ -184,7 +205,8 @@ bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const 
   return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
 }
 
-void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
+void PatchTracker::findParts(const std::vector<std::uint32_t>& patch_of, const std::vector<std::uint8_t>& on_new_voxel,
+                             const Outcome& outcome) {
   const std::vector<std::uint32_t>& part_of = graph_.components(touches_);
   releaseBurst(parts_);
   parts_.assign(graph_.componentCount(), Part());
@@ -197,7 +219,7 @@ void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
     if (current_[i] == NO_PATCH) continue;
     ++part.size;
     part.touches = true;
-    const Patch& patch = outcome.patches[found.patchOf()[current_[i]]];
+    const Patch& patch = outcome.patches[patch_of[current_[i]]];
     part.toc_lower = std::min(part.toc_lower, patch.toc_lower);
     part.toc_upper = std::min(part.toc_upper, patch.toc_upper);
     part.initial = part.initial || touch.initial;
@@ -207,12 +229,11 @@ void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
     std::sort(part.before.begin(), part.before.end());
     part.before.erase(std::unique(part.before.begin(), part.before.end()), part.before.end());
   }
+  if (!has_last_ || on_new_voxel.empty()) return;
   for (std::size_t i = 0; i < all_.size(); ++i) {
     Part& part = parts_[part_of[i]];
-    const Touch& touch = touches_[i];
-    if (current_[i] == NO_PATCH || !part.before.empty() || part.map_changed || !touch.initial || !touch.onMap())
-      continue;
-    part.map_changed = isNewOnMap(touch, outcome);
+    if (current_[i] == NO_PATCH || !part.before.empty()) continue;
+    part.map_changed = part.map_changed || on_new_voxel[current_[i]];
   }
 }
 

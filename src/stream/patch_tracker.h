@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dccd/outcome.h"
+#include "dccd/range_log.h"
 #include "step/patches.h"
 
 namespace dccd {
@@ -23,10 +24,17 @@ class PatchTracker {
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:
   /// what detect() found in it.
   void follow(const PatchMaker& found, double gap_s, Outcome& outcome);
+  /// The same of what a range has logged.
+  void follow(const std::vector<Touch>& touches, const std::vector<std::uint32_t>& patch_of,
+              const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
   void recognise(const PatchMaker& found, Outcome& outcome);
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
+  /// From now on patches get no identities: what they follow from goes into the log.
+  void leaveTo(RangeLog& log) { log_ = &log; }
+  /// The map of the step before the first one that is followed.
+  void knowMap(const Outcome& before);
 
   std::size_t livingCount() const { return living_.size(); }
   std::size_t traceSize() const { return trace_.size(); }
@@ -60,10 +68,12 @@ class PatchTracker {
   };
 
   void merge(const std::vector<Touch>& touches);
-  void findParts(const PatchMaker& found, const Outcome& outcome);
+  void findParts(const std::vector<std::uint32_t>& patch_of, const std::vector<std::uint8_t>& on_new_voxel,
+                 const Outcome& outcome);
+  void findNewVoxels(const std::vector<Touch>& touches, const Outcome& outcome);
   bool isNewOnMap(const Touch& touch, const Outcome& outcome) const;
   void keepIdentities(Outcome& outcome);
-  void name(const PatchMaker& found, Outcome& outcome) const;
+  void name(const std::vector<std::uint32_t>& patch_of, Outcome& outcome) const;
   void begin(Outcome& outcome);
   void findNews();
   void tellNews(Outcome& outcome) const;
@@ -82,6 +92,7 @@ class PatchTracker {
   bool has_last_ = false;
   std::shared_ptr<const VoxelSurface> last_map_;
   Eigen::Isometry3d last_map_pose_ = Eigen::Isometry3d::Identity();
+  RangeLog* log_ = nullptr;
 
   // Buffers of a step.
   TouchGraph graph_;
@@ -89,6 +100,7 @@ class PatchTracker {
   std::vector<Trace> all_;              // the same with what is known of each
   std::vector<std::uint32_t> current_;  // per one of these its touch of the step; NO_PATCH: none
   std::vector<Part> parts_;
+  std::vector<std::uint8_t> on_new_voxel_;  // per touch; empty: none is
 };
 
 }  // namespace dccd
