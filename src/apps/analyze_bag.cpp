@@ -165,8 +165,7 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
 
 /// What the page's head says of the run.
 void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary,
-              const std::vector<EffectDecision>& effects, const std::string& frame, std::size_t ranges,
-              Report& report) {
+              const std::vector<EffectDecision>& effects, std::size_t ranges, Report& report) {
   report.setEffects(effects);
   report.setLeftOut(summary.left_out, config.monitorBodies());
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
@@ -176,7 +175,7 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
   std::vector<std::pair<std::string, std::string>> facts{
       {"bag", a.bag},
       {"mesh topics", topics},
-      {"fixed frame", frame},
+      {"fixed frame", summary.fixed_frame},
       {"duration", seconds(summary.duration_s)},
       {"mesh messages", std::to_string(summary.mesh_messages)},
       {"octomap", summary.map_source},
@@ -219,14 +218,12 @@ int analyze(const Arguments& a) {
   }
   BagReplay replay(a.bag, config, options);
   Report report(a.report);
-  std::string frame;
   bool answered = false;
   BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
         report.setOrigin(so_far.origin_ns);
         report.add(outcome, pipeline.monitor().bodies());
         answered = answered || outcome.answered;
-        frame = pipeline.fixedFrame();
         if (out) out->add(outcome, pipeline, so_far, at);
       },
       [&](const rosbag::MessageInstance& m) {
@@ -240,10 +237,10 @@ int analyze(const Arguments& a) {
     log->close();
     summary.look_ahead.reset();  // the join's
     writeRange({a.report, std::filesystem::path(a.bag).filename(), std::filesystem::file_size(a.bag), config.hash(),
-                log->range(), a.from_s, a.to_s, frame, summary, summary.effects.decisions(), report.state()});
+                log->range(), a.from_s, a.to_s, summary, summary.effects.decisions(), report.state()});
     return conclude(a, summary, report, answered);
   }
-  describe(a, config, summary, summary.effects.decisions(), frame, 0, report);
+  describe(a, config, summary, summary.effects.decisions(), 0, report);
   report.finish();
   if (!a.no_rungs) {  // takes long, and what there is should not be lost with it
     out.reset();
@@ -280,7 +277,7 @@ int merge(const Arguments& a) {
   if (!ranges.back().reachesEnd()) missing("the end");
   BagReplaySummary summary = joined(ranges);
   summary.look_ahead = join.lookAhead();
-  describe(a, config, summary, ranges.back().effects, ranges.back().fixed_frame, ranges.size(), report);
+  describe(a, config, summary, ranges.back().effects, ranges.size(), report);
   report.finish();
   return conclude(a, summary, report, report.anyAnswered());
 }

@@ -333,6 +333,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     if (!missing.empty()) run.complain(missing);
   }
   run.summary.frames = run.pipeline.monitor().total();
+  run.summary.fixed_frame = run.pipeline.fixedFrame();
   run.summary.effects = run.pipeline.effects().plan();
   run.summary.left_out = run.pipeline.monitor().leftOut();
   if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();

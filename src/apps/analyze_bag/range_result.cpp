@@ -41,6 +41,7 @@ BagReplaySummary summaryFrom(const json& j) {
   j.at("mesh_messages").get_to(s.mesh_messages);
   j.at("maps").get_to(s.maps);
   j.at("maps_refused").get_to(s.maps_refused);
+  j.at("fixed_frame").get_to(s.fixed_frame);
   j.at("map_source").get_to(s.map_source);
   j.at("complaints").get_to(s.complaints);
   s.frames = countersFrom(j.at("frames"));
@@ -69,7 +70,6 @@ void writeRange(const RangeResult& range) {
             {"last", range.frames.last},
             {"from_s", range.from_s},
             {"to_s", range.to_s},
-            {"fixed_frame", range.fixed_frame},
             {"summary", toJson(range.summary)},
             {"effects", json::array()},
             {"report", range.report}};
@@ -100,7 +100,6 @@ RangeResult readRange(const std::string& folder) {
     j.at("last").get_to(range.frames.last);
     j.at("from_s").get_to(range.from_s);
     j.at("to_s").get_to(range.to_s);
-    j.at("fixed_frame").get_to(range.fixed_frame);
     range.summary = summaryFrom(j.at("summary"));
     for (const json& d : j.at("effects")) {
       EffectDecision decision;

@@ -19,8 +19,7 @@ struct RangeResult {
   std::uint64_t bag_bytes = 0, parameters = 0;  // MonitorConfig::hash()
   StepRange frames;                             // last: of the bag's end none
   double from_s = 0, to_s = 0;                  // infinity: to the end
-  std::string fixed_frame;
-  BagReplaySummary summary;  // its effects are below
+  BagReplaySummary summary;                     // its effects are below
   std::vector<EffectDecision> effects;
   nlohmann::json report;  // Report::state()
 
