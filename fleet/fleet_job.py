@@ -91,6 +91,9 @@ def compute_recording(fleet, name):
         result = analyze(fleet, recording, folder / 'report', extra)
     if result['exit'] == ERROR and not failures:
         failures.append({'range': 'all', 'what': result['said']})
+    for left in (folder / 'ranges').glob('*'):  # of another cut
+        if left.name not in {span['name'] for span in recording['ranges']}:
+            shutil.rmtree(left, ignore_errors=True)
     result['seconds'] = round(result['seconds'] + sum(r['seconds'] for r in records), 3)
     result['max_memory_kb'] = max([result['max_memory_kb'], *(r['max_memory_kb'] for r in records)])
     result.update({'name': name, 'bag': recording['bag'], 'ranges': len(recording['ranges']), 'failures': failures})

@@ -298,7 +298,7 @@ class FleetTest(unittest.TestCase):
         for file in ('Snakefile', 'profile', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
             (wrapper / file).symlink_to(FLEET / file)
         # As if the system had ended the worker of the second range.
-        (wrapper / 'analyze_bag').write_text('#!/bin/bash\n[[ " $* " != *" --from 0."*" "* || -e %s ]] || kill -KILL $$\nexec %s "$@"\n' % (
+        (wrapper / 'analyze_bag').write_text('#!/bin/bash\n[[ " $* " != *" --from 0."[1-9]* || -e %s ]] || kill -KILL $$\nexec %s "$@"\n' % (
             self.folder / 'healed', TOOLS / 'analyze_bag'))
         (wrapper / 'analyze_bag').chmod(0o755)
         words = ['/usr/bin/python3', wrapper / 'analyze_fleet', self.first, '--params', self.params, '--out', out, '--cores', 2,
@@ -338,7 +338,7 @@ class FleetTest(unittest.TestCase):
                 self.assertEqual(process.returncode, 1)
                 self.assertIn('stopped; the same command goes on where it was', said)
             now = {p: p.stat().st_mtime_ns for p in out.glob('recordings/*/ranges/*/record.json')}
-            self.assertEqual({p: now[p] for p in done}, done, 'what was done stays')
+            self.assertGreaterEqual(sum(now[p] == done[p] for p in done), len(done) - 1, 'all but what was cut off')
             done = now
         ran = run(*words)
         self.assertIn(ran.returncode, (0, 3), ran.stderr)
@@ -437,7 +437,9 @@ class FleetTest(unittest.TestCase):
         changed = fleet('--compare', one, '--out', other)
         patches = [rows_of(out, 'SELECT body_0, body_1, first_s, last_s FROM patches') for out in (one, other)]
         self.assertEqual(changed.returncode, 2 if sorted(patches[0]) != sorted(patches[1]) else 0, changed.stdout)
-        params.write_text(self.params.read_text() + '\nvertex_mask: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]\n')
+        text = self.params.read_text().replace('{topic: /cloth}', '{topic: /cloth, vertex_mask: %s}' % list(range(0, 1089, 2)))
+        self.assertIn('vertex_mask', text)
+        params.write_text(text)
         masked = self.folder / 'masked'
         fleet(self.first, '--params', params, '--out', masked)
         changed = fleet('--compare', one, '--out', masked)

@@ -26,9 +26,10 @@ FrameCounters countersFrom(const json& j) {
 
 json toJson(const BagReplaySummary& s) {
   json j = {{"mesh_topics", s.mesh_topics},   {"mesh_messages", s.mesh_messages}, {"maps", s.maps},
-            {"maps_refused", s.maps_refused}, {"map_source", s.map_source},       {"complaints", s.complaints},
-            {"frames", toJson(s.frames)},     {"told", toJson(s.told)},           {"passed", toJson(s.passed)},
-            {"duration_s", s.duration_s},     {"origin_ns", s.origin_ns},         {"left_out", json::array()}};
+            {"maps_refused", s.maps_refused}, {"fixed_frame", s.fixed_frame},     {"map_source", s.map_source},
+            {"complaints", s.complaints},     {"frames", toJson(s.frames)},       {"told", toJson(s.told)},
+            {"passed", toJson(s.passed)},     {"duration_s", s.duration_s},       {"origin_ns", s.origin_ns},
+            {"left_out", json::array()}};
   for (const LeftOutPair& pair : s.left_out) {
     j["left_out"].push_back({static_cast<int>(pair.kind), pair.body, pair.vertex});
   }
