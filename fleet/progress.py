@@ -20,3 +20,5 @@ def log_handler(message):
         say('%d of %d jobs, about %d:%02d:%02d left' % (done, total, left_s // 3600, left_s // 60 % 60, left_s % 60))
     elif message.get('level') == 'job_error':
         say('job %s failed: %s' % (message.get('name'), ' '.join(map(str, message.get('output') or []))))
+    elif message.get('level') == 'error' and 'WorkflowError' in str(message.get('msg')):  # as where a cluster refuses a job
+        say(' '.join(str(message['msg']).split()))

@@ -323,10 +323,6 @@ int main(int argc, char** argv) {
     return a.ranges.empty() ? analyze(a) : merge(a);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : ERROR;
-  } catch (const rosbag::BagException& e) {
-    const std::string text = e.what();
-    std::cerr << "analyze_bag: " << (text.find(a.bag) == std::string::npos ? a.bag + ": " : "") << text << '\n';
-    return ERROR;
   } catch (const std::exception& e) {
     std::cerr << "analyze_bag: " << e.what() << '\n';
     return ERROR;

@@ -231,7 +231,7 @@ class FleetTest(unittest.TestCase):
 
     def test_what_comes_out(self):
         self.assertEqual(self.ran.returncode, 4, self.ran.stderr)
-        self.assertRegex(self.ran.stderr, r'(?m)^analyze_fleet: corrupt: all: .*corrupt\.bag')
+        self.assertRegex(self.ran.stderr, r'(?m)^analyze_fleet: corrupt: all: analyze_bag: .*read')
         self.assertRegex(self.ran.stderr, r'\d+ of \d+ jobs, about \d+:\d\d:\d\d left')
         states = dict(rows_of(self.out, 'SELECT name, state FROM recordings'))
         self.assertEqual(set(states), {'first', 'second', 'corrupt'})
@@ -474,7 +474,7 @@ SelectTypeParameters=CR_Core
 ReturnToService=2
 JobAcctGatherType=jobacct_gather/none
 AccountingStorageType=accounting_storage/none
-NodeName={host} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
+NodeName={host} NodeAddr=127.0.0.1 CPUs=2 RealMemory=8000 State=UNKNOWN
 PartitionName=test Nodes={host} Default=YES State=UP
 '''
 
