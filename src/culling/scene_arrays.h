@@ -29,6 +29,7 @@ struct SceneBody {
   bool masked = false;
   bool uncertain = false;  ///< some vertex has an uncertainty radius above 0 in this step
   bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
+  bool stale = false;      ///< its records and bounds are not those of its vertices
   bool recorded = false;   ///< it has been through a step since it was set
   double reach_m = 0;      ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
@@ -72,7 +73,8 @@ class SceneArrays {
   void refit(const Pieces& pieces, StepStats& stats) {
     for (SceneBody& body : bodies_) {
       ++(body.kept ? stats.bodies_kept : stats.bodies_refitted);
-      if (body.kept) continue;
+      if (body.kept && !body.stale) continue;
+      body.stale = false;
       pieces(body.usedCount(), [&](std::size_t first, std::size_t last) {
         quantize(body.internal_begin + first, body.internal_begin + last);
       });
@@ -88,6 +90,11 @@ class SceneArrays {
 
   /// After a refit() that left pieces out: nothing is kept of it.
   void forgetBounds() { bounds_valid_ = false; }
+  /// In the place of refit(), for a step that is not computed: the next one keeps what it would have kept after it.
+  void putOffRefit() {
+    for (SceneBody& body : bodies_) body.stale = body.stale || !body.kept;
+    bounds_valid_ = true;
+  }
 
   const std::vector<SceneBody>& bodies() const { return bodies_; }
   const VertexMotion* vertices() const { return vertices_.get(); }

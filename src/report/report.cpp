@@ -122,11 +122,12 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     BodyHeat& heat = heat_[b];
     const auto& topology = outcome.step->bodies[b].topology;
-    if (!topology || (heat.topology && heat.contacts.size() == topology->vertexCount())) continue;
+    if (!topology || (!heat.mesh.is_null() && heat.contacts.size() == topology->vertexCount())) continue;
     // A body whose topology changed begins anew: its vertices are other ones.
-    heat.name = bodies[b].name;
-    heat.topology = topology;
-    heat.layout = *outcome.step->bodies[b].t0;
+    heat.begun_anew = !heat.mesh.is_null();
+    heat.mesh = {{"name", bodies[b].name}, {"xy", flatLayout(*outcome.step->bodies[b].t0)}};
+    heat.mesh["faces"] = topology->faces();
+    if (!topology->hasFaces()) heat.mesh["edges"] = topology->edges();
     heat.contacts.assign(topology->vertexCount(), 0);
     heat.first_s.assign(topology->vertexCount(), std::numeric_limits<double>::infinity());
   }
@@ -201,8 +202,7 @@ void Report::addTimes(const Outcome& o) {
 }
 
 void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
-  if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
-  any_ = true;
+  if (!any_) setOrigin(o.start_ns > 0 ? o.start_ns : o.stamp_ns);
   addRow(o);
   addProof(o);
   writePatches(o, bodies);  // a seam without an answer has events, too
@@ -214,6 +214,11 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   addHeat(o, bodies);
   addFirstContact(o, bodies);
   addTimes(o);
+}
+
+void Report::setOrigin(StampNs origin_ns) {
+  origin_ns_ = origin_ns;
+  any_ = true;
 }
 
 void Report::addProof(const Outcome& o) {
@@ -236,7 +241,9 @@ std::string Report::unproved() const {
     frames += found.second;
     reasons += (reasons.empty() ? "" : ", ") + found.first + " (" + std::to_string(found.second) + ")";
   }
-  if (frames > 0) return std::to_string(frames) + " of " + std::to_string(frames_) + " frames: " + reasons;
+  if (frames > 0) reasons = std::to_string(frames) + " of " + std::to_string(frames_) + " frames: " + reasons;
+  for (const std::string& what : missing_) reasons += (reasons.empty() ? "" : "; ") + what;
+  if (!reasons.empty()) return reasons;
   return answered_ > 0 ? "" : frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
 }
 
@@ -268,12 +275,11 @@ std::string Report::headline() const {
 nlohmann::json Report::heatJson() const {
   nlohmann::json bodies = nlohmann::json::array();
   for (const BodyHeat& h : heat_) {
-    if (!h.topology) continue;
-    nlohmann::json body = {{"name", h.name}, {"xy", flatLayout(h.layout)}, {"first", nlohmann::json::array()}};
+    if (h.mesh.is_null()) continue;
+    nlohmann::json body = h.mesh;
+    body["first"] = nlohmann::json::array();
     body["count"] = h.contacts;
     for (double f : h.first_s) body["first"].push_back(finiteOrNull(f));
-    body["faces"] = h.topology->faces();
-    if (!h.topology->hasFaces()) body["edges"] = h.topology->edges();
     bodies.push_back(std::move(body));
   }
   return bodies;
@@ -281,7 +287,7 @@ nlohmann::json Report::heatJson() const {
 
 nlohmann::json Report::effectsJson() const {
   nlohmann::json effects = nlohmann::json::array();
-  for (const EffectDecision& d : plan_.decisions()) {
+  for (const EffectDecision& d : effects_) {
     nlohmann::json e = {{"name", d.name}, {"running", d.running}, {"reason", d.reason}};
     for (std::size_t i = 0; i < sum_.effects.size(); ++i) {
       if (d.name != toString(static_cast<Effect>(i))) continue;
@@ -389,7 +395,15 @@ void Report::finish() {
   std::string text = data.dump(-1, ' ', false, REPLACE);
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
   page << reportPage(text);
-  for (std::ofstream* file : {&contacts_, &steps_, &patches_, &events_, &timing_, &json_file, &page}) {
+  close();
+  for (std::ofstream* file : {&json_file, &page}) {
+    file->close();
+    if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
+  }
+}
+
+void Report::close() {
+  for (std::ofstream* file : {&contacts_, &steps_, &patches_, &events_, &timing_}) {
     if (file->is_open()) file->close();
     if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
   }

@@ -27,7 +27,17 @@ class Report {
   explicit Report(const std::string& folder);
 
   void add(const Outcome& outcome, const std::vector<Body>& bodies);
-  void setEffects(const EffectPlan& plan) { plan_ = plan; }
+  /// Times are counted from here, and not from the first outcome that is added.
+  void setOrigin(StampNs origin_ns);
+  /// Of a range of a recording: all that append() needs beside the tables.
+  nlohmann::json state() const;
+  /// What a Report of the range that comes next left in the folder, and its state(). Its patches and events are added
+  /// by addPatches(), an outcome each. Throws std::runtime_error naming the file.
+  void append(const std::string& folder, const nlohmann::json& state);
+  void addPatches(const Outcome& outcome, const std::vector<Body>& bodies) { writePatches(outcome, bodies); }
+  /// What has no answer because its range is missing, in words.
+  void addMissing(const std::string& what) { missing_.push_back(what); }
+  void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
@@ -41,6 +51,9 @@ class Report {
   /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
   /// naming the file.
   void finish();
+  /// Of a range, instead of the page: closes the tables. Throws std::runtime_error naming the folder.
+  void close();
+  bool anyAnswered() const { return answered_ > 0; }
   /// One sentence: the first contact, or that there was none, or that there was no answer; and what is not proved of
   /// it.
   std::string headline() const;
@@ -50,11 +63,10 @@ class Report {
 
  private:
   struct BodyHeat {
-    std::string name;
-    std::shared_ptr<const Topology> topology;
-    Positions layout;                     // of the first answered step
+    nlohmann::json mesh;                  // name, layout of the first answered step, faces or edges
     std::vector<std::uint32_t> contacts;  // per vertex
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
+    bool begun_anew = false;              // with another topology
   };
   void addProof(const Outcome& outcome);
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
@@ -91,10 +103,11 @@ class Report {
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;
   LatencyHistogram step_times_;
-  EffectPlan plan_;
+  std::vector<EffectDecision> effects_;
   std::vector<RungCost> rungs_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
+  std::vector<std::string> missing_;
   FrameCounters counters_;
 };
 

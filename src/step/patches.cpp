@@ -172,7 +172,7 @@ void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
 void PatchMaker::make(Outcome& outcome) {
   std::vector<Patch>& patches = outcome.patches;
   patches.resize(graph_.componentCount());
-  unexpected_.assign(patches.size(), Unexpected());
+  unexpected_.assign(patches.size(), PatchUnexpected());
   for (std::size_t p = 0; p < patches.size(); ++p) {
     Patch& patch = patches[p];
     patch.body = touches_[order_[begin_[p]]].body;
@@ -223,7 +223,7 @@ void PatchMaker::findAreas(const Outcome& outcome) {
   findSpots();
   findVertexAreas(*outcome.step);
   areas_.assign(2 * graph_.componentCount(), 0);
-  for (const Spot& spot : spots_) areas_[2 * spot.patch + spot.side] += vertex_area_[spot.vertex];
+  for (const PatchSpot& spot : spots_) areas_[2 * spot.patch + spot.side] += vertex_area_[spot.vertex];
   for (std::uint32_t p = 0; p < graph_.componentCount(); ++p) {
     if (touches_[order_[begin_[p]]].onMap()) areas_[2 * p + 1] = leafArea(p, outcome.obstacle->resolution());
   }

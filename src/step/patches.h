@@ -9,6 +9,20 @@
 
 namespace dccd {
 
+/// A vertex that carries a feature of a patch's touches, once a patch: what the tracker keeps from step to step.
+struct PatchSpot {
+  Index vertex = 0;
+  Index across = NO_INDEX;  ///< a vertex of the other side that it touches; NO_INDEX with the map
+  std::uint32_t patch = 0;
+  std::uint8_t side = 0;  ///< 0: of Patch::body[0]
+  bool expected = false;  ///< all of the patch's touches there are
+};
+
+/// Has a patch touches that are not expected, and came in this step, or were there when it began?
+struct PatchUnexpected {
+  bool is_new = false, is_initial = false;
+};
+
 /// Buffers are kept from step to step.
 class PatchMaker {
  public:
@@ -35,21 +49,8 @@ class PatchMaker {
   const std::vector<Touch>& touches() const { return touches_; }
   const std::vector<std::uint32_t>& patchOf() const { return *patch_of_; }
 
-  /// A vertex that carries a feature of a patch's touches, once a patch: what the tracker keeps from step to step.
-  struct Spot {
-    Index vertex;
-    Index across;  ///< a vertex of the other side that it touches; NO_INDEX with the map
-    std::uint32_t patch;
-    std::uint8_t side;  ///< 0: of Patch::body[0]
-    bool expected;      ///< all of the patch's touches there are
-  };
-  const std::vector<Spot>& spots() const { return spots_; }
-
-  /// Per patch: has it touches that are not expected, and came in this step, or were there when it began?
-  struct Unexpected {
-    bool is_new = false, is_initial = false;
-  };
-  const std::vector<Unexpected>& unexpected() const { return unexpected_; }
+  const std::vector<PatchSpot>& spots() const { return spots_; }
+  const std::vector<PatchUnexpected>& unexpected() const { return unexpected_; }
 
  private:
   static constexpr std::size_t PIECE = 4096;
@@ -76,14 +77,14 @@ class PatchMaker {
   std::vector<std::uint32_t> order_;  // the touches, patch by patch, each patch's ascending
   std::vector<std::uint32_t> begin_;  // per patch, in order_
   struct Part : Patch {
-    Unexpected unexpected;
+    PatchUnexpected unexpected;
   };
   /// What a piece of order_ gives to a patch: that of piece i to patch p is at i + p, since in order_ with each of them
   /// either i or p goes on.
   std::vector<Part> parts_;
-  std::vector<Unexpected> unexpected_;
+  std::vector<PatchUnexpected> unexpected_;
   std::vector<double> vertex_area_;  // per vertex of all bodies: a third of the faces around it [m^2]
-  std::vector<Spot> spots_;          // patch by patch
+  std::vector<PatchSpot> spots_;     // patch by patch
   /// Per vertex: the last patch that had it, and its spot there.
   struct Seen {
     std::uint32_t patch, spot;

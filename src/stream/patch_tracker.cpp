@@ -48,6 +48,7 @@ PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
 }
 
 void PatchTracker::seam(std::size_t body) {
+  if (log_) return log_->seam(body);
   for (auto at = living_.begin(); at != living_.end();) {
     if (!isOf(at->second.body, body)) {
       ++at;
@@ -67,18 +68,32 @@ void PatchTracker::seam(std::size_t body) {
 }
 
 void PatchTracker::tell(Outcome& outcome) {
+  if (log_) return log_->tell(outcome);
   outcome.patch_events.insert(outcome.patch_events.begin(), waiting_.begin(), waiting_.end());
   waiting_.clear();
 }
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
+  findNewVoxels(found, outcome);
+  knowMap(outcome);
+  if (log_) return log_->follow(found.spots(), found.unexpected(), on_new_voxel_, outcome);
+  follow(found.spots(), found.unexpected(), on_new_voxel_, gap_s, outcome);
+}
+
+void PatchTracker::knowMap(const Outcome& before) {
+  last_map_ = before.obstacle;
+  last_map_pose_ = before.step->map.map_from_fixed;
+}
+
+void PatchTracker::follow(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
+                          const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   bool same = graph_.bodyCount() == bodies.size();
   for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
   if (!same) seam();
   graph_.setBodies(bodies);
-  merge(found, outcome);
-  findParts(found, outcome);
+  merge(spots, outcome);
+  findParts(spots, unexpected, on_new_voxel, outcome);
   findNews();
   keepIdentities(outcome);
   begin(outcome);
@@ -93,8 +108,6 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
     if (patch != outcome.patches.end()) event.patch = static_cast<std::uint32_t>(patch - outcome.patches.begin());
   }
   has_last_ = true;
-  last_map_ = outcome.obstacle;
-  last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
 void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
@@ -103,8 +116,8 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
-  merge(found, outcome);
-  findParts(found, outcome);
+  merge(found.spots(), outcome);
+  findParts(found.spots(), found.unexpected(), {}, outcome);
   findNews();
   for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
   name(outcome);
@@ -161,8 +174,7 @@ void PatchTracker::goOn(const Outcome& outcome) {
 }
 
 /// What touches and what did, each pair of vertices once.
-void PatchTracker::merge(const PatchMaker& found, const Outcome& outcome) {
-  const std::vector<PatchMaker::Spot>& spots = found.spots();
+void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& outcome) {
   all_.clear();
   releaseBurst(before_);
   before_.clear();
@@ -177,7 +189,7 @@ void PatchTracker::merge(const PatchMaker& found, const Outcome& outcome) {
   for (std::size_t i = 0; !burst && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
   releaseBurst(current_);
   current_.assign(all_.spots.size(), NO_PATCH);
-  for (const PatchMaker::Spot& spot : spots) {
+  for (const PatchSpot& spot : spots) {
     std::uint32_t at = last_at_[spot.vertex];
     while (at != NO_INDEX && all_.spots[at].point[1] != spot.across) at = before_[at];
     if (at == NO_INDEX) {
@@ -196,6 +208,18 @@ void PatchTracker::merge(const PatchMaker& found, const Outcome& outcome) {
   for (const Touch& spot : all_.spots) last_at_[spot.point[0]] = NO_INDEX;
 }
 
+/// Only where the map is another one than in the step before.
+void PatchTracker::findNewVoxels(const PatchMaker& found, const Outcome& outcome) {
+  on_new_voxel_.clear();
+  if (last_map_ == outcome.obstacle) return;
+  on_new_voxel_.assign(outcome.patches.size(), 0);
+  for (std::size_t t = 0; t < found.touches().size(); ++t) {
+    const Touch& touch = found.touches()[t];
+    std::uint8_t& is_new = on_new_voxel_[found.patchOf()[t]];
+    if (!is_new && touch.initial && touch.onMap()) is_new = isNewOnMap(touch, outcome);
+  }
+}
+
 bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
   if (!last_map_) return true;
   const double resolution_m = outcome.obstacle->resolution(), half = 0.5 * std::ldexp(resolution_m, touch.level);
@@ -205,9 +229,10 @@ bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const 
   return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
 }
 
-void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
+void PatchTracker::findParts(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
+                             const std::vector<std::uint8_t>& on_new_voxel, const Outcome& outcome) {
   // Where all that touched still does, the patches of the step are the parts.
-  const bool same = all_.spots.size() == found.spots().size();
+  const bool same = all_.spots.size() == spots.size();
   part_of_ = same ? &current_ : &graph_.components(all_.spots);
   releaseBurst(parts_);
   parts_.assign(same ? outcome.patches.size() : graph_.componentCount(), Part());
@@ -228,24 +253,17 @@ void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
     part.toc_lower = std::min(part.toc_lower, patch.toc_lower);
     part.toc_upper = std::min(part.toc_upper, patch.toc_upper);
     part.initial = part.initial || patch.initial + patch.crossings > 0;
-    part.unexpected_new = part.unexpected_new || found.unexpected()[p].is_new;
-    part.unexpected_initial = part.unexpected_initial || found.unexpected()[p].is_initial;
+    part.unexpected_new = part.unexpected_new || unexpected[p].is_new;
+    part.unexpected_initial = part.unexpected_initial || unexpected[p].is_initial;
   }
   for (Part& part : parts_) {
     std::sort(part.before.begin(), part.before.end());
     part.before.erase(std::unique(part.before.begin(), part.before.end()), part.before.end());
   }
-  findChangesOfTheMap(found, outcome);
-}
-
-/// Of parts of which nothing touched before.
-void PatchTracker::findChangesOfTheMap(const PatchMaker& found, const Outcome& outcome) {
-  if (!has_last_ || last_map_ == outcome.obstacle) return;
-  for (std::size_t t = 0; t < found.touches().size(); ++t) {
-    const Touch& touch = found.touches()[t];
-    if (!touch.initial || !touch.onMap()) continue;
-    Part& part = parts_[part_of_patch_[found.patchOf()[t]]];
-    if (part.before.empty() && !part.map_changed) part.map_changed = isNewOnMap(touch, outcome);
+  if (!has_last_ || on_new_voxel.empty()) return;
+  for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
+    Part& part = parts_[part_of_patch_[p]];
+    if (part.before.empty() && on_new_voxel[p]) part.map_changed = true;
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dccd/outcome.h"
+#include "dccd/range_log.h"
 #include "step/patches.h"
 
 namespace dccd {
@@ -23,10 +24,18 @@ class PatchTracker {
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:
   /// what detect() found in it.
   void follow(const PatchMaker& found, double gap_s, Outcome& outcome);
+  /// The same of what a range has logged. on_new_voxel: per patch, whether it touched at its start a voxel that the map
+  /// before did not have; empty: none did.
+  void follow(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
+              const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
   void recognise(const PatchMaker& found, Outcome& outcome);
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
+  /// From now on patches get no identities: what they follow from goes into the log.
+  void leaveTo(RangeLog& log) { log_ = &log; }
+  /// The map of the step before the first one that is followed.
+  void knowMap(const Outcome& before);
 
   std::size_t livingCount() const { return living_.size(); }
   std::size_t traceSize() const { return trace_.spots.size(); }
@@ -40,7 +49,7 @@ class PatchTracker {
     StampNs released_ns = UNKNOWN_NS;  // it no longer was; UNKNOWN_NS: it was not seen apart since
     bool unexpected = false;           // something of it that lasts is not expected
   };
-  /// What is known of a spot (PatchMaker::Spot) of a living patch.
+  /// What is known of a spot (PatchSpot) of a living patch.
   struct Known {
     std::uint64_t id = 0;
     std::int64_t last_ns = 0;  // by the clock of its partner
@@ -69,9 +78,10 @@ class PatchTracker {
     std::array<std::uint16_t, 2> body{0, 0};
   };
 
-  void merge(const PatchMaker& found, const Outcome& outcome);
-  void findParts(const PatchMaker& found, const Outcome& outcome);
-  void findChangesOfTheMap(const PatchMaker& found, const Outcome& outcome);
+  void merge(const std::vector<PatchSpot>& spots, const Outcome& outcome);
+  void findParts(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
+                 const std::vector<std::uint8_t>& on_new_voxel, const Outcome& outcome);
+  void findNewVoxels(const PatchMaker& found, const Outcome& outcome);
   bool isNewOnMap(const Touch& touch, const Outcome& outcome) const;
   void keepIdentities(Outcome& outcome);
   void name(Outcome& outcome) const;
@@ -93,6 +103,7 @@ class PatchTracker {
   bool has_last_ = false;
   std::shared_ptr<const VoxelSurface> last_map_;
   Eigen::Isometry3d last_map_pose_ = Eigen::Isometry3d::Identity();
+  RangeLog* log_ = nullptr;
 
   // Buffers of a step.
   TouchGraph graph_;
@@ -103,7 +114,8 @@ class PatchTracker {
   std::vector<std::uint32_t> before_;                    // per one of these: the one before it at the same vertex
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
-  std::vector<std::uint64_t> alive_;  // ascending
+  std::vector<std::uint64_t> alive_;        // ascending
+  std::vector<std::uint8_t> on_new_voxel_;  // per patch; empty: none is
 };
 
 }  // namespace dccd

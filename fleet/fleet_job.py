@@ -1,0 +1,120 @@
+"""One job of a fleet: a range of a recording, a recording, or the database and page of all. Snakemake calls it.
+
+A job that ends without an error has written its result, also where that is a failure: a bag that cannot be read stays so. A job
+that was killed, or found no room to write, leaves no result and ends with 1, and so is computed again by the next run.
+"""
+import json
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import fleet_database  # noqa: E402
+import fleet_tables  # noqa: E402
+
+ANSWERED = (0, 3)  # analyze_bag: proved; answered, but not all of it is proved
+ERROR = 1
+
+
+def write(path, data):
+    """Whole or not at all."""
+    path = pathlib.Path(path)
+    unfinished = path.with_name(path.name + '.part')
+    unfinished.write_text(json.dumps(data, indent=1) + '\n')
+    unfinished.replace(path)
+
+
+def analyze(fleet, recording, folder, extra):
+    """Runs analyze_bag with its report in the folder, which is there afterwards only where it was answered. What it said and
+    cost."""
+    unfinished = folder.with_name(folder.name + '.part')
+    shutil.rmtree(unfinished, ignore_errors=True)
+    unfinished.parent.mkdir(parents=True, exist_ok=True)
+    command = [fleet['tool'], recording['bag'], '--report', str(unfinished), '--quiet', '--threads', str(fleet['threads']),
+               *fleet['options'], *extra]
+    start = time.time()
+    ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+    said = ran.stderr.decode(errors='replace').strip()
+    if ran.returncode < 0:
+        sys.exit('%s: analyze_bag was ended by %s' % (recording['name'], signal.Signals(-ran.returncode).name))
+    if 'written' in said and ran.returncode not in ANSWERED:  # that is no property of the recording
+        sys.exit('%s: %s' % (recording['name'], said))
+    if ran.returncode not in (*ANSWERED, ERROR):
+        sys.exit('%s: analyze_bag ended with %d: %s' % (recording['name'], ran.returncode, said))
+    shutil.rmtree(folder, ignore_errors=True)  # only now, when there is something in its place
+    if ran.returncode in ANSWERED:
+        unfinished.replace(folder)
+    else:
+        shutil.rmtree(unfinished, ignore_errors=True)
+    bag = os.stat(recording['bag'])
+    return {'exit': ran.returncode, 'said': said, 'headline': ran.stdout.decode(errors='replace').split('\n')[0],
+            'seconds': round(time.time() - start, 3), 'bag_bytes': bag.st_size, 'version': fleet['version'],
+            'max_memory_kb': resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss}
+
+
+def compute_range(fleet, name, range_name):
+    recording = next(r for r in fleet['recordings'] if r['name'] == name)
+    span = next(s for s in recording['ranges'] if s['name'] == range_name)
+    extra = ['--from', repr(span['from_s'])]
+    if span['to_s'] is not None:
+        extra += ['--to', repr(span['to_s'])]
+    folder = pathlib.Path('recordings', name, 'ranges', range_name)
+    write_to = folder / 'record.json'
+    record = analyze(fleet, recording, folder / 'data', ['--no-accuracy-table', *extra])
+    write(write_to, {**record, **span})
+
+
+def compute_recording(fleet, name):
+    recording = next(r for r in fleet['recordings'] if r['name'] == name)
+    folder = pathlib.Path('recordings', name)
+    failures, records, extra = [], [], ['--no-accuracy-table']
+    for span in recording['ranges']:
+        there = folder / 'ranges' / span['name'] / 'record.json'
+        what = 'from %s s to %s' % (span['from_s'], 'the end' if span['to_s'] is None else '%s s' % span['to_s'])
+        if not there.exists():
+            failures.append({'range': what, 'what': 'is missing'})
+            continue
+        record = json.loads(there.read_text())
+        records.append(record)
+        if record['exit'] in ANSWERED:
+            extra += ['--merge', str(there.parent / 'data')] if '--merge' not in extra else [str(there.parent / 'data')]
+        else:
+            failures.append({'range': what, 'what': record['said']})
+    if recording['ranges'] and '--merge' not in extra:  # nothing to merge
+        result = {**records[0], 'seconds': 0}
+    else:
+        result = analyze(fleet, recording, folder / 'report', extra)
+    if result['exit'] == ERROR and not failures:
+        failures.append({'range': 'all', 'what': result['said']})
+    for left in (folder / 'ranges').glob('*'):  # of another cut
+        if left.name not in {span['name'] for span in recording['ranges']}:
+            shutil.rmtree(left, ignore_errors=True)
+    result['seconds'] = round(result['seconds'] + sum(r['seconds'] for r in records), 3)
+    result['max_memory_kb'] = max([result['max_memory_kb'], *(r['max_memory_kb'] for r in records)])
+    result.update({'name': name, 'bag': recording['bag'], 'ranges': len(recording['ranges']), 'failures': failures})
+    if result['exit'] in ANSWERED:
+        result['tables'] = fleet_tables.of_report(folder / 'report')
+    write(folder / 'result.json', result)
+
+
+def main():
+    verb, config, *names = sys.argv[1:]
+    fleet = json.loads(pathlib.Path(config).read_text())
+    try:
+        if verb == 'range':
+            compute_range(fleet, *names)
+        elif verb == 'recording':
+            compute_recording(fleet, *names)
+        else:
+            fleet_database.write(fleet, pathlib.Path('.'))
+    except OSError as error:
+        sys.exit('%s: %s' % (' '.join([verb, *names]), error))
+
+
+if __name__ == '__main__':
+    main()

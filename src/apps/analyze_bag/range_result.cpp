@@ -1,0 +1,156 @@
+#include "apps/analyze_bag/range_result.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+namespace dccd {
+namespace {
+
+using nlohmann::json;
+
+constexpr int FORMAT = 1;
+
+std::string fileOf(const std::string& folder) { return folder + "/range.cbor"; }
+
+json toJson(const FrameCounters& c) { return {c.received, c.receipt_stamps, c.by_status}; }
+FrameCounters countersFrom(const json& j) {
+  FrameCounters c;
+  j.at(0).get_to(c.received);
+  j.at(1).get_to(c.receipt_stamps);
+  for (std::size_t s = 0; s < c.by_status.size(); ++s) j.at(2).at(s).get_to(c.by_status[s]);
+  return c;
+}
+
+json toJson(const BagReplaySummary& s) {
+  json j = {{"mesh_topics", s.mesh_topics},   {"mesh_messages", s.mesh_messages}, {"maps", s.maps},
+            {"maps_refused", s.maps_refused}, {"fixed_frame", s.fixed_frame},     {"map_source", s.map_source},
+            {"complaints", s.complaints},     {"frames", toJson(s.frames)},       {"told", toJson(s.told)},
+            {"passed", toJson(s.passed)},     {"duration_s", s.duration_s},       {"origin_ns", s.origin_ns},
+            {"left_out", json::array()}};
+  for (const LeftOutPair& pair : s.left_out) {
+    j["left_out"].push_back({static_cast<int>(pair.kind), pair.body, pair.vertex});
+  }
+  return j;
+}
+
+BagReplaySummary summaryFrom(const json& j) {
+  BagReplaySummary s;
+  j.at("mesh_topics").get_to(s.mesh_topics);
+  j.at("mesh_messages").get_to(s.mesh_messages);
+  j.at("maps").get_to(s.maps);
+  j.at("maps_refused").get_to(s.maps_refused);
+  j.at("fixed_frame").get_to(s.fixed_frame);
+  j.at("map_source").get_to(s.map_source);
+  j.at("complaints").get_to(s.complaints);
+  s.frames = countersFrom(j.at("frames"));
+  s.told = countersFrom(j.at("told"));
+  s.passed = countersFrom(j.at("passed"));
+  j.at("duration_s").get_to(s.duration_s);
+  j.at("origin_ns").get_to(s.origin_ns);
+  for (const json& one : j.at("left_out")) {
+    LeftOutPair pair;
+    pair.kind = static_cast<PairKind>(one.at(0).get<int>());
+    one.at(1).get_to(pair.body);
+    one.at(2).get_to(pair.vertex);
+    s.left_out.push_back(pair);
+  }
+  return s;
+}
+
+}  // namespace
+
+void writeRange(const RangeResult& range) {
+  json j = {{"format", FORMAT},
+            {"bag", range.bag_name},
+            {"bag_bytes", range.bag_bytes},
+            {"parameters", range.parameters},
+            {"first", range.frames.first},
+            {"last", range.frames.last},
+            {"from_s", range.from_s},
+            {"to_s", range.to_s},
+            {"summary", toJson(range.summary)},
+            {"effects", json::array()},
+            {"report", range.report}};
+  for (const EffectDecision& d : range.effects) j["effects"].push_back({d.name, d.running, d.reason});
+  const std::string path = fileOf(range.folder), unfinished = path + ".part";
+  {
+    std::ofstream file(unfinished, std::ios::binary);
+    json::to_cbor(j, nlohmann::detail::output_adapter<char>(file));
+    file.close();
+    if (!file) throw std::runtime_error(path + ": could not be written completely");
+  }
+  std::filesystem::rename(unfinished, path);
+}
+
+RangeResult readRange(const std::string& folder) {
+  const std::string path = fileOf(folder);
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw std::runtime_error(path + ": cannot be read; it is no finished range of a bag");
+  try {
+    const json j = json::from_cbor(file);
+    if (j.at("format").get<int>() != FORMAT) throw std::runtime_error("written by another version of the program");
+    RangeResult range;
+    range.folder = folder;
+    j.at("bag").get_to(range.bag_name);
+    j.at("bag_bytes").get_to(range.bag_bytes);
+    j.at("parameters").get_to(range.parameters);
+    j.at("first").get_to(range.frames.first);
+    j.at("last").get_to(range.frames.last);
+    j.at("from_s").get_to(range.from_s);
+    j.at("to_s").get_to(range.to_s);
+    range.summary = summaryFrom(j.at("summary"));
+    for (const json& d : j.at("effects")) {
+      EffectDecision decision;
+      d.at(0).get_to(decision.name);
+      decision.running = d.at(1).get<bool>();
+      d.at(2).get_to(decision.reason);
+      range.effects.push_back(std::move(decision));
+    }
+    range.report = j.at("report");
+    return range;
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+}
+
+std::vector<RangeResult> readRanges(const std::vector<std::string>& folders, const std::string& bag,
+                                    std::uint64_t parameters) {
+  const std::string name = std::filesystem::path(bag).filename();
+  const std::uint64_t bytes = std::filesystem::file_size(bag);
+  std::vector<RangeResult> ranges;
+  for (const std::string& folder : folders) {
+    ranges.push_back(readRange(folder));
+    const RangeResult& range = ranges.back();
+    if (range.bag_name != name || range.bag_bytes != bytes) {
+      throw std::runtime_error(folder + ": is a range of " + range.bag_name + " with " +
+                               std::to_string(range.bag_bytes) + " bytes, not of " + name + " with " +
+                               std::to_string(bytes));
+    }
+    if (range.parameters != parameters) throw std::runtime_error(folder + ": was computed with other parameters");
+  }
+  std::stable_sort(ranges.begin(), ranges.end(), [](const RangeResult& a, const RangeResult& b) {
+    return a.frames.first != b.frames.first ? a.frames.first < b.frames.first : a.isEmpty() > b.isEmpty();
+  });
+  for (std::size_t i = 1; i < ranges.size(); ++i) {
+    if (ranges[i].isEmpty() || ranges[i].frames.first > ranges[i - 1].frames.last) continue;
+    throw std::runtime_error(ranges[i].folder + ": holds frames that " + ranges[i - 1].folder + " holds, too");
+  }
+  return ranges;
+}
+
+BagReplaySummary joined(const std::vector<RangeResult>& ranges) {
+  BagReplaySummary whole = ranges.back().summary;
+  // Of what is before its range the last one knows what came, and not how it was answered.
+  for (std::size_t s = 0; s < whole.frames.by_status.size(); ++s) {
+    whole.frames.by_status[s] -= whole.passed.by_status[s];
+    for (std::size_t i = 0; i + 1 < ranges.size(); ++i) {
+      whole.frames.by_status[s] += ranges[i].summary.told.by_status[s];
+    }
+  }
+  return whole;
+}
+
+}  // namespace dccd
