@@ -116,16 +116,31 @@ def cliffs_page(result):
     return lines
 
 
+def margins_page(table):
+    return ["", "## Margins", "",
+            "Each margin of `include/dccd/tolerances.h` covers rounding, by a derivation that stands beside the code. Is it needed? `scripts/test --long",
+            "--only margins` (and `scripts/benchmark hard_cases`, which prints this table) cuts each, one at a time: inputs that aim at its",
+            "bound, some of them found by search (`cut_margins --search`), must go wrong then, judged by exact arithmetic, and none with the whole",
+            "margin. The last column is the largest part of the margin at which one goes wrong. Where that is less than a tenth, the bound adds up",
+            "what dozens of roundings can do at once, or one margin serves several quantities, and search has found no input that needs more; the test",
+            "holds the part that is shown. What covers underflow (0: only without it) is far larger than what it covers, to be a normal number.",
+            ""] + table
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("results", help="JSON of hard_cases_benchmark")
     parser.add_argument("--out", required=True, help="folder for hard_cases.md and the folder hard_cases of pictures")
+    parser.add_argument("--margins", help="what cut_margins printed")
     arguments = parser.parse_args()
     with open(arguments.results) as source:
         result = json.load(source)
     pictures = os.path.join(arguments.out, "hard_cases")
     os.makedirs(pictures, exist_ok=True)
     lines = (hard_page(result, pictures) if "hard" in result else []) + (cliffs_page(result) if "cliffs" in result else [])
+    if arguments.margins:
+        with open(arguments.margins) as table:
+            lines += margins_page(table.read().splitlines())
     path = os.path.join(arguments.out, "hard_cases.md")
     with open(path, "w") as out:
         out.write("\n".join(lines).strip().replace("**  |", "** |") + "\n")

@@ -61,6 +61,11 @@ function(add_gtest_suite name)
   endif()
 endfunction()
 
+if(DEFORMABLE_CCD_VARIABLE_MARGINS)
+  add_executable(cut_margins test/margins/cut_margins.cpp)
+  target_link_libraries(cut_margins PRIVATE deformable_ccd_test_support deformable_ccd_archive)
+endif()
+
 # scripts/test reads this list: a suite that is on it but was not built counts as failed.
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "")
 set(PARTS_BEYOND_CORE octomap physics report ros)

@@ -4,7 +4,16 @@
 // A *margin* covers rounding: larger is safe and sends more pairs to a dearer stage, smaller loses contacts. A *guard*
 // bounds the numbers for which a margin holds: outside, exact arithmetic decides; narrower guards cost time, wider ones
 // certainty. A *default* is the user's to change (doc/interface.md).
+//
+// test/margins cuts each margin in turn and shows a test that fails then; for this it builds the core with margins that
+// are variables.
 #pragma once
+
+#ifdef DEFORMABLE_CCD_VARIABLE_MARGINS
+#define DCCD_MARGIN inline
+#else
+#define DCCD_MARGIN constexpr
+#endif
 
 namespace dccd {
 namespace tolerance {
@@ -30,8 +39,9 @@ constexpr double SMALLEST_RESOLUTION_M = 1e-290, LARGEST_RESOLUTION_M = 1e290;
 // --- projections and bounds ------------------------------------------------------------------------------------------
 constexpr double SQRT2_UP = 1.4142135623730952;  ///< [1] length of the diagonal directions, rounded up
 /// [1] Margin of a bound on the time of contact, for its few roundings. Larger: bounds are earlier, nothing else.
-constexpr double TOC_BOUND = 8 * 0x1p-52;
-/// [1] Margin of a distance in record units, more than its five roundings.
+DCCD_MARGIN double TOC_BOUND = 8 * HALF_ULP;
+/// [1] Of a distance in record units, more than its five roundings. No input can tell it from 1: these are below 2^-35
+/// units, and a whole unit is added for truncation, of which strict comparisons of whole numbers need nothing.
 constexpr double RECORD_REACH = 1.0000002;
 /// [1] Of the scene's extent: how much wider the records' range is on either side where a body rests, so that others
 /// may move within it. Larger: resting bodies are kept longer, all bounds are coarser.
@@ -39,56 +49,69 @@ constexpr double RECORD_PADDING = 0.5;
 /// [1] Of the records' range: what the scene must fill. Smaller: bodies are kept longer, all bounds are coarser.
 constexpr double RECORD_SHARE = 0.125;
 /// [1] Margin of a separation that is a sum of several, which must not come out too small.
-constexpr double SEPARATION_SUM = 0x1p-50;
+DCCD_MARGIN double SEPARATION_SUM = 0x1p-50;
 
 // --- filters ---------------------------------------------------------------------------------------------------------
 // Planar filter (simd/fused_filter.cpp), in float on differences.
-constexpr float FUSED_UNIT = 1.0f / 16777216.0f;  ///< [1] 2^-24, half an ulp of float: what its margins are made of
-constexpr float FUSED_UNDERFLOW = 7.888609e-31f;  ///< [m^2, m^3] 2^-100, more than all that underflows in a test
+DCCD_MARGIN float FUSED_PLANAR = 128 * 0x1p-24f;  ///< [1] margin of a cross product's coefficient, times M^2
+DCCD_MARGIN float FUSED_CUBIC = 192 * 0x1p-24f;   ///< [1] of one of the cubic of coplanarity, times M^3
+/// [m^2, m^3] More than all that underflows in a test, which is below 2^-146 where it counts: a normal number, since
+/// denormal ones may be slow to add. So much less would do; without it contacts are lost.
+DCCD_MARGIN float FUSED_UNDERFLOW = 0x1p-100f;
 constexpr float FUSED_LARGEST_M = 1073741824.0f;  ///< [m] guard, 2^30: cubes of differences stay finite
 // No fold (culling/unfolded.cpp).
 constexpr double UNFOLDED_COORDINATE = 0x1p-51;  ///< [1] margin of a projected coordinate, of the largest one
 constexpr double UNFOLDED_SMALLEST_NORMAL = 1e-200, UNFOLDED_LARGEST_NORMAL = 1e200;  ///< [m^2] guard
 constexpr double UNFOLDED_SMALLEST_M = 1e-100, UNFOLDED_LARGEST_M = 1e100;            ///< [m] guard
 // Start state (step/segment_triangle.cpp), in double.
-constexpr double SEGMENT_UNDERFLOW = 0x1p-1000;  ///< [m^3] margin: fewer than 100 operations that underflow
-constexpr double SEGMENT_LARGEST_M = 0x1p30;     ///< [m] guard: keeps the underflow below that margin
+DCCD_MARGIN double SEGMENT_PROJECTED = 35 * HALF_ULP;  ///< [1] margin of a cross product's component, times M^2
+DCCD_MARGIN double SEGMENT_LINE = 47 * HALF_ULP;       ///< [1] of where a line meets a face, times M^3
+DCCD_MARGIN double SEGMENT_PLANE = 240 * HALF_ULP;     ///< [1] of the side of a face's plane, times M^3
+/// [m^2, m^3] The same; what underflows where it counts is below 2^-1071.
+DCCD_MARGIN double SEGMENT_UNDERFLOW = 0x1p-1000;
+constexpr double SEGMENT_LARGEST_M = 0x1p30;  ///< [m] guard: keeps the underflow below that margin
 
 // --- elementary tests ------------------------------------------------------------------------------------------------
 // Batched exact test (simd/exact_batch_bounds.h). Margins, each rounded up by more than 0.5 %.
-constexpr double BATCH_VALUE = 70.5 * HALF_ULP;           ///< [1] of f(t) and f's coefficients, times U V W
-constexpr double BATCH_VALUE_ROUNDING = 6.25 * HALF_ULP;  ///< [1] the same, times max |fi|
-constexpr double BATCH_MINOR = 20.5 * HALF_ULP;           ///< [1] of a minor, times X Y
-constexpr double BATCH_MINOR_SLOPE = 8.125;               ///< [1] of a minor, times h X Y
-constexpr double BATCH_SEPARATION = 22.5 * HALF_ULP;      ///< [1] of a minor's coefficient over [a, b], times X Y
+DCCD_MARGIN double BATCH_VALUE = 107 * HALF_ULP;        ///< [1] of f(t) and f's coefficients, times U V W
+DCCD_MARGIN double BATCH_MINOR = 8.0625;                ///< [1] of a minor, times (h + 2.5 HALF_ULP) X Y
+DCCD_MARGIN double BATCH_SEPARATION = 22.5 * HALF_ULP;  ///< [1] of a minor's coefficient over [a, b], times X Y
+DCCD_MARGIN double SIMPLE_TIME = 155 * HALF_ULP;        ///< [1] of f's coefficients up to a rounded time, times U V W
 constexpr double BATCH_SMALLEST_M = 0x1p-150, BATCH_LARGEST_M = 0x1p150;  ///< [m] guard on U, V, W
 /// [step] Subdivision ends here and leaves the pair to the next tier. Smaller: fewer pairs there, more steps here.
 constexpr double BATCH_SMALLEST_INTERVAL = 0x1p-12;
 // Tiers in double and in pairs of doubles (elementary/exact_refined.cpp, exact_double_double.cpp).
 /// [step] Half the least width around an extremum of f on which its sign is not asked for.
 constexpr double EXTREMUM_ZONE = 0x1p-40;
-constexpr double INSIDE_MINOR = 48 * HALF_ULP;                              ///< [1] margin of a minor, times its sizes
+DCCD_MARGIN double INSIDE_MINOR = 48 * HALF_ULP;                   ///< [1] margin of a minor, times its sizes
+DCCD_MARGIN double CUBIC_VALUE = 102 * HALF_ULP;                   ///< [1] of f in doubles, times U V W
+DCCD_MARGIN double CUBIC_VALUE_PAIRS = 360 * HALF_ULP * HALF_ULP;  ///< [1] of f in pairs of doubles, times U V W
+DCCD_MARGIN double CUBIC_SLOPE = 656 * HALF_ULP;                   ///< [1] of f' in doubles, times U V W
+DCCD_MARGIN double SUBDIVISION = 0x1p-50;  ///< [1] of the difference of two projections, times the largest
+DCCD_MARGIN double QUADRATIC_SIGN = 2.5;   ///< [1] of a quadratic, times (radius + 2^-51), times its coefficients
 constexpr double CUBIC_SMALLEST_M3 = 0x1p-300, CUBIC_LARGEST_M3 = 0x1p300;  ///< [m^3] guard on the coefficients
 constexpr double TIME_GRID = 0x1p-52;  ///< [step] times are multiples of it, so that 1 - t is exact
 // Conservative advancement (elementary/conservative_advance.cpp).
-constexpr double ADVANCE_SEPARATION = 6.5 * HALF_ULP;  ///< [1] margin of n.w, times |n|_1 M
-constexpr double ADVANCE_LENGTH = 8 * HALF_ULP;        ///< [1] margin of |n|, relative
-constexpr double ADVANCE_POINT = 64 * HALF_ULP;        ///< [1] margin of the vector between two points, times M
-constexpr double ADVANCE_SMALLEST_M = 1e-140;          ///< [m] guard: products of lengths do not vanish
-constexpr double ADVANCE_LARGEST_M = 1e70;             ///< [m] guard: products of four lengths stay finite
+DCCD_MARGIN double ADVANCE_SEPARATION = 11 * HALF_ULP;  ///< [1] margin of n.w against d |n|, times |n|_1 M
+DCCD_MARGIN double ADVANCE_POINT = 44 * HALF_ULP;       ///< [1] margin of the distance of two points, times M
+constexpr double ADVANCE_SMALLEST_M = 1e-140;           ///< [m] guard: products of lengths do not vanish
+constexpr double ADVANCE_LARGEST_M = 1e70;              ///< [m] guard: products of four lengths stay finite
 /// [1] Squared sine of an angle below which a cross product is mostly rounding. Larger: shorter steps there.
 constexpr double ADVANCE_PARALLEL = 1e-22;
 
 // --- maps ------------------------------------------------------------------------------------------------------------
-/// [voxel] Cell coordinates are rounded outward by this: their error is below 2^-35. Larger: more candidates.
-constexpr double VOXEL_KEY = 1.0 / 1048576;
+/// [voxel] Cell coordinates are rounded outward by this: their error is below 2^-35.
+/// Larger: more candidates.
+DCCD_MARGIN double VOXEL_KEY = 0x1p-34;
 /// [1] Margin of a crossing time: two differences and a quotient, 3.01 half ulps, and slack for comparing two of them.
-constexpr double CROSSING_TIME = 8 * 0x1p-53;
+DCCD_MARGIN double CROSSING_TIME = 8 * 0x1p-53;
+DCCD_MARGIN double ORIENTATION_2D = 5 * HALF_ULP;   ///< [1] of a cross product, times the sum of its magnitudes
+DCCD_MARGIN double ORIENTATION_3D = 16 * HALF_ULP;  ///< [1] of a determinant, times the sum of its magnitudes
 constexpr double PREDICATE_SMALLEST = 0x1p-300, PREDICATE_LARGEST = 0x1p300;      ///< [m^2] guard on products
 constexpr double PREDICATE_SMALLEST_M = 0x1p-140, PREDICATE_LARGEST_M = 0x1p140;  ///< [m] guard on differences
-constexpr double SIDE = 0x1p-48;  ///< [1] margin of a side, times M^2: 20.1 half ulps
+DCCD_MARGIN double SIDE = 0x1p-48;  ///< [1] margin of a side, times M^2: 20.1 half ulps
 constexpr double SIDE_SMALLEST_M = 0x1p-400, SIDE_LARGEST_M = 0x1p400;  ///< [m] guard
-constexpr double MAP_REACH = 0x1p-40;  ///< [1] margin of the boxes that find candidates within a separation
+DCCD_MARGIN double MAP_BOUND = 2 * HALF_ULP;  ///< [1] margin of a coordinate that was moved by a separation
 
 // --- streams and advice ----------------------------------------------------------------------------------------------
 /// [ns] tf stamps that go back further begin a recording anew: broadcasters of one tree are late by less.
@@ -128,3 +151,5 @@ constexpr unsigned long long MAP_LEAF_ADDED = 200;
 
 }  // namespace tolerance
 }  // namespace dccd
+
+#undef DCCD_MARGIN

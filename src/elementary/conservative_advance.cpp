@@ -19,13 +19,18 @@
 // are multiples of 2^-52, so that 1-t is exact.
 //   w_ij(t) = fl(fl(w0 (1-t)) + fl(w1 t)), w0 and w1 rounded differences: 3 factors (1+eps) on each term, so the error
 //   is at most 3 eps M
-//   n.w_ij(t), n taken as exact: 3 more factors: error <= 6 eps |n|_1 M             (SEPARATION_ERROR, rounded up)
-//   |n|: sqrt of a sum of three squares, at most 3 eps relative                     (LENGTH_ERROR, rounded up)
-//   The connecting vectors n = w - beta u - gamma v and (w - u) - s (v - u), for exact beta, gamma, s: at most 6
-//   factors on each of at most four terms: 24 eps M a component; a second correction of s, and beta + gamma beyond 1,
-//   are worth a few eps M more. So the true vector between those two points is at most |n| (1 + 3 eps) +
-//   sqrt(3) 30 eps M long. The same holds for V at another time: 6 factors on each of three terms, a and b as before
-//                                                                                   (POINT_ERROR, rounded up)
+//   n.w_ij(t), n taken as exact: 3 more factors: error <= 6 eps |n|_1 M
+//   d |n| + margin: a sum of three squares and its root, 2.5 eps, a product and a sum: 4.5 eps d |n|. Where that
+//   decides anything, d |n| is not above |n|_1 M, since no n.w_ij is. So n.w_ij > d |n| is certain beyond 10.5 eps
+//   |n|_1 M
+//                                                                                   (ADVANCE_SEPARATION, rounded up)
+//   The connecting vectors w - beta u - gamma v, for exact beta, gamma in [0, 1] with a sum of 1: 3 eps M in w, 4 in
+//   the products, one of M for each of two differences, which are vectors between points of the features again: 9 eps M
+//   a component, 13 for edges. The dearest is (w - u) - s (v - u): 3 + 3 + 1 eps M, s times 3 + 3 + 2 + 2, and 2 for
+//   the last two operations: 19. A second correction of s, and beta + gamma beyond 1 by a rounding, are worth 2 more.
+//   So the true vector between those two points is at most sqrt(3) 21 eps M longer, and its computed length is off
+//   by 2.5 eps sqrt(3) M: 40.8 eps M in all. The same holds for V at another time                   (ADVANCE_POINT,
+//   rounded up)
 // Underflow: lengths below SMALLEST are not trusted, and far above what underflowing products add.
 #include "elementary/conservative_advance.h"
 
@@ -39,8 +44,7 @@ namespace conservative {
 namespace {
 
 constexpr double SMALLEST = tolerance::ADVANCE_SMALLEST_M, LARGEST = tolerance::ADVANCE_LARGEST_M;
-constexpr double SEPARATION_ERROR = tolerance::ADVANCE_SEPARATION, LENGTH_ERROR = tolerance::ADVANCE_LENGTH,
-                 POINT_ERROR = tolerance::ADVANCE_POINT;
+using tolerance::ADVANCE_POINT, tolerance::ADVANCE_SEPARATION, tolerance::SEPARATION_SUM;
 
 struct Vec {
   double x, y, z;
@@ -91,7 +95,7 @@ Differences differencesOf(PairKind kind, const Corners& x) {
   return r;
 }
 
-/// About the shortest vector from the one feature to the other: `vector` connects points of theirs (see POINT_ERROR).
+/// About the shortest vector from the one feature to the other: `vector` connects points of theirs (see ADVANCE_POINT).
 /// `direction`, of length about 1, is the same, but as nearly perpendicular to what it connects as doubles allow: where
 /// the features are close, the vector itself is mostly rounding error. The points are those for which it is w - a u - b
 /// v.
@@ -225,9 +229,9 @@ class Advancement {
   Advancement(PairKind kind, const Corners& corners, const Limits& limits)
       : vertex_face_(kind == PairKind::VERTEX_FACE),
         limits_(limits),
-        near_(limits.minimum_separation_m + limits.tolerance_m),
+        near_((limits.minimum_separation_m + limits.tolerance_m) * (1 - SEPARATION_SUM)),
         pair_(differencesOf(kind, corners)),
-        point_error_(POINT_ERROR * pair_.largest + SMALLEST) {}
+        point_error_(ADVANCE_POINT * pair_.largest + SMALLEST) {}
 
   ElementaryResult run() {
     if (!(pair_.largest <= LARGEST) || !(near_ <= LARGEST)) return resultOf(Verdict::UNDECIDED, 0, 1);
@@ -276,9 +280,8 @@ class Advancement {
   };
 
   Bound boundAlong(const Vec& n, double distance) const {
-    const double n_length = length(n) * (1 + LENGTH_ERROR);
-    const double error = SEPARATION_ERROR * sumOfAbs(n) * pair_.largest * (1 + LENGTH_ERROR);
-    return {distance * n_length * (1 + LENGTH_ERROR) + error, n_length, error};
+    const double n_length = length(n), error = ADVANCE_SEPARATION * sumOfAbs(n) * pair_.largest;
+    return {distance * n_length + error, n_length, error};
   }
 
   Connection connectionAt(double t) const {
@@ -291,14 +294,14 @@ class Advancement {
   }
 
   /// What the distance between two points is certainly not above.
-  double atMost(const Vec& vector) const { return length(vector) * (1 + LENGTH_ERROR) + point_error_; }
-  bool isNear(const Vec& vector) const { return atMost(vector) <= near_ * (1 - LENGTH_ERROR); }
+  double atMost(const Vec& vector) const { return length(vector) + point_error_; }
+  bool isNear(const Vec& vector) const { return atMost(vector) <= near_; }
 
   /// Goes on from `t`, at which the features are near, as long as they certainly stay so and are not within d.
   Approach follow(double t, Connection points) {
     const double d = limits_.minimum_separation_m;
-    const double floor = std::max(0.0, d - limits_.tolerance_m + LENGTH_ERROR * d);
-    const double slack = 2 * point_error_ + 4 * LENGTH_ERROR * near_;
+    const double floor = std::max(0.0, (d - limits_.tolerance_m) * (1 + SEPARATION_SUM));
+    const double slack = 2 * point_error_ + 4 * SEPARATION_SUM * near_;
     bool apart = true;
     const auto parted = [&] { return Approach{t, apart ? Verdict::NO_CONTACT : Verdict::CONTACT}; };
     do {  // the first step is that of run()
@@ -342,7 +345,7 @@ double closingSpeed(PairKind kind, const Corners& corners) {
   const Differences pair = differencesOf(kind, corners);
   double speed = 0;
   for (int i = 0; i < pair.corners; ++i) speed = std::max(speed, length(pair.w[i].t1 - pair.w[i].t0));
-  return speed * (1 + LENGTH_ERROR) + POINT_ERROR * pair.largest + SMALLEST;
+  return speed + ADVANCE_POINT * pair.largest + SMALLEST;
 }
 
 }  // namespace conservative

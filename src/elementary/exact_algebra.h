@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "dccd/tolerances.h"
 #include "elementary/exact_integer.h"
 
 namespace dccd {
@@ -92,14 +93,14 @@ struct Enclosure {
   double radius = 0;
 };
 
-/// Sign of q on all of the enclosure, or 0 when doubles cannot tell. With S = sum |c_i|: coefficients and Horner's
-/// scheme err by less than (2^-52 + 4 * 2^-53) S, moving by the radius changes q by at most 2 S radius; the
-/// constants below are larger and cover the rounding of the bound itself, too.
+/// Sign of q on all of the enclosure, or 0 when doubles cannot tell. With S = sum |c_i|: moving by the radius changes q
+/// by at most 2 S radius, coefficients and Horner's scheme err by less than (2^-52 + 4 * 2^-53) S: as much as another
+/// 3 * 2^-53 of radius. 2^-51 is used, and 2.5 for 2, which covers the rounding of the bound itself, too.
 template <class Z>
 int filteredSign(const Quadratic<Z>& q, const Enclosure& enclosure) {
   const DoublePolynomial<2> p(q);
   const double sum = std::fabs(p.c[0]) + std::fabs(p.c[1]) + std::fabs(p.c[2]);
-  const double bound = sum * (0x1p-49 + 2.5 * enclosure.radius) + 0x1p-990;
+  const double bound = tolerance::QUADRATIC_SIGN * sum * (enclosure.radius + 0x1p-51) + 0x1p-990;
   const double value = p.at(enclosure.middle);
   return value > bound ? 1 : value < -bound ? -1 : 0;
 }

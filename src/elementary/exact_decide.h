@@ -10,11 +10,13 @@
 namespace dccd {
 namespace exact {
 
-/// A pair's coordinates as integers: mantissa * 2^shift, all below 2^bits in magnitude. The common factor, a power of
-/// two, is dropped: it changes neither the answer nor the TOC.
+/// A pair's coordinates as integers: mantissa * 2^shift, all below 2^bits in magnitude. Each axis is multiplied by a
+/// power of two of its own, which changes neither the answer nor the TOC: each term of f has one factor of each axis,
+/// each term of a minor one of each of its two. A dot product is asked for where a point p is on the line through a and
+/// b, p = a + s (b - a), and there each axis's share of (p - a).(p - b) is s (s - 1) times a square: all have one sign.
 struct IntegerMotion {
-  std::int64_t mantissa[2][4][3];
-  int shift[2][4][3];
+  std::int64_t mantissa[2][4][3] = {};
+  int shift[2][4][3] = {};
   int bits = 0;
 
   explicit IntegerMotion(const PairMotion& pair);
@@ -101,6 +103,7 @@ class Decision {
     result.c[1] =
         (u.start[i] * v.change[j] + u.change[i] * v.start[j]) - (u.start[j] * v.change[i] + u.change[j] * v.start[i]);
     result.c[2] = u.change[i] * v.change[j] - u.change[j] * v.change[i];
+    for (Z& c : result.c) c.sharpened();
     return result;
   }
 
@@ -119,6 +122,7 @@ class Decision {
       f.c[2] = f.c[2] + (n.c[1] * w.change[k] + n.c[2] * w.start[k]);
       f.c[3] = f.c[3] + n.c[2] * w.change[k];
     }
+    for (Z& c : f.c) c.sharpened();
     return f;
   }
 

@@ -8,13 +8,14 @@
 //   n_k, a difference of two products: 2 * 8 + (6 + 8) for adding the trailing parts, + 2 * 2 * 8 from the errors of
 //     x and y: at most 62 e^2 U V; |n_k| <= 2 U V.
 //   f, a sum of three products: 3 * 16 + (12 + 18 + 10 + 28) for adding, 3 * 62 + 3 * 2 * 8 from the errors of n_k and
-//     w: at most 350 e^2 U V W. 512 covers terms of higher order, the bound's own rounding, and underflow: fewer than
-//     200 operations that each err by at most 2^-1074, times at most two of U, V, W, against 100 * 2^-106 U V W.
+//     w: at most 350 e^2 U V W. 360 covers terms of higher order, the bound's own rounding, and underflow: fewer than
+//     200 operations that each err by at most 2^-1074, times at most two of U, V, W, against 5 * 2^-106 U V W.
 //   The last sum to one double rounds once more, which changes no sign.
 // In plain double with x = fl(fl(s h0) + fl(t h1)): x errs by at most 4 e U; n_k by 2 * (2*4 + 1) + 2 = 20 e U V; f by
-//   3 * (20 + 2*4 + 2) + (4 + 6) = 100 e U V W; 128 is used.
+//   3 * (20 + 2*4 + 2) + (4 + 6) = 100 e U V W; 102 is used.
 // Slope: f' = det(u', v, w) + det(u, v', w) + det(u, v, w'), at most 3 * 6 * 2 U V W; three factors with at most 3
-//   roundings each, 2 for products, 5 for sums: at most 16 * 36 = 576 e U V W; 1024 is used.
+//   roundings each, 2 for products, 5 for sums: at most 16 * 36 = 576 e U V W; 656 is used, for what exact_refined.cpp
+//   adds.
 // Tangent: |f(x + h) - f(x) - f'(x) h| <= h^2 max|f''| / 2 on [0,1]; f'' is twice a sum of three determinants with two
 //   changes each, at most 2 * 3 * 6 * 4 U V W: 72 h^2 U V W.
 #include "elementary/exact_double_double.h"
@@ -100,10 +101,10 @@ CoplanarityCubic::CoplanarityCubic(PairKind kind, const PairMotion& pair) {
     volume *= size;
   }
   constexpr double INFINITE = std::numeric_limits<double>::infinity();
-  error_ = in_range ? 0x1p-97 * volume : INFINITE;
-  slope_error_ = 0x1p-43 * volume;
+  error_ = in_range ? tolerance::CUBIC_VALUE_PAIRS * volume : INFINITE;
+  slope_error_ = tolerance::CUBIC_SLOPE * volume;
   most_curvature_ = 73 * volume;
-  rough_error_ = in_range ? 0x1p-46 * volume : INFINITE;
+  rough_error_ = in_range ? tolerance::CUBIC_VALUE * volume : INFINITE;
 }
 
 double CoplanarityCubic::roughValueAt(double t) const {

@@ -20,9 +20,14 @@ class CoplanarityCubic {
  public:
   CoplanarityCubic(PairKind kind, const PairMotion& pair);
 
-  /// f(t) at a multiple of 2^-52 in [0,1]; exact f differs by at most error().
+  /// f(t) at a multiple of 2^-52 in [0,1]; exact f differs by at most error(), and by what rounding that to one double
+  /// takes, which changes no sign.
   double valueAt(double t) const;
   double error() const { return error_; }
+
+  /// The same in plain double, within roughError().
+  double roughValueAt(double t) const;
+  double roughError() const { return rough_error_; }
 
   /// Sign of f at a multiple of 2^-52 in [0,1]; 0 where the arithmetic cannot tell.
   int signAt(double t) const;
@@ -39,8 +44,6 @@ class CoplanarityCubic {
   double size(int i) const { return size_[i]; }
 
  private:
-  double roughValueAt(double t) const;  // in plain double, within rough_error_
-
   DoubleDouble difference_[2][3][3];  // at t = 0 and 1; u, v, w; axis
   double size_[3];
   double error_;  // infinite where the differences are too large or too small for the bound

@@ -37,6 +37,7 @@ class StackInteger {
   static StackInteger shifted(std::int64_t value, int shift) { return StackInteger(value) << shift; }
 
   int sign() const { return (size_ > 0) - (size_ < 0); }
+  const StackInteger& sharpened() const { return *this; }  // is exact; see exact_lazy_integer.h
 
   StackInteger operator-() const {
     StackInteger result(*this);
@@ -188,6 +189,7 @@ class BigInteger {
   static BigInteger shifted(std::int64_t value, int shift) { return BigInteger(value) << shift; }
 
   int sign() const { return mpz_sgn(value_); }
+  const BigInteger& sharpened() const { return *this; }
 
   BigInteger operator-() const {
     BigInteger result;

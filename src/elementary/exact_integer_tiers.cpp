@@ -1,6 +1,7 @@
 #include <cstring>
 
 #include "elementary/exact_decide.h"
+#include "elementary/exact_lazy_integer.h"
 #include "elementary/exact_tiers.h"
 
 namespace dccd {
@@ -11,7 +12,7 @@ static_assert(workingBits(FIXED_INTEGER_MAX_BITS) <= StackInteger<FIXED_INTEGER_
 
 IntegerMotion::IntegerMotion(const PairMotion& pair) {
   constexpr std::uint64_t FRACTION = (std::uint64_t{1} << 52) - 1;
-  int lowest = 1 << 14, highest = -(1 << 14);
+  int lowest[3] = {1 << 14, 1 << 14, 1 << 14}, highest[3] = {-(1 << 14), -(1 << 14), -(1 << 14)};
   for (int time = 0; time < 2; ++time) {
     for (int i = 0; i < 4; ++i) {
       for (int k = 0; k < 3; ++k) {
@@ -24,8 +25,8 @@ IntegerMotion::IntegerMotion(const PairMotion& pair) {
           const int zeros = __builtin_ctzll(magnitude);
           magnitude >>= zeros;
           exponent += zeros;
-          lowest = std::min(lowest, exponent);
-          highest = std::max(highest, exponent + 64 - __builtin_clzll(magnitude));
+          lowest[k] = std::min(lowest[k], exponent);
+          highest[k] = std::max(highest[k], exponent + 64 - __builtin_clzll(magnitude));
         }
         const auto value = static_cast<std::int64_t>(magnitude);
         mantissa[time][i][k] = (word >> 63) != 0 ? -value : value;
@@ -33,10 +34,10 @@ IntegerMotion::IntegerMotion(const PairMotion& pair) {
       }
     }
   }
-  bits = std::max(0, highest - lowest);
+  for (int k = 0; k < 3; ++k) bits = std::max(bits, highest[k] - lowest[k]);
   for (int time = 0; time < 2; ++time) {
     for (int i = 0; i < 4; ++i) {
-      for (int k = 0; k < 3; ++k) shift[time][i][k] = mantissa[time][i][k] == 0 ? 0 : shift[time][i][k] - lowest;
+      for (int k = 0; k < 3; ++k) shift[time][i][k] = mantissa[time][i][k] == 0 ? 0 : shift[time][i][k] - lowest[k];
     }
   }
 }
@@ -58,7 +59,9 @@ ElementaryResult decideByFixedIntegers(PairKind kind, const PairMotion& pair, in
 }
 
 ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int toc_bits) {
-  return decideByIntegers<BigInteger>(kind, IntegerMotion(pair), toc_bits, Tier::BIG_INTEGER);
+  const IntegerMotion motion(pair);
+  LazyInteger::beginDecision();
+  return decideByIntegers<LazyInteger>(kind, motion, toc_bits, Tier::BIG_INTEGER);
 }
 
 }  // namespace exact

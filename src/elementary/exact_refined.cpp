@@ -6,7 +6,7 @@
 // F3 t^3 with F0, F3 within 54 e U V W and F1, F2 within 198 e U V W (6 and 18 products of three differences with at
 // most 9 and 11 rounding factors). f' = c0 s^2 + 2 c1 s t + c2 t^2, c0 = F1 - 3 F0, c1 = F2 - F1, c2 = 3 F3 - F2:
 // 396 from those, at most 36 U V W in magnitude, so at most 3 * 36 for their own rounding and 4 * 36 for the blossom:
-// 648 e U V W; slopeError() has 1024.
+// 648 e U V W; slopeError() has 656.
 // Minors x_i y_j - x_j y_i at t within h of m: 16 e X Y computed, 8 h X Y for moving by h, 4 e X Y for sums of three;
 // with h = 2^-52 = 2 e: 36 e X Y; 48 is used. Underflow is covered by the range that CoplanarityCubic demands.
 #include <algorithm>
@@ -137,9 +137,9 @@ class RefinedDecision {
     for (int i = 0; i < 3; ++i) {
       for (int k = 0; k < 3; ++k) x[i][k] = f_.difference(0, i, k) * (1 - m) + f_.difference(1, i, k) * m;
     }
-    constexpr double RELATIVE = tolerance::INSIDE_MINOR;
-    const double error_n = RELATIVE * f_.size(0) * f_.size(1), error_b = RELATIVE * f_.size(1) * f_.size(2);
-    const double error_c = RELATIVE * f_.size(0) * f_.size(2);
+    const double error_n = tolerance::INSIDE_MINOR * f_.size(0) * f_.size(1),
+                 error_b = tolerance::INSIDE_MINOR * f_.size(1) * f_.size(2);
+    const double error_c = tolerance::INSIDE_MINOR * f_.size(0) * f_.size(2);
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
       const auto minor = [&](int p, int q) { return x[p][i] * x[q][j] - x[p][j] * x[q][i]; };

@@ -17,7 +17,7 @@
 // that f has no root before r by its Bernstein coefficients over [0, r], of which the last is 0 and the others are
 // certainly of one sign; that it has none after r by those over [r, 1]. Their errors are those of exact_batch_bounds.h,
 // and |r| 2^-53 for the rounded quotient p/q, at which they are taken: de Casteljau's three levels move by at most 3 *
-// 2 * 2^-53 max |fi|; 8 * 2^-53 max |fi| is used.
+// 2 * 2^-53 max |fi|; 8 * 2^-53 max |fi|, at most 48 * 2^-53 U V W, is used, so that the sum is (106 + 48) 2^-53 U V W.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -233,9 +233,7 @@ struct RoughCubic {
     }
     b[1] *= 1.0 / 3;
     b[2] *= 1.0 / 3;
-    error = tolerance::BATCH_VALUE * volume +
-            (tolerance::BATCH_VALUE_ROUNDING + 8 * tolerance::HALF_ULP) *
-                std::max({std::fabs(b[0]), std::fabs(b[1]), std::fabs(b[2]), std::fabs(b[3])});
+    error = tolerance::SIMPLE_TIME * volume;
   }
 
   double at(double t) const {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dccd/tolerances.h"
 #include "elementary/exact_tiers.h"
 
 namespace dccd {
@@ -45,7 +46,7 @@ class Separation {
       for (const auto& time : pair.x) {
         for (const auto& point : time) largest = std::max(largest, std::fabs(point[k]));
       }
-      margin_[k] = largest * 0x1p-50 + 0x1p-1070;
+      margin_[k] = tolerance::SUBDIVISION * largest + 0x1p-1070;
     }
   }
 

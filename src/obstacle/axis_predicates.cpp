@@ -41,7 +41,7 @@ class Rational {
 
 /// Products of differences above this and below its inverse neither overflow nor lose bits to underflow.
 constexpr double TINY = tolerance::PREDICATE_SMALLEST, LARGE = tolerance::PREDICATE_LARGEST;
-using tolerance::HALF_ULP, tolerance::PREDICATE_LARGEST_M, tolerance::PREDICATE_SMALLEST_M;
+using tolerance::PREDICATE_LARGEST_M, tolerance::PREDICATE_SMALLEST_M;
 
 /// Whether the rounded difference a - b has no error; a and b of moderate size.
 bool differenceIsExact(double a, double b, double difference) {
@@ -91,7 +91,7 @@ int orientation2d(double p0x, double p0y, double p1x, double p1y, double qx, dou
   // Each product carries three roundings (two differences, itself), the subtraction one: 4.01 * 2^-53 of the sum of
   // magnitudes. Only where nothing under- or overflowed.
   const double sum = std::abs(left) + std::abs(right);
-  if (std::abs(determinant) > 5 * HALF_ULP * sum && sum > TINY && sum < LARGE) return signOf(determinant);
+  if (std::abs(determinant) > tolerance::ORIENTATION_2D * sum && sum > TINY && sum < LARGE) return signOf(determinant);
   // Exact differences (they are, between neighbours): compare the two products, then their rounding errors. A zero
   // factor is exact whatever the other one is.
   const double largest = std::max(std::max(std::abs(ex), std::abs(ey)), std::max(std::abs(dx), std::abs(dy)));
@@ -121,7 +121,8 @@ int orientation3d(const double* a, const double* b, const double* c, const doubl
                            (std::abs(bx * cy) + std::abs(by * cx)) * std::abs(qz);
   // Factors below LARGE keep what an underflowing minor lost below the slack.
   const double largest = std::max(std::abs(qx), std::max(std::abs(qy), std::abs(qz)));
-  if (std::abs(determinant) > 16 * HALF_ULP * magnitude && magnitude > TINY && magnitude < LARGE && largest < LARGE) {
+  if (std::abs(determinant) > tolerance::ORIENTATION_3D * magnitude && magnitude > TINY && magnitude < LARGE &&
+      largest < LARGE) {
     return signOf(determinant);
   }
   return exactOrientation3d(a, b, c, q);
@@ -137,7 +138,8 @@ CrossingTime::CrossingTime(double plane_, double from_, double to_) : plane(plan
 int compare(const CrossingTime& a, const CrossingTime& b) {
   if (a.certain && b.certain) {
     const double difference = a.approximate - b.approximate;
-    if (std::abs(difference) > CROSSING_ERROR * std::max(a.approximate, b.approximate)) return signOf(difference);
+    if (std::abs(difference) > tolerance::CROSSING_TIME * std::max(a.approximate, b.approximate))
+      return signOf(difference);
   }
   // Ties are common where a mesh and a map share a grid: settled in double where nothing was rounded.
   const double na_rounded = a.plane - a.from, da_rounded = a.to - a.from;
@@ -161,9 +163,9 @@ std::int64_t timeCell(const CrossingTime& time, int bits) {
   const double scale = std::ldexp(1.0, bits);
   std::int64_t cell = 0;
   if (time.certain) {
-    const double scaled = time.approximate * scale, error = scaled * CROSSING_ERROR;
+    const double scaled = time.approximate * scale, error = scaled * tolerance::CROSSING_TIME;
     cell = static_cast<std::int64_t>(scaled);
-    // cell + 1 and the sums are exact or rounded to within the slack of CROSSING_ERROR.
+    // cell + 1 and the sums are exact or rounded to within the slack of tolerance::CROSSING_TIME.
     if (scaled - error >= static_cast<double>(cell) && scaled + error < static_cast<double>(cell + 1)) return cell;
   } else {
     // Differences that may overflow, or a tiny quotient: quarters cannot overflow, and lose nothing that matters here.

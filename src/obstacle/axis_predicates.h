@@ -21,12 +21,12 @@ struct CrossingTime {
   CrossingTime(double plane_, double from_, double to_);
 
   double plane = 0, from = 0, to = 1;
-  double approximate = 0;  ///< rounded; relative error at most CROSSING_ERROR where certain
+  double approximate = 0;  ///< rounded; relative error at most CROSSING_TIME where certain
   bool certain = true;     ///< false: `approximate` may be anything
 };
 
 /// Two differences and a quotient, each rounded once: 3.01 * 2^-53, and slack for comparing two of them in double.
-constexpr double CROSSING_ERROR = tolerance::CROSSING_TIME;
+using tolerance::CROSSING_TIME;
 
 /// Sign of a - b, exact.
 int compare(const CrossingTime& a, const CrossingTime& b);

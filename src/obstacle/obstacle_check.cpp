@@ -57,10 +57,10 @@ bool ObstacleCheck::Impl::reachesSurface(const Run& run) const {
 /// takes the reach of its features.
 void ObstacleCheck::Impl::prepareReaches(const Run& run) {
   reaches.assign(run.radius_m ? std::max<std::size_t>(run.topology->vertexCount(), 1) : 1,
-                 reachOf(options.minimum_separation_m));
+                 options.minimum_separation_m);
   if (!run.radius_m) return;
   for (const Edge& edge : run.topology->edges()) {
-    const double reach = reachOf(separationOf(run, edge));
+    const double reach = separationOf(run, edge);
     for (const Index v : edge) reaches[v] = std::max(reaches[v], reach);
   }
 }

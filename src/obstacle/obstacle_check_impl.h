@@ -53,7 +53,8 @@ struct ObstacleCheck::Impl {
   };
   static constexpr std::size_t NO_LIMIT = std::numeric_limits<std::size_t>::max();
 
-  /// Distance from which on a feature of these vertices is in contact.
+  /// Distance from which on a feature of these vertices is in contact. Boxes are widened by it and compared with the
+  /// map's planes, which are doubles: where the true sum is beyond a plane, so is the rounded one.
   template <class Feature>
   double separationOf(const Run& run, const Feature& feature) const {
     double radius = 0;
@@ -64,8 +65,6 @@ struct ObstacleCheck::Impl {
     return radius > 0 ? (options.minimum_separation_m + radius) * (1 + tolerance::SEPARATION_SUM)
                       : options.minimum_separation_m;
   }
-  /// The same, as far as bounds must reach.
-  static double reachOf(double separation_m) { return separation_m * (1 + tolerance::MAP_REACH); }
 
   /// Asked before each feature and each leaf near it: has this run found enough, or is its time up? Looks at one in 32.
   bool isLate(const Run& run) {

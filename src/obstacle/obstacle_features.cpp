@@ -43,8 +43,8 @@ MovingBounds boundsOf(const VertexMotion* points, int count, double reach_m) {
 double tocBound(const MovingBounds& moving, const LeafBox& box, double reach_m) {
   double bound = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    bound = std::max(bound, firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, box.lo[axis] - reach_m,
-                                         box.hi[axis] + reach_m));
+    bound = std::max(bound,
+                     firstMeeting(&moving.min[0][axis], &moving.max[0][axis], 3, box.lo[axis], box.hi[axis], reach_m));
   }
   return bound;
 }
@@ -103,8 +103,8 @@ void ObstacleCheck::Impl::setTime(Contact& contact, const CrossingTime& time) {
     contact.toc_lower = k * cell;
     contact.toc_upper = (k + 1) * cell;
   } else if (time.certain) {
-    contact.toc_lower = time.approximate * (1 - CROSSING_ERROR);
-    contact.toc_upper = std::min(1.0, time.approximate * (1 + CROSSING_ERROR));
+    contact.toc_lower = time.approximate * (1 - tolerance::CROSSING_TIME);
+    contact.toc_upper = std::min(1.0, time.approximate * (1 + tolerance::CROSSING_TIME));
   } else {
     const double k = static_cast<double>(timeCell(time, 52));
     contact.toc_lower = k * 0x1p-52;
@@ -201,8 +201,8 @@ void ObstacleCheck::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t
 void ObstacleCheck::Impl::vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
   VertexMotion points[4] = {motionOf(run, vertex), {}, {}, {}};
-  const double separation_m = separationOf(run, std::array<Index, 1>{vertex}), reach = reachOf(separation_m);
-  const double toc_bound = tocBound(boundsOf(points, 1, reach), box, reach);
+  const double separation_m = separationOf(run, std::array<Index, 1>{vertex});
+  const double toc_bound = tocBound(boundsOf(points, 1, separation_m), box, separation_m);
   if (toc_bound > 1) return;
   for (int direction = 0; direction < FACE_DIRECTIONS; ++direction) {
     if (!(run.surface->features[leaf] >> direction & 1)) continue;
@@ -240,7 +240,7 @@ void ObstacleCheck::Impl::runEdges(const Run& run) {
     run.stats->edge_pairs_in += near_leaves.size();
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
     const double separation_m = separationOf(run, edge);
-    const MovingBounds moving = boundsOf(points, 2, reachOf(separation_m));
+    const MovingBounds moving = boundsOf(points, 2, separation_m);
     for (const std::uint32_t leaf : near_leaves) {
       if (isLate(run)) return;
       edgePairs(run, edge, points, moving, separation_m, leaf, inside);
@@ -299,7 +299,7 @@ void ObstacleCheck::Impl::edgePairs(const Run& run, const Edge& edge, const Vert
       }
       const VertexMotion quad[4] = {points[0], points[1], fixedPoint(low[0], low[1], low[2]),
                                     fixedPoint(high[0], high[1], high[2])};
-      edge_batch.add(pair, quad, tocBound(moving, target, reachOf(separation_m)), separation_m);
+      edge_batch.add(pair, quad, tocBound(moving, target, separation_m), separation_m);
     }
   }
 }
@@ -319,7 +319,7 @@ void ObstacleCheck::Impl::runFaces(const Run& run) {
     if (near_leaves.empty()) continue;
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
     const double separation_m = separationOf(run, face);
-    const MovingBounds moving = boundsOf(points, 3, reachOf(separation_m));
+    const MovingBounds moving = boundsOf(points, 3, separation_m);
     for (const std::uint32_t leaf : near_leaves) {
       if (isLate(run)) return;
       cornerPairs(run, face, points, moving, separation_m, leaf, inside);
@@ -373,7 +373,7 @@ void ObstacleCheck::Impl::cornerPairs(const Run& run, const Face& face, const Ve
       continue;
     }
     const VertexMotion quad[4] = {fixedPoint(corner[0], corner[1], corner[2]), points[0], points[1], points[2]};
-    corner_batch.add(pair, quad, tocBound(moving, target, reachOf(separation_m)), separation_m);
+    corner_batch.add(pair, quad, tocBound(moving, target, separation_m), separation_m);
   }
 }
 

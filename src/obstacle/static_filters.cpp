@@ -71,7 +71,13 @@ bool triangleMissesPoint(const VertexMotion& p, const VertexMotion& q, const Ver
   return false;
 }
 
-double firstMeeting(const double* min, const double* max, int stride, double lo, double hi) {
+double firstMeeting(const double* min, const double* max, int stride, double lo, double hi, double reach) {
+  if (reach > 0) {  // rounded once, and outward by more than that
+    lo -= reach;
+    hi += reach;
+    lo -= tolerance::MAP_BOUND * std::abs(lo);
+    hi += tolerance::MAP_BOUND * std::abs(hi);
+  }
   const double gap_t0 = std::max(lo - max[0], min[0] - hi);
   if (!(gap_t0 > 0)) return 0;
   const double gap_t1 = lo - max[0] > 0 ? lo - max[stride] : min[stride] - hi;

@@ -13,9 +13,9 @@ bool edgeMissesLine(const VertexMotion& p, const VertexMotion& q, const double* 
 /// True only if the static point is certainly never in the moving closed triangle.
 bool triangleMissesPoint(const VertexMotion& p, const VertexMotion& q, const VertexMotion& r, const double* point);
 
-/// A time in [0,1] before which a coordinate range cannot meet [lo, hi], rounded down; above 1 when it never does.
-/// min and max: the range's ends at t=0 and, `stride` numbers on, at t=1; in between it lies within the straight lines
-/// that join them.
-double firstMeeting(const double* min, const double* max, int stride, double lo, double hi);
+/// A time in [0,1] before which a coordinate range cannot come within `reach` of [lo, hi], rounded down; above 1 when
+/// it never does. min and max: the range's ends at t=0 and, `stride` numbers on, at t=1; in between it lies within the
+/// straight lines that join them.
+double firstMeeting(const double* min, const double* max, int stride, double lo, double hi, double reach);
 
 }  // namespace dccd

@@ -41,13 +41,13 @@ inline LeafBox leafBox(const OccupiedLeaf& leaf, double resolution_m) {
   return box;
 }
 
-/// Cell coordinates are rounded outward by this many cells: |x / resolution| <= 2^15 carries an error of a few
-/// 2^-53 relative, so below 2^-35 cells; planes themselves are rounded by as much. Larger only costs candidates.
-constexpr double KEY_MARGIN = tolerance::VOXEL_KEY;
+// Cell coordinates are rounded outward by VOXEL_KEY cells. |x / resolution| <= 2^15, made by a rounded inverse and a
+// product, errs by 2^-37 cells, a plane by 2^-38; two sums of at most 2^16 round by 2^-38 and 2^-37, and x itself,
+// where it is a bound that was moved by a separation, by 2^-38: below 2^-35 in all.
 
 /// The key of the voxel below x (side -1) or above it (side +1), rounded outward and clamped to the map's range.
 inline std::int32_t outwardKey(double x, double inverse_resolution, double side) {
-  const double cell = x * inverse_resolution + (32768.0 + side * KEY_MARGIN);
+  const double cell = x * inverse_resolution + (32768.0 + side * tolerance::VOXEL_KEY);
   return static_cast<std::int32_t>(cell < 0 ? 0.0 : cell > 65535.0 ? 65535.0 : cell);
 }
 

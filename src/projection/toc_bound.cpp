@@ -9,7 +9,6 @@
 namespace dccd {
 namespace {
 
-constexpr double DOWN = 1 - tolerance::TOC_BOUND, UP = 1 + tolerance::TOC_BOUND;
 using tolerance::SQRT2_UP;
 
 void project(const double* x, double* p) {
@@ -36,8 +35,10 @@ double meets(double u0, double u1, double l0, double l1, double margin) {
   const double gap0 = (u0 - l0) - margin - slack0, gap1_low = (u1 - l1) - margin - slack1;
   if (margin == 0 ? u1 > l1 : gap1_low > 0) return gap0 > 0 || margin == 0 ? 2 : 0;
   if (!(gap0 > 0)) return 0;
-  const double t = gap0 * DOWN / ((gap0 - gap1_low) * UP);
-  return t > 0 ? std::min(t * DOWN, 1.0) : 0;
+  // Either gap is too large by at most two roundings, the sum, the quotient and the product with the margin by one
+  // each.
+  const double t = gap0 / (gap0 - gap1_low) * (1 - tolerance::TOC_BOUND);
+  return t > 0 ? std::min(t, 1.0) : 0;
 }
 
 double bound(const double (*p0)[8], const double (*p1)[8], int first_count, double separation) {
@@ -52,7 +53,7 @@ double bound(const double (*p0)[8], const double (*p1)[8], int first_count, doub
   }
   double latest = 0;
   for (int d = 0; d < 8; ++d) {
-    const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * UP : 0;
+    const double margin = separation > 0 ? separation * (d < 3 ? 1.0 : SQRT2_UP) * (1 + tolerance::TOC_BOUND) : 0;
     if (!(low_a[d] - margin > high_b[d]) && !(low_b[d] - margin > high_a[d])) continue;
     // Every vertex of one feature against every vertex of the other; the features' projections meet when the first pair
     // of opposite ends does. What is not later than the best so far needs no further look.

@@ -98,7 +98,7 @@ class VoxelExplanation : Explanation {
   /// The box of the feature's way and the leaf's.
   void tellBounds(const OccupiedLeaf& leaf) {
     const std::uint16_t key[3] = {leaf.min.x, leaf.min.y, leaf.min.z};
-    const double resolution = step_.map.surface->resolution(), reach_m = distance_m_ * (1 + tolerance::MAP_REACH);
+    const double resolution = step_.map.surface->resolution(), reach_m = distance_m_;
     Box way;
     for (const Index v : question_.vertex) {
       for (const std::size_t end : {part_, part_ + 1}) {

@@ -24,7 +24,9 @@
 //     the coefficients' errors contribute at most 174/3 = 58 eps U V W.
 //   de Casteljau with f1 = fl(F1 fl(1/3)): 2 more factors on F1, so (12*12 + 6*11)/3 = 70 eps U V W from the
 //     coefficients; three levels fl(fl(p s) + fl(q t)) give 6 factors on each.
-// One bound, 70 eps U V W + 6 eps max(|F0|, |f1|, |f2|, |F3|), serves both and the coefficients themselves.
+// Each fi is a sum of six products' worth, |fi| <= 6 U V W (1 + 2^-40). So one bound, (70 + 6 * 6) eps U V W, serves
+// both and the coefficients themselves. (Two terms, of U V W and of max |fi|, would be a third less where f is small;
+// but each would stand in for the other where it matters, and no test could hold either.)
 //
 // The inside test evaluates, at one t = m, two-by-two minors q = x_i y_j - x_j y_i of vectors x, y out of {u, v, w}
 // with absolute bounds X, Y, on one coordinate plane:
@@ -32,7 +34,8 @@
 //   q = fl(fl(a b) - fl(c d))                                3 + 3 + 1 + 1 = 8 factors on 2 products: 16 eps X Y
 //   over |t - m| <= h: |q(t) - q(m)| <= h max|q'|, |x'| = |x1 - x0| <= 2 X, so |q'| <= 8 X Y.
 //   sums n - B - C of three minors round twice more: at most 2 eps (|n| + |B| + |C|) <= 4 eps (sum of the X Y).
-// So each minor is known to (20 eps + 8 h) X Y, sums of minors to the sum of those.
+// So each minor is known to (20 eps + 8 h) X Y = 8 (h + 2.5 eps) X Y, sums of minors to the sum of those: rounding is
+// worth another 2.5 eps of time.
 //
 // The separation test takes the Bernstein coefficients q0, q1, q2 of the same minors over [a, b], from x(a), x(b):
 //   q0 = x(a)_i y(a)_j - x(a)_j y(a)_i and q2 as above:     16 eps X Y
@@ -50,12 +53,9 @@
 namespace dccd {
 namespace simd {
 
-constexpr double BATCH_EPS = tolerance::HALF_ULP;
-constexpr double BATCH_VALUE_ERROR = tolerance::BATCH_VALUE;
-constexpr double BATCH_MINOR_ERROR = tolerance::BATCH_MINOR;
-constexpr double BATCH_SEPARATION_ERROR = tolerance::BATCH_SEPARATION;
+using tolerance::BATCH_MINOR, tolerance::BATCH_SEPARATION, tolerance::BATCH_VALUE;
+constexpr double BATCH_ROUNDING_TIME = 2.5 * tolerance::HALF_ULP;
 constexpr double BATCH_SMALLEST = tolerance::BATCH_SMALLEST_M, BATCH_LARGEST = tolerance::BATCH_LARGEST_M;
-using tolerance::BATCH_MINOR_SLOPE, tolerance::BATCH_VALUE_ROUNDING;
 
 }  // namespace simd
 }  // namespace dccd

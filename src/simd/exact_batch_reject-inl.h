@@ -110,10 +110,7 @@ HWY_INLINE void rejectVector(BatchScratch& scratch, std::size_t i, std::size_t f
   if (CERTIFIED) {
     const V size_u = sizeOf(m + U_T0, m + U_T1, i), size_v = sizeOf(m + V_T0, m + V_T1, i);
     const V size_w = sizeOf(m + W_T0, m + W_T1, i);
-    const V ends = hn::Max(hn::Abs(f0), hn::Abs(f3)), middles = hn::Max(hn::Abs(f1), hn::Abs(f2));
-    const V volume = hn::Mul(hn::Mul(size_u, size_v), size_w);
-    error = hn::Add(hn::Mul(constant(BATCH_VALUE_ERROR), volume),
-                    hn::Mul(constant(BATCH_VALUE_ROUNDING), hn::Max(ends, hn::Mul(middles, constant(1.0 / 3)))));
+    error = hn::Mul(constant(BATCH_VALUE), hn::Mul(hn::Mul(size_u, size_v), size_w));
     error_times_3 = hn::Mul(error, constant(3));
     checked &= bitsOf(hn::And(hn::And(withinGuard(size_u), withinGuard(size_v)), withinGuard(size_w)));
   }

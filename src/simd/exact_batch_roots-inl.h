@@ -91,7 +91,7 @@ HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& t
   V error_n = hn::Zero(Tag()), error_b = error_n, error_c = error_n;
   if (CERTIFIED) {
     const V size_u = load(roots.size[0], i), size_v = load(roots.size[1], i), size_w = load(roots.size[2], i);
-    const V relative = hn::Add(constant(BATCH_MINOR_ERROR), hn::Mul(constant(BATCH_MINOR_SLOPE), h));
+    const V relative = hn::Mul(constant(BATCH_MINOR), hn::Add(h, constant(BATCH_ROUNDING_TIME)));
     error_n = hn::Mul(hn::Mul(size_u, size_v), relative);
     error_b = hn::Mul(hn::Mul(size_v, size_w), relative);
     error_c = hn::Mul(hn::Mul(size_u, size_w), relative);
@@ -172,7 +172,8 @@ HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
     root_hi = choose(hn::Lt(above, hi), above, hi);
     const M bracketed = hn::And(hn::Gt(hn::Xor(evaluate(f0, f1, f2, f3, root_lo), flip), error),
                                 hn::Lt(hn::Xor(evaluate(f0, f1, f2, f3, root_hi), flip), hn::Neg(error)));
-    insideTest<CERTIFIED, KIND>(roots, i, x, hn::Sub(root_hi, root_lo), touches, misses);
+    const V h = hn::Max(hn::Sub(x, root_lo), hn::Sub(root_hi, x));
+    insideTest<CERTIFIED, KIND>(roots, i, x, h, touches, misses);
     outcome = choose(misses, constant(ROOT_NO_CONTACT), outcome);
     outcome = choose(touches, constant(ROOT_CONTACT_NO_CELL), outcome);
     // At most one border between cells lies in the bracket unless cells are very fine; f's sign there tells the side.

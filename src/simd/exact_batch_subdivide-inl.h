@@ -56,7 +56,7 @@ HWY_INLINE M apart(const RootBlock& pairs, std::size_t i, V a, V b) {
   const auto& m = pairs.motion;
   const V sa = hn::Sub(constant(1), a), sb = hn::Sub(constant(1), b);
   const V size_u = load(pairs.size[0], i), size_v = load(pairs.size[1], i), size_w = load(pairs.size[2], i);
-  const V relative = constant(BATCH_SEPARATION_ERROR);
+  const V relative = constant(BATCH_SEPARATION);
   const V error_n = hn::Mul(hn::Mul(size_u, size_v), relative);
   const V error_b = hn::Mul(hn::Mul(size_v, size_w), relative);
   const V error_c = hn::Mul(hn::Mul(size_u, size_w), relative);

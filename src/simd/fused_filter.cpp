@@ -16,8 +16,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::CappedTag<float, 16>;
 using VF = hn::Vec<DF>;
 constexpr size_t MAX_LANES = 16;
-constexpr float UNIT = tolerance::FUSED_UNIT, UNDERFLOW_MARGIN = tolerance::FUSED_UNDERFLOW,
-                LARGEST_M = tolerance::FUSED_LARGEST_M;
+constexpr float LARGEST_M = tolerance::FUSED_LARGEST_M;
 
 struct Vec3V {
   VF x, y, z;
@@ -116,8 +115,8 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
       M = hn::Max(M, hn::Max(hn::Max(hn::Abs(p[t][i].x), hn::Abs(p[t][i].y)), hn::Abs(p[t][i].z)));
     }
   }
-  const VF tiny = hn::Set(d, UNDERFLOW_MARGIN), M_sq = hn::Mul(M, M);
-  const VF margin = hn::Add(hn::Mul(hn::Set(d, 128 * UNIT), M_sq), tiny);
+  const VF tiny = hn::Set(d, tolerance::FUSED_UNDERFLOW), M_sq = hn::Mul(M, M);
+  const VF margin = hn::Add(hn::Mul(hn::Set(d, tolerance::FUSED_PLANAR), M_sq), tiny);
 
   const Quadratic bc = cross(p[0][1], p[1][1], p[0][2], p[1][2]);
   const Quadratic ca = cross(p[0][2], p[1][2], p[0][0], p[1][0]);
@@ -129,7 +128,7 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
   const VF f1 = hn::Add(dot(p[1][0], bc.A), dot(p[0][0], bc.B));
   const VF f2 = hn::Add(dot(p[1][0], bc.B), dot(p[0][0], bc.C));
   const VF f3 = dot(p[1][0], bc.C);
-  const VF cubic_margin = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 192 * UNIT), M_sq), M), tiny);
+  const VF cubic_margin = hn::Add(hn::Mul(hn::Mul(hn::Set(d, tolerance::FUSED_CUBIC), M_sq), M), tiny);
   const VF f_lo = hn::Min(hn::Min(f0, f1), hn::Min(f2, f3)), f_hi = hn::Max(hn::Max(f0, f1), hn::Max(f2, f3));
   auto out = hn::Or(hn::Gt(f_lo, cubic_margin), hn::Lt(f_hi, hn::Neg(cubic_margin)));
 

@@ -21,10 +21,9 @@ enum class Answer : std::uint8_t { APART, MEET, UNKNOWN };
 // Rounding, u = 2^-53, M = largest |difference|, differences rounded once: a component of a cross product errs by
 // 2 * 3u M^2 + 2u M^2 = 8u M^2 and is at most 2 M^2; a dot product with one by 3 (8 + 2 + 2)u M^3 + (4 + 6)u M^3 =
 // 46u M^3 and is at most 6 M^3; the sum of three of these and a fourth by 4 * 46u M^3 + (12 + 18 + 24)u M^3 = 238u M^3.
-// The margins 64u M^3 and 256u M^3 cover the terms in u^2 and their own rounding. Underflow: fewer than 100 operations
+// The margins 47u M^3 and 240u M^3 cover the terms in u^2 and their own rounding. Underflow: fewer than 100 operations
 // lose at most 2^-1075 each, times factors of at most M^2 <= 2^60: below 2^-1000.
-constexpr double UNIT = tolerance::HALF_ULP, UNDERFLOW_MARGIN = tolerance::SEGMENT_UNDERFLOW,
-                 LARGEST_M = tolerance::SEGMENT_LARGEST_M;
+using tolerance::SEGMENT_LARGEST_M, tolerance::SEGMENT_UNDERFLOW;
 
 struct V {
   double x, y, z;
@@ -37,7 +36,8 @@ inline double largest(const V& a) { return std::max(std::max(std::abs(a.x), std:
 
 // In the projection onto a coordinate plane: is the triangle strictly on one side of the line pq, or the segment
 // strictly beyond the line of one of the triangle's edges? The 2D cross products are components of the 3D ones. The
-// longest sums have three terms, such as (b - q) x (c - q) = bc + (qb - qc), and err by at most (3 * 8 + 4 + 6)u M^2.
+// longest sums have three terms, such as (b - q) x (c - q) = bc + (qb - qc), and err by at most (3 * 8 + 4 + 6)u M^2;
+// 35u M^2 is used.
 inline bool apartInPlane(double bc, double ca, double ab, double qa, double qb, double qc, double margin) {
   const auto beyond = [margin](double x) { return x > margin; };
   if (beyond(std::min(std::min(qa, qb), qc)) || beyond(-std::max(std::max(qa, qb), qc))) return true;
@@ -60,10 +60,10 @@ inline bool apartOnAxis(const double* p, const double* q, const double* a, const
 Answer filter(const double* p, const double* q, const double* a, const double* b, const double* c) {
   const V pa = difference(a, p), pb = difference(b, p), pc = difference(c, p), pq = difference(q, p);
   const double M = std::max(std::max(largest(pa), largest(pb)), std::max(largest(pc), largest(pq)));
-  if (!(M <= LARGEST_M)) return apartOnAxis(p, q, a, b, c) ? Answer::APART : Answer::UNKNOWN;
+  if (!(M <= SEGMENT_LARGEST_M)) return apartOnAxis(p, q, a, b, c) ? Answer::APART : Answer::UNKNOWN;
   const double cubed = M * M * M;
-  const double line_margin = 64 * UNIT * cubed + UNDERFLOW_MARGIN;
-  const double plane_margin = 256 * UNIT * cubed + UNDERFLOW_MARGIN;
+  const double line_margin = tolerance::SEGMENT_LINE * cubed + SEGMENT_UNDERFLOW;
+  const double plane_margin = tolerance::SEGMENT_PLANE * cubed + SEGMENT_UNDERFLOW;
   const V bc = cross(pb, pc);
   const double side_p = -dot(pa, bc);
   const V ca = cross(pc, pa), ab = cross(pa, pb);
@@ -77,7 +77,7 @@ Answer filter(const double* p, const double* q, const double* a, const double* b
     return Answer::MEET;
   }
   if (apartOnAxis(p, q, a, b, c)) return Answer::APART;
-  const double margin = 64 * UNIT * (M * M) + UNDERFLOW_MARGIN;
+  const double margin = tolerance::SEGMENT_PROJECTED * (M * M) + SEGMENT_UNDERFLOW;
   const V qa = cross(pq, pa), qb = cross(pq, pb), qc = cross(pq, pc);
   const bool apart = apartInPlane(bc.x, ca.x, ab.x, qa.x, qb.x, qc.x, margin) ||
                      apartInPlane(bc.y, ca.y, ab.y, qa.y, qb.y, qc.y, margin) ||

@@ -1,6 +1,6 @@
-// Pairs that lie at the bounds of the margins of tolerances.h: contacts that a smaller margin loses, and pairs apart
-// that it invents. `scripts/test --long` cuts one margin after the other to a tenth and runs these tests (test/package/
-// margins_test.py); the table is in doc/accuracy.md.
+// Inputs that lie at the bounds of the margins of tolerances.h: contacts that a smaller margin loses, and pairs apart
+// that it invents. `scripts/test --long` cuts one margin after the other to a tenth and shows that inputs of these
+// tests go wrong then (test/package/margins_test.py); the table is in doc/hard_cases.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,9 @@
 #include "oracle/exact_distance.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
+#include "simd/float_mode.h"
 #include "support/generators.h"
+#include "support/margin_checks.h"
 #include "support/query_property.h"
 
 namespace dccd {
@@ -196,6 +198,22 @@ Query nearlyCoplanar(RandomSource& random) {
 TEST(Margins, BatchAnswersNearlyCoplanarPairs) {
   holdTier(Tier::DOUBLE_BATCH, longRun() ? 1000000 : 60000, nearlyCoplanar);
 }
+
+/// Each margin's own inputs, those that search found included: none goes wrong.
+class MarginChecks : public testing::TestWithParam<MarginCheck> {};
+
+TEST_P(MarginChecks, NoInputGoesWrong) {
+  const ScopedFloatMode mode;
+  const MarginCheck& check = GetParam();
+  RandomSource random(propertySeed());
+  std::vector<MarginInput> inputs = marginWitnesses(check.margin);
+  const int made = check.inputs * (longRun() ? 20 : 1);
+  for (int i = 0; i < made; ++i) inputs.push_back(check.make(random));
+  for (const MarginInput& input : inputs) ASSERT_FALSE(check.judge(input)()) << witnessLine(check.margin, input);
+}
+
+INSTANTIATE_TEST_SUITE_P(Margin, MarginChecks, testing::ValuesIn(marginChecks()),
+                         [](const testing::TestParamInfo<MarginCheck>& info) { return info.param.margin; });
 
 }  // namespace
 }  // namespace test

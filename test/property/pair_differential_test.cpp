@@ -1,5 +1,6 @@
 // Hard pairs by the million: every elementary test, on every SIMD target, in batches, against the oracle.
-// DEFORMABLE_CCD_LONG=1 runs 1e7 of them; the seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file
+// DEFORMABLE_CCD_LONG=1 runs 1e7 of them, DEFORMABLE_CCD_BLOCKS="FIRST COUNT" a part of these, in blocks of 10,000; the
+// seed is fixed, or DEFORMABLE_CCD_SEED. What fails is written to a file
 // that run_queries replays; the single-pair tests beside this one shrink it.
 #include <gtest/gtest.h>
 #include <tbb/blocked_range.h>
@@ -7,9 +8,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <sstream>
+#include <utility>
 #include <vector>
 
 #include "dccd/elementary.h"
@@ -85,13 +89,20 @@ struct Block {
   }
 };
 
+/// The first block to run, and how many.
+std::pair<std::size_t, std::size_t> blocksToRun() {
+  std::size_t first = 0, count = longRun() ? 1000 : 2;
+  if (const char* text = std::getenv("DEFORMABLE_CCD_BLOCKS")) std::istringstream(text) >> first >> count;
+  return {first, count};
+}
+
 TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
-  const std::size_t blocks = longRun() ? 1000 : 2;
+  const std::size_t first_block = blocksToRun().first, blocks = blocksToRun().second;
   const std::vector<AccuracyOptions> rungs = allRungs();
   std::atomic<std::size_t> tested{0}, contacts{0};
   std::mutex failure;
   std::string targets;
-  for (std::size_t b = 0; b < blocks && !HasFailure(); ++b) {
+  for (std::size_t b = first_block; b < first_block + blocks && !HasFailure(); ++b) {
     const PairKind kind = b % 2 == 0 ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
     Block block(propertySeed() + b * BLOCK, kind);
     contacts += static_cast<std::size_t>(
@@ -99,7 +110,7 @@ TEST(PairDifferential, EveryRungOnEveryTargetKeepsItsPromise) {
     // The answers on the first target are judged by the oracle; those on the others must be the same.
     std::vector<std::vector<ElementaryResult>> answers(rungs.size());
     forEachSimdTarget([&](const std::string& target) {
-      if (b == 0) targets += " " + target;
+      if (b == first_block) targets += " " + target;
       const bool first = answers[0].empty();
       if (first) std::fill(answers.begin(), answers.end(), std::vector<ElementaryResult>(BLOCK));
       inChunks([&](std::size_t begin, std::size_t end) {

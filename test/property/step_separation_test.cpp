@@ -7,6 +7,7 @@
 #include <iostream>
 #include <map>
 
+#include "dccd/stream.h"
 #include "oracle/exact_distance.h"
 #include "support/query_property.h"
 #include "support/step_support.h"
@@ -176,6 +177,7 @@ TEST(StepSeparation, NeverLateNothingMissedNothingFarther) {
 // Of brackets of any width the earliest is kept, and all that may be as early.
 TEST(StepSeparation, EarliestOnlyIsTheFirstOfAll) {
   int left_out = 0, several = 0;
+  std::uint64_t certain = 0, undecided = 0;
   for (int seed = 0; seed < 200; ++seed) {
     const NoisyStep noisy = randomNoisyStep(drawFrom(7700 + static_cast<std::uint64_t>(seed)));
     const Outcome full = run(noisy, BroadPhase::CLUSTERED), first = run(noisy, BroadPhase::CLUSTERED, true);
@@ -189,11 +191,65 @@ TEST(StepSeparation, EarliestOnlyIsTheFirstOfAll) {
       if (c.toc_lower <= upper) expected.push_back(c);
     }
     ASSERT_EQ(difference(first.contacts, expected), "") << "seed " << seed;
+    for (const Contact& c : first.contacts) {
+      ++(c.certainty == Certainty::CERTAIN ? certain : undecided);
+      if (c.certainty == Certainty::CERTAIN) ASSERT_EQ(wideInterval(noisy, c), "") << "seed " << seed << describe(c);
+    }
     left_out += full.contacts.size() > first.contacts.size();
     several += first.contacts.size() > 1;
   }
   EXPECT_GT(left_out, 20);
   EXPECT_GT(several, 20);
+  EXPECT_GT(certain, 500u);
+  EXPECT_LT(undecided, certain / 50);
+}
+
+// A prediction's step is an extrapolation; its times are as narrow as those of what was observed.
+TEST(StepSeparation, PredictionsAreAsNarrow) {
+  MonitorOptions options;
+  options.detector.accuracy.rung = Accuracy::CONSERVATIVE;
+  options.detector.accuracy.tolerance_m = TOLERANCE_M;
+  options.detector.max_contacts = 1 << 20;
+  options.store.max_vertex_step_m = 0;
+  options.look_ahead_s = 0.07;
+  constexpr StampNs TENTH_S = 100000000;
+  std::uint64_t certain = 0, within_step = 0, undecided = 0;
+  for (int seed = 0; seed < (longRun() ? 2000 : 200); ++seed) {
+    NoisyStep noisy = randomNoisyStep(drawFrom(8300 + static_cast<std::uint64_t>(seed)));
+    for (auto& radius : noisy.radius_m) radius.clear();
+    Step step = noisy.step.motion();
+    std::vector<Body> bodies = step.bodies;
+    for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].minimum_separation_m = noisy.separation_m[b];
+    Monitor monitor(options, bodies);
+    for (int frame = 0; frame < 2; ++frame) {
+      for (std::size_t b = 0; b < bodies.size(); ++b) {
+        const StepBody& body = noisy.step.bodies[b];
+        monitor.push(
+            b,
+            {frame * TENTH_S, bodies[b].topology, frame == 0 ? body.t0 : body.t1, false, Eigen::Isometry3d::Identity()},
+            0);
+      }
+    }
+    Outcome outcome;
+    while (monitor.next(0, outcome)) {
+    }
+    const Outcome ahead = monitor.predict();
+    ASSERT_TRUE(ahead.answered) << "seed " << seed << ": " << ahead.reason;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      noisy.step.bodies[b].t0 = *ahead.step->bodies[b].t0;
+      noisy.step.bodies[b].t1 = *ahead.step->bodies[b].t1;
+    }
+    for (const Contact& c : ahead.contacts) {
+      ++(c.certainty == Certainty::CERTAIN ? certain : undecided);
+      if (c.certainty != Certainty::CERTAIN) continue;
+      within_step += c.toc_upper > 0;
+      ASSERT_EQ(wideInterval(noisy, c), "") << "seed " << seed << describe(c);
+    }
+  }
+  std::cout << certain << " certain contacts of predictions, " << within_step << " that begin within the step, "
+            << undecided << " undecided\n";
+  EXPECT_GT(within_step, 300u);
+  EXPECT_LT(undecided, certain / 50);
 }
 
 // Just those vertices: a pair without an uncertain vertex gives the same bits as without any noise.

@@ -1,4 +1,4 @@
-// The exact rung's integers: both kinds obey the laws of arithmetic and agree with each other.
+// The exact rung's integers: all kinds obey the laws of arithmetic and agree with each other.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "elementary/exact_integer.h"
+#include "elementary/exact_lazy_integer.h"
 
 namespace dccd {
 namespace {
@@ -14,21 +15,24 @@ namespace {
 constexpr int LIMBS = 16;
 using Fixed = StackInteger<LIMBS>;
 
-/// The same number in both kinds.
+/// The same number in all kinds.
 struct Twin {
   Fixed fixed;
   BigInteger big;
+  LazyInteger lazy;
 };
 
-Twin operator+(const Twin& a, const Twin& b) { return {a.fixed + b.fixed, a.big + b.big}; }
-Twin operator-(const Twin& a, const Twin& b) { return {a.fixed - b.fixed, a.big - b.big}; }
-Twin operator*(const Twin& a, const Twin& b) { return {a.fixed * b.fixed, a.big * b.big}; }
+Twin operator+(const Twin& a, const Twin& b) { return {a.fixed + b.fixed, a.big + b.big, a.lazy + b.lazy}; }
+Twin operator-(const Twin& a, const Twin& b) { return {a.fixed - b.fixed, a.big - b.big, a.lazy - b.lazy}; }
+Twin operator*(const Twin& a, const Twin& b) { return {a.fixed * b.fixed, a.big * b.big, a.lazy * b.lazy}; }
 
 void expectTwins(const Twin& a) {
   EXPECT_EQ(a.fixed.sign(), a.big.sign());
-  const ScaledDouble fixed = a.fixed.approximate(), big = a.big.approximate();
+  EXPECT_EQ(a.lazy.sign(), a.big.sign());
+  const ScaledDouble fixed = a.fixed.approximate(), big = a.big.approximate(), lazy = a.lazy.approximate();
   const double unscaled = std::ldexp(fixed.mantissa, static_cast<int>(fixed.exponent - big.exponent));
   EXPECT_NEAR(unscaled, big.mantissa, 0x1p-51);
+  EXPECT_NEAR(std::ldexp(lazy.mantissa, static_cast<int>(lazy.exponent - big.exponent)), big.mantissa, 0x1p-51);
   if (a.fixed.sign() != 0) {
     EXPECT_GE(std::fabs(fixed.mantissa), 0.5);
     EXPECT_LT(std::fabs(fixed.mantissa), 1.0);
@@ -38,16 +42,18 @@ void expectTwins(const Twin& a) {
 void expectZero(const Twin& a) {
   EXPECT_EQ(a.fixed.sign(), 0);
   EXPECT_EQ(a.big.sign(), 0);
+  EXPECT_EQ(a.lazy.sign(), 0);
 }
 
 /// Numbers with carries and borrows: powers of two, their neighbours, zero, sums of such, any sign.
 Twin randomTwin(std::mt19937_64& random, int most_bits) {
-  Twin sum{Fixed(0), BigInteger(0)};
+  Twin sum{Fixed(0), BigInteger(0), LazyInteger(0)};
   for (int i = static_cast<int>(random() % 4); i >= 0; --i) {
     const auto value = static_cast<std::int64_t>(random()) >> (random() % 64);
     const std::int64_t picked = random() % 3 == 0 ? (random() % 2 == 0 ? 1 : -1) : value;
     const int shift = static_cast<int>(random() % static_cast<unsigned>(most_bits - 64));
-    sum = sum + Twin{Fixed::shifted(picked, shift), BigInteger::shifted(picked, shift)};
+    sum = sum +
+          Twin{Fixed::shifted(picked, shift), BigInteger::shifted(picked, shift), LazyInteger::shifted(picked, shift)};
   }
   return sum;
 }
@@ -55,6 +61,7 @@ Twin randomTwin(std::mt19937_64& random, int most_bits) {
 TEST(ExactInteger, LawsOfArithmetic) {
   std::mt19937_64 random(1);
   for (int i = 0; i < 20000; ++i) {
+    LazyInteger::beginDecision();
     const Twin a = randomTwin(random, 300), b = randomTwin(random, 300), c = randomTwin(random, 300);
     expectZero((a + b) - b - a);
     expectZero((a - b) + (b - a));
@@ -70,15 +77,32 @@ TEST(ExactInteger, LawsOfArithmetic) {
 TEST(ExactInteger, SmallFactorsShiftsAndNegation) {
   std::mt19937_64 random(2);
   for (int i = 0; i < 20000; ++i) {
+    LazyInteger::beginDecision();
     const Twin a = randomTwin(random, 400);
     const auto factor = static_cast<std::int64_t>(random()) >> (random() % 64);
     const int shift = static_cast<int>(random() % 300);
-    const Twin by_factor{a.fixed * factor, a.big * factor};
-    const Twin shifted{a.fixed << shift, a.big << shift};
-    expectZero(by_factor - a * Twin{Fixed(factor), BigInteger(factor)});
-    expectZero(shifted - a * Twin{Fixed::shifted(1, shift), BigInteger::shifted(1, shift)});
-    expectZero(a + Twin{-a.fixed, -a.big});
+    const Twin by_factor{a.fixed * factor, a.big * factor, a.lazy * factor};
+    const Twin shifted{a.fixed << shift, a.big << shift, a.lazy << shift};
+    expectZero(by_factor - a * Twin{Fixed(factor), BigInteger(factor), LazyInteger(factor)});
+    expectZero(shifted -
+               a * Twin{Fixed::shifted(1, shift), BigInteger::shifted(1, shift), LazyInteger::shifted(1, shift)});
+    expectZero(a + Twin{-a.fixed, -a.big, -a.lazy});
     if (HasFailure()) return;
+  }
+}
+
+// Where the leading terms cancel, all but one bit thousands of places below, only exact arithmetic knows the sign.
+TEST(ExactInteger, CancellationIsSeenThrough) {
+  std::mt19937_64 random(3);
+  for (int i = 0; i < 2000; ++i) {
+    LazyInteger::beginDecision();
+    const auto value = static_cast<std::int64_t>(random() >> 11);
+    const int far = static_cast<int>(random() % 4000);
+    const LazyInteger one(random() % 2 ? 1 : -1), large = LazyInteger::shifted(value + 1, far);
+    const LazyInteger next = large + one;
+    EXPECT_EQ((next * next - large * large).sign(), one.sign()) << value << " 2^" << far;
+    EXPECT_EQ(((large + next) - next - large).sign(), 0);
+    EXPECT_EQ((next - large).approximate().exponent, 1);
   }
 }
 
@@ -101,7 +125,7 @@ TEST(ExactInteger, ProductsFillTheCapacity) {
 TEST(ExactInteger, ExtremesOfInt64) {
   for (const std::int64_t value : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max(),
                                    std::int64_t{0}, std::int64_t{-1}}) {
-    const Twin a{Fixed(value), BigInteger(value)};
+    const Twin a{Fixed(value), BigInteger(value), LazyInteger(value)};
     expectTwins(a);
     expectTwins(a * a);
     EXPECT_EQ(a.fixed.sign(), (value > 0) - (value < 0));

@@ -1,0 +1,329 @@
+// Integers of any length of which only what is asked for is computed. Coordinates of wide ranges make numbers of
+// thousands of digits, but most signs are those of their largest terms. So each number is kept as a pair of doubles
+// with an exponent of its own and a bound on its error, and as what it was made of; GMP computes it where the bound
+// cannot tell its sign. What is made the same way of the same numbers is one number. They live until the next decision
+// of the thread begins.
+//
+// Bounds. A number is (high + low) 2^exponent, |high| in [1/2, 1), |low| <= 2^-54 |2 high|, off by at most error
+// 2^exponent. Every operation is correctly rounded.
+//   Product: of the leading parts exactly, p + q; the two cross terms, each at most 2^-54, err by 2^-108 each and their
+//     sum by 2^-107, q plus that by 2^-106; the product of the trailing parts, 2^-108, is dropped: below 2^-104.
+//   Sum: of the leading parts exactly, s + t, |s| < 2; the trailing parts' sum, at most 2^-53, errs by 2^-107, t plus
+//     that, at most 2^-52, by 2^-106: below 2^-104. An addend 2^200 times smaller goes into the error.
+// ROUNDING = 2^-102 is used, before the result is brought to [1/2, 1). Where no trailing part is there nothing is
+// rounded: differences of coordinates and their products are exact, and so are their zeros.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <deque>
+#include <vector>
+
+#include "elementary/exact_integer.h"
+
+namespace dccd {
+
+class LazyInteger {
+ public:
+  LazyInteger() = default;  // zero
+  LazyInteger(std::int64_t value) : index_(value == 0 ? 0 : arena().constant(value, 0)) {}
+
+  /// value * 2^shift, shift >= 0.
+  static LazyInteger shifted(std::int64_t value, int shift) {
+    return LazyInteger(Index{value == 0 ? 0 : arena().constant(value, shift)});
+  }
+  /// The number, computed if it is not known to some twenty digits, so that what is made of it is.
+  const LazyInteger& sharpened() const {
+    arena().sharpen(index_);
+    return *this;
+  }
+
+  /// Forgets all numbers of this thread.
+  static void beginDecision() { arena().clear(); }
+
+  int sign() const { return arena().sign(index_); }
+  ScaledDouble approximate() const { return arena().approximate(index_); }
+
+  LazyInteger operator-() const { return LazyInteger(Index{arena().negated(index_)}); }
+  LazyInteger operator+(const LazyInteger& other) const {
+    return LazyInteger(Index{arena().sum(index_, other.index_, 1)});
+  }
+  LazyInteger operator-(const LazyInteger& other) const {
+    return LazyInteger(Index{arena().sum(index_, other.index_, -1)});
+  }
+  LazyInteger operator*(const LazyInteger& other) const {
+    return LazyInteger(Index{arena().product(index_, other.index_)});
+  }
+  LazyInteger operator*(std::int64_t factor) const { return *this * LazyInteger(factor); }
+  LazyInteger operator<<(int bits) const { return LazyInteger(Index{arena().shifted(index_, bits)}); }
+
+ private:
+  struct Index {
+    std::int32_t value;
+  };
+  explicit LazyInteger(Index index) : index_(index.value) {}
+
+  static constexpr double ROUNDING = 0x1p-102;
+  static constexpr long FAR = 200;  ///< bits by which an addend is too small to count
+
+  struct Approximation {
+    double high = 0, low = 0, error = 0;
+    long exponent = 0;
+    bool isZero() const { return high == 0 && error == 0; }
+  };
+
+  enum class Made : std::uint8_t { CONSTANT, NEGATED, SUM, DIFFERENCE, PRODUCT, SHIFTED };
+  struct Number {
+    Approximation about;
+    std::int64_t constant = 0;
+    std::int32_t first = 0, second = 0;  ///< numbers, or bits to shift by
+    std::int32_t exact = -1;
+    Made made = Made::CONSTANT;
+  };
+
+  class Arena {
+   public:
+    Arena() { clear(); }
+
+    void clear() {
+      numbers_.resize(1);  // zero
+      exact_count_ = 0;
+      ++decision_;
+    }
+
+    std::int32_t constant(std::int64_t value, int shift) {
+      Number number;
+      number.constant = value;
+      number.second = shift;
+      const std::int32_t known = find(number);
+      if (known >= 0) return known;
+      const double high = static_cast<double>(value);
+      const double low = static_cast<double>(static_cast<__int128>(value) - static_cast<__int128>(high));  // exact
+      number.about = normalized(high, low, 0, shift);
+      return add(number);
+    }
+
+    std::int32_t negated(std::int32_t a) {
+      Number number = made(Made::NEGATED, a, 0);
+      const std::int32_t known = find(number);
+      if (a == 0 || known >= 0) return a == 0 ? 0 : known;
+      number.about = numbers_[a].about;
+      number.about.high = -number.about.high;
+      number.about.low = -number.about.low;
+      return add(number);
+    }
+
+    std::int32_t shifted(std::int32_t a, int bits) {
+      if (a == 0 || bits == 0) return a;
+      Number number = made(Made::SHIFTED, a, bits);
+      const std::int32_t known = find(number);
+      if (known >= 0) return known;
+      number.about = numbers_[a].about;
+      number.about.exponent += bits;
+      return add(number);
+    }
+
+    std::int32_t product(std::int32_t a, std::int32_t b) {
+      const Approximation &x = numbers_[a].about, &y = numbers_[b].about;
+      if (x.isZero() || y.isZero()) return 0;
+      Number number = made(Made::PRODUCT, a, b);
+      const std::int32_t known = find(number);
+      if (known >= 0) return known;
+      const double p = x.high * y.high, q = errorOfProduct(x.high, y.high, p);
+      const bool is_exact = x.low == 0 && y.low == 0;
+      const double rest = q + (x.high * y.low + x.low * y.high);
+      const double high = p + rest, low = rest - (high - p);  // |rest| is far below |p|
+      // |x|, |y| <= 1.
+      const double error = 1.001 * (x.error + y.error + x.error * y.error) + (is_exact ? 0 : ROUNDING);
+      number.about = normalized(high, low, error, x.exponent + y.exponent);
+      return add(number);
+    }
+
+    std::int32_t sum(std::int32_t a, std::int32_t b, int sign_of_b) {
+      if (numbers_[b].about.isZero()) return a;
+      if (numbers_[a].about.isZero()) return sign_of_b > 0 ? b : negated(b);
+      Number number = made(sign_of_b > 0 ? Made::SUM : Made::DIFFERENCE, a, b);
+      const std::int32_t known = find(number);
+      if (known >= 0) return known;
+      Approximation x = numbers_[a].about, y = numbers_[b].about;
+      y.high *= sign_of_b;
+      y.low *= sign_of_b;
+      if (x.exponent < y.exponent) std::swap(x, y);
+      const long apart = x.exponent - y.exponent;
+      if (apart > FAR) {
+        x.error = 1.001 * (x.error + (1.001 + y.error) * 0x1p-200);
+        number.about = x;
+        return add(number);
+      }
+      const double scale = powerOfTwo(static_cast<int>(-apart));
+      const double yh = y.high * scale, yl = y.low * scale;  // exact: far from underflow
+      const double s = x.high + yh, part = s - x.high, t = (x.high - (s - part)) + (yh - part);
+      const bool is_exact = x.low == 0 && yl == 0;
+      const double rest = t + (x.low + yl);
+      const double high = s + rest, back = high - s, low = (s - (high - back)) + (rest - back);
+      const double error = 1.001 * (x.error + y.error * scale) + (is_exact ? 0 : ROUNDING);
+      number.about = normalized(high, low, error, x.exponent);
+      return add(number);
+    }
+
+    int sign(std::int32_t a) {
+      const Approximation& x = numbers_[a].about;
+      if (std::fabs(x.high) * 0.999 > x.error) return x.high > 0 ? 1 : -1;
+      return x.isZero() ? 0 : mpz_sgn(exact(a));
+    }
+
+    void sharpen(std::int32_t a) {
+      const Approximation& x = numbers_[a].about;
+      if (x.error > 0x1p-70 || (x.high == 0 && !x.isZero())) exact(a);
+    }
+
+    ScaledDouble approximate(std::int32_t a) {
+      const Approximation& x = numbers_[a].about;
+      ScaledDouble result;
+      if (x.isZero()) return result;
+      if (std::fabs(x.high) > 0 && x.error <= 0x1p-60) {
+        result.mantissa = x.high;
+        result.exponent = x.exponent;
+      } else {
+        result.mantissa = mpz_get_d_2exp(&result.exponent, exact(a));
+      }
+      return result;
+    }
+
+   private:
+    /// What GMP computes lives on from decision to decision, so that nothing is allocated in the long run.
+    struct Exact {
+      mpz_t value;
+      Exact() { mpz_init(value); }
+      ~Exact() { mpz_clear(value); }
+      Exact(const Exact&) = delete;
+      Exact& operator=(const Exact&) = delete;
+    };
+
+    static Number made(Made how, std::int32_t first, std::int32_t second) {
+      Number number;
+      number.made = how;
+      number.first = first;
+      number.second = second;
+      return number;
+    }
+
+    /// The number of this thread's decision that is made alike, or -1, and then add() has its place in the table.
+    std::int32_t find(const Number& number) {
+      std::uint64_t key = static_cast<std::uint64_t>(number.constant) * 0x9e3779b97f4a7c15u;
+      key ^= (static_cast<std::uint64_t>(static_cast<std::uint32_t>(number.first)) << 32) |
+             static_cast<std::uint32_t>(number.second);
+      key = (key + static_cast<std::uint64_t>(number.made)) * 0xd1342543de82ef95u;
+      place_ = static_cast<std::size_t>(key >> (64 - TABLE_BITS));
+      const Place& place = table_[place_];
+      if (place.decision != decision_) return -1;
+      const Number& other = numbers_[place.number];
+      const bool is_same = other.made == number.made && other.first == number.first && other.second == number.second &&
+                           other.constant == number.constant;
+      return is_same ? place.number : -1;
+    }
+
+    std::int32_t add(const Number& number) {
+      numbers_.push_back(number);
+      const auto index = static_cast<std::int32_t>(numbers_.size()) - 1;
+      table_[place_] = {decision_, index};
+      return index;
+    }
+
+    static double powerOfTwo(int exponent) {  // normal ones
+      const std::uint64_t word = static_cast<std::uint64_t>(1023 + exponent) << 52;
+      double value;
+      std::memcpy(&value, &word, sizeof value);
+      return value;
+    }
+
+    static Approximation normalized(double high, double low, double error, long exponent) {
+      if (high == 0) return {0, 0, error, exponent};
+      std::uint64_t word;
+      std::memcpy(&word, &high, sizeof word);
+      const int shift = (static_cast<int>(word >> 52) & 0x7ff) - 1022;  // high is normal: no sum is below 2^-400
+      const double scale = powerOfTwo(-shift);
+      return {high * scale, low * scale, error * scale, exponent + shift};
+    }
+
+    /// The error of the rounded product of two numbers below 1 (Dekker).
+    static double errorOfProduct(double a, double b, double product) {
+      constexpr double SPLIT = 134217729.0;  // 2^27 + 1
+      const double ca = SPLIT * a, cb = SPLIT * b;
+      const double ah = ca - (ca - a), bh = cb - (cb - b), al = a - ah, bl = b - bh;
+      return ((ah * bh - product) + ah * bl + al * bh) + al * bl;
+    }
+
+    mpz_srcptr exact(std::int32_t a) {
+      if (numbers_[a].exact >= 0) return exacts_[static_cast<std::size_t>(numbers_[a].exact)].value;
+      const Number number = numbers_[a];
+      const bool is_leaf = number.made == Made::CONSTANT;
+      const mpz_srcptr first = is_leaf ? nullptr : exact(number.first);
+      const bool has_two = number.made == Made::SUM || number.made == Made::DIFFERENCE || number.made == Made::PRODUCT;
+      const mpz_srcptr second = has_two ? exact(number.second) : nullptr;
+      if (exact_count_ == exacts_.size()) exacts_.emplace_back();
+      numbers_[a].exact = static_cast<std::int32_t>(exact_count_);
+      const mpz_ptr result = exacts_[exact_count_++].value;
+      switch (number.made) {
+        case Made::CONSTANT:
+          mpz_set_si(result, number.constant);
+          mpz_mul_2exp(result, result, static_cast<mp_bitcnt_t>(number.second));
+          break;
+        case Made::NEGATED:
+          mpz_neg(result, first);
+          break;
+        case Made::SUM:
+          mpz_add(result, first, second);
+          break;
+        case Made::DIFFERENCE:
+          mpz_sub(result, first, second);
+          break;
+        case Made::PRODUCT:
+          mpz_mul(result, first, second);
+          break;
+        case Made::SHIFTED:
+          mpz_mul_2exp(result, first, static_cast<mp_bitcnt_t>(number.second));
+          break;
+      }
+      numbers_[a].about = approximationOf(result);
+      return result;
+    }
+
+    /// The leading 106 bits.
+    Approximation approximationOf(mpz_srcptr value) {
+      if (mpz_sgn(value) == 0) return {};
+      const long rest = static_cast<long>(mpz_sizeinbase(value, 2)) - 106;
+      mpz_tdiv_q_2exp(leading_.value, value, static_cast<mp_bitcnt_t>(rest > 0 ? rest : 0));
+      const double first = mpz_get_d(leading_.value);  // 53 bits, the others cut off
+      mpz_set_d(part_.value, first);
+      mpz_sub(leading_.value, leading_.value, part_.value);
+      const double second = mpz_get_d(leading_.value), high = first + second;
+      const bool is_cut = rest > 0 && mpz_scan1(value, 0) < static_cast<mp_bitcnt_t>(rest);
+      return normalized(high, second - (high - first), is_cut ? 1 : 0, rest > 0 ? rest : 0);
+    }
+
+    static constexpr int TABLE_BITS = 13;
+    struct Place {
+      std::uint64_t decision = 0;
+      std::int32_t number = 0;
+    };
+
+    std::vector<Number> numbers_;
+    std::vector<Place> table_ = std::vector<Place>(std::size_t{1} << TABLE_BITS);  ///< the newest number of each key
+    std::uint64_t decision_ = 0;
+    std::size_t place_ = 0;
+    Exact leading_, part_;
+    std::deque<Exact> exacts_;  ///< a deque: what was computed stays where it is
+    std::size_t exact_count_ = 0;
+  };
+
+  static Arena& arena() {
+    thread_local Arena arena;
+    return arena;
+  }
+
+  std::int32_t index_ = 0;
+};
+
+}  // namespace dccd
