@@ -139,6 +139,20 @@ def write_octomap(folder, result):
     return save(folder, "octomap", "# Mesh against octomap\n\n" + table(header, rows))
 
 
+def write_stream(folder, rows):
+    """Ratios are of neighbouring runs; their interval is what they span."""
+    header = ["sequence", "steps", "threads", "contacts", "pairs of clusters known apart, a step", "mean ms a step",
+              "the same with --forget", "ratio", "from", "to"]
+    lines = []
+    for r in rows:
+        ratios = sorted(with_memory / without for with_memory, without in zip(r["ms"], r["forget_ms"]))
+        lines.append([r["sequence"], str(r["steps"]), str(r["threads"]), str(r["contacts"]), "%.0f" % r["known_apart"],
+                      "%.2f" % sorted(r["ms"])[len(r["ms"]) // 2], "%.2f" % sorted(r["forget_ms"])[len(r["ms"]) // 2],
+                      "%.3f" % ratios[len(ratios) // 2], "%.3f" % ratios[0], "%.3f" % ratios[-1]])
+    write_rows(os.path.join(folder, "stream.csv"), header, lines)
+    return save(folder, "stream", "# Streams with memory and without\n\n" + table(header, lines))
+
+
 def write_budget(folder, result):
     header = ["input", "without, ms", "budget ms", "cut", "p50", "p95", "p99", "max", "allowed"]
     rows = []

@@ -35,7 +35,7 @@ struct Arguments {
   double look_ahead_s = 0;
   double from_s = 0, to_s = std::numeric_limits<double>::infinity();
   int threads = 0;
-  bool without_map = false, no_rungs = false, study = false, is_range = false, quiet = false;
+  bool without_map = false, no_rungs = false, study = false, is_range = false, quiet = false, forget = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -53,7 +53,9 @@ MonitorConfig configure(const Arguments& a) {
   if (!a.accuracy.empty()) tree.put("accuracy", a.accuracy);
   if (a.look_ahead_s > 0) tree.put("look_ahead_s", a.look_ahead_s);
   if (a.threads > 0) tree.put("num_threads", a.threads);
-  return readConfig(tree, a.params.empty() ? "--" : "");
+  MonitorConfig config = readConfig(tree, a.params.empty() ? "--" : "");
+  config.monitor.detector.keep_bounds = !a.forget;
+  return config;
 }
 
 // The input's messages with the results between them, as the node would have published them to subscribers of all
@@ -308,6 +310,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
+  app.add_flag("--forget", a.forget, "each step without what the ones before have shown; no answer changes");
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
   auto* study = app.add_flag(
       "--accuracy-study", a.study,

@@ -1,5 +1,5 @@
-// check_step FRAME_0 FRAME_1: the contacts of one step between two mesh files of the same topology. Ends with 0 when
-// what it says is proved (contacts or none), with 3 when it is not, with 1 on an error.
+// check_step FRAME FRAME...: the contacts of the steps between mesh files of the same topology. Ends with 0 when what
+// it says is proved (contacts or none), with 3 when it is not, with 1 on an error.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
@@ -7,6 +7,7 @@
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "dccd/detect.h"
 #include "dccd/simd_target.h"
@@ -23,18 +24,25 @@ constexpr double NARROW = 0.02;  // the interval of a ratio is narrow enough wit
 constexpr int NOT_PROVED = 3;  // CLI11 and this program's own errors have others
 
 struct Arguments {
-  std::string frame_0, frame_1, contacts, stats, truth;
+  std::vector<std::string> frames;
+  std::string contacts, stats, truth;
   std::string accuracy = "exact", broad_phase = "clustered", simd = "auto";
   double tolerance_m = 1e-6, budget_ms = 0;
   int toc_bits = 32, threads = 1, repeat = 1;
-  bool no_start_state = false, earliest_only = false;
+  bool no_start_state = false, earliest_only = false, forget = false;
+  bool isSequence() const { return frames.size() > 2; }
 };
 
 Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
-  app.add_option("FRAME_0", a.frame_0, "mesh at t=0 (.ply, .obj)")->required();
-  app.add_option("FRAME_1", a.frame_1, "mesh at t=1, same faces")->required();
-  app.add_option("--contacts", a.contacts, "write the contacts as CSV; with --accuracy all a file for each setting");
+  app.add_option("FRAME", a.frames,
+                 "meshes with the same faces, two or more, each a step after the one before (.ply, .obj)")
+      ->required()
+      ->expected(2, -1);
+  app.add_option(
+      "--contacts", a.contacts,
+      "write the contacts as CSV, of several steps with the step first, from 0; with --accuracy all a file for "
+      "each setting");
   app.add_option("--stats", a.stats, "write pairs and milliseconds per stage as JSON");
   app.add_option("--accuracy", a.accuracy, "fast, conservative or exact; all: all settings in turns, as a table")
       ->capture_default_str();
@@ -56,21 +64,29 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
   app.add_flag("--no-start-state", a.no_start_state, "leave out whether surfaces cross at t=0: then nothing is proved");
   app.add_flag("--earliest-only", a.earliest_only, "only the first contacts");
+  app.add_flag("--forget", a.forget,
+               "of several steps: each without what the ones before have shown; no answer changes");
   app.parse(argc, argv);
+  if (a.accuracy == "all" && a.isSequence()) throw std::runtime_error("--accuracy all takes two frames");
   if (a.accuracy == "all" && app.count("--repeat") == 0) a.repeat = MOST_ROUNDS;
   if (a.accuracy != "all" && !a.truth.empty()) throw std::runtime_error("--truth goes with --accuracy all");
   return a;
 }
 
-void writeContacts(const std::string& path, const Outcome& result) {
+/// Of several steps a column says which one.
+void writeContacts(const std::string& path, const std::vector<std::vector<Contact>>& steps) {
   std::ofstream out(path);
-  out << "kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty\n" << std::setprecision(17);
-  // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
-  for (const Contact& c : result.contacts) {
-    out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
-    for (Index v : c.vertex) out << ',' << v;
-    out << ',' << c.toc_lower << ',' << c.toc_upper << ','
-        << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';
+  const bool sequence = steps.size() > 1;
+  out << (sequence ? "step," : "") << "kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty\n" << std::setprecision(17);
+  for (std::size_t step = 0; step < steps.size(); ++step) {
+    // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
+    for (const Contact& c : steps[step]) {
+      if (sequence) out << step << ',';
+      out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
+      for (Index v : c.vertex) out << ',' << v;
+      out << ',' << c.toc_lower << ',' << c.toc_upper << ','
+          << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';
+    }
   }
   if (!out) throw std::runtime_error(path + ": cannot be written");
 }
@@ -79,19 +95,39 @@ struct Times {
   std::vector<double> ms;
   double best() const { return *std::min_element(ms.begin(), ms.end()); }
   double median() const { return medianOf(ms).median; }
-  nlohmann::json json() const { return {{"best", best()}, {"median", median()}}; }
+  double mean() const { return std::accumulate(ms.begin(), ms.end(), 0.0) / static_cast<double>(ms.size()); }
+  nlohmann::json json() const { return {{"best", best()}, {"median", median()}, {"mean", mean()}}; }
 };
 
-/// One way to answer the step, as often as it was run.
+/// One way to answer the steps, as often as they were run.
 struct Run {
   std::string name;
   Options options;
   History history;
-  Outcome result;
+  Outcome result;                              // of the last step
+  Assurance assurance;                         // of the first step that is not proved, or the last one
+  StepStats sum;                               // over the steps
+  std::vector<std::vector<Contact>> contacts;  // per step
   std::map<std::string, Times> times;
 
+  std::size_t contactCount() const {
+    std::size_t n = 0;
+    for (const std::vector<Contact>& step : contacts) n += step.size();
+    return n;
+  }
+  void once(const std::vector<Step>& steps) {
+    contacts.clear();
+    sum = StepStats();
+    if (steps.size() > 1) history.clear();
+    for (const Step& step : steps) {
+      once(step);
+      if (contacts.size() == 1 || assurance.proved) assurance = assuranceOf(result);
+    }
+  }
   void once(const Step& step) {
     result = detect(step, options, history);
+    contacts.push_back(result.contacts);
+    sum += result.stats;
     const StepStats& stats = result.stats;
     for (std::size_t s = 0; s < stats.stages.size(); ++s) {
       times[toString(static_cast<Stage>(s))].ms.push_back(stats.stages[s].ms);
@@ -104,7 +140,7 @@ Run runOf(const Arguments& a, const std::string& name, const AccuracyOptions& ac
   Run run;
   run.name = name;
   Options& options = run.options;
-  options.keep_bounds = false;  // the same step again and again
+  options.keep_bounds = a.isSequence() && !a.forget;  // else the same step again and again
   options.accuracy = accuracy;
   options.num_threads = a.threads;
   options.step_budget_ms = a.budget_ms;
@@ -116,24 +152,26 @@ Run runOf(const Arguments& a, const std::string& name, const AccuracyOptions& ac
 
 nlohmann::json statsJson(const Arguments& a, const Run& run) {
   nlohmann::json j;
-  for (std::size_t s = 0; s < run.result.stats.stages.size(); ++s) {
-    const StageStats& stage = run.result.stats.stages[s];
+  for (std::size_t s = 0; s < run.sum.stages.size(); ++s) {
+    const StageStats& stage = run.sum.stages[s];
     j["pairs"][toString(static_cast<Stage>(s))] = {{"in", stage.in}, {"out", stage.out}};
   }
   for (const auto& [name, times] : run.times) j["ms"][name] = times.json();
-  for (std::size_t t = 0; t < run.result.stats.tiers.settled.size(); ++t) {
-    j["tiers"][toString(static_cast<Tier>(t))] = run.result.stats.tiers.settled[t];
+  for (std::size_t t = 0; t < run.sum.tiers.settled.size(); ++t) {
+    j["tiers"][toString(static_cast<Tier>(t))] = run.sum.tiers.settled[t];
   }
+  j["steps"] = run.contacts.size();
+  j["pairs_known_apart"] = run.sum.pairs_known_apart;
+  j["pairs_shown_apart"] = run.sum.pairs_shown_apart;
   j["threads"] = a.threads;
   j["simd_target"] = simdTarget();
   j["accuracy"] = run.name;
-  j["contacts"] = run.result.contacts.size();
-  j["undecided"] = run.result.stats.undecided;
+  j["contacts"] = run.contactCount();
+  j["undecided"] = run.sum.undecided;
   j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
-  const Assurance assurance = assuranceOf(run.result);
-  j["proved"] = assurance.proved;
-  j["missing"] = assurance.missing;
-  j["touching"] = toString(assurance.touching);
+  j["proved"] = run.assurance.proved;
+  j["missing"] = run.assurance.missing;
+  j["touching"] = toString(run.assurance.touching);
   j["complete"] = run.result.allPairs();
   j["start_state"] = toString(run.result.start_state);
   j["start_state_complete"] = run.result.start_state_complete;
@@ -146,8 +184,8 @@ void print(const Run& run) {
             << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
             << "median ms" << '\n';
   const double earliest = run.result.earliest_toc;
-  std::cout << std::left << std::setw(14) << run.name << std::right << std::setw(10) << run.result.contacts.size()
-            << std::setw(11) << run.result.stats.undecided << std::setw(14);
+  std::cout << std::left << std::setw(14) << run.name << std::right << std::setw(10) << run.contactCount()
+            << std::setw(11) << run.sum.undecided << std::setw(14);
   if (earliest <= 1)
     std::cout << earliest;
   else
@@ -156,21 +194,27 @@ void print(const Run& run) {
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
 
-Step stepOf(const Arguments& a) {
-  const MeshFile m0 = loadMeshFile(a.frame_0), m1 = loadMeshFile(a.frame_1);
-  if (m0.positions.size() != m1.positions.size() || m0.faces != m1.faces) {
-    throw std::runtime_error(a.frame_1 + ": not the topology of " + a.frame_0 + " (" +
-                             std::to_string(m1.positions.size()) + " vertices and " + std::to_string(m1.faces.size()) +
-                             " faces, expected " + std::to_string(m0.positions.size()) + " and " +
-                             std::to_string(m0.faces.size()) + ", the same ones)");
-  }
+std::vector<Step> stepsOf(const Arguments& a) {
+  const MeshFile first = loadMeshFile(a.frames[0]);
   Step step;
   step.bodies.resize(1);
-  step.bodies[0].name = a.frame_0;
-  step.bodies[0].topology = share(Topology::fromTriangles(m0.positions.size(), m0.faces));
-  step.bodies[0].t0 = share(m0.positions);
-  step.bodies[0].t1 = share(m1.positions);
-  return step;
+  step.bodies[0].name = a.frames[0];
+  step.bodies[0].topology = share(Topology::fromTriangles(first.positions.size(), first.faces));
+  step.bodies[0].t1 = share(first.positions);
+  std::vector<Step> steps;
+  for (std::size_t i = 1; i < a.frames.size(); ++i) {
+    const MeshFile next = loadMeshFile(a.frames[i]);
+    if (first.positions.size() != next.positions.size() || first.faces != next.faces) {
+      throw std::runtime_error(
+          a.frames[i] + ": not the topology of " + a.frames[0] + " (" + std::to_string(next.positions.size()) +
+          " vertices and " + std::to_string(next.faces.size()) + " faces, expected " +
+          std::to_string(first.positions.size()) + " and " + std::to_string(first.faces.size()) + ", the same ones)");
+    }
+    step.bodies[0].t0 = step.bodies[0].t1;
+    step.bodies[0].t1 = share(next.positions);
+    steps.push_back(step);
+  }
+  return steps;
 }
 
 /// Times of the same rounds, divided: what slows the machine down slows both.
@@ -182,9 +226,9 @@ MedianInterval ratioOf(const Run& run, const Run& to) {
 }
 
 /// All of them in turns, each round beginning with another, until the ratios are known or the rounds are over.
-void runInTurns(const Step& step, std::size_t most, std::vector<Run>& runs, const Run& usual) {
+void runInTurns(const std::vector<Step>& steps, std::size_t most, std::vector<Run>& runs, const Run& usual) {
   for (std::size_t round = 0; round < most; ++round) {
-    for (std::size_t i = 0; i < runs.size(); ++i) runs[(round + i) % runs.size()].once(step);
+    for (std::size_t i = 0; i < runs.size(); ++i) runs[(round + i) % runs.size()].once(steps);
     const bool narrow = std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
       const MedianInterval ratio = ratioOf(run, usual);
       return ratio.high <= ratio.median * (1 + NARROW) && ratio.low >= ratio.median * (1 - NARROW);
@@ -242,7 +286,7 @@ nlohmann::json compareSettings(const Arguments& a, std::vector<Run>& runs, const
     j["ratio"] = {{"to", usual.name}, {"low", ratio.low}, {"median", ratio.median}, {"high", ratio.high}};
     all[run.name] = std::move(j);
     timed_by_truth = errors.timed_by_truth;
-    if (!a.contacts.empty()) writeContacts(fileOf(a.contacts, run.name), run.result);
+    if (!a.contacts.empty()) writeContacts(fileOf(a.contacts, run.name), run.contacts);
   }
   std::cout << "TOC error: of either end of the interval, in steps; " << timed_by_truth
             << " times are the truth's, the others' the cells of " << runs.back().name << '\n';
@@ -251,13 +295,13 @@ nlohmann::json compareSettings(const Arguments& a, std::vector<Run>& runs, const
 
 int checkStep(const Arguments& a) {
   setSimdTarget(a.simd);
-  const Step step = stepOf(a);
+  const std::vector<Step> steps = stepsOf(a);
   nlohmann::json all;
   std::vector<Run> runs;
   if (a.accuracy == "all") {
     for (const AccuracySetting& setting : accuracySettings()) runs.push_back(runOf(a, setting.name, setting.accuracy));
     const Run& usual = *std::find_if(runs.begin(), runs.end(), [](const Run& r) { return r.name == DEFAULT_SETTING; });
-    runInTurns(step, static_cast<std::size_t>(a.repeat), runs, usual);
+    runInTurns(steps, static_cast<std::size_t>(a.repeat), runs, usual);
     all = compareSettings(a, runs, usual);
   } else {
     AccuracyOptions accuracy;
@@ -265,16 +309,15 @@ int checkStep(const Arguments& a) {
     accuracy.tolerance_m = a.tolerance_m;
     accuracy.toc_bits = a.toc_bits;
     runs.push_back(runOf(a, a.accuracy, accuracy));
-    for (int i = 0; i < a.repeat; ++i) runs[0].once(step);
+    for (int i = 0; i < a.repeat; ++i) runs[0].once(steps);
     print(runs[0]);
     all = statsJson(a, runs[0]);
-    if (!a.contacts.empty()) writeContacts(a.contacts, runs[0].result);
+    if (!a.contacts.empty()) writeContacts(a.contacts, runs[0].contacts);
   }
   bool proved = false;
   for (const Run& run : runs) {
-    const Assurance assurance = assuranceOf(run.result);
-    proved = assurance.proved;  // of several settings the last and most accurate one's
-    std::cout << run.name << ": " << describe(assurance) << '\n';
+    proved = run.assurance.proved;  // of several settings the last and most accurate one's
+    std::cout << run.name << ": " << describe(run.assurance) << '\n';
   }
   if (!a.stats.empty()) {
     std::ofstream out(a.stats);
@@ -287,7 +330,7 @@ int checkStep(const Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Contacts of one step between two meshes of the same topology"};
+  CLI::App app{"Contacts of the steps between meshes of the same topology"};
   app.footer("Exit status: 0 when the answer is proved, with contacts or without; 3 when it is not; 1 on an error.");
   try {
     return checkStep(parse(argc, argv, app));

@@ -102,9 +102,13 @@ void ClusterTree::mask(const std::uint8_t* active) {
 
 void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
                               std::size_t last_group) {
-  const std::vector<Index>& features = masked_.empty() ? features_ : masked_;
-  simd::buildLeaves(records, features.data() + first_group * GROUP * arity_, arity_, (last_group - first_group) * GROUP,
-                    margin16, levels_[0].soa.data() + first_group * SOA_SIZE,
+  simd::buildLeaves(records, boundedGroup(first_group), arity_, (last_group - first_group) * GROUP, margin16,
+                    levels_[0].soa.data() + first_group * SOA_SIZE, levels_[0].aos.data() + first_group * AOS_SIZE);
+}
+
+void ClusterTree::boundLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+                              std::size_t last_group) {
+  simd::boundLeaves(records, boundedGroup(first_group), arity_, (last_group - first_group) * GROUP, margin16,
                     levels_[0].aos.data() + first_group * AOS_SIZE);
 }
 

@@ -50,6 +50,9 @@ class ClusterTree {
   /// Recomputes all bounds from the vertices' records. margin16: see simd::buildLeaves.
   void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
                    std::size_t last_group);
+  /// The groups' bounds alone; what their members are is then of another step.
+  void boundLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
+                   std::size_t last_group);
   void refitUpper();
 
   std::size_t featureCount() const { return feature_count_; }
@@ -58,6 +61,10 @@ class ClusterTree {
   const Level& level(std::size_t l) const { return levels_[l]; }
   /// Vertex indices of the feature in a slot; only slots below featureCount() hold one.
   const Index* feature(std::size_t slot) const { return features_.data() + slot * arity_; }
+  /// Those of a group's 16 slots as the bounds have them: without what is masked, NO_INDEX in empty ones.
+  const Index* boundedGroup(std::size_t group) const {
+    return (masked_.empty() ? features_ : masked_).data() + group * simd::GROUP * arity_;
+  }
 
  private:
   std::size_t feature_count_ = 0;

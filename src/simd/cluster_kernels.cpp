@@ -130,6 +130,30 @@ HWY_INLINE void finishGroup(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
   transpose16(hi, soa + RECORD * GROUP);
 }
 
+// Smallest and largest values k of a feature, widened by the margins; of an empty lane the empty values.
+template <class D, class V>
+HWY_INLINE void boundFeature(D d, const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT f, size_t arity,
+                             const int16_t* HWY_RESTRICT margin16, size_t k, V& small, V& large) {
+  small = hn::Set(d, EMPTY_LO);
+  large = hn::Set(d, EMPTY_HI);
+  if (f[0] == UINT32_MAX) return;
+  small = large = hn::LoadU(d, records + RECORD * size_t{f[0]} + k);
+  for (size_t j = 1; j < arity; ++j) {
+    const auto r = hn::LoadU(d, records + RECORD * size_t{f[j]} + k);
+    small = hn::Min(small, r);
+    large = hn::Max(large, r);
+  }
+  if (!margin16) return;
+  // Saturation at the empty values would hide a feature; the record range leaves room on both sides. What ends there
+  // reaches every record, which all lie within; but a margin of half the range reaches no end from the other one, so
+  // that what is cut off at UNBOUNDED goes there outright.
+  const auto m = hn::LoadU(d, margin16 + k);
+  const auto lowest = hn::Set(d, int16_t{-32766}), highest = hn::Set(d, int16_t{32766});
+  const auto unbounded = hn::Eq(m, hn::Set(d, UNBOUNDED));
+  small = hn::IfThenElse(unbounded, lowest, hn::Max(hn::SaturatedSub(small, m), lowest));
+  large = hn::IfThenElse(unbounded, highest, hn::Min(hn::SaturatedAdd(large, m), highest));
+}
+
 void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
                  const int16_t* HWY_RESTRICT margin16, int16_t* HWY_RESTRICT soa, int16_t* HWY_RESTRICT aos) {
   const D16 d;
@@ -137,34 +161,33 @@ void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRI
   HWY_ALIGN int16_t hi[GROUP * RECORD];
   for (size_t g = 0; g < count / GROUP; ++g) {
     for (size_t i = 0; i < GROUP; ++i) {
-      const uint32_t* f = indices + (g * GROUP + i) * arity;
-      const bool used = f[0] != UINT32_MAX;
       for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
-        auto small = hn::Set(d, EMPTY_LO);
-        auto large = hn::Set(d, EMPTY_HI);
-        if (used) {
-          small = large = hn::LoadU(d, records + RECORD * size_t{f[0]} + k);
-          for (size_t j = 1; j < arity; ++j) {
-            const auto r = hn::LoadU(d, records + RECORD * size_t{f[j]} + k);
-            small = hn::Min(small, r);
-            large = hn::Max(large, r);
-          }
-          if (margin16) {
-            // Saturation at the empty values would hide a feature; the record range leaves room on both sides. What
-            // ends there reaches every record, which all lie within; but a margin of half the range reaches no end from
-            // the other one, so that what is cut off at UNBOUNDED goes there outright.
-            const auto m = hn::LoadU(d, margin16 + k);
-            const auto lowest = hn::Set(d, int16_t{-32766}), highest = hn::Set(d, int16_t{32766});
-            const auto unbounded = hn::Eq(m, hn::Set(d, UNBOUNDED));
-            small = hn::IfThenElse(unbounded, lowest, hn::Max(hn::SaturatedSub(small, m), lowest));
-            large = hn::IfThenElse(unbounded, highest, hn::Min(hn::SaturatedAdd(large, m), highest));
-          }
-        }
+        hn::Vec<D16> small, large;
+        boundFeature(d, records, indices + (g * GROUP + i) * arity, arity, margin16, k, small, large);
         hn::Store(small, d, lo + i * RECORD + k);
         hn::Store(large, d, hi + i * RECORD + k);
       }
     }
     finishGroup(lo, hi, soa + g * SOA_SIZE, aos + g * AOS_SIZE);
+  }
+}
+
+void BoundLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
+                 const int16_t* HWY_RESTRICT margin16, int16_t* HWY_RESTRICT aos) {
+  const D16 d;
+  for (size_t g = 0; g < count / GROUP; ++g) {
+    for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
+      auto lowest = hn::Set(d, EMPTY_LO);
+      auto highest = hn::Set(d, EMPTY_HI);
+      for (size_t i = 0; i < GROUP; ++i) {
+        hn::Vec<D16> small, large;
+        boundFeature(d, records, indices + (g * GROUP + i) * arity, arity, margin16, k, small, large);
+        lowest = hn::Min(lowest, small);
+        highest = hn::Max(highest, large);
+      }
+      hn::StoreU(lowest, d, aos + g * AOS_SIZE + k);
+      hn::StoreU(highest, d, aos + g * AOS_SIZE + RECORD + k);
+    }
   }
 }
 
@@ -230,6 +253,47 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
   return bits;
 }
 
+// The surviving lanes of one pair of groups, less those in `shared` where it is given: to o, which is returned moved
+// on.
+template <bool T0_ONLY>
+HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
+                              Diagonal diagonal, const uint16_t* HWY_RESTRICT shared, uint32_t* HWY_RESTRICT o) {
+  const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
+  const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
+  const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
+  const int16_t* HWY_RESTRICT bound_b = b.aos + size_t{h} * AOS_SIZE;
+  uint32_t rows = same ? 0xffffu : meeting<T0_ONLY>(bound_b, bound_b + RECORD, 1, sa);
+  if (rows == 0) return o;
+  uint32_t cols = same ? 0xffffu : meeting<T0_ONLY>(bound_a, bound_a + RECORD, 1, sb);
+  if (cols == 0) return o;
+  // Broadcast the nodes of the side with fewer left.
+  const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
+  const int16_t* HWY_RESTRICT outer = by_rows ? sa : sb;
+  const int16_t* HWY_RESTRICT inner = by_rows ? sb : sa;
+  uint32_t outer_left = by_rows ? rows : cols;
+  const uint32_t inner_mask = by_rows ? cols : rows;
+  const uint32_t base_outer = (by_rows ? g : h) * GROUP, base_inner = (by_rows ? h : g) * GROUP;
+  while (outer_left) {
+    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(outer_left));
+    outer_left &= outer_left - 1;
+    uint32_t mask = inner_mask;
+    if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
+    if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
+    if (shared && by_rows) mask &= ~uint32_t{shared[i]};
+    if (mask == 0) continue;
+    mask &= meeting<T0_ONLY>(outer + i, outer + RECORD * GROUP + i, GROUP, inner);
+    while (mask) {
+      const uint32_t j = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
+      mask &= mask - 1;
+      if (shared && !by_rows && (shared[j] >> i & 1)) continue;
+      o[by_rows ? 0 : 1] = base_outer + i;
+      o[by_rows ? 1 : 0] = base_inner + j;
+      o += 2;
+    }
+  }
+  return o;
+}
+
 template <bool T0_ONLY>
 size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* HWY_RESTRICT group_pairs, size_t count,
                       bool self, Diagonal diagonal, uint32_t* HWY_RESTRICT out, size_t capacity, size_t* consumed) {
@@ -237,8 +301,6 @@ size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* 
   size_t p = 0;
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
-    const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
-    const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
     if (p + 1 < count) {
       const int16_t* next_a = a.soa + size_t{group_pairs[2 * p + 2]} * SOA_SIZE;
       const int16_t* next_b = b.soa + size_t{group_pairs[2 * p + 3]} * SOA_SIZE;
@@ -247,36 +309,7 @@ size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* 
         hwy::Prefetch(next_b + line);
       }
     }
-    const bool same = self && g == h;
-    const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
-    const int16_t* HWY_RESTRICT bound_b = b.aos + size_t{h} * AOS_SIZE;
-    uint32_t rows = same ? 0xffffu : meeting<T0_ONLY>(bound_b, bound_b + RECORD, 1, sa);
-    if (rows == 0) continue;
-    uint32_t cols = same ? 0xffffu : meeting<T0_ONLY>(bound_a, bound_a + RECORD, 1, sb);
-    if (cols == 0) continue;
-    // Broadcast the nodes of the side with fewer left.
-    const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
-    const int16_t* HWY_RESTRICT outer = by_rows ? sa : sb;
-    const int16_t* HWY_RESTRICT inner = by_rows ? sb : sa;
-    uint32_t outer_left = by_rows ? rows : cols;
-    const uint32_t inner_mask = by_rows ? cols : rows;
-    const uint32_t base_outer = (by_rows ? g : h) * GROUP, base_inner = (by_rows ? h : g) * GROUP;
-    while (outer_left) {
-      const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(outer_left));
-      outer_left &= outer_left - 1;
-      uint32_t mask = inner_mask;
-      if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
-      if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
-      if (mask == 0) continue;
-      mask &= meeting<T0_ONLY>(outer + i, outer + RECORD * GROUP + i, GROUP, inner);
-      while (mask) {
-        const uint32_t j = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
-        mask &= mask - 1;
-        o[by_rows ? 0 : 1] = base_outer + i;
-        o[by_rows ? 1 : 0] = base_inner + j;
-        o += 2;
-      }
-    }
+    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, nullptr, o);
   }
   *consumed = p;
   return static_cast<size_t>(o - out) / 2;
@@ -291,6 +324,102 @@ size_t TestGroupPairsT0(const GroupsView& a, const GroupsView& b, const uint32_t
   return TestGroupPairs<true>(a, b, group_pairs, count, self, diagonal, out, capacity, consumed);
 }
 
+bool SharedVertices(const uint32_t* HWY_RESTRICT fa, size_t a_arity, const uint32_t* HWY_RESTRICT fb, size_t b_arity,
+                    uint16_t* HWY_RESTRICT shared) {
+  const hn::CappedTag<uint32_t, GROUP> d;
+  HWY_ALIGN uint32_t lanes[3 * GROUP];
+  for (size_t j = 0; j < GROUP; ++j) {
+    for (size_t y = 0; y < b_arity; ++y) lanes[y * GROUP + j] = fb[j * b_arity + y];
+  }
+  uint32_t any = 0;
+  for (size_t i = 0; i < GROUP; ++i) {
+    uint32_t row = 0;
+    if (fa[i * a_arity] != UINT32_MAX) {
+      for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
+        auto same = hn::Zero(d);
+        for (size_t x = 0; x < a_arity; ++x) {
+          const auto v = hn::Set(d, fa[i * a_arity + x]);
+          for (size_t y = 0; y < b_arity; ++y) {
+            same = hn::Or(same, hn::VecFromMask(d, hn::Eq(v, hn::Load(d, lanes + y * GROUP + part))));
+          }
+        }
+        uint8_t packed[8] = {0};
+        hn::StoreMaskBits(d, hn::Ne(same, hn::Zero(d)), packed);
+        uint32_t word;
+        std::memcpy(&word, packed, 4);
+        row |= (word & ((1u << hn::Lanes(d)) - 1)) << part;
+      }
+    }
+    shared[i] = static_cast<uint16_t>(row);
+    any |= row;
+  }
+  return any != 0;
+}
+
+size_t TestLeafPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool self, const uint16_t* shared,
+                    uint32_t* out) {
+  const uint32_t* end = testPair<false>(a, b, g, h, self && g == h, Diagonal::STRICT_UPPER, shared, out);
+  return static_cast<size_t>(end - out) / 2;
+}
+
+int16_t GapAtEnd(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool self, const uint16_t* shared,
+                 const uint16_t* HWY_RESTRICT weights, int16_t target, uint8_t* HWY_RESTRICT near, size_t room,
+                 size_t* found) {
+  const D16 d;
+  const hn::RebindToUnsigned<D16> du;
+  // The half at t1 of the smallest values, then of the largest.
+  const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE + 8 * GROUP;
+  const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE + 8 * GROUP;
+  const bool same = self && g == h;
+  const auto zero = hn::Zero(d);
+  size_t n = 0;
+  auto smallest = hn::Set(d, EMPTY_LO);
+  for (size_t i = 0; i < GROUP; ++i) {
+    if (sa[i] == EMPTY_LO) continue;
+    uint32_t wanted = shared ? ~uint32_t{shared[i]} & 0xffffu : 0xffffu;
+    if (same) wanted &= ~0u << (i + 1);
+    if ((wanted & 0xffffu) == 0) continue;
+    for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
+      auto best = hn::Set(d, int16_t{-32767});
+      for (size_t k = 0; k < DIRECTIONS; ++k) {
+        const int16_t lo = sa[k * GROUP + i], hi = sa[RECORD * GROUP + k * GROUP + i];
+        const auto above = hn::SaturatedSub(hn::Set(d, lo), hn::Load(d, sb + (RECORD + k) * GROUP + part));
+        const auto below = hn::SaturatedSub(hn::Load(d, sb + k * GROUP + part), hn::Set(d, hi));
+        // More than a unit less than the gap; negative ones say nothing and need not be right.
+        const auto gap = hn::Max(hn::Sub(hn::Max(hn::Max(above, below), zero), hn::Set(d, int16_t{1})), zero);
+        const auto scaled = hn::MulHigh(hn::BitCast(du, gap), hn::Set(du, weights[k]));
+        best = hn::Max(best, hn::BitCast(d, scaled));
+      }
+      // Lanes that are not wanted, or empty, are as far as can be.
+      HWY_ALIGN uint8_t bits[8] = {0};
+      const uint32_t word = wanted >> part;
+      std::memcpy(bits, &word, 4);
+      const auto counts = hn::And(hn::LoadMaskBits(d, bits), hn::Ne(hn::Load(d, sb + part), hn::Set(d, EMPTY_LO)));
+      best = hn::IfThenElse(counts, best, hn::Set(d, EMPTY_LO));
+      const auto is_near = hn::Lt(best, hn::Set(d, target));
+      if (!hn::AllFalse(d, is_near)) {
+        uint8_t packed[8] = {0};
+        hn::StoreMaskBits(d, is_near, packed);
+        uint32_t mask;
+        std::memcpy(&mask, packed, 4);
+        mask &= (1u << hn::Lanes(d)) - 1;
+        while (mask) {
+          const uint32_t j = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
+          mask &= mask - 1;
+          if (n < room) near[n] = static_cast<uint8_t>(i * GROUP + part + j);
+          ++n;
+        }
+        best = hn::IfThenElse(is_near, hn::Set(d, EMPTY_LO), best);
+      }
+      smallest = hn::Min(smallest, best);
+    }
+  }
+  *found = n;
+  HWY_ALIGN int16_t lanes[GROUP];
+  hn::Store(smallest, d, lanes);
+  return *std::min_element(lanes, lanes + hn::Lanes(d));
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
 }  // namespace dccd
@@ -302,9 +431,13 @@ namespace simd {
 HWY_EXPORT(ProjectionBounds);
 HWY_EXPORT(Quantize);
 HWY_EXPORT(BuildLeaves);
+HWY_EXPORT(BoundLeaves);
 HWY_EXPORT(BuildUpper);
 HWY_EXPORT(TestGroupPairsBoth);
 HWY_EXPORT(TestGroupPairsT0);
+HWY_EXPORT(SharedVertices);
+HWY_EXPORT(TestLeafPair);
+HWY_EXPORT(GapAtEnd);
 
 void projectionBounds(const double* vertices, std::size_t n, double* min8, double* max8) {
   HWY_DYNAMIC_DISPATCH(ProjectionBounds)(vertices, n, min8, max8);
@@ -316,6 +449,10 @@ void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std:
                  const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildLeaves)(records, indices, arity, count, margin16, soa, aos);
 }
+void boundLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 const std::int16_t* margin16, std::int16_t* aos) {
+  HWY_DYNAMIC_DISPATCH(BoundLeaves)(records, indices, arity, count, margin16, aos);
+}
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildUpper)(child_aos, child_count, soa, aos);
 }
@@ -326,6 +463,20 @@ std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::
              ? HWY_DYNAMIC_DISPATCH(TestGroupPairsT0)(a, b, group_pairs, count, self, diagonal, out, capacity, consumed)
              : HWY_DYNAMIC_DISPATCH(TestGroupPairsBoth)(a, b, group_pairs, count, self, diagonal, out, capacity,
                                                         consumed);
+}
+
+bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,
+                    std::size_t b_arity, std::uint16_t* shared) {
+  return HWY_DYNAMIC_DISPATCH(SharedVertices)(indices_a, a_arity, indices_b, b_arity, shared);
+}
+std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
+                         const std::uint16_t* shared, std::uint32_t* out) {
+  return HWY_DYNAMIC_DISPATCH(TestLeafPair)(a, b, g, h, self, shared, out);
+}
+std::int16_t gapAtEnd(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
+                      const std::uint16_t* shared, const std::uint16_t* weights, std::int16_t target,
+                      std::uint8_t* near, std::size_t room, std::size_t* found) {
+  return HWY_DYNAMIC_DISPATCH(GapAtEnd)(a, b, g, h, self, shared, weights, target, near, room, found);
 }
 
 }  // namespace simd

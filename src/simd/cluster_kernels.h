@@ -44,6 +44,11 @@ void quantize(const double* vertices, std::size_t n, const double* low8, const d
 void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
                  const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos);
 
+/// The bounds of the groups alone, as buildLeaves() has them: for what is seen to be apart without a look at its
+/// members.
+void boundLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
+                 const std::int16_t* margin16, std::int16_t* aos);
+
 /// Groups of the level above: child_aos holds child_count bounds; groups are filled up with empty lanes.
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos);
 
@@ -63,6 +68,27 @@ enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UP
 std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                            std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
                            std::size_t capacity, std::size_t* consumed);
+
+/// Which lanes of two groups share a vertex: bit j of shared[i] says that feature i of a and feature j of b do. Empty
+/// lanes share none. indices_a, indices_b: 16 features of a_arity and b_arity vertices each, UINT32_MAX in empty ones.
+/// Returns whether any do.
+bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,
+                    std::size_t b_arity, std::uint16_t* shared);
+
+/// testGroupPairs() for one pair of leaf groups (g, h), STRICT_UPPER, both times, without the lanes in `shared`, which
+/// may be null: what it writes is what that would write, in that order, less those. out has room for 256 pairs.
+std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
+                         const std::uint16_t* shared, std::uint32_t* out);
+
+/// How far the features of two leaf groups are apart at t1, in any of the directions, of which `weights` says how much
+/// a record unit counts, in 2^-16 of a common unit. Rounded down; EMPTY_LO where there is no pair. Pairs in `shared`
+/// (may be null) do not count, nor do those (i, j) that are listed in `near`: those less than `target` apart, as i * 16
+/// + j, up to `room`; *found says how many there are. self: each pair once, and none with itself. In proof: a gap of n
+/// record units between two numbers truncated to a unit is one of more than n - 1 of the projections, and the
+/// directions' lengths and the rounding are the weights' affair.
+std::int16_t gapAtEnd(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
+                      const std::uint16_t* shared, const std::uint16_t* weights, std::int16_t target,
+                      std::uint8_t* near, std::size_t room, std::size_t* found);
 
 }  // namespace simd
 }  // namespace dccd

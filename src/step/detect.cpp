@@ -69,6 +69,8 @@ void Carried::clear() {
   apart.clear();
   start_state.clear();
   inside.clear();
+  memory.clear();
+  map = std::vector<MapAnswer>();
 }
 
 bool Carried::isContinuedBy(const Step& step) const {
@@ -168,6 +170,7 @@ void History::Impl::setOptions(const Options& wanted) {
   elementary = std::move(rung);
   scene.setKeepBounds(wanted.keep_bounds);
   obstacle_checks.clear();
+  carried.map.clear();
   expected_known = false;
   map_given = nullptr;  // other boxes may be excluded
   options = wanted;
@@ -278,7 +281,9 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   result.stats.left_out_listed = left_out_list.size();
   if (options->accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options->accuracy.tolerance_m;
   findPairs(context);
+  if (carried.memory.isOn()) useMemory(context);
   runPairs(context);
+  if (remembers) rememberPairs(context);
   hits_done = Clock::now();
   collect(part.step, part.deadline);
   const bool all_pairs = result.complete;
@@ -299,6 +304,8 @@ void History::Impl::leaveOutPart(const Part& part) {
   carried.apart.clear();
   carried.start_state.clear();
   carried.inside.clear();
+  carried.memory.clear();
+  carried.map.clear();
 }
 
 /// The part's positions into the scene's arrays, and what of it needs bounds.
@@ -306,6 +313,9 @@ bool History::Impl::fill(const Part& part) {
   StepStats& stats = result.stats;
   Clock::time_point start = Clock::now();
   scene.record(part.step, stats);
+  for (std::size_t b = 0; b < carried.map.size(); ++b) {
+    if (!scene.bodies()[b].unchanged) carried.map[b] = MapAnswer();
+  }
   if (observer) observer->onPart(part.index, scene);
   if (scene.uncertain()) checkHoldsDistance(*options, "an uncertainty radius");
   stats[Stage::RECORD] = {scene.vertexCount(), scene.vertexCount(), msSince(start)};
@@ -323,7 +333,15 @@ bool History::Impl::fill(const Part& part) {
       }
     });
   };
-  if (needsTrees(part)) scene.refit(inPieces, stats);
+  remembers = mayRemember(part) && needsTrees(part);
+  if (!remembers) carried.memory.clear();
+  if (needsTrees(part)) {
+    const bool searches = checksStartState(part) && !isStartKnown() && carried.start_state.needsTrees(part.continues);
+    scene.refit(inPieces, stats, searches || !carried.memory.isOn());
+    if (remembers && !late && carried.memory.state() != PairMemory::State::OFF) {
+      carried.memory.beginStep(scene, inPieces);
+    }
+  }
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;
 }

@@ -22,6 +22,7 @@
 #include "step/hit_order.h"
 #include "step/inside.h"
 #include "step/left_out.h"
+#include "step/pair_memory.h"
 #include "step/pair_worker.h"
 #include "step/patches.h"
 #include "step/start_state.h"
@@ -53,6 +54,14 @@ struct PartResult {
   StepStats stats;
 };
 
+/// The contacts of a body with the map, as long as neither changes.
+struct MapAnswer {
+  std::shared_ptr<const VoxelSurface> map;  ///< null: none
+  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
+  std::vector<Contact> contacts;
+  std::uint64_t pairs = 0;  ///< that were tested
+};
+
 /// What is known of the end of the last step, and nothing else that could change an answer: clear() is its beginning.
 struct Carried {
   std::vector<std::shared_ptr<const Positions>>
@@ -60,9 +69,13 @@ struct Carried {
   std::vector<std::uint8_t> apart;  ///< per body: it certainly did not touch itself
   StartStateSearch start_state;     ///< what may meet there
   InsideSearch inside;              ///< and what may be inside of something
+  PairMemory memory;                ///< and by how much what is apart is so
+  std::vector<MapAnswer> map;       ///< per body that has not moved since; empty: none
 
   void clear();
-  bool isClear() const { return end.empty() && apart.empty() && start_state.isClear() && inside.isClear(); }
+  bool isClear() const {
+    return end.empty() && apart.empty() && start_state.isClear() && inside.isClear() && memory.isClear() && map.empty();
+  }
   /// Does the step begin where the last one ended? Every body bit for bit. The one place that decides it.
   bool isContinuedBy(const Step& step) const;
 };
@@ -96,6 +109,10 @@ struct History::Impl {
   void orderByBound(const TreePair& trees);
   void findPairs(const StepContext& context);
   void runPairs(StepContext& context);
+  /// Whether certificates may be used or made in this part; what cannot be used is forgotten.
+  bool mayRemember(const Part& part);
+  void useMemory(StepContext& context);
+  void rememberPairs(const StepContext& context);
   void cutHits();
   /// What may be found in a whole step with these options and bodies; FoundLimit::NONE: no limit.
   std::size_t foundLimit() const;
@@ -107,6 +124,9 @@ struct History::Impl {
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runMap(const Part& part);
   bool runMapOf(std::size_t body, const Part& part, ObstacleStats& total);
+  /// The body's contacts with the map where they are known to be those of the step before; false: they are not.
+  bool takeMapAnswer(std::size_t body, const Part& part, std::size_t room, ObstacleStats& total);
+  void keepMapAnswer(std::size_t body, const Part& part, std::size_t first, std::uint64_t pairs);
   bool checksStartState(const Part& part) const;
   bool isStartKnown() const;
   /// all_pairs: no pair of meshes was left out.
@@ -117,6 +137,7 @@ struct History::Impl {
   void parallel(std::size_t n, std::size_t piece, const Function& function);
 
   Carried carried;
+  bool remembers = false;  // in this part
   StepObserver* observer = nullptr;
   Impl* begins_at = nullptr;  // the next step begins where this one's ended
   bool aside = false;         // so did the step that is being run

@@ -13,6 +13,29 @@ std::uint64_t pairsIn(const ObstacleStats& stats) {
 
 }  // namespace
 
+bool History::Impl::takeMapAnswer(std::size_t b, const Part& part, std::size_t room, ObstacleStats& total) {
+  if (b >= carried.map.size() || !options->keep_bounds) return false;
+  MapAnswer& known = carried.map[b];
+  const bool same = scene.bodies()[b].unchanged && known.map && known.map == map_reduced &&
+                    known.pose == part.step.map.map_from_fixed.matrix();
+  if (!same) known = MapAnswer();
+  if (!same || known.contacts.size() > room) return false;
+  result.contacts.insert(result.contacts.end(), known.contacts.begin(), known.contacts.end());
+  total.vertex_pairs_in += known.pairs;
+  ++result.stats.map_answers_kept;
+  return true;
+}
+
+/// What moves has other contacts in the next step: they are kept of what has not moved once already.
+void History::Impl::keepMapAnswer(std::size_t b, const Part& part, std::size_t first, std::uint64_t pairs) {
+  if (!scene.bodies()[b].unchanged || !options->keep_bounds) return;
+  carried.map.resize(scene.bodies().size());
+  carried.map[b] = {map_reduced,
+                    part.step.map.map_from_fixed.matrix(),
+                    {result.contacts.begin() + static_cast<std::ptrdiff_t>(first), result.contacts.end()},
+                    pairs};
+}
+
 /// False where the deadline cut it.
 bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& total) {
   const SceneBody& body = scene.bodies()[b];
@@ -28,23 +51,30 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
     for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];
     active = obstacle_active.data();
   }
-  const Deadline::Clock::time_point start = Deadline::Clock::now();
-  const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
   const Body& moving = part.step.bodies[b];
   const Positions& t0 = inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0);
   const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1);
   const std::size_t room =
       found_limit == FoundLimit::NONE ? FoundLimit::NONE : found_limit - std::min(found_limit, result.contacts.size());
+  const Deadline::Clock::time_point start = Deadline::Clock::now();
+  const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
+  const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
+                        : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
+                                                                 : Effect::OCTOMAP;
+  const auto count = [&] {
+    result.stats[effect] += StageStats{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(start)};
+  };
+  if (takeMapAnswer(b, part, room, total)) {
+    count();
+    return true;
+  }
   const Deadline deadline = part.deadline.movedBy(-per_hit * static_cast<std::int64_t>(result.contacts.size()));
   const bool whole = obstacle_checks[b]->run(*map_reduced, *body.setup.topology, t0, t1, active,
                                              static_cast<std::uint16_t>(b), result.contacts, total,
                                              body.uncertain ? moving.radius_m->data() : nullptr, deadline, room);
   if (obstacle_checks[b]->isFull()) result.cut = true;
-  const StageStats of_body{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(start)};
-  const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
-                        : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
-                                                                 : Effect::OCTOMAP;
-  result.stats[effect] += of_body;
+  if (whole && !obstacle_checks[b]->isFull()) keepMapAnswer(b, part, out_before, pairsIn(total) - in_before);
+  count();
   return whole;
 }
 

@@ -32,7 +32,8 @@ PairWorker::PairWorker()
       keys_(CAPACITY),
       kept_(CAPACITY),
       results_(CAPACITY),
-      separations_(CAPACITY) {}
+      separations_(CAPACITY),
+      remembered_slots_(2 * ClusterPairStream::CHUNK) {}
 
 void PairWorker::beginStep() {
   for (auto& h : hits_) {
@@ -103,14 +104,17 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
                        task.self && task.kind == PairKind::EDGE_EDGE, false};
   const Clock::time_point whole = Clock::now();
   Clock::time_point start = whole;
+  const double contact_m = context.contactDistance(task.body_a, task.body_b);
   for (std::size_t p = task.first; p < task.last; ++p) {
     const bool whole_pair =
-        goesOn() && stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
-          start = lap(Stage::BROAD_PHASE, start);
-          take(slots, n);
-          start = Clock::now();
-          return goesOn();
-        });
+        !goesOn()        ? false
+        : context.memory ? testRemembered(context.memory->group(p), contact_m, start)
+                         : stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
+                             start = lap(Stage::BROAD_PHASE, start);
+                             take(slots, n);
+                             start = Clock::now();
+                             return goesOn();
+                           });
     if (whole_pair) continue;
     leaveOut(trees, pairs, p);
     break;
@@ -120,6 +124,29 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   stats_[effect()].ms += msSince(whole) - separated_ms_;
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
+}
+
+/// What the memory says of a group is to be tested. False: it was not gone through.
+bool PairWorker::testRemembered(PairMemory::Group& group, double contact_m, Clock::time_point& start) {
+  constexpr std::size_t MOST = simd::GROUP * simd::GROUP;
+  std::size_t n = 0;
+  const auto pass = [&] {
+    start = lap(Stage::BROAD_PHASE, start);
+    take(remembered_slots_.data(), n);
+    start = Clock::now();
+    n = 0;
+    return goesOn();
+  };
+  for (PairMemory::Pair& pair : group.pairs) {
+    if (!pair.to_test) {
+      ++stats_.pairs_known_apart;
+      continue;
+    }
+    n += context_->memory->test(*context_->scene, group, pair, contact_m, remembered_slots_.data() + 2 * n, stats_);
+    stats_[Stage::BROAD_PHASE].in += MOST;
+    if (n + MOST > ClusterPairStream::CHUNK && !pass()) return false;
+  }
+  return n == 0 || pass();
 }
 
 /// Of what was not looked at here all that is known is when the groups can meet.

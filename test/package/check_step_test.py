@@ -1,5 +1,6 @@
 """check_step says "nothing touches" only where that is proved, else why not, and its exit status tells the two apart."""
 import json
+import math
 import os
 import pathlib
 import subprocess
@@ -97,6 +98,63 @@ class CheckStepTest(unittest.TestCase):
         done = subprocess.run([tool(), 'nowhere.ply', 'nowhere.ply'], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertEqual(subprocess.run([tool(), '--no-such-flag'], capture_output=True).returncode, 1)
+
+
+class SequenceTest(unittest.TestCase):
+    """A sheet that is rolled up, turns and is rolled tighter, until its layers meet: more than two frames are steps."""
+
+    N = 40
+
+    def frame(self, k):
+        points = []
+        for r in range(self.N):
+            for c in range(self.N):
+                angle = 10.0 * c / self.N
+                radius = 0.2 + (0.02 - 0.004 * k) * angle + 0.001 * math.sin(5 * r + 3 * c)
+                turned = angle + 0.1 * k
+                points.append((radius * math.cos(turned), radius * math.sin(turned), r / self.N))
+        return points
+
+    def test_each_step_has_the_answer_that_it_has_alone(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            frames = [str(folder / ('%d.ply' % k)) for k in range(7)]
+            for k, path in enumerate(frames):
+                write(pathlib.Path(path), self.frame(k), faces_of(self.N))
+
+            def run(frames, *flags):
+                done = subprocess.run([tool(), *frames, '--contacts', str(folder / 'out.csv'), '--stats', str(folder / 'out.json'),
+                                       *flags], capture_output=True, text=True)
+                self.assertEqual(done.stderr, '')
+                return (folder / 'out.csv').read_text(), json.loads((folder / 'out.json').read_text())
+
+            kept, stats = run(frames)
+            forgot, without = run(frames, '--forget')
+            self.assertEqual(kept, forgot)
+            self.assertEqual(kept, run(frames, '--threads', '2')[0])
+            self.assertGreater(stats['pairs_known_apart'], 0)
+            self.assertEqual(without['pairs_known_apart'], 0)
+            self.assertEqual(stats['steps'], 6)
+            self.assertEqual(set(stats['ms']['total']), {'best', 'median', 'mean'})
+            header, *rows = kept.splitlines()
+            self.assertEqual(header, 'step,kind,v0,v1,v2,v3,toc_lower,toc_upper,certainty')
+            alone = []
+            for k in range(6):
+                first, *of_step = run(frames[k:k + 2])[0].splitlines()
+                self.assertEqual('step,' + first, header)
+                alone += ['%d,%s' % (k, row) for row in of_step]
+            self.assertEqual(rows, alone)
+            self.assertGreater(len(rows), 10)
+
+    def test_a_frame_of_another_mesh_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            for k in range(3):
+                n = self.N if k < 2 else 8
+                write(folder / ('%d.ply' % k), self.frame(k) if k < 2 else sheet(0, 8), faces_of(n))
+            done = subprocess.run([tool(), *(str(folder / ('%d.ply' % k)) for k in range(3))], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn('2.ply: not the topology of', done.stderr)
 
 
 if __name__ == '__main__':

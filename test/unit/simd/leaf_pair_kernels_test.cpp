@@ -1,0 +1,186 @@
+// The kernels for single pairs of leaf groups against plain references, on every target that runs.
+#include <gtest/gtest.h>
+#include <hwy/aligned_allocator.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "simd/cluster_kernels.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+using namespace simd;
+using Random = std::mt19937_64;
+
+/// Two groups of features over the same few vertices, some lanes empty.
+struct LeafGroups {
+  std::size_t arity;
+  std::vector<std::uint32_t> features;  // 2 x 16 x arity
+  hwy::AlignedFreeUniquePtr<std::int16_t[]> records, soa, aos, bounds;
+
+  LeafGroups(Random& random, std::size_t vertices, std::size_t arity, const std::int16_t* margin,
+             const hwy::AlignedFreeUniquePtr<std::int16_t[]>& of)
+      : arity(arity),
+        soa(hwy::AllocateAligned<std::int16_t>(2 * SOA_SIZE)),
+        aos(hwy::AllocateAligned<std::int16_t>(2 * AOS_SIZE)),
+        bounds(hwy::AllocateAligned<std::int16_t>(2 * AOS_SIZE)) {
+    for (std::size_t i = 0; i < 2 * GROUP; ++i) {
+      const bool empty = random() % 10 == 0;
+      const std::size_t first = random() % vertices;
+      for (std::size_t k = 0; k < arity; ++k) {
+        features.push_back(empty ? UINT32_MAX : static_cast<std::uint32_t>((first + k) % vertices));
+      }
+    }
+    buildLeaves(of.get(), features.data(), arity, 2 * GROUP, margin, soa.get(), aos.get());
+    boundLeaves(of.get(), features.data(), arity, 2 * GROUP, margin, bounds.get());
+  }
+  GroupsView view() const { return {soa.get(), aos.get()}; }
+  bool isEmpty(std::size_t slot) const { return features[slot * arity] == UINT32_MAX; }
+  bool shares(std::size_t slot, const LeafGroups& other, std::size_t other_slot) const {
+    if (isEmpty(slot)) return false;
+    for (std::size_t x = 0; x < arity; ++x) {
+      for (std::size_t y = 0; y < other.arity; ++y) {
+        if (features[slot * arity + x] == other.features[other_slot * other.arity + y]) return true;
+      }
+    }
+    return false;
+  }
+  int low(std::size_t slot, std::size_t k) const { return soa[slot / GROUP * SOA_SIZE + k * GROUP + slot % GROUP]; }
+  int high(std::size_t slot, std::size_t k) const {
+    return soa[slot / GROUP * SOA_SIZE + (RECORD + k) * GROUP + slot % GROUP];
+  }
+};
+
+/// Calls test(a, b, self) with groups of all kinds, near and far, with and without margins.
+template <class Test>
+void forRandomGroups(const Test& test) {
+  forEachSimdTarget([&](const std::string& target) {
+    SCOPED_TRACE(target);
+    Random random(7);
+    for (int round = 0; round < 60; ++round) {
+      const std::size_t vertices = 40;
+      const int spread = round % 3 == 0 ? 30000 : round % 3 == 1 ? 900 : 40;
+      const auto records = hwy::AllocateAligned<std::int16_t>(vertices * RECORD);
+      for (std::size_t i = 0; i < vertices * RECORD; ++i) {
+        records[i] = static_cast<std::int16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * spread)) - spread);
+      }
+      std::int16_t margin[RECORD];
+      std::fill_n(margin, RECORD, static_cast<std::int16_t>(random() % 20));
+      const std::int16_t* widened = round % 2 ? margin : nullptr;
+      const bool self = round % 4 < 2;
+      const LeafGroups a(random, vertices, self ? 2 : 1, widened, records);
+      const LeafGroups b(random, vertices, self ? 2 : 3, widened, records);
+      test(a, self ? a : b, self, random);
+    }
+  });
+}
+
+TEST(LeafPairKernels, BoundsAloneAreThoseOfTheLeaves) {
+  forRandomGroups([](const LeafGroups& a, const LeafGroups&, bool, Random&) {
+    for (std::size_t i = 0; i < 2 * AOS_SIZE; ++i) ASSERT_EQ(a.bounds[i], a.aos[i]) << i;
+  });
+}
+
+TEST(LeafPairKernels, SharedVerticesAreThoseOfBothFeatures) {
+  forRandomGroups([](const LeafGroups& a, const LeafGroups& b, bool, Random&) {
+    std::uint16_t shared[GROUP];
+    const bool any = sharedVertices(a.features.data(), a.arity, b.features.data() + GROUP * b.arity, b.arity, shared);
+    bool expected_any = false;
+    for (std::size_t i = 0; i < GROUP; ++i) {
+      for (std::size_t j = 0; j < GROUP; ++j) {
+        const bool expected = a.shares(i, b, GROUP + j);
+        ASSERT_EQ(shared[i] >> j & 1, expected) << i << ' ' << j;
+        expected_any |= expected;
+      }
+    }
+    EXPECT_EQ(any, expected_any);
+  });
+}
+
+TEST(LeafPairKernels, ATestedPairIsTheGeneralTestLessWhatIsShared) {
+  std::size_t kept = 0, dropped = 0;
+  forRandomGroups([&](const LeafGroups& a, const LeafGroups& b, bool self, Random&) {
+    for (std::uint32_t g = 0; g < 2; ++g) {
+      for (std::uint32_t h = self ? g : 0; h < 2; ++h) {
+        const std::uint32_t pair[2] = {g, h};
+        std::uint32_t all[2 * GROUP * GROUP], some[2 * GROUP * GROUP];
+        std::size_t consumed = 0;
+        const std::size_t n = testGroupPairs(a.view(), b.view(), pair, 1, self, Diagonal::STRICT_UPPER, false, all,
+                                             GROUP * GROUP, &consumed);
+        ASSERT_EQ(testLeafPair(a.view(), b.view(), g, h, self, nullptr, some), n);
+        ASSERT_TRUE(std::equal(all, all + 2 * n, some));
+        std::uint16_t shared[GROUP];
+        sharedVertices(a.features.data() + g * GROUP * a.arity, a.arity, b.features.data() + h * GROUP * b.arity,
+                       b.arity, shared);
+        std::vector<std::uint32_t> expected;
+        for (std::size_t i = 0; i < n; ++i) {
+          if (a.shares(all[2 * i], b, all[2 * i + 1])) continue;
+          expected.insert(expected.end(), all + 2 * i, all + 2 * i + 2);
+        }
+        ASSERT_EQ(2 * testLeafPair(a.view(), b.view(), g, h, self, shared, some), expected.size());
+        ASSERT_TRUE(std::equal(expected.begin(), expected.end(), some));
+        kept += expected.size() / 2;
+        dropped += n - expected.size() / 2;
+      }
+    }
+  });
+  EXPECT_GT(kept, 1000u);
+  EXPECT_GT(dropped, 100u);
+}
+
+TEST(LeafPairKernels, TheGapAtTheEndIsTheSmallestOfThoseThatAreNotNear) {
+  std::size_t finite = 0, listed = 0;
+  forRandomGroups([&](const LeafGroups& a, const LeafGroups& b, bool self, Random& random) {
+    std::uint16_t weights[DIRECTIONS];
+    for (std::uint16_t& w : weights) w = static_cast<std::uint16_t>(random() % 65536);
+    for (std::uint32_t g = 0; g < 2; ++g) {
+      for (std::uint32_t h = self ? g : 0; h < 2; ++h) {
+        std::uint16_t shared[GROUP];
+        sharedVertices(a.features.data() + g * GROUP * a.arity, a.arity, b.features.data() + h * GROUP * b.arity,
+                       b.arity, shared);
+        const std::int16_t target = static_cast<std::int16_t>(1 + random() % 300);
+        int smallest = EMPTY_LO;
+        std::vector<std::uint8_t> near;
+        for (std::size_t i = 0; i < GROUP; ++i) {
+          for (std::size_t j = self && g == h ? i + 1 : 0; j < GROUP; ++j) {
+            const std::size_t x = g * GROUP + i, y = h * GROUP + j;
+            if (a.isEmpty(x) || b.isEmpty(y) || (shared[i] >> j & 1)) continue;
+            int best = 0;
+            for (std::size_t k = 8; k < 16; ++k) {
+              const int gap = std::min(std::max(a.low(x, k) - b.high(y, k), b.low(y, k) - a.high(x, k)), 32767) - 1;
+              if (gap > 0) best = std::max(best, static_cast<int>(std::int64_t{gap} * weights[k - 8] >> 16));
+            }
+            if (best < target) {
+              near.push_back(static_cast<std::uint8_t>(i * GROUP + j));
+            } else {
+              smallest = std::min(smallest, best);
+            }
+          }
+        }
+        std::uint8_t found_near[GROUP * GROUP];
+        std::size_t found = 0;
+        ASSERT_EQ(gapAtEnd(a.view(), b.view(), g, h, self, shared, weights, target, found_near, GROUP * GROUP, &found),
+                  smallest);
+        ASSERT_EQ(found, near.size());
+        std::sort(found_near, found_near + found);
+        ASSERT_TRUE(std::equal(near.begin(), near.end(), found_near));
+        finite += smallest != EMPTY_LO;
+        listed += found;
+        const std::size_t room = found / 2;
+        std::size_t same = 0;
+        gapAtEnd(a.view(), b.view(), g, h, self, shared, weights, target, found_near, room, &same);
+        ASSERT_EQ(same, found) << "counted, where there is no room";
+      }
+    }
+  });
+  EXPECT_GT(finite, 50u);
+  EXPECT_GT(listed, 1000u);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,107 @@
+// A body that does not move keeps its contacts with a map that does not change, and only then.
+#include <gtest/gtest.h>
+
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+struct OnAMap : testing::Test {
+  Topology topology = Topology::grid(12, 12);
+  Positions lying;
+  std::shared_ptr<const VoxelSurface> map;
+  Detector keeps;
+  std::uint64_t kept = 0;
+
+  OnAMap() {
+    for (int i = 0; i < 144; ++i) lying.emplace_back(0.1 * (i % 12) + 0.013, 0.1 * (i / 12) + 0.017, 1.0);
+    map = surface(0);
+  }
+  static std::shared_ptr<const VoxelSurface> surface(std::uint16_t missing) {
+    std::vector<OccupiedLeaf> leaves;
+    for (std::uint16_t x = missing; x < 6; ++x) {
+      for (std::uint16_t y = 0; y < 6; ++y) {
+        OccupiedLeaf leaf;
+        leaf.min = {static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32771};
+        leaves.push_back(leaf);
+      }
+    }
+    return VoxelSurface::build(0.25, leaves);
+  }
+  /// The step's answer, which is that of a history of its own.
+  Outcome run(const Positions& t0, const Positions& t1, const std::shared_ptr<const VoxelSurface>& on,
+              double shift = 0) {
+    Body body;
+    body.name = "cloth";
+    body.topology = share(topology);
+    Step step = stepOf(body, t0, t1);
+    step.map.surface = on;
+    step.map.map_from_fixed.translation() = Vec3(shift, 0, 0);
+    const Outcome with = keeps.run(step);
+    Detector fresh;
+    const Outcome expected = fresh.run(step);
+    EXPECT_EQ(difference(with.contacts, expected.contacts), "");
+    EXPECT_EQ(with.start_state, expected.start_state);
+    EXPECT_EQ(with.intersections.size(), expected.intersections.size());
+    kept = with.stats.map_answers_kept;
+    return with;
+  }
+};
+
+TEST_F(OnAMap, ItsContactsAreKeptWhileNothingChanges) {
+  EXPECT_GT(run(lying, lying, map).contacts.size(), 100u);
+  EXPECT_EQ(kept, 0u) << "nothing is known of a first step";
+  run(lying, lying, map);
+  EXPECT_EQ(kept, 0u) << "the first step that shows that it rests";
+  run(lying, lying, map);
+  EXPECT_EQ(kept, 1u);
+  run(lying, lying, surface(1));
+  EXPECT_EQ(kept, 0u) << "another map";
+  run(lying, lying, map);
+  run(lying, lying, map);
+  EXPECT_EQ(kept, 1u);
+  run(lying, lying, map, 0.01);
+  EXPECT_EQ(kept, 0u) << "the map is elsewhere";
+  run(lying, lying, map, 0.01);
+  EXPECT_EQ(kept, 1u);
+}
+
+TEST_F(OnAMap, WhatMovesIsLookedAt) {
+  for (int i = 0; i < 3; ++i) run(lying, lying, map);
+  EXPECT_EQ(kept, 1u);
+  Positions lifted = lying;
+  for (Vec3& p : lifted) p.z() += 0.01;
+  run(lying, lifted, map);
+  EXPECT_EQ(kept, 0u);
+  EXPECT_EQ(run(lifted, lifted, map).contacts.size(), 0u);
+  run(lifted, lifted, map);
+  EXPECT_EQ(run(lifted, lifted, map).contacts.size(), 0u);
+  EXPECT_EQ(kept, 1u) << "also where there are none";
+  run(lifted, lying, map);
+  run(lying, lying, map);
+  Positions one = lying;
+  one[70].z() = std::nextafter(1.0, 2.0);
+  run(lying, one, map);
+  EXPECT_EQ(kept, 0u) << "one vertex by one representable number";
+}
+
+TEST_F(OnAMap, ASeamAndOtherOptionsForget) {
+  for (int i = 0; i < 3; ++i) run(lying, lying, map);
+  EXPECT_EQ(kept, 1u);
+  keeps.history().clear();
+  EXPECT_TRUE(keeps.history().isClear());
+  run(lying, lying, map);
+  EXPECT_EQ(kept, 0u);
+  for (int i = 0; i < 2; ++i) run(lying, lying, map);
+  EXPECT_EQ(kept, 1u);
+  Options forget;
+  forget.keep_bounds = false;
+  keeps.setOptions(forget);
+  run(lying, lying, map);
+  EXPECT_EQ(kept, 0u);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
