@@ -99,6 +99,7 @@ class SceneArrays {
 
   /// After a refit() that left pieces out: nothing is kept of it.
   void forgetBounds() { bounds_valid_ = false; }
+
   /// In the place of refit(), for a step that is not computed: the next one keeps what it would have kept after it.
   void putOffRefit() {
     for (SceneBody& body : bodies_) body.stale = body.stale || !body.kept;
