@@ -263,6 +263,17 @@ class AccuracyStudyTest(unittest.TestCase):
         self.assertEqual([r['rung'] for r in report['rungs']], ['fast', 'conservative', 'exact'])
         self.expect_patches(self.rows_of('on')['frames', 'every 2nd'], 1, [first_ms((0, 0), every=2) - first_ms((0, 0))])
 
+    def test_with_distances_there_is_one_rung(self):
+        params = self.folder / 'noisy.yaml'
+        params.write_text('uncertainty: {radius_m: 0.001}\ntopology: {rows: %d, cols: %d}\n' % (SIDE, SIDE))
+        self.study(self.bag, 'noisy', '--params', params, '--quiet')
+        rows = self.rows_of('noisy')
+        self.assertEqual([what for what in rows if what[0] in ('reference', 'rung')],
+                         [('reference', 'conservative 1e-9'), ('reference', 'the same again'), ('rung', 'conservative 1e-3'),
+                          ('rung', 'conservative 1e-6')])
+        more = rows['tracker noise', '3 mm']  # than the 1 mm that the reference has
+        self.expect_vertices(more, [first_ms(v, VOXEL_M + 0.004) - first_ms(v, VOXEL_M + 0.001) for v in VERTICES], places=2)
+
     def test_a_scene_at_another_rate_lasts_as_long(self):
         """That is what a study's reference is recorded by."""
         counts, last = [], []

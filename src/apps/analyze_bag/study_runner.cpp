@@ -62,10 +62,17 @@ AccuracyOptions finest(const MonitorConfig& config) {
   return accuracy;
 }
 
+/// Each rung has a knob of its own at most.
+bool isSame(const AccuracyOptions& a, const AccuracyOptions& b) {
+  if (a.rung != b.rung) return false;
+  return a.rung == Accuracy::EXACT ? a.toc_bits == b.toc_bits : a.tolerance_m == b.tolerance_m;
+}
+
 std::string nameOf(const AccuracyOptions& accuracy) {
-  const std::string rung = toString(accuracy.rung);
-  if (accuracy.rung == Accuracy::EXACT) return rung + " 2^-" + std::to_string(accuracy.toc_bits);
-  return rung + ' ' + text(accuracy.tolerance_m);
+  for (const AccuracySetting& setting : accuracySettings()) {
+    if (isSame(setting.accuracy, accuracy)) return setting.name;
+  }
+  return toString(accuracy.rung) + (' ' + text(accuracy.tolerance_m)) + " m";
 }
 
 std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& reference) {
@@ -95,7 +102,7 @@ std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& refere
   for (const AccuracySetting& setting : accuracySettings()) {
     if (whole.config.holdsDistance() && setting.accuracy.rung != Accuracy::CONSERVATIVE) continue;
     AccuracyOptions accuracy = whole.config.monitor.detector.accuracy;
-    if (setting.name == nameOf(accuracy)) continue;
+    if (isSame(setting.accuracy, accuracy)) continue;
     accuracy.rung = setting.accuracy.rung;
     accuracy.toc_bits = setting.accuracy.toc_bits;
     accuracy.tolerance_m = setting.accuracy.tolerance_m;
