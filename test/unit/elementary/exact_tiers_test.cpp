@@ -304,7 +304,11 @@ TEST(ExactTiers, FixedIntegersAgreeWithBigOnesUpToTheirWidth) {
 
 TEST(ExactTiers, FixedIntegersRefuseWhatIsTooWideForThem) {
   test::RandomSource random(29);
-  const Query wide = test::hardQuery(random, PairKind::VERTEX_FACE, Hardness::MIXED_150);
+  Query wide = test::hardQuery(random, PairKind::VERTEX_FACE, Hardness::GENERAL);
+  for (int i = 0; i < 24; ++i) (&wide.motion.x[0][0][0])[i] *= i % 3 == 0 ? 0x1p300 : i % 3 == 1 ? 0x1p-300 : 1;
+  EXPECT_NE(exact::decideWithTier(Tier::FIXED_INTEGER, wide.kind, wide.motion, 32).verdict, Verdict::UNDECIDED)
+      << "each axis has a power of two of its own";
+  wide.motion.x[0][1][0] *= 0x1p-400;
   EXPECT_EQ(exact::decideWithTier(Tier::FIXED_INTEGER, wide.kind, wide.motion, 32).verdict, Verdict::UNDECIDED);
   EXPECT_NE(exact::decideWithTier(Tier::BIG_INTEGER, wide.kind, wide.motion, 32).verdict, Verdict::UNDECIDED);
 }
