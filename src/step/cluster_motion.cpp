@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace dccd {
 
@@ -23,7 +24,7 @@ std::size_t ClusterMotion::bytes() const {
 
 void ClusterMotion::setBodies(const SceneArrays& scene) {
   bodies_ = std::vector<BodyMotion>(scene.bodies().size());
-  std::vector<std::uint32_t> pieces;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pieces;  // of a cluster, and how many of its corners are there
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const SceneBody& body = scene.bodies()[b];
     BodyMotion& motion = bodies_[b];
@@ -36,22 +37,29 @@ void ClusterMotion::setBodies(const SceneArrays& scene) {
         pieces.clear();
         const std::size_t end = std::min((g + 1) * simd::GROUP, tree.featureCount()) * tree.arity();
         for (std::size_t i = g * simd::GROUP * tree.arity(); i < end; ++i) {
-          pieces.push_back(static_cast<std::uint32_t>((tree.feature(0)[i] - body.internal_begin) / PIECE));
+          const auto piece = static_cast<std::uint32_t>((tree.feature(0)[i] - body.internal_begin) / PIECE);
+          // A handful of them, most of them the one before.
+          auto at = std::find_if(pieces.rbegin(), pieces.rend(), [&](const auto& p) { return p.first == piece; });
+          if (at == pieces.rend()) {
+            pieces.push_back({piece, 1});
+          } else {
+            ++at->second;
+          }
         }
         std::sort(pieces.begin(), pieces.end());
         Cluster& cluster = motion.clusters[kind][g];
         std::size_t most = 0;
         for (std::size_t i = 0, j = 0; i < pieces.size(); i = j) {
-          const std::uint32_t block = static_cast<std::uint32_t>(pieces[i] / (BLOCK / PIECE));
-          for (j = i; j < pieces.size() && pieces[j] / (BLOCK / PIECE) == block; ++j) {
-          }
-          if (j - i > most) {
-            most = j - i;
-            cluster.block = block;
+          const std::size_t block = pieces[i].first / (BLOCK / PIECE);
+          std::size_t vertices = 0;
+          for (j = i; j < pieces.size() && pieces[j].first / (BLOCK / PIECE) == block; ++j)
+            vertices += pieces[j].second;
+          if (vertices > most) {
+            most = vertices;
+            cluster.block = static_cast<std::uint32_t>(block);
           }
         }
-        pieces.erase(std::unique(pieces.begin(), pieces.end()), pieces.end());
-        motion.links[kind].insert(motion.links[kind].end(), pieces.begin(), pieces.end());
+        for (const auto& piece : pieces) motion.links[kind].push_back(piece.first);
         motion.clusters[kind][g + 1].first_link = static_cast<std::uint32_t>(motion.links[kind].size());
       }
       motion.links[kind].shrink_to_fit();

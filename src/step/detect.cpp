@@ -283,7 +283,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   findPairs(context);
   if (carried.memory.isOn()) useMemory(context);
   runPairs(context);
-  if (remembers) rememberPairs(context);
+  if (remembers) rememberPairs(context, part);
   hits_done = Clock::now();
   collect(part.step, part.deadline);
   const bool all_pairs = result.complete;

@@ -112,7 +112,7 @@ struct History::Impl {
   /// Whether certificates may be used or made in this part; what cannot be used is forgotten.
   bool mayRemember(const Part& part);
   void useMemory(StepContext& context);
-  void rememberPairs(const StepContext& context);
+  void rememberPairs(const StepContext& context, const Part& part);
   void cutHits();
   /// What may be found in a whole step with these options and bodies; FoundLimit::NONE: no limit.
   std::size_t foundLimit() const;

@@ -13,9 +13,10 @@ namespace {
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 constexpr double DOWN = 1 - 0x1p-40;                  // more than all roundings of a product
 constexpr double SHORTEST_DIRECTION = 1e-150;         // of which the squares and products do not vanish
-constexpr double STEPS_AHEAD = 4;                     // that a certificate is to last, as far as they are like this one
+constexpr double STEPS_AHEAD = 2;                     // that a certificate is to last, as far as they are like this one
 constexpr double WORTH_A_CERTIFICATE = 1.5;           // residuals of this step that it must have
-constexpr double WORTH_A_TRY = 0.3, WORTH_IT = 0.25;  // share of the pairs that are known to be apart
+constexpr double WORTH_A_TRY = 0.8, WORTH_IT = 0.75;  // share of the pairs that are known to be apart
+constexpr std::size_t WORTH_MEASURING = 6;            // distances of features, of which one takes as long as a row
 constexpr std::size_t PAIRS_PER_EDGE = 2;             // that may be kept: 144 bytes a triangle
 constexpr std::size_t PAIRS_IN_ANY_CASE = 4096;
 
@@ -245,18 +246,15 @@ void PairMemory::certify(const SceneArrays& scene, const Group& group, Pair& pai
     const double units = std::min((contact_m + steps * pair.residual_m) / unit_m_ + 1, 32000.0);
     return static_cast<std::int16_t>(units >= 1 ? units : 1);
   };
-  std::uint8_t near[MOST_NEAR];
+  std::uint8_t near[WORTH_MEASURING];
   std::size_t found = 0;
-  const auto gapBeyond = [&](std::int16_t target) {
-    return simd::gapAtEnd(a.level(0).view(), b.level(0).view(), clusterA(group, pair), clusterB(group, pair),
-                          group.trees.isSelf(), pair.shared, weights_, target, near, MOST_NEAR, &found);
-  };
-  std::int16_t gap = gapBeyond(targetOf(STEPS_AHEAD));
-  if (found > MOST_NEAR) gap = gapBeyond(targetOf(WORTH_A_CERTIFICATE));
+  const std::int16_t gap =
+      simd::gapAtEnd(a.level(0).view(), b.level(0).view(), clusterA(group, pair), clusterB(group, pair),
+                     group.trees.isSelf(), pair.shared, weights_, targetOf(STEPS_AHEAD), near, WORTH_MEASURING, &found);
   double distance = gap == simd::EMPTY_LO ? INFINITE : gap * unit_m_ * DOWN;
-  if (found > MOST_NEAR) distance = 0;
+  if (found > WORTH_MEASURING) distance = 0;
   const bool edges = group.trees.kind == PairKind::EDGE_EDGE;
-  for (std::size_t i = 0; i < std::min(found, MOST_NEAR) && distance > 0; ++i) {
+  for (std::size_t i = 0; i < std::min(found, WORTH_MEASURING) && distance > 0; ++i) {
     const Index* fa = a.feature(clusterA(group, pair) * simd::GROUP + (near[i] >> 4));
     const Index* fb = b.feature(clusterB(group, pair) * simd::GROUP + (near[i] & 15));
     Vec3 x[2], y[3];

@@ -61,11 +61,12 @@ void History::Impl::useMemory(StepContext& context) {
   result.stats[Stage::BROAD_PHASE].ms += msSince(start);
 }
 
-void History::Impl::rememberPairs(const StepContext& context) {
+/// A trial costs some hundredths of a step: where no step continues the one before there is none.
+void History::Impl::rememberPairs(const StepContext& context, const Part& part) {
   PairMemory& memory = carried.memory;
   if (!result.complete || context.expired) return memory.clear();
   if (context.memory) return memory.endStep();
-  if (group_pairs.size() / 2 < FEWEST_GROUPS || !memory.wantsTrial()) return;
+  if (!part.continues || group_pairs.size() / 2 < FEWEST_GROUPS || !memory.wantsTrial()) return;
   const Clock::time_point start = Clock::now();
   memory.beginGroups(scene);
   std::size_t i = 0;

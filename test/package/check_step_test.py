@@ -110,7 +110,7 @@ class SequenceTest(unittest.TestCase):
         for r in range(self.N):
             for c in range(self.N):
                 angle = 10.0 * c / self.N
-                radius = 0.2 + (0.02 - 0.004 * k) * angle + 0.001 * math.sin(5 * r + 3 * c)
+                radius = 0.2 + (0.002 - 0.0004 * k) * angle + 0.0001 * math.sin(5 * r + 3 * c)
                 turned = angle + 0.1 * k
                 points.append((radius * math.cos(turned), radius * math.sin(turned), r / self.N))
         return points
