@@ -61,9 +61,13 @@ function(add_gtest_suite name)
   endif()
 endfunction()
 
+# A tool of the tests, run from the build folder and never installed.
+function(add_test_tool name)
+  add_executable(${name} ${ARGN})
+  target_link_libraries(${name} PRIVATE deformable_ccd_test_support deformable_ccd_archive)
+endfunction()
 if(DEFORMABLE_CCD_VARIABLE_MARGINS)
-  add_executable(cut_margins test/margins/cut_margins.cpp)
-  target_link_libraries(cut_margins PRIVATE deformable_ccd_test_support deformable_ccd_archive)
+  add_test_tool(cut_margins test/margins/cut_margins.cpp)
 endif()
 
 # scripts/test reads this list: a suite that is on it but was not built counts as failed.
