@@ -166,6 +166,7 @@ int analyze(const Arguments& a) {
   BagReplay replay(a.bag, config, options);
   std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   Report report(a.report);
+  report.setAccuracy(config.monitor.detector.accuracy);
   std::string frame;
   bool answered = false;
   const BagReplaySummary summary = replay.run(

@@ -14,19 +14,24 @@
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "report/contact_log.h"
+#include "report/lanes.h"
 #include "report/latency_histogram.h"
+#include "report/player_data.h"
 
 namespace dccd {
 
 /// Writes into a folder: contacts.csv, steps.csv, patches.csv and events.csv (the same bytes for any number of
 /// threads), timing.csv, left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json
-/// and report.html. Outcomes are added in order; nothing but their summaries is kept.
+/// and report.html. Outcomes are added in order; kept are their summaries and, in
+/// a bounded amount of memory, what the page's player shows.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
   explicit Report(const std::string& folder);
 
   void add(const Outcome& outcome, const std::vector<Body>& bodies);
+  /// Before the first outcome: what they are answered with.
+  void setAccuracy(const AccuracyOptions& accuracy) { player_.setAccuracy(accuracy); }
   void setEffects(const EffectPlan& plan) { plan_ = plan; }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
@@ -89,13 +94,15 @@ class Report {
   std::optional<LookAheadSummary> look_ahead_;
   double horizon_s_ = 0;
   LatencyHistogram step_times_;
+  ContactLanes lanes_;
+  PlayerData player_;
   EffectPlan plan_;
   std::vector<RungCost> rungs_;
   std::vector<std::pair<std::string, std::string>> facts_;
   FrameCounters counters_;
 };
 
-/// The page with `data` (JSON) inside; opens from disk, loads nothing.
-std::string reportPage(const std::string& data);
+/// The page with `data` and `player` (JSON) inside; opens from disk, loads nothing.
+std::string reportPage(std::string data, std::string player);
 
 }  // namespace dccd
