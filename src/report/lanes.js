@@ -51,5 +51,5 @@ const calendar = stamp => +stamp > 1e8 ? new Date(+stamp * 1000).toISOString().r
   const of = name => R.steps.filter(s => s.answered && s.start_state === name).length;
   const facts = document.getElementById('facts').insertRow();
   facts.insertCell().textContent = 'surfaces when steps began';
-  facts.insertCell().textContent = ['CLEAR', 'INTERSECTING', 'NOT_CHECKED'].map(n => `${of(n)} ${n}`).join(', ') + `; ${R.steps.filter(s => !s.answered).length} frames without an answer`;
+  facts.insertCell().textContent = ['CLEAR', 'INTERSECTING', 'NOT_CHECKED'].map(n => `${of(n)} ${n}`).join(', ') + `; frames without an answer: ${R.steps.filter(s => !s.answered).length}`;
   [...facts.cells].forEach(c => c.className = 'text'); }

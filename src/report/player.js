@@ -28,8 +28,11 @@ const player = (() => {
     return out;
   })();
   const START = frames[0].to, END = frames[frames.length - 1].to, canvas = get('canvas'), view = get('view');
+  // Smooth edges take a software renderer four times as long.
+  const isSoftware = () => { const gl = document.createElement('canvas').getContext('webgl'), info = gl && gl.getExtension('WEBGL_debug_renderer_info');
+    return !!info && /swiftshader|llvmpipe|software/i.test(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)); };
   let renderer;
-  try { renderer = new THREE.WebGLRenderer({ canvas, antialias: true }); } catch (e) {
+  try { renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware() }); } catch (e) {
     note.textContent = 'The player needs WebGL, which this browser does not give: ' + e.message;
     return null;
   }
@@ -61,7 +64,7 @@ const player = (() => {
     s.surface = null;
     if (faces) {
       const g = new THREE.BufferGeometry(); g.setAttribute('position', s.position);
-      s.surface = new THREE.Mesh(g, new THREE.MeshPhongMaterial({ color: s.colour, side: THREE.DoubleSide, flatShading: true, shininess: 5,
+      s.surface = new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: s.colour, side: THREE.DoubleSide,
         polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }));
       s.surface.frustumCulled = false; s.group.add(s.surface);
     }
@@ -77,27 +80,42 @@ const player = (() => {
     let whole = true;
     for (let i = 0; i < p.length; ++i) { if (quanta[i] === D.not_finite) whole = false; p[i] = origin[i % 3] + quantum * quanta[i]; }
     s.position.needsUpdate = true;
-    if (whole && s.whole) return;
-    s.whole = whole;  // features on a vertex without a position are not drawn
+    if (!whole || !s.whole) index(s, shape, quanta, whole);
+    if (s.surface) s.surface.geometry.computeVertexNormals();
+  }
+  function index(s, shape, quanta, whole) {  // features on a vertex without a position are not drawn
+    s.whole = whole;
     const known = v => whole || ![0, 1, 2].some(k => quanta[3 * v + k] === D.not_finite);
     const flat = list => list.filter(f => f.every(known)).reduce((all, f) => { all.push(...f); return all; }, []);
     s.lines.geometry.setIndex(flat(s.edges));
     if (s.surface) s.surface.geometry.setIndex(flat(D.shapes[shape].faces));
   }
 
+  // The faces of voxels that no voxel of the same size hides.
+  const SIDES = [0, 1, 2].flatMap(axis => [0, 1].map(up => ({ axis, up, at: [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]].map(([u, v]) => {
+    const p = [0, 0, 0]; p[axis] = up; p[(axis + 1) % 3] = up ? u : v; p[(axis + 2) % 3] = up ? v : u; return p; }) })));
   const maps = D.maps.map(m => {
-    const n = m.leaves.length / 4, cubes = new THREE.InstancedMesh(new THREE.BoxBufferGeometry(1, 1, 1),
-      new THREE.MeshPhongMaterial({ color: 0x8a8378, shininess: 0, flatShading: true }), Math.max(n, 1));
-    const r = m.resolution, one = new THREE.Matrix4(), f = m.matrix;
-    const fixed = new THREE.Matrix4().set(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], 0, 0, 0, 1);
+    const key = (x, y, z, size) => ((x * 65536 + y) * 65536 + z) * 20 + Math.log2(size), there = new Set(), points = [], normals = [], lines = [];
+    const r = m.resolution, f = m.matrix, n = m.leaves.length / 4;
+    const turn = p => [0, 1, 2].map(i => f[4 * i] * p[0] + f[4 * i + 1] * p[1] + f[4 * i + 2] * p[2]), move = p => turn(p).map((v, i) => v + f[4 * i + 3]);
+    for (let i = 0; i < n; ++i) there.add(key(...m.leaves.slice(4 * i, 4 * i + 4)));
     for (let i = 0; i < n; ++i) {
-      const [x, y, z, size] = m.leaves.slice(4 * i, 4 * i + 4), half = size / 2, side = size * r * 0.985;  // a seam between voxels
-      one.makeScale(side, side, side).setPosition((x + half - 32768) * r, (y + half - 32768) * r, (z + half - 32768) * r);
-      cubes.setMatrixAt(i, one.premultiply(fixed));
+      const leaf = m.leaves.slice(4 * i, 4 * i + 4), size = leaf[3];
+      SIDES.forEach(({ axis, up, at }) => {
+        const next = leaf.slice(); next[axis] += up ? size : -size;
+        if (there.has(key(...next))) return;
+        const normal = [0, 0, 0]; normal[axis] = up ? 1 : -1;
+        const corners = at.map(p => move(p.map((v, k) => (leaf[k] + v * size - 32768) * r)));
+        corners.forEach(c => { points.push(...c); normals.push(...turn(normal)); });
+        lines.push(...corners[0], ...corners[1], ...corners[1], ...corners[2]);
+      });
     }
-    cubes.count = n; cubes.frustumCulled = false; cubes.visible = false;
-    scene.add(cubes);
-    return { from: m.from, cubes };
+    const g = new THREE.BufferGeometry(), h = new THREE.BufferGeometry(), group = new THREE.Group(), values = list => new THREE.BufferAttribute(new Float32Array(list), 3);
+    g.setAttribute('position', values(points)); g.setAttribute('normal', values(normals)); h.setAttribute('position', values(lines));
+    group.add(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: 0x8a8378, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 })));
+    group.add(new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: 0x6d675e })));
+    group.visible = false; scene.add(group);
+    return { from: m.from, cubes: group };
   });
 
   // Points on top of everything: discs for contacts, rings for patches.
@@ -124,8 +142,9 @@ const player = (() => {
   // Names of vertices by feature: what belongs to the first partner, what to the second.
   const features = (kind, v, b0, b1, voxel) => { const first = [1, 2, 1, 2, 3][kind], part = (b, list) => name(b) + (list.length > 1 ? ' vertices ' : ' vertex ') + list.join(' ');
     return part(b0, v.slice(0, first)) + ' and ' + (voxel ? `octomap voxel ${voxel.slice(0, 3).join(' ')}` + (voxel[3] > 1 ? `, ${voxel[3]} voxels wide` : '') : part(b1, v.slice(first))); };
-  const interval = (f, low, high) => low === high ? `at ${low} of the step, ${seconds(f.from + low * (f.to - f.from))} after the start` :
-    `between ${low} and ${high} of the step, from ${seconds(f.from + low * (f.to - f.from))} after the start, ${((high - low) * (f.to - f.from)).toExponential(1)} s wide`;
+  const digits = x => +x.toPrecision(12);
+  const interval = (f, low, high) => low === high ? `at ${digits(low)} of the step, ${seconds(f.from + low * (f.to - f.from))} after the start` :
+    `between ${digits(low)} and ${digits(high)} of the step, from ${seconds(f.from + low * (f.to - f.from))} after the start, ${((high - low) * (f.to - f.from)).toExponential(1)} s wide`;
   function items(f) {
     if (!f.details) return [];
     const contacts = f.details.c.map(([kind, b0, b1, v, flags, low, high, tier, at, patch, voxel]) => {
@@ -133,8 +152,8 @@ const player = (() => {
       const states = [is(1) ? 'certain' : 'undecided', is(2) ? 'there when the step began' : 'new', is(4) && 'leaving', is(8) && 'expected'].filter(Boolean);
       const settled = tier ? `Settled by tier ${tier}.` : D.rung && D.rung !== 'exact' ? `The rung ${D.rung} has no tiers.` :
         voxel ? 'Tiers are told for pairs of meshes.' : 'Its tier is not told: the pair alone does not tell how it was settled.';
-      return { kind: 'contact', at, rgb: is(8) ? MUTED : rgb(colour(low)), title: `${name(b0)} and ${name(b1)}: ${KIND[kind]}`,
-        text: `Contact, ${KIND[kind]}: ${features(kind, v, b0, b1, voxel)}. ${states.join(', ')}. Time of contact ${interval(f, low, high)}. ` + settled + (patch ? ` Part of patch ${patch}.` : '') };
+      return { kind: 'contact', at, rgb: is(8) ? MUTED : rgb(colour(low)), title: features(kind, v, b0, b1, voxel) + (is(2) ? ', there when the step began' : ''),
+        text: `Contact, ${KIND[kind]}: ${features(kind, v, b0, b1, voxel)}; ${states.join(', ')}. Time of contact ${interval(f, low, high)}. ` + settled + (patch ? ` Part of patch ${patch}.` : '') };
     });
     const patches = f.details.p.map(([id, b0, b1, beginning, n, crossings, expected, low, high, area, at, normal, from, to]) => {
       const began = to === null ? 'When it began is not known.' : from === null ? `It began at or before ${seconds(to)}.` : `It began between ${seconds(from)} and ${seconds(to)}.`;
@@ -220,16 +239,19 @@ const player = (() => {
     listed.forEach(x => { const [px, py] = screenOf(x), d = Math.hypot(px - e.clientX, py - e.clientY); if (d < best) { best = d; item = x; } });
     choose(item); });
 
-  function fit() {  // all bodies that move, over all frames; only still ones: those
-    const box = new THREE.Box3();
-    const add = all => shown.forEach((s, b) => {
-      const places = frames.map(f => f.places[b]).filter(Boolean);
-      if (!places.length || (!all && places.every(p => p === places[0]))) return;
+  function fit() {  // where the bodies that move mostly are; only still ones: those
+    const sample = all => shown.flatMap((s, b) => {
+      const places = frames.map(f => f.places[b]).filter(Boolean), points = [];
+      if (!places.length || (!all && places.every(p => p === places[0]))) return points;
       const every = Math.max(1, Math.floor(places.length / 50));
-      places.filter((_, i) => i % every === 0).forEach(q => { for (let i = 0; i < q.length; i += 3) if (q[i] !== D.not_finite)
-        box.expandByPoint(new THREE.Vector3(...[0, 1, 2].map(k => s.body.origin[k] + s.body.quantum * q[i + k]))); }); });
-    add(false); if (box.isEmpty()) add(true);
-    const centre = box.getCenter(new THREE.Vector3()), radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 1e-6);
+      places.filter((_, i) => i % every === 0).forEach(q => { const skip = 3 * Math.max(1, Math.floor(q.length / 900));
+        for (let i = 0; i < q.length; i += skip) if (q[i] !== D.not_finite)
+          points.push(new THREE.Vector3(...[0, 1, 2].map(k => s.body.origin[k] + s.body.quantum * q[i + k]))); });
+      return points; });
+    let points = sample(false); if (!points.length) points = sample(true);
+    const centre = points.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(Math.max(points.length, 1));
+    const distances = points.map(p => p.distanceTo(centre)).sort((a, b) => a - b);
+    const radius = Math.max(distances[Math.floor(0.98 * (distances.length - 1))] || 0, 1e-6);
     const narrow = Math.min(1, camera.aspect), away = radius / Math.sin(camera.fov * Math.PI / 360) / narrow;
     camera.near = away / 200; camera.far = away * 50; camera.updateProjectionMatrix();
     camera.position.copy(centre).add(new THREE.Vector3(-0.55, -0.75, 0.45).normalize().multiplyScalar(away));

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "report/lanes.h"
+#include "report/report.h"
 
 namespace dccd {
 namespace {
@@ -190,6 +192,56 @@ TEST(PlayerData, OnlyVoxelsNearTheBodiesAreTaken) {
   same.obstacle = o.obstacle;
   player.add(same, run.bodies, 0, false);
   EXPECT_EQ(json::parse(player.json())["maps"].size(), 1u) << "the same map, the same place";
+}
+
+TEST(ReportPage, TenMinutesOfAClothOf600VerticesFitIn25Megabytes) {
+  constexpr std::size_t ROWS = 20, COLUMNS = 30, STEPS = 18000;
+  const std::string folder = ::testing::TempDir() + "ten_minutes";
+  std::vector<Body> bodies(1);
+  bodies[0].name = "cloth";
+  const auto topology = share(Topology::grid(ROWS, COLUMNS));
+  const auto cloth = [&](std::uint64_t step) {  // waves of 5 cm run over it, faster than 1 m/s
+    Positions positions;
+    for (std::size_t r = 0; r < ROWS; ++r) {
+      for (std::size_t c = 0; c < COLUMNS; ++c) {
+        const double x = 0.04 * static_cast<double>(c), y = 0.04 * static_cast<double>(r);
+        const double phase = 9 * x + 5 * y + 0.37 * static_cast<double>(step);
+        positions.emplace_back(x + 0.01 * std::cos(phase), y, 0.05 * std::sin(phase));
+      }
+    }
+    return share(positions);
+  };
+  Report report(folder);
+  auto before = cloth(0);
+  for (std::uint64_t i = 1; i <= STEPS; ++i) {
+    Outcome o;
+    o.answered = true;
+    o.status = StepStatus::OK;
+    o.sequence = i;
+    o.start_ns = static_cast<StampNs>(i - 1) * 33'333'333;
+    o.stamp_ns = o.start_ns + 33'333'333;
+    auto step = std::make_shared<Step>();
+    step->bodies = bodies;
+    step->bodies[0].topology = topology;
+    step->bodies[0].t0 = before;
+    step->bodies[0].t1 = before = cloth(i);
+    o.step = step;
+    for (Index c = 0; i % 3 == 0 && c < 10; ++c) {
+      Contact contact;
+      contact.vertex = {c, 40 + c, 41 + c, 70 + c};
+      contact.toc_lower = 0.1 + 1e-9 * static_cast<double>(i);
+      contact.toc_upper = contact.toc_lower + 2.3283064365386963e-10;
+      o.contacts.push_back(contact);
+    }
+    o.total_contacts = o.counts.certain = o.contacts.size();
+    if (i % 30 == 0) o.patch_events.resize(1);
+    report.add(o, bodies);
+  }
+  report.finish();
+  const auto page = std::filesystem::file_size(folder + "/report.html");
+  EXPECT_LT(page, 25'000'000u);
+  EXPECT_GT(page, 8'000'000u) << "the player's frames are in it";
+  if (!std::getenv("DEFORMABLE_CCD_KEEP")) std::filesystem::remove_all(folder);
 }
 
 Patch touching(std::uint64_t id, bool is_new, double toc, std::size_t expected = 0) {
