@@ -46,6 +46,7 @@ const player = (() => {
   const controls = new THREE.OrbitControls(camera, canvas);
   controls.addEventListener('change', () => draw());
 
+  const ratio = Math.min(window.devicePixelRatio || 1, 2);
   const COLOURS = [0x6fa8dc, 0x93c47d, 0xc9a0dc, 0x76c7c0, 0xd5c08a, 0x9aa9e0];
   const shown = D.bodies.map((body, b) => {
     const group = new THREE.Group(); scene.add(group);
@@ -67,6 +68,10 @@ const player = (() => {
       s.surface = new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: s.colour, side: THREE.DoubleSide,
         polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }));
       s.surface.frustumCulled = false; s.group.add(s.surface);
+    }
+    if (!faces) {  // a line is one pixel wide whatever is asked for; beads make a rope visible
+      const beads = new THREE.Points(lines, new THREE.PointsMaterial({ color: s.colour, size: 5 * ratio, sizeAttenuation: false }));
+      beads.frustumCulled = false; s.group.add(beads);
     }
     s.whole = null;
   }
@@ -126,7 +131,6 @@ const player = (() => {
   const dots = (ring, size) => { const p = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size, sizeAttenuation: false,
     map: sprite(ring), vertexColors: THREE.VertexColors || true, transparent: true, depthTest: false, depthWrite: false }));
     p.frustumCulled = false; p.renderOrder = ring ? 2 : 1; scene.add(p); return p; };
-  const ratio = Math.min(window.devicePixelRatio || 1, 2);
   const contactDots = dots(false, 11 * ratio), patchDots = dots(true, 22 * ratio), pickedDot = dots(true, 34 * ratio);
   const rgb = text => text.match(/\d+/g).map(v => v / 255);
   function fill(points, list) {
