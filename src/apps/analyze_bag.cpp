@@ -219,6 +219,7 @@ int analyze(const Arguments& a) {
   }
   BagReplay replay(a.bag, config, options);
   Report report(a.report);
+  report.setAccuracy(config.monitor.detector.accuracy);
   bool answered = false;
   BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {

@@ -12,21 +12,12 @@
 #include "report/contact_vertices.h"
 #include "report/flat_layout.h"
 #include "report/quantile.h"
+#include "report/words.h"
 
 namespace dccd {
 namespace {
 
 const char* const KINDS[] = {"VF", "EE", "vertex-voxel_face", "edge-voxel_edge", "face-voxel_corner"};
-const char* const KINDS_IN_WORDS[] = {"vertex against face", "edge against edge", "vertex against voxel face",
-                                      "edge against voxel edge", "face against voxel corner"};
-
-std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
-  return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
-}
-
-int meshPoints(const Contact& c) {
-  return static_cast<int>(std::count_if(c.vertex.begin(), c.vertex.end(), [](Index v) { return v != NO_INDEX; }));
-}
 
 // Commas, quotes and line ends in a field are quoted (RFC 4180).
 std::string csvField(const std::string& text) {
@@ -179,13 +170,7 @@ void Report::addFirstContact(const Outcome& o, const std::vector<Body>& bodies) 
   });
   if (first == o.contacts.end() || first->expected) return;
   first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
-  std::ostringstream text;
-  text << bodyName(first->body[0], bodies) << " meets " << bodyName(first->body[1], bodies) << " ("
-       << KINDS_IN_WORDS[static_cast<int>(first->kind)] << (meshPoints(*first) == 1 ? ", vertex" : ", vertices");
-  for (int i = 0; i < meshPoints(*first); ++i) text << ' ' << first->vertex[i];
-  text << (first->certainty == Certainty::CERTAIN ? ", certain" : ", undecided") << (first->initial ? ", initial" : "")
-       << ")";
-  first_contact_ = text.str();
+  first_contact_ = contactInWords(*first, bodies);
 }
 
 void Report::addTimes(const Outcome& o) {
@@ -206,6 +191,8 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   addRow(o);
   addProof(o);
   writePatches(o, bodies);  // a seam without an answer has events, too
+  lanes_.add(o, bodies, origin_ns_);
+  player_.add(o, bodies, origin_ns_, lanes_.addedFirst());
   if (!o.answered) return;
   ++answered_;
   with_contact_ += o.total_contacts > o.counts.expected;
@@ -214,6 +201,11 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   addHeat(o, bodies);
   addFirstContact(o, bodies);
   addTimes(o);
+}
+
+void Report::addPatches(const Outcome& o, const std::vector<Body>& bodies) {
+  writePatches(o, bodies);
+  lanes_.add(o, bodies, origin_ns_);
 }
 
 void Report::setOrigin(StampNs origin_ns) {
@@ -381,6 +373,7 @@ nlohmann::json Report::json() const {
                           {"max_toc_error", r.max_toc_error}});
   }
   j["study"] = study_;
+  j["partners"] = lanes_.json();
   j["bodies"] = heatJson();
   return j;
 }
@@ -391,10 +384,7 @@ void Report::finish() {
   // A name out of a message need not be UTF-8.
   constexpr auto REPLACE = nlohmann::json::error_handler_t::replace;
   json_file << data.dump(1, ' ', false, REPLACE) << '\n';
-  // "</" would end the script element that carries the data.
-  std::string text = data.dump(-1, ' ', false, REPLACE);
-  for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.replace(at, 2, "<\\/");
-  page << reportPage(text);
+  page << reportPage(data.dump(-1, ' ', false, REPLACE), player_.json());
   close();
   for (std::ofstream* file : {&json_file, &page}) {
     file->close();

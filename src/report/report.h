@@ -14,13 +14,16 @@
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
 #include "report/contact_log.h"
+#include "report/lanes.h"
 #include "report/latency_histogram.h"
+#include "report/player_data.h"
 
 namespace dccd {
 
 /// Writes into a folder: contacts.csv, steps.csv, patches.csv and events.csv (the same bytes for any number of
 /// threads), timing.csv, left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json
-/// and report.html. Outcomes are added in order; nothing but their summaries is kept.
+/// and report.html. Outcomes are added in order; kept are their summaries and, in
+/// a bounded amount of memory, what the page's player shows.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
@@ -34,10 +37,12 @@ class Report {
   /// What a Report of the range that comes next left in the folder, and its state(). Its patches and events are added
   /// by addPatches(), an outcome each. Throws std::runtime_error naming the file.
   void append(const std::string& folder, const nlohmann::json& state);
-  void addPatches(const Outcome& outcome, const std::vector<Body>& bodies) { writePatches(outcome, bodies); }
+  void addPatches(const Outcome& outcome, const std::vector<Body>& bodies);
   /// What has no answer because its range is missing, in words.
   void addMissing(const std::string& what) { missing_.push_back(what); }
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
+  /// Before the first outcome: what they are answered with.
+  void setAccuracy(const AccuracyOptions& accuracy) { player_.setAccuracy(accuracy); }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
@@ -104,6 +109,8 @@ class Report {
   double horizon_s_ = 0;
   LatencyHistogram step_times_;
   std::vector<EffectDecision> effects_;
+  ContactLanes lanes_;
+  PlayerData player_;
   std::vector<RungCost> rungs_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
@@ -111,7 +118,7 @@ class Report {
   FrameCounters counters_;
 };
 
-/// The page with `data` (JSON) inside; opens from disk, loads nothing.
-std::string reportPage(const std::string& data);
+/// The page with `data` and `player` (JSON) inside; opens from disk, loads nothing.
+std::string reportPage(std::string data, std::string player);
 
 }  // namespace dccd

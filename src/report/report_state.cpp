@@ -64,6 +64,7 @@ Json Report::state() const {
             {"sum", toJson(sum_)},
             {"total_ms", total_ms_},
             {"unknown_fraction", unknown_fraction_},
+            {"lanes", lanes_.state()},
             {"heat", Json::array()}};
   for (const BodyHeat& h : heat_) {
     j["heat"].push_back(
@@ -95,6 +96,7 @@ void Report::append(const std::string& folder, const Json& j) {
   addAll(j.at("total_ms"), total_ms_);
   for (const Json& ms : j.at("total_ms")) step_times_.add(ms.get<double>() * 1e-3);
   addAll(j.at("unknown_fraction"), unknown_fraction_);
+  lanes_.append(j.at("lanes"));
   heat_.resize(std::max(heat_.size(), j.at("heat").size()));
   for (std::size_t b = 0; b < j.at("heat").size(); ++b) {
     const Json& from = j.at("heat").at(b);

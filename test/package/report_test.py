@@ -1,4 +1,6 @@
 """The report's page in a real browser: it draws what it promises, reports no error, and asks for nothing from anywhere."""
+import csv
+import json
 import pathlib
 import re
 import shutil
@@ -7,6 +9,13 @@ import tempfile
 import unittest
 
 from checkout import CHECKOUT, TOOLS
+
+try:
+    from selenium import webdriver
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.actions.action_builder import ActionBuilder
+except ImportError:  # as chromium-driver, only where somebody installed it
+    webdriver = None
 
 BROWSER = next((b for b in ('chromium', 'chromium-browser', 'google-chrome') if shutil.which(b)), None)
 
@@ -24,6 +33,8 @@ class ReportPageTest(unittest.TestCase):
 
     def test_loads_nothing(self):
         text = self.page.read_text()
+        self.assertIn("default-src 'none'", text)
+        text = re.sub(r'<script id="three">.*?</script>', '', text, flags=re.S)  # the library names sites and loads none
         addresses = set(re.findall(r'https?://[^\s\'"]+', text)) - {'http://www.w3.org/2000/svg'}
         self.assertEqual(addresses, set())
         self.assertNotRegex(text, r'<(?:link|img|iframe)\b|<script[^>]*\bsrc=|@import|\burl\(')
@@ -35,7 +46,7 @@ class ReportPageTest(unittest.TestCase):
                              capture_output=True, text=True, timeout=120, check=False)
         self.assertNotRegex(ran.stderr, r'CONSOLE.*(?:Error|error)')
         dom = ran.stdout
-        body = dom[:dom.index('<script>')]
+        body = dom[:dom.index('<script')]
         for name, least in (('contacts', 10), ('toc', 10), ('rungs_plot', 2), ('study_plot', 15)):
             drawn = body[body.index('id="%s"' % name):].split('</svg>')[0]
             self.assertGreater(len(re.findall(r'<(?:rect|circle)\b', drawn)), least, name)
@@ -46,6 +57,92 @@ class ReportPageTest(unittest.TestCase):
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
         self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
+
+    def browser(self):
+        """A page of 1280 x 1000 pixels, drawn by software; its console is empty at the end."""
+        options = webdriver.ChromeOptions()
+        for argument in ('--headless=new', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+                         '--window-size=1280,1000', '--user-data-dir=%s' % (self.folder / 'profile')):
+            options.add_argument(argument)
+        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
+        driver = webdriver.Chrome(options=options)
+        self.addCleanup(driver.quit)
+        driver.get(self.page.as_uri())
+        return driver
+
+    @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
+    def test_the_player(self):
+        data = json.loads((self.folder / 'report.json').read_text())
+        page = self.browser()
+        if 'without three.js' in page.find_element('id', 'player_note').text:
+            self.skipTest('the tools were built without libjs-three')
+
+        def text(name):
+            return page.find_element('id', name).text
+
+        def seek(seconds):
+            page.execute_script("const s = document.getElementById('seek'); s.value = arguments[0];"
+                                "s.dispatchEvent(new Event('input'))", seconds)
+
+        # To the step of the first contact: its contacts are those of contacts.csv, and a click says what one is.
+        first = data['partners'][0]['first']
+        seek(first['t'])
+        with open(self.folder / 'contacts.csv', encoding='utf-8') as file:
+            rows = [row for row in csv.DictReader(file) if int(row['step']) == first['step']]
+        self.assertRegex(text('now'), r'^Step %d, which ended at .*: %d contacts?\b' % (first['step'], len(rows)))
+        earliest = min((row for row in rows if row['initial'] == '0'), key=lambda row: float(row['toc_lower']))
+        page.execute_script("document.getElementById('view').scrollIntoView({block: 'center'})")
+        index, x, y = page.execute_script("""
+            const toc = arguments[0], all = player.items();
+            const i = all.findIndex(c => c.kind === 'contact' && c.text.includes('between ' + +toc.toPrecision(12) + ' and'));
+            return [i, ...(i < 0 ? [0, 0] : player.screenOf(i))]""", float(earliest['toc_lower']))
+        self.assertGreaterEqual(index, 0, 'the earliest contact is listed, with its time')
+        actions = ActionBuilder(page)
+        actions.pointer_action.move_to_location(round(x), round(y)).click()
+        actions.perform()
+        self.assertRegex(text('picked'), r'^Contact, .*: mesh vert\w+ %s .*; certain, new\. Time of contact between .* '
+                                         r'wide\. Settled by tier \w+\. Part of patch \d+\.$' % earliest['v0'])
+        page.execute_script("player.seek(0)")
+        self.assertEqual(text('picked'), 'Click a contact or a patch to see what it is.')
+
+        # What is drawn is the cloth: turning the view changes the picture, and so does another frame.
+        def picture():
+            return page.execute_async_script("""const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(
+                () => done(0)))""") or page.find_element('id', 'canvas').screenshot_as_base64
+        at_start = picture()
+        seek(first['t'] + 0.3)
+        later = picture()
+        self.assertNotEqual(at_start, later)
+        ActionChains(page).drag_and_drop_by_offset(page.find_element('id', 'canvas'), 150, 20).perform()
+        self.assertNotEqual(later, picture())
+
+        # Step by step, and playing to a pause.
+        before = page.execute_script('return player.time()')
+        page.find_element('id', 'on').click()
+        self.assertGreater(page.execute_script('return player.time()'), before)
+        page.find_element('id', 'back').click()
+        self.assertLessEqual(page.execute_script('return player.time()'), before + 0.04)
+        page.execute_script('player.seek(0)')
+        page.find_element('id', 'play').click()
+        page.execute_async_script('setTimeout(arguments[0], 700)')
+        page.find_element('id', 'play').click()
+        stopped = page.execute_script('return player.time()')
+        self.assertGreater(stopped, 0.2)
+        self.assertEqual(text('play'), 'Play')
+        page.execute_async_script('setTimeout(arguments[0], 300)')
+        self.assertEqual(page.execute_script('return player.time()'), stopped)
+
+        # A lane for each two partners, as in report.json; a click on a bar takes the player there.
+        bars = page.find_elements('css selector', '#lanes rect.bar')
+        self.assertEqual(len(bars), sum(len(pair['bars']) for pair in data['partners']))
+        self.assertEqual(len(page.find_elements('css selector', '#lanes line.event')),
+                         sum(len(pair['events']) for pair in data['partners']))
+        page.execute_script("arguments[0].dispatchEvent(new MouseEvent('click', {bubbles: true}))", bars[0])
+        self.assertAlmostEqual(page.execute_script('return player.time()'), data['partners'][0]['bars'][0][1], 6)
+        self.assertIn(first['text'], text('firsts'))
+        self.assertIn(first['stamp'], text('firsts'))
+        self.assertEqual(page.execute_script("return performance.getEntriesByType('resource').length"), 0)
+        self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
 
 
 if __name__ == '__main__':
