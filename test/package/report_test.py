@@ -99,8 +99,12 @@ class ReportPageTest(unittest.TestCase):
         actions = ActionBuilder(page)
         actions.pointer_action.move_to_location(round(x), round(y)).click()
         actions.perform()
-        self.assertRegex(text('picked'), r'^Contact, .*: mesh vert\w+ %s .*; certain, new\. Time of contact between .* '
-                                         r'wide\. Settled by tier \w+\. Part of patch \d+\.$' % earliest['v0'])
+        self.assertRegex(text('picked'), r'^Contact, .*: mesh vert.* \d.*; certain, new\. Time of contact between .* wide\. '
+                                         r'Settled by tier \w+\. Part of patch \d+\.$')
+        near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
+            return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)
+        self.assertIn(text('picked'), near, 'what was clicked, or what lies on the same spot')
+        self.assertLess(len(near), len(page.execute_script('return player.items()')))
         page.execute_script("player.seek(0)")
         self.assertEqual(text('picked'), 'Click a contact or a patch to see what it is.')
 
