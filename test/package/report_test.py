@@ -147,6 +147,18 @@ class ReportPageTest(unittest.TestCase):
         self.assertEqual(page.execute_script("return performance.getEntriesByType('resource').length"), 0)
         self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
 
+    @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
+    def test_without_the_library_the_page_says_so_and_has_the_rest(self):
+        page = self.page.read_text()
+        self.page.write_text(re.sub(r'(<script id="three">).*?(</script>)', r'\1\2', page, flags=re.S))
+        browser = self.browser()
+        self.assertRegex(browser.find_element('id', 'player_note').text, 'has no player: .*three.js')
+        self.assertFalse(browser.find_element('id', 'view').is_displayed())
+        bars = browser.find_elements('css selector', '#lanes rect.bar')
+        self.assertGreater(len(bars), 0)
+        browser.execute_script("arguments[0].dispatchEvent(new MouseEvent('click', {bubbles: true}))", bars[0])
+        self.assertEqual([line for line in browser.get_log('browser') if line['level'] == 'SEVERE'], [])
+
 
 if __name__ == '__main__':
     unittest.main()
