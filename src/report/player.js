@@ -28,11 +28,12 @@ const player = (() => {
     return out;
   })();
   const START = frames[0].to, END = frames[frames.length - 1].to, canvas = get('canvas'), view = get('view');
-  // Smooth edges take a software renderer four times as long.
-  const isSoftware = () => { const gl = document.createElement('canvas').getContext('webgl'), info = gl && gl.getExtension('WEBGL_debug_renderer_info');
-    return !!info && /swiftshader|llvmpipe|software/i.test(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)); };
+  // For a software renderer smooth edges and thin lines cost most of a frame: it gets none of the first, and the second
+  // only while nothing plays.
+  const isSoftware = (() => { const gl = document.createElement('canvas').getContext('webgl'), info = gl && gl.getExtension('WEBGL_debug_renderer_info');
+    return !!info && /swiftshader|llvmpipe|software/i.test(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)); })();
   let renderer;
-  try { renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware() }); } catch (e) {
+  try { renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware }); } catch (e) {
     note.textContent = 'The player needs WebGL, which this browser does not give: ' + e.message;
     return null;
   }
@@ -62,6 +63,7 @@ const player = (() => {
     const lines = new THREE.BufferGeometry(); lines.setAttribute('position', s.position);
     s.lines = new THREE.LineSegments(lines, new THREE.LineBasicMaterial(faces ? { color: 0x10151b, transparent: true, opacity: 0.35 } : { color: s.colour }));
     s.lines.frustumCulled = false; s.group.add(s.lines);
+    s.lines.visible = !faces || !isSoftware || !playing;
     s.surface = null;
     if (faces) {
       const g = new THREE.BufferGeometry(); g.setAttribute('position', s.position);
@@ -211,7 +213,15 @@ const player = (() => {
     return low + 1 < frames.length && frames[low].to < t - 1e-9 && frames[low + 1].from < t && frames[low + 1].details ? low + 1 : low;
   }
   const seek = t => { t = Math.min(END, Math.max(START, t)); show(frameAt(t), t); };
-  const stop = () => { playing = false; get('play').textContent = 'Play'; };
+  const setPlaying = on => {
+    playing = on;
+    get('play').textContent = on ? 'Pause' : 'Play';
+    if (!isSoftware) return;
+    shown.forEach(s => { if (s.surface) s.lines.visible = !on; });
+    maps.forEach(m => { m.cubes.children[1].visible = !on; });
+    draw();
+  };
+  const stop = () => setPlaying(false);
   function go(now) {
     if (!playing) return;
     if (before) { seek(clock + (now - before) / 1000 * +get('speed').value); if (clock >= END) return stop(); }
@@ -222,7 +232,7 @@ const player = (() => {
   get('play').addEventListener('click', () => {
     if (playing) return stop();
     if (clock >= END) seek(START);
-    playing = true; before = 0; get('play').textContent = 'Pause'; requestAnimationFrame(go); });
+    before = 0; setPlaying(true); requestAnimationFrame(go); });
   const stepTo = i => { stop(); i = Math.min(frames.length - 1, Math.max(0, i)); show(i, frames[i].to); };
   get('back').addEventListener('click', () => stepTo(current - 1));
   get('on').addEventListener('click', () => stepTo(current + 1));

@@ -100,8 +100,12 @@ class ReportPageTest(unittest.TestCase):
         actions = ActionBuilder(page)
         actions.pointer_action.move_to_location(round(x), round(y)).click()
         actions.perform()
-        self.assertRegex(text('picked'), r'^Contact, .*: mesh vert\w+ %s .*; certain, new\. Time of contact between .* '
-                                         r'wide\. Settled by tier \w+\. Part of patch \d+\.$' % earliest['v0'])
+        self.assertRegex(text('picked'), r'^Contact, .*: mesh vert.* \d.*; certain, new\. Time of contact between .* wide\. '
+                                         r'Settled by tier \w+\. Part of patch \d+\.$')
+        near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
+            return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)
+        self.assertIn(text('picked'), near, 'what was clicked, or what lies on the same spot')
+        self.assertLess(len(near), len(page.execute_script('return player.items()')))
         page.execute_script("player.seek(0)")
         self.assertEqual(text('picked'), 'Click a contact or a patch to see what it is.')
 
@@ -143,6 +147,18 @@ class ReportPageTest(unittest.TestCase):
         self.assertIn(first['stamp'], text('firsts'))
         self.assertEqual(page.execute_script("return performance.getEntriesByType('resource').length"), 0)
         self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
+
+    @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
+    def test_without_the_library_the_page_says_so_and_has_the_rest(self):
+        page = self.page.read_text()
+        self.page.write_text(re.sub(r'(<script id="three">).*?(</script>)', r'\1\2', page, flags=re.S))
+        browser = self.browser()
+        self.assertRegex(browser.find_element('id', 'player_note').text, 'has no player: .*three.js')
+        self.assertFalse(browser.find_element('id', 'view').is_displayed())
+        bars = browser.find_elements('css selector', '#lanes rect.bar')
+        self.assertGreater(len(bars), 0)
+        browser.execute_script("arguments[0].dispatchEvent(new MouseEvent('click', {bubbles: true}))", bars[0])
+        self.assertEqual([line for line in browser.get_log('browser') if line['level'] == 'SEVERE'], [])
 
 
 if __name__ == '__main__':
