@@ -64,9 +64,19 @@ class EndingTest(AttackTest):
         node = subprocess.Popen([str(self.tool('collision_monitor_node')), '__name:=board', '_fixed_frame:=world',
                                  '_octomap_file:=' + path, '_unknown_space:=report'])
         self.addCleanup(self.end, node)
-        time.sleep(0.5)
+        # Until then a signal is not the node's to answer.
+        begun = time.monotonic()
+        while not self.catches(node.pid, signal.SIGINT) and time.monotonic() - begun < 10 * SLOW:
+            time.sleep(0.01)
         self.assertIsNone(node.poll())
         self.ends(node, signal.SIGINT, 'a map that is being decoded')
+
+    @staticmethod
+    def catches(pid, number):
+        """Whether the process has a handler of its own for the signal."""
+        with open('/proc/%d/status' % pid, encoding='ascii') as status:
+            mask = next(line.split()[1] for line in status if line.startswith('SigCgt:'))
+        return int(mask, 16) >> (number - 1) & 1 == 1
 
 
 if __name__ == '__main__':

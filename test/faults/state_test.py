@@ -134,7 +134,8 @@ class StateTest(LiveNodeTest):
         wait_for(lambda: len(self.states) > said, step_s + 10, 'a word before the answer')
         self.assertIn('had no answer', self.states[said].missing[0])
         wait_for(lambda: self.states[-1].proved, 10 + 3 * step_s, 'the answer, which proves contacts')
-        self.assertEqual(self.states[-1].touching, State.NEW)
+        # It touches itself all over: that is one patch, which lasts.
+        self.assertEqual(self.states[-1].touching, State.LASTING)
         # With a frame behind it that waits, an answer that comes is no proof any more.
         stream = self.stream(cloud, 100)
         wait_for(lambda: len(self.contacts) >= 6, 10 + 10 * step_s, 'more steps')
