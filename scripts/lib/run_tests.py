@@ -168,6 +168,10 @@ class PythonRunner:
         return result, log
 
 
+# The commands of the pages take minutes: they run once, in the bare root, or here where none can be made.
+PAGE_COMMANDS = PythonRunner(CHECKOUT / 'test/package/commands_test.py')
+
+
 def count_unittest(output, status, name, result):
     """Adds what `python3 -m unittest -v` printed."""
     ran = re.search(r'^Ran (\d+) tests? in', output, re.M)
@@ -209,12 +213,13 @@ class BareRootRunner:
                 # Its own log, and then behind the demo's: what is printed counts what unittest says.
                 pages = logs / 'bare_root_pages.log'
                 with open(pages, 'w') as page_output:
-                    status = root.run('cd test/package && python3 -m unittest -v commands_test.py',
+                    status = root.run('cd test/package && python3 -m unittest -v %s' % PAGE_COMMANDS.path.name,
                                       stdout=page_output, stderr=subprocess.STDOUT).returncode
                 text = pages.read_text(errors='replace')
                 output.write(text)
                 count_unittest(text, status, 'commands_test.py in a bare root', result)
         except CannotMake as why:
+            result, log = PAGE_COMMANDS(logs)  # they are run once, here or there
             result.skipped += 1
             result.notes.append('skipped: %s' % why)
         return result, log
@@ -328,6 +333,8 @@ def find_runners(arguments):
     live = [RostestRunner(p) for p in sorted((CHECKOUT / 'test' / 'ros').glob('*.test'))]
     # In a bare root there is no root to be made, and a sanitizer looks at nothing that a stranger's build does.
     inside = os.environ.get('DEFORMABLE_CCD_IN_BARE_ROOT') or os.environ.get('DEFORMABLE_CCD_SANITIZED')
+    if not inside and not arguments.only:
+        python = [runner for runner in python if runner.name != PAGE_COMMANDS.name]
     return busy + python, launch + live, [] if inside else [BareRootRunner()]
 
 

@@ -18,12 +18,9 @@ namespace {
 
 using Clock = Deadline::Clock;
 
-constexpr double PATCHES_SHARE = 0.4;         // of a step's time at most
-constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
-constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
-constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
-constexpr double MOST_NS_PER_HIT = 2000;                          // more is what the operating system took
-constexpr std::size_t FEWEST_TO_MEASURE = 1000;                   // hits of a step that tell what one takes
+constexpr double PATCHES_SHARE = 0.4;            // of a step's time at most
+constexpr double MOST_NS_PER_HIT = 2000;         // more is what the operating system took
+constexpr std::size_t FEWEST_TO_MEASURE = 1000;  // hits of a step that tell what one takes
 constexpr std::size_t PIECE = 256;             // groups or vertices in a unit of refitting, before a look at the clock
 constexpr std::size_t PIECES_IN_ANY_CASE = 8;  // so that a budget too small for anything still bounds a small mesh
 
@@ -344,140 +341,6 @@ bool History::Impl::fill(const Part& part) {
   }
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;
-}
-
-/// Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
-bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
-  if (c.toc_lower > 0) return false;
-  if (scene.separation(c.body[0], c.body[1]) > 0 || scene.uncertain()) return true;
-  const bool face = c.kind == PairKind::VERTEX_FACE;
-  const auto x = [&](std::size_t i) {
-    return (*step.bodies[c.body[i < (face ? 1u : 2u) ? 0 : 1]].t0)[c.vertex[i]].data();
-  };
-  // A vertex is a segment without length, an edge a triangle without area.
-  return face ? segmentMeetsTriangle(x(0), x(0), x(1), x(2), x(3)) : segmentMeetsTriangle(x(0), x(1), x(2), x(3), x(3));
-}
-
-void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& c) const {
-  c = Contact();
-  c.kind = kind;
-  c.toc_lower = hit.toc_lower;
-  c.toc_upper = hit.toc_upper;
-  c.certainty = hit.certainty;
-  c.body = {static_cast<std::uint16_t>(hit.bodies >> 16), static_cast<std::uint16_t>(hit.bodies)};
-  const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
-  scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
-  scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
-  c.initial = !(late && hit.certainty == Certainty::UNDECIDED) && meetAtStart(step, c);
-}
-
-/// What is undecided when the deadline is over may be new: nothing is computed for it any more.
-void History::Impl::collect(const Step& step, const Deadline& deadline) {
-  const Clock::time_point start = Clock::now();
-  for (const PairWorker& w : workers) {
-    result.stats += w.stats();
-    result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
-  }
-  std::vector<const std::vector<Hit>*> parts;
-  std::size_t base = 0;
-  for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
-    parts.clear();
-    for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
-    const std::vector<const Hit*>& sorted = order.sort(parts);
-    result.contacts.resize(base + sorted.size());
-    parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
-      bool late = false;
-      for (std::size_t i = first; i < last; ++i) {
-        if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
-        // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
-        if (i + 8 < last) __builtin_prefetch(sorted[i + 8]);
-        writeContact(kind, *sorted[i], step, late, result.contacts[base + i]);
-      }
-    });
-    base += sorted.size();
-  }
-  if (result.cut) {  // what was found beyond depends on the threads
-    const auto undecided = [](const Contact& c) { return c.certainty == Certainty::UNDECIDED; };
-    result.stats.undecided =
-        static_cast<std::uint64_t>(std::count_if(result.contacts.begin(), result.contacts.end(), undecided));
-  }
-  result.stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
-}
-
-void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_pairs) {
-  const auto forget = [&] {
-    carried.start_state.clear();
-    carried.inside.clear();
-  };
-  // Edges alone have no inside, and do not cross but in a contact.
-  if (!checksStartState(part) || !(scene.hasFaces() || map_reduced)) return forget();
-  const Clock::time_point start = Clock::now();
-  StepStats& stats = result.stats;
-  StartStateSearch::IsOver is_over;
-  if (part.deadline.canEnd()) {
-    Deadline deadline = part.deadline;
-    if (!deadline.isNever()) {
-      // Later parts need as much time for their pairs; what is over that is shared.
-      const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
-      const Clock::duration slack = deadline.at() - start - later * (start - begin);
-      // Contacts are still to be joined, counted and cut.
-      const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size());
-      deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
-    }
-    is_over = [this, deadline] {
-      return deadline.movedBy(-LISTING_AN_INTERSECTION * carried.start_state.foundCount()).isOver();
-    };
-  }
-  std::vector<StartIntersection> met;
-  result.start_state_complete = listStart(part, is_over, met) && result.start_state_complete;
-  if (!met.empty()) {
-    result.start_state = StartState::INTERSECTING;
-  } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
-    result.start_state = StartState::NOT_CHECKED;
-  }
-  result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
-  if (isStartKnown()) {
-    forget();
-  } else {
-    // With earliest_only the later contacts are unknown, and `fast` may miss some, so nothing may be concluded about
-    // the end of the step.
-    const bool complete = all_pairs && !options->earliest_only && stats.unchecked_vertices == 0 &&
-                          options->accuracy.rung != Accuracy::FAST;
-    carried.start_state.remember(scene, result.contacts, complete);
-    carried.inside.remember(scene, result.contacts, complete);
-  }
-  stats[Stage::START_STATE].ms += msSince(start);
-  stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
-}
-
-/// What meets or is inside at t=0. False: is_over ended it. The vertices come first, for they are few.
-bool History::Impl::listStart(const Part& part, const StartStateSearch::IsOver& is_over,
-                              std::vector<StartIntersection>& met) {
-  std::vector<StartIntersection> inside;
-  bool whole = false;
-  if (isStartKnown()) {
-    const SceneArrays& before = begins_at->scene;
-    whole = begins_at->carried.inside.listEnd(before, is_over, inside);
-    whole = begins_at->carried.start_state.listEnd(before, is_over, met) && whole;
-  } else {
-    inside = carried.inside.run(scene, part.continues, is_over, result.stats);
-    met = carried.start_state.run(scene, part.continues, is_over, result.stats, foundLimit());
-    if (carried.start_state.isCut()) result.cut = true;
-    whole = carried.inside.isWhole() && carried.start_state.isWhole();
-  }
-  met.insert(met.end(), inside.begin(), inside.end());
-  return whole;
-}
-
-/// Of a step aside from all others only the first part is asked about: nothing is carried over from it.
-bool History::Impl::checksStartState(const Part& part) const {
-  return options->check_start_state && (part.index == 0 || !aside);
-}
-
-/// By the step that this one begins at.
-bool History::Impl::isStartKnown() const {
-  return begins_at && !begins_at->carried.end.empty() && begins_at->carried.start_state.knowsEnd() &&
-         begins_at->carried.inside.knowsEnd();
 }
 
 }  // namespace dccd

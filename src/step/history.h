@@ -1,5 +1,6 @@
-// What a history holds, and what a step does with it: detect.cpp has the flow, pairs.cpp the pairs of meshes, map.cpp
-// the map, left_out.h what is left out of the separation.
+// What a history holds, and what a step does with it: detect.cpp has the flow, pairs.cpp the pairs of meshes,
+// contacts.cpp the list of what they found, map.cpp the map, start.cpp what meets at t=0, left_out.h what is left out
+// of the separation.
 #pragma once
 
 #include <tbb/blocked_range.h>

@@ -30,7 +30,7 @@ class BudgetTest(AttackTest):
 
     def test_doubles_from_denormal_to_a_decimetre(self):
         self.start_node('doubles', step_budget_ms=10)
-        rows, cols = 16, 16
+        rows, cols = 28, 28  # three and a half million pairs: more than any machine decides in the budget
         messages = []
         for i in range(20):
             points = [tuple(math.ldexp(((7 * k + 13 * a + i) % 31 - 15) / 16, -3 - (k * 37 + a * 11 + i * 5) % 1070) for a in range(3))
@@ -38,7 +38,10 @@ class BudgetTest(AttackTest):
             messages.append(cloud_of(i, points, rows, cols))
         outcomes = self.run_frames(10, messages)
         self.assertFalse(any(s.clear for s in self.states[1:]))
-        self.assertIn(ContactArray.DEADLINE, [o.status for o in outcomes])
+        # A fast machine comes to the limit of what a step may find before it comes to the end of the budget.
+        self.assertTrue(all(o.status in (ContactArray.DEADLINE, ContactArray.TRUNCATED) for o in outcomes[1:]),
+                        [(o.status, o.reason) for o in outcomes])
+        self.assertFalse(any(o.complete for o in outcomes[1:]))
         self.recovers(30, rows, cols)
 
     def test_random_bytes(self):

@@ -5,9 +5,7 @@ frames are answered within two steps.
 DEFORMABLE_CCD_LIVE_FUZZ_SECONDS: how long, 20 s unless told, with --long 300 s; _SEED: where it begins, 1 unless told. What was sent is
 in the seed; the last actions are printed when something does not hold."""
 import collections
-import io
 import os
-import random
 import signal
 import struct
 import time
@@ -19,196 +17,22 @@ import dynamic_reconfigure.srv
 import genpy
 import rosgraph
 import rospy
-from attack import SLOW, AttackTest, checkerboard, cloud_of, peak_kb, resident_kb, wait_for
-from deformable_ccd.msg import ContactArray, MeshStamped
-from geometry_msgs.msg import Point, TransformStamped
+from attack import SLOW, AttackTest, cloud_of, peak_kb, resident_kb, wait_for
+from deformable_ccd.msg import ContactArray, State, StepStats
+from fuzz_source import COLS, MESHES, ODD, ROWS, Source, bytes_of, raw
+from node_watch import NodeWatch
 from octomap_msgs.msg import Octomap
-from pcl_msgs.msg import PolygonMesh, Vertices
 from sensor_msgs.msg import PointCloud2
-from shape_msgs.msg import Mesh, MeshTriangle
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import MarkerArray
 
 SECONDS = float(os.environ.get('DEFORMABLE_CCD_LIVE_FUZZ_SECONDS', 300 if os.environ.get('DEFORMABLE_CCD_LONG') else 20))
 SEED = int(os.environ.get('DEFORMABLE_CCD_LIVE_FUZZ_SEED', 1))
 NODE_SECONDS = 30  # then the next node, with other parameters
 LIMIT_MB = 64  # of memory and of maps, each
 ANSWER_S = 60  # for an answer of a node that is not stuck, on a machine that is busy
-ROWS, COLS = 8, 10
-ODD = [0.0, -0.0, 1.0, 1e-320, 1e-30, 1e-9, 1e9, 1e30, 1e150, 1e300, float('inf'), float('-inf'), float('nan')]
-NAMES = ['world', 'world', 'world', 'world', 'camera', 'nowhere', '', '/', '//cam', 'a b\n', '\x01', 'y' * 3000]
-MESHES = [PointCloud2, MeshStamped, PolygonMesh, Mesh, Marker, MarkerArray]
-
-
-def bytes_of(message):
-    buff = io.BytesIO()
-    message.serialize(buff)
-    return buff.getvalue()
-
-
-def raw(kind, data):
-    """A message of a type whose bytes are these."""
-    class Raw(kind):
-        def serialize(self, buff):
-            buff.write(data)
-
-        def _check_types(self, exc=None):
-            pass
-    return Raw()
-
-
-class Source:
-    """What is sent: all of it from one random generator."""
-
-    def __init__(self, seed):
-        self.random = random.Random(seed)
-        self.stamp_s = 1000.0
-
-    def stamp(self):
-        step = self.random.choices([0.03, 0, -0.03, 5.0, -100.0, 1e6], [80, 4, 4, 4, 4, 1])[0]
-        self.stamp_s = min(max(self.stamp_s + step, 1.0), 4e9)
-        return rospy.Time() if self.random.random() < 0.03 else rospy.Time.from_sec(self.stamp_s)
-
-    def frame_id(self):
-        return self.random.choice(NAMES) if self.random.random() < 0.3 else 'world'
-
-    def points(self, count):
-        r = self.random
-        kind = r.random()
-        if kind < 0.1:
-            return [(0.1, 0.1, 0.1)] * count  # a tracker that collapsed
-        if kind < 0.2:
-            return [tuple(r.choice(ODD) for _ in range(3)) for _ in range(count)]
-        size = r.choice([0.0, 0.001, 0.01, 0.1])
-        at = r.choice([(0, 0, 0), (0.1, 0, 0.2), (10, 10, 10)])
-        points = [(at[0] + 0.01 * (i % COLS) + r.uniform(-size, size), at[1] + 0.01 * (i // COLS) + r.uniform(-size, size),
-                   at[2] + r.uniform(-size, size)) for i in range(count)]
-        if kind < 0.3:
-            points[r.randrange(count)] = tuple(r.choice(ODD) for _ in range(3))
-        return points
-
-    def triangles(self, points, count):
-        top = points if self.random.random() < 0.95 else 2 ** 32 - 1
-        return [tuple(self.random.randrange(top) for _ in range(3)) for _ in range(count)]
-
-    def mesh(self, kind):
-        r = self.random
-        rows, cols = r.choice([(ROWS, COLS), (ROWS, COLS), (2, 2), (1, 7), (20, 30), (1, 1)])
-        points = self.points(rows * cols)
-        if kind is PointCloud2 or kind is PolygonMesh:
-            message = cloud_of(0, points, rows, cols)
-            message.header.frame_id, message.header.stamp = self.frame_id(), self.stamp()
-            if r.random() < 0.05:
-                message.fields = message.fields[:r.randrange(3)]
-            if r.random() < 0.05:
-                message.point_step = r.choice([0, 1, 23, 2 ** 32 - 1])
-            if kind is PointCloud2:
-                return message
-            faces = self.triangles(len(points), r.choice([0, 1, 50, 500]))
-            return PolygonMesh(header=message.header, cloud=message, polygons=[Vertices(f[:r.choice([3, 3, 3, 0, 2])]) for f in faces])
-        corners = [Point(*p) for p in points]
-        faces = self.triangles(len(points), r.choice([1, 50, 500]))
-        if kind is Mesh:
-            return Mesh(vertices=corners, triangles=[MeshTriangle(f) for f in faces])
-        if kind is MeshStamped:
-            message = MeshStamped(vertices=corners, triangles=[MeshTriangle(f) for f in faces])
-        else:
-            message = Marker(type=r.choice([11, 11, 11, 0, 7]), points=(corners * 3)[:r.choice([3, 30, 31, 90])])
-            message.pose.orientation.w = r.choice([1, 1, 1, 0, float('nan')])
-        message.header.frame_id, message.header.stamp = self.frame_id(), self.stamp()
-        return MarkerArray([message] * r.choice([0, 1, 1, 3])) if kind is MarkerArray else message
-
-    def damaged(self, kind, message):
-        """The message with bytes changed, cut or added, or none of its bytes."""
-        data = bytearray(bytes_of(message))
-        r = self.random
-        how = r.random()
-        if how < 0.4:
-            for _ in range(r.choice([1, 4, 100])):
-                data[r.randrange(len(data))] = r.choice([0, 1, 0x7f, 0x80, 0xff, r.randrange(256)])
-        elif how < 0.6:
-            data = data[:r.randrange(len(data))]
-        elif how < 0.8:
-            data += bytes(r.choice([1, 1000, 3000000]))
-        elif how < 0.9:
-            at = 4 * r.randrange(max(1, len(data) // 4 - 1))
-            data[at:at + 4] = struct.pack('<I', r.choice([2 ** 31, 2 ** 32 - 1, 1000000, 500000000]))
-        else:
-            data = r.randbytes(r.choice([0, 3, 100, 1000000]))
-        return raw(kind, bytes(data))
-
-    def map(self):
-        r = self.random
-        data = checkerboard(r.choice([0, 2, 4, 5, 5, 6, 7]))
-        if r.random() < 0.2:
-            data = r.randbytes(r.choice([0, 2, 100, 100000]))
-        if r.random() < 0.1:
-            data = data[:r.randrange(len(data) + 1)]
-        if r.random() < 0.1:
-            data = struct.pack('<H', r.choice([0xaaaa, 0x5555, 0xa5a5, 0xffff])) + data
-        whole = Octomap(binary=r.random() < 0.8, id=r.choice(['OcTree'] * 8 + ['ColorOcTree', 'x' * 5000]),
-                        resolution=r.choice([0.01, 0.01, 0.05, 1e-5] + ODD))
-        whole.header.frame_id, whole.header.stamp = self.frame_id(), rospy.Time()
-        # rospy packs int8[] one by one, which takes seconds.
-        return raw(Octomap, bytes_of(whole)[:-4] + struct.pack('<I', len(data)) + data)
-
-    def transform(self):
-        r = self.random
-        t = TransformStamped(child_frame_id=r.choice(['camera', 'camera', 'camera', 'world', '', '//a', 'z' * 1000]))
-        t.header.frame_id = r.choice(['world', 'world', 'camera', '', 'nowhere'])
-        t.header.stamp = rospy.Time.from_sec(max(0, self.stamp_s + r.choice([0, 0, 0.1, -0.1, -1000, 1e6])))
-        t.transform.translation.x = r.choice([0.0, 0.1] + ODD)
-        t.transform.rotation.w = r.choice([1.0, 1.0, 1.0, 0.5, 0.0, float('nan')])
-        return TFMessage([t] * r.choice([0, 1, 1, 1, 200]))
-
-
-class Watch:
-    """What the node says, judged as it comes."""
-
-    def __init__(self, wants_map):
-        self.wants_map = wants_map
-        self.wrong, self.outcomes = [], collections.OrderedDict()
-        self.clear_ones = collections.deque(maxlen=200)  # states, with when they came
-        self.steps = 0
-
-    def contacts(self, message):
-        self.steps += 1
-        self.outcomes.setdefault(message.header.stamp, []).append(message)
-        if len(self.outcomes) > 300:
-            self.outcomes.popitem(last=False)
-        if len(message.reason) > 2000:
-            self.wrong.append('a reason of %d characters' % len(message.reason))
-
-    def counts(self, s):
-        if s.frames_received != s.frames_processed + s.frames_started + s.frames_skipped + s.frames_waiting:
-            self.wrong.append('%d received, %d processed, %d started, %d skipped, %d waiting' % (
-                s.frames_received, s.frames_processed, s.frames_started, s.frames_skipped, s.frames_waiting))
-        if s.frames_skipped != (s.skipped_duplicate + s.skipped_vertex_count + s.skipped_bad_message + s.skipped_no_transform +
-                                s.skipped_no_body + s.skipped_queue_full + s.skipped_disabled + s.skipped_reset + s.skipped_error):
-            self.wrong.append('skipped frames do not add up')
-        if s.skipped_error:
-            self.wrong.append('%d frames were lost to an error of the monitor' % s.skipped_error)
-
-    def state(self, s):
-        said = 'proved %s, touching %d, clear %s, missing %s' % (s.proved, s.touching, s.clear, s.missing)
-        if s.proved != (not s.missing) or s.clear != (s.proved and s.touching == s.NONE):
-            self.wrong.append(said)
-        if s.clear and (s.holds_until.is_zero() or not (s.checked_self or s.checked_map or s.checked_bodies)):
-            self.wrong.append('nothing was looked at: ' + said)
-        if s.clear and self.wants_map and not s.checked_map:
-            self.wrong.append('no map: ' + said)
-        if s.clear:
-            self.clear_ones.append((time.monotonic(), s))
-
-    def compare(self):
-        """Each clear state has an outcome of its stamp that says the same. They come by other connections, in any order, and a stamp
-        may come again."""
-        while self.clear_ones and time.monotonic() - self.clear_ones[0][0] > 1:
-            said = self.outcomes.get(self.clear_ones.popleft()[1].holds_until, [])
-            if said and not any(o.answered and o.complete and not o.contacts for o in said):
-                self.wrong.append('clear beside statuses %s and %s contacts' % ([o.status for o in said], [len(o.contacts) for o in said]))
 
 
 class LiveFuzzTest(AttackTest):
@@ -235,8 +59,7 @@ class LiveFuzzTest(AttackTest):
             rospy.set_param('/%s/%s' % (self.name, key), value)
         self.kind = None
         self.node = self.start_node(self.name, publishes=False, **parameters)
-        self.watch = Watch(parameters['effects/octomap'] == 'on')
-        from deformable_ccd.msg import State, StepStats
+        self.watch = NodeWatch(parameters['effects/octomap'] == 'on')
         self.subscribers = [rospy.Subscriber('/%s/%s' % (self.name, topic), kind, into) for topic, kind, into in (
             ('contacts', ContactArray, self.watch.contacts), ('stats', StepStats, self.watch.counts), ('state', State, self.watch.state),
             ('markers', MarkerArray, lambda m: None), ('prediction/contacts', ContactArray, lambda m: None))]

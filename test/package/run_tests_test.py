@@ -1,5 +1,6 @@
 """The runner that adds the tests up: a test that did not start, crashed or failed must never read as passed."""
 import importlib.util
+import os
 import pathlib
 import stat
 import subprocess
@@ -102,6 +103,25 @@ class RunTestsTest(unittest.TestCase):
         result, _ = run_tests.PythonRunner(test)(self.path)
         self.assertGreater(result.failed, 0)
         self.assertEqual(result.passed, 0)
+
+    def test_the_commands_of_the_pages_run_here_where_there_is_no_bare_root(self):
+        (self.path / 'gtest_suites.txt').write_text('')
+        arguments = unittest.mock.Mock(build=self.path, filter='', emulator='', fuzzers=None, only='')
+        environment = {k: v for k, v in os.environ.items() if k not in ('DEFORMABLE_CCD_IN_BARE_ROOT', 'DEFORMABLE_CCD_SANITIZED')}
+        name = run_tests.PAGE_COMMANDS.name
+        with unittest.mock.patch.dict(os.environ, environment, clear=True):
+            busy, _, alone = run_tests.find_runners(arguments)
+            self.assertNotIn(name, [r.name for r in busy])
+            with unittest.mock.patch.object(run_tests, 'bare_root', side_effect=run_tests.CannotMake('no root')), \
+                    unittest.mock.patch.object(run_tests, 'PAGE_COMMANDS', return_value=(run_tests.Result(), None)) as commands:
+                result, _ = alone[0](self.path)
+                commands.assert_called_once()
+            self.assertEqual((result.failed, result.skipped), (0, 1))
+            self.assertIn(name, [r.name for r in run_tests.find_runners(unittest.mock.Mock(
+                build=self.path, filter='', emulator='', fuzzers=None, only='commands'))[0]])
+        with unittest.mock.patch.dict(os.environ, {**environment, 'DEFORMABLE_CCD_SANITIZED': 'thread'}, clear=True):
+            busy, _, alone = run_tests.find_runners(arguments)
+            self.assertEqual(([r.name for r in busy].count(name), alone), (1, []))
 
     def fuzz(self, coverages, runs):
         """The result of a decoder's fuzzer whose rounds reach these coverages, the last one again and again."""

@@ -1,0 +1,74 @@
+// From what the pairs found to the list of contacts, in their order.
+#include <algorithm>
+
+#include "step/history.h"
+
+namespace dccd {
+namespace {
+
+using Clock = Deadline::Clock;
+
+constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
+constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
+
+}  // namespace
+
+/// Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
+bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
+  if (c.toc_lower > 0) return false;
+  if (scene.separation(c.body[0], c.body[1]) > 0 || scene.uncertain()) return true;
+  const bool face = c.kind == PairKind::VERTEX_FACE;
+  const auto x = [&](std::size_t i) {
+    return (*step.bodies[c.body[i < (face ? 1u : 2u) ? 0 : 1]].t0)[c.vertex[i]].data();
+  };
+  // A vertex is a segment without length, an edge a triangle without area.
+  return face ? segmentMeetsTriangle(x(0), x(0), x(1), x(2), x(3)) : segmentMeetsTriangle(x(0), x(1), x(2), x(3), x(3));
+}
+
+void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& c) const {
+  c = Contact();
+  c.kind = kind;
+  c.toc_lower = hit.toc_lower;
+  c.toc_upper = hit.toc_upper;
+  c.certainty = hit.certainty;
+  c.body = {static_cast<std::uint16_t>(hit.bodies >> 16), static_cast<std::uint16_t>(hit.bodies)};
+  const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
+  scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
+  scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
+  c.initial = !(late && hit.certainty == Certainty::UNDECIDED) && meetAtStart(step, c);
+}
+
+/// What is undecided when the deadline is over may be new: nothing is computed for it any more.
+void History::Impl::collect(const Step& step, const Deadline& deadline) {
+  const Clock::time_point start = Clock::now();
+  for (const PairWorker& w : workers) {
+    result.stats += w.stats();
+    result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
+  }
+  std::vector<const std::vector<Hit>*> parts;
+  std::size_t base = 0;
+  for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
+    parts.clear();
+    for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
+    const std::vector<const Hit*>& sorted = order.sort(parts);
+    result.contacts.resize(base + sorted.size());
+    parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
+      bool late = false;
+      for (std::size_t i = first; i < last; ++i) {
+        if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
+        // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
+        if (i + 8 < last) __builtin_prefetch(sorted[i + 8]);
+        writeContact(kind, *sorted[i], step, late, result.contacts[base + i]);
+      }
+    });
+    base += sorted.size();
+  }
+  if (result.cut) {  // what was found beyond depends on the threads
+    const auto undecided = [](const Contact& c) { return c.certainty == Certainty::UNDECIDED; };
+    result.stats.undecided =
+        static_cast<std::uint64_t>(std::count_if(result.contacts.begin(), result.contacts.end(), undecided));
+  }
+  result.stats[Stage::SORT] = {result.contacts.size(), result.contacts.size(), msSince(start)};
+}
+
+}  // namespace dccd
