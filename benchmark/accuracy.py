@@ -9,6 +9,7 @@ import argparse
 import csv
 import gzip
 import json
+import math
 import os
 import platform
 import subprocess
@@ -169,25 +170,42 @@ def front(rows):
     return kept
 
 
-def plot_errors(axes, steps, fcl):
-    """Time across, error up. A mark a setting; crossed where answers are missing, ringed where some are false."""
-    for k, scene in enumerate(dict.fromkeys(r["scene"] for r in steps)):
-        mine = [r for r in steps if r["scene"] == scene]
-        line = front(mine)
-        axes.plot([r["median_ms"] for r in line], [r["toc_error"] for r in line], color="C%d" % k, linewidth=0.8, drawstyle="steps-post")
-        for r in mine + [r for r in fcl if r["scene"] == scene]:
-            ours = r["setting"].startswith("exact")
-            axes.plot(r["median_ms"], r["toc_error"], color="C%d" % k, linestyle="none", markersize=6,
-                      marker="o" if ours else "s" if r["setting"].startswith("conservative") else "D" if r["setting"] == "fast" else "^",
-                      label=scene if r is mine[0] else None)
-            if r["missed"]:
-                axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="x", markersize=13, markeredgewidth=1.5)
-            if r["false"]:
-                axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="o", markersize=15, fillstyle="none")
-            axes.annotate(r["setting"], (r["median_ms"], r["toc_error"]), xytext=(9, 3), textcoords="offset points", fontsize=7)
-    axes.set(yscale="log", ylabel="largest error of a time of contact [step]",
-             title="What accuracy costs: cross = contacts missed, ring = contacts invented, line = the front")
-    axes.legend(fontsize=8, loc="center right")
+def short_names(settings):
+    """Marks that lie on one another share a label: "conservative 1e-3, 1e-6"."""
+    rungs = {}
+    for setting in settings:
+        rung, _, more = setting.partition(" ")
+        rungs.setdefault(rung, []).append(more)
+    return "; ".join((rung + " " + ", ".join(more)).strip() for rung, more in rungs.items())
+
+
+def label(axes, rows):
+    """A name beside each mark, one for those that are nearer to each other than a name is high."""
+    groups = []
+    for r in sorted(rows, key=lambda r: r["median_ms"]):
+        near = [g for g in groups if abs(math.log10(g[0]["toc_error"] / r["toc_error"])) < 0.8
+                and r["median_ms"] < 1.25 * g[0]["median_ms"]]
+        near[0].append(r) if near else groups.append([r])
+    for group in groups:
+        axes.annotate(short_names(r["setting"] for r in rows if r in group), (max(r["median_ms"] for r in group), group[0]["toc_error"]),
+                      xytext=(10, -3), textcoords="offset points", fontsize=7)
+
+
+def plot_errors(axes, scene, steps, fcl, colour):
+    """Time across, error up, of one scene. A mark a setting; crossed where answers are missing, ringed where some are false."""
+    mine = [r for r in steps if r["scene"] == scene]
+    line, rivals = front(mine), [r for r in fcl if r["scene"] == scene]
+    axes.plot([r["median_ms"] for r in line], [r["toc_error"] for r in line], color=colour, linewidth=0.8, drawstyle="steps-post")
+    for r in mine + rivals:
+        marker = {"exact": "o", "conservative": "s", "fast": "D"}.get(r["setting"].split()[0], "^")
+        axes.plot(r["median_ms"], r["toc_error"], color=colour, linestyle="none", markersize=6, marker=marker)
+        if r["missed"]:
+            axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="x", markersize=13, markeredgewidth=1.5)
+        if r["false"]:
+            axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="o", markersize=15, fillstyle="none")
+    label(axes, mine + rivals)
+    times = [r["median_ms"] for r in mine + rivals]
+    axes.set(yscale="log", xscale="log", xlim=(0.85 * min(times), 2.2 * max(times)), title=scene, xlabel="whole step, one thread, median [ms]")
 
 
 def plot_wrong(axes, steps, fcl):
@@ -196,11 +214,16 @@ def plot_wrong(axes, steps, fcl):
         for r in [r for r in steps + fcl if r["scene"] == scene]:
             for what, marker in (("missed", "x"), ("false", "o")):
                 axes.plot(r["median_ms"], r[what], color="C%d" % k, marker=marker, fillstyle="none", linestyle="none")
+        axes.plot([], [], color="C%d" % k, marker="o", linestyle="none", label=scene)
         for name, seconds, false in APART.get(scene, []):
             if false is None:
                 continue
             axes.plot(1e3 * seconds, false, color="C%d" % k, marker="o", fillstyle="none", linestyle="none", alpha=0.5)
             axes.annotate(name + ", measured apart", (1e3 * seconds, false), xytext=(-6, -11), ha="right", textcoords="offset points", fontsize=7)
+    for r in [r for r in steps if r["setting"] == "fast"]:
+        axes.annotate("fast", (r["median_ms"], max(r["missed"], r["false"])), xytext=(-6, 2), ha="right", textcoords="offset points", fontsize=7)
+    axes.annotate("conservative, exact", (max(r["median_ms"] for r in steps), 0), xytext=(9, 1), textcoords="offset points", fontsize=7)
+    axes.legend(fontsize=8, loc="center")
     for r in fcl:
         axes.annotate("FCL's tests", (r["median_ms"], max(r["missed"], r["false"])), xytext=(7, 0), textcoords="offset points", fontsize=7)
     axes.set_yscale("symlog", linthresh=1)
@@ -211,16 +234,22 @@ def plot_wrong(axes, steps, fcl):
 def plot_hard(axes, pairs):
     """One pair at a time, of those that are made to be hard: microseconds against the share of wrong answers."""
     mine = [r for r in pairs if r["source"] == "hard queries"]
+    right = []  # rungs without a wrong answer share a label
     for rung in dict.fromkeys(r["rung"] for r in mine):
         rows = [r for r in mine if r["rung"] == rung]
         count = sum(int(r["pairs"]) for r in rows)
         us = sum(int(r["pairs"]) * float(r["median_ns"]) for r in rows) / count * 1e-3
         wrong = sum(int(r["missed"]) + int(r["false_contacts"]) for r in rows) / count
         axes.plot(us, wrong, color="C2", marker="o" if rung.startswith("exact") else "^" if rung == "FCL" else "s", linestyle="none")
-        axes.annotate(rung, (us, wrong), xytext=(6, 3), textcoords="offset points", fontsize=7, rotation=25)
+        if wrong:
+            axes.annotate(rung, (us, wrong), xytext=(8, -2), textcoords="offset points", fontsize=7)
+        else:
+            right.append((us, rung))
+    if right:
+        axes.annotate(short_names(rung for _, rung in right), (max(right)[0], 0), xytext=(8, -2), textcoords="offset points", fontsize=7)
     for name, us, wrong in APART_HARD:
         axes.plot(us, wrong / HARD_QUERIES_APART, color="C2", marker="o", fillstyle="none", linestyle="none", alpha=0.5)
-        axes.annotate(name + ", measured apart", (us, wrong / HARD_QUERIES_APART), xytext=(-6, -11), ha="right", textcoords="offset points", fontsize=7)
+        axes.annotate(name + ", measured apart", (us, wrong / HARD_QUERIES_APART), xytext=(-8, -2), ha="right", textcoords="offset points", fontsize=7)
     axes.set_yscale("symlog", linthresh=1e-3)
     axes.set_ylim(bottom=-3e-4)
     axes.set(xscale="log", xlabel="one pair of the hard queries [us]", ylabel="share of wrong answers")
@@ -231,13 +260,20 @@ def plot(steps, fcl, pairs, folder):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     import matplotlib.ticker
-    figure, (upper, lower, hard) = plt.subplots(3, 1, figsize=(9, 11), gridspec_kw={"height_ratios": (2, 1, 1)})
-    lower.sharex(upper)
-    plot_errors(upper, steps, fcl)
+    figure = plt.figure(figsize=(9, 11))
+    grid = figure.add_gridspec(3, 2, height_ratios=(2, 1, 1))
+    scenes = list(dict.fromkeys(r["scene"] for r in steps))
+    upper = []
+    for k, scene in enumerate(scenes[:2]):
+        upper.append(figure.add_subplot(grid[0, k], sharey=upper[0] if upper else None))
+        plot_errors(upper[k], scene, steps, fcl, "C%d" % k)
+    upper[0].set_ylabel("largest error of a time of contact [step]")
+    figure.suptitle("What accuracy costs: cross = contacts missed, ring = contacts invented, line = the front", fontsize=11)
+    lower, hard = (figure.add_subplot(grid[row, :]) for row in (1, 2))
     plot_wrong(lower, steps, fcl)
     plot_hard(hard, pairs)
-    for axes in (upper, lower, hard):
-        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+    for axes in (*upper, lower, hard):
+        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
         axes.grid(True, linewidth=0.3)

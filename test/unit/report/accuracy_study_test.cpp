@@ -90,6 +90,27 @@ TEST(FirstContacts, WhatGrewTogetherIsNotMissed) {
   EXPECT_EQ(parted.patches.invented, 0u);
   EXPECT_EQ(parted.parted, 1u);
   EXPECT_DOUBLE_EQ(parted.patches.late_ms, 10);
+  const RunRecord later_first = run({patch(200, 400, 0.08), patch(100, 400, 0)});
+  EXPECT_DOUBLE_EQ(errorsOf(one, later_first).patches.early_ms, -10) << "whichever was found first";
+}
+
+TEST(FirstContacts, PatchesMeetWithinAnEdgeOfTheFinerBodyOrAnEdgeAndAVoxel) {
+  const auto missed = [](std::array<std::uint16_t, 2> partners, double apart_m) {
+    RunRecord truth = run({patch(100, 300, 0)}), found = run({patch(100, 300, apart_m)});
+    for (RunRecord* record : {&truth, &found}) {
+      record->bodies.resize(2);
+      record->bodies[0].edge_m = 0.1;
+      record->bodies[1].edge_m = 0.5;
+      record->voxel_m = 0.25;
+      record->patches[0].body = partners;
+    }
+    return errorsOf(found, truth).patches.missed;
+  };
+  EXPECT_EQ(missed({0, 1}, 0.09), 0u);
+  EXPECT_EQ(missed({0, 1}, 0.11), 1u) << "of the finer body";
+  EXPECT_EQ(missed({0, OBSTACLE_BODY}, 0.34), 0u);
+  EXPECT_EQ(missed({0, OBSTACLE_BODY}, 0.36), 1u);
+  EXPECT_EQ(missed({1, OBSTACLE_BODY}, 0.74), 0u);
 }
 
 /// A step of 100 ms of a square with two faces.
@@ -130,9 +151,15 @@ TEST(RunRecorder, FirstTimesAreTheEarliestOfAllFeaturesOnAVertex) {
   contact.toc_lower = 0.25;
   contact.toc_upper = 1;
   outcome.contacts.push_back(contact);
+  contact.vertex = {1, 2, NO_INDEX, NO_INDEX};
+  contact.toc_lower = 0.3;
+  contact.toc_upper = 0.5;
+  outcome.contacts.push_back(contact);
   recorder.add(outcome);
   Outcome next = step(1);
   next.contacts = outcome.contacts;
+  next.complete = false;
+  next.unchecked_toc_lower = 0.125;
   recorder.add(next);
   const RunRecord record = recorder.take();
   EXPECT_EQ(record.steps, 2u);
@@ -141,10 +168,12 @@ TEST(RunRecorder, FirstTimesAreTheEarliestOfAllFeaturesOnAVertex) {
   const RunRecord::BodyRecord& body = record.bodies[0];
   EXPECT_EQ(body.vertices.size(), 4u);
   EXPECT_DOUBLE_EQ(body.edge_m, (4 + std::sqrt(2.0)) / 5);
-  ASSERT_EQ(body.first.size(), 2u);
+  ASSERT_EQ(body.first.size(), 3u);
   EXPECT_EQ(body.first.at(3).from_ns, 1025 * MS);
   EXPECT_EQ(body.first.at(3).to_ns, 1075 * MS);
-  EXPECT_EQ(body.first.at(1).to_ns, 1100 * MS);
+  EXPECT_EQ(body.first.at(1).from_ns, 1025 * MS);
+  EXPECT_EQ(body.first.at(1).to_ns, 1050 * MS);
+  EXPECT_EQ(record.bounds, std::vector<double>{0.125}) << "of the step that was cut";
   EXPECT_TRUE(body.comparable);
 }
 
