@@ -78,13 +78,13 @@ def microseconds(ns):
 
 def hard_page(result, folder):
     lines = ["# Hard cases", "",
-             "Made by `scripts/benchmark hard_cases` (seeded generators of `test/support/generators.h`). Of each family and kind %d pairs"
+             "`scripts/benchmark hard_cases` makes this page from random pairs of each family (`test/support/generators.h`, with fixed seeds).",
+             "The rational oracle of `oracle/`, which shares no code with `src/`, judges %d pairs of each family and kind. *Wrong* counts"
              % result["hard"][0]["judged"],
-             "were judged by the rational oracle of `oracle/`, which shares no code with `src/`; *wrong* counts verdicts among these. `exact` has",
-             "none: the command fails otherwise, and where a time is not the cell of the oracle's. Times are a pair's, on one core of",
-             "%s (%s); *worst* is the dearest single pair. The pictures show one pair at t = 0 (grey), t = 1 (black) and"
+             "verdicts among these. `exact` has no wrong verdict, and each of its times is in the cell that the oracle's time is in: otherwise",
+             "the command fails. *Mean* and *worst* are the time of one pair on one core of %s (%s)."
              % (result["machine"].get("processor", "this machine"), result["machine"].get("simd_target", "best target")),
-             "where it meets (red); wide ranges are drawn by their logarithms.", "",
+             "Each picture shows one pair at t = 0 (grey), at t = 1 (black) and where it meets (red). Wide ranges are drawn by their logarithms.", "",
              "| | family | kind | contacts | FCL wrong | `fast` wrong | `exact`: tiers | mean µs | worst µs |",
              "|---|---|---|--:|--:|--:|---|--:|--:|"]
     for row in result["hard"]:
@@ -118,12 +118,12 @@ def cliffs_page(result):
 
 def margins_page(table):
     return ["", "## Margins", "",
-            "Each margin of `include/dccd/tolerances.h` covers rounding, by a derivation that stands beside the code. Is it needed? `scripts/test --long",
-            "--only margins` (and `scripts/benchmark hard_cases`, which prints this table) cuts each, one at a time: inputs that aim at its",
-            "bound, some of them found by search (`cut_margins --search`), must go wrong then, judged by exact arithmetic, and none with the whole",
-            "margin. The last column is the largest part of the margin at which one goes wrong. Where that is less than a tenth, the bound adds up",
-            "what dozens of roundings can do at once, or one margin serves several quantities, and search has found no input that needs more; the test",
-            "holds the part that is shown. What covers underflow (0: only without it) is far larger than what it covers, to be a normal number.",
+            "Each margin of `include/dccd/tolerances.h` covers rounding. Its derivation stands beside the code. This table shows that it is",
+            "needed: the test cuts one margin at a time and asks exact arithmetic about inputs that aim at its bound. Some of these were found",
+            "by search (`cut_margins --search`). With the whole margin no input may go wrong; with less of it, one must. The last column is the",
+            "largest part of the margin with which one does. It is below a tenth where the bound adds up dozens of roundings, or where one margin",
+            "serves several quantities: there search found no input that needs more. A 0 stands where the margin covers underflow: it is a normal",
+            "number, and so far larger than what it covers. `scripts/test --long --only margins` runs the test.",
             ""] + table
 
 

@@ -40,9 +40,6 @@ constexpr double SMALLEST_RESOLUTION_M = 1e-290, LARGEST_RESOLUTION_M = 1e290;
 constexpr double SQRT2_UP = 1.4142135623730952;  ///< [1] length of the diagonal directions, rounded up
 /// [1] Margin of a bound on the time of contact, for its few roundings. Larger: bounds are earlier, nothing else.
 DCCD_MARGIN double TOC_BOUND = 8 * HALF_ULP;
-/// [1] Of a distance in record units, more than its five roundings. No input can tell it from 1: these are below 2^-35
-/// units, and a whole unit is added for truncation, of which strict comparisons of whole numbers need nothing.
-constexpr double RECORD_REACH = 1.0000002;
 /// [1] Of the scene's extent: how much wider the records' range is on either side where a body rests, so that others
 /// may move within it. Larger: resting bodies are kept longer, all bounds are coarser.
 constexpr double RECORD_PADDING = 0.5;
@@ -60,7 +57,7 @@ DCCD_MARGIN float FUSED_CUBIC = 192 * 0x1p-24f;   ///< [1] of one of the cubic o
 DCCD_MARGIN float FUSED_UNDERFLOW = 0x1p-100f;
 constexpr float FUSED_LARGEST_M = 1073741824.0f;  ///< [m] guard, 2^30: cubes of differences stay finite
 // No fold (culling/unfolded.cpp).
-constexpr double UNFOLDED_COORDINATE = 0x1p-51;  ///< [1] margin of a projected coordinate, of the largest one
+DCCD_MARGIN double UNFOLDED_COORDINATE = 0x1p-51;  ///< [1] margin of a projected coordinate, of the largest |x|+|y|+|z|
 constexpr double UNFOLDED_SMALLEST_NORMAL = 1e-200, UNFOLDED_LARGEST_NORMAL = 1e200;  ///< [m^2] guard
 constexpr double UNFOLDED_SMALLEST_M = 1e-100, UNFOLDED_LARGEST_M = 1e100;            ///< [m] guard
 // Start state (step/segment_triangle.cpp), in double.

@@ -194,9 +194,11 @@ void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t*
   for (int k = 0; k < 16; ++k) {
     const int d = k % 8;
     const double length = d < 3 ? 1.0 : tolerance::SQRT2_UP;
-    // A unit for the truncation of both values, and the rounding of both sums; enough where one side alone is widened.
+    // The rounding of both sums, enough where one side alone is widened, and a unit for the truncation of both values.
+    // Strict comparisons of whole numbers need nothing of that unit, so that it also holds the five roundings of the
+    // distance itself, which are below 2^-35 units.
     const double rounding = std::ldexp(std::max(std::abs(range_min_[d]), std::abs(range_max_[d])), -51) * scale_[d];
-    const double units = std::ceil(tolerance::RECORD_REACH * reach_m * length * scale_[d] + rounding) + 1;
+    const double units = std::ceil(reach_m * length * scale_[d] + rounding) + 1;
     margin16[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min<double>(units, simd::UNBOUNDED) : 0);
   }
 }

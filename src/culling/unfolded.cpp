@@ -102,8 +102,7 @@ bool UnfoldedProof::run(const SceneBody& body, const VertexMotion* vertices) {
     if (!(sampled(f, false).dot(sum) > 0 && sampled(f, true).dot(sum) > 0)) return false;
   }
 
-  // The certificate is for the projection to (u . x, w . x) with these very doubles, along V = u x w.
-  const Vec3 u = (sum / length).unitOrthogonal(), w = (sum / length).cross(u);
+  const ViewPlane plane(sum);
   points_.resize(body.usedCount());
   double size = 0;  // largest |x| + |y| + |z|
   const double inf = std::numeric_limits<double>::infinity();
@@ -111,7 +110,9 @@ bool UnfoldedProof::run(const SceneBody& body, const VertexMotion* vertices) {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const VertexMotion& v = vertices[body.internal_begin + i];
     const Eigen::Map<const Vec3> p(v.t0), q(v.t1);
-    points_[i] = {u.dot(p), w.dot(p), u.dot(q), w.dot(q)};
+    const auto [x0, y0] = plane.coordinates(v.t0);
+    const auto [x1, y1] = plane.coordinates(v.t1);
+    points_[i] = {x0, y0, x1, y1};
     size = std::max(size, std::max(p.lpNorm<1>(), q.lpNorm<1>()));
     low[0] = std::min(low[0], std::min(points_[i].x0, points_[i].x1));
     low[1] = std::min(low[1], std::min(points_[i].y0, points_[i].y1));
@@ -119,8 +120,7 @@ bool UnfoldedProof::run(const SceneBody& body, const VertexMotion* vertices) {
     high[1] = std::max(high[1], std::max(points_[i].y0, points_[i].y1));
   }
   if (!(size > tolerance::UNFOLDED_SMALLEST_M && size < tolerance::UNFOLDED_LARGEST_M)) return false;
-  // Three products and two sums of |x|, |y|, |z| <= size times components of at most 1 + 2^-50: below 4 * 2^-53 size.
-  error_ = tolerance::UNFOLDED_COORDINATE * size;
+  error_ = ViewPlane::error(size);
   // Differences are at most L = extent, and off by 2 error + 2^-53 L <= 2.5 error; so a product of two by 5 L error and
   // 7 error^2, twice for two products, and their three roundings add less than 3 L error: below 20 error (L + error).
   const double extent = std::max(high[0] - low[0], high[1] - low[1]);

@@ -1,11 +1,28 @@
 // High-level culling of self-collision: normal cone and contour test over a whole body and a whole step.
 #pragma once
 
+#include <Eigen/Geometry>
+#include <array>
 #include <vector>
 
 #include "culling/scene_arrays.h"
+#include "dccd/tolerances.h"
 
 namespace dccd {
+
+/// The plane that a surface is seen in: (u . x, w . x), for which the certificate holds with these very doubles.
+struct ViewPlane {
+  explicit ViewPlane(const Vec3& along) : u(along.normalized().unitOrthogonal()), w(along.normalized().cross(u)) {}
+  std::array<double, 2> coordinates(const double* x) const {
+    const Eigen::Map<const Vec3> p(x);
+    return {u.dot(p), w.dot(p)};
+  }
+  /// What a coordinate is off by for points with |x| + |y| + |z| <= size: three products and two sums with components
+  /// of at most 1 + 2^-50, below 4 * 2^-53 size.
+  static double error(double size) { return tolerance::UNFOLDED_COORDINATE * size; }
+
+  Vec3 u, w;
+};
 
 /// Certifies that a surface cannot touch itself during a step (Volino and Magnenat-Thalmann 1994, made continuous).
 ///

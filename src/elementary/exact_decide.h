@@ -25,7 +25,7 @@ struct IntegerMotion {
 /// Limbs' bits that decide() needs for coordinates of `bits` bits. Differences have b+1 bits, their change over the
 /// step b+2; the quadratics' coefficients at most 2b+6, those of f 3b+10. The longest number is the square of
 /// 2 g2 b - a g1 in QuadraticRoots::signAt, with (a, b) = f reduced modulo a quadratic (7b+24): 18b+64; for a grid of
-/// 2^52 cells f at a grid point takes 3b+10+156+2.
+/// 2^52 cells f at a grid point takes 3b+10+156+2, a quadratic on a cell less.
 constexpr int workingBits(int bits) { return std::max(18 * bits + 66, 3 * bits + 170); }
 
 /// The answer: contact or not, and the TOC's cell of the 2^-toc_bits grid (2^toc_bits for a TOC of exactly 1).

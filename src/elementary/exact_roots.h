@@ -42,6 +42,8 @@ class PolynomialRoots {
     const Enclosure enclosure = {(static_cast<double>(cell(i)) + 0.5) * width, 0.5 * width};
     const int filtered = filteredSign(q, enclosure);
     if (filtered != 0) return filtered;
+    const int on_cell = signOnCell(q, cell(i));
+    if (on_cell != 0) return on_cell;
     const RootLabel label = labels_[i];
     if (label == RootLabel::SMALLER || label == RootLabel::LARGER) {
       using Which = typename QuadraticRoots<Z>::Which;
@@ -51,6 +53,16 @@ class PolynomialRoots {
   }
 
  private:
+  /// The sign of q on the whole of a grid cell: that of its Bernstein coefficients there, or 0 where they differ. These
+  /// are taken times 4^grid_bits and, the middle one, 2.
+  int signOnCell(const Quadratic<Z>& q, std::int64_t k) const {
+    const Z along = q.c[1] << grid_bits_, square = q.c[2] * k;
+    const Z first = (q.c[0] << (2 * grid_bits_)) + (along + square) * k, slope = along + square * 2;
+    const int sign = first.sign();
+    if (sign == 0 || (first * 2 + slope).sign() != sign || (first + slope + q.c[2]).sign() != sign) return 0;
+    return sign;
+  }
+
   /// f of degree 3. Its extrema exist when e = c2^2 - 3 c3 c1 > 0; f there is positive at the first and negative at the
   /// second exactly when the discriminant is positive; otherwise both have the sign of f at the inflection, which is
   /// their mean (one of them may be zero: a double root, then a root of f').
@@ -170,6 +182,7 @@ class PolynomialRoots {
   int degree_;
   int count_ = 0;
   RootLabel labels_[3] = {};
+  int octaves_[3] = {};  ///< 0: not known yet
   std::int64_t cells_[3] = {};
 };
 

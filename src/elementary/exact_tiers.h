@@ -33,6 +33,8 @@ ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int
 /// FIXED_INTEGER, where integers of one or two words and one look at a rational time p/q with a small q are enough:
 /// both features at rest, or the first root of f is such a time. Undecided otherwise.
 ElementaryResult decideAtSimpleTime(PairKind kind, const PairMotion& pair, int toc_bits);
+/// The same where the points move along one axis alone: f is linear then.
+ElementaryResult decideAlongAxis(PairKind kind, const PairMotion& pair, int toc_bits);
 /// The contact at the only root of f in (low, high), where that is such a time; else undecided.
 ElementaryResult contactAtSimpleTime(PairKind kind, const PairMotion& pair, double low, double high, int toc_bits);
 /// FIXED_INTEGER: undecided for more than FIXED_INTEGER_MAX_BITS bits. BIG_INTEGER: always decides.

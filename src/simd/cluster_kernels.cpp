@@ -9,6 +9,9 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+// Where hn::Compress is one instruction.
+#define DCCD_COMPRESS (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3)
+
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
 namespace simd {
@@ -62,53 +65,31 @@ void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_R
   }
 }
 
-#if HWY_TARGET != HWY_SCALAR
-using D8 = hn::FixedTag<int16_t, 8>;
-using V8 = hn::Vec<D8>;
-
-// 8x8 transpose of int16: in[i] is row i, out row k to out + k * GROUP.
-HWY_INLINE void transpose8(const V8* HWY_RESTRICT in, int16_t* HWY_RESTRICT out) {
-  const D8 d;
-  const hn::RepartitionToWide<D8> d32;
+// rows: 16 rows of 16 values. A lane's two neighbouring directions stay side by side (soaIndex()).
+HWY_INLINE void transposePairs(const int16_t* HWY_RESTRICT rows, int16_t* HWY_RESTRICT out) {
+#if HWY_TARGET == HWY_SCALAR
+  for (size_t i = 0; i < GROUP; ++i)
+    for (size_t k = 0; k < RECORD; ++k) out[soaIndex(k, i)] = rows[i * RECORD + k];
+#else
+  const hn::FixedTag<int16_t, 8> d;
+  const hn::RepartitionToWide<decltype(d)> d32;
   const hn::RepartitionToWide<decltype(d32)> d64;
-  const auto w = [&](V8 v) { return hn::BitCast(d32, v); };
-  V8 a[8];
-  for (int i = 0; i < 4; ++i) {
-    a[2 * i] = hn::InterleaveLower(d, in[2 * i], in[2 * i + 1]);
-    a[2 * i + 1] = hn::InterleaveUpper(d, in[2 * i], in[2 * i + 1]);
-  }
-  // a[2i]: rows 2i, 2i+1, columns 0..3; a[2i+1]: columns 4..7.
-  for (int half = 0; half < 2; ++half) {
-    const auto r01_lo = hn::InterleaveLower(d32, w(a[half]), w(a[2 + half]));
-    const auto r01_hi = hn::InterleaveUpper(d32, w(a[half]), w(a[2 + half]));
-    const auto r23_lo = hn::InterleaveLower(d32, w(a[4 + half]), w(a[6 + half]));
-    const auto r23_hi = hn::InterleaveUpper(d32, w(a[4 + half]), w(a[6 + half]));
-    const auto x = [&](hn::Vec<decltype(d32)> v) { return hn::BitCast(d64, v); };
-    int16_t* o = out + 4 * half * GROUP;
-    hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, x(r01_lo), x(r23_lo))), d, o);
-    hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, x(r01_lo), x(r23_lo))), d, o + GROUP);
-    hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, x(r01_hi), x(r23_hi))), d, o + 2 * GROUP);
-    hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, x(r01_hi), x(r23_hi))), d, o + 3 * GROUP);
-  }
-}
-
-// rows: 16 rows of 16 values.
-HWY_INLINE void transpose16(const int16_t* HWY_RESTRICT rows, int16_t* HWY_RESTRICT out) {
-  const D8 d;
-  for (int r = 0; r < 2; ++r) {
-    for (int c = 0; c < 2; ++c) {
-      V8 in[8];
-      for (int i = 0; i < 8; ++i) in[i] = hn::Load(d, rows + (8 * r + i) * RECORD + 8 * c);
-      transpose8(in, out + 8 * c * GROUP + 8 * r);
+  const auto wide = [&](hn::Vec<decltype(d32)> v) { return hn::BitCast(d64, v); };
+  for (size_t r = 0; r < GROUP; r += 4) {
+    for (size_t k = 0; k < RECORD; k += 8) {
+      const auto row = [&](size_t i) { return hn::BitCast(d32, hn::Load(d, rows + (r + i) * RECORD + k)); };
+      const auto lower01 = wide(hn::InterleaveLower(d32, row(0), row(1)));
+      const auto upper01 = wide(hn::InterleaveUpper(d32, row(0), row(1)));
+      const auto lower23 = wide(hn::InterleaveLower(d32, row(2), row(3)));
+      const auto upper23 = wide(hn::InterleaveUpper(d32, row(2), row(3)));
+      hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, lower01, lower23)), d, out + soaIndex(k, r));
+      hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, lower01, lower23)), d, out + soaIndex(k + 2, r));
+      hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, upper01, upper23)), d, out + soaIndex(k + 4, r));
+      hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, upper01, upper23)), d, out + soaIndex(k + 6, r));
     }
   }
-}
-#else
-HWY_INLINE void transpose16(const int16_t* HWY_RESTRICT rows, int16_t* HWY_RESTRICT out) {
-  for (size_t i = 0; i < GROUP; ++i)
-    for (size_t k = 0; k < RECORD; ++k) out[k * GROUP + i] = rows[i * RECORD + k];
-}
 #endif
+}
 
 using D16 = hn::CappedTag<int16_t, 16>;
 
@@ -126,8 +107,8 @@ HWY_INLINE void finishGroup(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
     hn::StoreU(small, d, aos + k);
     hn::StoreU(large, d, aos + RECORD + k);
   }
-  transpose16(lo, soa);
-  transpose16(hi, soa + RECORD * GROUP);
+  transposePairs(lo, soa);
+  transposePairs(hi, soa + RECORD * GROUP);
 }
 
 // Smallest and largest values k of a feature, widened by the margins; of an empty lane the empty values.
@@ -210,47 +191,95 @@ void BuildUpper(const int16_t* HWY_RESTRICT child_aos, size_t child_count, int16
   }
 }
 
-// Positive lanes are separated in one of the directions [first, last): the smaller of the gaps at t0 and t1 is positive
-// on one side. Saturating differences keep the sign. lo and hi point at the 16 values of one node, `stride` apart.
-template <bool T0_ONLY>
-HWY_INLINE hn::Vec<D16> gaps(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
-                             const int16_t* HWY_RESTRICT lanes, size_t first, size_t last) {
-  const D16 d;
-  auto acc = hn::Set(d, int16_t{-1});
-  for (size_t k = first; k < last; ++k) {
-    const auto above0 = hn::SaturatedSub(hn::Set(d, lo[k * stride]), hn::Load(d, lanes + (16 + k) * GROUP));
-    const auto below0 = hn::SaturatedSub(hn::Load(d, lanes + k * GROUP), hn::Set(d, hi[k * stride]));
-    if (T0_ONLY) {
-      acc = hn::Max(acc, hn::Max(above0, below0));
-    } else {
-      const auto above1 = hn::SaturatedSub(hn::Set(d, lo[(8 + k) * stride]), hn::Load(d, lanes + (24 + k) * GROUP));
-      const auto below1 = hn::SaturatedSub(hn::Load(d, lanes + (8 + k) * GROUP), hn::Set(d, hi[(8 + k) * stride]));
-      acc = hn::Max(acc, hn::Max(hn::Min(above0, above1), hn::Min(below0, below1)));
-    }
-  }
-  return acc;
+template <class D, class M>
+HWY_INLINE uint32_t bitsOf(D d, M mask) {
+  uint8_t packed[8] = {0};
+  hn::StoreMaskBits(d, mask, packed);
+  uint32_t word;
+  std::memcpy(&word, packed, sizeof word);
+  return word & ((1u << hn::Lanes(d)) - 1);
 }
 
-// Bit per lane: 1 where the node may meet the lane's node.
+// Bit per lane: 1 where the node may meet the lane's node. It does not where both nodes' values are strictly in order
+// in a direction, the same way round at t0 and t1. lo and hi point at the 16 values of one node, of which each two
+// neighbours are `stride` dwords after those before.
+#if HWY_TARGET == HWY_SCALAR
 template <bool T0_ONLY>
 HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
                             const int16_t* HWY_RESTRICT lanes) {
-  const D16 d;
+  constexpr size_t HALF = RECORD * GROUP;
   uint32_t bits = 0;
-  for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
-    const auto zero = hn::Zero(d);
-    auto acc = gaps<T0_ONLY>(lo, hi, stride, lanes + part, 0, 4);
-    if (hn::AllTrue(d, hn::Gt(acc, zero))) continue;
-    acc = hn::Max(acc, gaps<T0_ONLY>(lo, hi, stride, lanes + part, 4, 8));
-    const auto separated = hn::Gt(acc, zero);
-    uint8_t packed[8] = {0};
-    hn::StoreMaskBits(d, separated, packed);
-    uint32_t word;
-    std::memcpy(&word, packed, 4);
-    const uint32_t all = (1u << hn::Lanes(d)) - 1;
-    bits |= (~word & all) << part;
+  for (size_t lane = 0; lane < GROUP; ++lane) {
+    bool apart = false;
+    for (size_t k = 0; k < DIRECTIONS && !apart; ++k) {
+      const size_t node0 = 2 * (k / 2) * stride + k % 2, node1 = node0 + DIRECTIONS * stride;
+      const size_t lane0 = soaIndex(k, lane), lane1 = soaIndex(DIRECTIONS + k, lane);
+      const bool above = lo[node0] > lanes[HALF + lane0] && (T0_ONLY || lo[node1] > lanes[HALF + lane1]);
+      const bool below = lanes[lane0] > hi[node0] && (T0_ONLY || lanes[lane1] > hi[node1]);
+      apart = above || below;
+    }
+    bits |= static_cast<uint32_t>(!apart) << lane;
   }
   return bits;
+}
+#else
+template <bool T0_ONLY>
+HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
+                            const int16_t* HWY_RESTRICT lanes) {
+  const hn::CappedTag<int16_t, 2 * GROUP> d;
+  const hn::RepartitionToWide<decltype(d)> d32;
+  constexpr size_t HALF = RECORD * GROUP, AT_T1 = DIRECTIONS * GROUP;
+  const auto both = [&](const int16_t* HWY_RESTRICT two) {
+    int32_t pair;
+    std::memcpy(&pair, two, sizeof pair);
+    return hn::BitCast(d, hn::Set(d32, pair));
+  };
+  uint32_t bits = 0;
+  for (size_t part = 0; part < 2 * GROUP; part += hn::Lanes(d)) {
+    const auto apartIn = [&](size_t k) {
+      const int16_t* HWY_RESTRICT smallest = lanes + soaIndex(k, 0) + part;
+      const int16_t* HWY_RESTRICT largest = smallest + HALF;
+      auto above = hn::Gt(both(lo + k * stride), hn::Load(d, largest));
+      auto below = hn::Gt(hn::Load(d, smallest), both(hi + k * stride));
+      if (!T0_ONLY) {
+        above = hn::And(above, hn::Gt(both(lo + (DIRECTIONS + k) * stride), hn::Load(d, largest + AT_T1)));
+        below = hn::And(below, hn::Gt(hn::Load(d, smallest + AT_T1), both(hi + (DIRECTIONS + k) * stride)));
+      }
+      return hn::Or(above, below);
+    };
+    const auto apart = hn::Or(hn::Or(apartIn(0), apartIn(2)), hn::Or(apartIn(4), apartIn(6)));
+    const auto meets = hn::Eq(hn::BitCast(d32, hn::VecFromMask(d, apart)), hn::Zero(d32));
+    bits |= bitsOf(d32, meets) << (part / 2);
+  }
+  return bits;
+}
+#endif
+
+// Writes the pairs of one node with those lanes of the other group that are in the mask, node first or second, in the
+// order of lanes, and returns where the next one goes. There is room for all lanes from o on. Lanes are numbered from
+// `base`.
+HWY_INLINE uint32_t* writePairs(uint32_t node, uint32_t base, uint32_t mask, bool node_first,
+                                uint32_t* HWY_RESTRICT o) {
+#if DCCD_COMPRESS
+  // Without a branch on how many there are, which nothing foretells: whole vectors are stored, o moves on less.
+  const hn::FixedTag<uint32_t, GROUP> d;
+  const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
+  const auto lanes = hn::Compress(hn::Iota(d, base), hn::LoadMaskBits(d, packed)), nodes = hn::Set(d, node);
+  if (node_first) {
+    hn::StoreInterleaved2(nodes, lanes, d, o);
+  } else {
+    hn::StoreInterleaved2(lanes, nodes, d, o);
+  }
+  return o + 2 * hwy::PopCount(mask);
+#else
+  for (; mask; mask &= mask - 1) {
+    const uint32_t lane = base + static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
+    o[node_first ? 0 : 1] = node;
+    o[node_first ? 1 : 0] = lane;
+    o += 2;
+  }
+  return o;
+#endif
 }
 
 // The surviving lanes of one pair of groups, less those in `shared` where it is given: to o, which is returned moved
@@ -281,15 +310,14 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     if (shared && by_rows) mask &= ~uint32_t{shared[i]};
     if (mask == 0) continue;
-    mask &= meeting<T0_ONLY>(outer + i, outer + RECORD * GROUP + i, GROUP, inner);
-    while (mask) {
-      const uint32_t j = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
-      mask &= mask - 1;
-      if (shared && !by_rows && (shared[j] >> i & 1)) continue;
-      o[by_rows ? 0 : 1] = base_outer + i;
-      o[by_rows ? 1 : 0] = base_inner + j;
-      o += 2;
+    mask &= meeting<T0_ONLY>(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i), GROUP, inner);
+    if (shared && !by_rows) {
+      for (uint32_t rest = mask; rest; rest &= rest - 1) {
+        const auto j = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+        mask &= ~(static_cast<uint32_t>(shared[j] >> i & 1) << j);
+      }
     }
+    if (mask) o = writePairs(base_outer + i, base_inner, mask, by_rows, o);
   }
   return o;
 }
@@ -343,11 +371,7 @@ bool SharedVertices(const uint32_t* HWY_RESTRICT fa, size_t a_arity, const uint3
             same = hn::Or(same, hn::VecFromMask(d, hn::Eq(v, hn::Load(d, lanes + y * GROUP + part))));
           }
         }
-        uint8_t packed[8] = {0};
-        hn::StoreMaskBits(d, hn::Ne(same, hn::Zero(d)), packed);
-        uint32_t word;
-        std::memcpy(&word, packed, 4);
-        row |= (word & ((1u << hn::Lanes(d)) - 1)) << part;
+        row |= bitsOf(d, hn::Ne(same, hn::Zero(d))) << part;
       }
     }
     shared[i] = static_cast<uint16_t>(row);
@@ -362,62 +386,83 @@ size_t TestLeafPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32
   return static_cast<size_t>(end - out) / 2;
 }
 
+// How far lane i of one group is from each lane of the other at t1, in weighted units, rounded down: the larger of the
+// gaps above and below, in the direction that says most. sa, sb: the halves at t1 of the smallest values.
+HWY_INLINE void rowGaps(const int16_t* HWY_RESTRICT sa, size_t i, const int16_t* HWY_RESTRICT sb,
+                        const uint16_t* HWY_RESTRICT weights, int32_t* HWY_RESTRICT out) {
+  constexpr size_t HALF = RECORD * GROUP;
+#if HWY_TARGET == HWY_SCALAR
+  for (size_t j = 0; j < GROUP; ++j) {
+    out[j] = 0;
+    for (size_t k = 0; k < DIRECTIONS; ++k) {
+      const size_t x = soaIndex(k, i), y = soaIndex(k, j);
+      const int32_t gap = std::max(sa[x] - sb[HALF + y], sb[y] - sa[HALF + x]);
+      out[j] = std::max(out[j], std::max(std::min(gap, 32767) - 1, 0) * weights[k] >> 16);
+    }
+  }
+#else
+  const hn::CappedTag<int16_t, 2 * GROUP> d;
+  const hn::RebindToUnsigned<decltype(d)> du;
+  const hn::RepartitionToWide<decltype(d)> d32;
+  const auto both = [&](const void* two) {
+    int32_t pair;
+    std::memcpy(&pair, two, sizeof pair);
+    return hn::BitCast(d, hn::Set(d32, pair));
+  };
+  const auto zero = hn::Zero(d), one = hn::Set(d, int16_t{1});
+  for (size_t part = 0; part < 2 * GROUP; part += hn::Lanes(d)) {
+    auto best = zero;
+    for (size_t k = 0; k < DIRECTIONS; k += 2) {
+      const int16_t* HWY_RESTRICT smallest = sb + soaIndex(k, 0) + part;
+      const int16_t* HWY_RESTRICT mine = sa + soaIndex(k, i);
+      const auto above = hn::SaturatedSub(both(mine), hn::Load(d, smallest + HALF));
+      const auto below = hn::SaturatedSub(hn::Load(d, smallest), both(mine + HALF));
+      // More than a unit less than the gap; negative ones say nothing and need not be right.
+      const auto gap = hn::Max(hn::Sub(hn::Max(hn::Max(above, below), zero), one), zero);
+      best = hn::Max(best, hn::BitCast(d, hn::MulHigh(hn::BitCast(du, gap), hn::BitCast(du, both(weights + k)))));
+    }
+    const auto even = hn::ShiftRight<16>(hn::ShiftLeft<16>(hn::BitCast(d32, best)));
+    hn::Store(hn::Max(even, hn::ShiftRight<16>(hn::BitCast(d32, best))), d32, out + part / 2);
+  }
+#endif
+}
+
 int16_t GapAtEnd(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool self, const uint16_t* shared,
                  const uint16_t* HWY_RESTRICT weights, int16_t target, uint8_t* HWY_RESTRICT near, size_t room,
                  size_t* found) {
-  const D16 d;
-  const hn::RebindToUnsigned<D16> du;
-  // The half at t1 of the smallest values, then of the largest.
-  const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE + 8 * GROUP;
-  const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE + 8 * GROUP;
-  const bool same = self && g == h;
-  const auto zero = hn::Zero(d);
+  const hn::CappedTag<int32_t, GROUP> d;
+  const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE + soaIndex(DIRECTIONS, 0);
+  const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE + soaIndex(DIRECTIONS, 0);
+  const auto isEmpty = [](const int16_t* half, size_t lane) { return half[soaIndex(0, lane)] == EMPTY_LO; };
+  uint32_t there = 0;
+  for (size_t j = 0; j < GROUP; ++j) there |= static_cast<uint32_t>(!isEmpty(sb, j)) << j;
   size_t n = 0;
-  auto smallest = hn::Set(d, EMPTY_LO);
+  auto smallest = hn::Set(d, int32_t{EMPTY_LO});
+  HWY_ALIGN int32_t gaps[GROUP];
   for (size_t i = 0; i < GROUP; ++i) {
-    if (sa[i] == EMPTY_LO) continue;
-    uint32_t wanted = shared ? ~uint32_t{shared[i]} & 0xffffu : 0xffffu;
-    if (same) wanted &= ~0u << (i + 1);
-    if ((wanted & 0xffffu) == 0) continue;
+    uint32_t wanted = isEmpty(sa, i) ? 0 : shared ? there & ~uint32_t{shared[i]} : there;
+    if (self && g == h) wanted &= ~0u << (i + 1);
+    if (wanted == 0) continue;
+    rowGaps(sa, i, sb, weights, gaps);
+    uint32_t is_near = 0;
     for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
-      auto best = hn::Set(d, int16_t{-32767});
-      for (size_t k = 0; k < DIRECTIONS; ++k) {
-        const int16_t lo = sa[k * GROUP + i], hi = sa[RECORD * GROUP + k * GROUP + i];
-        const auto above = hn::SaturatedSub(hn::Set(d, lo), hn::Load(d, sb + (RECORD + k) * GROUP + part));
-        const auto below = hn::SaturatedSub(hn::Load(d, sb + k * GROUP + part), hn::Set(d, hi));
-        // More than a unit less than the gap; negative ones say nothing and need not be right.
-        const auto gap = hn::Max(hn::Sub(hn::Max(hn::Max(above, below), zero), hn::Set(d, int16_t{1})), zero);
-        const auto scaled = hn::MulHigh(hn::BitCast(du, gap), hn::Set(du, weights[k]));
-        best = hn::Max(best, hn::BitCast(d, scaled));
-      }
-      // Lanes that are not wanted, or empty, are as far as can be.
-      HWY_ALIGN uint8_t bits[8] = {0};
-      const uint32_t word = wanted >> part;
-      std::memcpy(bits, &word, 4);
-      const auto counts = hn::And(hn::LoadMaskBits(d, bits), hn::Ne(hn::Load(d, sb + part), hn::Set(d, EMPTY_LO)));
-      best = hn::IfThenElse(counts, best, hn::Set(d, EMPTY_LO));
-      const auto is_near = hn::Lt(best, hn::Set(d, target));
-      if (!hn::AllFalse(d, is_near)) {
-        uint8_t packed[8] = {0};
-        hn::StoreMaskBits(d, is_near, packed);
-        uint32_t mask;
-        std::memcpy(&mask, packed, 4);
-        mask &= (1u << hn::Lanes(d)) - 1;
-        while (mask) {
-          const uint32_t j = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
-          mask &= mask - 1;
-          if (n < room) near[n] = static_cast<uint8_t>(i * GROUP + part + j);
-          ++n;
-        }
-        best = hn::IfThenElse(is_near, hn::Set(d, EMPTY_LO), best);
-      }
-      smallest = hn::Min(smallest, best);
+      const auto gap = hn::Load(d, gaps + part);
+      const uint32_t rest = wanted >> part;
+      uint8_t bits[8] = {0};
+      std::memcpy(bits, &rest, sizeof rest);
+      const auto counts = hn::LoadMaskBits(d, bits);
+      const auto near_ones = hn::And(counts, hn::Lt(gap, hn::Set(d, int32_t{target})));
+      smallest = hn::Min(smallest, hn::IfThenElse(hn::AndNot(near_ones, counts), gap, hn::Set(d, int32_t{EMPTY_LO})));
+      is_near |= bitsOf(d, near_ones) << part;
+    }
+    for (; is_near; is_near &= is_near - 1) {
+      if (n < room) near[n] = static_cast<uint8_t>(i * GROUP + hwy::Num0BitsBelowLS1Bit_Nonzero32(is_near));
+      ++n;
     }
   }
   *found = n;
-  HWY_ALIGN int16_t lanes[GROUP];
-  hn::Store(smallest, d, lanes);
-  return *std::min_element(lanes, lanes + hn::Lanes(d));
+  hn::Store(smallest, d, gaps);
+  return static_cast<int16_t>(*std::min_element(gaps, gaps + hn::Lanes(d)));
 }
 
 }  // namespace HWY_NAMESPACE

@@ -2,10 +2,11 @@
 //
 // Every vertex has a record of 16 int16: its projections onto the 8 directions at t0, then at t1. Sixteen nodes
 // (features, or groups of the level below) form a group, stored as structure of arrays:
-//   soa[k * 16 + lane]        smallest record value k of the node in that lane  (k < 16)
-//   soa[256 + k * 16 + lane]  largest
-// and as the bounds of the group itself: aos[k] smallest, aos[16 + k] largest. Unused lanes are empty
-// (smallest EMPTY_LO, largest EMPTY_HI) and separated from everything.
+//   soa[soaIndex(k, lane)]        smallest record value k of the node in that lane  (k < 16)
+//   soa[256 + soaIndex(k, lane)]  largest
+// (two neighbouring directions side by side, so that one broadcast of 32 bits serves both), and as the bounds of the
+// group itself: aos[k] smallest, aos[16 + k] largest. Unused lanes are empty (smallest EMPTY_LO, largest EMPTY_HI) and
+// separated from everything.
 //
 // Why the test on quantised numbers is conservative: a record value is a composition of monotone non-decreasing
 // functions of the exact projection n.x of the vertex: one rounded sum, minus a constant, times a positive constant,
@@ -30,6 +31,9 @@ constexpr std::int16_t EMPTY_LO = 32767;   ///< larger than any record value
 constexpr std::int16_t EMPTY_HI = -32767;  ///< smaller than any record value
 constexpr std::int16_t UNBOUNDED = 32767;  ///< as a margin: as far as the records go, on both sides
 constexpr double RECORD_RANGE = 65528.0;   ///< record values lie in [-32764, 32764]
+
+/// Where value k (< RECORD) of a lane stands in its half of a group's soa.
+constexpr std::size_t soaIndex(std::size_t k, std::size_t lane) { return (k / 2 * GROUP + lane) * 2 + k % 2; }
 
 /// Smallest and largest projection per direction over both times. vertices: n x 8 doubles (x0 y0 z0 0 x1 y1 z1 0).
 /// min8 and max8 are read first, so that calls over pieces can be chained.

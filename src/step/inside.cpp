@@ -32,11 +32,12 @@ void visitAbove(const ClusterTree& tree, bool members, const std::int16_t* recor
     return;
   }
   const std::int16_t* from = record + at * simd::DIRECTIONS;
-  const std::int16_t* low = tree.level(level).soa.data() + group * simd::SOA_SIZE + at * simd::DIRECTIONS * simd::GROUP;
+  const std::int16_t* low =
+      tree.level(level).soa.data() + group * simd::SOA_SIZE + simd::soaIndex(at * simd::DIRECTIONS, 0);
   const std::int16_t* high = low + simd::SOA_SIZE / 2;
   for (std::size_t lane = 0; lane < simd::GROUP; ++lane) {
-    const auto lowest = [&](int axis) { return low[axis * simd::GROUP + lane]; };
-    const auto highest = [&](int axis) { return high[axis * simd::GROUP + lane]; };
+    const auto lowest = [&](std::size_t axis) { return low[simd::soaIndex(axis, lane)]; };
+    const auto highest = [&](std::size_t axis) { return high[simd::soaIndex(axis, lane)]; };
     if (lowest(0) > from[0] || highest(0) < from[0] || lowest(1) > from[1] || highest(1) < from[1]) continue;
     if (highest(2) < from[2]) continue;
     const std::size_t node = group * simd::GROUP + lane;

@@ -11,6 +11,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "culling/unfolded.h"
 #include "dccd/elementary.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
@@ -721,6 +722,33 @@ IsWrong judgeBound(const MarginInput& input) {
   };
 }
 
+// --- no fold ---------------------------------------------------------------------------------------------------------
+
+/// What the plane lies across, and a point near where both coordinates are small, so that the terms cancel.
+MarginInput viewInput(RandomSource& random) {
+  const V3 along = heavyVector(random);
+  const V3 point = random() % 2 ? V3(power(random, -20, 20) * along) : V3(power(random, -20, 20) * heavyVector(random));
+  MarginInput input;
+  input.x = {along[0], along[1], along[2], point[0], point[1], point[2]};
+  return input;
+}
+
+/// Whether a projected coordinate is further off than its margin.
+IsWrong judgeView(const MarginInput& input) {
+  return [input] {
+    const ViewPlane plane(V3(input.x[0], input.x[1], input.x[2]));
+    const double* point = input.x.data() + 3;
+    const std::array<double, 2> seen = plane.coordinates(point);
+    const Rational error = exact(ViewPlane::error(V3(point[0], point[1], point[2]).lpNorm<1>()));
+    const auto isOff = [&](const V3& axis, double coordinate) {
+      Rational truth;
+      for (int k = 0; k < 3; ++k) truth += exact(axis[k]) * exact(point[k]);
+      return abs(exact(coordinate) - truth) > error;
+    };
+    return isOff(plane.u, seen[0]) || isOff(plane.w, seen[1]);
+  };
+}
+
 std::vector<MarginCheck> makeChecks() {
   const auto tier = [](ElementaryResult (*decide)(PairKind, const PairMotion&, int)) { return decide; };
   std::vector<MarginCheck> checks = {
@@ -761,6 +789,7 @@ std::vector<MarginCheck> makeChecks() {
       {"MAP_BOUND", meetingInput, changeOne, judgeMeeting, 20000},
       {"SEPARATION_SUM", meetingInput, changeOne, judgeMeeting, 20000},
       {"TOC_BOUND", boundInput, changeOne, judgeBound, 4000},
+      {"UNFOLDED_COORDINATE", viewInput, changeOne, judgeView, 4000},
   };
   // So small that what the margins are made of vanishes. What covers that is large, to be a normal number: an input
   // goes wrong only where it is gone.

@@ -135,7 +135,7 @@ TEST(ClusterTree, MaskedFeaturesAreEmptyAndComeBack) {
   active[20] = 0;
   const auto isEmpty = [&](std::size_t slot) {
     const std::int16_t* soa = tree.level(0).soa.data() + slot / simd::GROUP * simd::SOA_SIZE;
-    return soa[slot % simd::GROUP] == simd::EMPTY_LO;
+    return soa[simd::soaIndex(0, slot % simd::GROUP)] == simd::EMPTY_LO;
   };
   tree.mask(active.data());
   tree.refitLeaves(records.data(), nullptr, 0, tree.level(0).groups);

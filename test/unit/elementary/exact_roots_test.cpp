@@ -115,6 +115,21 @@ TYPED_TEST(ExactRoots, CubicRootSharedWithAQuadratic) {
   }
 }
 
+TYPED_TEST(ExactRoots, AQuadraticThatChangesItsSignTwiceInTheRootsCell) {
+  using Z = TypeParam;
+  // Sixteen cells; the root 18/64 is in the fourth, [16/64, 20/64), between and beside the quadratic's 17/64 and 19/64.
+  for (const Cubic<Z>& f : {cubic<Z>(-18, 64, 0, 0), cubic<Z>(-18, 64, -18, 64)}) {
+    PolynomialRoots<Z> roots(f, 4);
+    ASSERT_EQ(roots.count(), 1);
+    ASSERT_EQ(roots.cell(0), 4);
+    EXPECT_EQ(roots.signAt(0, quadratic<Z>(17 * 19, -64 * 36, 64 * 64)), -1);
+    EXPECT_EQ(roots.signAt(0, quadratic<Z>(-17 * 19, 64 * 36, -64 * 64)), 1);
+    EXPECT_EQ(roots.signAt(0, quadratic<Z>(19 * 19, -64 * 38, 64 * 64)), 1);
+    EXPECT_EQ(roots.signAt(0, quadratic<Z>(17 * 17, -64 * 34, 64 * 64)), 1);
+    EXPECT_EQ(roots.signAt(0, quadratic<Z>(-17 * 15, 64 * 32, -64 * 64)), -1);
+  }
+}
+
 TYPED_TEST(ExactRoots, RootsTooCloseForDoubles) {
   using Z = TypeParam;
   // (t - 1/2)((t - 1/2)^2 - e^2), e = 2^-100, times 2^203: three roots in one cell, told apart by the sign of t - 1/2.

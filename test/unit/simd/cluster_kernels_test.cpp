@@ -66,8 +66,8 @@ struct Groups {
         std::int16_t lo = EMPTY_LO, hi = EMPTY_HI;
         for (std::size_t i = 0; i < GROUP; ++i) {
           const Node& n = nodes[g * GROUP + i];
-          soa[g * SOA_SIZE + k * GROUP + i] = n.lo[k];
-          soa[g * SOA_SIZE + RECORD * GROUP + k * GROUP + i] = n.hi[k];
+          soa[g * SOA_SIZE + simd::soaIndex(k, i)] = n.lo[k];
+          soa[g * SOA_SIZE + RECORD * GROUP + simd::soaIndex(k, i)] = n.hi[k];
           lo = std::min(lo, n.lo[k]);
           hi = std::max(hi, n.hi[k]);
         }

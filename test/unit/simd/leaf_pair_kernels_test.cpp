@@ -49,9 +49,9 @@ struct LeafGroups {
     }
     return false;
   }
-  int low(std::size_t slot, std::size_t k) const { return soa[slot / GROUP * SOA_SIZE + k * GROUP + slot % GROUP]; }
+  int low(std::size_t slot, std::size_t k) const { return soa[slot / GROUP * SOA_SIZE + soaIndex(k, slot % GROUP)]; }
   int high(std::size_t slot, std::size_t k) const {
-    return soa[slot / GROUP * SOA_SIZE + (RECORD + k) * GROUP + slot % GROUP];
+    return soa[slot / GROUP * SOA_SIZE + RECORD * GROUP + soaIndex(k, slot % GROUP)];
   }
 };
 
