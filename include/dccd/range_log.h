@@ -1,6 +1,6 @@
 // One recording cut in ranges that are computed apart and joined again (doc/fleet.md). What follows from one step alone
-// a range says itself; what depends on the steps before, which patch is which and what became of predictions, it leaves
-// to the join, in a file of what these need.
+// a range says itself; what depends on the steps before, which patch is which and what became of predictions that were
+// made before the cut, it leaves to the join, in a file of what these need.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +28,12 @@ struct StepRange {
 };
 
 /// What a range leaves to the join. Its functions are those of PatchTracker and of LookAheadScore, which are called in
-/// the same order when the ranges are joined.
+/// the same order when the ranges are joined; those of LookAheadScore only until nothing that was predicted before the
+/// range is waited for any more. From there on the range keeps the score itself.
 class DCCD_EXPORT RangeLog {
  public:
-  /// Throws std::runtime_error naming the file.
-  RangeLog(const std::string& path, StepRange range);
+  /// look_ahead_s: 0: nothing is predicted. Throws std::runtime_error naming the file.
+  RangeLog(const std::string& path, StepRange range, double look_ahead_s);
 
   const StepRange& range() const { return range_; }
   void seam(std::size_t body);
@@ -53,6 +54,9 @@ class DCCD_EXPORT RangeLog {
   StepRange range_;
   std::string waiting_;  // records of the outcome that comes next
   std::vector<std::shared_ptr<const Topology>> topologies_;
+  std::optional<LookAheadScore> score_;
+  std::optional<StampNs> begin_ns_;  // of the first answered step
+  bool keeps_score_ = false;
 };
 
 /// Joins the logs of ranges, in their order, as one run would have gone.

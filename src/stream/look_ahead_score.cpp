@@ -11,8 +11,11 @@ std::uint64_t keyOf(std::uint16_t body, std::uint16_t against, Index vertex) {
   return std::uint64_t{body} << 48 | std::uint64_t{against} << 32 | vertex;
 }
 
-double quantile(const std::vector<double>& sorted, double q) {
-  return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1) + 0.5)];
+double quantile(std::vector<double>& values, double q) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 }  // namespace
@@ -76,7 +79,6 @@ void LookAheadScore::observe(const Outcome& outcome) {
     }
     return;
   }
-  if (!any_) origin_ns_ = outcome.start_ns;
   const bool had_predictions = any_;
   any_ = true;
   Times first;
@@ -84,14 +86,15 @@ void LookAheadScore::observe(const Outcome& outcome) {
   vertexTimes(outcome, first, &touching);
   for (const auto& [key, toc] : first) {
     if (touching_.count(key)) continue;
-    const double observed_ns = static_cast<double>(outcome.start_ns - origin_ns_) +
-                               toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns);
+    const double observed_ns = toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns);
     const auto waiting = pending_.find(key);
     if (waiting == pending_.end()) {
       not_predicted_ += had_predictions;
       continue;
     }
-    for (const Prediction& p : waiting->second) addSample((p.predicted_ns - observed_ns) * 1e-9);
+    for (const Prediction& p : waiting->second) {
+      addSample((static_cast<double>(p.made_ns - outcome.start_ns) + p.after_ns - observed_ns) * 1e-9);
+    }
     pending_.erase(waiting);
   }
   touching_ = std::move(touching);
@@ -104,10 +107,32 @@ void LookAheadScore::predict(const Outcome& prediction) {
   vertexTimes(prediction, first, nullptr);
   for (const auto& [key, toc] : first) {
     if (touching_.count(key)) continue;
-    const double at_ns = static_cast<double>(prediction.start_ns - origin_ns_) +
-                         toc * static_cast<double>(prediction.stamp_ns - prediction.start_ns);
-    pending_[key].push_back({prediction.start_ns, at_ns});
+    pending_[key].push_back(
+        {key, prediction.start_ns, toc * static_cast<double>(prediction.stamp_ns - prediction.start_ns)});
   }
+}
+
+void LookAheadScore::beginPart() {
+  errors_s_.clear();
+  next_sample_ = not_observed_ = not_predicted_ = 0;
+}
+
+LookAheadScore::Part LookAheadScore::part() const {
+  Part part{errors_s_, not_observed_, not_predicted_, {touching_.begin(), touching_.end()}, {}};
+  for (const auto& [key, predictions] : pending_) {
+    part.pending.insert(part.pending.end(), predictions.begin(), predictions.end());
+  }
+  return part;
+}
+
+void LookAheadScore::add(const Part& next) {
+  for (const double error_s : next.errors_s) addSample(error_s);
+  not_observed_ += next.not_observed;
+  not_predicted_ += next.not_predicted;
+  any_ = true;
+  touching_ = {next.touching.begin(), next.touching.end()};
+  pending_.clear();
+  for (const Prediction& p : next.pending) pending_[p.key].push_back(p);
 }
 
 LookAheadSummary LookAheadScore::summary() const {
@@ -115,13 +140,11 @@ LookAheadSummary LookAheadScore::summary() const {
   out.compared = errors_s_.size();
   out.not_observed = not_observed_;
   out.not_predicted = not_predicted_;
-  std::vector<double> sorted = errors_s_;
-  std::sort(sorted.begin(), sorted.end());
-  out.median_signed_error_s = quantile(sorted, 0.5);
-  for (double& error : sorted) error = std::abs(error);
-  std::sort(sorted.begin(), sorted.end());
-  out.median_error_s = quantile(sorted, 0.5);
-  out.p95_error_s = quantile(sorted, 0.95);
+  std::vector<double> errors_s = errors_s_;
+  out.median_signed_error_s = quantile(errors_s, 0.5);
+  for (double& error : errors_s) error = std::abs(error);
+  out.median_error_s = quantile(errors_s, 0.5);
+  out.p95_error_s = quantile(errors_s, 0.95);
   return out;
 }
 

@@ -11,12 +11,12 @@ namespace {
 
 // A range is joined by the program that computed it, on a machine of its kind: fields are written as they lie in
 // memory. What tells a file of another build apart:
-constexpr std::uint64_t FORMAT = 1;
+constexpr std::uint64_t FORMAT = 2;
 constexpr std::uint64_t LAYOUT = FORMAT << 48 | sizeof(Patch) << 32 | sizeof(PatchSpot) << 16 | sizeof(Contact);
 constexpr std::uint64_t MOST = std::uint64_t{1} << 32;  // bytes of a list
 
 // A record begins with its kind.
-constexpr char MESHES = 'M', SEAM = 'S', FOLLOW = 'F', TELL = 'T', OBSERVE = 'O', PREDICT = 'P';
+constexpr char MESHES = 'M', SEAM = 'S', FOLLOW = 'F', TELL = 'T', OBSERVE = 'O', PREDICT = 'P', SCORE = 'L';
 
 template <class T>
 void put(std::string& out, const T& value) {
@@ -76,8 +76,9 @@ class Reader {
 
 }  // namespace
 
-RangeLog::RangeLog(const std::string& path, StepRange range)
+RangeLog::RangeLog(const std::string& path, StepRange range, double look_ahead_s)
     : path_(path), file_(path, std::ios::binary | std::ios::trunc), range_(range) {
+  if (look_ahead_s > 0) score_.emplace(look_ahead_s);
   if (!file_) throw std::runtime_error(path + ": cannot be written");
   std::string head;
   put(head, LAYOUT);
@@ -126,10 +127,36 @@ void RangeLog::contacts(char kind, const Outcome& outcome) {
   putAll(record, outcome.contacts);
   file_ << record;
 }
-void RangeLog::observe(const Outcome& outcome) { contacts(OBSERVE, outcome); }
-void RangeLog::predict(const Outcome& prediction) { contacts(PREDICT, prediction); }
+
+void RangeLog::observe(const Outcome& outcome) {
+  if (!score_) return;
+  score_->observe(outcome);
+  if (keeps_score_) return;
+  contacts(OBSERVE, outcome);
+  if (!outcome.answered) return;
+  if (!begin_ns_) begin_ns_ = outcome.start_ns;
+  // The horizon of all that was predicted before the range is over, as LookAheadScore sees it.
+  keeps_score_ = static_cast<double>(outcome.stamp_ns - *begin_ns_) * 1e-9 > score_->horizon_s();
+  if (keeps_score_) score_->beginPart();
+}
+
+void RangeLog::predict(const Outcome& prediction) {
+  if (!score_) return;
+  score_->predict(prediction);
+  if (!keeps_score_) contacts(PREDICT, prediction);
+}
 
 void RangeLog::close() {
+  if (keeps_score_) {
+    const LookAheadScore::Part part = score_->part();
+    std::string record(1, SCORE);
+    putAll(record, part.errors_s);
+    put(record, part.not_observed);
+    put(record, part.not_predicted);
+    putAll(record, part.touching);
+    putAll(record, part.pending);
+    file_ << record;
+  }
   file_.close();
   if (!file_) throw std::runtime_error(path_ + ": could not be written completely");
 }
@@ -146,7 +173,7 @@ struct RangeJoin::Impl {
   void readMeshes(Reader& in) {
     const auto bodies = in.get<std::uint64_t>();
     if (bodies > OBSTACLE_BODY) in.fail("has " + std::to_string(bodies) + " bodies");
-    step = std::make_shared<Step>();
+    const std::shared_ptr<Step> before = std::exchange(step, std::make_shared<Step>());
     for (std::uint64_t b = 0; b < bodies; ++b) {
       const auto vertices = static_cast<std::size_t>(in.get<std::uint64_t>());
       std::vector<Face> faces;
@@ -155,6 +182,10 @@ struct RangeJoin::Impl {
       // What has no faces is a rope.
       body.topology = std::make_shared<const Topology>(faces.empty() ? Topology::polyline(vertices)
                                                                      : Topology::fromTriangles(vertices, faces));
+      // The same object over the cut, or every step would compare the two.
+      if (before && b < before->bodies.size() && *before->bodies[b].topology == *body.topology) {
+        body.topology = before->bodies[b].topology;
+      }
       step->bodies.push_back(std::move(body));
     }
   }
@@ -217,6 +248,14 @@ void RangeJoin::add(const std::string& path, const std::function<void(const Outc
       in.getHead(of_score);
       in.getAll(of_score.contacts);
       if (impl_->score) kind == OBSERVE ? impl_->score->observe(of_score) : impl_->score->predict(of_score);
+    } else if (kind == SCORE) {
+      LookAheadScore::Part part;
+      in.getAll(part.errors_s);
+      part.not_observed = in.get<std::size_t>();
+      part.not_predicted = in.get<std::size_t>();
+      in.getAll(part.touching);
+      in.getAll(part.pending);
+      if (impl_->score) impl_->score->add(part);
     } else {
       in.fail("has a record of unknown kind " + std::to_string(kind));
     }

@@ -3,7 +3,6 @@ jobs."""
 import collections
 import copy
 import csv
-import getpass
 import json
 import os
 import pathlib
@@ -12,7 +11,6 @@ import signal
 import socket
 import sqlite3
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
@@ -23,7 +21,7 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, FolderTestCase
 
 TABLES = ('contacts.csv', 'steps.csv', 'patches.csv', 'events.csv')
 LONG = bool(os.environ.get('DEFORMABLE_CCD_LONG'))
@@ -79,11 +77,10 @@ def write_harsh(path, messages):
     return path
 
 
-class CutTest(unittest.TestCase):
+class CutTest(FolderTestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        super().setUpClass()
         cls.bag, cls.params = make_scene(cls.folder, 'scene', 'table_edge', '--frames', 60)
         cls.messages = messages_of(cls.bag)
         with rosbag.Bag(str(cls.bag)) as bag:
@@ -113,7 +110,7 @@ class CutTest(unittest.TestCase):
         reports = []
         for folder in (whole, merged):
             report = json.loads((folder / 'report.json').read_text())
-            report['facts'] = [fact for fact in report['facts'] if fact[0] not in ('joined from',)]
+            report['facts'] = [fact for fact in report['facts'] if fact[0] not in ('joined from', 'command')]
             for steps in (report['steps'], report['stages'], report['effects']):
                 for step in steps:
                     for key in ('ms', 'median_ms', 'p95_ms'):
@@ -213,15 +210,14 @@ def rows_of(out, query):
         return database.execute(query).fetchall()
 
 
-class FleetTest(unittest.TestCase):
+class FleetTest(FolderTestCase):
     """On the cores of this machine."""
 
     @classmethod
     def setUpClass(cls):
         if shutil.which('snakemake') is None:
             raise unittest.SkipTest('no snakemake; apt install snakemake')
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        super().setUpClass()
         cls.first, cls.params = make_scene(cls.folder, 'first', 'table_edge', '--frames', 40)
         cls.second, _ = make_scene(cls.folder, 'second', 'table_edge', '--frames', 30, '--seed', 2)
         cls.corrupt = cls.folder / 'corrupt.bag'
@@ -291,18 +287,22 @@ class FleetTest(unittest.TestCase):
             self.params.write_text(text)
             fleet(*same, self.params)  # the other tests look at these results
 
+    def wrapped(self, name, script):
+        """An analyze_fleet that has a line of a script run before each analyze_bag."""
+        folder = self.folder / name
+        folder.mkdir()
+        shutil.copy(str(FLEET / 'analyze_fleet'), str(folder / 'analyze_fleet'))
+        for file in ('Snakefile', 'profile', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
+            (folder / file).symlink_to(FLEET / file)
+        (folder / 'analyze_bag').write_text('#!/bin/bash\n%s\nexec %s "$@"\n' % (script, TOOLS / 'analyze_bag'))
+        (folder / 'analyze_bag').chmod(0o755)
+        return folder / 'analyze_fleet'
+
     def test_a_worker_that_is_killed(self):
         out = self.folder / 'killed'
-        wrapper = self.folder / 'bin'
-        wrapper.mkdir()
-        shutil.copy(str(FLEET / 'analyze_fleet'), str(wrapper / 'analyze_fleet'))
-        for file in ('Snakefile', 'profile', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
-            (wrapper / file).symlink_to(FLEET / file)
         # As if the system had ended the worker of the second range.
-        (wrapper / 'analyze_bag').write_text('#!/bin/bash\n[[ " $* " != *" --from 0."[1-9]* || -e %s ]] || kill -KILL $$\nexec %s "$@"\n' % (
-            self.folder / 'healed', TOOLS / 'analyze_bag'))
-        (wrapper / 'analyze_bag').chmod(0o755)
-        words = ['/usr/bin/python3', wrapper / 'analyze_fleet', self.first, '--params', self.params, '--out', out, '--cores', 2,
+        wrapper = self.wrapped('bin', '[[ " $* " != *" --from 0."[1-9]* || -e %s ]] || kill -KILL $$' % (self.folder / 'healed'))
+        words = ['/usr/bin/python3', wrapper, self.first, '--params', self.params, '--out', out, '--cores', 2,
                  '--chunk', self.half_length()]
         ran = run(*words)
         self.assertEqual(ran.returncode, 4, ran.stderr)
@@ -370,6 +370,9 @@ class FleetTest(unittest.TestCase):
         inside = self.folder / 'inside'
         inside.mkdir()
         shutil.copy(str(self.first), str(inside / 'first.bag'))
+        braces, link = self.folder / '{a}.bag', self.folder / 'link.bag'
+        shutil.copy(str(self.first), str(braces))
+        link.symlink_to(self.first)
         full = self.folder / 'full'
         full.mkdir()
         (full / 'thesis.txt').write_text('mine')
@@ -378,10 +381,14 @@ class FleetTest(unittest.TestCase):
                 ([self.first, self.first], [], 'first.bag is given twice'),
                 ([self.first, inside / 'first.bag'], [], 'have one name'),
                 ([active], [], 'is still being written'),
-                ([self.folder / 'none.bag'], [], 'no such file'),
+                ([self.folder / 'none.bag'], [], 'none.bag cannot be read: no such file'),
+                ([braces], [], 'braces in a path'),
+                ([self.first, link], [], 'link.bag is the same bag as .*first.bag'),
                 ([self.folder], [], 'is no file'),
                 ([self.first], ['--params', self.folder / 'none.yaml'], 'none.yaml cannot be read'),
                 ([self.first], ['--chunk', '-1'], '--chunk must be above 0'),
+                ([self.first], ['--cores', '0'], '--threads, --cores and --jobs must be 1 or more'),
+                ([self.first], ['--out', full / 'thesis.txt'], 'thesis.txt is no folder'),
                 ([self.first], ['--out', full], 'holds no fleet')):
             out = self.folder / 'bad'
             ran = fleet(*bags, '--out', out, *words)
@@ -405,6 +412,25 @@ class FleetTest(unittest.TestCase):
         self.assertRegex(ran.stderr, r'without: all: .*no topic /cloth; the bag has /tf')
         self.assertRegex(ran.stderr, r'changes: the mesh has another topology from frame 7 on')
 
+    def test_bags_that_may_not_be_read(self):
+        """By somebody who is not root, whom nothing is closed to."""
+        place = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, place, True)
+        place.chmod(0o755)
+        other = {'user': 65534, 'group': 65534} if os.getuid() == 0 else {}
+        if subprocess.run(['test', '-r', str(TOOLS / 'analyze_fleet')], check=False, **other).returncode != 0:
+            self.skipTest('nobody but root may read %s' % TOOLS)
+        closed, folder = place / 'closed.bag', place / 'folder'
+        shutil.copy(str(self.first), str(closed))
+        closed.chmod(0)
+        folder.mkdir()
+        folder.chmod(0)
+        for bag in (closed, folder / 'inside.bag'):
+            ran = subprocess.run(['/usr/bin/python3', str(TOOLS / 'analyze_fleet'), str(bag), '--out', str(place / 'out')],
+                                 stderr=subprocess.PIPE, text=True, check=False, **other)
+            self.assertEqual((ran.returncode, ran.stderr),
+                             (1, 'analyze_fleet: %s cannot be read: permission denied\n' % bag))
+
     def test_without_or_with_an_old_snakemake(self):
         path = self.folder / 'path'
         path.mkdir()
@@ -418,15 +444,25 @@ class FleetTest(unittest.TestCase):
         self.assertIn('--slurm needs snakemake 7.19 or newer, and this is 5.24.1', ran.stderr)
 
     def test_no_space_left(self):
+        """Before anything is computed, and in the middle of it, when there are good results already."""
         if os.getuid() != 0 or run('unshare', '--mount', 'true').returncode != 0:
             self.skipTest('a small file system needs root')
-        small = self.folder / 'small'
+        small, bag, full = self.folder / 'small', self.folder / 'copy.bag', self.folder / 'is_full'
         small.mkdir()
-        words = ' '.join(str(w) for w in ('/usr/bin/python3', TOOLS / 'analyze_fleet', self.first, '--params', self.params,
-                                          '--out', small / 'out'))
-        ran = run('unshare', '--mount', 'bash', '-c', 'mount -t tmpfs -o size=1m tmpfs %s && %s' % (small, words))
-        self.assertEqual(ran.returncode, 1)
-        self.assertIn('no space left on the disk of', ran.stderr)
+        shutil.copy(str(self.first), str(bag))
+        wrapper = self.wrapped('filled', '[[ ! -e %s ]] || cat /dev/zero >%s/zeros 2>/dev/null' % (full, small))
+        script = '''
+            compute() { /usr/bin/python3 %s %s --params %s --out out >/dev/null 2>said; echo $? $(grep -c 'no space left on the disk of' said); }
+            results() { sha256sum out/index.html out/fleet.sqlite out/recordings/copy/report/* | sha256sum; }
+            mount -t tmpfs -o size=1m tmpfs %s && cd %s && compute
+            mount -o remount,size=80m . && compute && results
+            touch %s %s && compute && results
+            rm zeros %s && compute''' % (wrapper, bag, self.params, small, small, full, bag, full)
+        ran = run('unshare', '--mount', 'bash', '-c', script)
+        tight, good, before, filled, after, again = ran.stdout.splitlines()
+        self.assertEqual((tight, filled), ('1 1', '1 1'), ran.stderr)
+        self.assertEqual((good, again), ('0 0', '0 0'))
+        self.assertEqual(before, after, 'nothing good is overwritten')
 
     def test_comparison(self):
         one, other, params = (self.folder / name for name in ('one', 'two', 'compared.yaml'))
@@ -491,7 +527,7 @@ def free_ports(count):
 
 
 @unittest.skipUnless(LONG, 'a cluster of its own takes minutes; scripts/test --long')
-class SlurmTest(unittest.TestCase):
+class SlurmTest(FolderTestCase):
     """On a real Slurm: one node on loopback, without slurmdbd and without USER."""
 
     @classmethod
@@ -501,8 +537,7 @@ class SlurmTest(unittest.TestCase):
             raise unittest.SkipTest('no ' + ', '.join(missing))
         if os.getuid() != 0:
             raise unittest.SkipTest('Slurm is started by root')
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        super().setUpClass()
         cls.folder.chmod(0o755)
         host = socket.gethostname().split('.')[0]
         (cls.folder / 'munge.key').write_bytes(os.urandom(1024))

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int FORMAT = 1;
+constexpr int FORMAT = 2;
 
 std::string fileOf(const std::string& folder) { return folder + "/range.cbor"; }
 
@@ -24,12 +24,26 @@ FrameCounters countersFrom(const json& j) {
   return c;
 }
 
+/// Of a summary, by name, what is JSON as it is.
+template <class Summary, class Visit>
+void forFields(Summary& s, Visit visit) {
+  visit("mesh_topics", s.mesh_topics);
+  visit("mesh_messages", s.mesh_messages);
+  visit("maps", s.maps);
+  visit("maps_refused", s.maps_refused);
+  visit("fixed_frame", s.fixed_frame);
+  visit("map_source", s.map_source);
+  visit("complaints", s.complaints);
+  visit("duration_s", s.duration_s);
+  visit("origin_ns", s.origin_ns);
+}
+
 json toJson(const BagReplaySummary& s) {
-  json j = {{"mesh_topics", s.mesh_topics},   {"mesh_messages", s.mesh_messages}, {"maps", s.maps},
-            {"maps_refused", s.maps_refused}, {"fixed_frame", s.fixed_frame},     {"map_source", s.map_source},
-            {"complaints", s.complaints},     {"frames", toJson(s.frames)},       {"told", toJson(s.told)},
-            {"passed", toJson(s.passed)},     {"duration_s", s.duration_s},       {"origin_ns", s.origin_ns},
+  json j = {{"frames", toJson(s.frames)},
+            {"told", toJson(s.told)},
+            {"passed", toJson(s.passed)},
             {"left_out", json::array()}};
+  forFields(s, [&](const char* name, const auto& value) { j[name] = value; });
   for (const LeftOutPair& pair : s.left_out) {
     j["left_out"].push_back({static_cast<int>(pair.kind), pair.body, pair.vertex});
   }
@@ -38,18 +52,10 @@ json toJson(const BagReplaySummary& s) {
 
 BagReplaySummary summaryFrom(const json& j) {
   BagReplaySummary s;
-  j.at("mesh_topics").get_to(s.mesh_topics);
-  j.at("mesh_messages").get_to(s.mesh_messages);
-  j.at("maps").get_to(s.maps);
-  j.at("maps_refused").get_to(s.maps_refused);
-  j.at("fixed_frame").get_to(s.fixed_frame);
-  j.at("map_source").get_to(s.map_source);
-  j.at("complaints").get_to(s.complaints);
+  forFields(s, [&](const char* name, auto& value) { j.at(name).get_to(value); });
   s.frames = countersFrom(j.at("frames"));
   s.told = countersFrom(j.at("told"));
   s.passed = countersFrom(j.at("passed"));
-  j.at("duration_s").get_to(s.duration_s);
-  j.at("origin_ns").get_to(s.origin_ns);
   for (const json& one : j.at("left_out")) {
     LeftOutPair pair;
     pair.kind = static_cast<PairKind>(one.at(0).get<int>());
@@ -90,7 +96,7 @@ RangeResult readRange(const std::string& folder) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error(path + ": cannot be read; it is no finished range of a bag");
   try {
-    const json j = json::from_cbor(file);
+    json j = json::from_cbor(file);
     if (j.at("format").get<int>() != FORMAT) throw std::runtime_error("written by another version of the program");
     RangeResult range;
     range.folder = folder;
@@ -109,7 +115,7 @@ RangeResult readRange(const std::string& folder) {
       d.at(2).get_to(decision.reason);
       range.effects.push_back(std::move(decision));
     }
-    range.report = j.at("report");
+    range.report = std::move(j.at("report"));
     return range;
   } catch (const std::exception& error) {
     throw std::runtime_error(path + ": " + error.what());

@@ -14,7 +14,7 @@ namespace dccd {
 namespace test {
 namespace {
 
-constexpr std::uint64_t FRAMES = 48, NO_MAP = 10, GAP = 20, MAP = 30;
+constexpr std::uint64_t FRAMES = 48, NO_MAP = 10, GAP = 20, MAP = 30, LIFTED = 42;
 constexpr double HORIZON_S = 0.1;
 const double GAPS_S[] = {0, 0.1};  // of patches: what comes apart is two at once, or later
 
@@ -101,12 +101,16 @@ Told stream(RangeLog* log, double gap_s) {
   Monitor monitor(options, bodies);
   if (log) monitor.computeOnly(*log);
   const auto topology = std::make_shared<const Topology>(Topology::grid(ROWS, COLS));
+  const auto surface = table();
   LookAheadScore score(HORIZON_S);
   Told told;
   StampNs stamp_ns = 1000000000;
   for (std::uint64_t frame = 1; frame <= FRAMES; ++frame) {
     stamp_ns += frame == GAP ? 2000000000 : 33000000;
-    if (frame == 1 || frame == MAP) monitor.setMap({table(), 1, Eigen::Isometry3d::Identity(), {}});
+    if (frame == 1 || frame == MAP) monitor.setMap({surface, 1, Eigen::Isometry3d::Identity(), {}});
+    if (frame == LIFTED) {  // the same map, up to what rests above it: that is no change of the map
+      monitor.setMap({surface, 1, Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.06)), {}});
+    }
     if (frame == NO_MAP) monitor.setMap({});
     for (const std::size_t b : {1, 0}) {
       MeshFrame mesh;
@@ -145,7 +149,7 @@ class RangeLogTest : public ::testing::Test {
     std::uint64_t first = 1;
     for (std::size_t i = 0; i < ends.size(); ++i) {
       {
-        RangeLog log(file(i), {first, ends[i]});
+        RangeLog log(file(i), {first, ends[i]}, HORIZON_S);
         const Told part = stream(&log, gap_s);
         all.answers.insert(all.answers.end(), part.answers.begin(), part.answers.end());
         log.close();
@@ -178,7 +182,7 @@ TEST_F(RangeLogTest, AnyCutIsNoCut) {
       EXPECT_EQ(cut.score->median_signed_error_s, whole.score->median_signed_error_s);
     };
     for (std::uint64_t end = 1; gap_s > 0 && end < FRAMES; end += 1 + (end % 3 == 0)) expectSame({end});
-    expectSame({2, 3, NO_MAP - 1, GAP - 1, GAP, MAP - 1, MAP, FRAMES - 1});
+    expectSame({2, 3, NO_MAP - 1, GAP - 1, GAP, MAP - 1, MAP, LIFTED - 1, FRAMES - 1});
   }
   for (const char* event : {"BEGAN", "ENDED", "MERGED", "SPLIT", "INITIAL", "MAP_CHANGED"}) {
     EXPECT_NE(all.find(event), std::string::npos) << event << " does not happen here";
@@ -187,7 +191,7 @@ TEST_F(RangeLogTest, AnyCutIsNoCut) {
 
 TEST_F(RangeLogTest, OverAGapNothingIsCarried) {
   for (const auto& [first, last] : {std::pair<std::uint64_t, std::uint64_t>{1, 10}, {15, StepRange().last}}) {
-    RangeLog log(file(first), {first, last});
+    RangeLog log(file(first), {first, last}, 0);
     stream(&log, GAPS_S[1]);
     log.close();
   }
@@ -219,7 +223,7 @@ TEST_F(RangeLogTest, FilesThatAreNone) {
   std::ofstream(file(1)) << "not this one";
   expectRefused("was written by another version");
   {
-    RangeLog log(file(1), {1, 10});
+    RangeLog log(file(1), {1, 10}, HORIZON_S);
     stream(&log, GAPS_S[1]);
     log.close();
   }
@@ -230,7 +234,7 @@ TEST_F(RangeLogTest, FilesThatAreNone) {
   std::filesystem::resize_file(file(1), 8);
   std::ofstream(file(1), std::ios::app) << "?";
   expectRefused("unknown kind");
-  EXPECT_THROW(RangeLog((folder_ / "none/here").string(), {}), std::runtime_error);
+  EXPECT_THROW(RangeLog((folder_ / "none/here").string(), {}, 0), std::runtime_error);
 }
 
 }  // namespace
