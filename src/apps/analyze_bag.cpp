@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <limits>
@@ -28,9 +29,14 @@ namespace {
 using namespace dccd;
 
 constexpr int ERROR = 1, NOT_PROVED = 3;
+#ifdef __clang__
+#define COMPILER __VERSION__  // names Clang itself
+#else
+#define COMPILER "g++ " __VERSION__
+#endif
 
 struct Arguments {
-  std::string bag, out, report, params, octomap, accuracy, mesh;
+  std::string bag, out, report, params, octomap, accuracy, mesh, command;
   std::vector<std::string> ranges;
   double look_ahead_s = 0;
   double from_s = 0, to_s = std::numeric_limits<double>::infinity();
@@ -72,8 +78,7 @@ class ResultBag {
     if (m.getTopic().compare(0, own.size(), own) == 0) return;
     bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
   }
-  void add(const Outcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far,
-           const ros::Time& at) {
+  void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
     const std::string& frame = pipeline.fixedFrame();
     StatsContext context;
     context.frames = pipeline.monitor().total();
@@ -88,6 +93,12 @@ class ResultBag {
     context.markers_built = markers_built_;
     context.parameter_hash = pipeline.config().hash();
     bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
+    EffectTracker& effects = pipeline.effects();
+    if (effects.takeNewPlan()) bag_.write("/collision_monitor/effects", at, effects.message(at, frame));
+    if (effects.takeNewLeftOut(pipeline.monitor())) {
+      bag_.write("/collision_monitor/left_out", at,
+                 toLeftOutPairs(pipeline.monitor().leftOut(), pipeline.monitor().bodies(), outcome.stamp_ns, frame));
+    }
     bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
     bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
     if (pipeline.config().monitor.detector.patches) {
@@ -115,6 +126,10 @@ class ResultBag {
                toContactArray(prediction, pipeline.monitor().bodies(), frame));
     bag_.write("/collision_monitor/time_to_contact", at,
                toTimeToContact(prediction, horizon_s, pipeline.monitor().bodies(), frame));
+    if (!prediction.answered || frame.empty()) return;
+    const auto ahead =
+        toPredictedMarkers(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.config().markers, frame);
+    if (!ahead.markers.empty()) bag_.write("/collision_monitor/markers", at, ahead);
   }
 
  private:
@@ -163,6 +178,29 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
   return text.str();
 }
 
+/// Its name, and in the lines after it what is in it.
+std::string textOf(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << file << '\n' << in.rdbuf();
+  return text.str();
+}
+
+/// As a shell would take it again.
+std::string commandLine(int argc, char** argv) {
+  std::string line;
+  for (int i = 0; i < argc; ++i) {
+    std::string word = i == 0 ? std::filesystem::path(argv[0]).filename().string() : argv[i];
+    const char* const plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=:,+@%";
+    if (word.empty() || word.find_first_not_of(plain) != std::string::npos) {
+      for (std::size_t at = 0; (at = word.find('\'', at)) != std::string::npos; at += 4) word.replace(at, 1, "'\\''");
+      word = "'" + word + "'";
+    }
+    line += (i > 0 ? " " : "") + word;
+  }
+  return line;
+}
+
 /// What the page's head says of the run.
 void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary,
               const std::vector<EffectDecision>& effects, std::size_t ranges, Report& report) {
@@ -174,6 +212,9 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
   for (const std::string& t : summary.mesh_topics) topics += (topics.empty() ? "" : ", ") + (t.empty() ? "(rigid)" : t);
   std::vector<std::pair<std::string, std::string>> facts{
       {"bag", a.bag},
+      {"command", a.command},
+      {"program", "deformable_ccd " DEFORMABLE_CCD_VERSION ", compiled by " COMPILER},
+      {"parameters", a.params.empty() ? "the defaults, and what the command says" : textOf(a.params)},
       {"mesh topics", topics},
       {"fixed frame", summary.fixed_frame},
       {"duration", seconds(summary.duration_s)},
@@ -214,7 +255,7 @@ int analyze(const Arguments& a) {
   if (a.is_range) {
     const StepRange frames = BagReplay(a.bag, config, options).rangeOf(a.from_s, a.to_s);
     std::filesystem::create_directories(a.report);
-    log.emplace(a.report + "/" + RANGE_LOG, frames);
+    log.emplace(a.report + "/" + RANGE_LOG, frames, config.monitor.look_ahead_s);
     options.log = &*log;
   }
   BagReplay replay(a.bag, config, options);
@@ -334,6 +375,7 @@ int main(int argc, char** argv) {
       "  3  answered, but not all of it is proved, or no frame was answered; a line says why");
   try {
     app.parse(argc, argv);
+    a.command = commandLine(argc, argv);
     a.is_range = from->count() + to->count() > 0;
     if (!(a.from_s < a.to_s)) throw std::runtime_error("--from " + seconds(a.from_s) + " is not before --to");
     return a.ranges.empty() ? analyze(a) : merge(a);

@@ -13,6 +13,7 @@
 #include "dccd/simd_target.h"
 #include "input/mesh_file.h"
 #include "report/accuracy_settings.h"
+#include "report/progress_bar.h"
 
 namespace {
 
@@ -115,13 +116,14 @@ struct Run {
     for (const std::vector<Contact>& step : contacts) n += step.size();
     return n;
   }
-  void once(const std::vector<Step>& steps) {
+  void once(const std::vector<Step>& steps, ProgressBar& progress) {
     contacts.clear();
     sum = StepStats();
     if (steps.size() > 1) history.clear();
     for (const Step& step : steps) {
       once(step);
       if (contacts.size() == 1 || assurance.proved) assurance = assuranceOf(result);
+      progress.advance();
     }
   }
   void once(const Step& step) {
@@ -227,8 +229,9 @@ MedianInterval ratioOf(const Run& run, const Run& to) {
 
 /// All of them in turns, each round beginning with another, until the ratios are known or the rounds are over.
 void runInTurns(const std::vector<Step>& steps, std::size_t most, std::vector<Run>& runs, const Run& usual) {
+  ProgressBar progress("rounds, at most " + std::to_string(most), most * runs.size() * steps.size());
   for (std::size_t round = 0; round < most; ++round) {
-    for (std::size_t i = 0; i < runs.size(); ++i) runs[(round + i) % runs.size()].once(steps);
+    for (std::size_t i = 0; i < runs.size(); ++i) runs[(round + i) % runs.size()].once(steps, progress);
     const bool narrow = std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
       const MedianInterval ratio = ratioOf(run, usual);
       return ratio.high <= ratio.median * (1 + NARROW) && ratio.low >= ratio.median * (1 - NARROW);
@@ -309,7 +312,10 @@ int checkStep(const Arguments& a) {
     accuracy.tolerance_m = a.tolerance_m;
     accuracy.toc_bits = a.toc_bits;
     runs.push_back(runOf(a, a.accuracy, accuracy));
-    for (int i = 0; i < a.repeat; ++i) runs[0].once(steps);
+    {
+      ProgressBar progress("steps", static_cast<std::size_t>(a.repeat) * steps.size());
+      for (int i = 0; i < a.repeat; ++i) runs[0].once(steps, progress);
+    }
     print(runs[0]);
     all = statsJson(a, runs[0]);
     if (!a.contacts.empty()) writeContacts(a.contacts, runs[0].contacts);

@@ -167,7 +167,7 @@ void CollisionMonitor::Impl::predict(Outcome& outcome) {
 
 void CollisionMonitor::Impl::publishPrediction(const Outcome& prediction) {
   const double horizon_s = config.monitor.look_ahead_s;
-  outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.fixedFrame());
+  outputs.publishPrediction(prediction, horizon_s, pipeline.monitor().bodies(), config.markers, pipeline.fixedFrame());
 }
 
 /// Whatever a command throws, the node goes on; a service's caller has been told by then (InputQueue::call).

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
+
+#include "dccd/new_contacts.h"
+#include "output/patch_messages.h"
 
 namespace dccd {
 
@@ -38,7 +42,38 @@ Marker list(const Outcome& outcome, const std::string& frame, const std::string&
   marker.pose.orientation.w = 1;
   marker.scale.x = marker.scale.y = marker.scale.z = scale;
   marker.color = color(1, 1, 1);
+  // What a node that is gone has said last shall not stand as what is.
+  marker.lifetime = ros::Duration(1 + 2 * std::max(outcome.duration_s(), 0.0));
   return marker;
+}
+
+// What means what. The legend shows each in its own colour.
+const std_msgs::ColorRGBA EARLY = color(1, 0.1, 0), LATE = color(1, 1, 0), INITIAL = color(0.75, 0.4, 1),
+                          EXPECTED = color(0.65, 0.65, 0.68), PREDICTED = color(0.2, 0.9, 1),
+                          NORMAL = color(0.2, 0.9, 0.4), VOXEL = color(1, 0.55, 0.15);
+const std::pair<const char*, std_msgs::ColorRGBA> LEGEND[] = {{"contact, early in the step", EARLY},
+                                                              {"contact, late in it", LATE},
+                                                              {"touched before it", INITIAL},
+                                                              {"expected", EXPECTED},
+                                                              {"predicted", PREDICTED},
+                                                              {"normal of a patch", NORMAL},
+                                                              {"voxel that is touched", VOXEL}};
+constexpr double TOLD_S = 2;  // this long a patch's text says that it began
+
+Marker text(const Outcome& outcome, const std::string& frame, const std::string& ns, int id, const Vec3& at,
+            double height, const std_msgs::ColorRGBA& rgba, const std::string& words) {
+  Marker marker = list(outcome, frame, ns, Marker::TEXT_VIEW_FACING, height);
+  marker.id = id;
+  marker.pose.position = point(at);
+  marker.color = rgba;
+  marker.text = words;
+  return marker;
+}
+
+std::string inSeconds(double s) {
+  char words[32];
+  std::snprintf(words, sizeof words, "%.2f s", s);
+  return words;
 }
 
 /// The mesh face that takes part, at the time of contact; nothing for edge pairs.
@@ -60,14 +95,8 @@ Vec3 voxelMin(const VoxelKey& key, double resolution_m) {
   return {voxelPlane(key.x, resolution_m), voxelPlane(key.y, resolution_m), voxelPlane(key.z, resolution_m)};
 }
 
-/// The list for leaves of this size, in the map's pose; `share` of the edge is drawn.
-Marker& voxelList(const Outcome& outcome, const std::string& frame, const std::string& ns, std::uint32_t size,
-                  double share, const std_msgs::ColorRGBA& rgba, VoxelLists& by_size) {
-  const auto found = by_size.find(size);
-  if (found != by_size.end()) return found->second;
-  Marker marker = list(outcome, frame, ns, Marker::CUBE_LIST, share * size * outcome.obstacle->resolution());
-  marker.id = static_cast<int>(size);
-  marker.color = rgba;
+/// Points of it are in the map's frame.
+void placeInMap(const Outcome& outcome, Marker& marker) {
   const Eigen::Isometry3d pose = outcome.step->map.map_from_fixed.inverse();
   const Eigen::Quaterniond q(pose.linear());
   marker.pose.position = point(pose.translation());
@@ -75,6 +104,16 @@ Marker& voxelList(const Outcome& outcome, const std::string& frame, const std::s
   marker.pose.orientation.y = q.y();
   marker.pose.orientation.z = q.z();
   marker.pose.orientation.w = q.w();
+}
+
+/// The list for leaves of this size: cubes a little smaller than the voxels, so that one shows beside the next.
+Marker& voxelList(const Outcome& outcome, const std::string& frame, std::uint32_t size, VoxelLists& by_size) {
+  const auto found = by_size.find(size);
+  if (found != by_size.end()) return found->second;
+  Marker marker = list(outcome, frame, "obstacle", Marker::CUBE_LIST, 0.97 * size * outcome.obstacle->resolution());
+  marker.id = static_cast<int>(size);
+  marker.color = color(0.62, 0.62, 0.6);
+  placeInMap(outcome, marker);
   return by_size.emplace(size, std::move(marker)).first->second;
 }
 
@@ -92,8 +131,8 @@ Box boundsInMap(const Outcome& outcome) {
   return box;
 }
 
-/// The map around the bodies: cubes a little smaller than the voxels, so that those that were hit show.
-/// More are not drawn: a map may have millions, and a marker of so many is of no use to anybody.
+/// Of the map around the bodies more are not drawn: it may have millions, and a marker of so many is of no use to
+/// anybody.
 constexpr std::size_t MAX_VOXELS_SHOWN = 200000;
 
 void addObstacle(const Outcome& outcome, double within_m, const std::string& frame, MarkerArray& out) {
@@ -109,23 +148,35 @@ void addObstacle(const Outcome& outcome, double within_m, const std::string& fra
     if ((min.array() > bodies.max.array() + within_m).any()) continue;
     if ((max.array() < bodies.min.array() - within_m).any()) continue;
     ++shown;
-    voxelList(outcome, frame, "obstacle", leaf.size, 0.97, color(0.62, 0.62, 0.6), by_size)
-        .points.push_back(point(min + Vec3::Constant(0.5 * edge)));
+    voxelList(outcome, frame, leaf.size, by_size).points.push_back(point(min + Vec3::Constant(0.5 * edge)));
   }
   for (auto& voxels : by_size) out.markers.push_back(std::move(voxels.second));
 }
 
-void addVoxel(const Outcome& outcome, const Contact& contact, const std::string& frame, VoxelLists& by_size) {
+/// Its edges, so that it hides nothing of what touches it; in the map's pose.
+void addVoxel(const Outcome& outcome, const Contact& contact, Marker& edges) {
   if (contact.body[1] != OBSTACLE_BODY) return;
-  const double resolution = outcome.obstacle->resolution();
-  const geometry_msgs::Point centre =
-      point(voxelMin(contact.voxel, resolution) + Vec3::Constant(0.5 * contact.voxel_size * resolution));
+  const double edge = contact.voxel_size * outcome.obstacle->resolution();
+  const Vec3 min = voxelMin(contact.voxel, outcome.obstacle->resolution());
+  const geometry_msgs::Point corner = point(min);
   // Contacts come sorted by feature, so one voxel comes many times; once is enough where it is next to itself.
-  auto& points = voxelList(outcome, frame, "voxels", contact.voxel_size, 1, color(0.9, 0.4, 0.1, 0.5), by_size).points;
-  if (points.empty() || points.back().x != centre.x || points.back().y != centre.y || points.back().z != centre.z) {
-    points.push_back(centre);
+  if (edges.points.size() >= 24) {
+    const geometry_msgs::Point& last = edges.points[edges.points.size() - 24];
+    if (last.x == corner.x && last.y == corner.y && last.z == corner.z) return;
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int side = 0; side < 4; ++side) {
+      Vec3 from = min;
+      from[(a + 1) % 3] += (side & 1) * edge;
+      from[(a + 2) % 3] += (side >> 1) * edge;
+      edges.points.push_back(point(from));
+      edges.points.push_back(point(from + edge * Vec3::Unit(a)));
+    }
   }
 }
+
+// RViz draws nothing on top of anything: contacts shine through.
+constexpr double BODY_ALPHA = 0.7;
 
 /// Shaded by the angle to a light above, the back in another tint: RViz itself leaves backs of faces black, and a fold
 /// shows both sides.
@@ -135,8 +186,28 @@ std_msgs::ColorRGBA shaded(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double length = normal.norm();
   const double cosine = length > 0 ? normal.dot(LIGHT) / length : 0;
   const double light = 0.45 + 0.55 * std::abs(cosine);
-  if (cosine >= 0) return color(0.36 * light, 0.58 * light, light, 0.85);
-  return color(0.30 * light, 0.62 * light, 0.70 * light, 0.85);
+  if (cosine >= 0) return color(0.36 * light, 0.58 * light, light, BODY_ALPHA);
+  return color(0.30 * light, 0.62 * light, 0.70 * light, BODY_ALPHA);
+}
+
+void addTriangle(const Vec3& a, const Vec3& b, const Vec3& c, Marker& marker) {
+  for (const Vec3* p : {&a, &b, &c}) marker.points.push_back(point(*p));
+  marker.colors.insert(marker.colors.end(), 3, shaded(a, b, c));
+}
+
+/// A rope's edge, for a line has no light and shade.
+void addTube(const Vec3& a, const Vec3& b, double radius_m, Marker& marker) {
+  if (a == b) return;
+  constexpr int SIDES = 6;
+  const Vec3 along = (b - a).normalized(), u = along.unitOrthogonal(), v = along.cross(u);
+  const auto around = [&](int k) {
+    return Vec3(radius_m * (std::cos(2 * M_PI * k / SIDES) * u + std::sin(2 * M_PI * k / SIDES) * v));
+  };
+  for (int k = 0; k < SIDES; ++k) {
+    const Vec3 p = around(k), q = around(k + 1);
+    addTriangle(a + p, a + q, b + q, marker);
+    addTriangle(a + p, b + q, b + p, marker);
+  }
 }
 
 void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& config,
@@ -144,24 +215,56 @@ void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const Ma
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const Topology& topology = *outcome.step->bodies[b].topology;
     const Positions& at = *outcome.step->bodies[b].t1;
-    const bool rope = !topology.hasFaces();
-    Marker marker = list(outcome, frame, "mesh/" + bodies[b].name, rope ? Marker::LINE_LIST : Marker::TRIANGLE_LIST,
-                         rope ? config.line_width_m : 1.0);
-    marker.color = color(0.3, 0.5, 0.9, 0.6);
-    const auto add = [&](const auto& feature) {
-      for (const Index v : feature) {
-        if (!at[v].allFinite()) return;
+    Marker marker = list(outcome, frame, "mesh/" + bodies[b].name, Marker::TRIANGLE_LIST, 1.0);
+    for (const auto& f : topology.faces()) {
+      if (at[f[0]].allFinite() && at[f[1]].allFinite() && at[f[2]].allFinite()) {
+        addTriangle(at[f[0]], at[f[1]], at[f[2]], marker);
       }
-      for (const Index v : feature) marker.points.push_back(point(at[v]));
-      if (rope) return;
-      const std_msgs::ColorRGBA rgba = shaded(at[feature[0]], at[feature[1]], at[feature.back()]);
-      marker.colors.insert(marker.colors.end(), 3, rgba);
-    };
-    if (rope)
-      std::for_each(topology.edges().begin(), topology.edges().end(), add);
-    else
-      std::for_each(topology.faces().begin(), topology.faces().end(), add);
+    }
+    for (const auto& e : topology.edges()) {
+      if (topology.hasFaces()) break;
+      if (at[e[0]].allFinite() && at[e[1]].allFinite()) addTube(at[e[0]], at[e[1]], 0.4 * config.point_size_m, marker);
+    }
     if (!marker.points.empty()) out.markers.push_back(std::move(marker));
+  }
+}
+
+/// Beside the bodies, a line in each colour.
+void addLegend(const Outcome& outcome, const std::string& frame, MarkerArray& out) {
+  Box box;
+  for (const Body& body : outcome.step->bodies) {
+    for (const Vec3& p : *body.t1) {
+      if (!p.allFinite()) continue;
+      box.min = box.min.cwiseMin(p);
+      box.max = box.max.cwiseMax(p);
+    }
+  }
+  if (box.empty()) return;
+  const double height = 0.045 * (box.max - box.min).norm();
+  Vec3 at(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + 12 * height);
+  for (const auto& [words, rgba] : LEGEND) {
+    const int id = static_cast<int>(out.markers.size());
+    out.markers.push_back(text(outcome, frame, "legend", id, at, height, rgba, words));
+    at.z() -= 1.3 * height;
+  }
+}
+
+/// At the patch of each pair of partners that began last, as long as that is news.
+void addBeginnings(const Outcome& outcome, const std::vector<Body>& bodies, double height, const std::string& frame,
+                   MarkerArray& out) {
+  std::map<std::array<std::uint16_t, 2>, const Patch*> newest;
+  for (const Patch& patch : outcome.patches) {
+    if (patch.beginning != PatchBeginning::NEW || patch.began_to_ns == UNKNOWN_NS) continue;
+    const Patch*& so_far = newest[patch.body];
+    if (!so_far || so_far->began_to_ns < patch.began_to_ns) so_far = &patch;
+  }
+  int id = 0;
+  for (const auto& [body, patch] : newest) {
+    const double ago_s = static_cast<double>(outcome.stamp_ns - patch->began_to_ns) * 1e-9;
+    if (ago_s > TOLD_S || !patch->centroid.allFinite()) continue;
+    const Vec3 at = patch->centroid + Vec3(0, 0, 2 * height);
+    const std::string words = pairOf(body, bodies) + ", " + inSeconds(ago_s) + " ago";
+    out.markers.push_back(text(outcome, frame, "began", id++, at, height, color(1, 1, 1), words));
   }
 }
 
@@ -177,34 +280,72 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
 
   Marker contacts = list(outcome, frame, "contacts", Marker::SPHERE_LIST, config.point_size_m);
   Marker initial = list(outcome, frame, "initial", Marker::SPHERE_LIST, config.point_size_m);
-  Marker normals = list(outcome, frame, "normals", Marker::LINE_LIST, config.line_width_m);
+  Marker normals = list(outcome, frame, "normals", Marker::LINE_LIST, 2 * config.line_width_m);
   Marker faces = list(outcome, frame, "faces", Marker::TRIANGLE_LIST, 1);
-  initial.color = color(0.6, 0.2, 0.9);
-  normals.color = color(0.2, 0.9, 0.4);
+  Marker expected = list(outcome, frame, "expected", Marker::SPHERE_LIST, config.point_size_m);
+  Marker voxels = list(outcome, frame, "voxels", Marker::LINE_LIST, 1.5 * config.line_width_m);
+  initial.color = INITIAL;
+  expected.color = EXPECTED;
+  normals.color = NORMAL;
+  voxels.color = VOXEL;
   faces.color = color(1, 0.2, 0.2, 0.7);
-  VoxelLists voxels;
+  if (outcome.obstacle) placeInMap(outcome, voxels);
+  // Of a body against itself neither side is the first one: both ways.
+  const auto addNormal = [&](const std::array<std::uint16_t, 2>& body, const Vec3& at, const Vec3& normal) {
+    normals.points.push_back(point(body[0] == body[1] ? Vec3(at - config.normal_length_m * normal) : at));
+    normals.points.push_back(point(at + config.normal_length_m * normal));
+  };
+  for (const Patch& patch : outcome.patches) {
+    if (patch.centroid.allFinite() && patch.normal.allFinite()) addNormal(patch.body, patch.centroid, patch.normal);
+  }
   const std::size_t shown = std::min(outcome.contacts.size(), static_cast<std::size_t>(config.max_contacts));
   for (std::size_t i = 0; i < shown; ++i) {
     const Contact& contact = outcome.contacts[i];
     const ContactGeometry geometry = contactGeometry(outcome, contact);
     if (!geometry.point.allFinite() || !geometry.normal.allFinite()) continue;
-    addVoxel(outcome, contact, frame, voxels);
-    if (contact.initial) {
-      initial.points.push_back(point(geometry.point));
+    addVoxel(outcome, contact, voxels);
+    if (contact.initial || contact.expected) {
+      (contact.expected ? expected : initial).points.push_back(point(geometry.point));
       continue;
     }
     contacts.points.push_back(point(geometry.point));
     contacts.colors.push_back(color(1, contact.toc_lower, contact.certainty == Certainty::CERTAIN ? 0 : 0.8));
-    normals.points.push_back(point(geometry.point));
-    normals.points.push_back(point(geometry.point + config.normal_length_m * geometry.normal));
+    if (outcome.patches.empty()) addNormal(contact.body, geometry.point, geometry.normal);
     addFace(outcome, contact, faces);
   }
   addObstacle(outcome, config.obstacle_m, frame, out);
-  if (config.mesh) addMeshes(outcome, bodies, config, frame, out);
-  for (Marker* marker : {&contacts, &initial, &normals, &faces}) {
+  if (config.mesh) {
+    addMeshes(outcome, bodies, config, frame, out);
+    addLegend(outcome, frame, out);
+  }
+  addBeginnings(outcome, bodies, 2 * config.point_size_m, frame, out);
+  for (Marker* marker : {&voxels, &faces, &normals, &expected, &initial, &contacts}) {
     if (!marker->points.empty()) out.markers.push_back(std::move(*marker));
   }
-  for (auto& voxel : voxels) out.markers.push_back(std::move(voxel.second));
+  return out;
+}
+
+MarkerArray toPredictedMarkers(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
+                               const MarkerConfig& config, const std::string& frame) {
+  MarkerArray out;
+  if (!prediction.answered) return out;
+  Marker points = list(prediction, frame, "predicted", Marker::CUBE_LIST, 0.7 * config.point_size_m);
+  points.color = PREDICTED;
+  points.color.a = 0.6f;
+  for (const Contact& contact : prediction.contacts) {
+    if (contact.initial || points.points.size() == static_cast<std::size_t>(config.max_contacts)) continue;
+    const Vec3 at = contactGeometry(prediction, contact).point;
+    if (at.allFinite()) points.points.push_back(point(at));
+  }
+  if (!points.points.empty()) out.markers.push_back(std::move(points));
+  for (const NewContact& next : newContacts(prediction)) {
+    const Vec3 at = contactGeometry(prediction, next.contact).point + Vec3(0, 0, 2 * config.point_size_m);
+    const std::string words = pairOf(next.body, bodies) + " in " + inSeconds(next.contact.toc_lower * horizon_s);
+    if (!at.allFinite()) continue;
+    out.markers.push_back(text(prediction, frame, "predicted first", static_cast<int>(out.markers.size()), at,
+                               2 * config.point_size_m, PREDICTED, words));
+  }
+  for (Marker& marker : out.markers) marker.header.stamp = toRosTime(prediction.start_ns);
   return out;
 }
 

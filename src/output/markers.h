@@ -9,10 +9,15 @@
 
 namespace dccd {
 
-/// First a DELETEALL, then a few list markers: contacts (points coloured by TOC, red early to yellow late), normals,
-/// faces, voxels (one list per size of leaf), initial contacts apart, and the meshes and the map around them if asked
-/// for.
+/// First a DELETEALL, then a few list markers, in namespaces as doc/interface.md lists them: contacts, those that were
+/// there when the step began, expected ones, a normal of each patch, faces, edges of voxels, a text where a patch
+/// began; if asked for the map around the bodies, and the bodies with a legend.
 visualization_msgs::MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies,
                                           const MarkerConfig& config, const std::string& frame);
+
+/// To be shown beside those of the step that it begins after.
+visualization_msgs::MarkerArray toPredictedMarkers(const Outcome& prediction, double horizon_s,
+                                                   const std::vector<Body>& bodies, const MarkerConfig& config,
+                                                   const std::string& frame);
 
 }  // namespace dccd

@@ -55,14 +55,18 @@ void Outputs::publishStats(const Outcome& outcome, StatsContext context, const s
 
 bool Outputs::wantsPrediction() const {
   return (predicted_ && predicted_.getNumSubscribers() > 0) ||
-         (time_to_contact_ && time_to_contact_.getNumSubscribers() > 0);
+         (time_to_contact_ && (time_to_contact_.getNumSubscribers() > 0 || markers_.getNumSubscribers() > 0));
 }
 
 void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
-                                const std::string& frame) {
+                                const MarkerConfig& markers, const std::string& frame) {
   if (predicted_.getNumSubscribers() > 0) predicted_.publish(toContactArray(prediction, bodies, frame));
   if (time_to_contact_.getNumSubscribers() > 0) {
     time_to_contact_.publish(toTimeToContact(prediction, horizon_s, bodies, frame));
+  }
+  if (markers_.getNumSubscribers() > 0 && prediction.answered && !frame.empty()) {
+    const visualization_msgs::MarkerArray ahead = toPredictedMarkers(prediction, horizon_s, bodies, markers, frame);
+    if (!ahead.markers.empty()) markers_.publish(ahead);
   }
 }
 

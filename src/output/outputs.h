@@ -29,7 +29,7 @@ class Outputs {
   bool wantsPrediction() const;
   /// Also one without an answer.
   void publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
-                         const std::string& frame);
+                         const MarkerConfig& markers, const std::string& frame);
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.
   void publishLeftOut(const deformable_ccd::LeftOutPairs& pairs);

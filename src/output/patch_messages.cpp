@@ -59,11 +59,6 @@ PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
   return out;
 }
 
-/// "cloth and itself".
-std::string pairOf(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies) {
-  return nameOf(body[0], bodies) + " and " + (body[0] == body[1] ? "itself" : nameOf(body[1], bodies));
-}
-
 std::string listOf(const std::vector<std::uint64_t>& ids) {
   std::string text;
   for (const std::uint64_t id : ids) text += (text.empty() ? "" : ", ") + std::to_string(id);
@@ -90,6 +85,10 @@ std::string summaryOf(const PatchEvent& event, const std::vector<Body>& bodies) 
 }
 
 }  // namespace
+
+std::string pairOf(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies) {
+  return nameOf(body[0], bodies) + " and " + (body[0] == body[1] ? "itself" : nameOf(body[1], bodies));
+}
 
 deformable_ccd::PatchArray toPatchArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                         const std::string& frame) {

@@ -1,6 +1,7 @@
 // Patches, their events and what is new as messages. Used by the node and by analyze_bag.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 
 namespace dccd {
 
+/// "cloth and itself".
+std::string pairOf(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies);
 deformable_ccd::PatchArray toPatchArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                         const std::string& frame);
 /// One for each event of the outcome, in order.

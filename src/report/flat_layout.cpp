@@ -8,9 +8,9 @@ namespace dccd {
 
 namespace {
 
-using Flat = Eigen::Matrix2Xd;
+using Flat = Eigen::Matrix3Xd;
 
-/// Columns: the finite points in the plane of their two largest directions; others at the origin.
+/// Columns: the finite points along their directions, the largest first, right-handed; others at the origin.
 Flat project(const Positions& positions) {
   Vec3 mean = Vec3::Zero();
   double count = 0;
@@ -25,21 +25,22 @@ Flat project(const Positions& positions) {
     if (p.allFinite()) covariance += (p - mean) * (p - mean).transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);  // ascending
-  Flat flat = Flat::Zero(2, static_cast<Eigen::Index>(positions.size()));
+  Eigen::Matrix3d to_flat = axes.eigenvectors().rowwise().reverse().transpose();
+  to_flat.row(2) = to_flat.row(0).cross(to_flat.row(1));
+  Flat flat = Flat::Zero(3, static_cast<Eigen::Index>(positions.size()));
   for (std::size_t i = 0; i < positions.size(); ++i) {
     if (!positions[i].allFinite()) continue;
-    const Vec3 q = positions[i] - mean;
-    flat.col(static_cast<Eigen::Index>(i)) << axes.eigenvectors().col(2).dot(q), axes.eigenvectors().col(1).dot(q);
+    flat.col(static_cast<Eigen::Index>(i)) = to_flat * (positions[i] - mean);
   }
   return flat;
 }
 
-Eigen::Matrix2d turn(int degrees) { return Eigen::Rotation2Dd(degrees * M_PI / 180).toRotationMatrix(); }
+Eigen::Matrix3d turn(int degrees) { return Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::UnitZ()).toRotationMatrix(); }
 
 }  // namespace
 
-std::vector<std::array<double, 2>> flatLayout(const Positions& positions) {
-  std::vector<std::array<double, 2>> out(positions.size());
+std::vector<std::array<double, 3>> flatLayout(const Positions& positions) {
+  std::vector<std::array<double, 3>> out(positions.size());
   if (positions.empty()) return out;
   const Flat flat = project(positions);
   // Of a square the directions of largest spread are arbitrary, and the picture would stand askew.
@@ -47,16 +48,16 @@ std::vector<std::array<double, 2>> flatLayout(const Positions& positions) {
   double least = std::numeric_limits<double>::infinity();
   for (int degrees = 0; degrees < 90; ++degrees) {
     const Flat turned = turn(degrees) * flat;
-    const Eigen::Vector2d extent = turned.rowwise().maxCoeff() - turned.rowwise().minCoeff();
-    if (extent.prod() < least * (1 - 1e-9)) least = extent.prod(), best = degrees;
+    const Vec3 extent = turned.rowwise().maxCoeff() - turned.rowwise().minCoeff();
+    if (extent.x() * extent.y() < least * (1 - 1e-9)) least = extent.x() * extent.y(), best = degrees;
   }
   Flat turned = turn(best) * flat;
-  const Eigen::Vector2d extent = turned.rowwise().maxCoeff() - turned.rowwise().minCoeff();
+  const Vec3 extent = turned.rowwise().maxCoeff() - turned.rowwise().minCoeff();
   if (extent.y() > extent.x()) turned = turn(90) * turned;
   const auto rounded = [](double x) { return std::round(x * 1e6) / 1e6; };
   for (std::size_t i = 0; i < out.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
-    out[i] = {rounded(turned(0, column)), rounded(turned(1, column))};
+    out[i] = {rounded(turned(0, column)), rounded(turned(1, column)), rounded(turned(2, column))};
   }
   return out;
 }

@@ -9,7 +9,8 @@
 namespace dccd {
 
 /// Each position in the plane in which the points spread most, turned so that their bounding box is smallest and lies
-/// along the page. [m], about the centroid; what is not finite lands on it.
-std::vector<std::array<double, 2>> flatLayout(const Positions& positions);
+/// along the page, and how high it is above that plane, towards the reader. [m], about the centroid; what is not finite
+/// lands on it.
+std::vector<std::array<double, 3>> flatLayout(const Positions& positions);
 
 }  // namespace dccd

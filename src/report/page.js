@@ -62,7 +62,11 @@ function axes(id, height, ymax, ylabel, whole) {
   return { svg, x, y, bar: Math.max(1.5, 0.8 * slot) };
 }
 document.getElementById('headline').textContent = R.headline;
-table('facts', null, R.facts);
+{ const t = table('facts', null, R.facts);  // what has many lines is folded under the first
+  R.facts.forEach(([, value], i) => { const end = value.indexOf('\n'), cell = t.rows[i].cells[1]; if (end < 0) return;
+    const fold = document.createElement('details'); cell.textContent = ''; cell.appendChild(fold);
+    fold.appendChild(document.createElement('summary')).textContent = value.slice(0, end);
+    fold.appendChild(document.createElement('pre')).textContent = value.slice(end + 1); }); }
 { const a = axes('contacts', 240, Math.max(1, ...R.steps.map(s => s.contacts)), 'contacts', true);
   R.steps.forEach(s => [[s.contacts, '#2a6fb0'], [s.undecided + s.initial, '#f0a030'], [s.initial, '#9aa4b0']].forEach(([n, fill]) => {
     const top = a.y(Math.min(n, s.contacts));
@@ -131,9 +135,15 @@ const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
 const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
   return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
 const GRADIENT = 'linear-gradient(to right,' + STOPS.map(s => `rgb(${s.join(',')})`).join(',') + ')';
-// values: per vertex 0 to 1, or null for never.
-function map(parent, b, values, caption, low, high) {
-  const xs = b.xy.map(p => p[0]), ys = b.xy.map(p => p[1]);
+// Whether faces look both ways when the body is laid flat, as of a closed one or a tube: then each side gets a picture.
+const turnsOver = b => { let up = 0, down = 0;
+  b.faces.forEach(f => { const [p, q, r] = f.map(v => b.flat[v]), area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    if (area > 0) up += area; else down -= area; });
+  return Math.min(up, down) > 0.1 * (up + down); };
+// values: per vertex 0 to 1, or null for never. From below it is turned about the upright axis.
+function map(parent, b, values, caption, low, high, below) {
+  const xs = b.flat.map(p => below ? -p[0] : p[0]), ys = b.flat.map(p => p[1]), depth = f => f.reduce((sum, v) => sum + (below ? -1 : 1) * b.flat[v][2], 0) / f.length;
+  const faces = b.faces.map(f => [depth(f), f]).sort((p, q) => p[0] - q[0]);  // what is nearer is painted later
   const range = v => v.reduce((r, x) => [Math.min(r[0], x), Math.max(r[1], x)], [Infinity, -Infinity]);
   const [x0, x1] = range(xs), [y0, y1] = range(ys), width = 510, s = Math.min((width - 20) / Math.max(x1 - x0, 1e-9), 490 / Math.max(y1 - y0, 1e-9));
   const figure = parent.appendChild(document.createElement('figure')), c = figure.appendChild(document.createElement('canvas'));
@@ -143,23 +153,24 @@ function map(parent, b, values, caption, low, high) {
   const px = i => width / 2 + s * (xs[i] - (x0 + x1) / 2), py = i => H / 2 - s * (ys[i] - (y0 + y1) / 2);
   const shade = vertices => { const known = vertices.map(v => values[v]).filter(v => v !== null);
     return known.length ? colour(known.reduce((a, v) => a + v, 0) / known.length) : '#e4e8ec'; };
-  b.faces.forEach(f => { g.beginPath(); f.forEach((v, k) => k ? g.lineTo(px(v), py(v)) : g.moveTo(px(v), py(v))); g.closePath();
+  faces.forEach(([, f]) => { g.beginPath(); f.forEach((v, k) => k ? g.lineTo(px(v), py(v)) : g.moveTo(px(v), py(v))); g.closePath();
     g.fillStyle = shade(f); g.fill(); g.strokeStyle = 'rgba(90,100,110,.25)'; g.lineWidth = .5; g.stroke(); });
   (b.edges || []).forEach(e => { g.beginPath(); g.moveTo(px(e[0]), py(e[0])); g.lineTo(px(e[1]), py(e[1]));
     g.strokeStyle = shade(e); g.lineWidth = 4; g.stroke(); });
   const text = figure.appendChild(document.createElement('figcaption')), bar = document.createElement('span');
-  bar.className = 'scale'; bar.style.background = GRADIENT;
-  text.append(caption + ': ' + low, bar, high);
+  bar.className = 'scale'; bar.style.background = low === high ? colour(1) : GRADIENT;
+  text.append(caption + (below === undefined ? '' : below ? ', seen from below' : ', seen from above') + ': ');
+  text.append(...low === high ? [bar, low] : [low, bar, high]);  // one value alone has no scale
 }
 R.bodies.forEach(b => {
   const box = document.getElementById('heat'), most = Math.max(0, ...b.count), times = b.first.filter(t => t !== null);
-  box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.xy.length} vertices, ` +
+  box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.flat.length} vertices, ` +
     `${b.count.filter(c => c).length} of them in contact at some time`;
-  const row = box.appendChild(document.createElement('div')); row.className = 'maps';
-  map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), 'contacts of a vertex (logarithmic)', '1', String(most));
+  const row = box.appendChild(document.createElement('div')), sides = turnsOver(b) ? [false, true] : [undefined]; row.className = 'maps';
+  sides.forEach(below => map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), 'contacts of a vertex (logarithmic)', '1', String(most), below));
   if (!times.length) return;
   const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
-  map(row, b, b.first.map(t => t === null ? null : 1 - (t - t0) / Math.max(t1 - t0, 1e-9)), 'first contact, late to early', number(t1) + ' s', number(t0) + ' s');
+  sides.forEach(below => map(row, b, b.first.map(t => t === null ? null : t1 > t0 ? 1 - (t - t0) / (t1 - t0) : 1), 'first contact, late to early', number(t1) + ' s', number(t0) + ' s', below));
 });
 const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'vertices could not be checked, or left the path',
   DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
@@ -179,7 +190,7 @@ const longest = list => Math.max(1e-12, ...list);
     [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)]));
   R.effects.forEach((e, i) => { if (!e.running) t.rows[i + 1].className = 'off'; }); }
 document.getElementById('effects_note').textContent =
-  `Bounds of bodies: ${R.bounds.bodies_refitted} times computed, ${R.bounds.bodies_kept} times kept from the step before.` +
+  `Each pair and each moment counts in one row alone: a pair that carries a distance in tracker_noise or else minimum_separation, no longer in self_collision, body_body or octomap. Bounds of bodies: ${R.bounds.bodies_refitted} times computed, ${R.bounds.bodies_kept} times kept from the step before.` +
   (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +
     `they came up ${R.left_out.met} times.` : '') +
   (R.unknown_fraction.max ? ` Of the swept space the map does not know ${number(100 * R.unknown_fraction.median)} % (median), at most ${number(100 * R.unknown_fraction.max)} %.` : '');
@@ -188,6 +199,7 @@ document.getElementById('effects_note').textContent =
   else document.getElementById('look_ahead').textContent = 'Off: look_ahead_s is 0.'; }
 frontPlot('rungs_plot', R.rungs.map(r => ({ x: r.median_ms, y: r.max_toc_error, name: r.rung, group: 'rung', missed: r.missed, invented: r.false })),
   'a step, median [ms]', 'largest error of a time [step]', 1e-12);
+if (R.rungs.length) document.getElementById('rungs_note').textContent = `Missed and false are against the run with ${R.rungs[R.rungs.length - 1].rung}; ` + document.getElementById('rungs_note').textContent;
 { const most = longest(R.rungs.map(r => r.median_ms));
   table('rungs', ['rung', 'steps', 'contacts', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '', '95 % ms'],
     R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, bar(r.median_ms / most), r.p95_ms])); }

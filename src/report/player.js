@@ -119,8 +119,8 @@ const player = (() => {
     }
     const g = new THREE.BufferGeometry(), h = new THREE.BufferGeometry(), group = new THREE.Group(), values = list => new THREE.BufferAttribute(new Float32Array(list), 3);
     g.setAttribute('position', values(points)); g.setAttribute('normal', values(normals)); h.setAttribute('position', values(lines));
-    group.add(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: 0x8a8378, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 })));
-    group.add(new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: 0x6d675e })));
+    group.add(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: 0xb0a698, transparent: true, opacity: 0.45, depthWrite: false })));
+    group.add(new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: 0x8f877b, transparent: true, opacity: 0.5, depthWrite: false })));
     group.visible = false; scene.add(group);
     return { from: m.from, cubes: group };
   });
@@ -166,7 +166,7 @@ const player = (() => {
       const since = to === null ? f.from : to, whole = expected >= n + crossings;
       return { kind: 'patch', at, rgb: whole ? MUTED : rgb(byTime(since)), title: `patch${id ? ' ' + id : ''}: ${b0 === b1 ? name(b0) + ' with itself' : name(b0) + ' with ' + name(b1)}`,
         text: `Patch${id ? ' ' + id : ''} of ${name(b0)} and ${b0 === b1 ? 'itself' : name(b1)} (${beginning}): ${n} contacts` + (crossings ? `, ${crossings} edges through faces` : '') + (expected ? `, ${expected} of them expected` : '') +
-          (area ? `, ${(1e4 * area).toPrecision(3)} cm²` : '') + `. First touch in this step ${interval(f, low, high)}. ${began}` };
+          (area ? `, ${area.toPrecision(3)} m²` : '') + `. First touch in this step ${interval(f, low, high)}. ${began}` };
     });
     return contacts.concat(patches);
   }
@@ -186,9 +186,11 @@ const player = (() => {
   }
   function show(i, t) {
     clock = t;
-    get('seek').value = t; get('clock').textContent = t.toFixed(3) + ' s';
-    lanes.cursor(t);
-    if (i === current) return;
+    if (i !== current) move(i);
+    if (!playing || performance.now() - told > TELL_MS) tell();
+  }
+  function move(i) {
+    if (chosen || current < 0) choose(null);
     current = i;
     const f = frames[i];
     shown.forEach((s, b) => place(s, b < f.shapes.length ? f.shapes[b] : -1, f.places[b]));
@@ -197,13 +199,22 @@ const player = (() => {
     listed = items(f);
     fill(contactDots, listed.filter(x => x.kind === 'contact'));
     fill(patchDots, listed.filter(x => x.kind === 'patch'));
-    choose(null);
-    const d = f.details, more = d && d.n > d.c.length ? ` (${d.c.length} shown, the others are in contacts.csv)` : '';
+    draw();
+  }
+  // In words, and on the lanes: to lay the page out anew for each frame that is played would cost more than the frame.
+  const TELL_MS = 200;
+  let told = 0, toldOf = -1;
+  function tell() {
+    told = performance.now();
+    get('seek').value = clock; get('clock').textContent = clock.toFixed(3) + ' s';
+    lanes.cursor(clock);
+    if (toldOf === current) return;
+    toldOf = current;
+    const f = frames[current], d = f.details, more = d && d.n > d.c.length ? ` (${d.c.length} shown, the others are in contacts.csv)` : '';
     get('now').textContent = !d ? `Where the bodies were at ${seconds(f.to)}, when a step began.` :
       `Step ${f.step}, which ended at ${seconds(f.to)}: ${d.n} contact${d.n === 1 ? '' : 's'}${more}, ${d.np} patch${d.np === 1 ? '' : 'es'}.`;
     get('listing').querySelector('summary').textContent = `Contacts and patches of this frame (${listed.length})`;
     if (get('listing').open) list();
-    draw();
   }
   get('listing').addEventListener('toggle', () => get('listing').open && list());
   // The step that holds the time; between the frames that were kept, the one before.
@@ -216,6 +227,7 @@ const player = (() => {
   const setPlaying = on => {
     playing = on;
     get('play').textContent = on ? 'Pause' : 'Play';
+    if (!on) tell();
     if (!isSoftware) return;
     shown.forEach(s => { if (s.surface) s.lines.visible = !on; });
     maps.forEach(m => { m.cubes.children[1].visible = !on; });
@@ -237,7 +249,7 @@ const player = (() => {
   get('back').addEventListener('click', () => stepTo(current - 1));
   get('on').addEventListener('click', () => stepTo(current + 1));
   get('seek').min = START; get('seek').max = END;
-  get('seek').addEventListener('input', e => { stop(); seek(+e.target.value); });
+  get('seek').addEventListener('input', e => { const t = +e.target.value; stop(); seek(t); });
   lanes.seek = t => { stop(); seek(t); };
 
   function screenOf(item) {
@@ -266,7 +278,7 @@ const player = (() => {
     const centre = points.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(Math.max(points.length, 1));
     const distances = points.map(p => p.distanceTo(centre)).sort((a, b) => a - b);
     const radius = Math.max(distances[Math.floor(0.98 * (distances.length - 1))] || 0, 1e-6);
-    const narrow = Math.min(1, camera.aspect), away = radius / Math.sin(camera.fov * Math.PI / 360) / narrow;
+    const narrow = Math.min(1, camera.aspect), away = 0.85 * radius / Math.sin(camera.fov * Math.PI / 360) / narrow;
     camera.near = away / 200; camera.far = away * 50; camera.updateProjectionMatrix();
     camera.position.copy(centre).add(new THREE.Vector3(-0.55, -0.75, 0.45).normalize().multiplyScalar(away));
     controls.target.copy(centre); controls.update();
@@ -289,9 +301,9 @@ const player = (() => {
     i.style.background = '#' + s.colour.toString(16).padStart(6, '0'); p.append(s.body.name); });
   note.textContent = (frames.length < D.seen ? `${frames.length} of ${D.seen} recorded frames are kept, those with events of patches first: what is between is not shown. ` :
     `All ${D.seen} recorded frames. `) + 'Nothing is interpolated. Positions are rounded for display, to ' +
-    D.bodies.filter(b => b.quantum).map(b => `${(1e3 * b.quantum).toPrecision(2)} mm (${b.name})`).join(', ') + `. At most ${D.most_contacts} contacts of a frame are drawn, new ones first.` +
+    D.bodies.filter(b => b.quantum).map(b => `${b.quantum.toExponential(1)} m (${b.name})`).join(', ') + `. At most ${D.most_contacts} contacts of a frame are drawn, new ones first.` +
     (D.maps.some(m => !m.all) ? ' Of the map the voxels next to the bodies are drawn.' : D.maps.length ? ' Of the map the voxels near the bodies are drawn.' : '') +
     (D.maps_left_out ? ` ${D.maps_left_out} later changes of the map are not drawn.` : '') + ' Drag to turn, wheel to zoom, right button to move.';
   seek(START);
-  return { seek, frames, items: () => listed, screenOf: i => screenOf(listed[i]), drawn: () => drawn, time: () => clock };
+  return { seek, paint, frames, items: () => listed, screenOf: i => screenOf(listed[i]), drawn: () => drawn, time: () => clock };
 })();

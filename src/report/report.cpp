@@ -27,6 +27,14 @@ std::string csvField(const std::string& text) {
   return quoted + '"';
 }
 
+// In the place of the rows of the steps, which are text already. No text has it inside: its quotes would be escaped.
+const char* const ROWS = "@rows@";
+
+// A name out of a message need not be UTF-8.
+std::string toText(const nlohmann::json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
 
 }  // namespace
@@ -46,7 +54,7 @@ Report::Report(const std::string& folder) : folder_(folder) {
   open(events_, "events.csv");
   contacts_
       << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
-         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_step,"
+         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_s,"
          "expected\n";
   steps_
       << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
@@ -79,7 +87,8 @@ void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodi
               << c.leaving << ',' << c.toc_lower << ',' << c.toc_upper << ','
               << static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9 + c.toc_lower * outcome.duration_s() << ','
               << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y()
-              << ',' << g.normal.z() << ',' << g.approach_speed << ',' << c.expected << '\n';
+              << ',' << g.normal.z() << ',' << g.approach_speed / std::max(outcome.duration_s(), 1e-9) << ','
+              << c.expected << '\n';
   }
 }
 
@@ -116,7 +125,7 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
     if (!topology || (!heat.mesh.is_null() && heat.contacts.size() == topology->vertexCount())) continue;
     // A body whose topology changed begins anew: its vertices are other ones.
     heat.begun_anew = !heat.mesh.is_null();
-    heat.mesh = {{"name", bodies[b].name}, {"xy", flatLayout(*outcome.step->bodies[b].t0)}};
+    heat.mesh = {{"name", bodies[b].name}, {"flat", flatLayout(*outcome.step->bodies[b].t0)}};
     heat.mesh["faces"] = topology->faces();
     if (!topology->hasFaces()) heat.mesh["edges"] = topology->edges();
     heat.contacts.assign(topology->vertexCount(), 0);
@@ -148,19 +157,25 @@ void Report::addRow(const Outcome& o) {
   steps_ << ',' << s[Stage::BROAD_PHASE].out << ',' << s[Stage::PLANAR].out << ',' << s[Stage::ELEMENTARY].in << ','
          << s[Stage::OBSTACLE].in << '\n';
   const double time_s = static_cast<double>(o.stamp_ns - origin_ns_) * 1e-9;
-  rows_.push_back({{"step", o.sequence},
-                   {"t", time_s},
-                   {"status", toString(o.status)},
-                   {"reason", o.reason},
-                   {"answered", o.answered},
-                   {"start_state", toString(o.start_state)},
-                   {"clear", assuranceOf(o).clear()},
-                   {"contacts", o.total_contacts},
-                   {"undecided", o.counts.undecided},
-                   {"initial", o.counts.initial},
-                   {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
-                   {"toc_new", finiteOrNull(earliest_new)},
-                   {"ms", s.total_ms}});
+  const nlohmann::json row = {{"step", o.sequence},
+                              {"t", time_s},
+                              {"status", toString(o.status)},
+                              {"reason", o.reason},
+                              {"answered", o.answered},
+                              {"start_state", toString(o.start_state)},
+                              {"clear", assuranceOf(o).clear()},
+                              {"contacts", o.total_contacts},
+                              {"undecided", o.counts.undecided},
+                              {"initial", o.counts.initial},
+                              {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
+                              {"toc_new", finiteOrNull(earliest_new)},
+                              {"ms", s.total_ms}};
+  addRows(toText(row, -1));
+}
+
+void Report::addRows(const std::string& rows) {
+  if (!rows_.empty() && !rows.empty()) rows_ += ",\n";
+  rows_ += rows;
 }
 
 void Report::addFirstContact(const Outcome& o, const std::vector<Body>& bodies) {
@@ -327,7 +342,7 @@ nlohmann::json Report::json() const {
   j["headline"] = headline();
   j["facts"] = nlohmann::json::array();
   for (const auto& [name, value] : facts_) j["facts"].push_back(nlohmann::json::array({name, value}));
-  j["steps"] = rows_;
+  j["steps"] = ROWS;
   j["counters"] = {{"received", counters_.received},
                    {"processed", counters_.processed()},
                    {"started", counters_.started()},
@@ -378,13 +393,17 @@ nlohmann::json Report::json() const {
   return j;
 }
 
+std::string Report::dumped(const nlohmann::json& data, int indent) const {
+  std::string text = toText(data, indent);
+  const std::string mark = toText(ROWS, -1);
+  return text.replace(text.find(mark), mark.size(), "[" + rows_ + "]");
+}
+
 void Report::finish() {
   const nlohmann::json data = json();
   std::ofstream json_file(folder_ + "/report.json"), page(folder_ + "/report.html");
-  // A name out of a message need not be UTF-8.
-  constexpr auto REPLACE = nlohmann::json::error_handler_t::replace;
-  json_file << data.dump(1, ' ', false, REPLACE) << '\n';
-  page << reportPage(data.dump(-1, ' ', false, REPLACE), player_.json());
+  json_file << dumped(data, 1) << '\n';
+  page << reportPage(dumped(data, -1), player_.json());
   close();
   for (std::ofstream* file : {&json_file, &page}) {
     file->close();

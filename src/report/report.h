@@ -76,6 +76,7 @@ class Report {
   void addProof(const Outcome& outcome);
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
   void addRow(const Outcome& outcome);
+  void addRows(const std::string& rows);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
   void addTimes(const Outcome& outcome);
   void writeContacts(const Outcome& outcome, const std::vector<Body>& bodies);
@@ -84,6 +85,7 @@ class Report {
   nlohmann::json effectsJson() const;
   nlohmann::json lookAheadJson() const;
   nlohmann::json json() const;
+  std::string dumped(const nlohmann::json& data, int indent) const;
 
   std::string folder_;
   std::ofstream contacts_, steps_, patches_, events_, timing_;
@@ -98,7 +100,7 @@ class Report {
               with_expected_ = 0;  // steps; with contacts that are not expected, and with such that are
   double first_contact_s_ = 0;
   std::string first_contact_;
-  nlohmann::json rows_ = nlohmann::json::array();
+  std::string rows_;  // of the steps, as JSON, a line each
   std::vector<BodyHeat> heat_;
   std::array<std::vector<double>, static_cast<std::size_t>(Stage::COUNT)> stage_ms_;
   StepStats sum_;

@@ -4,10 +4,8 @@ import copy
 import csv
 import io
 import json
-import pathlib
-import shutil
+import re
 import subprocess
-import tempfile
 import unittest
 
 import genpy
@@ -16,7 +14,7 @@ from geometry_msgs.msg import Point, TransformStamped
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, FolderTestCase
 
 OWN = '/collision_monitor/'
 
@@ -42,11 +40,10 @@ def write_moving(bag, cloth, stamp, at, transform_at):
     bag.write('/tf', TFMessage([moving]), transform_at)
 
 
-class AnalyzeBagTest(unittest.TestCase):
+class AnalyzeBagTest(FolderTestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        super().setUpClass()
         cls.bag = cls.folder / 'scene.bag'
         cls.tool('make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', cls.bag, '--frames', 40, '--quiet')
         cls.messages = messages_of(cls.bag)
@@ -312,8 +309,11 @@ class AnalyzeBagTest(unittest.TestCase):
             by_topic[topic].append(message)
         frames = len(by_topic['/cloth'])
         self.assertEqual(frames, sum(topic == '/cloth' for topic, _, _ in self.messages))
+        # Beside a step's markers come those of the prediction after it, where it has anything to show.
+        foreseen = sum(any(not c.initial for c in array.contacts) for array in by_topic[OWN + 'predicted_contacts'])
+        self.assertGreater(foreseen, 10)
         for name, count in (('contacts', frames), ('first_contact', frames), ('clear', frames), ('stats', frames),
-                            ('markers', frames), ('predicted_contacts', frames), ('time_to_contact', frames)):
+                            ('markers', frames + foreseen), ('predicted_contacts', frames), ('time_to_contact', frames)):
             self.assertEqual(len(by_topic[OWN + name]), count, name)
         self.assertEqual([m.answered for m in by_topic[OWN + 'time_to_contact']], [False] + [True] * (frames - 1))
         listed = sum(len(array.contacts) for array in by_topic[OWN + 'contacts'])
@@ -321,12 +321,20 @@ class AnalyzeBagTest(unittest.TestCase):
         # The last frame with contacts of both kinds: those that the step began with, and new ones.
         initial = [{c.initial for c in array.contacts} for array in by_topic[OWN + 'contacts']]
         both = [i for i, kinds in enumerate(initial) if len(kinds) == 2]
-        drawn = by_topic[OWN + 'markers'][both[-1]].markers
-        self.assertEqual(drawn[0].action, drawn[0].DELETEALL)
-        points = {marker.ns: len(marker.points) for marker in drawn[1:]}
-        self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels'}, set(points))
-        self.assertGreater(points['obstacle'], points['voxels'])
-        self.assertEqual(points['normals'], 2 * points['contacts'])
+        steps = [array for array in by_topic[OWN + 'markers'] if array.markers[:1] and array.markers[0].action == Marker.DELETEALL]
+        self.assertEqual(len(steps), frames)
+        drawn = {marker.ns: marker for marker in steps[both[-1]].markers[1:]}
+        self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels', 'legend', 'began'}, set(drawn))
+        patches = by_topic[OWN + 'patches'][both[-1]].patches
+        self.assertEqual(len(drawn['normals'].points), 2 * len(patches), 'one of each patch')
+        self.assertEqual(len(drawn['voxels'].points) % 24, 0, 'the twelve edges of each, which hide nothing')
+        self.assertEqual(drawn['voxels'].type, Marker.LINE_LIST)
+        self.assertRegex(drawn['began'].text, r'^mesh and octomap, \d\.\d\d s ago$')
+        self.assertTrue(all(0 < marker.lifetime.to_sec() < 2 for marker in drawn.values()), 'nothing stays of a node that is gone')
+        ahead = {marker.ns: marker for array in by_topic[OWN + 'markers'] for marker in array.markers if array not in steps}
+        self.assertEqual(set(ahead), {'predicted', 'predicted first'})
+        self.assertNotEqual(ahead['predicted'].type, drawn['contacts'].type, 'a style of their own')
+        self.assertRegex(ahead['predicted first'].text, r'^mesh and (octomap|itself) in 0\.\d\d s$')
         # What the statistics say beyond the step.
         stats = by_topic[OWN + 'stats']
         self.assertEqual([s.markers_built for s in stats], list(range(1, frames + 1)))
@@ -335,6 +343,36 @@ class AnalyzeBagTest(unittest.TestCase):
         self.assertGreater(score['compared'], 0)
         self.assertEqual(stats[-1].look_ahead_compared, min(score['compared'], 1000))
         self.assertLess(stats[0].look_ahead_compared, stats[-1].look_ahead_compared)
+
+    def test_a_rope_is_drawn_as_a_tube_and_what_is_expected_apart(self):
+        rope, params, out = self.folder / 'rope.bag', self.folder / 'rope.yaml', self.folder / 'rope_out.bag'
+        self.tool('make_scene_bag', CHECKOUT / 'config/scenes/rope_through_ring.yaml', rope, '--monitor-config', params, '--quiet')
+        params.write_text(params.read_text() + '\nmarkers: {mesh: true}\nexpected_contacts:\n  - {between: [rope, octomap]}\n')
+        self.analyze('rope', rope, '--params', params, '--no-accuracy-table', '-o', out)
+        drawn = [{m.ns: m for m in message.markers} for topic, message, _ in messages_of(out) if topic == OWN + 'markers']
+        meshes = [markers['mesh/rope'] for markers in drawn if 'mesh/rope' in markers]
+        self.assertEqual({m.type for m in meshes}, {Marker.TRIANGLE_LIST})
+        self.assertEqual({len(m.points) % 36 for m in meshes}, {0}, 'six sides of two triangles an edge')
+        self.assertTrue(any('expected' in markers for markers in drawn))
+        self.assertFalse(any('contacts' in markers or 'initial' in markers for markers in drawn))
+
+    def test_the_bag_of_results_has_every_topic_of_the_node(self):
+        out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
+        params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\n')  # more than the cloth's edges
+        self.analyze('all', self.bag, '--params', params, '--no-accuracy-table', '-o', out)
+        by_topic = collections.defaultdict(list)
+        for topic, message, _ in messages_of(out):
+            by_topic[topic].append(message)
+        topics = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
+                  for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
+        self.assertGreater(len(topics), 10)
+        self.assertEqual({OWN + topic for topic in topics} - set(by_topic), set())
+        effects = by_topic[OWN + 'effects']
+        self.assertEqual({e.name for e in effects[-1].effects if e.running} & {'look_ahead', 'minimum_separation'},
+                         {'look_ahead', 'minimum_separation'})
+        self.assertLess(len(effects), 10, 'when the plan changes, and not in each step')
+        listed = len((self.folder / 'all/left_out.csv').read_text().splitlines()) - 1
+        self.assertEqual(len(by_topic[OWN + 'left_out'][-1].pairs), listed)
 
     def test_contacts_that_are_expected_in_the_phase_of_the_bag(self):
         """The cloth on its map: found as before, marked, and no alarm; in another phase it is one."""

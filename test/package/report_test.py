@@ -24,12 +24,23 @@ class ReportPageTest(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder, True)
-        scene, bag = CHECKOUT / 'config/scenes/table_edge.yaml', self.folder / 'scene.bag'
-        for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', '80', '--quiet'],
-                        [TOOLS / 'analyze_bag', bag, '--report', self.folder, '--accuracy-study', '--quiet']):
+        self.page = self.folder / 'report.html'
+        self.report('table_edge', 80, '--accuracy-study')
+
+    def report(self, scene, frames, *words):
+        bag, params = self.folder / 'scene.bag', self.folder / 'scene.yaml'
+        for command in ([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes' / (scene + '.yaml'), bag, '--frames', frames,
+                         '--monitor-config', params, '--quiet'],
+                        [TOOLS / 'analyze_bag', bag, '--params', params, '--report', self.folder, '--quiet', *words]):
             ran = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
             self.assertEqual(ran.returncode, 0, ran.stderr)
-        self.page = self.folder / 'report.html'
+
+    def dom(self):
+        """The page as a browser leaves it, and what its console said."""
+        ran = subprocess.run([BROWSER, '--headless', '--no-sandbox', '--disable-gpu', '--enable-logging=stderr', '--v=0',
+                              '--user-data-dir=%s' % (self.folder / 'profile'), '--dump-dom', self.page.as_uri()],
+                             capture_output=True, text=True, timeout=120, check=False)
+        return ran.stdout[:ran.stdout.index('<script')], ran.stderr
 
     def test_loads_nothing(self):
         text = self.page.read_text()
@@ -41,22 +52,35 @@ class ReportPageTest(unittest.TestCase):
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_draws_in_a_browser(self):
-        ran = subprocess.run([BROWSER, '--headless', '--no-sandbox', '--disable-gpu', '--enable-logging=stderr', '--v=0',
-                              '--user-data-dir=%s' % (self.folder / 'profile'), '--dump-dom', self.page.as_uri()],
-                             capture_output=True, text=True, timeout=120, check=False)
-        self.assertNotRegex(ran.stderr, r'CONSOLE.*(?:Error|error)')
-        dom = ran.stdout
-        body = dom[:dom.index('<script')]
+        body, console = self.dom()
+        self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
         for name, least in (('contacts', 10), ('toc', 10), ('rungs_plot', 2), ('study_plot', 15)):
             drawn = body[body.index('id="%s"' % name):].split('</svg>')[0]
             self.assertGreater(len(re.findall(r'<(?:rect|circle)\b', drawn)), least, name)
         self.assertIn('<polyline', body)
-        self.assertGreaterEqual(body.count('<canvas'), 2, 'how often, and when first')
+        heat = body[body.index('id="heat"'):].split('<h2')[0]
+        self.assertEqual(heat.count('<canvas'), 2, 'how often, and when first: of a sheet one side')
+        self.assertNotIn('seen from', heat)
         for name in ('seams', 'stages', 'effects', 'rungs', 'study', 'tiers'):
             rows = body[body.index('id="%s"' % name):].split('</table>')[0].count('<tr')
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
         self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
+
+    @unittest.skipUnless(BROWSER, 'no Chromium is installed')
+    def test_what_made_it_and_both_sides_of_what_is_round(self):
+        self.report('felt_and_finger', 40)
+        body, console = self.dom()
+        self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
+        heat = body[body.index('id="heat"'):].split('<h2')[0]
+        self.assertEqual(heat.count('<canvas'), 8, 'of two bodies two pictures, from both sides')
+        self.assertEqual((heat.count('seen from above'), heat.count('seen from below')), (4, 4))
+        facts = body[body.index('id="facts"'):].split('</table>')[0]
+        self.assertRegex(facts, r'analyze_bag \S*scene\.bag --params \S*scene\.yaml --report ')
+        self.assertRegex(facts, r'deformable_ccd \d+\.\d+\.\d+, compiled by ')
+        self.assertRegex(facts, r'<summary>\S*scene\.yaml</summary><pre>[^<]*minimum_separation_m: 0\.012')
+        self.assertRegex(facts, r'\d+ CLEAR, \d+ INTERSECTING, \d+ NOT_CHECKED; frames without an answer: 1')
+        self.assertRegex(body, r'id="rungs_note">Missed and false are against the run with conservative[^;]*; ')
 
     def browser(self):
         """A page of 1280 x 1000 pixels, drawn by software; its console is empty at the end."""
@@ -100,7 +124,7 @@ class ReportPageTest(unittest.TestCase):
         actions = ActionBuilder(page)
         actions.pointer_action.move_to_location(round(x), round(y)).click()
         actions.perform()
-        self.assertRegex(text('picked'), r'^Contact, .*: mesh vert.* \d.*; certain, new\. Time of contact between .* wide\. '
+        self.assertRegex(text('picked'), r'^Contact, .*: cloth vert.* \d.*; certain, new\. Time of contact between .* wide\. '
                                          r'Settled by tier \w+\. Part of patch \d+\.$')
         near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
             return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)

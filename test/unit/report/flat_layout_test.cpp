@@ -19,7 +19,7 @@ Positions tiltedGrid() {
   return positions;
 }
 
-double distance(const std::array<double, 2>& a, const std::array<double, 2>& b) {
+double distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1]);
 }
 
@@ -38,10 +38,25 @@ TEST(FlatLayout, KeepsDistancesAndLiesAlongThePage) {
   EXPECT_NEAR(high - low, 0.2, 2e-3) << "the short side is upright, within a degree";
 }
 
+TEST(FlatLayout, IsNotMirroredSeenFromAbove) {
+  Positions positions = tiltedGrid();
+  const Vec3 up = (positions[1] - positions[0]).cross(positions[4] - positions[0]).normalized();
+  positions.push_back(positions[5] + 0.03 * up);
+  const auto flat = flatLayout(positions);
+  const auto at = [&](std::size_t i) { return Vec3(flat[i][0], flat[i][1], flat[i][2]); };
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    EXPECT_NEAR((at(i) - at(0)).norm(), (positions[i] - positions[0]).norm(), 1e-5)
+        << "with heights it is the same body";
+  }
+  EXPECT_GT((at(1) - at(0)).cross(at(4) - at(0)).dot(at(12) - at(5)), 0) << "and no mirror image of it";
+}
+
 TEST(FlatLayout, WhatIsNotFiniteIsNoPlace) {
   Positions positions = tiltedGrid();
   positions[5].y() = std::numeric_limits<double>::quiet_NaN();
-  for (const auto& point : flatLayout(positions)) EXPECT_TRUE(std::isfinite(point[0]) && std::isfinite(point[1]));
+  for (const auto& point : flatLayout(positions)) {
+    EXPECT_TRUE(std::isfinite(point[0]) && std::isfinite(point[1]) && std::isfinite(point[2]));
+  }
   EXPECT_TRUE(flatLayout({}).empty());
 }
 
