@@ -116,6 +116,8 @@ class BareRoot:
         """Runs the shell line in the copy of the checkout, in a process namespace that ends all it has started."""
         root = str(self.folder)
         mounts = ['mount -t proc proc "$0/proc"', 'mount -t tmpfs tmpfs "$0/dev/shm"',
+                  # Terminals of its own: a test looks at a tool's screen through one.
+                  'mount -t devpts -o newinstance,ptmxmode=0666 devpts "$0/dev/pts"', 'mount --bind "$0/dev/pts/ptmx" "$0/dev/ptmx"',
                   '{ [ ! -d "$1" ] || mount --bind -o ro "$(realpath "$1")" "$0%s"; }' % (os.path.dirname(INSIDE) + '/shared'),
                   'cd /', 'exec chroot "$0" /bin/bash -c "$2"']
         # A master's port of its own: this machine may have one running.

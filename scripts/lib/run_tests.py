@@ -225,6 +225,20 @@ class BareRootRunner:
         return result, log
 
 
+class PagesRunner:
+    """Counts what scripts/test --newcomer ran before this: scripts/demo, without which it ends, and the pages' commands."""
+    name = "scripts/demo and the pages' commands"
+
+    def __init__(self, log):
+        self.log = log
+
+    def __call__(self, logs):
+        result = Result(passed=1)
+        text = self.log.read_text(errors='replace') if self.log.exists() else ''
+        count_unittest(text, 0 if re.search(r'^OK\b', text, re.M) else 1, PAGE_COMMANDS.name, result)
+        return result, self.log
+
+
 class FuzzRunner:
     """A libFuzzer target: a decoder in rounds, until one brings no new coverage, and for a least number of runs; the core's
     (whose numbers come from the long property tests, PairDifferential and StepProperty) and replays for one round."""
@@ -333,8 +347,10 @@ def find_runners(arguments):
     live = [RostestRunner(p) for p in sorted((CHECKOUT / 'test' / 'ros').glob('*.test'))]
     # In a bare root there is no root to be made, and a sanitizer looks at nothing that a stranger's build does.
     inside = os.environ.get('DEFORMABLE_CCD_IN_BARE_ROOT') or os.environ.get('DEFORMABLE_CCD_SANITIZED')
-    if not inside and not arguments.only:
+    if (arguments.pages or not inside) and not arguments.only:
         python = [runner for runner in python if runner.name != PAGE_COMMANDS.name]
+    if arguments.pages:
+        python.append(PagesRunner(arguments.pages))
     return busy + python, launch + live, [] if inside else [BareRootRunner()]
 
 
@@ -343,6 +359,7 @@ def main():
     parser.add_argument('--build', type=pathlib.Path, required=True, help='build folder of the package')
     parser.add_argument('--fuzzers', type=pathlib.Path, help='build folder of the libFuzzer targets')
     parser.add_argument('--emulator', default='', help='command that runs the gtest binaries; no others are run then')
+    parser.add_argument('--pages', type=pathlib.Path, help="what the tests of the pages' commands printed, where they have run")
     parser.add_argument('--only', default='')
     parser.add_argument('--filter', default='')
     arguments = parser.parse_args()

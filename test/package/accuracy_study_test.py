@@ -3,12 +3,10 @@ voxels. A vertex first touches where the straight path between two frames meets 
 sheet does before. One vertex dips to the floor in frame 5 alone."""
 import csv
 import json
-import pathlib
 import shutil
 import signal
 import struct
 import subprocess
-import tempfile
 import unittest
 
 import genpy
@@ -19,7 +17,7 @@ from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2, PointField
 from shape_msgs.msg import MeshTriangle
 
-from checkout import CHECKOUT, TOOLS
+from checkout import CHECKOUT, TOOLS, FolderTestCase
 
 SIDE, FRAMES, PERIOD_MS, VOXEL_M = 9, 17, 40, 0.05
 DIPS, DIP_FRAME = (3, 3), 5
@@ -99,11 +97,10 @@ def write_bag(path, make):
     return path
 
 
-class AccuracyStudyTest(unittest.TestCase):
+class AccuracyStudyTest(FolderTestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        super().setUpClass()
         cls.bag = write_bag(cls.folder / 'sheet.bag', cloud)
         cls.ran = cls.study(cls.bag, 'study')
         cls.rows = cls.rows_of('study')

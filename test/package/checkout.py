@@ -1,14 +1,26 @@
 """Where the checkout is and what belongs to it; for the tests beside this file."""
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
+import tempfile
+import unittest
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
 # Of the build under test: scripts/test --sanitize has a workspace of its own.
 TOOLS = pathlib.Path(os.environ.get('DEFORMABLE_CCD_WORKSPACE', CHECKOUT / 'build')) / 'devel/lib/deformable_ccd'
 CODE_SUFFIXES = {'.h', '.cpp'}
 sys.path.append(str(CHECKOUT / 'scripts/lib'))  # ros_process
+
+
+class FolderTestCase(unittest.TestCase):
+    """With a folder of its own, as long as its tests last."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
 
 
 def tracked_files():

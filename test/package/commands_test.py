@@ -36,6 +36,7 @@ NOT_RUN = {
     'scripts/setup': 'installs packages; the demo and the tests call it',
     'scripts/benchmark': 'takes half an hour of a quiet machine',
     'scripts/test': 'is what runs this test; --fresh and --long are run by hand',
+    'scripts/pictures': 'needs a browser and RViz, and takes minutes',
     'scripts/package': 'installs packages and takes minutes; deb_test.py does it',
     'apt': 'installs or removes what scripts/package makes; deb_test.py does it',
     'scripts/build': 'was run before this test, or there would be nothing to test',
@@ -306,6 +307,13 @@ class CommandsTest(unittest.TestCase):
             finally:
                 stop(client)
                 self.gone('/stop_the_arm/stop')
+        if words[:3] == ['rosrun', 'deformable_ccd', 'watch']:
+            self.with_a_monitor()
+            view = self.start(command)
+            try:
+                return wait_for(lambda: re.search(r'(?m)^[\d:]+ .*PROVED, ', view.log.read_text()), 40, 'a line of the view')
+            finally:
+                stop(view)
         if words[:2] == ['rosrun', 'dynamic_reconfigure']:
             return self.ask(command, answers=False)
         if words[0] in ('rostopic', 'rosservice', 'rosparam', 'rosmsg'):
@@ -319,7 +327,8 @@ class CommandsTest(unittest.TestCase):
         self.assertGreater(len(found), 12, 'the search found too little to mean anything')
         # First what writes files for others; those that ask a monitor come last, so that it is started once.
         first = ('echo', 'source')
-        last = ('rosbag record', 'rostopic', 'rosservice', 'rosrun dynamic_reconfigure', 'rosrun deformable_ccd stop', 'rosrun deformable_ccd replay')
+        last = ('rosbag record', 'rostopic', 'rosservice', 'rosrun dynamic_reconfigure', 'rosrun deformable_ccd stop', 'rosrun deformable_ccd replay',
+                'rosrun deformable_ccd watch')
         for command in sorted(found, key=lambda c: (not c.startswith(first), c.startswith(last))):
             started = time.monotonic()
             with self.subTest(command):

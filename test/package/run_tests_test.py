@@ -106,7 +106,7 @@ class RunTestsTest(unittest.TestCase):
 
     def test_the_commands_of_the_pages_run_here_where_there_is_no_bare_root(self):
         (self.path / 'gtest_suites.txt').write_text('')
-        arguments = unittest.mock.Mock(build=self.path, filter='', emulator='', fuzzers=None, only='')
+        arguments = unittest.mock.Mock(build=self.path, filter='', emulator='', fuzzers=None, pages=None, only='')
         environment = {k: v for k, v in os.environ.items() if k not in ('DEFORMABLE_CCD_IN_BARE_ROOT', 'DEFORMABLE_CCD_SANITIZED')}
         name = run_tests.PAGE_COMMANDS.name
         with unittest.mock.patch.dict(os.environ, environment, clear=True):
@@ -118,10 +118,28 @@ class RunTestsTest(unittest.TestCase):
                 commands.assert_called_once()
             self.assertEqual((result.failed, result.skipped), (0, 1))
             self.assertIn(name, [r.name for r in run_tests.find_runners(unittest.mock.Mock(
-                build=self.path, filter='', emulator='', fuzzers=None, only='commands'))[0]])
+                build=self.path, filter='', emulator='', fuzzers=None, pages=None, only='commands'))[0]])
         with unittest.mock.patch.dict(os.environ, {**environment, 'DEFORMABLE_CCD_SANITIZED': 'thread'}, clear=True):
             busy, _, alone = run_tests.find_runners(arguments)
             self.assertEqual(([r.name for r in busy].count(name), alone), (1, []))
+
+    def test_commands_that_ran_before_are_counted_once(self):
+        (self.path / 'gtest_suites.txt').write_text('')
+        log = self.path / 'pages.log'
+        arguments = unittest.mock.Mock(build=self.path, filter='', emulator='', fuzzers=None, pages=log, only='')
+        with unittest.mock.patch.dict(os.environ, {'DEFORMABLE_CCD_IN_BARE_ROOT': '1'}):
+            busy, _, alone = run_tests.find_runners(arguments)
+        names = [runner.name for runner in busy]
+        self.assertEqual((names.count(run_tests.PAGE_COMMANDS.name), names.count(run_tests.PagesRunner.name), alone), (0, 1, []))
+
+        def counted(text):
+            log.write_text(text)
+            result, _ = run_tests.PagesRunner(log)(self.path)
+            return result.passed, result.failed, result.skipped
+        self.assertEqual(counted('Ran 6 tests in 1.0s\n\nOK (skipped=1)\n'), (6, 0, 1))
+        self.assertEqual(counted('FAIL: test_x\nRan 6 tests in 1.0s\n\nFAILED (failures=1)\n'), (6, 1, 0))
+        self.assertEqual(counted('Ran 6 tests in 1.0s\n'), (7, 1, 0))  # it ended in between
+        self.assertEqual(counted('Traceback'), (1, 1, 0))
 
     def fuzz(self, coverages, runs):
         """The result of a decoder's fuzzer whose rounds reach these coverages, the last one again and again."""
