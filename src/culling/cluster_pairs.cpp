@@ -25,7 +25,7 @@ double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::
     latest = std::max(latest, firstMeeting(x[d] - y[HI + d], x[8 + d] - y[HI + 8 + d]));
     latest = std::max(latest, firstMeeting(y[d] - x[HI + d], y[8 + d] - x[HI + 8 + d]));
   }
-  return latest;
+  return latest * trees.span.end;
 }
 
 // A time that is not 0 is worth so many bounds; the rest of what is left out when time is up may touch at once.
@@ -65,9 +65,9 @@ double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pair
       scratch.resize(used + 2 * STEP);
       std::size_t consumed = 0;
       const std::size_t found = simd::testGroupPairs(
-          trees.a->level(l).view(), trees.b->level(l).view(), pairs.data() + 2 * done,
-          std::min(count - done, PAIRS_PER_LOOK_AT_THE_CLOCK), trees.self, simd::Diagonal::UPPER_WITH_DIAGONAL,
-          trees.t0_only, scratch.data() + used, STEP, &consumed);
+          trees.viewA(l), trees.viewB(l), pairs.data() + 2 * done, std::min(count - done, PAIRS_PER_LOOK_AT_THE_CLOCK),
+          trees.self, simd::Diagonal::UPPER_WITH_DIAGONAL, trees.span.times != Times::BOTH, scratch.data() + used, STEP,
+          &consumed);
       scratch.resize(used + 2 * found);
       done += consumed;
     }

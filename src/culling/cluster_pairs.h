@@ -15,7 +15,11 @@ struct TreePair {
   const ClusterTree* a = nullptr;
   const ClusterTree* b = nullptr;
   bool self = false;
-  bool t0_only = false;  ///< test the state at t0 instead of the whole step
+  Span span;
+  bool adjacent = false;  ///< both are of one body: features that share a vertex are no pair
+
+  simd::GroupsView viewA(std::size_t level) const { return a->level(level).view(span.times == Times::SWEPT); }
+  simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
 };
 
 /// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads. Of more than max_pairs
@@ -26,7 +30,7 @@ double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pair
                          const std::function<bool()>& is_over = {});
 
 /// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
-/// overlap (to two record units) in all 8 directions at t=0. 1 when they never meet during the step.
+/// overlap (to two record units) in all 8 directions at t=0. The end of the bounds when they never meet until then.
 double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_t b);
 
 /// Streams the surviving slot pairs of superclusters in chunks. One per worker; keeps its buffers.
@@ -43,15 +47,21 @@ class ClusterPairStream {
     std::size_t done = 0;
     while (done < count) {
       std::size_t consumed = 0;
-      const std::size_t clusters = simd::testGroupPairs(
-          trees.a->level(1).view(), trees.b->level(1).view(), pairs + 2 * done, count - done, trees.self,
-          simd::Diagonal::UPPER_WITH_DIAGONAL, trees.t0_only, clusters_.data(), CLUSTER_PAIRS, &consumed);
+      const std::size_t clusters =
+          simd::testGroupPairs(trees.viewA(1), trees.viewB(1), pairs + 2 * done, count - done, trees.self,
+                               simd::Diagonal::UPPER_WITH_DIAGONAL, trees.span.times != Times::BOTH, clusters_.data(),
+                               CLUSTER_PAIRS, &consumed);
       done += consumed;
       std::size_t leaf_done = 0;
       while (leaf_done < clusters) {
-        const std::size_t found = simd::testGroupPairs(
-            trees.a->level(0).view(), trees.b->level(0).view(), clusters_.data() + 2 * leaf_done, clusters - leaf_done,
-            trees.self, simd::Diagonal::STRICT_UPPER, trees.t0_only, slots_.data(), CHUNK, &consumed);
+        const std::uint32_t* from = clusters_.data() + 2 * leaf_done;
+        const bool swept = trees.span.times == Times::SWEPT, one_end = trees.span.times != Times::BOTH;
+        const std::size_t found =
+            trees.adjacent
+                ? simd::testUnsharedPairs(trees.a->leaves(swept), trees.b->leaves(swept), from, clusters - leaf_done,
+                                          trees.self, one_end, slots_.data(), CHUNK, &consumed)
+                : simd::testGroupPairs(trees.viewA(0), trees.viewB(0), from, clusters - leaf_done, trees.self,
+                                       simd::Diagonal::STRICT_UPPER, one_end, slots_.data(), CHUNK, &consumed);
         leaf_done += consumed;
         cluster_pairs_tested_ += consumed;
         if (found && !sink(slots_.data(), found)) return false;

@@ -63,6 +63,13 @@ void ClusterTree::build(std::vector<Index> features, std::size_t arity) {
   features_ = std::move(features);
   features_.resize(std::max(roundUp(feature_count_), GROUP) * arity, NO_INDEX);
   features_.shrink_to_fit();
+  lanes_ = hwy::AllocateAligned<Index>(features_.size());
+  if (!lanes_) throw std::bad_alloc();
+  for (std::size_t slot = 0; slot < features_.size() / arity; ++slot) {
+    for (std::size_t k = 0; k < arity; ++k) {
+      lanes_[(slot / GROUP * arity + k) * GROUP + slot % GROUP] = features_[slot * arity + k];
+    }
+  }
   masked_.clear();
   levels_.clear();
   std::size_t groups = features_.size() / arity / GROUP;
@@ -116,6 +123,13 @@ void ClusterTree::refitUpper() {
   for (std::size_t l = 1; l < levels_.size(); ++l) {
     simd::buildUpper(levels_[l - 1].aos.data(), levels_[l - 1].groups, levels_[l].soa.data(), levels_[l].aos.data());
   }
+}
+
+void ClusterTree::shorten(std::size_t level, std::int32_t end, bool swept, std::size_t first_group,
+                          std::size_t last_group) {
+  Level& of = levels_[level];
+  simd::shortenBounds(of.soa.data() + first_group * simd::SOA_SIZE, of.aos.data() + first_group * simd::AOS_SIZE,
+                      last_group - first_group, end, swept);
 }
 
 }  // namespace dccd

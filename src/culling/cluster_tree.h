@@ -9,7 +9,7 @@
 #include <hwy/aligned_allocator.h>
 
 #include "dccd/types.h"
-#include "simd/cluster_kernels.h"
+#include "simd/group_pairs.h"
 
 namespace dccd {
 
@@ -29,12 +29,24 @@ class AlignedRecords {
   std::size_t capacity_ = 0;
 };
 
+/// Which bounds are tested: those at both ends, the same way round; those at t0 alone; or swept ones.
+enum class Times : std::uint8_t { BOTH, T0, SWEPT };
+
+/// What bounds are about: until when they reach, in the place of t1, and which of them are to be tested.
+struct Span {
+  double end = 1;
+  Times times = Times::BOTH;
+};
+
 class ClusterTree {
  public:
   struct Level {
     std::size_t groups = 0;
     AlignedRecords soa, aos;
-    simd::GroupsView view() const { return {soa.data(), aos.data()}; }
+    /// Without the features' vertices. swept: bounds that shorten() has swept, in the place of those at t0.
+    simd::GroupsView view(bool swept = false) const {
+      return {soa.data() + (swept ? simd::SOA_T1 : 0), aos.data() + (swept ? simd::DIRECTIONS : 0)};
+    }
   };
 
   /// features: vertex indices, `arity` each, in the order given by spatialOrder. Slots are feature positions, filled up
@@ -54,11 +66,20 @@ class ClusterTree {
   void boundLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
                    std::size_t last_group);
   void refitUpper();
+  /// simd::shortenBounds() of the groups of a level.
+  void shorten(std::size_t level, std::int32_t end, bool swept, std::size_t first_group, std::size_t last_group);
 
   std::size_t featureCount() const { return feature_count_; }
   std::size_t arity() const { return arity_; }
   std::size_t height() const { return levels_.size(); }
   const Level& level(std::size_t l) const { return levels_[l]; }
+  /// The leaves, with the features' vertices.
+  simd::GroupsView leaves(bool swept) const {
+    simd::GroupsView view = levels_[0].view(swept);
+    view.vertices = lanes_.get();
+    view.arity = arity_;
+    return view;
+  }
   /// Vertex indices of the feature in a slot; only slots below featureCount() hold one.
   const Index* feature(std::size_t slot) const { return features_.data() + slot * arity_; }
   /// Those of a group's 16 slots as the bounds have them: without what is masked, NO_INDEX in empty ones.
@@ -69,8 +90,9 @@ class ClusterTree {
  private:
   std::size_t feature_count_ = 0;
   std::size_t arity_ = 1;
-  std::vector<Index> features_;  // slots x arity, empty ones NO_INDEX
-  std::vector<Index> masked_;    // the same with left-out ones NO_INDEX; empty when nothing is left out
+  std::vector<Index> features_;               // slots x arity, empty ones NO_INDEX
+  hwy::AlignedFreeUniquePtr<Index[]> lanes_;  // features_ group by group, a vertex of each lane after another
+  std::vector<Index> masked_;                 // the same with left-out ones NO_INDEX; empty when nothing is left out
   std::vector<Level> levels_;
 };
 

@@ -203,6 +203,22 @@ double SceneArrays::separation(std::size_t a, std::size_t b) const {
   return std::max(bodies_[a].setup.minimum_separation_m, bodies_[b].setup.minimum_separation_m);
 }
 
+/// Of a direction in which the scene is small beside its coordinates, a record's roundings are no small part of a unit.
+std::int32_t SceneArrays::endOf(double until) const {
+  for (int d = 0; d < 8; ++d) {
+    if (scale_[d] > 0 && unit(d) == 0) return simd::WHOLE_STEP;
+  }
+  const bool widened =
+      std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& body) { return body.reach_m > 0; });
+  if (widened || uncertain_ || !(until < 1)) return simd::WHOLE_STEP;
+  return std::max(static_cast<std::int32_t>(std::ceil(until * simd::WHOLE_STEP)), 1);
+}
+
+bool SceneArrays::isStill(const SceneBody& body) const {
+  const VertexMotion& first = vertices_[body.internal_begin];
+  return body.usedCount() == 0 || (body.translates && std::equal(first.t0, first.t0 + 3, first.t1));
+}
+
 void SceneArrays::refitBodies() {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     // All three trees: a feature is widened by the largest radius of its vertices, which may lie in another group of

@@ -97,6 +97,26 @@ class SceneArrays {
     refitLeaves(bodies_[b], bodies_[b].trees[static_cast<int>(kind)], true, group, group + 1);
   }
 
+  /// After a refit() with members: its bounds reach from t0 to `until` or a little later. The next refit() makes them
+  /// anew. Does nothing to a scene with separations or radii.
+  template <class Pieces>
+  Span shorten(const Pieces& pieces, double until) {
+    const std::int32_t end = endOf(until);
+    if (end == simd::WHOLE_STEP) return {};
+    const bool swept = end <= SWEPT_AT_MOST;
+    for (SceneBody& body : bodies_) {
+      if (isStill(body)) continue;  // its bounds at t1 are those of any time
+      body.stale = true;
+      for (ClusterTree& tree : body.trees) {
+        for (std::size_t l = 0; l < tree.height(); ++l) {
+          pieces(tree.level(l).groups,
+                 [&](std::size_t first, std::size_t last) { tree.shorten(l, end, swept, first, last); });
+        }
+      }
+    }
+    return {static_cast<double>(end) / simd::WHOLE_STEP, swept ? Times::SWEPT : Times::BOTH};
+  }
+
   /// After a refit() that left pieces out: nothing is kept of it.
   void forgetBounds() { bounds_valid_ = false; }
 
@@ -141,6 +161,9 @@ class SceneArrays {
   void featureVertices(FeatureKind kind, std::size_t body, Index rank, Index* out) const;
 
  private:
+  // Nothing moves far in a short time: swept bounds then say nearly as much as those at two times, for half the work.
+  static constexpr std::int32_t SWEPT_AT_MOST = simd::WHOLE_STEP / 16;
+
   void buildTrees(SceneBody& body, const Positions& rest);
   void makeRoom();
   void setReaches();
@@ -148,6 +171,8 @@ class SceneArrays {
   bool recordRadii(SceneBody& body, const Body& motion);
   void setRange(bool keep);
   void setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const;
+  std::int32_t endOf(double until) const;
+  bool isStill(const SceneBody& body) const;
   void quantize(std::size_t first, std::size_t last);
   void refitLeaves(const SceneBody& body, ClusterTree& tree, bool members, std::size_t first, std::size_t last) const;
   void refitBodies();

@@ -271,15 +271,20 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   context.scene = &scene;
   context.elementary = elementary.get();
   context.earliest_only = options->earliest_only;
+  context.bounds_late = options->earliest_only && !stopsAtFirst();
   context.left_out = &left_out;
   context.observer = observer;
   context.deadline = part.deadline;
   context.per_hit = per_hit;
   result.stats.left_out_listed = left_out_list.size();
   if (options->accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options->accuracy.tolerance_m;
-  findPairs(context);
-  if (carried.memory.isOn()) useMemory(context);
-  runPairs(context);
+  if (stopsAtFirst()) {
+    runUntilFirst(context);
+  } else {
+    findPairs(context, Share::ALL);
+    if (carried.memory.isOn()) useMemory(context);
+    runPairs(context);
+  }
   if (remembers) rememberPairs(context, part);
   hits_done = Clock::now();
   collect(part.step, part.deadline);

@@ -105,16 +105,24 @@ struct History::Impl {
   bool isUnfolded(std::size_t body);
   bool needsTrees(const Part& part) const;
   void rememberApart(bool certain);
-  void addSelfTasks(std::size_t body, const StepContext& context);
-  void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context);
+  /// Which pairs of groups a search is for: all of them, a sample of them, or the rest of it.
+  enum class Share : std::uint8_t { ALL, SAMPLE, REST };
+  void addSelfTasks(std::size_t body, const StepContext& context, Share share);
+  void addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context, Share share);
   void orderByBound(const TreePair& trees);
-  void findPairs(const StepContext& context);
+  void findPairs(const StepContext& context, Share share);
   void runPairs(StepContext& context);
+  void runUntilFirst(StepContext& context);
+  /// Only the first contact is wanted, and what cannot touch before it is not looked at.
+  bool stopsAtFirst() const {
+    return options->earliest_only && options->accuracy.rung == Accuracy::EXACT &&
+           options->broad_phase == BroadPhase::CLUSTERED && !observer;
+  }
   /// Whether certificates may be used or made in this part; what cannot be used is forgotten.
   bool mayRemember(const Part& part);
   void useMemory(StepContext& context);
   void rememberPairs(const StepContext& context, const Part& part);
-  void cutHits();
+  void cutHits(const Span& span);
   /// What may be found in a whole step with these options and bodies; FoundLimit::NONE: no limit.
   std::size_t foundLimit() const;
   /// More was there to be found, by a limit (by_count) or a deadline; nothing of what was left out touches before this.

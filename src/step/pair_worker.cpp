@@ -73,6 +73,13 @@ void PairWorker::begin(StepContext& context, const PairTask& task, std::size_t i
   separated_ms_ = 0;
 }
 
+/// Features of the task, by their slots.
+bool PairWorker::shareVertex(std::size_t i, std::size_t j) const {
+  const ClusterTree &ta = a_->tree(kindA(task_->kind)), &tb = b_->tree(kindB(task_->kind));
+  const Index *va = ta.feature(i), *vb = tb.feature(j);
+  return std::find_first_of(va, va + ta.arity(), vb, vb + tb.arity()) != va + ta.arity();
+}
+
 void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
   begin(context, task, index);
   const Clock::time_point whole = Clock::now();
@@ -83,7 +90,7 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::
   std::size_t n = 0;
   for (std::uint32_t i = 0; i < na && !enough_; ++i) {
     for (std::uint32_t j = same_tree ? i + 1 : 0; j < nb; ++j) {
-      if (!a_->holds(kindA(task.kind), i) || !b_->holds(kindB(task.kind), j)) continue;
+      if (!a_->holds(kindA(task.kind), i) || !b_->holds(kindB(task.kind), j) || shareVertex(i, j)) continue;
       slots[2 * n] = i;
       slots[2 * n + 1] = j;
       if (++n == ClusterPairStream::CHUNK) {
@@ -101,7 +108,7 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
                      const std::vector<std::uint32_t>& pairs) {
   begin(context, task, index);
   const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
-                       task.self && task.kind == PairKind::EDGE_EDGE, false};
+                       task.self && task.kind == PairKind::EDGE_EDGE, context.span, task.self};
   const Clock::time_point whole = Clock::now();
   Clock::time_point start = whole;
   const double contact_m = context.contactDistance(task.body_a, task.body_b);
@@ -162,23 +169,17 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   std::size_t n = count_;
   if (task_->kind == PairKind::EDGE_EDGE) {
     const ClusterTree &ta = a_->tree(FeatureKind::EDGE), &tb = b_->tree(FeatureKind::EDGE);
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
-      const Index *ea = ta.feature(sa), *eb = tb.feature(sb);
-      const bool shared = (ea[0] == eb[0]) | (ea[0] == eb[1]) | (ea[1] == eb[0]) | (ea[1] == eb[1]);
+    for (std::size_t i = 0; i < count; ++i, ++n) {
+      const Index *ea = ta.feature(slots[2 * i]), *eb = tb.feature(slots[2 * i + 1]);
       quads_[n] = {ea[0], ea[1], eb[0], eb[1]};
-      slots_[n] = {sa, sb};
-      n += !shared;
+      slots_[n] = {slots[2 * i], slots[2 * i + 1]};
     }
   } else {
     const ClusterTree &ta = a_->tree(FeatureKind::VERTEX), &tb = b_->tree(FeatureKind::FACE);
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t sa = slots[2 * i], sb = slots[2 * i + 1];
-      const Index v = *ta.feature(sa);
-      const Index* f = tb.feature(sb);
-      quads_[n] = {v, f[0], f[1], f[2]};
-      slots_[n] = {sa, sb};
-      n += !((v == f[0]) | (v == f[1]) | (v == f[2]));
+    for (std::size_t i = 0; i < count; ++i, ++n) {
+      const Index* f = tb.feature(slots[2 * i + 1]);
+      quads_[n] = {*ta.feature(slots[2 * i]), f[0], f[1], f[2]};
+      slots_[n] = {slots[2 * i], slots[2 * i + 1]};
     }
   }
   (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
@@ -202,7 +203,7 @@ void PairWorker::flush() {
   const std::size_t before = hits.size();
   // Which pairs are late depends on which were looked at first: no pair is left out where they are counted.
   const bool counts = context_->found && context_->found->isSet();
-  if (context_->earliest_only && !counts) dropLate();
+  if (context_->bounds_late && !counts) dropLate();
   if (context_->timeIsUp()) {
     keepUndecided();
   } else {
@@ -306,7 +307,7 @@ void PairWorker::keepUndecided() {
   std::size_t out = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const double bound = boundOf(i, separationOf(i));
-    if (bound > 1) continue;
+    if (bound > std::min(context_->not_after, 1.0)) continue;
     countOut(i);
     hits.push_back({keys_[i], bound, 1, bodies, Certainty::UNDECIDED});
     ++out;
@@ -333,7 +334,7 @@ void PairWorker::decide() {
   for (std::size_t i = 0; i < count_; ++i) {
     ElementaryResult& r = results_[i];
     if (context_->observer) context_->observer->onResult(task_->kind, quads_[i], r);
-    if (r.verdict == Verdict::NO_CONTACT) continue;
+    if (r.verdict == Verdict::NO_CONTACT || r.toc_lower > context_->not_after) continue;
     countOut(i);
     const bool certain = r.verdict == Verdict::CONTACT;
     if (!certain) {

@@ -70,6 +70,9 @@ struct StepContext {
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   FoundLimit* found = nullptr;            ///< null: no limit
+  double not_after = 2;                   ///< earliest_only: and contacts that begin later are not listed
+  bool bounds_late = false;               ///< earliest_only: pairs are bounded before they are tested
+  Span span;                              ///< of the bounds
   PairMemory* memory = nullptr;           ///< what its groups say is to be tested; null: all of it
   /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
   std::chrono::nanoseconds per_hit{0};
@@ -104,6 +107,8 @@ class PairWorker {
   void begin(StepContext& context, const PairTask& task, std::size_t index);
   bool goesOn() const { return !enough_ && !context_->timeIsUp(); }
   bool testRemembered(PairMemory::Group& group, const double contact_m, Deadline::Clock::time_point& start);
+  bool shareVertex(std::size_t i, std::size_t j) const;
+  /// Pairs of slots whose features share no vertex.
   void take(const std::uint32_t* slots, std::size_t count);
   void flush();
   void filter();

@@ -12,10 +12,24 @@ namespace {
 
 constexpr std::size_t TASK_SUPERCLUSTERS = 16;            // supercluster pairs in a unit of work: about a millisecond
 constexpr std::chrono::nanoseconds ORDERING_A_PAIR(200);  // its bound, and its share of sorting ten thousand
+constexpr std::size_t PIECE_TO_SHORTEN = 1024;            // groups in a unit of moving their bounds
+constexpr double WORTH_SHORTENING = 0.75;                 // of the step: to move all bounds takes a tenth of a search
+
+/// One pair of groups in 32 is in the sample, whatever the order in which they are found.
+void keepShare(bool sample, std::vector<std::uint32_t>& pairs) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < pairs.size(); i += 2) {
+    const std::uint32_t hash = (pairs[i] * 0x9e3779b1u ^ pairs[i + 1] * 0x85ebca77u) * 0xc2b2ae3du;
+    if ((hash >> 27 == 0) != sample) continue;
+    pairs[kept++] = pairs[i];
+    pairs[kept++] = pairs[i + 1];
+  }
+  pairs.resize(kept);
+}
 
 }  // namespace
 
-void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context) {
+void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context, Share share) {
   const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
   if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
   const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
@@ -24,7 +38,7 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
     tasks.push_back(task);
     return;
   }
-  const TreePair trees{&ta, &tb, same_tree, false};
+  const TreePair trees{&ta, &tb, same_tree, context.span};
   const bool limited = foundLimit() != FoundLimit::NONE;
   const std::size_t room = limited ? MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
   bool late = false;
@@ -33,6 +47,7 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
     return late;
   });
   if (left_out_toc <= 1) leaveOutAt(left_out_toc, !late);
+  if (share != Share::ALL) keepShare(share == Share::SAMPLE, found_groups);
   const auto ordering = ORDERING_A_PAIR * static_cast<std::int64_t>(found_groups.size() / 2);
   late = late || (found_groups.size() / 2 > TASK_SUPERCLUSTERS && context.deadline.movedBy(-ordering).isOver());
   task.by_bound = (limited || context.deadline.canEnd()) && !late;
@@ -111,27 +126,31 @@ void History::Impl::rememberApart(bool certain) {
   }
 }
 
-void History::Impl::addSelfTasks(std::size_t body, const StepContext& context) {
+void History::Impl::addSelfTasks(std::size_t body, const StepContext& context, Share share) {
   const std::uint16_t i = static_cast<std::uint16_t>(body);
-  addTasks(PairKind::VERTEX_FACE, i, i, context);
-  addTasks(PairKind::EDGE_EDGE, i, i, context);
+  addTasks(PairKind::VERTEX_FACE, i, i, context, share);
+  addTasks(PairKind::EDGE_EDGE, i, i, context, share);
 }
 
-void History::Impl::findPairs(const StepContext& context) {
+void History::Impl::findPairs(const StepContext& context, Share share) {
   const Clock::time_point start = Clock::now();
-  const std::size_t used = group_pairs.size();  // by the last step
-  for (auto* buffer : {&group_pairs, &found_groups, &scratch}) {
-    buffer->clear();
-    releaseBurst(*buffer, used);
+  if (share != Share::REST) {
+    const std::size_t used = group_pairs.size();  // by the last step
+    for (auto* buffer : {&group_pairs, &found_groups, &scratch}) {
+      buffer->clear();
+      releaseBurst(*buffer, used);
+    }
+    by_toc.clear();
+    releaseBurst(by_toc, used / 2);
+    releaseBurst(tasks);
+    releaseBurst(task_hits);
   }
-  by_toc.clear();
-  releaseBurst(by_toc, used / 2);
-  releaseBurst(tasks);
-  releaseBurst(task_hits);
+  group_pairs.clear();
   tasks.clear();
+  result.stats.body_pairs = 0;
   const std::size_t n = scene.bodies().size();
   for (std::size_t b = 0; b < n; ++b) {
-    if (self_tested[b]) addSelfTasks(b, context);
+    if (self_tested[b]) addSelfTasks(b, context, share);
   }
   if (n > 1) {
     scene.overlappingBodies(false, body_pairs, scratch);
@@ -140,9 +159,9 @@ void History::Impl::findPairs(const StepContext& context) {
                           b = static_cast<std::uint16_t>(body_pairs[p + 1]);
       if (!meet(scene.bodies()[a].setup, scene.bodies()[b].setup)) continue;
       ++result.stats.body_pairs;
-      addTasks(PairKind::VERTEX_FACE, a, b, context);
-      addTasks(PairKind::VERTEX_FACE, b, a, context);
-      addTasks(PairKind::EDGE_EDGE, a, b, context);
+      addTasks(PairKind::VERTEX_FACE, a, b, context, share);
+      addTasks(PairKind::VERTEX_FACE, b, a, context, share);
+      addTasks(PairKind::EDGE_EDGE, a, b, context, share);
     }
   }
   result.stats[Stage::BROAD_PHASE].ms += msSince(start);
@@ -190,7 +209,7 @@ void History::Impl::findLeftOut(const Step& step) {
   group_pairs.clear();
   found_limit = foundLimit();  // a pair that is not listed keeps its separation
   for (std::size_t b = 0; b < n; ++b) {
-    if (needsReference(b)) addSelfTasks(b, context);
+    if (needsReference(b)) addSelfTasks(b, context, Share::ALL);
   }
   runPairs(context);
   for (std::size_t b = 0; b < n; ++b) {
@@ -263,11 +282,32 @@ void History::Impl::runPairs(StepContext& context) {
     }
   });
   if (context.expired) result.complete = false;
-  cutHits();
+  cutHits(context.span);
+}
+
+/// What only the first contact is asked of: a sample of the pairs says until when the step is to be looked at, and the
+/// bounds of the rest end there. With `exact` the first contacts are those in the cell that ends first, so that none of
+/// them touches after the end of any cell, and what is apart until then is none of them. (A conservative contact may
+/// be one that never touches; what it says is the nearness of features, which bounds do not hold.) A sample that is
+/// cut says nothing: what it found may depend on the threads.
+void History::Impl::runUntilFirst(StepContext& context) {
+  findPairs(context, Share::SAMPLE);
+  runPairs(context);
+  const double until = context.best_toc_upper;
+  if (result.complete) context.not_after = until;
+  if (context.not_after <= WORTH_SHORTENING) {
+    const Clock::time_point start = Clock::now();
+    context.span = scene.shorten(
+        [&](std::size_t groups, const auto& shorten) { parallel(groups, PIECE_TO_SHORTEN, shorten); }, until);
+    result.stats[Stage::BOUNDS].ms += msSince(start);
+  }
+  found_limit -= found_limit == FoundLimit::NONE ? 0 : std::min<std::size_t>(found_limit, context.hits);
+  findPairs(context, Share::REST);
+  runPairs(context);
 }
 
 /// Of what is over the limit all that is known is when the groups can meet.
-void History::Impl::cutHits() {
+void History::Impl::cutHits(const Span& span) {
   std::size_t listed = 0;
   const std::size_t cut = found.cutTask(listed);
   for (std::size_t t = cut; t < tasks.size(); ++t) {
@@ -280,7 +320,7 @@ void History::Impl::cutHits() {
     }
     if (t > cut && task.follows(tasks[t - 1])) continue;
     const TreePair trees{&scene.bodies()[task.body_a].tree(firstKind(task.kind)),
-                         &scene.bodies()[task.body_b].tree(secondKind(task.kind)), task.self, false};
+                         &scene.bodies()[task.body_b].tree(secondKind(task.kind)), task.self, span};
     for (std::size_t p = task.first; p < (task.by_bound ? task.first + 1 : task.last); ++p) {
       leaveOutAt(superclusterTocBound(trees, group_pairs[2 * p], group_pairs[2 * p + 1]), true);
     }

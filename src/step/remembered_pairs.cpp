@@ -18,8 +18,8 @@ constexpr std::size_t FEWEST_GROUPS = 8;                            // pairs of 
 /// `fast` may call apart what meets, and meeting what is apart: it has to see what it would see otherwise. So has who
 /// watches a pair. A step aside is alone, and uncertain vertices have other radii in each step.
 bool History::Impl::mayRemember(const Part& part) {
-  const bool wanted = options->keep_bounds && options->accuracy.rung != Accuracy::FAST && !observer && !aside &&
-                      options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&
+  const bool wanted = options->keep_bounds && !stopsAtFirst() && options->accuracy.rung != Accuracy::FAST &&
+                      !observer && !aside && options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&
                       scene.size() > SMALLEST_SIZE_M && scene.size() < LARGEST_SIZE_M;
   if (!wanted) return false;
   if (carried.memory.state() == PairMemory::State::OFF) return true;

@@ -177,7 +177,8 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
   TreePair trees;
   trees.a = &edges;
   trees.b = &faces;
-  trees.t0_only = true;
+  trees.span.times = Times::T0;
+  trees.adjacent = edge_body == face_body;
   const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : MAX_SUPERCLUSTER_PAIRS;
   cut_ = superclusterPairs(trees, groups_, scratch_, room) <= 1 || cut_;
   // By group of edges, so that all before the one that comes next are done.
@@ -195,7 +196,6 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
     bool late = false;
     stream_.run(trees, by_group_[first].data(), last - first, [&](const std::uint32_t* slots, std::size_t count) {
       for (std::size_t i = 0; i < count; ++i) {
-        if (shareVertex(edges.feature(slots[2 * i]), faces.feature(slots[2 * i + 1]))) continue;
         test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
         const std::uint64_t tested = tested_ - tested_before;
         if (!is_over || tested < TESTS_IN_ANY_CASE || tested % TESTS_PER_LOOK_AT_THE_CLOCK != 0) continue;

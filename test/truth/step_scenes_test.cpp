@@ -13,7 +13,7 @@
 #include "oracle/algebraic.h"
 #include "oracle/query_file.h"
 #include "projection/toc_bound.h"
-#include "simd/cluster_kernels.h"
+#include "simd/group_pairs.h"
 #include "simd/fused_filter.h"
 #include "support/data.h"
 #include "support/patch_oracle.h"

@@ -91,7 +91,7 @@ Count expectComplete(const Scene& scene, FeatureKind kind_a, std::size_t body_a,
   trees.a = &a.tree(kind_a);
   trees.b = &b.tree(kind_b);
   trees.self = trees.a == trees.b;
-  trees.t0_only = t0_only;
+  trees.span.times = t0_only ? Times::T0 : Times::BOTH;
   const std::vector<SlotPair> pairs = streamed(trees);
   std::set<SlotPair> unique;
   for (const SlotPair& p : pairs) {

@@ -1,11 +1,12 @@
 // The records of the clustered broad phase: monotone in the exact projection, on every target that runs.
 #include <gtest/gtest.h>
+#include <hwy/aligned_allocator.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "simd/cluster_kernels.h"
+#include "simd/cluster_bounds.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -153,6 +154,118 @@ TEST(ClusterRecords, WhatLiesOutsideTheRangeTakesItsEnd) {
       }
     }
   });
+}
+
+/// A group of leaves, each a vertex of its own.
+struct VertexLeaves {
+  hwy::AlignedFreeUniquePtr<std::int16_t[]> soa = hwy::AllocateAligned<std::int16_t>(simd::SOA_SIZE),
+                                            aos = hwy::AllocateAligned<std::int16_t>(simd::AOS_SIZE);
+  explicit VertexLeaves(const std::vector<std::int16_t>& records) {
+    std::vector<std::uint32_t> lanes(simd::GROUP, UINT32_MAX);
+    for (std::uint32_t i = 0; i < records.size() / RECORD && i < simd::GROUP; ++i) lanes[i] = i;
+    simd::buildLeaves(records.data(), lanes.data(), 1, simd::GROUP, nullptr, soa.get(), aos.get());
+  }
+  /// The values at the second end: lowest or highest.
+  int at1(std::size_t direction, std::size_t lane, bool highest) const {
+    return soa[(highest ? simd::SOA_SIZE / 2 : 0) + simd::SOA_T1 + simd::soaIndex(direction, lane)];
+  }
+};
+
+/// Sign of p - q at the time end / WHOLE_STEP, for two vertices that move straight.
+int compareMoved(const VertexMotion& p, const VertexMotion& q, std::int32_t end, int d) {
+  static const int TERMS[8][2] = {{0, -1}, {1, -1}, {2, -1}, {0, 1}, {0, 2}, {1, 2}, {0, 1}, {1, 2}};
+  const auto at = [&](const VertexMotion& v, int axis) {
+    return Rational(v.t0[axis]) * Rational(simd::WHOLE_STEP - end) + Rational(v.t1[axis]) * Rational(end);
+  };
+  const auto projection = [&](const VertexMotion& v) {
+    Rational sum = at(v, TERMS[d][0]);
+    if (TERMS[d][1] >= 0) sum += (d < 6 ? 1 : -1) * at(v, TERMS[d][1]);
+    return sum;
+  };
+  const Rational a = projection(p), b = projection(q);
+  return a > b ? 1 : a < b ? -1 : 0;
+}
+
+// The bounds of two vertices in strict order say that the vertices are, at that time; swept, at t0 as well. And they
+// are no wider than they must be.
+TEST(ShortenedBounds, OrderOfBoundsIsOrderOfVertices) {
+  std::size_t ordered = 0, pairs = 0;
+  forEachSimdTarget([&](const std::string& target) {
+    for (std::uint64_t seed = 0; seed < 24; ++seed) {
+      const Draw draw = drawFrom(seed);
+      const std::int32_t end = seed % 3 == 0 ? draw(1, 9) : draw(1, simd::WHOLE_STEP);
+      const bool swept = seed % 2 == 0;
+      const std::vector<VertexMotion> vertices =
+          randomVertices(draw, simd::GROUP, seed % 4 < 2 ? Coordinates::REAL : Coordinates::SMALL_INTEGERS);
+      const Records r = quantized(vertices);
+      VertexLeaves leaves(r.values);
+      simd::shortenBounds(leaves.soa.get(), leaves.aos.get(), 1, end, swept);
+      for (std::size_t d = 0; d < 8; ++d) {
+        int lowest = 32767, highest = -32767;
+        for (std::size_t i = 0; i < simd::GROUP; ++i) {
+          lowest = std::min(lowest, leaves.at1(d, i, false));
+          highest = std::max(highest, leaves.at1(d, i, true));
+          const int q0 = r.values[RECORD * i + d], q1 = r.values[RECORD * i + 8 + d];
+          const double moved = q0 + (q1 - q0) * static_cast<double>(end) / simd::WHOLE_STEP;
+          ASSERT_GE(leaves.at1(d, i, false), (swept ? std::min<double>(q0, moved) : moved) - 2) << target;
+          ASSERT_LE(leaves.at1(d, i, true), (swept ? std::max<double>(q0, moved) : moved) + 2) << target;
+          for (std::size_t j = 0; j < simd::GROUP; ++j) {
+            ++pairs;
+            if (leaves.at1(d, i, false) <= leaves.at1(d, j, true)) continue;
+            ++ordered;
+            ASSERT_EQ(compareMoved(vertices[i], vertices[j], end, static_cast<int>(d)), 1) << target << ' ' << seed;
+            const int order_before = compareExactly(vertices[i].t0, vertices[j].t0, static_cast<int>(d));
+            ASSERT_TRUE(!swept || order_before == 1) << target << ' ' << seed;
+          }
+        }
+        ASSERT_LE(leaves.aos[8 + d], lowest) << "the group's bounds hold those of its members";
+        ASSERT_GE(leaves.aos[RECORD + 8 + d], highest);
+      }
+    }
+  });
+  EXPECT_GT(ordered, pairs / 10);
+}
+
+// A record is truncated after a product that is rounded: a coordinate can lie a little below its record. Vertices are
+// looked for that are in another order than the line between their records says, by less than a rounding.
+TEST(ShortenedBounds, TheUnitThatTheyAreWidenedByHoldsTheRounding) {
+  const std::int32_t end = simd::WHOLE_STEP / 4 * 3;
+  constexpr double RANGE = 13;  // of the scene: its scale is no power of two
+  std::size_t tried = 0;
+  for (int k = 4; k < 40000; k += 3) {
+    // What is at rest has a product that rounds up to k. What moves has one just below 1 and one just below 4/3 (k - 1)
+    // + 1, so that it is just below k after three quarters of its way, but less so: its records say k - 1.
+    const int last = 4 * (k - 1) / 3;
+    const double scale = simd::RECORD_RANGE / 2 / (RANGE / 2);
+    const auto firstAt = [&](int record) {  // the first double whose product is not below the record
+      double x = record / scale;
+      while (x * scale >= record) x = std::nextafter(x, 0);
+      while (x * scale < record) x = std::nextafter(x, RANGE);
+      return x;
+    };
+    VertexMotion rest{}, moving{}, low{}, high{};
+    rest.t0[0] = rest.t1[0] = firstAt(k);
+    moving.t0[0] = std::nextafter(firstAt(1), 0);
+    moving.t1[0] = std::nextafter(firstAt(last + 1), 0);
+    high.t0[0] = high.t1[0] = RANGE;
+    if (compareMoved(moving, rest, end, 0) < 0) continue;
+    ++tried;
+    const Records r = quantized({rest, moving, low, high});
+    ASSERT_EQ(r.scale[0], scale);
+    ASSERT_EQ(r.values[0], k - 32764);
+    ASSERT_EQ(r.values[RECORD], 0 - 32764);
+    ASSERT_EQ(r.values[RECORD + 8], last - 32764);
+    forEachSimdTarget([&](const std::string& target) {
+      for (const bool swept : {false, true}) {
+        VertexLeaves leaves(r.values);
+        simd::shortenBounds(leaves.soa.get(), leaves.aos.get(), 1, end, swept);
+        // One of both may be of a body that is still, whose bounds are not moved.
+        EXPECT_LE(leaves.at1(0, 0, false), leaves.at1(0, 1, true)) << target << ": k = " << k;
+        EXPECT_LE(VertexLeaves(r.values).at1(0, 0, false), leaves.at1(0, 1, true)) << target << ": k = " << k;
+      }
+    });
+  }
+  EXPECT_GT(tried, 10u) << "no vertices of the kind were found";
 }
 
 TEST(ClusterRecords, RecordsAndBoundsAreTheSameOnEveryTarget) {

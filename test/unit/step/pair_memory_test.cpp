@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "simd/cluster_kernels.h"
+#include "simd/group_pairs.h"
 #include "step/history.h"
 #include "support/step_support.h"
 

@@ -1,10 +1,10 @@
-#include "simd/cluster_kernels.h"
+#include "simd/group_pairs.h"
 
 #include <algorithm>
 #include <cstring>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "simd/cluster_kernels.cpp"
+#define HWY_TARGET_INCLUDE "simd/group_pairs.cpp"
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
@@ -17,179 +17,6 @@ namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-// The five sums are rounded once each: monotone in the exact projection.
-HWY_INLINE void project(const double* HWY_RESTRICT x, double* HWY_RESTRICT p) {
-  p[0] = x[0];
-  p[1] = x[1];
-  p[2] = x[2];
-  p[3] = x[0] + x[1];
-  p[4] = x[0] + x[2];
-  p[5] = x[1] + x[2];
-  p[6] = x[0] - x[1];
-  p[7] = x[1] - x[2];
-}
-
-void ProjectionBounds(const double* HWY_RESTRICT vertices, size_t n, double* HWY_RESTRICT min8,
-                      double* HWY_RESTRICT max8) {
-  double lo[8], hi[8], p[8];
-  std::copy(min8, min8 + 8, lo);
-  std::copy(max8, max8 + 8, hi);
-  for (size_t i = 0; i < 2 * n; ++i) {
-    project(vertices + 4 * i, p);
-    for (int d = 0; d < 8; ++d) {
-      lo[d] = p[d] < lo[d] ? p[d] : lo[d];
-      hi[d] = p[d] > hi[d] ? p[d] : hi[d];
-    }
-  }
-  std::copy(lo, lo + 8, min8);
-  std::copy(hi, hi + 8, max8);
-}
-
-void Quantize(const double* HWY_RESTRICT vertices, size_t n, const double* HWY_RESTRICT low8,
-              const double* HWY_RESTRICT scale8, int16_t* HWY_RESTRICT records) {
-  const hn::CappedTag<double, 8> dd;
-  const hn::Rebind<int32_t, decltype(dd)> di;
-  HWY_ALIGN double p[8];
-  HWY_ALIGN int32_t q[8];
-  for (size_t i = 0; i < 2 * n; ++i) {
-    project(vertices + 4 * i, p);
-    for (size_t d = 0; d < 8; d += hn::Lanes(dd)) {
-      const auto value = hn::Mul(hn::Sub(hn::Load(dd, p + d), hn::LoadU(dd, low8 + d)), hn::LoadU(dd, scale8 + d));
-      // A sum that overflowed meets a scale of 0 only; the direction then says nothing about any vertex. What lies
-      // outside the range (a body without any active vertex) takes its end, which keeps the order, too.
-      const auto number = hn::IfThenElseZero(hn::Eq(value, value), value);
-      hn::Store(hn::DemoteTo(di, hn::Clamp(number, hn::Zero(dd), hn::Set(dd, RECORD_RANGE))), di, q + d);
-    }
-    for (int d = 0; d < 8; ++d) records[8 * i + d] = static_cast<int16_t>(q[d] - 32764);
-  }
-}
-
-// rows: 16 rows of 16 values. A lane's two neighbouring directions stay side by side (soaIndex()).
-HWY_INLINE void transposePairs(const int16_t* HWY_RESTRICT rows, int16_t* HWY_RESTRICT out) {
-#if HWY_TARGET == HWY_SCALAR
-  for (size_t i = 0; i < GROUP; ++i)
-    for (size_t k = 0; k < RECORD; ++k) out[soaIndex(k, i)] = rows[i * RECORD + k];
-#else
-  const hn::FixedTag<int16_t, 8> d;
-  const hn::RepartitionToWide<decltype(d)> d32;
-  const hn::RepartitionToWide<decltype(d32)> d64;
-  const auto wide = [&](hn::Vec<decltype(d32)> v) { return hn::BitCast(d64, v); };
-  for (size_t r = 0; r < GROUP; r += 4) {
-    for (size_t k = 0; k < RECORD; k += 8) {
-      const auto row = [&](size_t i) { return hn::BitCast(d32, hn::Load(d, rows + (r + i) * RECORD + k)); };
-      const auto lower01 = wide(hn::InterleaveLower(d32, row(0), row(1)));
-      const auto upper01 = wide(hn::InterleaveUpper(d32, row(0), row(1)));
-      const auto lower23 = wide(hn::InterleaveLower(d32, row(2), row(3)));
-      const auto upper23 = wide(hn::InterleaveUpper(d32, row(2), row(3)));
-      hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, lower01, lower23)), d, out + soaIndex(k, r));
-      hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, lower01, lower23)), d, out + soaIndex(k + 2, r));
-      hn::StoreU(hn::BitCast(d, hn::InterleaveLower(d64, upper01, upper23)), d, out + soaIndex(k + 4, r));
-      hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(d64, upper01, upper23)), d, out + soaIndex(k + 6, r));
-    }
-  }
-#endif
-}
-
-using D16 = hn::CappedTag<int16_t, 16>;
-
-// lo and hi: 16 rows of 16 values each.
-HWY_INLINE void finishGroup(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, int16_t* HWY_RESTRICT soa,
-                            int16_t* HWY_RESTRICT aos) {
-  const D16 d;
-  for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
-    auto small = hn::Load(d, lo + k);
-    auto large = hn::Load(d, hi + k);
-    for (size_t i = 1; i < GROUP; ++i) {
-      small = hn::Min(small, hn::Load(d, lo + i * RECORD + k));
-      large = hn::Max(large, hn::Load(d, hi + i * RECORD + k));
-    }
-    hn::StoreU(small, d, aos + k);
-    hn::StoreU(large, d, aos + RECORD + k);
-  }
-  transposePairs(lo, soa);
-  transposePairs(hi, soa + RECORD * GROUP);
-}
-
-// Smallest and largest values k of a feature, widened by the margins; of an empty lane the empty values.
-template <class D, class V>
-HWY_INLINE void boundFeature(D d, const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT f, size_t arity,
-                             const int16_t* HWY_RESTRICT margin16, size_t k, V& small, V& large) {
-  small = hn::Set(d, EMPTY_LO);
-  large = hn::Set(d, EMPTY_HI);
-  if (f[0] == UINT32_MAX) return;
-  small = large = hn::LoadU(d, records + RECORD * size_t{f[0]} + k);
-  for (size_t j = 1; j < arity; ++j) {
-    const auto r = hn::LoadU(d, records + RECORD * size_t{f[j]} + k);
-    small = hn::Min(small, r);
-    large = hn::Max(large, r);
-  }
-  if (!margin16) return;
-  // Saturation at the empty values would hide a feature; the record range leaves room on both sides. What ends there
-  // reaches every record, which all lie within; but a margin of half the range reaches no end from the other one, so
-  // that what is cut off at UNBOUNDED goes there outright.
-  const auto m = hn::LoadU(d, margin16 + k);
-  const auto lowest = hn::Set(d, int16_t{-32766}), highest = hn::Set(d, int16_t{32766});
-  const auto unbounded = hn::Eq(m, hn::Set(d, UNBOUNDED));
-  small = hn::IfThenElse(unbounded, lowest, hn::Max(hn::SaturatedSub(small, m), lowest));
-  large = hn::IfThenElse(unbounded, highest, hn::Min(hn::SaturatedAdd(large, m), highest));
-}
-
-void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
-                 const int16_t* HWY_RESTRICT margin16, int16_t* HWY_RESTRICT soa, int16_t* HWY_RESTRICT aos) {
-  const D16 d;
-  HWY_ALIGN int16_t lo[GROUP * RECORD];
-  HWY_ALIGN int16_t hi[GROUP * RECORD];
-  for (size_t g = 0; g < count / GROUP; ++g) {
-    for (size_t i = 0; i < GROUP; ++i) {
-      for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
-        hn::Vec<D16> small, large;
-        boundFeature(d, records, indices + (g * GROUP + i) * arity, arity, margin16, k, small, large);
-        hn::Store(small, d, lo + i * RECORD + k);
-        hn::Store(large, d, hi + i * RECORD + k);
-      }
-    }
-    finishGroup(lo, hi, soa + g * SOA_SIZE, aos + g * AOS_SIZE);
-  }
-}
-
-void BoundLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
-                 const int16_t* HWY_RESTRICT margin16, int16_t* HWY_RESTRICT aos) {
-  const D16 d;
-  for (size_t g = 0; g < count / GROUP; ++g) {
-    for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
-      auto lowest = hn::Set(d, EMPTY_LO);
-      auto highest = hn::Set(d, EMPTY_HI);
-      for (size_t i = 0; i < GROUP; ++i) {
-        hn::Vec<D16> small, large;
-        boundFeature(d, records, indices + (g * GROUP + i) * arity, arity, margin16, k, small, large);
-        lowest = hn::Min(lowest, small);
-        highest = hn::Max(highest, large);
-      }
-      hn::StoreU(lowest, d, aos + g * AOS_SIZE + k);
-      hn::StoreU(highest, d, aos + g * AOS_SIZE + RECORD + k);
-    }
-  }
-}
-
-void BuildUpper(const int16_t* HWY_RESTRICT child_aos, size_t child_count, int16_t* HWY_RESTRICT soa,
-                int16_t* HWY_RESTRICT aos) {
-  HWY_ALIGN int16_t lo[GROUP * RECORD];
-  HWY_ALIGN int16_t hi[GROUP * RECORD];
-  for (size_t g = 0; g * GROUP < child_count; ++g) {
-    for (size_t i = 0; i < GROUP; ++i) {
-      const size_t c = g * GROUP + i;
-      if (c < child_count) {
-        std::memcpy(lo + i * RECORD, child_aos + c * AOS_SIZE, RECORD * sizeof(int16_t));
-        std::memcpy(hi + i * RECORD, child_aos + c * AOS_SIZE + RECORD, RECORD * sizeof(int16_t));
-      } else {
-        std::fill_n(lo + i * RECORD, RECORD, EMPTY_LO);
-        std::fill_n(hi + i * RECORD, RECORD, EMPTY_HI);
-      }
-    }
-    finishGroup(lo, hi, soa + g * SOA_SIZE, aos + g * AOS_SIZE);
-  }
-}
 
 template <class D, class M>
 HWY_INLINE uint32_t bitsOf(D d, M mask) {
@@ -228,7 +55,7 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
                             const int16_t* HWY_RESTRICT lanes) {
   const hn::CappedTag<int16_t, 2 * GROUP> d;
   const hn::RepartitionToWide<decltype(d)> d32;
-  constexpr size_t HALF = RECORD * GROUP, AT_T1 = DIRECTIONS * GROUP;
+  constexpr size_t HALF = RECORD * GROUP;
   const auto both = [&](const int16_t* HWY_RESTRICT two) {
     int32_t pair;
     std::memcpy(&pair, two, sizeof pair);
@@ -242,8 +69,8 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
       auto above = hn::Gt(both(lo + k * stride), hn::Load(d, largest));
       auto below = hn::Gt(hn::Load(d, smallest), both(hi + k * stride));
       if (!T0_ONLY) {
-        above = hn::And(above, hn::Gt(both(lo + (DIRECTIONS + k) * stride), hn::Load(d, largest + AT_T1)));
-        below = hn::And(below, hn::Gt(hn::Load(d, smallest + AT_T1), both(hi + (DIRECTIONS + k) * stride)));
+        above = hn::And(above, hn::Gt(both(lo + (DIRECTIONS + k) * stride), hn::Load(d, largest + SOA_T1)));
+        below = hn::And(below, hn::Gt(hn::Load(d, smallest + SOA_T1), both(hi + (DIRECTIONS + k) * stride)));
       }
       return hn::Or(above, below);
     };
@@ -282,11 +109,61 @@ HWY_INLINE uint32_t* writePairs(uint32_t node, uint32_t base, uint32_t mask, boo
 #endif
 }
 
-// The surviving lanes of one pair of groups, less those in `shared` where it is given: to o, which is returned moved
-// on.
-template <bool T0_ONLY>
+// What of the surviving lanes of a pair of groups is left out. before(): of the lanes j of the other group, what is
+// known of node i without a test; after(): of those that are left. by_rows: i is of the first group.
+struct LeaveNoneOut {
+  HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
+  HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }
+};
+
+// By a mask for each node of the first group.
+struct LeaveMasksOut {
+  const uint16_t* HWY_RESTRICT masks;
+  HWY_INLINE uint32_t before(bool by_rows, uint32_t i, uint32_t mask) const {
+    return by_rows ? mask & ~uint32_t{masks[i]} : mask;
+  }
+  HWY_INLINE uint32_t after(bool by_rows, uint32_t i, uint32_t mask) const {
+    for (uint32_t rest = by_rows ? 0 : mask; rest; rest &= rest - 1) {
+      const auto j = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+      mask &= ~(static_cast<uint32_t>(masks[j] >> i & 1) << j);
+    }
+    return mask;
+  }
+};
+
+// Features of A and B vertices that share one: their vertices lane by lane.
+template <size_t A, size_t B>
+struct LeaveAdjacentOut {
+  const uint32_t* HWY_RESTRICT a;
+  const uint32_t* HWY_RESTRICT b;
+  HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
+  HWY_INLINE uint32_t after(bool by_rows, uint32_t i, uint32_t mask) const {
+    if (mask == 0) return 0;
+    return mask & ~(by_rows ? sharing<A, B>(a, i, b) : sharing<B, A>(b, i, a));
+  }
+
+ private:
+  template <size_t ONE, size_t OTHER>
+  static HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const uint32_t* HWY_RESTRICT other) {
+    const hn::CappedTag<uint32_t, GROUP> d;
+    uint32_t bits = 0;
+    for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
+      auto same = hn::Eq(hn::Set(d, one[i]), hn::Load(d, other + part));
+      for (size_t x = 0; x < ONE; ++x) {
+        for (size_t y = x == 0 ? 1 : 0; y < OTHER; ++y) {
+          same = hn::Or(same, hn::Eq(hn::Set(d, one[x * GROUP + i]), hn::Load(d, other + y * GROUP + part)));
+        }
+      }
+      bits |= bitsOf(d, same) << part;
+    }
+    return bits;
+  }
+};
+
+// The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
+template <bool T0_ONLY, class LeaveOut>
 HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
-                              Diagonal diagonal, const uint16_t* HWY_RESTRICT shared, uint32_t* HWY_RESTRICT o) {
+                              Diagonal diagonal, const LeaveOut& leave_out, uint32_t* HWY_RESTRICT o) {
   const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
   const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
   const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
@@ -308,48 +185,62 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     uint32_t mask = inner_mask;
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
-    if (shared && by_rows) mask &= ~uint32_t{shared[i]};
+    mask = leave_out.before(by_rows, i, mask);
     if (mask == 0) continue;
     mask &= meeting<T0_ONLY>(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i), GROUP, inner);
-    if (shared && !by_rows) {
-      for (uint32_t rest = mask; rest; rest &= rest - 1) {
-        const auto j = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-        mask &= ~(static_cast<uint32_t>(shared[j] >> i & 1) << j);
-      }
-    }
+    mask = leave_out.after(by_rows, i, mask);
     if (mask) o = writePairs(base_outer + i, base_inner, mask, by_rows, o);
   }
   return o;
 }
 
-template <bool T0_ONLY>
-size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* HWY_RESTRICT group_pairs, size_t count,
-                      bool self, Diagonal diagonal, uint32_t* HWY_RESTRICT out, size_t capacity, size_t* consumed) {
+HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
+  const int16_t* next = view.soa + size_t{group} * SOA_SIZE;
+  for (size_t line = 0; line < SOA_SIZE; line += 128) hwy::Prefetch(next + line);
+}
+
+// leaveOut(g, h): of a pair of groups.
+template <bool T0_ONLY, class LeaveOutOf>
+HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint32_t* HWY_RESTRICT group_pairs,
+                            size_t count, bool self, Diagonal diagonal, const LeaveOutOf& leaveOutOf,
+                            uint32_t* HWY_RESTRICT out, size_t capacity, size_t* consumed) {
   uint32_t* o = out;
   size_t p = 0;
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
     if (p + 1 < count) {
-      const int16_t* next_a = a.soa + size_t{group_pairs[2 * p + 2]} * SOA_SIZE;
-      const int16_t* next_b = b.soa + size_t{group_pairs[2 * p + 3]} * SOA_SIZE;
-      for (size_t line = 0; line < SOA_SIZE; line += 128) {
-        hwy::Prefetch(next_a + line);
-        hwy::Prefetch(next_b + line);
-      }
+      prefetch(a, group_pairs[2 * p + 2]);
+      prefetch(b, group_pairs[2 * p + 3]);
     }
-    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, nullptr, o);
+    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, leaveOutOf(g, h), o);
   }
   *consumed = p;
   return static_cast<size_t>(o - out) / 2;
 }
 
-size_t TestGroupPairsBoth(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count,
-                          bool self, Diagonal diagonal, uint32_t* out, size_t capacity, size_t* consumed) {
-  return TestGroupPairs<false>(a, b, group_pairs, count, self, diagonal, out, capacity, consumed);
+size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
+                      Diagonal diagonal, bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
+  const auto none = [](uint32_t, uint32_t) { return LeaveNoneOut(); };
+  return t0_only ? testPairs<true>(a, b, group_pairs, count, self, diagonal, none, out, capacity, consumed)
+                 : testPairs<false>(a, b, group_pairs, count, self, diagonal, none, out, capacity, consumed);
 }
-size_t TestGroupPairsT0(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
-                        Diagonal diagonal, uint32_t* out, size_t capacity, size_t* consumed) {
-  return TestGroupPairs<true>(a, b, group_pairs, count, self, diagonal, out, capacity, consumed);
+
+template <size_t A, size_t B>
+HWY_INLINE size_t testApartPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count,
+                                 bool self, bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
+  const auto adjacent = [&](uint32_t g, uint32_t h) {
+    return LeaveAdjacentOut<A, B>{a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP};
+  };
+  constexpr auto UPPER = Diagonal::STRICT_UPPER;
+  return t0_only ? testPairs<true>(a, b, group_pairs, count, self, UPPER, adjacent, out, capacity, consumed)
+                 : testPairs<false>(a, b, group_pairs, count, self, UPPER, adjacent, out, capacity, consumed);
+}
+
+size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
+                         bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
+  if (a.arity == 1) return testApartPairs<1, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+  if (b.arity == 3) return testApartPairs<2, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+  return testApartPairs<2, 2>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
 }
 
 bool SharedVertices(const uint32_t* HWY_RESTRICT fa, size_t a_arity, const uint32_t* HWY_RESTRICT fb, size_t b_arity,
@@ -382,7 +273,7 @@ bool SharedVertices(const uint32_t* HWY_RESTRICT fa, size_t a_arity, const uint3
 
 size_t TestLeafPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool self, const uint16_t* shared,
                     uint32_t* out) {
-  const uint32_t* end = testPair<false>(a, b, g, h, self && g == h, Diagonal::STRICT_UPPER, shared, out);
+  const uint32_t* end = testPair<false>(a, b, g, h, self && g == h, Diagonal::STRICT_UPPER, LeaveMasksOut{shared}, out);
   return static_cast<size_t>(end - out) / 2;
 }
 
@@ -473,41 +364,23 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace dccd {
 namespace simd {
-HWY_EXPORT(ProjectionBounds);
-HWY_EXPORT(Quantize);
-HWY_EXPORT(BuildLeaves);
-HWY_EXPORT(BoundLeaves);
-HWY_EXPORT(BuildUpper);
-HWY_EXPORT(TestGroupPairsBoth);
-HWY_EXPORT(TestGroupPairsT0);
+HWY_EXPORT(TestGroupPairs);
+HWY_EXPORT(TestUnsharedPairs);
 HWY_EXPORT(SharedVertices);
 HWY_EXPORT(TestLeafPair);
 HWY_EXPORT(GapAtEnd);
 
-void projectionBounds(const double* vertices, std::size_t n, double* min8, double* max8) {
-  HWY_DYNAMIC_DISPATCH(ProjectionBounds)(vertices, n, min8, max8);
-}
-void quantize(const double* vertices, std::size_t n, const double* low8, const double* scale8, std::int16_t* records) {
-  HWY_DYNAMIC_DISPATCH(Quantize)(vertices, n, low8, scale8, records);
-}
-void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
-                 const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos) {
-  HWY_DYNAMIC_DISPATCH(BuildLeaves)(records, indices, arity, count, margin16, soa, aos);
-}
-void boundLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
-                 const std::int16_t* margin16, std::int16_t* aos) {
-  HWY_DYNAMIC_DISPATCH(BoundLeaves)(records, indices, arity, count, margin16, aos);
-}
-void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos) {
-  HWY_DYNAMIC_DISPATCH(BuildUpper)(child_aos, child_count, soa, aos);
-}
 std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                            std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
                            std::size_t capacity, std::size_t* consumed) {
-  return t0_only
-             ? HWY_DYNAMIC_DISPATCH(TestGroupPairsT0)(a, b, group_pairs, count, self, diagonal, out, capacity, consumed)
-             : HWY_DYNAMIC_DISPATCH(TestGroupPairsBoth)(a, b, group_pairs, count, self, diagonal, out, capacity,
-                                                        consumed);
+  return HWY_DYNAMIC_DISPATCH(TestGroupPairs)(a, b, group_pairs, count, self, diagonal, t0_only, out, capacity,
+                                              consumed);
+}
+
+std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
+                              std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
+                              std::size_t* consumed) {
+  return HWY_DYNAMIC_DISPATCH(TestUnsharedPairs)(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
 }
 
 bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,

@@ -1,4 +1,5 @@
-// Kernels of the clustered broad phase over raw arrays (doc/algorithm.md, "Linear filter").
+// Records of vertices and bounds of groups of nodes, over raw arrays (doc/algorithm.md, "Linear filter"). group_pairs.h
+// tests pairs of them.
 //
 // Every vertex has a record of 16 int16: its projections onto the 8 directions at t0, then at t1. Sixteen nodes
 // (features, or groups of the level below) form a group, stored as structure of arrays:
@@ -32,6 +33,8 @@ constexpr std::int16_t EMPTY_HI = -32767;  ///< smaller than any record value
 constexpr std::int16_t UNBOUNDED = 32767;  ///< as a margin: as far as the records go, on both sides
 constexpr double RECORD_RANGE = 65528.0;   ///< record values lie in [-32764, 32764]
 
+constexpr std::size_t SOA_T1 = 128;  ///< where the values at t1 begin in a half of a soa
+
 /// Where value k (< RECORD) of a lane stands in its half of a group's soa.
 constexpr std::size_t soaIndex(std::size_t k, std::size_t lane) { return (k / 2 * GROUP + lane) * 2 + k % 2; }
 
@@ -56,43 +59,17 @@ void boundLeaves(const std::int16_t* records, const std::uint32_t* indices, std:
 /// Groups of the level above: child_aos holds child_count bounds; groups are filled up with empty lanes.
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos);
 
-/// One level of a tree for testGroupPairs.
-struct GroupsView {
-  const std::int16_t* soa;
-  const std::int16_t* aos;
-};
+constexpr std::int32_t WHOLE_STEP = 1 << 15;  ///< the time t1 for shortenBounds()
 
-/// Which (lane i, lane j) to report for a pair of a group with itself.
-enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UPPER = 2 };
-
-/// Linear filter between the nodes of each group pair (a[2p], b[2p+1]). Writes the surviving node pairs as
-/// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs), stops before it could overflow.
-/// diagonal applies to pairs with equal indices when self is true. times: 2 tests t0 and t1, 1 tests t0 alone.
-/// Returns the number of pairs written; *consumed is the number of group pairs done.
-std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
-                           std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
-                           std::size_t capacity, std::size_t* consumed);
-
-/// Which lanes of two groups share a vertex: bit j of shared[i] says that feature i of a and feature j of b do. Empty
-/// lanes share none. indices_a, indices_b: 16 features of a_arity and b_arity vertices each, UINT32_MAX in empty ones.
-/// Returns whether any do.
-bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,
-                    std::size_t b_arity, std::uint16_t* shared);
-
-/// testGroupPairs() for one pair of leaf groups (g, h), STRICT_UPPER, both times, without the lanes in `shared`, which
-/// may be null: what it writes is what that would write, in that order, less those. out has room for 256 pairs.
-std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
-                         const std::uint16_t* shared, std::uint32_t* out);
-
-/// How far the features of two leaf groups are apart at t1, in any of the directions, of which `weights` says how much
-/// a record unit counts, in 2^-16 of a common unit. Rounded down; EMPTY_LO where there is no pair. Pairs in `shared`
-/// (may be null) do not count, nor do those (i, j) that are listed in `near`: those less than `target` apart, as i * 16
-/// + j, up to `room`; *found says how many there are. self: each pair once, and none with itself. In proof: a gap of n
-/// record units between two numbers truncated to a unit is one of more than n - 1 of the projections, and the
-/// directions' lengths and the rounding are the weights' affair.
-std::int16_t gapAtEnd(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
-                      const std::uint16_t* shared, const std::uint16_t* weights, std::int16_t target,
-                      std::uint8_t* near, std::size_t room, std::size_t* found);
+/// Puts the time `end` (1 to WHOLE_STEP, in 2^-15 of the step) in the place of t1 in the bounds of `groups` groups, so
+/// that they tell what is apart from t0 to there; or, swept, what holds a node all the way to it. Not for bounds with a
+/// margin: what is cut off at the records' range moves on no line. In proof: a value q at t0 and q' at t1 says that the
+/// scaled projection lies in [q, q + 1) and [q', q' + 1), but for its roundings, which the caller knows to be below
+/// 2^-10. It moves on a line, so at the time s it lies in (1-s) q + s q' + [0, 1); the smallest of a node's vertices is
+/// above the line of the smallest values, the largest below that of the largest. Smallest values are rounded down and
+/// largest up, and each goes one further: two nodes in strict order are then apart by more than those roundings,
+/// whether the bounds of one or of both were moved.
+void shortenBounds(std::int16_t* soa, std::int16_t* aos, std::size_t groups, std::int32_t end, bool swept);
 
 }  // namespace simd
 }  // namespace dccd

@@ -1,5 +1,5 @@
 // The kernels of the clustered broad phase against plain references written here, on every target that runs.
-#include "simd/cluster_kernels.h"
+#include "simd/group_pairs.h"
 
 #include <gtest/gtest.h>
 #include <hwy/aligned_allocator.h>
@@ -149,7 +149,7 @@ std::vector<std::uint32_t> allGroupPairs(std::size_t na, std::size_t nb, bool up
   return pairs;
 }
 
-TEST(ClusterKernels, MoreThanOneTargetRuns) {
+TEST(GroupPairs, MoreThanOneTargetRuns) {
   std::vector<std::string> names;
   forEachSimdTarget([&](const std::string& name) { names.push_back(name); });
   for (const std::string& name : names) std::cout << "SIMD target: " << name << '\n';
@@ -158,7 +158,7 @@ TEST(ClusterKernels, MoreThanOneTargetRuns) {
   EXPECT_EQ(std::unique(names.begin(), names.end()), names.end());
 }
 
-TEST(ClusterKernels, PairsOfTwoTreesAreThoseOfTheDefinition) {
+TEST(GroupPairs, PairsOfTwoTreesAreThoseOfTheDefinition) {
   forEachSimdTarget([](const std::string& target) {
     Random random(7);
     std::size_t kept = 0, all = 0;
@@ -182,7 +182,7 @@ TEST(ClusterKernels, PairsOfTwoTreesAreThoseOfTheDefinition) {
   });
 }
 
-TEST(ClusterKernels, EachPairOfATreeWithItselfOnce) {
+TEST(GroupPairs, EachPairOfATreeWithItselfOnce) {
   forEachSimdTarget([](const std::string& target) {
     Random random(11);
     for (int round = 0; round < 40; ++round) {
@@ -198,7 +198,7 @@ TEST(ClusterKernels, EachPairOfATreeWithItselfOnce) {
   });
 }
 
-TEST(ClusterKernels, EveryTargetGivesTheSameOrder) {
+TEST(GroupPairs, EveryTargetGivesTheSameOrder) {
   Random random(13);
   const Groups a = randomGroups(random, 6, 60, 50), b = randomGroups(random, 6, 60, 50);
   const auto groups = allGroupPairs(a.count, b.count, false);
@@ -210,7 +210,7 @@ TEST(ClusterKernels, EveryTargetGivesTheSameOrder) {
 
 // One node against one node, everything overlapping but one direction: apart only where strictly beyond, at both times
 // and on the same side, with values up to the ends of their range (where a difference would wrap around).
-TEST(ClusterKernels, StrictAndOneUnitEitherSide) {
+TEST(GroupPairs, StrictAndOneUnitEitherSide) {
   forEachSimdTarget([](const std::string& target) {
     for (std::size_t d = 0; d < 8; ++d) {
       for (const int at : {-32764, -32763, 0, 32762, 32763}) {
@@ -247,7 +247,7 @@ TEST(ClusterKernels, StrictAndOneUnitEitherSide) {
 }
 
 // Two that pass each other are beyond each other at both times, on different sides: they may meet.
-TEST(ClusterKernels, PassingEachOtherIsKept) {
+TEST(GroupPairs, PassingEachOtherIsKept) {
   Node a, b;
   a.lo.fill(0);
   a.hi.fill(1);
@@ -271,7 +271,7 @@ TEST(ClusterKernels, PassingEachOtherIsKept) {
 
 // --- groups ----------------------------------------------------------------------------------------------------------
 
-TEST(ClusterKernels, LeavesHoldTheBoundsOfTheirVertices) {
+TEST(GroupPairs, LeavesHoldTheBoundsOfTheirVertices) {
   forEachSimdTarget([](const std::string& target) {
     Random random(17);
     for (std::size_t arity = 1; arity <= 3; ++arity) {
@@ -317,7 +317,7 @@ TEST(ClusterKernels, LeavesHoldTheBoundsOfTheirVertices) {
   });
 }
 
-TEST(ClusterKernels, UpperGroupsHoldTheBoundsOfTheirChildren) {
+TEST(GroupPairs, UpperGroupsHoldTheBoundsOfTheirChildren) {
   forEachSimdTarget([](const std::string& target) {
     Random random(19);
     for (std::size_t children = 1; children <= 40; ++children) {
@@ -344,7 +344,7 @@ TEST(ClusterKernels, UpperGroupsHoldTheBoundsOfTheirChildren) {
 }
 
 // A margin that reaches the ends of the range must not make a feature look empty, or two overlapping ones apart.
-TEST(ClusterKernels, WidenedNodesStillMeetWhatTheyTouch) {
+TEST(GroupPairs, WidenedNodesStillMeetWhatTheyTouch) {
   forEachSimdTarget([](const std::string& target) {
     std::vector<std::int16_t> records(2 * RECORD, 32764);
     std::fill_n(records.begin(), RECORD, static_cast<std::int16_t>(-32764));

@@ -1,0 +1,56 @@
+// Kernels of the clustered broad phase that test pairs of groups of nodes (cluster_bounds.h).
+#pragma once
+
+#include "simd/cluster_bounds.h"
+
+namespace dccd {
+namespace simd {
+
+/// One level of a tree for testGroupPairs.
+struct GroupsView {
+  const std::int16_t* soa;
+  const std::int16_t* aos;
+  const std::uint32_t* vertices = nullptr;  ///< of leaves: lane j's k-th at [(group * arity + k) * GROUP + j], aligned
+  std::size_t arity = 0;
+};
+
+/// Which (lane i, lane j) to report for a pair of a group with itself.
+enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UPPER = 2 };
+
+/// Linear filter between the nodes of each group pair (a[2p], b[2p+1]). Writes the surviving node pairs as
+/// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs), stops before it could overflow.
+/// diagonal applies to pairs with equal indices when self is true. times: 2 tests t0 and t1, 1 tests t0 alone.
+/// Returns the number of pairs written; *consumed is the number of group pairs done.
+std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
+                           std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
+                           std::size_t capacity, std::size_t* consumed);
+
+/// testGroupPairs() for leaves with vertices, STRICT_UPPER, without the pairs that share one; both trees are of the
+/// same body, and their features have 1 and 3, 2 and 2, or 2 and 3 vertices.
+std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
+                              std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
+                              std::size_t* consumed);
+
+/// Which lanes of two groups share a vertex: bit j of shared[i] says that feature i of a and feature j of b do. Empty
+/// lanes share none. indices_a, indices_b: 16 features of a_arity and b_arity vertices each, UINT32_MAX in empty ones.
+/// Returns whether any do.
+bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,
+                    std::size_t b_arity, std::uint16_t* shared);
+
+/// testGroupPairs() for one pair of leaf groups (g, h), STRICT_UPPER, both times, without the lanes in `shared`:
+/// what it writes is what that would write, in that order, less those. out has room for 256 pairs.
+std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
+                         const std::uint16_t* shared, std::uint32_t* out);
+
+/// How far the features of two leaf groups are apart at t1, in any of the directions, of which `weights` says how much
+/// a record unit counts, in 2^-16 of a common unit. Rounded down; EMPTY_LO where there is no pair. Pairs in `shared`
+/// (may be null) do not count, nor do those (i, j) that are listed in `near`: those less than `target` apart, as i * 16
+/// + j, up to `room`; *found says how many there are. self: each pair once, and none with itself. In proof: a gap of n
+/// record units between two numbers truncated to a unit is one of more than n - 1 of the projections, and the
+/// directions' lengths and the rounding are the weights' affair.
+std::int16_t gapAtEnd(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
+                      const std::uint16_t* shared, const std::uint16_t* weights, std::int16_t target,
+                      std::uint8_t* near, std::size_t room, std::size_t* found);
+
+}  // namespace simd
+}  // namespace dccd
