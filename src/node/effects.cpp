@@ -30,6 +30,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   scene_.map_named = config.octomap_topic_named;
   scene_.map_seen = !config.octomap_file.empty();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
+  scene_.earliest_only = config.monitor.detector.earliest_only;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
   plan_ = EffectPlan(scene_, settings_);
 }

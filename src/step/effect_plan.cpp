@@ -142,7 +142,10 @@ Finding lookAhead(const EffectScene& scene) {
   return {true, true, "predictions reach " + metres(scene.look_ahead_s) + " s ahead"};
 }
 
-Finding patches(const EffectScene&) { return {true, true, "contacts that belong together are told as one"}; }
+Finding patches(const EffectScene& scene) {
+  if (scene.earliest_only) return {false, false, "earliest_only is true, and patches are made of all contacts"};
+  return {true, true, "contacts that belong together are told as one"};
+}
 
 /// By Effect: its name, and what a scene says of it.
 struct EffectRow {

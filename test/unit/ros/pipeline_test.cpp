@@ -33,9 +33,10 @@ std::vector<std::uint8_t> bytesOf(const Message& message) {
   return bytes;
 }
 
-/// 2 x 2 points, 0.1 m apart, first corner at (0.15, 0.15, z); the field sigma where wanted.
+/// 2 x 2 points, 0.1 m apart, first corner at (0.15, 0.15, z), each point `tilt` above the one before; the field sigma
+/// where wanted.
 std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float>& sigma = {},
-                                const std::string& frame = "world") {
+                                const std::string& frame = "world", float tilt = 0) {
   sensor_msgs::PointCloud2 out;
   out.header.stamp = ros::Time(stamp_s);
   out.header.frame_id = frame;
@@ -53,8 +54,8 @@ std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float
   out.row_step = 32;
   out.data.resize(64);
   for (std::size_t i = 0; i < 4; ++i) {
-    const float p[4] = {0.15f + 0.1f * static_cast<float>(i % 2), 0.15f + 0.1f * static_cast<float>(i / 2), z,
-                        sigma.empty() ? 0 : sigma[i]};
+    const float p[4] = {0.15f + 0.1f * static_cast<float>(i % 2), 0.15f + 0.1f * static_cast<float>(i / 2),
+                        z + tilt * static_cast<float>(i), sigma.empty() ? 0 : sigma[i]};
     std::memcpy(out.data.data() + 16 * i, p, 16);
   }
   return bytesOf(out);
@@ -103,9 +104,9 @@ struct Driven {
     transform.transform.rotation.w = 1;
     transforms.setTransform(transform, "test", true);
   }
-  const Outcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {},
-                      const std::string& frame = "world") {
-    pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma, frame), 0, 0});
+  const Outcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {}, const std::string& frame = "world",
+                      float tilt = 0) {
+    pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma, frame, tilt), 0, 0});
     EXPECT_TRUE(pipeline.nextOutcome(0, outcome));
     return outcome;
   }
@@ -386,7 +387,7 @@ XmlRpcValue expecting(const std::string& phase = "") {
 std::string refusalOf(const XmlRpcValue& tree) {
   try {
     Driven refused(tree);
-  } catch (const ParameterError& error) {
+  } catch (const std::exception& error) {
     return error.what();
   }
   return "nothing was refused";
@@ -451,6 +452,37 @@ TEST(ExpectedContacts, APhaseIsOnFromTheNextStepAndStaysOverAReset) {
   EXPECT_EQ(driven.feed(2.1, -0.05f).touching, Touching::EXPECTED);
   driven.pipeline.setPhase("");
   EXPECT_EQ(driven.feed(2.2, -0.15f).touching, Touching::LASTING);
+}
+
+TEST(EarliestOnly, TheFirstContactsAloneAndNoPatches) {
+  XmlRpcValue tree = scene();
+  Driven all(tree);
+  tree["earliest_only"] = true;
+  Driven first(tree);
+  for (Driven* driven : {&all, &first}) {
+    driven->giveMap(1);
+    driven->feed(1, 0.35f, {}, "world", 0.03f);  // one corner after another arrives
+    driven->feed(1.1, -0.25f, {}, "world", 0.03f);
+    ASSERT_EQ(driven->outcome.status, StepStatus::OK);
+  }
+  EXPECT_EQ(all.pipeline.effects().plan().running(Effect::PATCHES), true);
+  EXPECT_FALSE(all.outcome.patches.empty());
+  EXPECT_FALSE(first.pipeline.effects().plan().running(Effect::PATCHES));
+  EXPECT_TRUE(first.outcome.patches.empty());
+  EXPECT_EQ(first.outcome.earliest_toc, all.outcome.earliest_toc);
+  EXPECT_GT(first.outcome.contacts.size(), 0u);
+  EXPECT_LT(first.outcome.contacts.size(), all.outcome.contacts.size());
+  EXPECT_EQ(first.outcome.touching, Touching::NEW);
+  EXPECT_FALSE(assuranceOf(first.outcome).clear());
+  tree["effects"]["patches"] = "on";
+  EXPECT_EQ(refusalOf(tree),
+            "effects/patches is on, but earliest_only is true, and patches are made of all contacts; or "
+            "write effects/patches: auto");
+  XmlRpcValue both = expecting();
+  both["earliest_only"] = true;
+  EXPECT_EQ(refusalOf(both),
+            "parameter ~earliest_only is true beside expected_contacts: the first contact may be an "
+            "expected one, which would hide all others; remove one of both");
 }
 
 TEST(Options, WhatIsReconfiguredIsInForceBesideWhatThePlanDecides) {

@@ -94,6 +94,13 @@ TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
   unknown.bodies[0].against_obstacle = false;
   EXPECT_FALSE(on(unknown, Effect::UNKNOWN_SPACE).running(Effect::UNKNOWN_SPACE));
 
+  EffectScene first = cloth();
+  EXPECT_TRUE(EffectPlan(first, {}).running(Effect::PATCHES));
+  first.earliest_only = true;
+  EXPECT_FALSE(EffectPlan(first, {}).running(Effect::PATCHES));
+  EXPECT_EQ(reason(EffectPlan(first, {}), "patches"), "earliest_only is true, and patches are made of all contacts");
+  EXPECT_THROW(on(first, Effect::PATCHES), std::invalid_argument);
+
   EffectScene ahead = cloth();
   ahead.look_ahead_s = 0.5;
   EXPECT_FALSE(on(ahead, Effect::LOOK_AHEAD).running(Effect::LOOK_AHEAD));
