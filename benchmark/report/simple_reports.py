@@ -139,6 +139,20 @@ def write_octomap(folder, result):
     return save(folder, "octomap", "# Mesh against octomap\n\n" + table(header, rows))
 
 
+def write_first(folder, rows):
+    """Ratios are of neighbouring runs; their interval is what they span."""
+    header = ["scene", "threads", "contacts", "first ones", "their TOC", "all, ms", "the first, ms", "ratio", "from", "to"]
+    lines = []
+    for r in rows:
+        ratios = sorted(first / whole for first, whole in zip(r["first_ms"], r["all_ms"]))
+        lines.append([r["scene"], str(r["threads"]), str(r["all"]), str(r["first"]), "%.2g" % float(r["toc"]),
+                      "%.1f" % sorted(r["all_ms"])[len(r["all_ms"]) // 2],
+                      "%.1f" % sorted(r["first_ms"])[len(r["first_ms"]) // 2], "%.3f" % ratios[len(ratios) // 2],
+                      "%.3f" % ratios[0], "%.3f" % ratios[-1]])
+    write_rows(os.path.join(folder, "first.csv"), header, lines)
+    return save(folder, "first", "# The first contact only\n\n" + table(header, lines))
+
+
 def write_stream(folder, rows):
     """Ratios are of neighbouring runs; their interval is what they span."""
     header = ["sequence", "steps", "threads", "contacts", "pairs of clusters known apart, a step", "mean ms a step",
