@@ -100,8 +100,12 @@ class BareRoot:
         if self.run('true').returncode != 0:
             raise CannotMake('this machine may not mount /proc for a root')
 
+    def path(self, name=''):
+        """Where a file of the copy lies, seen from outside."""
+        return pathlib.Path(str(self.folder) + INSIDE) / name
+
     def copy_checkout(self):
-        target = pathlib.Path(str(self.folder) + INSIDE)
+        target = self.path()
         target.mkdir(parents=True, exist_ok=True)
         for name in checkout_files():
             (target / name).parent.mkdir(parents=True, exist_ok=True)

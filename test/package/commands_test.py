@@ -32,7 +32,7 @@ PROSE = {'file', 'test', 'map', 'time', 'at', 'find', 'look', 'of', 'more', 'if'
          'size', 'head', 'as', 'cut', 'sort', 'split', 'join', 'type', 'who', 'which', 'last', 'read', 'set', 'c++', 'watch', 'bc'}
 # Words that a command begins with -> why it is not run here.
 NOT_RUN = {
-    'scripts/demo': 'is the first command in the bare root (scripts/lib/run_tests.py)',
+    'scripts/demo': 'is the first command in the bare root (scripts/lib/newcomer.sh)',
     'scripts/setup': 'installs packages; the demo and the tests call it',
     'scripts/benchmark': 'takes half an hour of a quiet machine',
     'scripts/test': 'is what runs this test; --fresh and --long are run by hand',

@@ -1,7 +1,8 @@
 """The runner that adds the tests up: a test that did not start, crashed or failed must never read as passed."""
-import importlib.util
+import contextlib
 import os
 import pathlib
+import shutil
 import stat
 import subprocess
 import sys
@@ -11,10 +12,8 @@ import unittest
 import unittest.mock
 
 from checkout import CHECKOUT
-
-SPEC = importlib.util.spec_from_file_location('run_tests', CHECKOUT / 'scripts/lib/run_tests.py')
-run_tests = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(run_tests)
+import run_tests
+import runners
 
 
 class RunTestsTest(unittest.TestCase):
@@ -28,7 +27,7 @@ class RunTestsTest(unittest.TestCase):
         binary.write_text('#!/bin/sh\nfor a in "$@"; do case $a in --gtest_output=xml:*) xml=${a#*xml:};; esac; done\n' +
                           textwrap.dedent(body))
         binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
-        result, _ = run_tests.GtestRunner(binary, 0, 1, '')(self.path)
+        result, _ = runners.GtestRunner(binary, 0, 1, '')(self.path)
         return result.passed, result.failed, result.skipped
 
     def test_counts_what_gtest_reports(self):
@@ -57,7 +56,7 @@ class RunTestsTest(unittest.TestCase):
             exit 66'''), (1, 1, 0))
 
     def test_a_binary_that_was_not_built_failed(self):
-        result, _ = run_tests.GtestRunner(self.path / 'not_there', 0, 1, '')(self.path)
+        result, _ = runners.GtestRunner(self.path / 'not_there', 0, 1, '')(self.path)
         self.assertEqual((result.passed, result.failed), (0, 1))
 
     def test_a_filter_that_nothing_matches_failed(self):
@@ -72,7 +71,7 @@ class RunTestsTest(unittest.TestCase):
         self.assertEqual((ran.returncode, ran.stdout.splitlines()[-1]), (1, '0 passed, 1 failed, 0 skipped'))
 
     def test_each_report_of_a_sanitizer_failed(self):
-        result = run_tests.Result()
+        result = runners.Result()
         run_tests.sanitizer_reports(self.path, result)
         self.assertEqual(result.failed, 0)
         (self.path / 'report.node.17').write_text('WARNING: ThreadSanitizer: data race\n')
@@ -92,7 +91,7 @@ class RunTestsTest(unittest.TestCase):
                 def test_skipped(self): self.skipTest('why')
             '''))
         self.addCleanup(test.unlink)
-        result, _ = run_tests.PythonRunner(test)(self.path)
+        result, _ = runners.PythonRunner(test)(self.path)
         self.assertEqual((result.passed, result.failed, result.skipped), (1, 1, 1))
 
     def test_a_python_file_that_cannot_be_imported_failed(self):
@@ -100,7 +99,7 @@ class RunTestsTest(unittest.TestCase):
         test.parent.mkdir(exist_ok=True)
         test.write_text('import there_is_no_such_module\n')
         self.addCleanup(test.unlink)
-        result, _ = run_tests.PythonRunner(test)(self.path)
+        result, _ = runners.PythonRunner(test)(self.path)
         self.assertGreater(result.failed, 0)
         self.assertEqual(result.passed, 0)
 
@@ -108,12 +107,12 @@ class RunTestsTest(unittest.TestCase):
         (self.path / 'gtest_suites.txt').write_text('')
         arguments = unittest.mock.Mock(build=self.path, filter='', emulator='', fuzzers=None, pages=None, only='')
         environment = {k: v for k, v in os.environ.items() if k not in ('DEFORMABLE_CCD_IN_BARE_ROOT', 'DEFORMABLE_CCD_SANITIZED')}
-        name = run_tests.PAGE_COMMANDS.name
+        name = runners.PAGE_COMMANDS.name
         with unittest.mock.patch.dict(os.environ, environment, clear=True):
             busy, _, alone = run_tests.find_runners(arguments)
             self.assertNotIn(name, [r.name for r in busy])
-            with unittest.mock.patch.object(run_tests, 'bare_root', side_effect=run_tests.CannotMake('no root')), \
-                    unittest.mock.patch.object(run_tests, 'PAGE_COMMANDS', return_value=(run_tests.Result(), None)) as commands:
+            with unittest.mock.patch.object(runners, 'bare_root', side_effect=runners.CannotMake('no root')), \
+                    unittest.mock.patch.object(runners, 'PAGE_COMMANDS', return_value=(runners.Result(), None)) as commands:
                 result, _ = alone[0](self.path)
                 commands.assert_called_once()
             self.assertEqual((result.failed, result.skipped), (0, 1))
@@ -130,16 +129,66 @@ class RunTestsTest(unittest.TestCase):
         with unittest.mock.patch.dict(os.environ, {'DEFORMABLE_CCD_IN_BARE_ROOT': '1'}):
             busy, _, alone = run_tests.find_runners(arguments)
         names = [runner.name for runner in busy]
-        self.assertEqual((names.count(run_tests.PAGE_COMMANDS.name), names.count(run_tests.PagesRunner.name), alone), (0, 1, []))
+        self.assertEqual((names.count(runners.PAGE_COMMANDS.name), names.count(runners.PagesRunner.name), alone), (0, 1, []))
 
         def counted(text):
             log.write_text(text)
-            result, _ = run_tests.PagesRunner(log)(self.path)
+            result, _ = runners.PagesRunner(log)(self.path)
             return result.passed, result.failed, result.skipped
         self.assertEqual(counted('Ran 6 tests in 1.0s\n\nOK (skipped=1)\n'), (6, 0, 1))
         self.assertEqual(counted('FAIL: test_x\nRan 6 tests in 1.0s\n\nFAILED (failures=1)\n'), (6, 1, 0))
         self.assertEqual(counted('Ran 6 tests in 1.0s\n'), (7, 1, 0))  # it ended in between
         self.assertEqual(counted('Traceback'), (1, 1, 0))
+
+    def newcomer(self, demo, verdict):
+        """A checkout with the real newcomer.sh, whose demo and tests of the pages are these; its path."""
+        checkout = self.path / 'checkout'
+        for folder in ('scripts/lib', 'test/package'):
+            (checkout / folder).mkdir(parents=True, exist_ok=True)
+        for name in ('common.sh', 'newcomer.sh'):
+            shutil.copy(CHECKOUT / 'scripts/lib' / name, checkout / 'scripts/lib')
+        (checkout / 'scripts/demo').write_text('#!/bin/sh\nmkdir -p build; echo the demo; %s\n' % demo)
+        (checkout / 'scripts/demo').chmod(0o755)
+        (checkout / 'test/package/commands_test.py').write_text(textwrap.dedent('''
+            import os, unittest
+            class T(unittest.TestCase):
+                def test_the_demo_was_before(self): assert os.path.isdir('../../build')
+                def test_verdict(self): %s
+            ''') % verdict)
+        return checkout
+
+    def bare(self, demo, verdict):
+        """What the runner counts where the bare root holds such a checkout, which is gone afterwards."""
+        checkout = self.newcomer(demo, verdict)
+
+        @contextlib.contextmanager
+        def bare_root(_release):
+            root = unittest.mock.Mock(path=lambda name: checkout / name, run=lambda command, **more: subprocess.run(
+                command, shell=True, cwd=checkout, check=False, **more))
+            yield root
+            shutil.rmtree(checkout)
+        with unittest.mock.patch.object(runners, 'bare_root', bare_root), \
+                unittest.mock.patch.dict(os.environ, {'DEFORMABLE_CCD_WORKSPACE': str(checkout / 'build')}):
+            result, log = runners.BareRootRunner()(self.path)
+        return result, log.read_text()
+
+    def test_the_bare_root_counts_the_demo_and_the_commands(self):
+        result, log = self.bare('true', 'pass')
+        self.assertEqual((result.passed, result.failed, result.skipped), (3, 0, 0))
+        self.assertRegex(result.notes[-1], r'^scripts/demo took \d+ s, downloads included$')
+        self.assertIn('Ran 2 tests', log)
+
+    def test_a_command_that_fails_in_the_bare_root_failed(self):
+        result, log = self.bare('true', 'self.fail("no such command")')
+        self.assertEqual((result.passed, result.failed, result.skipped), (2, 1, 0))
+        self.assertIn('no such command', log)
+
+    def test_without_the_demo_no_command_runs_in_the_bare_root(self):
+        result, log = self.bare('echo it broke; exit 3', 'pass')
+        self.assertEqual((result.passed, result.failed, result.skipped), (0, 1, 0))
+        self.assertEqual(result.notes, ['scripts/demo ended with status 3 in a bare root'])
+        self.assertIn('it broke', log)
+        self.assertNotIn('Ran ', log)
 
     def fuzz(self, coverages, runs):
         """The result of a decoder's fuzzer whose rounds reach these coverages, the last one again and again."""
@@ -151,8 +200,8 @@ class RunTestsTest(unittest.TestCase):
             echo "#9 DONE cov: $(sed -n "$(wc -l <rounds)p; \\$p" coverages | head -n 1) ft: 1"
             echo "stat::number_of_executed_units: %d"''') % runs)
         binary.chmod(0o755)
-        with unittest.mock.patch.object(run_tests.FuzzRunner, 'ROUND_S', 600):
-            result, _ = run_tests.FuzzRunner(binary)(self.path)
+        with unittest.mock.patch.object(runners.FuzzRunner, 'ROUND_S', 600):
+            result, _ = runners.FuzzRunner(binary)(self.path)
         return result.passed, result.failed, len((self.path / 'rounds').read_text().split())
 
     def test_a_fuzzer_goes_on_until_a_round_brings_nothing(self):
@@ -165,10 +214,10 @@ class RunTestsTest(unittest.TestCase):
         self.assertEqual(self.fuzz([5], 10**6 // 4), (1, 0, 4))
 
     def test_a_fuzzer_that_still_finds_code_failed(self):
-        self.assertEqual(self.fuzz(range(1, 100), 10**6), (0, 1, run_tests.FuzzRunner.MAX_ROUNDS))
+        self.assertEqual(self.fuzz(range(1, 100), 10**6), (0, 1, runners.FuzzRunner.MAX_ROUNDS))
 
     def test_a_fuzzer_with_too_few_runs_failed(self):
-        self.assertEqual(self.fuzz([5], 1), (0, 1, run_tests.FuzzRunner.MAX_ROUNDS))
+        self.assertEqual(self.fuzz([5], 1), (0, 1, runners.FuzzRunner.MAX_ROUNDS))
 
 
 if __name__ == '__main__':
