@@ -79,6 +79,7 @@ class Report {
   void addRows(const std::string& rows);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
   void addTimes(const Outcome& outcome);
+  void writeStep(const Outcome& outcome);
   void writeContacts(const Outcome& outcome, const std::vector<Body>& bodies);
   void writePatches(const Outcome& outcome, const std::vector<Body>& bodies);
   nlohmann::json heatJson() const;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 namespace dccd {
 namespace {
@@ -62,6 +63,36 @@ TEST(Headline, ExpectedContactsAreToldApart) {
   quiet.touching = Touching::EXPECTED;
   EXPECT_EQ(headlineOf({quiet, nothingFound(StepStatus::OK, StartState::CLEAR)}),
             "No unexpected contact in 2 answered steps; expected contacts in 1 of them.");
+}
+
+TEST(ReportJson, NoNameIsTakenForThePlaceOfTheSteps) {
+  const std::string folder = ::testing::TempDir() + "report_of_odd_names";
+  Outcome first = nothingFound(StepStatus::OK, StartState::CLEAR), second = first;
+  first.sequence = 1;
+  second.sequence = 2;
+  auto step = std::make_shared<Step>();
+  step->bodies.resize(1);
+  step->bodies[0].topology = share(Topology::grid(2, 2));
+  step->bodies[0].t0 = step->bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  first.step = second.step = step;
+  for (const char* const name : {"@rows@", "@steps@", "\"steps\": [", "steps", "{", "[]"}) {
+    SCOPED_TRACE(name);
+    std::vector<Body> bodies(1);
+    bodies[0].name = name;
+    Report report(folder);
+    report.setFacts({{"bag", name}, {name, name}});
+    report.setEffects({{name, EffectSetting::AUTO, true, name}});
+    report.add(first, bodies);
+    report.add(second, bodies);
+    report.finish();
+    const auto data = nlohmann::json::parse(std::ifstream(folder + "/report.json"), nullptr, false);
+    std::filesystem::remove_all(folder);
+    ASSERT_FALSE(data.is_discarded());
+    ASSERT_EQ(data["steps"].size(), 2u);
+    EXPECT_EQ(data["steps"][1]["step"], 2);
+    EXPECT_EQ(data["facts"][1], nlohmann::json::array({name, name}));
+    EXPECT_EQ(data["bodies"][0]["name"], name);
+  }
 }
 
 }  // namespace
