@@ -1,7 +1,7 @@
 // run_queries DIR...: hard queries in; wrong answers, time per query and error of the TOC out, for each rung.
 //
 // Time per query: one pair per call; the best of 5 repeats, each long enough (about a microsecond) for the clock; then
-// the statistics over the queries. Errors of the TOC are against the exact oracle (test/support/oracle.h).
+// the statistics over the queries. Errors of the TOC are against the exact oracle (oracle/oracle.h).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -20,6 +20,7 @@
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
 #include "oracle/query_file.h"
+#include "statistics/quantile.h"
 
 namespace dccd {
 namespace {
@@ -162,20 +163,16 @@ std::string formatted(const char* format, double value) {
   return text;
 }
 
-/// The cells of a row. Sorts the row's times.
-std::vector<std::string> cellsOf(const std::string& family, const std::string& kind, const JudgedRung& rung, Row row) {
-  std::sort(row.nanoseconds.begin(), row.nanoseconds.end());
-  const auto quantile = [&](double q) {
-    return row.nanoseconds[std::min(row.nanoseconds.size() - 1, static_cast<std::size_t>(q * row.queries))];
-  };
+/// The cells of a row.
+std::vector<std::string> cellsOf(const std::string& family, const std::string& kind, const JudgedRung& rung,
+                                 const Row& row) {
   std::vector<std::string> cells = {family, kind, toString(rung.options.rung)};
   for (std::size_t count : {row.queries, row.contacts, row.false_negatives, row.false_positives, row.undecided}) {
     cells.push_back(std::to_string(count));
   }
   const double mean = std::accumulate(row.nanoseconds.begin(), row.nanoseconds.end(), 0.0) / row.queries;
-  for (double time : {mean, quantile(0.5), quantile(0.99), row.nanoseconds.back()}) {
-    cells.push_back(formatted("%.1f", time));
-  }
+  cells.push_back(formatted("%.1f", mean));
+  for (const double q : {0.5, 0.99, 1.0}) cells.push_back(formatted("%.1f", quantile(row.nanoseconds, q)));
   cells.push_back(formatted("%.3g", row.max_toc_error));
   return cells;
 }

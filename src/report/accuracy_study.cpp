@@ -1,4 +1,5 @@
 #include "report/accuracy_study.h"
+#include "statistics/quantile.h"
 
 #include <algorithm>
 #include <fstream>
@@ -7,8 +8,6 @@
 #include <sstream>
 #include <stdexcept>
 #include <utility>
-
-#include "report/quantile.h"
 
 namespace dccd {
 namespace {

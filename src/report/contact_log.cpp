@@ -1,9 +1,8 @@
 #include "report/contact_log.h"
+#include "statistics/quantile.h"
 
 #include <algorithm>
 #include <tuple>
-
-#include "report/quantile.h"
 
 namespace dccd {
 

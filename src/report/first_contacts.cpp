@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "report/contact_vertices.h"
-#include "report/quantile.h"
+#include "statistics/quantile.h"
 
 namespace dccd {
 namespace {

@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "dccd/assurance.h"
-#include "report/quantile.h"
 #include "report/report.h"
+#include "statistics/quantile.h"
 
 namespace dccd {
 namespace {

@@ -1,4 +1,4 @@
-// One quantile of a run's values, for the tables of the report.
+// One quantile of a run's values, for scores and tables.
 #pragma once
 
 #include <algorithm>

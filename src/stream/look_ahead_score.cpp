@@ -3,19 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "statistics/quantile.h"
+
 namespace dccd {
 
 namespace {
 
 std::uint64_t keyOf(std::uint16_t body, std::uint16_t against, Index vertex) {
   return std::uint64_t{body} << 48 | std::uint64_t{against} << 32 | vertex;
-}
-
-double quantile(std::vector<double>& values, double q) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 # Folder of src/ -> the folders of src/ that it may include. The public headers (dccd/...) are open to all but simd,
 # which takes the tolerances alone. A folder may always include itself.
 CORE = {
+    'statistics': set(),
     'simd': set(),
     'mesh': set(),
     'projection': {'simd'},
@@ -16,12 +17,12 @@ CORE = {
     'elementary': {'simd'},
     'obstacle': {'simd'},
     'step': {'projection', 'culling', 'elementary', 'obstacle', 'simd'},
-    'stream': {'step', 'obstacle'},
+    'stream': {'step', 'obstacle', 'statistics'},
     'record': {'stream', 'step', 'culling', 'projection', 'obstacle', 'simd'},
 }
 MAY_INCLUDE = {
     **CORE,
-    'report': set(),
+    'report': {'statistics'},
     'octomap': {'obstacle'},
     'parameters': set(),
     'scene': {'parameters'},

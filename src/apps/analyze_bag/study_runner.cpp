@@ -17,7 +17,7 @@
 #include "apps/analyze_bag/thinned_mesh.h"
 #include "dccd/accuracy.h"
 #include "report/accuracy_settings.h"
-#include "report/quantile.h"
+#include "statistics/quantile.h"
 
 namespace dccd {
 namespace {
