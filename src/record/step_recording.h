@@ -17,7 +17,7 @@
 namespace dccd {
 
 /// 1, without distances beyond the bodies' own, 2, without what an assurance follows from, 3, without expected
-/// contacts, and 4, without patches, can be read, too.
+/// contacts, and 4, without patches, can be read, too; of 1 not the first files, without Options::unfolded_test.
 constexpr std::uint32_t RECORDING_VERSION = 5;
 
 /// A recording that cannot be read; the text names the input, the byte and the value.

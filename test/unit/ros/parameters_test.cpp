@@ -222,6 +222,10 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        [](XmlRpcValue& t) { t["accuracy"] = "screen"; }},
       {"~accuracy is 'exactly', it must be one of conservative, exact; nearest is 'exact'",
        [](XmlRpcValue& t) { t["accuracy"] = "exactly"; }},
+      // Names that were once taken.
+      {"~record_ring is not known; nearest is ~record_steps", [](XmlRpcValue& t) { t["record_ring"] = 3; }},
+      {"~record_directory is not known; nearest is ~record_folder",
+       [](XmlRpcValue& t) { t["record_directory"] = "steps"; }},
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
       {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
        "separation: write accuracy: conservative",
