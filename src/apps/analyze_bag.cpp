@@ -1,10 +1,4 @@
 // analyze_bag IN.bag [-o OUT.bag] --report DIR: a recorded run through the same core as the node's, without a master.
-#include "output/output_messages.h"
-#include "output/patch_messages.h"
-
-#include <rosbag/bag.h>
-#include <std_msgs/Bool.h>
-
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
@@ -15,13 +9,12 @@
 #include <sstream>
 
 #include "apps/analyze_bag/range_result.h"
+#include "apps/analyze_bag/result_bag.h"
 #include "apps/analyze_bag/study_runner.h"
 #include "dccd/accuracy.h"
 #include "dccd/range_log.h"
 #include "dccd/simd_target.h"
-#include "input/known_types.h"
 #include "node/bag_replay.h"
-#include "output/markers.h"
 #include "report/report.h"
 
 namespace {
@@ -63,80 +56,6 @@ MonitorConfig configure(const Arguments& a) {
   config.monitor.detector.keep_bounds = !a.forget;
   return config;
 }
-
-// The input's messages with the results between them, as the node would have published them to subscribers of all
-// topics.
-class ResultBag {
- public:
-  ResultBag(const std::string& path, const MonitorConfig& config)
-      : bag_(path, rosbag::bagmode::Write), look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES) {
-    bag_.setCompression(rosbag::CompressionType::LZ4);
-  }
-  /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
-  void copy(const rosbag::MessageInstance& m) {
-    const std::string own = std::string(MONITOR_NAMESPACE) + "/";
-    if (m.getTopic().compare(0, own.size(), own) == 0) return;
-    bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
-  }
-  void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
-    const std::string& frame = pipeline.fixedFrame();
-    StatsContext context;
-    context.frames = pipeline.monitor().total();
-    context.weld_changes = pipeline.weldChanges();
-    context.maps_received = so_far.maps;
-    context.maps_refused = so_far.maps_refused;
-    if (pipeline.config().monitor.look_ahead_s > 0) {
-      look_ahead_.observe(outcome);
-      context.look_ahead = look_ahead_.summary();
-    }
-    if (!frame.empty()) ++markers_built_;  // before a frame was taken there is none to draw in
-    context.markers_built = markers_built_;
-    context.parameter_hash = pipeline.config().hash();
-    bag_.write("/collision_monitor/contacts", at, toContactArray(outcome, pipeline.monitor().bodies(), frame));
-    EffectTracker& effects = pipeline.effects();
-    if (effects.takeNewPlan()) bag_.write("/collision_monitor/effects", at, effects.message(at, frame));
-    if (effects.takeNewLeftOut(pipeline.monitor())) {
-      bag_.write("/collision_monitor/left_out", at,
-                 toLeftOutPairs(pipeline.monitor().leftOut(), pipeline.monitor().bodies(), outcome.stamp_ns, frame));
-    }
-    bag_.write("/collision_monitor/stats", at, toStepStats(outcome, context, frame));
-    bag_.write("/collision_monitor/first_contact", at, toFirstContact(outcome, pipeline.monitor().bodies(), frame));
-    if (pipeline.config().monitor.detector.patches) {
-      bag_.write("/collision_monitor/patches", at, toPatchArray(outcome, pipeline.monitor().bodies(), frame));
-      for (const auto& event : toPatchEvents(outcome, pipeline.monitor().bodies(), frame)) {
-        bag_.write("/collision_monitor/events", at, event);
-      }
-    }
-    deformable_ccd::State state = toState(outcome, frame);
-    state.header.stamp = at;
-    fillState(assuranceOf(outcome), state);
-    bag_.write("/collision_monitor/state", at, state);
-    std_msgs::Bool clear;
-    clear.data = state.clear;
-    bag_.write("/collision_monitor/clear", at, clear);
-    if (frame.empty()) return;
-    bag_.write("/collision_monitor/markers", at,
-               toMarkers(outcome, pipeline.monitor().bodies(), pipeline.config().markers, frame));
-  }
-  void addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {
-    const std::string& frame = pipeline.fixedFrame();
-    const double horizon_s = pipeline.config().monitor.look_ahead_s;
-    look_ahead_.predict(prediction);
-    bag_.write("/collision_monitor/predicted_contacts", at,
-               toContactArray(prediction, pipeline.monitor().bodies(), frame));
-    bag_.write("/collision_monitor/time_to_contact", at,
-               toTimeToContact(prediction, horizon_s, pipeline.monitor().bodies(), frame));
-    if (!prediction.answered || frame.empty()) return;
-    const auto ahead =
-        toPredictedMarkers(prediction, horizon_s, pipeline.monitor().bodies(), pipeline.config().markers, frame);
-    if (!ahead.markers.empty()) bag_.write("/collision_monitor/markers", at, ahead);
-  }
-
- private:
-  rosbag::Bag bag_;
-  LookAheadScore look_ahead_;
-  std::uint64_t markers_built_ = 0;
-};
 
 std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config, const BagReplayOptions& options) {
   std::vector<std::string> names;

@@ -46,7 +46,8 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance(), config.monitor.detector.patches),
       state(private_node, livenessLimits(config)),
       queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_queue_bytes),
-      diagnostics(private_node.getNamespace(), node),
+      diagnostics(private_node.getNamespace()),
+      diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),
       log(node, private_node.getNamespace(), config),
       look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
       disabled_frames(config.bodies.size()) {}

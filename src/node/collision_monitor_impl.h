@@ -44,6 +44,7 @@ struct CollisionMonitor::Impl {
   StateReporter state;
   InputQueue queue;
   Diagnostics diagnostics;
+  ros::Publisher diagnostics_publisher;
   MonitorLog log;
   LookAheadScore look_ahead;
   std::unique_ptr<MapLoader> maps;

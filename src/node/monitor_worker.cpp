@@ -213,7 +213,9 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   bool more = false;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
   lookIntoSilence();
-  diagnostics.publishWhenDue(steadyNs(), enabled, pipeline.effects().mapExpected() ? log.mapSource() : "", log.hint());
+  const auto status = diagnostics.takeWhenDue(steadyNs(), ros::Time::now(), enabled,
+                                              pipeline.effects().mapExpected() ? log.mapSource() : "", log.hint());
+  if (status) diagnostics_publisher.publish(*status);
   return more;
 }
 

@@ -5,9 +5,6 @@
 #include <sstream>
 #include <utility>
 
-#include <diagnostic_msgs/DiagnosticArray.h>
-#include <ros/time.h>
-
 #include "output/advice.h"
 
 namespace dccd {
@@ -30,14 +27,13 @@ void put(DiagnosticStatus& status, const char* key, const T& value) {
 
 }  // namespace
 
-Diagnostics::Diagnostics(const std::string& name, ros::NodeHandle& node)
-    : name_(name), publisher_(node.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10)) {}
+Diagnostics::Diagnostics(const std::string& monitor) : name_(monitor + ": steps") {}
 
 void Diagnostics::add(const Outcome& outcome, const StatsContext& context) {
   ++outcomes_;
   answers_ += outcome.answered;
   worst_latency_s_ = std::max(worst_latency_s_, context.latency_s);
-  latency_.add(context.latency_s);
+  if (context.latency_s > 0) latency_.add(context.latency_s);
   status_ = outcome.status;
   reason_ = outcome.reason;
   context_ = context;
@@ -73,13 +69,23 @@ void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::strin
   if (!hint.empty()) raise(DiagnosticStatus::WARN, hint);
 }
 
-void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic,
-                                 const std::string& hint) {
-  if (now_ns - last_ns_ < PERIOD_NS) return;
+/// A recorded run has none: nobody waited.
+void Diagnostics::putLatency(DiagnosticStatus& status) const {
+  if (latency_.count() == 0) return;
+  put(status, "worst latency [s]", worst_latency_s_);
+  put(status, "latency since start: median [s]", latency_.quantile(0.5));
+  put(status, "latency since start: p99 [s]", latency_.quantile(0.99));
+  put(status, "latency since start: worst [s]", latency_.worst());
+}
+
+std::optional<diagnostic_msgs::DiagnosticArray> Diagnostics::takeWhenDue(std::int64_t now_ns, const ros::Time& stamp,
+                                                                         bool enabled, const std::string& map_topic,
+                                                                         const std::string& hint) {
+  if (now_ns - last_ns_ < PERIOD_NS) return std::nullopt;
   const double seconds = last_ns_ == 0 ? 1 : static_cast<double>(now_ns - last_ns_) * 1e-9;
   last_ns_ = now_ns;
   DiagnosticStatus status;
-  status.name = name_ + ": steps";
+  status.name = name_;
   status.level = DiagnosticStatus::OK;
   status.message = toString(status_);
   judge(status, enabled, map_topic, hint);
@@ -87,10 +93,7 @@ void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::s
   dropped_before_ = dropped;
   put(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
   put(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
-  put(status, "worst latency [s]", worst_latency_s_);
-  put(status, "latency since start: median [s]", latency_.quantile(0.5));
-  put(status, "latency since start: p99 [s]", latency_.quantile(0.99));
-  put(status, "latency since start: worst [s]", latency_.worst());
+  putLatency(status);
   put(status, "frames received", context_.frames.received);
   put(status, "frames processed", context_.frames.processed());
   put(status, "frames started anew", context_.frames.started());
@@ -106,9 +109,9 @@ void Diagnostics::publishWhenDue(std::int64_t now_ns, bool enabled, const std::s
   outcomes_ = answers_ = 0;
   worst_latency_s_ = 0;
   diagnostic_msgs::DiagnosticArray array;
-  array.header.stamp = ros::Time::now();
+  array.header.stamp = stamp;
   array.status.push_back(std::move(status));
-  publisher_.publish(array);
+  return array;
 }
 
 std::string describe(const Outcome& outcome) {

@@ -3,30 +3,36 @@
 
 #include "output/output_messages.h"
 
+#include <optional>
 #include <string>
 
-#include <diagnostic_msgs/DiagnosticStatus.h>
-#include <ros/node_handle.h>
-#include <ros/publisher.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <ros/time.h>
 
 #include "report/latency_histogram.h"
 
 namespace dccd {
 
+constexpr const char* DIAGNOSTICS_TOPIC = "/diagnostics";
+
 class Diagnostics {
  public:
-  Diagnostics(const std::string& name, ros::NodeHandle& node);
+  /// `monitor`: the namespace that it publishes in.
+  explicit Diagnostics(const std::string& monitor);
+  /// What its status is called.
+  const std::string& name() const { return name_; }
   void add(const Outcome& outcome, const StatsContext& context);
-  /// At most once a second. `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty
-  /// when none is expected.
-  void publishWhenDue(std::int64_t now_ns, bool enabled, const std::string& map_topic, const std::string& hint);
+  /// At most once a second by the clock of `now_ns`. `hint`: what looks like a mistake; `map_topic`: where the octomap
+  /// is looked for, or empty when none is expected.
+  std::optional<diagnostic_msgs::DiagnosticArray> takeWhenDue(std::int64_t now_ns, const ros::Time& stamp, bool enabled,
+                                                              const std::string& map_topic, const std::string& hint);
 
  private:
   void judge(diagnostic_msgs::DiagnosticStatus& status, bool enabled, const std::string& map_topic,
              const std::string& hint) const;
+  void putLatency(diagnostic_msgs::DiagnosticStatus& status) const;
 
   std::string name_;
-  ros::Publisher publisher_;
   std::int64_t last_ns_ = 0;
   // Since the last status.
   std::uint64_t outcomes_ = 0, answers_ = 0, dropped_before_ = 0;

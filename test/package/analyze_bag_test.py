@@ -10,6 +10,7 @@ import unittest
 
 import genpy
 import rosbag
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, TransformStamped
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -374,6 +375,36 @@ class AnalyzeBagTest(FolderTestCase):
         listed = len((self.folder / 'all/left_out.csv').read_text().splitlines()) - 1
         self.assertEqual(len(by_topic[OWN + 'left_out'][-1].pairs), listed)
 
+    def test_the_bag_of_results_is_diagnosed_once_a_second_of_its_time(self):
+        """What a monitor said when the bag was recorded is not in it; what others said is."""
+        slow, out = self.folder / 'slow.bag', self.folder / 'slow_out.bag'
+        start, own = self.messages[0][2], DiagnosticStatus(name='/collision_monitor: steps', message='of before')
+        seconds = 8
+        stretch = seconds / (self.messages[-1][2] - start).to_sec()
+        with rosbag.Bag(str(slow), 'w') as bag:
+            for array in ([own, DiagnosticStatus(name='camera')], [own], [DiagnosticStatus(name='arm')]):
+                bag.write('/diagnostics', DiagnosticArray(status=array), start)
+            for topic, message, at in self.messages:
+                bag.write(topic, message, start + genpy.Duration.from_sec((at - start).to_sec() * stretch))
+        self.expect_same(self.analyze('slow', slow, '-o', out))
+        arrays = [(message, at) for topic, message, at in messages_of(out) if topic == '/diagnostics']
+        others = [status.name for array, _ in arrays for status in array.status if status.name != own.name]
+        self.assertEqual(others, ['camera', 'arm'])
+        said = [(array.status[0], array.header.stamp, at) for array, at in arrays if array.status[0].name == own.name]
+        self.assertTrue(all(stamp == at for _, stamp, at in said), 'of the time of the bag')
+        self.assertIn(len(said), (seconds, seconds + 1))
+        self.assertNotIn('of before', [status.message for status, _, _ in said])
+        self.assertEqual(said[0][0].message, 'no frames arrive', 'yet')
+        last = said[-1][0]
+        self.assertEqual((last.level, last.message), (DiagnosticStatus.OK, 'OK'))
+        values = {pair.key: pair.value for pair in last.values}
+        rows = re.findall(r'put\(status, "([^"]+)"', (CHECKOUT / 'src/output/diagnostics.cpp').read_text())
+        self.assertEqual(set(values), {row for row in rows if 'latency' not in row}, 'the rows of the node; nobody waited')
+        frames = sum(topic == '/cloth' for topic, _, _ in self.messages)
+        self.assertGreater(int(values['frames received']), frames // 2)
+        self.assertAlmostEqual(float(values['answers [Hz]']), frames / seconds, delta=1.5)
+        self.assertEqual((values['maps received'], values['maps refused'], values['frames dropped']), ('1', '0', '0'))
+
     def test_contacts_that_are_expected_in_the_phase_of_the_bag(self):
         """The cloth on its map: found as before, marked, and no alarm; in another phase it is one."""
         expected = 'expected_contacts: [{between: [mesh, octomap], phase: lay}, {between: [mesh, self], phase: fold}]\n'
@@ -415,8 +446,9 @@ class AnalyzeBagTest(FolderTestCase):
             for topic, message, at in self.messages:
                 bag.write(topic, message, at)
         self.expect_same(self.analyze('recorded', recorded, '-o', again))
-        count = collections.Counter(topic for topic, _, _ in results)
-        found = collections.Counter(topic for topic, _, _ in messages_of(again))
+        # Of diagnostics there is one a second, and the recording is longer.
+        count, found = (collections.Counter(topic for topic, _, _ in messages if topic != '/diagnostics')
+                        for messages in (results, messages_of(again)))
         self.assertGreater(count[OWN + 'markers'], 20)
         self.assertEqual({t: n for t, n in found.items() if not t.startswith('/guard/')}, count, 'nothing twice')
         self.assertEqual(found['/guard/contacts'], count[OWN + 'contacts'], 'of others, everything')

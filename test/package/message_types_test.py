@@ -5,9 +5,9 @@ import unittest
 from checkout import CHECKOUT, code_under, tracked_files
 
 ROWS = CHECKOUT / 'src/input/message_types'
-# These write messages for others to read: the recorder of scenes, and what RViz shows.
-WRITERS = {'src/apps/make_scene_bag/messages.cpp', 'src/apps/make_scene_bag/messages.h', 'src/output/markers.cpp',
-           'src/output/markers.h', 'src/output/outputs.cpp'}
+# These write messages for others to read: the recorder of scenes, the bag of results, and what RViz shows.
+WRITERS = {'src/apps/analyze_bag/result_bag.cpp', 'src/apps/make_scene_bag/messages.cpp',
+           'src/apps/make_scene_bag/messages.h', 'src/output/markers.cpp', 'src/output/markers.h', 'src/output/outputs.cpp'}
 
 
 def registered():

@@ -1,0 +1,127 @@
+#include "output/output_messages.h"
+#include "output/patch_messages.h"
+
+#include "apps/analyze_bag/result_bag.h"
+
+#include <algorithm>
+
+#include <std_msgs/Bool.h>
+
+#include "input/known_types.h"
+#include "output/markers.h"
+
+namespace dccd {
+
+ResultBag::ResultBag(const std::string& path, const MonitorConfig& config)
+    : bag_(path, rosbag::bagmode::Write),
+      look_ahead_(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
+      diagnostics_(MONITOR_NAMESPACE) {
+  bag_.setCompression(rosbag::CompressionType::LZ4);
+}
+
+template <class Message>
+void ResultBag::write(const char* name, const ros::Time& at, const Message& message) {
+  bag_.write(std::string(MONITOR_NAMESPACE) + "/" + name, at, message);
+}
+
+void ResultBag::copy(const rosbag::MessageInstance& m) {
+  // With every message of the bag, so that frames that do not come are missed as they are live.
+  const auto status =
+      diagnostics_.takeWhenDue(static_cast<std::int64_t>(m.getTime().toNSec()), m.getTime(), true, map_source_, "");
+  if (status) bag_.write(DIAGNOSTICS_TOPIC, m.getTime(), *status);
+  const std::string own = std::string(MONITOR_NAMESPACE) + "/";
+  if (m.getTopic().compare(0, own.size(), own) == 0) return;
+  if (m.getTopic() == DIAGNOSTICS_TOPIC && copyOthersDiagnostics(m)) return;
+  bag_.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
+}
+
+/// False where the message holds nothing of a monitor of this name.
+bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
+  const auto recorded = m.instantiate<diagnostic_msgs::DiagnosticArray>();
+  if (!recorded) return false;
+  diagnostic_msgs::DiagnosticArray others = *recorded;
+  const auto own = std::remove_if(others.status.begin(), others.status.end(),
+                                  [&](const auto& status) { return status.name == diagnostics_.name(); });
+  if (own == others.status.end()) return false;
+  others.status.erase(own, others.status.end());
+  if (!others.status.empty()) bag_.write(DIAGNOSTICS_TOPIC, m.getTime(), others, m.getConnectionHeader());
+  return true;
+}
+
+StatsContext ResultBag::contextOf(const Outcome& outcome, const MonitorPipeline& pipeline,
+                                  const BagReplaySummary& so_far) {
+  StatsContext context;
+  context.frames = pipeline.monitor().total();
+  context.weld_changes = pipeline.weldChanges();
+  context.maps_received = so_far.maps;
+  context.maps_refused = so_far.maps_refused;
+  if (pipeline.config().monitor.look_ahead_s > 0) {
+    look_ahead_.observe(outcome);
+    context.look_ahead = look_ahead_.summary();
+  }
+  if (!pipeline.fixedFrame().empty()) ++markers_built_;  // before a frame was taken there is none to draw in
+  context.markers_built = markers_built_;
+  context.parameter_hash = pipeline.config().hash();
+  return context;
+}
+
+void ResultBag::addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at) {
+  const std::string& frame = pipeline.fixedFrame();
+  EffectTracker& effects = pipeline.effects();
+  if (effects.takeNewPlan()) write("effects", at, effects.message(at, frame));
+  if (effects.takeNewLeftOut(pipeline.monitor())) {
+    write("left_out", at,
+          toLeftOutPairs(pipeline.monitor().leftOut(), pipeline.monitor().bodies(), outcome.stamp_ns, frame));
+  }
+}
+
+void ResultBag::addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
+  if (!pipeline.config().monitor.detector.patches) return;
+  const std::vector<Body>& bodies = pipeline.monitor().bodies();
+  const std::string& frame = pipeline.fixedFrame();
+  write("patches", at, toPatchArray(outcome, bodies, frame));
+  for (const auto& event : toPatchEvents(outcome, bodies, frame)) write("events", at, event);
+}
+
+void ResultBag::addState(const Outcome& outcome, const std::string& frame, const ros::Time& at) {
+  deformable_ccd::State state = toState(outcome, frame);
+  state.header.stamp = at;
+  fillState(assuranceOf(outcome), state);
+  write("state", at, state);
+  std_msgs::Bool clear;
+  clear.data = state.clear;
+  write("clear", at, clear);
+}
+
+void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far,
+                    const ros::Time& at) {
+  const std::vector<Body>& bodies = pipeline.monitor().bodies();
+  const std::string& frame = pipeline.fixedFrame();
+  const StatsContext context = contextOf(outcome, pipeline, so_far);
+  write("contacts", at, toContactArray(outcome, bodies, frame));
+  addPlan(outcome, pipeline, at);
+  write("stats", at, toStepStats(outcome, context, frame));
+  write("first_contact", at, toFirstContact(outcome, bodies, frame));
+  addPatches(outcome, pipeline, at);
+  addState(outcome, frame, at);
+  if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
+  diagnostics_.add(outcome, context);
+  const MonitorConfig& config = pipeline.config();
+  const std::string& source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
+  map_source_ = pipeline.effects().mapExpected() ? source : "";
+}
+
+void ResultBag::addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {
+  const std::vector<Body>& bodies = pipeline.monitor().bodies();
+  const std::string& frame = pipeline.fixedFrame();
+  const double horizon_s = pipeline.config().monitor.look_ahead_s;
+  look_ahead_.predict(prediction);
+  write("predicted_contacts", at, toContactArray(prediction, bodies, frame));
+  write("time_to_contact", at, toTimeToContact(prediction, horizon_s, bodies, frame));
+  if (!prediction.answered || frame.empty()) return;
+  const visualization_msgs::MarkerArray ahead =
+      toPredictedMarkers(prediction, horizon_s, bodies, pipeline.config().markers, frame);
+  if (!ahead.markers.empty()) write("markers", at, ahead);
+}
+
+}  // namespace dccd

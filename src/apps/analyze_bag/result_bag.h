@@ -1,0 +1,40 @@
+// The bag of results (analyze_bag -o): the input's messages with the results between them, as the node would have
+// published them to subscribers of all topics.
+#pragma once
+
+#include <string>
+
+#include <rosbag/bag.h>
+
+#include "dccd/look_ahead_score.h"
+#include "node/bag_replay.h"
+#include "output/diagnostics.h"
+
+namespace dccd {
+
+class ResultBag {
+ public:
+  /// Throws rosbag::BagException when the file cannot be written; so do the others.
+  ResultBag(const std::string& path, const MonitorConfig& config);
+  /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
+  void copy(const rosbag::MessageInstance& m);
+  void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at);
+  void addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at);
+
+ private:
+  template <class Message>
+  void write(const char* name, const ros::Time& at, const Message& message);
+  bool copyOthersDiagnostics(const rosbag::MessageInstance& m);
+  StatsContext contextOf(const Outcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
+  void addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at);
+  void addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
+  void addState(const Outcome& outcome, const std::string& frame, const ros::Time& at);
+
+  rosbag::Bag bag_;
+  LookAheadScore look_ahead_;
+  std::uint64_t markers_built_ = 0;
+  Diagnostics diagnostics_;
+  std::string map_source_;  // where the octomap is looked for; empty when none is expected
+};
+
+}  // namespace dccd
