@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
@@ -222,6 +223,19 @@ std::size_t expectedBytes(const Outcome& answer) {  // what version 4 added, whe
   return 8 + answer.contacts.size() + answer.intersections.size() + 8 + 8;
 }
 
+TEST(StepReplay, PatchesOfExpectedContactsAreMadeAgain) {
+  MonitorOptions options = expecting();
+  options.detector.patches = true;
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(options));
+  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  const auto expected = std::find_if(read.answer.patches.begin(), read.answer.patches.end(),
+                                     [](const Patch& patch) { return patch.expected > 0; });
+  ASSERT_NE(expected, read.answer.patches.end());
+  EXPECT_TRUE(replayStep(read).differences.empty());
+  --expected->expected;
+  EXPECT_EQ(replayStep(read).differences.size(), 1u);
+}
+
 /// The file of version 3 is that of version 4 without its end.
 TEST(StepRecording, AFileWithoutExpectedContactsIsReadAndReplayed) {
   const StepRecording r = recordScene();
@@ -293,7 +307,7 @@ TEST(StepRecording, AFileOfVersion1IsReadAndReplayed) {
       << "that byte is the flag: " << errorOf(bytes);
 }
 
-/// Files of versions 1 and 2 as programs of that time wrote them; one that is refused early is no seed for a fuzzer.
+/// Files of versions 1, 2 and 5 as programs of that time wrote them; one that is refused early is no seed for a fuzzer.
 TEST(StepRecording, TheSeedsOfTheFuzzerAreRead) {
   std::set<std::uint32_t> versions;
   for (const auto& seed : fs::directory_iterator(DEFORMABLE_CCD_SOURCE_DIR "/test/fuzz/corpus/recording")) {
@@ -305,7 +319,7 @@ TEST(StepRecording, TheSeedsOfTheFuzzerAreRead) {
       EXPECT_EQ(seed.path().filename(), "screen_without_answer") << error.what();
     }
   }
-  EXPECT_EQ(versions, (std::set<std::uint32_t>{1, 2}));
+  EXPECT_EQ(versions, (std::set<std::uint32_t>{1, 2, 5}));
 }
 
 TEST(StepRecording, AnyByteMayLie) {
