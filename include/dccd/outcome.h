@@ -46,21 +46,28 @@ DCCD_EXPORT bool isSeam(StepStatus status);
 
 /// The stages of the flow, in order. Names by toString().
 enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTARY, OBSTACLE, START_STATE, SORT, COUNT };
-/// What a scene can call for, and a user can set (doc/interface.md). Names by toString(). Each pair and each moment
-/// counts for one of them alone.
-enum class Effect : std::uint8_t {
-  SELF_COLLISION,
-  BODY_BODY,
-  OCTOMAP,
-  START_STATE,
-  RIGID_BODIES,        ///< in: bodies that turn, out: how often one was placed for a part of the step
-  UNKNOWN_SPACE,       ///< in: voxels that the step sweeps, out: those that the map does not know
-  MINIMUM_SEPARATION,  ///< pairs that carry a distance into the elementary test, and no uncertainty
-  TRACKER_NOISE,       ///< pairs whose vertices bring an uncertainty radius
-  LOOK_AHEAD,          ///< the last prediction: pairs past the filters, contacts
-  PATCHES,             ///< in: contacts and edges through faces at the start, out: patches
-  COUNT
-};
+/// What a scene can call for, and a user can set (doc/interface.md). Each pair and each moment counts for one effect
+/// alone. The second name of a row is that of the setting and of the published fields. Those are pairs in and out, but
+/// - rigid_bodies: bodies that turn, and how often one was placed for a part of the step;
+/// - unknown_space: voxels that the step sweeps, and those that the map does not know;
+/// - minimum_separation: pairs that carry a distance into the elementary test, and no uncertainty;
+/// - tracker_noise: pairs whose vertices bring an uncertainty radius;
+/// - look_ahead: of the last prediction, pairs past the filters, and contacts;
+/// - patches: contacts and edges through faces at the start, and patches.
+#define DCCD_EFFECTS(ROW)                     \
+  ROW(SELF_COLLISION, self_collision)         \
+  ROW(BODY_BODY, body_body)                   \
+  ROW(OCTOMAP, octomap)                       \
+  ROW(START_STATE, start_state)               \
+  ROW(RIGID_BODIES, rigid_bodies)             \
+  ROW(UNKNOWN_SPACE, unknown_space)           \
+  ROW(MINIMUM_SEPARATION, minimum_separation) \
+  ROW(TRACKER_NOISE, tracker_noise)           \
+  ROW(LOOK_AHEAD, look_ahead)                 \
+  ROW(PATCHES, patches)
+#define DCCD_EFFECT_ENUMERATOR(EFFECT, name) EFFECT,
+enum class Effect : std::uint8_t { DCCD_EFFECTS(DCCD_EFFECT_ENUMERATOR) COUNT };
+#undef DCCD_EFFECT_ENUMERATOR
 DCCD_EXPORT const char* toString(Stage stage);
 DCCD_EXPORT const char* toString(Effect effect);
 

@@ -140,37 +140,13 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.planar_ms = stats[Stage::PLANAR].ms;
   out.elementary_ms = stats[Stage::ELEMENTARY].ms;
   out.obstacle_ms = stats[Stage::OBSTACLE].ms;
-  out.start_state_ms = stats[Stage::START_STATE].ms;
   out.sort_ms = stats[Stage::SORT].ms;
-  out.self_collision_in = stats[Effect::SELF_COLLISION].in;
-  out.self_collision_out = stats[Effect::SELF_COLLISION].out;
-  out.self_collision_ms = stats[Effect::SELF_COLLISION].ms;
-  out.body_body_in = stats[Effect::BODY_BODY].in;
-  out.body_body_out = stats[Effect::BODY_BODY].out;
-  out.body_body_ms = stats[Effect::BODY_BODY].ms;
-  out.octomap_in = stats[Effect::OCTOMAP].in;
-  out.octomap_out = stats[Effect::OCTOMAP].out;
-  out.octomap_ms = stats[Effect::OCTOMAP].ms;
-  out.start_state_in = stats[Effect::START_STATE].in;
-  out.start_state_out = stats[Effect::START_STATE].out;
-  out.rigid_bodies_in = stats[Effect::RIGID_BODIES].in;
-  out.rigid_bodies_out = stats[Effect::RIGID_BODIES].out;
-  out.rigid_bodies_ms = stats[Effect::RIGID_BODIES].ms;
-  out.unknown_space_in = stats[Effect::UNKNOWN_SPACE].in;
-  out.unknown_space_out = stats[Effect::UNKNOWN_SPACE].out;
-  out.unknown_space_ms = stats[Effect::UNKNOWN_SPACE].ms;
-  out.minimum_separation_in = stats[Effect::MINIMUM_SEPARATION].in;
-  out.minimum_separation_out = stats[Effect::MINIMUM_SEPARATION].out;
-  out.minimum_separation_ms = stats[Effect::MINIMUM_SEPARATION].ms;
-  out.tracker_noise_in = stats[Effect::TRACKER_NOISE].in;
-  out.tracker_noise_out = stats[Effect::TRACKER_NOISE].out;
-  out.tracker_noise_ms = stats[Effect::TRACKER_NOISE].ms;
-  out.look_ahead_in = stats[Effect::LOOK_AHEAD].in;
-  out.look_ahead_out = stats[Effect::LOOK_AHEAD].out;
-  out.look_ahead_ms = stats[Effect::LOOK_AHEAD].ms;
-  out.patches_in = stats[Effect::PATCHES].in;
-  out.patches_out = stats[Effect::PATCHES].out;
-  out.patches_ms = stats[Effect::PATCHES].ms;
+#define DCCD_FILL_EFFECT(EFFECT, name)        \
+  out.name##_in = stats[Effect::EFFECT].in;   \
+  out.name##_out = stats[Effect::EFFECT].out; \
+  out.name##_ms = stats[Effect::EFFECT].ms;
+  DCCD_EFFECTS(DCCD_FILL_EFFECT)
+#undef DCCD_FILL_EFFECT
   out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
   out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
   out.unfolded_bodies = static_cast<std::uint32_t>(stats.unfolded_bodies);

@@ -147,24 +147,12 @@ Finding patches(const EffectScene& scene) {
   return {true, true, "contacts that belong together are told as one"};
 }
 
-/// By Effect: its name, and what a scene says of it.
-struct EffectRow {
-  const char* name;
-  Finding (*find)(const EffectScene&);
+/// By Effect: what a scene says of it.
+constexpr Finding (*FIND[])(const EffectScene&) = {
+    selfCollision, bodyBody,          octomap,      startState, rigidBodies,
+    unknownSpace,  minimumSeparation, trackerNoise, lookAhead,  patches,
 };
-constexpr EffectRow EFFECTS[] = {
-    {"self_collision", selfCollision},
-    {"body_body", bodyBody},
-    {"octomap", octomap},
-    {"start_state", startState},
-    {"rigid_bodies", rigidBodies},
-    {"unknown_space", unknownSpace},
-    {"minimum_separation", minimumSeparation},
-    {"tracker_noise", trackerNoise},
-    {"look_ahead", lookAhead},
-    {"patches", patches},
-};
-static_assert(std::size(EFFECTS) == static_cast<std::size_t>(Effect::COUNT), "a row for each effect");
+static_assert(std::size(FIND) == static_cast<std::size_t>(Effect::COUNT), "one for each effect");
 
 EffectDecision decide(const std::string& name, EffectSetting setting, const Finding& finding) {
   switch (setting) {
@@ -189,13 +177,19 @@ const char* toString(EffectSetting setting) {
   return setting == EffectSetting::AUTO ? "auto" : setting == EffectSetting::ON ? "on" : "off";
 }
 
-const char* toString(Effect effect) { return EFFECTS[static_cast<std::size_t>(effect)].name; }
+const char* toString(Effect effect) {
+#define DCCD_EFFECT_NAME(EFFECT, name) #name,
+  static constexpr const char* NAMES[] = {DCCD_EFFECTS(DCCD_EFFECT_NAME)};
+#undef DCCD_EFFECT_NAME
+  return NAMES[static_cast<std::size_t>(effect)];
+}
 
 EffectPlan::EffectPlan(const EffectScene& scene, const EffectSettings& settings) {
-  for (std::size_t e = 0; e < std::size(EFFECTS); ++e) {
-    const auto setting = settings.find(static_cast<Effect>(e));
-    decisions_.push_back(decide(EFFECTS[e].name, setting == settings.end() ? EffectSetting::AUTO : setting->second,
-                                EFFECTS[e].find(scene)));
+  for (std::size_t e = 0; e < std::size(FIND); ++e) {
+    const Effect effect = static_cast<Effect>(e);
+    const auto setting = settings.find(effect);
+    decisions_.push_back(
+        decide(toString(effect), setting == settings.end() ? EffectSetting::AUTO : setting->second, FIND[e](scene)));
   }
   if (!running(Effect::OCTOMAP)) return;
   const bool faces = !ropesOnly(scene);

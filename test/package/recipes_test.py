@@ -4,10 +4,11 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
-from checkout import CHECKOUT, tracked_files
+from checkout import CHECKOUT, TOOLS, tracked_files
 
 TOY_RUNG = '''#include "dccd/elementary.h"
 
@@ -37,11 +38,15 @@ RUNG = {
          '{"exact", makeExactRung, false, true},\n    {"toy", makeToyRung, false, false},\n')],
 }
 EFFECT = {
-    'include/dccd/outcome.h': (r'patches' + '\n  COUNT\n', 'patches\n  TOY,\n  COUNT\n'),
+    'include/dccd/outcome.h': ('ROW(PATCHES, patches)\n', 'ROW(PATCHES, patches) \\\n  ROW(TOY, toy)\n'),
     'src/step/effect_plan.cpp': [
         ('/// By Effect:', 'Finding toy(const EffectScene& scene) {\n  return {scene.bodies.size() > 1, true, "toys like company"};\n}\n\n'
                           '/// By Effect:'),
-        ('{"patches", patches},\n', '{"patches", patches},\n    {"toy", toy},\n')],
+        (' patches,\n};', ' patches, toy,\n};')],
+    'src/step/detect.cpp': ('  if (options->patches) patches.list(outcome);\n',
+                            '  if (options->patches) patches.list(outcome);\n'
+                            '  outcome.stats[Effect::TOY].in = step.bodies.size();\n'),
+    'msg/StepStats.msg': ('float64 patches_ms\n', 'float64 patches_ms\nuint64 toy_in\nuint64 toy_out\nfloat64 toy_ms\n'),
 }
 USER = r'''
 #include <dccd/accuracy.h>
@@ -70,8 +75,9 @@ int main() {
   EffectScene scene;
   scene.bodies = step.bodies;
   const EffectPlan plan(scene, {});
-  std::printf("%s %zu undecided %d %s\n", toString(allRungs().back()), outcome.counts.undecided,
-              plan.running(Effect::TOY), plan.lines()[static_cast<std::size_t>(Effect::TOY)].c_str());
+  std::printf("%s %zu undecided %d %s, %d of them\n", toString(allRungs().back()), outcome.counts.undecided,
+              plan.running(Effect::TOY), plan.lines()[static_cast<std::size_t>(Effect::TOY)].c_str(),
+              static_cast<int>(outcome.stats[Effect::TOY].in));
 }
 '''
 
@@ -81,7 +87,7 @@ def recipe(kind):
     page = (CHECKOUT / 'doc/development.md').read_text()
     text = page[page.index('**%s.**' % kind):]
     text = text[:text.index('\n\n')]
-    return set(re.findall(r'`((?:include|src)/[\w./]+)`', text))
+    return set(re.findall(r'`((?:include|src|msg)/[\w./]+)`', text))
 
 
 def apply(edits, tree):
@@ -124,7 +130,22 @@ class RecipesTest(unittest.TestCase):
                 ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
                 self.assertEqual(ran.returncode, 0, ran.stdout[-3000:] + ran.stderr[-3000:])
             said = subprocess.run([str(tree / 'user')], capture_output=True, text=True, check=True).stdout
-            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company$')
+            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company, 2 of them$')
+            self.publish_toy(tree)
+
+    def publish_toy(self, tree):
+        """The message with the toy's fields is generated, and what fills it compiles: it names the fields of each row."""
+        headers = TOOLS.parents[1] / 'include'
+        generator = shutil.which('gen_cpp.py') or '/usr/lib/gencpp/gen_cpp.py'
+        if not (headers / 'deformable_ccd/StepStats.h').is_file() or not os.path.isfile(generator):
+            self.skipTest('the toy was built and seen; no messages are generated here, so that its fields were not')
+        for command in ([sys.executable, generator, 'msg/StepStats.msg', '-p', 'deformable_ccd', '-o', 'made/deformable_ccd',
+                         '-I', 'deformable_ccd:msg', '-I', 'std_msgs:/usr/share/std_msgs/msg', '-e', '/usr/share/gencpp'],
+                        ['g++', '-std=c++17', '-fsyntax-only', '-Imade', '-Iinclude', '-Isrc', '-I' + str(headers),
+                         '-isystem', '/usr/include/eigen3', 'src/output/output_messages.cpp']):
+            ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+            self.assertEqual(ran.returncode, 0, ran.stdout[-3000:] + ran.stderr[-3000:])
+        self.assertIn('_toy_ms_type toy_ms;', (tree / 'made/deformable_ccd/StepStats.h').read_text())
 
 
 if __name__ == '__main__':
