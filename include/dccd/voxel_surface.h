@@ -52,16 +52,28 @@ class DCCD_EXPORT VoxelSurface {
 };
 
 struct ObstacleStats {
-  std::uint64_t vertex_pairs_in = 0, edge_pairs_in = 0, corner_pairs_in = 0;  ///< candidates past the bounds
-  std::uint64_t vertex_contacts = 0, edge_contacts = 0, corner_contacts = 0;
-  std::uint64_t initial = 0, leaving = 0;
-  TierCounters tiers;  ///< of the pairs that reached the elementary test
-  double ms = 0;
+  std::uint64_t pairs_in = 0;  ///< candidates past the bounds
 };
 
 struct ObstacleOptions {
   AccuracyOptions accuracy;
   double minimum_separation_m = 0;  ///< contact when closer than this; conservative only when > 0
+};
+
+/// What ObstacleCheck is asked: one body's step in the map's frame. It names what must live until the answer.
+struct ObstacleQuery {
+  const VoxelSurface& surface;
+  const Topology& topology;
+  const Positions& map_t0;
+  const Positions& map_t1;
+  std::uint16_t body = 0;                       ///< for Contact::body[0]
+  const std::uint8_t* vertex_active = nullptr;  ///< a byte a vertex, 0 leaves out it and its features; null: all count
+  /// Uncertainty per vertex, 0 or more; null: none. The largest one of a feature adds to the separation, which only
+  /// conservative can hold.
+  const double* vertex_radius_m = nullptr;
+  Deadline deadline;  ///< features that have not been begun by then are left out
+  /// So many contacts at most are appended; of more, those found first.
+  std::size_t most_found = std::numeric_limits<std::size_t>::max();
 };
 
 /// Mesh vertices against exposed voxel faces, mesh edges against convex voxel edges, voxel corners against mesh faces,
@@ -75,22 +87,14 @@ struct ObstacleOptions {
 /// - `leaving`: a feature that touched some leaf at t=0 meets another one's face, edge or corner from within.
 /// Rungs: vertices are always decided exactly (the path of a point through a box is linear); edges and corners by the
 /// elementary test.
-/// Reusable scratch inside: after warm-up a run
-/// allocates nothing that grows with the number of steps. Not thread-safe; one per thread or body.
+/// Reusable scratch inside: after warm-up a run allocates nothing that grows with the number of steps. Not thread-safe;
+/// one per thread or body.
 class DCCD_EXPORT ObstacleCheck {
  public:
   explicit ObstacleCheck(const ObstacleOptions& options);
   ~ObstacleCheck();
-  /// Appends contacts (body index in Contact::body[0], OBSTACLE_BODY in [1]) in canonical order.
-  /// vertex_active: one byte a vertex, 0 leaves the vertex and every feature on it out; null means all.
-  /// vertex_radius_m: uncertainty per vertex, 0 or more; null means none. A feature's largest one adds to the
-  /// separation, so that rungs other than conservative cannot hold it. deadline: features that have not been
-  /// begun by then are left out, and false is returned. most_found: so many contacts at most are appended; of more,
-  /// those found first, and false is returned.
-  bool run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0, const Positions& map_t1,
-           const std::uint8_t* vertex_active, std::uint16_t body, std::vector<Contact>& contacts, ObstacleStats& stats,
-           const double* vertex_radius_m = nullptr, const Deadline& deadline = {},
-           std::size_t most_found = std::numeric_limits<std::size_t>::max());
+  /// Appends contacts (OBSTACLE_BODY in Contact::body[1]) in canonical order. False: the deadline left features out.
+  bool run(const ObstacleQuery& query, std::vector<Contact>& contacts, ObstacleStats& stats);
   /// Whether the last run had more to find than most_found.
   bool isFull() const;
 

@@ -84,7 +84,6 @@ void ObstacleBatch::clear(const Deadline& deadline) {
   any_separation_ = false;
   releaseBurst(contacts_);
   contacts_.clear();
-  tiers_ = TierCounters();
 }
 
 void ObstacleBatch::add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m) {
@@ -106,7 +105,8 @@ void ObstacleBatch::flush() {
   batch.count = count;
   if (any_separation_) batch.minimum_separation_m = separations_.data();
   if (deadline_.canEnd()) batch.deadline = &deadline_;
-  test_->run(batch, results_.data(), tiers_);
+  TierCounters uncounted;  // statistics tell of pairs of meshes alone
+  test_->run(batch, results_.data(), uncounted);
   for (std::size_t i = 0; i < count; ++i) {
     if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);
   }

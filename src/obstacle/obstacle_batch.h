@@ -33,7 +33,6 @@ class ObstacleBatch {
 
   std::vector<Contact>& contacts() { return contacts_; }
   const std::vector<Contact>& contacts() const { return contacts_; }
-  const TierCounters& tiers() const { return tiers_; }
 
  private:
   void append(std::size_t index, const ElementaryResult& result);
@@ -50,7 +49,6 @@ class ObstacleBatch {
   std::vector<double> separations_;
   std::vector<ElementaryResult> results_;
   std::vector<Contact> contacts_;
-  TierCounters tiers_;
 };
 
 /// Sorts contacts canonically and joins those of one mesh feature and one leaf into one: the earliest time counts, and

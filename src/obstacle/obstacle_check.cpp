@@ -1,6 +1,5 @@
 // One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for
 // each face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -12,13 +11,6 @@
 #include "obstacle/burst.h"
 
 namespace dccd {
-namespace {
-
-double millisecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-}  // namespace
 
 std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options) {
   if (!(options.minimum_separation_m >= 0 && std::isfinite(options.minimum_separation_m))) {
@@ -35,8 +27,8 @@ std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options) {
 
 bool ObstacleCheck::Impl::reachesSurface(const Run& run) const {
   Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
-  const std::size_t count = run.topology->vertexCount();
-  for (const Positions* positions : {run.t0, run.t1}) {
+  const std::size_t count = run.query.topology.vertexCount();
+  for (const Positions* positions : {&run.query.map_t0, &run.query.map_t1}) {
     for (std::size_t i = 0; i < count; ++i) {
       const double* p = (*positions)[i].data();
       for (int axis = 0; axis < 3; ++axis) {  // a NaN fails both comparisons and changes nothing
@@ -56,26 +48,29 @@ bool ObstacleCheck::Impl::reachesSurface(const Run& run) const {
 /// A face reaches as far as its most uncertain vertex asks for, and is found by the keys of all its vertices: each
 /// takes the reach of its features.
 void ObstacleCheck::Impl::prepareReaches(const Run& run) {
-  reaches.assign(run.radius_m ? std::max<std::size_t>(run.topology->vertexCount(), 1) : 1,
+  reaches.assign(run.query.vertex_radius_m ? std::max<std::size_t>(run.query.topology.vertexCount(), 1) : 1,
                  options.minimum_separation_m);
-  if (!run.radius_m) return;
-  for (const Edge& edge : run.topology->edges()) {
+  if (!run.query.vertex_radius_m) return;
+  for (const Edge& edge : run.query.topology.edges()) {
     const double reach = separationOf(run, edge);
     for (const Index v : edge) reaches[v] = std::max(reaches[v], reach);
   }
 }
 
-void ObstacleCheck::Impl::prepareVertices(const Run& run, const std::uint8_t* vertex_active) {
-  keys.resize(run.topology->vertexCount());
-  start_keys.resize(run.topology->vertexCount());
-  state.assign(run.topology->vertexCount(), 0);
-  for (const Index v : run.topology->usedVertices()) {
-    const Vec3 &p0 = (*run.t0)[v], &p1 = (*run.t1)[v];
+void ObstacleCheck::Impl::prepareVertices(const Run& run) {
+  const Topology& topology = run.query.topology;
+  const Positions &t0 = run.query.map_t0, &t1 = run.query.map_t1;
+  const std::uint8_t* active = run.query.vertex_active;
+  keys.resize(topology.vertexCount());
+  start_keys.resize(topology.vertexCount());
+  state.assign(topology.vertexCount(), 0);
+  for (const Index v : topology.usedVertices()) {
+    const Vec3 &p0 = t0[v], &p1 = t1[v];
     // x - x is 0 for finite x only.
     const double finite = (p0 - p0).sum() + (p1 - p1).sum();
-    if ((vertex_active != nullptr && vertex_active[v] == 0) || !(finite == 0)) continue;
+    if ((active != nullptr && active[v] == 0) || !(finite == 0)) continue;
     start_keys[v] = pointKeys(p0, run.surface->inverse_resolution, 0);
-    const double reach = reaches[run.radius_m ? v : 0];
+    const double reach = reaches[run.query.vertex_radius_m ? v : 0];
     if (reach > 0) {
       keys[v] = pointKeys(p0, run.surface->inverse_resolution, reach);
     } else {
@@ -99,7 +94,7 @@ std::uint8_t ObstacleCheck::Impl::nearBits(const Run& run, const KeyLanes& swept
 
 void ObstacleCheck::Impl::markNearFaces(const Run& run) {
   near_faces.clear();
-  const std::vector<Face>& faces = run.topology->faces();
+  const std::vector<Face>& faces = run.query.topology.faces();
   for (std::size_t f = 0; f < faces.size() && !isLate(run); ++f) {
     const Face& face = faces[f];
     // The other features of a face with an inactive vertex are looked at themselves.
@@ -117,7 +112,7 @@ void ObstacleCheck::Impl::markNearFaces(const Run& run) {
 
 void ObstacleCheck::Impl::markNearEdges(const Run& run) {
   near_faces.clear();
-  for (const Edge& edge : run.topology->edges()) {
+  for (const Edge& edge : run.query.topology.edges()) {
     if (isLate(run)) return;
     std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
     bool corner = false;
@@ -131,11 +126,11 @@ void ObstacleCheck::Impl::markNearEdges(const Run& run) {
 /// A feature and a leaf may meet in a dozen places, which are joined now and then. A contact that was settled and one
 /// that was tested may still be the same: hence twice the number.
 bool ObstacleCheck::Impl::foundTooMuch(const Run& run) {
-  if (run.most_found == NO_LIMIT || foundCount() <= 2 * std::max(run.most_found, joined)) return false;
+  if (run.query.most_found == NO_LIMIT || foundCount() <= 2 * std::max(run.query.most_found, joined)) return false;
   for (auto* list : {&vertex_contacts, &edge_contacts, &face_contacts}) sortAndJoin(*list);
   for (ObstacleBatch* batch : {&vertex_batch, &edge_batch, &corner_batch}) sortAndJoin(batch->contacts());
   joined = foundCount();
-  return joined > 2 * run.most_found;
+  return joined > 2 * run.query.most_found;
 }
 
 std::size_t ObstacleCheck::Impl::foundCount() const {
@@ -144,11 +139,9 @@ std::size_t ObstacleCheck::Impl::foundCount() const {
   return sum;
 }
 
-void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found,
-                                  ObstacleStats& stats) {
-  const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch, std::uint64_t& count) {
+void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found) {
+  const auto append = [&](std::vector<Contact>& settled, ObstacleBatch& batch) {
     batch.flush();
-    stats.tiers += batch.tiers();
     // Settled ones are mostly in order already, and the tested ones few.
     std::vector<Contact>& tested = batch.contacts();
     sortAndJoin(tested);
@@ -160,18 +153,13 @@ void ObstacleCheck::Impl::collect(std::vector<Contact>& contacts, std::size_t fi
       sortAndJoin(settled);
     }
     contacts.insert(contacts.end(), settled.begin(), settled.end());
-    count += settled.size();
   };
-  append(vertex_contacts, vertex_batch, stats.vertex_contacts);
-  append(edge_contacts, edge_batch, stats.edge_contacts);
-  append(face_contacts, corner_batch, stats.corner_contacts);
+  append(vertex_contacts, vertex_batch);
+  append(edge_contacts, edge_batch);
+  append(face_contacts, corner_batch);
   if (contacts.size() - first > most_found) {
     full = late = true;
     contacts.resize(first + most_found);
-  }
-  for (std::size_t i = first; i < contacts.size(); ++i) {
-    stats.initial += contacts[i].initial;
-    stats.leaving += contacts[i].leaving;
   }
 }
 
@@ -191,23 +179,19 @@ void ObstacleCheck::Impl::begin(const Deadline& deadline) {
 ObstacleCheck::ObstacleCheck(const ObstacleOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 ObstacleCheck::~ObstacleCheck() = default;
 
-bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, const Positions& map_t0,
-                        const Positions& map_t1, const std::uint8_t* vertex_active, std::uint16_t body,
-                        std::vector<Contact>& contacts, ObstacleStats& stats, const double* vertex_radius_m,
-                        const Deadline& deadline, std::size_t most_found) {
-  const auto start = std::chrono::steady_clock::now();
-  if (map_t0.size() != topology.vertexCount() || map_t1.size() != topology.vertexCount()) {
-    throw std::invalid_argument("positions of " + std::to_string(map_t0.size()) + " and " +
-                                std::to_string(map_t1.size()) + " vertices, the topology has " +
+bool ObstacleCheck::run(const ObstacleQuery& query, std::vector<Contact>& contacts, ObstacleStats& stats) {
+  const Topology& topology = query.topology;
+  if (query.map_t0.size() != topology.vertexCount() || query.map_t1.size() != topology.vertexCount()) {
+    throw std::invalid_argument("positions of " + std::to_string(query.map_t0.size()) + " and " +
+                                std::to_string(query.map_t1.size()) + " vertices, the topology has " +
                                 std::to_string(topology.vertexCount()));
   }
   Impl& impl = *impl_;
-  const Impl::Run run{&surface.impl(), &topology,       &map_t0,  &map_t1,   body,
-                      &stats,          vertex_radius_m, deadline, most_found};
-  impl.begin(deadline);
+  const Impl::Run run{query, &query.surface.impl(), &stats};
+  impl.begin(query.deadline);
   impl.prepareReaches(run);
-  if (surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
-    impl.prepareVertices(run, vertex_active);
+  if (query.surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
+    impl.prepareVertices(run);
     if (topology.hasFaces()) {
       impl.markNearFaces(run);
     } else {
@@ -216,9 +200,8 @@ bool ObstacleCheck::run(const VoxelSurface& surface, const Topology& topology, c
     impl.runVertices(run);
     impl.runEdges(run);
     impl.runFaces(run);
-    impl.collect(contacts, contacts.size(), most_found, stats);
+    impl.collect(contacts, contacts.size(), query.most_found);
   }
-  stats.ms += millisecondsSince(start);
   return !impl.late;
 }
 

@@ -1,4 +1,4 @@
-// What one obstacle test holds and does: obstacle_test.cpp has the flow, obstacle_features.cpp the features' tests.
+// What an ObstacleCheck holds and does: obstacle_check.cpp has the flow, obstacle_features.cpp the features' tests.
 #pragma once
 
 #include <algorithm>
@@ -40,16 +40,10 @@ struct ObstacleCheck::Impl {
 
   /// What one run works on.
   struct Run {
+    const ObstacleQuery& query;
     const VoxelSurface::Impl* surface;
-    const Topology* topology;
-    const Positions* t0;
-    const Positions* t1;
-    std::uint16_t body;
     ObstacleStats* stats;
-    const double* radius_m = nullptr;  ///< uncertainty per vertex; null: none
-    Deadline deadline;
-    std::size_t most_found = NO_LIMIT;
-    bool isUnlimited() const { return deadline.isNever() && most_found == NO_LIMIT; }
+    bool isUnlimited() const { return query.deadline.isNever() && query.most_found == NO_LIMIT; }
   };
   static constexpr std::size_t NO_LIMIT = std::numeric_limits<std::size_t>::max();
 
@@ -58,8 +52,8 @@ struct ObstacleCheck::Impl {
   template <class Feature>
   double separationOf(const Run& run, const Feature& feature) const {
     double radius = 0;
-    if (run.radius_m) {
-      for (const Index v : feature) radius = std::max(radius, run.radius_m[v]);
+    if (run.query.vertex_radius_m) {
+      for (const Index v : feature) radius = std::max(radius, run.query.vertex_radius_m[v]);
     }
     // Rounded up, so that a contact at exactly the sum is none too far.
     return radius > 0 ? (options.minimum_separation_m + radius) * (1 + tolerance::SEPARATION_SUM)
@@ -70,7 +64,8 @@ struct ObstacleCheck::Impl {
   bool isLate(const Run& run) {
     if (late || run.isUnlimited() || (looked_at++ & 31) != 0) return late;
     full = full || foundTooMuch(run);
-    return late = full || run.deadline.movedBy(-LISTING_A_CONTACT * static_cast<std::int64_t>(foundCount())).isOver();
+    return late = full ||
+                  run.query.deadline.movedBy(-LISTING_A_CONTACT * static_cast<std::int64_t>(foundCount())).isOver();
   }
   /// Contacts so far, of which some may be the same.
   std::size_t foundCount() const;
@@ -81,7 +76,7 @@ struct ObstacleCheck::Impl {
   void begin(const Deadline& deadline);
   bool reachesSurface(const Run& run) const;
   void prepareReaches(const Run& run);
-  void prepareVertices(const Run& run, const std::uint8_t* vertex_active);
+  void prepareVertices(const Run& run);
   /// What the keys of a face or an edge reach, as NEAR bits for its vertices; corner: also a corner.
   std::uint8_t nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start, bool& corner) const;
   void markNearFaces(const Run& run);
@@ -107,17 +102,16 @@ struct ObstacleCheck::Impl {
                  double separation_m, std::uint32_t leaf, bool inside);
   void cornerPairs(const Run& run, const Face& face, const VertexMotion* points, const MovingBounds& moving,
                    double separation_m, std::uint32_t leaf, bool inside);
-  void collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found, ObstacleStats& stats);
+  void collect(std::vector<Contact>& contacts, std::size_t first, std::size_t most_found);
 
   Contact contactOf(const Run& run, PairKind kind, std::uint32_t leaf) const;
   void setInitial(Contact& contact);
   void setTime(Contact& contact, const CrossingTime& time);
-  template <class Feature>
-  bool settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points, std::uint32_t leaf,
-                  const LeafBox& target, const double* outward, double separation_m, bool inside,
+  /// points: those of the mesh's feature, 2 or 3.
+  bool settleFall(const ObstaclePair& pair, const VertexMotion* points, std::size_t count, const LeafBox& target,
                   std::vector<Contact>& contacts);
   VertexMotion motionOf(const Run& run, Index vertex) const {
-    const Vec3 &a = (*run.t0)[vertex], &b = (*run.t1)[vertex];
+    const Vec3 &a = run.query.map_t0[vertex], &b = run.query.map_t1[vertex];
     return {{a.x(), a.y(), a.z(), 0}, {b.x(), b.y(), b.z(), 0}};
   }
   template <class Feature>
@@ -134,9 +128,10 @@ struct ObstacleCheck::Impl {
   static constexpr std::size_t LEAVES_PER_LOOK_AT_THE_CLOCK = 4096;
   bool addNear(const Run& run, std::uint32_t leaf) {
     if (near_leaves.size() % LEAVES_PER_LOOK_AT_THE_CLOCK == LEAVES_PER_LOOK_AT_THE_CLOCK - 1) {
-      late = late || run.deadline.movedBy(-SORTING_A_LEAF * static_cast<std::int64_t>(near_leaves.size())).isOver();
+      late =
+          late || run.query.deadline.movedBy(-SORTING_A_LEAF * static_cast<std::int64_t>(near_leaves.size())).isOver();
     }
-    if (run.most_found != NO_LIMIT && near_leaves.size() == MOST_NEAR_LEAVES) {
+    if (run.query.most_found != NO_LIMIT && near_leaves.size() == MOST_NEAR_LEAVES) {
       full = late = true;
     } else {
       near_leaves.push_back(leaf);

@@ -82,7 +82,7 @@ Contact ObstacleCheck::Impl::contactOf(const Run& run, PairKind kind, std::uint3
   const OccupiedLeaf& occupied = run.surface->tree.leaves()[leaf];
   Contact contact;
   contact.kind = kind;
-  contact.body = {run.body, OBSTACLE_BODY};
+  contact.body = {run.query.body, OBSTACLE_BODY};
   contact.voxel = occupied.min;
   contact.voxel_size = occupied.size;
   return contact;
@@ -129,11 +129,9 @@ void ObstacleCheck::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vec
 /// that is lowered): it meets the target, a leaf's edge or corner as a flat box, where it meets the target's shadow, at
 /// the first time at which it is at the target's height. Settled exactly here, since such scenes are full of contacts
 /// on borders, which are slow to decide in general. False where the feature moves otherwise.
-template <class Feature>
-bool ObstacleCheck::Impl::settleFall(const Run& run, PairKind kind, const Feature& feature, const VertexMotion* points,
-                                     std::uint32_t leaf, const LeafBox& target, const double* outward,
-                                     double separation_m, bool inside, std::vector<Contact>& contacts) {
-  const int axis = separation_m > 0 ? -1 : fallAxis(points, feature.size());
+bool ObstacleCheck::Impl::settleFall(const ObstaclePair& pair, const VertexMotion* points, std::size_t count,
+                                     const LeafBox& target, std::vector<Contact>& contacts) {
+  const int axis = fallAxis(points, count);
   if (axis < 0) return false;
   const double from = points[0].t0[axis], to = points[0].t1[axis];
   if (std::max(from, to) < target.lo[axis] || std::min(from, to) > target.hi[axis]) return true;
@@ -141,13 +139,12 @@ bool ObstacleCheck::Impl::settleFall(const Run& run, PairKind kind, const Featur
   const double plane = from < target.lo[axis] ? target.lo[axis] : target.hi[axis];
   LeafBox shadow = target;
   shadow.lo[axis] = shadow.hi[axis] = from;
-  const bool meets = feature.size() == 2
+  const bool meets = count == 2
                          ? segmentMeetsBox(points[0].t0, points[1].t0, shadow)
                          : triangleMeetsBox(points[0].t0, points[1].t0, points[2].t0, shadow) != TriangleStart::APART;
   if (!meets) return true;
-  Contact contact = contactOf(run, kind, leaf);
-  std::copy(feature.begin(), feature.end(), contact.vertex.begin());
-  contact.leaving = inside && (to - from) * outward[axis] > 0;
+  Contact contact = pair.contact;
+  contact.leaving = pair.started_inside && (to - from) * pair.outward[axis] > 0;
   setTime(contact, CrossingTime(plane, from, to));
   contacts.push_back(contact);
   return true;
@@ -155,13 +152,13 @@ bool ObstacleCheck::Impl::settleFall(const Run& run, PairKind kind, const Featur
 
 void ObstacleCheck::Impl::runVertices(const Run& run) {
   const double resolution = run.surface->resolution_m;
-  for (const Index v : run.topology->usedVertices()) {
+  for (const Index v : run.query.topology.usedVertices()) {
     if ((state[v] & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
     if (isLate(run)) return;
     findLeaves(run, keys[v].box());
     if (near_leaves.empty()) continue;
-    run.stats->vertex_pairs_in += near_leaves.size();
-    const double* p0 = (*run.t0)[v].data();
+    run.stats->pairs_in += near_leaves.size();
+    const double* p0 = run.query.map_t0[v].data();
     std::size_t apart = 0;
     for (const std::uint32_t leaf : near_leaves) {
       if (isLate(run)) return;
@@ -179,7 +176,7 @@ void ObstacleCheck::Impl::runVertices(const Run& run) {
       if (!(run.surface->features[near_leaves[i]] & FACE_MASK)) continue;
       if (separationOf(run, std::array<Index, 1>{v}) > 0) {
         vertexSeparation(run, v, near_leaves[i], inside);
-      } else if ((*run.t0)[v] != (*run.t1)[v]) {
+      } else if (run.query.map_t0[v] != run.query.map_t1[v]) {
         vertexPath(run, v, near_leaves[i], inside);
       }
     }
@@ -188,8 +185,8 @@ void ObstacleCheck::Impl::runVertices(const Run& run) {
 
 void ObstacleCheck::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
   const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
-  const FaceHit hit =
-      firstFaceHit((*run.t0)[vertex].data(), (*run.t1)[vertex].data(), box, run.surface->features[leaf] & FACE_MASK);
+  const FaceHit hit = firstFaceHit(run.query.map_t0[vertex].data(), run.query.map_t1[vertex].data(), box,
+                                   run.surface->features[leaf] & FACE_MASK);
   if (!hit.hit) return;
   Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
   contact.vertex[0] = vertex;
@@ -225,7 +222,7 @@ void ObstacleCheck::Impl::vertexSeparation(const Run& run, Index vertex, std::ui
 }
 
 void ObstacleCheck::Impl::runEdges(const Run& run) {
-  for (const Edge& edge : run.topology->edges()) {
+  for (const Edge& edge : run.query.topology.edges()) {
     const std::uint8_t both = state[edge[0]] & state[edge[1]], either = state[edge[0]] | state[edge[1]];
     if ((both & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
     if (isLate(run)) return;
@@ -237,7 +234,7 @@ void ObstacleCheck::Impl::runEdges(const Run& run) {
     run.surface->tree.visitLeavesWithEdges(unite(keys, edge).box(),
                                            [&](std::uint32_t leaf) { return addNear(run, leaf); });
     if (near_leaves.empty()) continue;
-    run.stats->edge_pairs_in += near_leaves.size();
+    run.stats->pairs_in += near_leaves.size();
     const VertexMotion points[2] = {motionOf(run, edge[0]), motionOf(run, edge[1])};
     const double separation_m = separationOf(run, edge);
     const MovingBounds moving = boundsOf(points, 2, separation_m);
@@ -254,7 +251,7 @@ bool ObstacleCheck::Impl::edgeStartsInside(const Run& run, const Edge& edge) {
   for (const std::uint32_t leaf : near_leaves) {
     if (isLate(run)) break;
     const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
-    if (!segmentMeetsBox((*run.t0)[edge[0]].data(), (*run.t0)[edge[1]].data(), box)) continue;
+    if (!segmentMeetsBox(run.query.map_t0[edge[0]].data(), run.query.map_t0[edge[1]].data(), box)) continue;
     inside = true;
     addInitial(run, PairKind::EDGE_VOXEL_EDGE, edge, leaf, edge_contacts);
   }
@@ -293,10 +290,7 @@ void ObstacleCheck::Impl::edgePairs(const Run& run, const Edge& edge, const Vert
       pair.outward[b] = side_b ? 1 : -1;
       pair.outward[c] = side_c ? 1 : -1;
       const LeafBox target{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
-      if (settleFall(run, PairKind::EDGE_VOXEL_EDGE, edge, points, leaf, target, pair.outward, separation_m, inside,
-                     edge_contacts)) {
-        continue;
-      }
+      if (separation_m == 0 && settleFall(pair, points, 2, target, edge_contacts)) continue;
       const VertexMotion quad[4] = {points[0], points[1], fixedPoint(low[0], low[1], low[2]),
                                     fixedPoint(high[0], high[1], high[2])};
       edge_batch.add(pair, quad, tocBound(moving, target, separation_m), separation_m);
@@ -307,7 +301,7 @@ void ObstacleCheck::Impl::edgePairs(const Run& run, const Edge& edge, const Vert
 void ObstacleCheck::Impl::runFaces(const Run& run) {
   for (const NearFace& near : near_faces) {
     if (isLate(run)) return;
-    const Face& face = run.topology->faces()[near.face];
+    const Face& face = run.query.topology.faces()[near.face];
     const std::uint8_t any = state[face[0]] | state[face[1]] | state[face[2]];
     bool inside = (any & INSIDE) != 0;
     if (!inside && near.start) inside = faceStartsInside(run, face);
@@ -315,7 +309,7 @@ void ObstacleCheck::Impl::runFaces(const Run& run) {
     near_leaves.clear();
     run.surface->tree.visitLeavesWithCorners(unite(keys, face).box(),
                                              [&](std::uint32_t leaf) { return addNear(run, leaf); });
-    run.stats->corner_pairs_in += near_leaves.size();
+    run.stats->pairs_in += near_leaves.size();
     if (near_leaves.empty()) continue;
     const VertexMotion points[3] = {motionOf(run, face[0]), motionOf(run, face[1]), motionOf(run, face[2])};
     const double separation_m = separationOf(run, face);
@@ -329,7 +323,8 @@ void ObstacleCheck::Impl::runFaces(const Run& run) {
 
 bool ObstacleCheck::Impl::faceStartsInside(const Run& run, const Face& face) {
   findLeaves(run, unite(start_keys, face).box());
-  const double *p0 = (*run.t0)[face[0]].data(), *p1 = (*run.t0)[face[1]].data(), *p2 = (*run.t0)[face[2]].data();
+  const double *p0 = run.query.map_t0[face[0]].data(), *p1 = run.query.map_t0[face[1]].data(),
+               *p2 = run.query.map_t0[face[2]].data();
   std::size_t pierced = 0;
   for (const std::uint32_t leaf : near_leaves) {
     if (isLate(run)) return true;
@@ -368,10 +363,7 @@ void ObstacleCheck::Impl::cornerPairs(const Run& run, const Face& face, const Ve
         contactOf(run, PairKind::FACE_VOXEL_CORNER, leaf), {x ? 1.0 : -1.0, y ? 1.0 : -1.0, z ? 1.0 : -1.0}, inside};
     std::copy(face.begin(), face.end(), pair.contact.vertex.begin());
     const LeafBox target{{corner[0], corner[1], corner[2]}, {corner[0], corner[1], corner[2]}};
-    if (settleFall(run, PairKind::FACE_VOXEL_CORNER, face, points, leaf, target, pair.outward, separation_m, inside,
-                   face_contacts)) {
-      continue;
-    }
+    if (separation_m == 0 && settleFall(pair, points, 3, target, face_contacts)) continue;
     const VertexMotion quad[4] = {fixedPoint(corner[0], corner[1], corner[2]), points[0], points[1], points[2]};
     corner_batch.add(pair, quad, tocBound(moving, target, separation_m), separation_m);
   }

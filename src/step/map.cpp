@@ -5,13 +5,6 @@
 #include "step/map_frame.h"
 
 namespace dccd {
-namespace {
-
-std::uint64_t pairsIn(const ObstacleStats& stats) {
-  return stats.vertex_pairs_in + stats.edge_pairs_in + stats.corner_pairs_in;
-}
-
-}  // namespace
 
 bool History::Impl::takeMapAnswer(std::size_t b, const Part& part, std::size_t room, ObstacleStats& total) {
   if (b >= carried.map.size() || !options->keep_bounds) return false;
@@ -21,7 +14,7 @@ bool History::Impl::takeMapAnswer(std::size_t b, const Part& part, std::size_t r
   if (!same) known = MapAnswer();
   if (!same || known.contacts.size() > room) return false;
   result.contacts.insert(result.contacts.end(), known.contacts.begin(), known.contacts.end());
-  total.vertex_pairs_in += known.pairs;
+  total.pairs_in += known.pairs;
   ++result.stats.map_answers_kept;
   return true;
 }
@@ -45,35 +38,33 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
     o.minimum_separation_m = scene.separation(b, OBSTACLE_BODY);
     obstacle_checks[b] = std::make_unique<ObstacleCheck>(o);
   }
-  const std::uint8_t* active = nullptr;
+  const Body& moving = part.step.bodies[b];
+  ObstacleQuery query{*map_reduced, *body.setup.topology, inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0),
+                      inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1)};
+  query.body = static_cast<std::uint16_t>(b);
   if (body.masked) {
     obstacle_active.assign(body.setup.topology->vertexCount(), 0);
     for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];
-    active = obstacle_active.data();
+    query.vertex_active = obstacle_active.data();
   }
-  const Body& moving = part.step.bodies[b];
-  const Positions& t0 = inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0);
-  const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1);
-  const std::size_t room =
-      found_limit == FoundLimit::NONE ? FoundLimit::NONE : found_limit - std::min(found_limit, result.contacts.size());
+  if (body.uncertain) query.vertex_radius_m = moving.radius_m->data();
+  if (found_limit != FoundLimit::NONE) query.most_found = found_limit - std::min(found_limit, result.contacts.size());
   const Deadline::Clock::time_point start = Deadline::Clock::now();
-  const std::uint64_t in_before = pairsIn(total), out_before = result.contacts.size();
+  const std::uint64_t in_before = total.pairs_in, out_before = result.contacts.size();
   const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
                         : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
                                                                  : Effect::OCTOMAP;
   const auto count = [&] {
-    result.stats[effect] += StageStats{pairsIn(total) - in_before, result.contacts.size() - out_before, msSince(start)};
+    result.stats[effect] += StageStats{total.pairs_in - in_before, result.contacts.size() - out_before, msSince(start)};
   };
-  if (takeMapAnswer(b, part, room, total)) {
+  if (takeMapAnswer(b, part, query.most_found, total)) {
     count();
     return true;
   }
-  const Deadline deadline = part.deadline.movedBy(-per_hit * static_cast<std::int64_t>(result.contacts.size()));
-  const bool whole = obstacle_checks[b]->run(*map_reduced, *body.setup.topology, t0, t1, active,
-                                             static_cast<std::uint16_t>(b), result.contacts, total,
-                                             body.uncertain ? moving.radius_m->data() : nullptr, deadline, room);
+  query.deadline = part.deadline.movedBy(-per_hit * static_cast<std::int64_t>(result.contacts.size()));
+  const bool whole = obstacle_checks[b]->run(query, result.contacts, total);
   if (obstacle_checks[b]->isFull()) result.cut = true;
-  if (whole && !obstacle_checks[b]->isFull()) keepMapAnswer(b, part, out_before, pairsIn(total) - in_before);
+  if (whole && !obstacle_checks[b]->isFull()) keepMapAnswer(b, part, out_before, total.pairs_in - in_before);
   count();
   return whole;
 }
@@ -95,7 +86,7 @@ void History::Impl::runMap(const Part& part) {
   if (!std::is_sorted(first, result.contacts.end(), canonicalLess)) {
     std::sort(first, result.contacts.end(), canonicalLess);
   }
-  result.stats[Stage::OBSTACLE] = {pairsIn(total), result.contacts.size() - before, msSince(start)};
+  result.stats[Stage::OBSTACLE] = {total.pairs_in, result.contacts.size() - before, msSince(start)};
   for (std::size_t i = before; i < result.contacts.size(); ++i) {
     const Contact& c = result.contacts[i];
     result.stats.initial += c.initial;

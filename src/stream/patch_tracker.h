@@ -37,9 +37,6 @@ class PatchTracker {
   /// The map of the step before the first one that is followed.
   void knowMap(const Outcome& before);
 
-  std::size_t livingCount() const { return living_.size(); }
-  std::size_t traceSize() const { return trace_.spots.size(); }
-
  private:
   struct Living {
     std::array<std::uint16_t, 2> body{0, 0};

@@ -122,8 +122,8 @@ std::vector<Contact> contactsOf(const ObstacleScene& scene, const ObstacleOption
   ObstacleCheck test(options);
   std::vector<Contact> contacts;
   ObstacleStats stats;
-  test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 3,
-           contacts, stats);
+  const auto surface = VoxelSurface::build(scene.resolution_m, scene.leaves);
+  test.run({*surface, scene.topology, scene.t0, scene.t1, 3}, contacts, stats);
   return contacts;
 }
 

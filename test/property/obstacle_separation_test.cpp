@@ -61,8 +61,8 @@ TEST(ObstacleSeparation, NeverLateNothingMissedNothingFarther) {
     ObstacleCheck test(options);
     std::vector<Contact> contacts;
     ObstacleStats stats;
-    test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
-             contacts, stats);
+    const auto surface = VoxelSurface::build(scene.resolution_m, scene.leaves);
+    test.run({*surface, scene.topology, scene.t0, scene.t1}, contacts, stats);
     double earliest = 2;
     for (const Contact& contact : contacts) earliest = std::min(earliest, contact.toc_lower);
     bool close = false;
@@ -133,8 +133,8 @@ TEST(ObstacleSeparation, UncertainVerticesCarryTheirRadius) {
     ObstacleCheck test(options);
     std::vector<Contact> contacts;
     ObstacleStats stats;
-    test.run(*VoxelSurface::build(scene.resolution_m, scene.leaves), scene.topology, scene.t0, scene.t1, nullptr, 0,
-             contacts, stats, radius.data());
+    const auto surface = VoxelSurface::build(scene.resolution_m, scene.leaves);
+    test.run({*surface, scene.topology, scene.t0, scene.t1, 0, nullptr, radius.data()}, contacts, stats);
     for (const Edge& edge : scene.topology.edges()) {
       ObstacleScene alone = scene;
       alone.topology = Topology::polyline(2);

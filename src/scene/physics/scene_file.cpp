@@ -250,7 +250,6 @@ SceneSpec readScene(const ParameterTree& tree) {
 SceneSpec parseScene(const std::string& text, const std::string& name) {
   SceneSpec spec = readScene(parseYaml(text, name));
   spec.monitor_yaml = yamlBelow(text, "monitor");
-  spec.expect_yaml = yamlBelow(text, "expect");
   return spec;
 }
 

@@ -118,7 +118,6 @@ struct SceneSpec {
   std::vector<RigidBody> rigid_bodies;
   ParameterTree monitor;     ///< the scene's `monitor` block, as the node reads it
   std::string monitor_yaml;  ///< the same as text, passed on as written
-  std::string expect_yaml;   ///< the scene's `expect` block: facts that tests hold the monitor to
 };
 
 }  // namespace dccd::scene
