@@ -119,29 +119,20 @@ void CollisionMonitor::Impl::subscribe() {
 
 // --- service thread --------------------------------------------------------------------------------------------------
 
-void CollisionMonitor::Impl::advertiseServices() {
+void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
   using Trigger = std_srvs::Trigger;
   using SetBool = std_srvs::SetBool;
   using deformable_ccd::SetPhase;
-  ros::NodeHandle service(private_node);
-  service.setCallbackQueue(&service_callbacks);
-  const auto advertise = [&](const char* name, const std::function<Reply()>& run, const char* asks = nullptr) {
-    services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
-        name, [this, run, asks](Trigger::Request&, Trigger::Response& response) {
-          if (asks) state.asked(asks);
-          const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-          response.success = reply.success;
-          response.message = reply.message;
-          return true;
-        }));
+  const auto answer = [this](const std::function<Reply()>& run, auto& response) {
+    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+    response.success = reply.success;
+    response.message = reply.message;
+    return true;
   };
-  advertise(
-      "reset",
-      [this] {
-        resetNow(StepStatus::RESET);
-        return Reply{true, "frames forgotten; the next one is a first frame"};
-      },
-      "a reset was asked for");
+  const auto advertise = [&](const char* name, const std::function<Reply()>& run) {
+    services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
+        name, [answer, run](Trigger::Request&, Trigger::Response& response) { return answer(run, response); }));
+  };
   advertise("check_now", [this] {
     const Outcome outcome = pipeline.checkNow();
     return Reply{outcome.answered, describe(outcome)};
@@ -151,8 +142,17 @@ void CollisionMonitor::Impl::advertiseServices() {
     reply.success = recorder.record(reply.message);
     return reply;
   });
+  services.push_back(service.advertiseService<Trigger::Request, Trigger::Response>(
+      "reset", [this, answer](Trigger::Request&, Trigger::Response& response) {
+        state.asked("a reset was asked for");
+        const auto run = [this] {
+          resetNow(StepStatus::RESET);
+          return Reply{true, "frames forgotten; the next one is a first frame"};
+        };
+        return answer(run, response);
+      }));
   services.push_back(service.advertiseService<SetBool::Request, SetBool::Response>(
-      "enable", [this](SetBool::Request& request, SetBool::Response& response) {
+      "enable", [this, answer](SetBool::Request& request, SetBool::Response& response) {
         enabled = request.data;
         state.setEnabled(enabled);
         state.asked("~enable was called");
@@ -160,13 +160,10 @@ void CollisionMonitor::Impl::advertiseServices() {
           resetNow(StepStatus::DISABLED);
           return Reply{true, on ? "enabled" : "disabled; frames are counted and dropped, but for static bodies'"};
         };
-        const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-        response.success = reply.success;
-        response.message = reply.message;
-        return true;
+        return answer(run, response);
       }));
   services.push_back(service.advertiseService<SetPhase::Request, SetPhase::Response>(
-      "set_phase", [this](SetPhase::Request& request, SetPhase::Response& response) {
+      "set_phase", [this, answer](SetPhase::Request& request, SetPhase::Response& response) {
         const auto run = [this, phase = request.phase] {
           try {
             pipeline.setPhase(phase);
@@ -175,11 +172,11 @@ void CollisionMonitor::Impl::advertiseServices() {
           }
           return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
         };
-        const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
-        response.success = reply.success;
-        response.message = reply.message;
-        return true;
+        return answer(run, response);
       }));
+}
+
+void CollisionMonitor::Impl::listenToChanges(const ros::NodeHandle& service) {
   Reconfigure::Events events;
   events.changed = [this](const Reconfigure::Change& change) {
     queue.command([this, change] {
@@ -193,12 +190,14 @@ void CollisionMonitor::Impl::advertiseServices() {
   reconfigure = std::make_unique<Reconfigure>(service, config, std::move(events));
 }
 
-// --- start and stop
-// ---------------------------------------------------------------------------------------------------
+// --- start and stop --------------------------------------------------------------------------------------------------
 
 void CollisionMonitor::Impl::start() {
   subscribe();
-  advertiseServices();
+  ros::NodeHandle service(private_node);
+  service.setCallbackQueue(&service_callbacks);
+  advertiseServices(service);
+  listenToChanges(service);
   master = std::make_unique<MasterWatch>(
       mesh_subscriptions, map_subscriber, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
   worker = std::thread([this] { work(); });

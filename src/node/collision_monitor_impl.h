@@ -78,7 +78,8 @@ struct CollisionMonitor::Impl {
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
 
   // Service thread.
-  void advertiseServices();
+  void advertiseServices(ros::NodeHandle& service);
+  void listenToChanges(const ros::NodeHandle& service);  ///< of live parameters
 
   // Worker.
   void work();

@@ -76,75 +76,83 @@ bool ClusterMotion::isStill(const SceneArrays& scene, std::size_t b) {
 
 /// Whatever the rotation is, the residuals are measured with it; a poor one only makes them larger. The best one, by
 /// Cayley's form: x1 = Q x0 with the axis and tan(angle / 2) in w says x1 - x0 = w x (x1 + x0), linear in w.
+void ClusterMotion::Block::fit(const VertexMotion* v, std::size_t n) {
+  double sum_from[3] = {0, 0, 0}, sum_to[3] = {0, 0, 0};
+  for (std::size_t i = 0; i < n; ++i) {
+    for (int c = 0; c < 3; ++c) {
+      sum_from[c] += v[i].t0[c];
+      sum_to[c] += v[i].t1[c];
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    from[c] = sum_from[c] / static_cast<double>(n);
+    to[c] = sum_to[c] / static_cast<double>(n);
+  }
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0, right[3] = {0, 0, 0};
+  for (std::size_t i = 0; i < n; ++i) {
+    double sum[3], difference[3];
+    for (int c = 0; c < 3; ++c) {
+      const double x0 = v[i].t0[c] - from[c], x1 = v[i].t1[c] - to[c];
+      sum[c] = x1 + x0;
+      difference[c] = x1 - x0;
+    }
+    xx += sum[0] * sum[0];
+    yy += sum[1] * sum[1];
+    zz += sum[2] * sum[2];
+    xy += sum[0] * sum[1];
+    xz += sum[0] * sum[2];
+    yz += sum[1] * sum[2];
+    right[0] += sum[1] * difference[2] - sum[2] * difference[1];
+    right[1] += sum[2] * difference[0] - sum[0] * difference[2];
+    right[2] += sum[0] * difference[1] - sum[1] * difference[0];
+  }
+  // (|s|^2 I - s s') w = s x d, summed up; by the adjugate. A little is added where all points lie on a line.
+  const double little = 1e-9 * (xx + yy + zz);
+  const double a = yy + zz + little, d = xx + zz + little, f = xx + yy + little;
+  const double p = d * f - yz * yz, q = yz * xz + xy * f, r = xy * yz + d * xz;
+  const double determinant = a * p - xy * q - xz * r;
+  double w[3] = {0, 0, 0};
+  if (determinant > 0) {
+    w[0] = (p * right[0] + q * right[1] + r * right[2]) / determinant;
+    w[1] = (q * right[0] + (a * f - xz * xz) * right[1] + (a * yz + xy * xz) * right[2]) / determinant;
+    w[2] = (r * right[0] + (a * yz + xy * xz) * right[1] + (a * d - xy * xy) * right[2]) / determinant;
+  }
+  const double square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], scale = 2 / (1 + square);
+  half_cosine = 1 / std::sqrt(1 + square);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) rotation[3 * i + j] = scale * (w[i] * w[j] - (i == j ? square : 0)) + (i == j);
+  }
+  rotation[1] -= scale * w[2];
+  rotation[2] += scale * w[1];
+  rotation[3] += scale * w[2];
+  rotation[5] -= scale * w[0];
+  rotation[6] -= scale * w[1];
+  rotation[7] += scale * w[0];
+}
+
+void ClusterMotion::Block::measure(const VertexMotion* v, std::size_t n) {
+  for (std::size_t piece = 0; piece * PIECE < n; ++piece) {
+    double most = 0;
+    bool finite = true;
+    for (std::size_t i = piece * PIECE; i < std::min(n, (piece + 1) * PIECE); ++i) {
+      double at[3], squared = 0;
+      move(v[i].t0, at);
+      for (int c = 0; c < 3; ++c) squared += (at[c] - v[i].t1[c]) * (at[c] - v[i].t1[c]);
+      finite = finite && squared < std::numeric_limits<double>::infinity();
+      most = std::max(most, squared);
+    }
+    residual[piece] = finite ? std::sqrt(most) * (1 + 0x1p-40) : std::numeric_limits<double>::infinity();
+  }
+}
+
 void ClusterMotion::fitBlocks(const SceneArrays& scene, std::size_t b, std::size_t first, std::size_t last) {
   const SceneBody& body = scene.bodies()[b];
   for (std::size_t k = first; k < last; ++k) {
     Block& block = bodies_[b].blocks[k];
     const VertexMotion* v = scene.vertices() + body.internal_begin + k * BLOCK;
     const std::size_t n = std::min(BLOCK, body.usedCount() - k * BLOCK);
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0};
-    for (std::size_t i = 0; i < n; ++i) {
-      for (int c = 0; c < 3; ++c) {
-        from[c] += v[i].t0[c];
-        to[c] += v[i].t1[c];
-      }
-    }
-    for (int c = 0; c < 3; ++c) {
-      block.from[c] = from[c] / static_cast<double>(n);
-      block.to[c] = to[c] / static_cast<double>(n);
-    }
-    double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0, right[3] = {0, 0, 0};
-    for (std::size_t i = 0; i < n; ++i) {
-      double sum[3], difference[3];
-      for (int c = 0; c < 3; ++c) {
-        const double x0 = v[i].t0[c] - block.from[c], x1 = v[i].t1[c] - block.to[c];
-        sum[c] = x1 + x0;
-        difference[c] = x1 - x0;
-      }
-      xx += sum[0] * sum[0];
-      yy += sum[1] * sum[1];
-      zz += sum[2] * sum[2];
-      xy += sum[0] * sum[1];
-      xz += sum[0] * sum[2];
-      yz += sum[1] * sum[2];
-      right[0] += sum[1] * difference[2] - sum[2] * difference[1];
-      right[1] += sum[2] * difference[0] - sum[0] * difference[2];
-      right[2] += sum[0] * difference[1] - sum[1] * difference[0];
-    }
-    // (|s|^2 I - s s') w = s x d, summed up; by the adjugate. A little is added where all points lie on a line.
-    const double little = 1e-9 * (xx + yy + zz);
-    const double a = yy + zz + little, d = xx + zz + little, f = xx + yy + little;
-    const double p = d * f - yz * yz, q = yz * xz + xy * f, r = xy * yz + d * xz;
-    const double determinant = a * p - xy * q - xz * r;
-    double w[3] = {0, 0, 0};
-    if (determinant > 0) {
-      w[0] = (p * right[0] + q * right[1] + r * right[2]) / determinant;
-      w[1] = (q * right[0] + (a * f - xz * xz) * right[1] + (a * yz + xy * xz) * right[2]) / determinant;
-      w[2] = (r * right[0] + (a * yz + xy * xz) * right[1] + (a * d - xy * xy) * right[2]) / determinant;
-    }
-    const double square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], scale = 2 / (1 + square);
-    block.half_cosine = 1 / std::sqrt(1 + square);
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) block.rotation[3 * i + j] = scale * (w[i] * w[j] - (i == j ? square : 0)) + (i == j);
-    }
-    block.rotation[1] -= scale * w[2];
-    block.rotation[2] += scale * w[1];
-    block.rotation[3] += scale * w[2];
-    block.rotation[5] -= scale * w[0];
-    block.rotation[6] -= scale * w[1];
-    block.rotation[7] += scale * w[0];
-    for (std::size_t piece = 0; piece * PIECE < n; ++piece) {
-      double most = 0;
-      bool finite = true;
-      for (std::size_t i = piece * PIECE; i < std::min(n, (piece + 1) * PIECE); ++i) {
-        double at[3], squared = 0;
-        block.move(v[i].t0, at);
-        for (int c = 0; c < 3; ++c) squared += (at[c] - v[i].t1[c]) * (at[c] - v[i].t1[c]);
-        finite = finite && squared < std::numeric_limits<double>::infinity();
-        most = std::max(most, squared);
-      }
-      block.residual[piece] = finite ? std::sqrt(most) * (1 + 0x1p-40) : std::numeric_limits<double>::infinity();
-    }
+    block.fit(v, n);
+    block.measure(v, n);
   }
 }
 

@@ -87,6 +87,8 @@ class ClusterMotion {
     double half_cosine = 1;
     double residual[BLOCK / PIECE] = {};  ///< of its pieces
 
+    void fit(const VertexMotion* v, std::size_t n);      ///< the motion of n vertices, as well as it can be
+    void measure(const VertexMotion* v, std::size_t n);  ///< the residuals, from above
     void move(const double* x, double* y) const {
       const double d[3] = {x[0] - from[0], x[1] - from[1], x[2] - from[2]};
       for (int i = 0; i < 3; ++i) {

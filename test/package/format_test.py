@@ -5,9 +5,10 @@ import subprocess
 import tempfile
 import unittest
 
-from checkout import CHECKOUT, tracked_files
+from checkout import CHECKOUT, code_under, tracked_files
 
 VERSION = '14'  # Debian 12's; other versions break lines differently
+MOST_LINES = 60  # of a function's body, which a reader can see at once
 
 
 def clang_format():
@@ -40,6 +41,34 @@ class FormatTest(unittest.TestCase):
             file.write('#include <vector>\n#include <string>\nint  f( ) ;\n')
             file.flush()
             self.assertNotEqual(self.check([file.name]).returncode, 0)
+
+
+def functions(text):
+    """The line and the length of each body. Of formatted code: what begins at a column is closed there."""
+    lines = text.split('\n')
+    for first, line in enumerate(lines):
+        head = re.match(r'(?:  )?(?!namespace|class|struct|union|enum|extern|#|/)[\w~]', line)
+        if head is None or '(' not in line:
+            continue
+        opens = next((n for n in range(first, len(lines)) if lines[n].endswith(('{', ';', '}')) or not lines[n]), None)
+        if opens is None or not lines[opens].endswith('{'):
+            continue
+        last = next(n for n in range(opens + 1, len(lines)) if lines[n].startswith(line[:head.end() - 1] + '}'))
+        yield first + 1, last - opens - 1
+
+
+class LengthTest(unittest.TestCase):
+    def test_no_function_is_longer_than_a_screen(self):
+        found = [(path, line, length) for folder in ('src', 'include', 'paper', 'oracle') for path in code_under(folder)
+                 for line, length in functions(path.read_text())]
+        self.assertGreater(len(found), 1500, 'the scan found too little to mean anything')
+        self.assertEqual(['%s:%d: %d lines' % (path.relative_to(CHECKOUT), line, length)
+                          for path, line, length in found if length > MOST_LINES], [])
+
+    def test_a_long_one_is_seen(self):
+        body = '  f();\n' * (MOST_LINES + 1)
+        for head in ('void g() {', 'int C::g(int a,\n         int b) const {', 'struct S {\n  void g() {'):
+            self.assertIn(MOST_LINES + 1, [length for _, length in functions(head + '\n' + body + '  }\n' * ('S' in head) + '}\n')])
 
 
 if __name__ == '__main__':

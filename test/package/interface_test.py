@@ -103,7 +103,7 @@ class InterfaceTest(unittest.TestCase):
 
     def test_services(self):
         source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()
-        source = source[source.index('::advertiseServices()'):]
+        source = source[source.index('::advertiseServices('):]
         code = set(re.findall(r'advertise(?:Service<[^>]*>)?\(\s*"(\w+)"', source))
         section = PAGE[PAGE.index('## Services'):PAGE.index('## Parameters')]
         self.assertGreaterEqual(len(code), 5)
