@@ -163,6 +163,23 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
   return NOT_PROVED;
 }
 
+/// What a join needs of this run, which computed a part of the bag.
+RangeResult rangeOf(const Arguments& a, const MonitorConfig& config, const RangeLog& log,
+                    const BagReplaySummary& summary, const Report& report) {
+  RangeResult range;
+  range.folder = a.report;
+  range.bag_name = std::filesystem::path(a.bag).filename();
+  range.bag_bytes = std::filesystem::file_size(a.bag);
+  range.parameters = config.hash();
+  range.frames = log.range();
+  range.from_s = a.from_s;
+  range.to_s = a.to_s;
+  range.summary = summary;
+  range.effects = summary.effects.decisions();
+  range.report = report.state();
+  return range;
+}
+
 int analyze(const Arguments& a) {
   const MonitorConfig config = configure(a);
   setSimdTarget(config.simd_target);
@@ -198,8 +215,7 @@ int analyze(const Arguments& a) {
     report.close();
     log->close();
     summary.look_ahead.reset();  // the join's
-    writeRange({a.report, std::filesystem::path(a.bag).filename(), std::filesystem::file_size(a.bag), config.hash(),
-                log->range(), a.from_s, a.to_s, summary, summary.effects.decisions(), report.state()});
+    writeRange(rangeOf(a, config, *log, summary, report));
     return conclude(a, summary, report, answered);
   }
   describe(a, config, summary, summary.effects.decisions(), 0, report);

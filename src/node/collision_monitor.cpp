@@ -43,7 +43,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       pipeline(given, transforms, mapSourceOf(node, given)),
       config(pipeline.config()),
       recorder(config, pipeline.monitor(), private_node.getNamespace()),
-      outputs(private_node, config.monitor.look_ahead_s > 0, config.holdsDistance(), config.monitor.detector.patches),
+      outputs(private_node, config),
       state(private_node, livenessLimits(config)),
       queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_queue_bytes),
       diagnostics(private_node.getNamespace()),

@@ -14,14 +14,24 @@ std::string noTransform(const std::string& from, const std::string& to, const st
   return "no transform from '" + from + "' to '" + to + "': " + shortText(why);
 }
 
+ObstacleMap noMap(std::string why) {
+  ObstacleMap none;
+  none.problem = std::move(why);
+  return none;
+}
+
 }  // namespace
 
 bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    MeshFrame frame{stamp_ns, rigid_[b]->topology,           rigid_[b]->rest,
-                    true,     Eigen::Isometry3d::Identity(), rigid_[b]->radius_m};
+    MeshFrame frame;
+    frame.stamp_ns = stamp_ns;
+    frame.topology = rigid_[b]->topology;
+    frame.positions = rigid_[b]->rest;
+    frame.rigid = true;
+    frame.radius_m = rigid_[b]->radius_m;
     const std::string& carrier = config_.bodies[b].tf_frame;
     if (!lookupTransform(transforms_, fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
       reason =
@@ -105,11 +115,14 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     return true;
   }
   if (isStatic(body) && config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
-  transform(fixed_from_mesh, done.mesh.positions);
-  monitor_->push(body,
-                 {done.mesh.stamp_ns, done.mesh.topology, std::move(done.mesh.positions), false,
-                  Eigen::Isometry3d::Identity(), std::move(done.mesh.radius_m), done.mesh.dropped_faces},
-                 now_ns);
+  MeshFrame frame;
+  frame.stamp_ns = done.mesh.stamp_ns;
+  frame.topology = std::move(done.mesh.topology);
+  frame.positions = std::move(done.mesh.positions);
+  frame.radius_m = std::move(done.mesh.radius_m);
+  frame.dropped_faces = done.mesh.dropped_faces;
+  transform(fixed_from_mesh, frame.positions);
+  monitor_->push(body, std::move(frame), now_ns);
   if (is_clock) arrivals_.push_back(done.arrival_ns);
   placed_[body] = isStatic(body);
   return true;
@@ -119,7 +132,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   if (!unplaced_map_) return;
   if (!unplaced_map_->surface) {
     // Refused: what was there before is out of date, and no map is better than a wrong one.
-    monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(), unplaced_map_->problem});
+    monitor_->setMap(noMap(unplaced_map_->problem));
     unplaced_map_.reset();
     placed_map_.reset();
     known_.reset();
@@ -127,7 +140,9 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   }
   if (fixed_frame_.empty()) return;
   const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
-  ObstacleMap map{unplaced_map_->surface, unplaced_map_->stamp_ns, Eigen::Isometry3d::Identity(), {}};
+  ObstacleMap map;
+  map.surface = unplaced_map_->surface;
+  map.stamp_ns = unplaced_map_->stamp_ns;
   std::string reason;
   if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
     monitor_->setMap(std::move(map));
@@ -137,8 +152,8 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
     if (monitor_->map().problem.empty()) {
-      monitor_->setMap({nullptr, 0, Eigen::Isometry3d::Identity(),
-                        "no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason});
+      monitor_->setMap(
+          noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason));
     }
   }
 }

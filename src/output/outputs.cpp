@@ -13,21 +13,21 @@ constexpr std::uint32_t EVENT_QUEUE = 4096;  // many may come of one step, a mes
 
 }  // namespace
 
-Outputs::Outputs(ros::NodeHandle& node, bool look_ahead, bool separates, bool patches) {
+Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   contacts_ = node.advertise<deformable_ccd::ContactArray>("contacts", QUEUE);
   first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", QUEUE);
   stats_ = node.advertise<deformable_ccd::StepStats>("stats", QUEUE);
   markers_ = node.advertise<visualization_msgs::MarkerArray>("markers", 2);
   effects_ = node.advertise<deformable_ccd::EffectArray>("effects", 1, true);
-  if (look_ahead) {
+  if (config.monitor.look_ahead_s > 0) {
     predicted_ = node.advertise<deformable_ccd::ContactArray>("predicted_contacts", QUEUE);
     time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", QUEUE);
   }
-  if (patches) {
+  if (config.monitor.detector.patches) {
     patches_ = node.advertise<deformable_ccd::PatchArray>("patches", QUEUE);
     events_ = node.advertise<deformable_ccd::PatchEvent>("events", EVENT_QUEUE);
   }
-  if (separates) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
+  if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {

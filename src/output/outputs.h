@@ -17,7 +17,8 @@ namespace dccd {
 
 class Outputs {
  public:
-  Outputs(ros::NodeHandle& private_node, bool look_ahead, bool separates, bool patches);
+  /// Topics of effects that the configuration has no use for are not there.
+  Outputs(ros::NodeHandle& private_node, const MonitorConfig& config);
 
   /// What a robot waits for, before all that is only looked at: first contact, contacts, patches and their events.
   void publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame);

@@ -135,9 +135,19 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
   return status;
 }
 
-void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, std::string reason) {
+Monitor::Impl::Pending Monitor::Impl::pendingOf(StepStatus status, StampNs stamp_ns, const std::string& reason) {
+  Pending step;
+  step.status = status;
+  step.stamp_ns = stamp_ns;
+  step.sequence = ++sequence;
+  step.reason = reason;
+  return step;
+}
+
+void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, const std::string& reason) {
   const MeshStore& store = stores[options.clock_body];
-  Pending step{status, nullptr, nullptr, stamp_ns, now_ns, ++sequence, std::move(reason)};
+  Pending step = pendingOf(status, stamp_ns, reason);
+  step.since_ns = now_ns;
   if (status == StepStatus::OK) {
     step.from = store.previous();
     step.to = store.newestShared();
@@ -165,7 +175,7 @@ void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64
 void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason) {
   Impl& m = *impl_;
   if (body == m.options.clock_body) {
-    m.pending.push_back({status, nullptr, nullptr, stamp_ns, 0, ++m.sequence, reason});
+    m.pending.push_back(m.pendingOf(status, stamp_ns, reason));
   } else {
     m.counters.at(body).count(status);
   }

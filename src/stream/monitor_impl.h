@@ -81,7 +81,8 @@ struct Monitor::Impl {
     step.status = status;
     step.reason = reason;
   }
-  void onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, std::string reason);
+  Pending pendingOf(StepStatus status, StampNs stamp_ns, const std::string& reason);
+  void onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, const std::string& reason);
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   Step place(const Pending& pending);
