@@ -78,7 +78,7 @@ class DCCD_EXPORT History {
   /// reference frames only.
   const std::vector<LeftOutPair>& leftOut() const;
 
-  struct Impl;
+  struct DCCD_HIDDEN Impl;
   Impl& impl() { return *impl_; }
 
  private:

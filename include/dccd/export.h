@@ -5,3 +5,5 @@
 #define DCCD_API_VERSION 1
 
 #define DCCD_EXPORT __attribute__((visibility("default")))
+/// For what is declared within an exported class, which otherwise shows it, too.
+#define DCCD_HIDDEN __attribute__((visibility("hidden")))

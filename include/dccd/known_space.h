@@ -54,7 +54,7 @@ class DCCD_EXPORT KnownSpace {
                         const Deadline& deadline = {}) const;
 
  private:
-  struct Impl;
+  struct DCCD_HIDDEN Impl;
   explicit KnownSpace(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

@@ -74,7 +74,7 @@ class DCCD_EXPORT RangeJoin {
   std::optional<LookAheadSummary> lookAhead() const;
 
  private:
-  struct Impl;
+  struct DCCD_HIDDEN Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -128,7 +128,7 @@ class DCCD_EXPORT Monitor {
   void setListener(StepListener* listener);
 
  private:
-  struct Impl;
+  struct DCCD_HIDDEN Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -26,7 +26,7 @@ inline double voxelPlane(std::int64_t k, double resolution_m) { return static_ca
 /// The surface of the occupied space of one map, in the map's frame. Immutable once built.
 class DCCD_EXPORT VoxelSurface {
  public:
-  struct Impl;
+  struct DCCD_HIDDEN Impl;
   /// Leaves in any order. Throws std::invalid_argument naming the value when resolution_m is not from 1e-290 to 1e290,
   /// or a leaf's size is no power of two up to 65536, its key no multiple of its size, or two leaves overlap.
   static std::shared_ptr<const VoxelSurface> build(double resolution_m, std::vector<OccupiedLeaf> leaves);
@@ -99,7 +99,7 @@ class DCCD_EXPORT ObstacleCheck {
   bool isFull() const;
 
  private:
-  struct Impl;
+  struct DCCD_HIDDEN Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -7,7 +7,7 @@ import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
 
-from checkout import CHECKOUT
+from checkout import CHECKOUT, TOOLS
 
 # In no Debian package: scripts/build links the definitions in dependencies/ where the system has none.
 FROM_OVERLAY = {'octomap_msgs'}
@@ -89,6 +89,16 @@ class DependenciesTest(unittest.TestCase):
                                             capture_output=True, text=True, check=False)
                     self.assertEqual((result.returncode, result.stdout.strip()), (0, ''), result.stderr)
                     self.assertIn('checked 1 packages and found 0 problems', result.stderr)
+
+
+class LibraryTest(unittest.TestCase):
+    def test_it_shows_its_interface_and_nothing_within(self):
+        library = TOOLS.parent / 'libdeformable_ccd.so'
+        if not library.is_file():
+            self.skipTest('%s is not built' % library.name)
+        shown = subprocess.run(['nm', '-DC', '--defined-only', str(library)], capture_output=True, text=True, check=True).stdout
+        self.assertIn('dccd::detect(', shown)
+        self.assertEqual([line for line in shown.splitlines() if '::Impl::' in line], [])
 
 
 if __name__ == '__main__':
