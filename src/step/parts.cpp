@@ -28,7 +28,7 @@ std::size_t requiredSubsteps(const Step& step, double tolerance_m) {
     double radius = 0;
     for (const Vec3& p : *body.t0) radius = std::max(radius, (p - body.pose_t0.translation()).norm());
     // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
-    if (radius * (1 - std::cos(std::min(angle, M_PI) / 2)) <= tolerance_m) continue;
+    if (radius * (1 - std::cos(std::min(angle, 2 * M_PI) / 2)) <= tolerance_m) continue;
     parts = std::max(parts, std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius))));
   }
   return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);

@@ -73,6 +73,21 @@ TEST(TurningBody, IsCutIntoAsManyPartsAsTheToleranceAsksFor) {
   EXPECT_EQ(requiredSubsteps(turning, 1e-3), 1u);
 }
 
+// A prediction may turn a body by more than half a turn. Then its chord leaves the arc by more than the body's radius.
+TEST(TurningBody, MoreThanHalfATurnLeavesTheArcByMoreThanTheRadius) {
+  constexpr double RADIUS_M = 0.8e-3, TOLERANCE_M = 1e-3;
+  Step turning;
+  turning.bodies.resize(1);
+  Body& body = turning.bodies[0];
+  body.t0 = share(Positions{{RADIUS_M, 0, 0}, {0, 0, 0}, {0, 0, RADIUS_M}});
+  body.turns = true;
+  body.pose_t1.linear() = Eigen::AngleAxisd(0.75 * M_PI, Vec3::UnitY()).toRotationMatrix();
+  EXPECT_EQ(requiredSubsteps(turning, TOLERANCE_M), 1u);
+  turning.pose_scale = 2;
+  ASSERT_GT(RADIUS_M * (1 - std::cos(0.75 * M_PI)), TOLERANCE_M);
+  EXPECT_EQ(requiredSubsteps(turning, TOLERANCE_M), 2u);
+}
+
 // A bar of 1 m turns by nearly 180 degrees about its end; half way its other end passes what no chord comes near.
 TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
   Monitor far(loose(), clockAndBar());
