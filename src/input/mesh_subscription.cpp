@@ -114,10 +114,10 @@ void MeshSubscription::onAny(const ros::MessageEvent<const ShapeShifter>& event)
   ended.shutdown();
 }
 
-/// What is handed over comes at once, and overtakes the bytes of messages before it that are still on their way; until
-/// the first subscription is closed, every message comes both ways. So the first objects are held back until the bytes
-/// have caught up with them. A message that was on its way when the second subscription was made comes through that one
-/// as bytes, too, right behind itself and perhaps behind objects that overtook it.
+/// Until the first subscription is closed, every message comes both ways: as an object at once, as bytes a little
+/// later. An object thus overtakes the bytes of the messages before it. To keep the order, the first objects are held
+/// back until their bytes have come. A message that was on its way as bytes when the second subscription was made comes
+/// through both: what the second brings of it is dropped here, even behind objects that overtook it.
 void MeshSubscription::onTyped(TypedMesh message) {
   ros::Subscriber ended;
   {

@@ -90,7 +90,7 @@ void uniteBlocks(std::vector<TouchedBlock>& blocks) {
 constexpr std::chrono::nanoseconds BLOCK_TIME(300);  // to sort a block among a million, and to count its voxels
 constexpr std::size_t FEATURES_PER_LOOK_AT_THE_CLOCK = 32;
 
-/// How many can be sorted and counted until then.
+/// How many blocks can be sorted and counted before the deadline.
 std::size_t blocksUntil(const Deadline& deadline) {
   const auto left = deadline.at() - Deadline::Clock::now();
   return static_cast<std::size_t>(std::max<std::int64_t>(0, left / BLOCK_TIME));
@@ -199,7 +199,7 @@ SweptSpace KnownSpace::sweptSpace(const Topology& topology, const Positions& map
   SweptSpace swept;
   std::vector<TouchedBlock> blocks;
   std::size_t features = 0;
-  // Up to twice as many are held, and sorted and counted in the end.
+  // addBlocks() may hold twice as many as it is allowed, and all that it holds is sorted and counted in the end.
   const std::size_t most_blocks = deadline.isNever() ? limit : std::min(limit, blocksUntil(deadline) / 2);
   const auto isLate = [&] {
     return deadline.isOver() || (!deadline.isNever() && blocksUntil(deadline) < blocks.size());

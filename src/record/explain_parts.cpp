@@ -61,7 +61,7 @@ Step alone(const Step& step, const std::vector<Feature>& features) {
     for (Index v = 0; v < asked.size(); ++v) {
       if (!asked[v]) body.vertex_mask.push_back(v);
     }
-    // A rope is small as it is.
+    // A rope has no faces to choose from, and keeps its edges: the mask leaves out those that nobody asks about.
     if (body.topology->hasFaces()) body.topology = share(Topology::fromTriangles(asked.size(), faces));
   }
   return out;

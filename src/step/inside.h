@@ -91,10 +91,10 @@ class InsideSearch {
   bool whole_ = false;
   bool known_ = false;                        // all contacts since the last run(): what that found can be carried over
   bool searched_ = false;                     // the search has come to its end
-  std::array<std::uint32_t, 2> next_pair_{};  // else where it goes on: pairs of bodies are taken in order,
-  std::size_t next_piece_ = 0;                // in them the pieces
-  std::vector<Question> inside_;              // answered: yes; of all that was asked about the rest is outside
-  std::vector<Question> open_;                // to be asked again, for they touched; after run() what a deadline left
+  std::array<std::uint32_t, 2> next_pair_{};  // of bodies: where a search that has not come to its end goes on,
+  std::size_t next_piece_ = 0;                // with this piece of the first one; pairs are taken in ascending order
+  std::vector<Question> inside_;              // answered with yes; all else that was asked is outside
+  std::vector<Question> open_;  // to be asked again, since they touched; after run(): what is left of them
   std::vector<StartIntersection> intersections_;
   std::vector<std::array<std::uint32_t, 2>> body_pairs_;
   std::vector<std::uint32_t> overlapping_, scratch_;

@@ -59,7 +59,7 @@ struct Monitor::Impl {
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
   References references;
-  std::vector<std::uint64_t> runs, last_runs;
+  std::vector<std::uint64_t> runs, last_runs;  // per body, the run without a seam that this step, the last one is in
   bool finishing = false;
   std::atomic<bool> cancelled{false};
   StepListener* listener = nullptr;

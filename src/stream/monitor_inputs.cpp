@@ -128,9 +128,9 @@ void Monitor::Impl::forgetReferences() {
   references.topologies.assign(bodies.size(), nullptr);
 }
 
-/// The first frame of each topology is what a minimum separation measures neighbours in: the first that asks for a
-/// distance, for radii may come later. Radii that grow past those of the reference make a new list; twice as large, so
-/// that it happens seldom.
+/// A minimum separation tells neighbours by a reference frame: the first one with this topology, or if no distance was
+/// asked for then (radii may come later), the first one for which it is. Radii that grow past those of the reference
+/// make a new list of left-out pairs; it is made for twice as large ones, so that this happens seldom.
 void Monitor::Impl::keepReferences(Step& step, References& kept) const {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
