@@ -1,7 +1,9 @@
 // The answer to a step, and what it cost.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -217,7 +219,16 @@ struct Outcome {
 
   /// No pair was left out of the contacts, whatever is known of the start state.
   bool allPairs() const { return !(unchecked_toc_lower <= 1); }
-  double duration_s() const { return static_cast<double>(stamp_ns - start_ns) * 1e-9; }
+  double duration_s() const { return secondsBetween(start_ns, stamp_ns); }
+  /// A stamp that is not later than this time of the step [1].
+  StampNs stampBefore(double toc) const {
+    return start_ns + static_cast<StampNs>(std::floor(toc * static_cast<double>(stamp_ns - start_ns)));
+  }
+  /// A stamp that is not earlier, and not past the step's end.
+  StampNs stampAfter(double toc) const {
+    const double after_ns = std::ceil(toc * static_cast<double>(stamp_ns - start_ns));
+    return std::min(stamp_ns, start_ns + 1 + static_cast<StampNs>(after_ns));
+  }
 };
 
 /// Point, normal, weights and approach speed [m per step] of one of the outcome's contacts, any kind, in the fixed

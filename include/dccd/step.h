@@ -28,7 +28,7 @@ struct Step {
   double pose_scale = 1;
   std::string off_path;  ///< why the bodies' paths are not those that were seen, in words; empty: they are
 
-  double duration_s() const { return static_cast<double>(stamp_ns - start_ns) * 1e-9; }
+  double duration_s() const { return secondsBetween(start_ns, stamp_ns); }
 };
 
 }  // namespace dccd

@@ -35,6 +35,9 @@ constexpr double PATCH_GAP_S = 0.25;
 /// [m] Edge lengths of voxels that a map may have: their planes' coordinates, up to 2^16 of them, neither overflow nor
 /// vanish. Wider: such a map is no longer refused, and answers about it may be wrong.
 constexpr double SMALLEST_RESOLUTION_M = 1e-290, LARGEST_RESOLUTION_M = 1e290;
+/// [1] How far a map's edge length and the one in its data's own header may differ, for the header has six digits.
+/// Larger: maps that contradict themselves are taken. Smaller: good maps are refused.
+constexpr double OCTOMAP_HEADER = 1e-5;
 
 // --- projections and bounds ------------------------------------------------------------------------------------------
 constexpr double SQRT2_UP = 1.4142135623730952;  ///< [1] length of the diagonal directions, rounded up

@@ -19,6 +19,7 @@ using Edge = std::array<Index, 2>;  ///< vertex indices, the smaller one first
 using Face = std::array<Index, 3>;  ///< vertex indices in the order of the input
 using Positions = std::vector<Vec3>;
 using StampNs = std::int64_t;  ///< nanoseconds; the stamp of a mesh, never the wall clock
+inline double secondsBetween(StampNs from_ns, StampNs to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; }
 
 /// A closed axis-aligned box.
 struct Box {

@@ -4,13 +4,13 @@
 #include <iomanip>
 #include <sstream>
 
+#include "dccd/types.h"
+
 namespace dccd {
 namespace {
 
 // A worker that is that far behind is late whichever frame is looked at; the rest is not kept.
 constexpr std::size_t MAX_OPEN = 4096;
-
-double secondsSince(std::int64_t from_ns, std::int64_t now_ns) { return static_cast<double>(now_ns - from_ns) * 1e-9; }
 
 std::string seconds(double value) {
   std::ostringstream text;
@@ -26,7 +26,7 @@ void Liveness::frame(std::int64_t name, std::int64_t now_ns) {
 }
 
 void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns) {
-  // One that came just before a reset, which forgot it, is answered after it.
+  // The reset forgot a frame that had just come, and its answer comes after the reset.
   if (newest_.came_ns == NEVER) newest_ = {name, now_ns};
   answered_ns_ = now_ns;
   while (!open_.empty() && open_.front().name <= name) {
@@ -34,7 +34,7 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
     open_.pop_front();
   }
   answered_ = std::max(answered_, name);
-  // So many had no answer that the newest found no place: now it is the one that counts.
+  // MAX_OPEN frames had no answer, and the newest one was not kept: now it is the one that counts.
   if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
 }
@@ -57,18 +57,18 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (stopped_) add(Fault::Kind::STOPPED, "the monitor was stopped");
   if (disabled_) add(Fault::Kind::DISABLED, "the monitor is disabled");
   if (!asked_.empty()) add(Fault::Kind::ASKED, asked_);
-  if (!open_.empty() && secondsSince(open_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
+  if (!open_.empty() && secondsBetween(open_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
     add(Fault::Kind::NO_ANSWER, "a frame has had no answer for more than " + seconds(limits_.answer_timeout_s));
   }
-  if (newest_.came_ns != NEVER && secondsSince(newest_.came_ns, now_ns) > limits_.max_step_s) {
+  if (newest_.came_ns != NEVER && secondsBetween(newest_.came_ns, now_ns) > limits_.max_step_s) {
     add(Fault::Kind::SILENCE, "no frame has come for more than " + seconds(limits_.max_step_s));
   }
-  if (map_since_ns_ != NEVER && secondsSince(map_since_ns_, now_ns) > limits_.answer_timeout_s) {
+  if (map_since_ns_ != NEVER && secondsBetween(map_since_ns_, now_ns) > limits_.answer_timeout_s) {
     add(Fault::Kind::NEWER_MAP,
         "a newer map came and has not been in use for more than " + seconds(limits_.answer_timeout_s));
   }
   if (limits_.octomap_timeout_s > 0 && map_age_s_ >= 0 && answered_ns_ != NEVER &&
-      map_age_s_ + secondsSince(answered_ns_, now_ns) > limits_.octomap_timeout_s) {
+      map_age_s_ + secondsBetween(answered_ns_, now_ns) > limits_.octomap_timeout_s) {
     add(Fault::Kind::OLD_MAP, "the map is older than " + seconds(limits_.octomap_timeout_s));
   }
   return faults;

@@ -96,8 +96,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   if (!placed) {
     if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
     waiting.reason = reason;
-    waiting.overdue =
-        finishing_ || static_cast<double>(now_ns - waiting.arrival_ns) * 1e-9 >= config_.transform_timeout_s;
+    waiting.overdue = finishing_ || secondsBetween(waiting.arrival_ns, now_ns) >= config_.transform_timeout_s;
     // There is no use in waiting for a static body that has waited in vain itself.
     const bool timed_out =
         waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept);
@@ -149,7 +148,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
     known_ = unplaced_map_->known;
     if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
     unplaced_map_.reset();
-  } else if (finishing_ || static_cast<double>(now_ns - unplaced_since_ns_) * 1e-9 >= config_.transform_timeout_s) {
+  } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
     if (monitor_->map().problem.empty()) {
       monitor_->setMap(

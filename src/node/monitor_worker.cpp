@@ -123,7 +123,7 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   newest_ns = outcome.stamp_ns;
   state.tell(outcome, pipeline.arrivalOfOutcome(), frame);
   outputs.publishResult(outcome, bodies, frame);
-  const double latency_s = static_cast<double>(steadyNs() - pipeline.arrivalOfOutcome()) * 1e-9;
+  const double latency_s = secondsBetween(pipeline.arrivalOfOutcome(), steadyNs());
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
   publishEffects(toRosTime(outcome.stamp_ns));
   if (pipeline.effects().takeNewLeftOut(pipeline.monitor())) {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "dccd/regular_file.h"
+#include "dccd/tolerances.h"
 #include "obstacle/voxel_bits.h"
 #include "obstacle/voxel_tree.h"
 #include "octomap/octomap_header.h"
@@ -36,7 +37,7 @@ TreeKind treeKind(const std::string& id) {
 }
 
 void checkResolution(double resolution) {
-  if (!(resolution >= 1e-290 && resolution <= 1e290)) {
+  if (!(resolution >= tolerance::SMALLEST_RESOLUTION_M && resolution <= tolerance::LARGEST_RESOLUTION_M)) {
     throw OctomapError("octomap resolution is " + text(resolution) + ", which is not a length from 1e-290 to 1e290 m");
   }
 }
@@ -225,8 +226,7 @@ DecodedOctomap decodeOctomap(const OctomapFields& fields, const OctomapLimits& l
     throw OctomapError("octomap id is '" + fields.id + "', but the data's header says '" + header.id.substr(0, 80) +
                        "'");
   }
-  // The header's number has six digits.
-  if (!(std::abs(header.resolution - fields.resolution) <= 1e-5 * fields.resolution)) {
+  if (!(std::abs(header.resolution - fields.resolution) <= tolerance::OCTOMAP_HEADER * fields.resolution)) {
     throw OctomapError("octomap resolution is " + text(fields.resolution) + ", but the data's header says " +
                        text(header.resolution));
   }

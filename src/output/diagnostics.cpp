@@ -40,7 +40,7 @@ void Diagnostics::add(const Outcome& outcome, const StatsContext& context) {
   if (!outcome.answered) return;
   map_present_ = outcome.obstacle != nullptr;
   map_reason_ = outcome.reason;
-  map_age_s_ = map_present_ ? static_cast<double>(outcome.stamp_ns - outcome.step->map.stamp_ns) * 1e-9 : 0;
+  map_age_s_ = map_present_ ? secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns) : 0;
 }
 
 void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::string& map_topic,
@@ -82,7 +82,7 @@ std::optional<diagnostic_msgs::DiagnosticArray> Diagnostics::takeWhenDue(std::in
                                                                          bool enabled, const std::string& map_topic,
                                                                          const std::string& hint) {
   if (now_ns - last_ns_ < PERIOD_NS) return std::nullopt;
-  const double seconds = last_ns_ == 0 ? 1 : static_cast<double>(now_ns - last_ns_) * 1e-9;
+  const double seconds = last_ns_ == 0 ? 1 : secondsBetween(last_ns_, now_ns);
   last_ns_ = now_ns;
   DiagnosticStatus status;
   status.name = name_;

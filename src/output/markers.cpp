@@ -260,7 +260,7 @@ void addBeginnings(const Outcome& outcome, const std::vector<Body>& bodies, doub
   }
   int id = 0;
   for (const auto& [body, patch] : newest) {
-    const double ago_s = static_cast<double>(outcome.stamp_ns - patch->began_to_ns) * 1e-9;
+    const double ago_s = secondsBetween(patch->began_to_ns, outcome.stamp_ns);
     if (ago_s > TOLD_S || !patch->centroid.allFinite()) continue;
     const Vec3 at = patch->centroid + Vec3(0, 0, 2 * height);
     const std::string words = pairOf(body, bodies) + ", " + inSeconds(ago_s) + " ago";

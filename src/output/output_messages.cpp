@@ -171,16 +171,6 @@ std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
   return out;
 }
 
-ros::Time timeBefore(const Outcome& outcome, double toc) {
-  const double offset_ns = std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
-  return toRosTime(outcome.start_ns + static_cast<StampNs>(offset_ns));
-}
-
-ros::Time timeAfter(const Outcome& outcome, double toc) {
-  const double offset_ns = std::ceil(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns));
-  return toRosTime(std::min(outcome.stamp_ns, outcome.start_ns + 1 + static_cast<StampNs>(offset_ns)));
-}
-
 ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch) {
   const ContactGeometry geometry = contactGeometry(outcome, contact);
   ContactMessage out;
@@ -196,7 +186,7 @@ ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::ui
   out.patch = patch;
   out.toc_lower = contact.toc_lower;
   out.toc_upper = contact.toc_upper;
-  out.time_of_contact = timeBefore(outcome, contact.toc_lower);
+  out.time_of_contact = toRosTime(outcome.stampBefore(contact.toc_lower));
   out.point.x = geometry.point.x();
   out.point.y = geometry.point.y();
   out.point.z = geometry.point.z();
@@ -269,7 +259,7 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
     out.certain |= certain;
   }
   if (out.contact) {
-    out.time_of_contact = timeBefore(outcome, toc);
+    out.time_of_contact = toRosTime(outcome.stampBefore(toc));
     out.seconds_from_start = toc * outcome.duration_s();
   }
   out.summary = summaryOf(outcome, toc, first, bodies);
@@ -288,7 +278,7 @@ deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) 
   }
   if (out.checked_map) {
     out.map_stamp = toRosTime(outcome.step->map.stamp_ns);
-    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.step->map.stamp_ns) * 1e-9;
+    out.map_age = secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns);
   }
   out.start = toRosTime(outcome.start_ns);
   out.holds_until = toRosTime(outcome.stamp_ns);
@@ -322,7 +312,7 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.map_present = outcome.obstacle != nullptr;
   if (outcome.obstacle) {
     out.map_leaves = outcome.obstacle->leafCount();
-    out.map_age = static_cast<double>(outcome.stamp_ns - outcome.step->map.stamp_ns) * 1e-9;
+    out.map_age = secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns);
   }
   out.excluded_voxels = outcome.excluded_voxels;
   out.unknown_fraction = outcome.unknown_fraction;

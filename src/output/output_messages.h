@@ -19,9 +19,6 @@ namespace dccd {
 /// The nearest that a message can hold: 0 to 2^32 s.
 ros::Time toRosTime(StampNs stamp_ns);
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame);
-/// A time within the step [1] as an absolute one that is not after it, not before it.
-ros::Time timeBefore(const Outcome& outcome, double toc);
-ros::Time timeAfter(const Outcome& outcome, double toc);
 /// With its geometry; `patch`: identity of its patch, 0 for none.
 deformable_ccd::Contact toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch);
 

@@ -127,8 +127,8 @@ std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, 
     fillNames(one.body, bodies, out.bodies);
     out.patch = one.patch;
     out.contact = toContact(outcome, one.contact, one.patch);
-    out.earliest = timeBefore(outcome, one.contact.toc_lower);
-    out.latest = timeAfter(outcome, one.contact.toc_upper);
+    out.earliest = toRosTime(outcome.stampBefore(one.contact.toc_lower));
+    out.latest = toRosTime(outcome.stampAfter(one.contact.toc_upper));
     all.push_back(std::move(out));
   }
   return all;

@@ -8,8 +8,6 @@
 namespace dccd {
 namespace {
 
-double secondsFrom(StampNs origin_ns, StampNs when_ns) { return static_cast<double>(when_ns - origin_ns) * 1e-9; }
-
 // Seconds with nine digits, exactly: a double does not hold the nanoseconds of today.
 std::string stampText(StampNs ns) {
   char text[40];
@@ -60,7 +58,7 @@ void ContactLanes::addFirst(const Outcome& o, const std::vector<Body>& bodies, S
         o.start_ns + static_cast<StampNs>(contact->toc_lower * static_cast<double>(o.stamp_ns - o.start_ns));
     const Vec3 where = contactGeometry(o, *contact).point;
     of.first = {{"text", contactInWords(*contact, bodies)},
-                {"t", secondsFrom(origin_ns, at_ns)},
+                {"t", secondsBetween(origin_ns, at_ns)},
                 {"stamp", stampText(at_ns)},
                 {"where", {where.x(), where.y(), where.z()}},
                 {"step", o.sequence}};
@@ -69,7 +67,7 @@ void ContactLanes::addFirst(const Outcome& o, const std::vector<Body>& bodies, S
 
 void ContactLanes::add(const Outcome& o, const std::vector<Body>& bodies, StampNs origin_ns) {
   added_first_ = false;
-  const double start_s = secondsFrom(origin_ns, o.start_ns), end_s = secondsFrom(origin_ns, o.stamp_ns);
+  const double start_s = secondsBetween(origin_ns, o.start_ns), end_s = secondsBetween(origin_ns, o.stamp_ns);
   for (const PatchEvent& e : o.patch_events) {
     Lane& of = lane(e.body, bodies);
     if (of.events.size() >= MOST_MARKS) {
@@ -77,7 +75,7 @@ void ContactLanes::add(const Outcome& o, const std::vector<Body>& bodies, StampN
       continue;
     }
     const StampNs when_ns = e.to_ns != UNKNOWN_NS ? e.to_ns : e.from_ns != UNKNOWN_NS ? e.from_ns : o.stamp_ns;
-    of.events.push_back({toString(e.kind), secondsFrom(origin_ns, when_ns), e.id, e.expected});
+    of.events.push_back({toString(e.kind), secondsBetween(origin_ns, when_ns), e.id, e.expected});
   }
   if (!o.answered) return;
   for (const Patch& p : o.patches) {

@@ -151,7 +151,7 @@ std::string PlayerData::detailsOf(const Outcome& o, StampNs origin_ns) const {
   for (std::size_t i = 0; i < std::min(o.patches.size(), MOST_PATCHES); ++i) {
     const Patch& p = o.patches[i];
     const auto seconds = [&](StampNs ns) {
-      return ns == UNKNOWN_NS ? nlohmann::json() : nlohmann::json(static_cast<double>(ns - origin_ns) * 1e-9);
+      return ns == UNKNOWN_NS ? nlohmann::json() : nlohmann::json(secondsBetween(origin_ns, ns));
     };
     patches.push_back({p.id, p.body[0], p.body[1], toString(p.beginning), p.contacts, p.crossings, p.expected,
                        p.toc_lower, p.toc_upper, p.area_m2, rounded(p.centroid), rounded(p.normal),
@@ -269,7 +269,7 @@ void PlayerData::addVoxels(const Outcome& o, double from_s) {
 void PlayerData::add(const Outcome& o, const std::vector<Body>& bodies, StampNs origin_ns, bool keep) {
   if (!o.answered || !o.step) return;
   for (std::size_t b = names_.size(); b < bodies.size(); ++b) names_.push_back(bodies[b].name);
-  const auto seconds = [&](StampNs ns) { return static_cast<double>(ns - origin_ns) * 1e-9; };
+  const auto seconds = [&](StampNs ns) { return secondsBetween(origin_ns, ns); };
   addVoxels(o, seconds(o.start_ns));
   const bool begins = !any_ || o.start_ns != end_ns_;  // after a seam the step's start is a frame of its own
   for (const bool at_start : {true, false}) {

@@ -73,10 +73,10 @@ void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodi
     }
     contacts_ << ',' << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << ',' << c.initial << ','
               << c.leaving << ',' << c.toc_lower << ',' << c.toc_upper << ','
-              << static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9 + c.toc_lower * outcome.duration_s() << ','
-              << g.point.x() << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y()
-              << ',' << g.normal.z() << ',' << g.approach_speed / std::max(outcome.duration_s(), 1e-9) << ','
-              << c.expected << '\n';
+              << secondsBetween(origin_ns_, outcome.start_ns) + c.toc_lower * outcome.duration_s() << ',' << g.point.x()
+              << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y() << ','
+              << g.normal.z() << ',' << g.approach_speed / std::max(outcome.duration_s(), 1e-9) << ',' << c.expected
+              << '\n';
   }
 }
 
@@ -99,7 +99,7 @@ void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodie
             << toString(e.beginning) << ',' << e.expected;
     for (const StampNs when_ns : {e.from_ns, e.to_ns}) {
       events_ << ',';
-      if (when_ns != UNKNOWN_NS) events_ << static_cast<double>(when_ns - origin_ns_) * 1e-9;
+      if (when_ns != UNKNOWN_NS) events_ << secondsBetween(origin_ns_, when_ns);
     }
     events_ << '\n';
   }
@@ -131,7 +131,7 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
     heat.contacts.assign(topology->vertexCount(), 0);
     heat.first_s.assign(topology->vertexCount(), std::numeric_limits<double>::infinity());
   }
-  const double start_s = static_cast<double>(outcome.start_ns - origin_ns_) * 1e-9;
+  const double start_s = secondsBetween(origin_ns_, outcome.start_ns);
   for (const Contact& c : outcome.contacts) {
     forContactVertices(c, [&](std::uint16_t body, Index v) {
       if (body >= heat_.size() || v >= heat_[body].contacts.size()) return;
@@ -148,7 +148,7 @@ void Report::addFirstContact(const Outcome& o, const std::vector<Body>& bodies) 
     return std::tie(a.expected, a.toc_lower) < std::tie(b.expected, b.toc_lower);
   });
   if (first == o.contacts.end() || first->expected) return;
-  first_contact_s_ = static_cast<double>(o.start_ns - origin_ns_) * 1e-9 + first->toc_lower * o.duration_s();
+  first_contact_s_ = secondsBetween(origin_ns_, o.start_ns) + first->toc_lower * o.duration_s();
   first_contact_ = contactInWords(*first, bodies);
 }
 

@@ -25,7 +25,7 @@ void Report::addRow(const Outcome& o) {
   for (const Contact& c : o.contacts) {
     if (!c.initial) earliest_new = std::min(earliest_new, c.toc_lower);
   }
-  const double time_s = static_cast<double>(o.stamp_ns - origin_ns_) * 1e-9;
+  const double time_s = secondsBetween(origin_ns_, o.stamp_ns);
   const nlohmann::json row = {{"step", o.sequence},
                               {"t", time_s},
                               {"status", toString(o.status)},

@@ -57,9 +57,8 @@ void LookAheadScore::addSample(double error_s) {
 void LookAheadScore::expire(StampNs now_ns) {
   for (auto at = pending_.begin(); at != pending_.end();) {
     auto& list = at->second;
-    const auto over = std::remove_if(list.begin(), list.end(), [&](const Prediction& p) {
-      return static_cast<double>(now_ns - p.made_ns) * 1e-9 > horizon_s_;
-    });
+    const auto over = std::remove_if(
+        list.begin(), list.end(), [&](const Prediction& p) { return secondsBetween(p.made_ns, now_ns) > horizon_s_; });
     not_observed_ += static_cast<std::size_t>(list.end() - over);
     list.erase(over, list.end());
     at = list.empty() ? pending_.erase(at) : std::next(at);

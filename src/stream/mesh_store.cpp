@@ -99,7 +99,7 @@ StepStatus MeshStore::classify(const MeshFrame& frame) const {
   if (frame.stamp_ns == last.stamp_ns) return StepStatus::DUPLICATE;
   if (frame.stamp_ns < last.stamp_ns) return StepStatus::TIME_JUMP;
   if (frame.topology != last.topology && *frame.topology != *last.topology) return StepStatus::TOPOLOGY_CHANGED;
-  if (static_cast<double>(frame.stamp_ns - last.stamp_ns) * 1e-9 > options_.max_step_s) return StepStatus::GAP;
+  if (secondsBetween(last.stamp_ns, frame.stamp_ns) > options_.max_step_s) return StepStatus::GAP;
   if (options_.max_vertex_step_m > 0 && teleports(last.positions, frame.positions, options_.max_vertex_step_m)) {
     return StepStatus::TELEPORT;
   }

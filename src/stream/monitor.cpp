@@ -158,7 +158,7 @@ void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64
     }
     for (std::size_t b = 0; b < stores.size(); ++b) {
       const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
-                         seconds(stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
+                         secondsBetween(stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
       if (stale) stores[b].clear();
     }
   }
@@ -275,7 +275,7 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
   if (m.pending.empty()) return false;
   Impl::Pending& step = m.pending.front();
   if (step.status == StepStatus::OK) {
-    const bool timed_out = m.finishing || Impl::seconds(step.since_ns, now_ns) >= m.options.sync_timeout_s;
+    const bool timed_out = m.finishing || secondsBetween(step.since_ns, now_ns) >= m.options.sync_timeout_s;
     if (m.ready(step, timed_out) == Impl::Ready::WAIT) return false;
   }
   const auto without = [&](StepStatus status, const std::string& reason) {

@@ -75,7 +75,6 @@ struct Monitor::Impl {
   }
 
   Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
-  static double seconds(StampNs from, StampNs to) { return static_cast<double>(to - from) * 1e-9; }
   bool isStream(std::size_t body) const { return bodies[body].motion == BodyMotionKind::STREAM; }
   void drop(Pending& step, StepStatus status, const std::string& reason) {
     step.status = status;

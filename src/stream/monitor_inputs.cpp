@@ -169,7 +169,7 @@ ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
   }
   if (!(options.octomap_timeout_s > 0) || used.stamp_ns <= 0) return used;
   // Also one from the future: by its stamp it would be fresh for ever, and its clock is not that of the meshes.
-  const double age_s = seconds(used.stamp_ns, stamp_ns);
+  const double age_s = secondsBetween(used.stamp_ns, stamp_ns);
   if (std::abs(age_s) <= options.octomap_timeout_s) return used;
   used.surface = nullptr;
   std::ostringstream problem;

@@ -9,19 +9,9 @@
 namespace dccd {
 namespace {
 
-// What touched is forgotten early where it is this many times what touches now, and more than so many.
+// After a burst of contacts the trace would cost every later step as much. So it is forgotten early where it has more
+// than TRACE_ALWAYS spots and TRACE_PER_SPOT times as many as touch now.
 constexpr std::size_t TRACE_PER_SPOT = 8, TRACE_ALWAYS = 1 << 16;
-
-/// Not later, not earlier, than the time of contact.
-StampNs stampBefore(const Outcome& outcome, double toc) {
-  return outcome.start_ns +
-         static_cast<StampNs>(std::floor(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns)));
-}
-StampNs stampAfter(const Outcome& outcome, double toc) {
-  return std::min(outcome.stamp_ns,
-                  outcome.start_ns + 1 +
-                      static_cast<StampNs>(std::ceil(toc * static_cast<double>(outcome.stamp_ns - outcome.start_ns))));
-}
 
 bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
   return body == PatchTracker::ALL || partners[0] == body || partners[1] == body;
@@ -56,7 +46,7 @@ void PatchTracker::seam(std::size_t body) {
     }
     waiting_.push_back(eventOf(PatchEventKind::ENDED, at->first));
     waiting_.back().from_ns = at->second.touched_ns;
-    waiting_.back().to_ns = at->second.released_ns;  // where it had been let go before
+    waiting_.back().to_ns = at->second.released_ns;  // known only where it had been let go before the seam
     at = living_.erase(at);
   }
   std::swap(trace_, all_);
@@ -139,7 +129,8 @@ void PatchTracker::name(Outcome& outcome) const {
   outcome.tracked = true;
 }
 
-/// A living patch has one first contact that is not expected; what did touch when the step began is none.
+/// A living patch is news once: in the step in which something unexpected of it begins to touch. What touched already
+/// when the step began is no news.
 void PatchTracker::findNews() {
   for (Part& part : parts_) {
     const bool known = std::any_of(part.before.begin(), part.before.end(),
@@ -148,7 +139,7 @@ void PatchTracker::findNews() {
   }
 }
 
-/// Of patches that began before, and were as expected until now.
+/// The event UNEXPECTED, for patches that began in an earlier step and of which all was expected until now.
 void PatchTracker::tellNews(Outcome& outcome) const {
   for (const Part& part : parts_) {
     if (!part.is_new || part.before.empty()) continue;
@@ -156,15 +147,16 @@ void PatchTracker::tellNews(Outcome& outcome) const {
     PatchEvent& event = outcome.patch_events.back();
     for (const Patch& patch : outcome.patches) {
       if (patch.id != part.id || !patch.is_new) continue;
-      const StampNs from_ns = stampBefore(outcome, patch.earliest.toc_lower);
+      const StampNs from_ns = outcome.stampBefore(patch.earliest.toc_lower);
       if (event.from_ns != UNKNOWN_NS && event.from_ns <= from_ns) continue;
       event.from_ns = from_ns;
-      event.to_ns = stampAfter(outcome, patch.earliest.toc_upper);
+      event.to_ns = outcome.stampAfter(patch.earliest.toc_upper);
     }
   }
 }
 
-/// By the time that this step was looked at.
+/// How long ago something touched is told by clocks that stand still while nobody looks: a step that was cut short, or
+/// had no map, does not make what it did not see any older.
 void PatchTracker::goOn(const Outcome& outcome) {
   mesh_seen_ = outcome.complete && !outcome.cut;
   map_seen_ = mesh_seen_ && outcome.status != StepStatus::NO_MAP;
@@ -173,7 +165,7 @@ void PatchTracker::goOn(const Outcome& outcome) {
   if (map_seen_) map_clock_ns_ += duration_ns;
 }
 
-/// What touches and what did, each pair of vertices once.
+/// Joins the trace and what touches in this step into all_, each pair of vertices once.
 void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& outcome) {
   all_.clear();
   releaseBurst(before_);
@@ -208,7 +200,8 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
   for (const Touch& spot : all_.spots) last_at_[spot.point[0]] = NO_INDEX;
 }
 
-/// Only where the map is another one than in the step before.
+/// Which patches touch, when the step begins, a voxel that the map before did not have. Asked only where the map is
+/// another one than in the step before.
 void PatchTracker::findNewVoxels(const PatchMaker& found, const Outcome& outcome) {
   on_new_voxel_.clear();
   if (last_map_ == outcome.obstacle) return;
@@ -267,7 +260,8 @@ void PatchTracker::findParts(const std::vector<PatchSpot>& spots, const std::vec
   }
 }
 
-/// Of each identity the largest part keeps it; of several in a part the oldest stays.
+/// Where a living patch has come apart, its largest part keeps the identity and the others get new ones. Where several
+/// have become one part, the oldest identity stays.
 void PatchTracker::keepIdentities(Outcome& outcome) {
   std::map<std::uint64_t, std::vector<Part*>> parts_of;
   for (Part& part : parts_) {
@@ -306,7 +300,7 @@ void PatchTracker::keepIdentities(Outcome& outcome) {
   }
 }
 
-/// What touches and is of no living patch, in the order of the first touches.
+/// Parts that touch and were part of no living patch begin as new ones, numbered in the order of their first touches.
 void PatchTracker::begin(Outcome& outcome) {
   std::vector<Part*> fresh;
   for (Part& part : parts_) {
@@ -323,8 +317,8 @@ void PatchTracker::begin(Outcome& outcome) {
       living.beginning = part->map_changed ? PatchBeginning::MAP_CHANGED : PatchBeginning::INITIAL;
       living.began_to_ns = outcome.start_ns;
     } else {
-      living.began_from_ns = stampBefore(outcome, part->toc_lower);
-      living.began_to_ns = stampAfter(outcome, part->toc_upper);
+      living.began_from_ns = outcome.stampBefore(part->toc_lower);
+      living.began_to_ns = outcome.stampAfter(part->toc_upper);
     }
     outcome.patch_events.push_back(eventOf(PatchEventKind::BEGAN, part->id));
     outcome.patch_events.back().from_ns = living.began_from_ns;
@@ -360,7 +354,7 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   for (const Part& part : parts_) {
     if (!part.touches) continue;
     Living& living = living_.at(part.id);
-    living.touched_ns = std::max(living.touched_ns, stampBefore(outcome, part.toc_lower));
+    living.touched_ns = std::max(living.touched_ns, outcome.stampBefore(part.toc_lower));
     living.released_ns = UNKNOWN_NS;
     living.unexpected = living.unexpected || part.lasts_unexpected;
     alive_.push_back(part.id);

@@ -136,7 +136,7 @@ void RangeLog::observe(const Outcome& outcome) {
   if (!outcome.answered) return;
   if (!begin_ns_) begin_ns_ = outcome.start_ns;
   // The horizon of all that was predicted before the range is over, as LookAheadScore sees it.
-  keeps_score_ = static_cast<double>(outcome.stamp_ns - *begin_ns_) * 1e-9 > score_->horizon_s();
+  keeps_score_ = secondsBetween(*begin_ns_, outcome.stamp_ns) > score_->horizon_s();
   if (keeps_score_) score_->beginPart();
 }
 

@@ -26,7 +26,7 @@ std::string sizeOf(const Topology& topology) {
 std::string seamReason(StepStatus status, const MeshFrame& before, const MeshFrame& after,
                        const MeshStoreOptions& options) {
   std::ostringstream text;
-  const double elapsed_s = static_cast<double>(after.stamp_ns - before.stamp_ns) * 1e-9;
+  const double elapsed_s = secondsBetween(before.stamp_ns, after.stamp_ns);
   switch (status) {
     case StepStatus::TIME_JUMP:
       text << "the stamp is " << -elapsed_s << " s before that of the last frame";
