@@ -48,7 +48,7 @@ def insert(database, table, recording, row_list):
                          tuple(row.values()))
 
 
-def fill(database, fleet, folder):
+def fill(database, fleet, folder, snakemake_version):
     database.executescript(SCHEMA)
     for recording, result in results_of(fleet, folder):
         name = recording['name']
@@ -71,7 +71,7 @@ def fill(database, fleet, folder):
     database.executemany('INSERT INTO parameters VALUES (?, ?)',
                          [('params', fleet['params'] or ''), ('text', fleet['params_text']), ('options', ' '.join(fleet['options']))])
     database.executemany('INSERT INTO versions VALUES (?, ?)', [('deformable_ccd', fleet['version']),
-                                                                ('snakemake', fleet['snakemake'])])
+                                                                ('snakemake', snakemake_version)])
 
 
 PAGE = pathlib.Path(__file__).resolve().parent / 'page.html'
@@ -130,13 +130,13 @@ def open_database(path):
     return database
 
 
-def write(fleet, folder):
+def write(fleet, folder, snakemake_version):
     """Both whole or not at all."""
     unfinished = folder / 'fleet.sqlite.part'
     unfinished.unlink(missing_ok=True)
     database = open_database(unfinished)
     with database:
-        fill(database, fleet, folder)
+        fill(database, fleet, folder, snakemake_version)
     page_part = folder / 'index.html.part'
     page_part.write_text(fleet_page(database))
     database.close()

@@ -111,7 +111,7 @@ def main():
         elif verb == 'recording':
             compute_recording(fleet, *names)
         else:
-            fleet_database.write(fleet, pathlib.Path('.'))
+            fleet_database.write(fleet, pathlib.Path('.'), *names)
     except OSError as error:
         sys.exit('%s: %s' % (' '.join([verb, *names]), error))
 

@@ -249,6 +249,8 @@ class FleetTest(FolderTestCase):
             self.assertAlmostEqual(
                 rows_of(self.out, "SELECT in_contact_s FROM partners WHERE recording = '%s' AND body_1 = 'octomap'" % name)[0][0],
                 sum(durations[s] for s in touched) * 1e-9, places=9)
+        self.assertEqual(rows_of(self.out, "SELECT version FROM versions WHERE component = 'snakemake'"),
+                         [(run('snakemake', '--version').stdout.strip(),)])
         page = (self.out / 'index.html').read_text()
         self.assertIn('recordings/first/report/report.html', page)
         self.assertNotIn('http', page.replace('<!doctype html>', ''), 'it loads nothing')
