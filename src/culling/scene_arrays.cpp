@@ -215,8 +215,9 @@ std::int32_t SceneArrays::endOf(double until) const {
 }
 
 bool SceneArrays::isStill(const SceneBody& body) const {
+  if (body.usedCount() == 0) return true;
   const VertexMotion& first = vertices_[body.internal_begin];
-  return body.usedCount() == 0 || (body.translates && std::equal(first.t0, first.t0 + 3, first.t1));
+  return body.translates && std::equal(first.t0, first.t0 + 3, first.t1);
 }
 
 void SceneArrays::refitBodies() {

@@ -5,22 +5,12 @@
 #include <limits>
 
 #include "dccd/tolerances.h"
+#include "simd/directions.h"
 
 namespace dccd {
 namespace {
 
 using tolerance::SQRT2_UP;
-
-void project(const double* x, double* p) {
-  p[0] = x[0];
-  p[1] = x[1];
-  p[2] = x[2];
-  p[3] = x[0] + x[1];
-  p[4] = x[0] + x[2];
-  p[5] = x[1] + x[2];
-  p[6] = x[0] - x[1];
-  p[7] = x[1] - x[2];
-}
 
 // First time at which the point u -> (1-t) u0 + t u1 is not above l -> (1-t) l0 + t l1 + margin, rounded down; 2 if
 // never.
@@ -76,8 +66,8 @@ double bound(const double (*p0)[8], const double (*p1)[8], int first_count, doub
 double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& pair, double minimum_separation_m) {
   double p0[4][8], p1[4][8];
   for (int i = 0; i < 4; ++i) {
-    project(vertices[pair[i]].t0, p0[i]);
-    project(vertices[pair[i]].t1, p1[i]);
+    simd::project(vertices[pair[i]].t0, p0[i]);
+    simd::project(vertices[pair[i]].t1, p1[i]);
   }
   return bound(p0, p1, kind == PairKind::VERTEX_FACE ? 1 : 2, minimum_separation_m);
 }
@@ -85,8 +75,8 @@ double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& p
 double linearTocBound(PairKind kind, const PairMotion& pair, double minimum_separation_m) {
   double p0[4][8], p1[4][8];
   for (int i = 0; i < 4; ++i) {
-    project(pair.x[0][i], p0[i]);
-    project(pair.x[1][i], p1[i]);
+    simd::project(pair.x[0][i], p0[i]);
+    simd::project(pair.x[1][i], p1[i]);
   }
   return bound(p0, p1, kind == PairKind::VERTEX_FACE ? 1 : 2, minimum_separation_m);
 }

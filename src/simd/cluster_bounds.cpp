@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "simd/directions.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/cluster_bounds.cpp"
 #include <hwy/foreach_target.h>
@@ -13,18 +15,6 @@ namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-// The five sums are rounded once each: monotone in the exact projection.
-HWY_INLINE void project(const double* HWY_RESTRICT x, double* HWY_RESTRICT p) {
-  p[0] = x[0];
-  p[1] = x[1];
-  p[2] = x[2];
-  p[3] = x[0] + x[1];
-  p[4] = x[0] + x[2];
-  p[5] = x[1] + x[2];
-  p[6] = x[0] - x[1];
-  p[7] = x[1] - x[2];
-}
 
 void ProjectionBounds(const double* HWY_RESTRICT vertices, size_t n, double* HWY_RESTRICT min8,
                       double* HWY_RESTRICT max8) {

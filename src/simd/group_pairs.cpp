@@ -131,6 +131,23 @@ struct LeaveMasksOut {
   }
 };
 
+// Bit per lane: 1 where feature i of one group and the lane's of the other share a vertex. Empty ones share theirs.
+template <size_t ONE, size_t OTHER>
+HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const uint32_t* HWY_RESTRICT other) {
+  const hn::CappedTag<uint32_t, GROUP> d;
+  uint32_t bits = 0;
+  for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
+    auto same = hn::Eq(hn::Set(d, one[i]), hn::Load(d, other + part));
+    for (size_t x = 0; x < ONE; ++x) {
+      for (size_t y = x == 0 ? 1 : 0; y < OTHER; ++y) {
+        same = hn::Or(same, hn::Eq(hn::Set(d, one[x * GROUP + i]), hn::Load(d, other + y * GROUP + part)));
+      }
+    }
+    bits |= bitsOf(d, same) << part;
+  }
+  return bits;
+}
+
 // Features of A and B vertices that share one: their vertices lane by lane.
 template <size_t A, size_t B>
 struct LeaveAdjacentOut {
@@ -140,23 +157,6 @@ struct LeaveAdjacentOut {
   HWY_INLINE uint32_t after(bool by_rows, uint32_t i, uint32_t mask) const {
     if (mask == 0) return 0;
     return mask & ~(by_rows ? sharing<A, B>(a, i, b) : sharing<B, A>(b, i, a));
-  }
-
- private:
-  template <size_t ONE, size_t OTHER>
-  static HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const uint32_t* HWY_RESTRICT other) {
-    const hn::CappedTag<uint32_t, GROUP> d;
-    uint32_t bits = 0;
-    for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
-      auto same = hn::Eq(hn::Set(d, one[i]), hn::Load(d, other + part));
-      for (size_t x = 0; x < ONE; ++x) {
-        for (size_t y = x == 0 ? 1 : 0; y < OTHER; ++y) {
-          same = hn::Or(same, hn::Eq(hn::Set(d, one[x * GROUP + i]), hn::Load(d, other + y * GROUP + part)));
-        }
-      }
-      bits |= bitsOf(d, same) << part;
-    }
-    return bits;
   }
 };
 
@@ -199,7 +199,7 @@ HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
   for (size_t line = 0; line < SOA_SIZE; line += 128) hwy::Prefetch(next + line);
 }
 
-// leaveOut(g, h): of a pair of groups.
+// leaveOutOf(g, h): what is left out of a pair of groups.
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint32_t* HWY_RESTRICT group_pairs,
                             size_t count, bool self, Diagonal diagonal, const LeaveOutOf& leaveOutOf,
@@ -226,8 +226,9 @@ size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* 
 }
 
 template <size_t A, size_t B>
-HWY_INLINE size_t testApartPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count,
-                                 bool self, bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
+HWY_INLINE size_t testUnsharedPairsOf(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs,
+                                      size_t count, bool self, bool t0_only, uint32_t* out, size_t capacity,
+                                      size_t* consumed) {
   const auto adjacent = [&](uint32_t g, uint32_t h) {
     return LeaveAdjacentOut<A, B>{a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP};
   };
@@ -238,37 +239,25 @@ HWY_INLINE size_t testApartPairs(const GroupsView& a, const GroupsView& b, const
 
 size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
                          bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
-  if (a.arity == 1) return testApartPairs<1, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
-  if (b.arity == 3) return testApartPairs<2, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
-  return testApartPairs<2, 2>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+  if (a.arity == 1) return testUnsharedPairsOf<1, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+  if (b.arity == 3) return testUnsharedPairsOf<2, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+  return testUnsharedPairsOf<2, 2>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
 }
 
-bool SharedVertices(const uint32_t* HWY_RESTRICT fa, size_t a_arity, const uint32_t* HWY_RESTRICT fb, size_t b_arity,
-                    uint16_t* HWY_RESTRICT shared) {
-  const hn::CappedTag<uint32_t, GROUP> d;
-  HWY_ALIGN uint32_t lanes[3 * GROUP];
-  for (size_t j = 0; j < GROUP; ++j) {
-    for (size_t y = 0; y < b_arity; ++y) lanes[y * GROUP + j] = fb[j * b_arity + y];
+template <size_t A, size_t B>
+HWY_INLINE void shareMasks(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b,
+                           uint16_t* HWY_RESTRICT masks) {
+  for (uint32_t i = 0; i < GROUP; ++i) {
+    masks[i] = static_cast<uint16_t>(a[i] == UINT32_MAX ? 0 : sharing<A, B>(a, i, b));
   }
-  uint32_t any = 0;
-  for (size_t i = 0; i < GROUP; ++i) {
-    uint32_t row = 0;
-    if (fa[i * a_arity] != UINT32_MAX) {
-      for (size_t part = 0; part < GROUP; part += hn::Lanes(d)) {
-        auto same = hn::Zero(d);
-        for (size_t x = 0; x < a_arity; ++x) {
-          const auto v = hn::Set(d, fa[i * a_arity + x]);
-          for (size_t y = 0; y < b_arity; ++y) {
-            same = hn::Or(same, hn::VecFromMask(d, hn::Eq(v, hn::Load(d, lanes + y * GROUP + part))));
-          }
-        }
-        row |= bitsOf(d, hn::Ne(same, hn::Zero(d))) << part;
-      }
-    }
-    shared[i] = static_cast<uint16_t>(row);
-    any |= row;
-  }
-  return any != 0;
+}
+
+void SharedVertices(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, uint16_t* shared) {
+  const uint32_t* of_a = a.vertices + size_t{g} * a.arity * GROUP;
+  const uint32_t* of_b = b.vertices + size_t{h} * b.arity * GROUP;
+  if (a.arity == 1) return shareMasks<1, 3>(of_a, of_b, shared);
+  if (b.arity == 3) return shareMasks<2, 3>(of_a, of_b, shared);
+  shareMasks<2, 2>(of_a, of_b, shared);
 }
 
 size_t TestLeafPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool self, const uint16_t* shared,
@@ -383,9 +372,8 @@ std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const st
   return HWY_DYNAMIC_DISPATCH(TestUnsharedPairs)(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
 }
 
-bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,
-                    std::size_t b_arity, std::uint16_t* shared) {
-  return HWY_DYNAMIC_DISPATCH(SharedVertices)(indices_a, a_arity, indices_b, b_arity, shared);
+void sharedVertices(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, std::uint16_t* shared) {
+  HWY_DYNAMIC_DISPATCH(SharedVertices)(a, b, g, h, shared);
 }
 std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
                          const std::uint16_t* shared, std::uint32_t* out) {

@@ -31,11 +31,9 @@ std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const st
                               std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
                               std::size_t* consumed);
 
-/// Which lanes of two groups share a vertex: bit j of shared[i] says that feature i of a and feature j of b do. Empty
-/// lanes share none. indices_a, indices_b: 16 features of a_arity and b_arity vertices each, UINT32_MAX in empty ones.
-/// Returns whether any do.
-bool sharedVertices(const std::uint32_t* indices_a, std::size_t a_arity, const std::uint32_t* indices_b,
-                    std::size_t b_arity, std::uint16_t* shared);
+/// Which lanes of two groups of such leaves share a vertex: bit j of shared[i] says that feature i of g and feature j
+/// of h do. Empty lanes share none.
+void sharedVertices(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, std::uint16_t* shared);
 
 /// testGroupPairs() for one pair of leaf groups (g, h), STRICT_UPPER, both times, without the lanes in `shared`:
 /// what it writes is what that would write, in that order, less those. out has room for 256 pairs.

@@ -220,8 +220,7 @@ void PairMemory::shareVertices(const SceneArrays& scene, const Group& group, Pai
   pair.has_shared = true;
   if (group.trees.body_a != group.trees.body_b) return;
   const ClusterTree &a = treeA(scene, group.trees), &b = treeB(scene, group.trees);
-  simd::sharedVertices(a.feature(clusterA(group, pair) * simd::GROUP), a.arity(),
-                       b.feature(clusterB(group, pair) * simd::GROUP), b.arity(), pair.shared);
+  simd::sharedVertices(a.leaves(false), b.leaves(false), clusterA(group, pair), clusterB(group, pair), pair.shared);
 }
 
 std::size_t PairMemory::test(const SceneArrays& scene, const Group& group, Pair& pair, double contact_m,
