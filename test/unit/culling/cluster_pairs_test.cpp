@@ -224,7 +224,7 @@ TEST(ClusterPairs, ASearchThatIsCutKeepsTheFirstAndBoundsTheRest) {
 
 // superclusterTocBound: never after the first contact of any pair of features in the groups.
 TEST(ClusterPairs, BoundsOfGroupsAreNeverLate) {
-  std::size_t contacts = 0, positive = 0;
+  std::size_t contacts = 0, positive = 0, shortened_positive = 0;
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const Draw draw = drawFrom(9000 + seed);
     TestStep step = randomStep(draw, 8, seed % 4 == 0 ? Coordinates::REAL : Coordinates::SMALL_INTEGERS);
@@ -233,6 +233,8 @@ TEST(ClusterPairs, BoundsOfGroupsAreNeverLate) {
       for (Vec3& x : step.bodies[b].t0) x += Vec3(20.0 * static_cast<double>(b), 0, draw(0, 1));
     }
     const Scene scene(step);
+    Scene shortened(step);  // whose bounds end before most contacts
+    const Span span = shortened.arrays.shorten([](std::size_t n, const auto& f) { f(0, n); }, seed % 2 ? 0.5 : 0.05);
     for (const TrueContact& truth : trueContacts(step)) {
       const bool vf = truth.contact.kind == PairKind::VERTEX_FACE;
       const SceneBody &a = scene.arrays.bodies()[truth.contact.body[0]],
@@ -243,16 +245,25 @@ TEST(ClusterPairs, BoundsOfGroupsAreNeverLate) {
       ASSERT_EQ(trees.a->level(1).groups, 1u) << "small enough for the pair to be in group 0 of level 1";
       ASSERT_EQ(trees.b->level(1).groups, 1u);
       const double bound = superclusterTocBound(trees, 0, 0);
+      TreePair until = trees;
+      until.a = &shortened.arrays.bodies()[truth.contact.body[0]].tree(vf ? FeatureKind::VERTEX : FeatureKind::EDGE);
+      until.b = &shortened.arrays.bodies()[truth.contact.body[1]].tree(vf ? FeatureKind::FACE : FeatureKind::EDGE);
+      until.span = span;
       ASSERT_GE(bound, 0);
       ASSERT_LE(bound, 1);
       Root toc = truth.toc;
       EXPECT_GE(tocError(toc, bound), 0) << "seed " << seed << ": bound " << bound;
+      const double earlier = superclusterTocBound(until, 0, 0);
+      EXPECT_GE(tocError(toc, earlier), 0)
+          << "seed " << seed << ": bound " << earlier << " of bounds until " << span.end;
+      shortened_positive += earlier > 0;
       ++contacts;
       positive += bound > 0;
     }
   }
   EXPECT_GT(contacts, 200u);
   EXPECT_GT(positive, 20u) << "bounds of 0 show nothing";
+  EXPECT_GT(shortened_positive, 20u);
 }
 
 }  // namespace
