@@ -50,31 +50,40 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
   return bits;
 }
 #else
+// Both values of a direction pair in all lanes.
+template <class D>
+HWY_INLINE hn::Vec<D> both(D d, const int16_t* HWY_RESTRICT two) {
+  int32_t pair;
+  std::memcpy(&pair, two, sizeof pair);
+  return hn::BitCast(d, hn::Set(hn::RepartitionToWide<D>(), pair));
+}
+
+template <bool T0_ONLY, class D>
+HWY_INLINE hn::Mask<D> apartIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
+                               size_t stride, const int16_t* HWY_RESTRICT lanes) {
+  const int16_t* HWY_RESTRICT smallest = lanes + soaIndex(k, 0);
+  const int16_t* HWY_RESTRICT largest = smallest + RECORD * GROUP;
+  auto above = hn::Gt(both(d, lo + k * stride), hn::Load(d, largest));
+  auto below = hn::Gt(hn::Load(d, smallest), both(d, hi + k * stride));
+  if (!T0_ONLY) {
+    above = hn::And(above, hn::Gt(both(d, lo + (DIRECTIONS + k) * stride), hn::Load(d, largest + SOA_T1)));
+    below = hn::And(below, hn::Gt(hn::Load(d, smallest + SOA_T1), both(d, hi + (DIRECTIONS + k) * stride)));
+  }
+  return hn::Or(above, below);
+}
+
 template <bool T0_ONLY>
 HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
                             const int16_t* HWY_RESTRICT lanes) {
   const hn::CappedTag<int16_t, 2 * GROUP> d;
   const hn::RepartitionToWide<decltype(d)> d32;
-  constexpr size_t HALF = RECORD * GROUP;
-  const auto both = [&](const int16_t* HWY_RESTRICT two) {
-    int32_t pair;
-    std::memcpy(&pair, two, sizeof pair);
-    return hn::BitCast(d, hn::Set(d32, pair));
-  };
   uint32_t bits = 0;
   for (size_t part = 0; part < 2 * GROUP; part += hn::Lanes(d)) {
-    const auto apartIn = [&](size_t k) {
-      const int16_t* HWY_RESTRICT smallest = lanes + soaIndex(k, 0) + part;
-      const int16_t* HWY_RESTRICT largest = smallest + HALF;
-      auto above = hn::Gt(both(lo + k * stride), hn::Load(d, largest));
-      auto below = hn::Gt(hn::Load(d, smallest), both(hi + k * stride));
-      if (!T0_ONLY) {
-        above = hn::And(above, hn::Gt(both(lo + (DIRECTIONS + k) * stride), hn::Load(d, largest + SOA_T1)));
-        below = hn::And(below, hn::Gt(hn::Load(d, smallest + SOA_T1), both(hi + (DIRECTIONS + k) * stride)));
-      }
-      return hn::Or(above, below);
-    };
-    const auto apart = hn::Or(hn::Or(apartIn(0), apartIn(2)), hn::Or(apartIn(4), apartIn(6)));
+    const int16_t* HWY_RESTRICT some = lanes + part;
+    auto apart = apartIn<T0_ONLY>(d, 0, lo, hi, stride, some);
+    apart = hn::Or(apart, apartIn<T0_ONLY>(d, 2, lo, hi, stride, some));
+    apart = hn::Or(apart, apartIn<T0_ONLY>(d, 4, lo, hi, stride, some));
+    apart = hn::Or(apart, apartIn<T0_ONLY>(d, 6, lo, hi, stride, some));
     const auto meets = hn::Eq(hn::BitCast(d32, hn::VecFromMask(d, apart)), hn::Zero(d32));
     bits |= bitsOf(d32, meets) << (part / 2);
   }
