@@ -100,7 +100,10 @@ HWY_INLINE uint32_t* writePairs(uint32_t node, uint32_t base, uint32_t mask, boo
   // Without a branch on how many there are, which nothing foretells: whole vectors are stored, o moves on less.
   const hn::FixedTag<uint32_t, GROUP> d;
   const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
-  const auto lanes = hn::Compress(hn::Iota(d, base), hn::LoadMaskBits(d, packed)), nodes = hn::Set(d, node);
+  // From a table: Iota() is written to the stack lane by lane, and read back at once.
+  HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const auto left = hn::Compress(hn::Load(d, LANES), hn::LoadMaskBits(d, packed));
+  const auto lanes = hn::Add(left, hn::Set(d, base)), nodes = hn::Set(d, node);
   if (node_first) {
     hn::StoreInterleaved2(nodes, lanes, d, o);
   } else {
