@@ -58,18 +58,20 @@ HWY_INLINE hn::Vec<D> both(D d, const int16_t* HWY_RESTRICT two) {
   return hn::BitCast(d, hn::Set(hn::RepartitionToWide<D>(), pair));
 }
 
+// Above 0 in the lanes that are apart in direction k.
 template <bool T0_ONLY, class D>
-HWY_INLINE hn::Mask<D> apartIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
-                               size_t stride, const int16_t* HWY_RESTRICT lanes) {
+HWY_INLINE hn::Vec<D> gapIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
+                            size_t stride, const int16_t* HWY_RESTRICT lanes) {
   const int16_t* HWY_RESTRICT smallest = lanes + soaIndex(k, 0);
   const int16_t* HWY_RESTRICT largest = smallest + RECORD * GROUP;
-  auto above = hn::Gt(both(d, lo + k * stride), hn::Load(d, largest));
-  auto below = hn::Gt(hn::Load(d, smallest), both(d, hi + k * stride));
+  auto above = hn::SaturatedSub(both(d, lo + k * stride), hn::Load(d, largest));
+  auto below = hn::SaturatedSub(hn::Load(d, smallest), both(d, hi + k * stride));
   if (!T0_ONLY) {
-    above = hn::And(above, hn::Gt(both(d, lo + (DIRECTIONS + k) * stride), hn::Load(d, largest + SOA_T1)));
-    below = hn::And(below, hn::Gt(hn::Load(d, smallest + SOA_T1), both(d, hi + (DIRECTIONS + k) * stride)));
+    const size_t t1 = (DIRECTIONS + k) * stride;
+    above = hn::Min(above, hn::SaturatedSub(both(d, lo + t1), hn::Load(d, largest + SOA_T1)));
+    below = hn::Min(below, hn::SaturatedSub(hn::Load(d, smallest + SOA_T1), both(d, hi + t1)));
   }
-  return hn::Or(above, below);
+  return hn::Max(above, below);
 }
 
 template <bool T0_ONLY>
@@ -80,12 +82,11 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
   uint32_t bits = 0;
   for (size_t part = 0; part < 2 * GROUP; part += hn::Lanes(d)) {
     const int16_t* HWY_RESTRICT some = lanes + part;
-    auto apart = apartIn<T0_ONLY>(d, 0, lo, hi, stride, some);
-    apart = hn::Or(apart, apartIn<T0_ONLY>(d, 2, lo, hi, stride, some));
-    apart = hn::Or(apart, apartIn<T0_ONLY>(d, 4, lo, hi, stride, some));
-    apart = hn::Or(apart, apartIn<T0_ONLY>(d, 6, lo, hi, stride, some));
-    const auto meets = hn::Eq(hn::BitCast(d32, hn::VecFromMask(d, apart)), hn::Zero(d32));
-    bits |= bitsOf(d32, meets) << (part / 2);
+    auto gap = hn::Max(hn::Zero(d), gapIn<T0_ONLY>(d, 0, lo, hi, stride, some));
+    gap = hn::Max(gap, gapIn<T0_ONLY>(d, 2, lo, hi, stride, some));
+    gap = hn::Max(gap, gapIn<T0_ONLY>(d, 4, lo, hi, stride, some));
+    gap = hn::Max(gap, gapIn<T0_ONLY>(d, 6, lo, hi, stride, some));
+    bits |= bitsOf(d32, hn::Eq(hn::BitCast(d32, gap), hn::Zero(d32))) << (part / 2);
   }
   return bits;
 }
