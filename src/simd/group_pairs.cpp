@@ -58,38 +58,81 @@ HWY_INLINE hn::Vec<D> both(D d, const int16_t* HWY_RESTRICT two) {
   return hn::BitCast(d, hn::Set(hn::RepartitionToWide<D>(), pair));
 }
 
+// The values of a group's nodes, a vector of each two directions, side by side.
+template <class D>
+struct InMemory {
+  const int16_t* HWY_RESTRICT lanes;
+  HWY_INLINE hn::Vec<D> operator()(size_t at) const { return hn::Load(D(), lanes + at); }
+};
+
 // Above 0 in the lanes that are apart in direction k.
-template <bool T0_ONLY, class D>
+template <bool T0_ONLY, class D, class Lanes>
 HWY_INLINE hn::Vec<D> gapIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
-                            size_t stride, const int16_t* HWY_RESTRICT lanes) {
-  const int16_t* HWY_RESTRICT smallest = lanes + soaIndex(k, 0);
-  const int16_t* HWY_RESTRICT largest = smallest + RECORD * GROUP;
-  auto above = hn::SaturatedSub(both(d, lo + k * stride), hn::Load(d, largest));
-  auto below = hn::SaturatedSub(hn::Load(d, smallest), both(d, hi + k * stride));
+                            size_t stride, const Lanes& lanes) {
+  const size_t smallest = soaIndex(k, 0), largest = smallest + RECORD * GROUP;
+  auto above = hn::SaturatedSub(both(d, lo + k * stride), lanes(largest));
+  auto below = hn::SaturatedSub(lanes(smallest), both(d, hi + k * stride));
   if (!T0_ONLY) {
     const size_t t1 = (DIRECTIONS + k) * stride;
-    above = hn::Min(above, hn::SaturatedSub(both(d, lo + t1), hn::Load(d, largest + SOA_T1)));
-    below = hn::Min(below, hn::SaturatedSub(hn::Load(d, smallest + SOA_T1), both(d, hi + t1)));
+    above = hn::Min(above, hn::SaturatedSub(both(d, lo + t1), lanes(largest + SOA_T1)));
+    below = hn::Min(below, hn::SaturatedSub(lanes(smallest + SOA_T1), both(d, hi + t1)));
   }
   return hn::Max(above, below);
+}
+
+template <bool T0_ONLY, class D, class Lanes>
+HWY_INLINE uint32_t meetingIn(D d, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
+                              const Lanes& lanes) {
+  const hn::RepartitionToWide<D> d32;
+  auto gap = hn::Max(hn::Zero(d), gapIn<T0_ONLY>(d, 0, lo, hi, stride, lanes));
+  gap = hn::Max(gap, gapIn<T0_ONLY>(d, 2, lo, hi, stride, lanes));
+  gap = hn::Max(gap, gapIn<T0_ONLY>(d, 4, lo, hi, stride, lanes));
+  gap = hn::Max(gap, gapIn<T0_ONLY>(d, 6, lo, hi, stride, lanes));
+  return bitsOf(d32, hn::Eq(hn::BitCast(d32, gap), hn::Zero(d32)));
 }
 
 template <bool T0_ONLY>
 HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
                             const int16_t* HWY_RESTRICT lanes) {
   const hn::CappedTag<int16_t, 2 * GROUP> d;
-  const hn::RepartitionToWide<decltype(d)> d32;
   uint32_t bits = 0;
   for (size_t part = 0; part < 2 * GROUP; part += hn::Lanes(d)) {
-    const int16_t* HWY_RESTRICT some = lanes + part;
-    auto gap = hn::Max(hn::Zero(d), gapIn<T0_ONLY>(d, 0, lo, hi, stride, some));
-    gap = hn::Max(gap, gapIn<T0_ONLY>(d, 2, lo, hi, stride, some));
-    gap = hn::Max(gap, gapIn<T0_ONLY>(d, 4, lo, hi, stride, some));
-    gap = hn::Max(gap, gapIn<T0_ONLY>(d, 6, lo, hi, stride, some));
-    bits |= bitsOf(d32, hn::Eq(hn::BitCast(d32, gap), hn::Zero(d32))) << (part / 2);
+    bits |= meetingIn<T0_ONLY>(d, lo, hi, stride, InMemory<decltype(d)>{lanes + part}) << (part / 2);
   }
   return bits;
 }
+#endif
+
+// A group's nodes, of which the nodes of another one are compared with all.
+#if DCCD_COMPRESS
+class GroupLanes {  // 16 of the 32 registers
+  using D = hn::FixedTag<int16_t, 2 * GROUP>;
+
+ public:
+  HWY_INLINE explicit GroupLanes(const int16_t* HWY_RESTRICT lanes) {
+    for (size_t i = 0; i < RECORD; ++i) vectors_[i] = hn::Load(D(), lanes + i * 2 * GROUP);
+  }
+  HWY_INLINE hn::Vec<D> operator()(size_t at) const { return vectors_[at / (2 * GROUP)]; }
+  template <bool T0_ONLY>
+  HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
+    return meetingIn<T0_ONLY>(D(), lo, hi, GROUP, *this);
+  }
+
+ private:
+  hn::Vec<D> vectors_[RECORD];
+};
+#else
+class GroupLanes {
+ public:
+  HWY_INLINE explicit GroupLanes(const int16_t* HWY_RESTRICT lanes) : lanes_(lanes) {}
+  template <bool T0_ONLY>
+  HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
+    return meeting<T0_ONLY>(lo, hi, GROUP, lanes_);
+  }
+
+ private:
+  const int16_t* HWY_RESTRICT lanes_;
+};
 #endif
 
 // Writes the pairs of one node with those lanes of the other group that are in the mask, node first or second, in the
@@ -188,7 +231,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   // Broadcast the nodes of the side with fewer left.
   const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
   const int16_t* HWY_RESTRICT outer = by_rows ? sa : sb;
-  const int16_t* HWY_RESTRICT inner = by_rows ? sb : sa;
+  const GroupLanes lanes(by_rows ? sb : sa);
   uint32_t outer_left = by_rows ? rows : cols;
   const uint32_t inner_mask = by_rows ? cols : rows;
   const uint32_t base_outer = (by_rows ? g : h) * GROUP, base_inner = (by_rows ? h : g) * GROUP;
@@ -200,7 +243,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     mask = leave_out.before(by_rows, i, mask);
     if (mask == 0) continue;
-    mask &= meeting<T0_ONLY>(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i), GROUP, inner);
+    mask &= lanes.template meets<T0_ONLY>(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
     mask = leave_out.after(by_rows, i, mask);
     if (mask) o = writePairs(base_outer + i, base_inner, mask, by_rows, o);
   }
