@@ -268,17 +268,4 @@ void SceneArrays::overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pa
   }
 }
 
-void SceneArrays::featureVertices(FeatureKind kind, std::size_t body_index, Index rank, Index* out) const {
-  const SceneBody& body = bodies_[body_index];
-  if (kind == FeatureKind::VERTEX) {
-    *out = rank - body.vertex_begin;
-  } else if (kind == FeatureKind::EDGE) {
-    const Edge& e = body.setup.topology->edges()[rank - body.edge_begin];
-    std::copy(e.begin(), e.end(), out);
-  } else {
-    const Face& face = body.setup.topology->faces()[face_order_[rank]];
-    std::copy(face.begin(), face.end(), out);
-  }
-}
-
 }  // namespace dccd

@@ -158,7 +158,18 @@ class SceneArrays {
   const double* radii() const { return radii_.data(); }
 
   /// The body-local vertices (1, 2 or 3) of the feature with the rank, in the input's order.
-  void featureVertices(FeatureKind kind, std::size_t body, Index rank, Index* out) const;
+  void featureVertices(FeatureKind kind, std::size_t body_index, Index rank, Index* out) const {
+    const SceneBody& body = bodies_[body_index];
+    if (kind == FeatureKind::VERTEX) {
+      out[0] = rank - body.vertex_begin;
+    } else if (kind == FeatureKind::EDGE) {
+      const Edge& e = body.setup.topology->edges()[rank - body.edge_begin];
+      out[0] = e[0], out[1] = e[1];
+    } else {
+      const Face& face = body.setup.topology->faces()[face_order_[rank]];
+      out[0] = face[0], out[1] = face[1], out[2] = face[2];
+    }
+  }
 
  private:
   // Nothing moves far in a short time: swept bounds then say nearly as much as those at two times, for half the work.

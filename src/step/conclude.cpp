@@ -192,19 +192,24 @@ void leaveOut(double toc, Outcome& outcome) {
   outcome.unchecked_toc_lower = std::min(outcome.unchecked_toc_lower, toc);
 }
 
-void addPart(std::size_t part, std::size_t parts, const PartResult& result, Outcome& outcome) {
+void addPart(std::size_t part, std::size_t parts, PartResult& result, Outcome& outcome) {
   if (part == 0) {
     outcome.start_state = result.start_state;
     outcome.start_state_complete = result.start_state_complete;
     outcome.complete = outcome.complete && result.start_state_complete;
     outcome.intersections = result.intersections;
   }
-  outcome.contacts.reserve(outcome.contacts.size() + result.contacts.size());
-  for (Contact contact : result.contacts) {
-    contact.toc_lower = scaleDown(contact.toc_lower, part, parts);
-    contact.toc_upper = scaleUp(contact.toc_upper, part, parts);
-    contact.initial = contact.initial && part == 0;
-    outcome.contacts.push_back(contact);
+  if (parts == 1) {
+    outcome.contacts = std::move(result.contacts);
+    result.contacts.clear();
+  } else {
+    outcome.contacts.reserve(outcome.contacts.size() + result.contacts.size());
+    for (Contact contact : result.contacts) {
+      contact.toc_lower = scaleDown(contact.toc_lower, part, parts);
+      contact.toc_upper = scaleUp(contact.toc_upper, part, parts);
+      contact.initial = contact.initial && part == 0;
+      outcome.contacts.push_back(contact);
+    }
   }
   outcome.cut = outcome.cut || result.cut;
   if (!result.complete) leaveOut(scaleDown(std::min(result.unchecked_toc_lower, 1.0), part, parts), outcome);
