@@ -55,7 +55,7 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
     throw std::invalid_argument("exact test: a minimum separation needs the rung conservative");
   }
   static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
-  BlockOutput output;
+  BlockOutput output{};
   simd::BatchInput input;
   input.vertices = reinterpret_cast<const double*>(batch.vertices);
   input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
@@ -73,11 +73,12 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
     simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
     for (std::size_t i = 0; i < input.count; ++i) {
       ElementaryResult& result = results[begin + i];
-      if (output.verdict[i] == simd::BATCH_NO) {
-        result = no_contact;
-      } else if (output.verdict[i] == simd::BATCH_YES) {  // inside the step: its cells are below 2^toc_bits
+      if (output.verdict[i] <= simd::BATCH_YES) {  // inside the step: its cells are below 2^toc_bits
+        // By a table, without a branch: nothing foretells which it is. Of a "no" the cell is not looked at.
         const auto cell = static_cast<double>(static_cast<std::int64_t>(output.cell[i]));
-        result = {cell * width, (cell + 1) * width, Verdict::CONTACT, Tier::DOUBLE_BATCH};
+        const ElementaryResult either[2] = {no_contact,
+                                            {cell * width, (cell + 1) * width, Verdict::CONTACT, Tier::DOUBLE_BATCH}};
+        result = either[output.verdict[i]];
       } else {
         result = finish(batch, begin + i, output, i, toc_bits_);
       }

@@ -22,17 +22,24 @@ void join(Contact& into, const Contact& later) {
   into.toc_upper = later.toc_upper;
 }
 
-ContactCounts countsOf(const std::vector<Contact>& contacts) {
+/// How many there are of each kind, and when the first ones begin, all of it in one pass.
+void countContacts(Outcome& outcome) {
   ContactCounts counts;
-  for (const Contact& contact : contacts) {
+  double earliest = outcome.unchecked_toc_lower, earliest_unexpected = earliest;
+  for (const Contact& contact : outcome.contacts) {
     ++(contact.certainty == Certainty::CERTAIN ? counts.certain : counts.undecided);
     ++(contact.body[1] == OBSTACLE_BODY ? counts.obstacle : counts.mesh);
     counts.initial += contact.initial;
     counts.leaving += contact.leaving;
     counts.expected += contact.expected;
     counts.expected_initial += contact.expected && contact.initial;
+    earliest = std::min(earliest, contact.toc_lower);
+    if (!contact.expected) earliest_unexpected = std::min(earliest_unexpected, contact.toc_lower);
   }
-  return counts;
+  outcome.total_contacts = outcome.contacts.size();
+  outcome.counts = counts;
+  outcome.earliest_toc = earliest;
+  outcome.earliest_unexpected_toc = earliest_unexpected;
 }
 
 /// Unexpected ones first: an alarm must not be crowded out by what rests where it is meant to.
@@ -294,17 +301,9 @@ const char* toString(StartState state) {
 }
 
 void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
-  auto& contacts = outcome.contacts;
   const std::size_t suppressed_unexpected = options.suppress_initial ? suppressInitial(outcome) : 0;
-  outcome.total_contacts = contacts.size();
-  outcome.counts = countsOf(contacts);
-  outcome.earliest_toc = outcome.earliest_unexpected_toc = outcome.unchecked_toc_lower;
-  for (const Contact& contact : contacts) {
-    outcome.earliest_toc = std::min(outcome.earliest_toc, contact.toc_lower);
-    if (contact.expected) continue;
-    outcome.earliest_unexpected_toc = std::min(outcome.earliest_unexpected_toc, contact.toc_lower);
-  }
-  keepEarliest(options.max_contacts, contacts);
+  countContacts(outcome);
+  keepEarliest(options.max_contacts, outcome.contacts);
   judge(options, step, needed_parts, outcome);
   outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);
   outcome.expected = describe(options.expected, step.bodies);

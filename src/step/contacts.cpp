@@ -26,7 +26,6 @@ bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
 }
 
 void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& c) const {
-  c = Contact();
   c.kind = kind;
   c.toc_lower = hit.toc_lower;
   c.toc_upper = hit.toc_upper;
@@ -47,6 +46,7 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
   }
   std::vector<const std::vector<Hit>*> parts;
   std::size_t base = 0;
+  result.contacts.clear();
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     parts.clear();
     for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
@@ -57,7 +57,10 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
       for (std::size_t i = first; i < last; ++i) {
         if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
-        if (i + 8 < last) __builtin_prefetch(sorted[i + 8]);
+        if (i + 16 < last) __builtin_prefetch(sorted[i + 16]);
+        if (i + 8 < last)
+          scene.prefetchFeature(secondKind(kind), sorted[i + 8]->bodies & 0xffff,
+                                static_cast<Index>(sorted[i + 8]->key));
         writeContact(kind, *sorted[i], step, late, result.contacts[base + i]);
       }
     });

@@ -243,13 +243,16 @@ void PairWorker::filter() {
 void PairWorker::makeCanonical() {
   const std::vector<Index>&ra = a_->rank(kindA(task_->kind)), &rb = b_->rank(kindB(task_->kind));
   for (std::size_t i = 0; i < count_; ++i) {
-    std::uint64_t rank_a = ra[slots_[i][0]], rank_b = rb[slots_[i][1]];
-    if (task_->kind == PairKind::EDGE_EDGE && rank_b < rank_a) {
-      std::swap(rank_a, rank_b);
-      Quad& q = quads_[i];
-      q = {q[2], q[3], q[0], q[1]};
+    const std::uint64_t rank_a = ra[slots_[i][0]], rank_b = rb[slots_[i][1]];
+    if (task_->kind == PairKind::VERTEX_FACE) {
+      keys_[i] = rank_a << 32 | rank_b;
+      continue;
     }
-    keys_[i] = rank_a << 32 | rank_b;
+    // Without a branch: of two edges, which one is first nothing foretells.
+    const Quad q = quads_[i];
+    const std::size_t first = rank_b < rank_a ? 2 : 0, second = 2 - first;
+    quads_[i] = {q[first], q[first + 1], q[second], q[second + 1]};
+    keys_[i] = std::min(rank_a, rank_b) << 32 | std::max(rank_a, rank_b);
   }
 }
 
@@ -331,10 +334,17 @@ void PairWorker::decide() {
   auto& hits = hits_[static_cast<int>(task_->kind)];
   const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   const std::size_t before = hits.size();
+  // First which, without a branch on what half of the pairs are and the other half are not.
+  std::uint32_t* hit = kept_.data();
   for (std::size_t i = 0; i < count_; ++i) {
-    ElementaryResult& r = results_[i];
+    const ElementaryResult& r = results_[i];
     if (context_->observer) context_->observer->onResult(task_->kind, quads_[i], r);
-    if (r.verdict == Verdict::NO_CONTACT || r.toc_lower > context_->not_after) continue;
+    *hit = static_cast<std::uint32_t>(i);
+    hit += (r.verdict != Verdict::NO_CONTACT) & !(r.toc_lower > context_->not_after);
+  }
+  for (const std::uint32_t* one = kept_.data(); one != hit; ++one) {
+    const std::size_t i = *one;
+    ElementaryResult& r = results_[i];
     countOut(i);
     const bool certain = r.verdict == Verdict::CONTACT;
     if (!certain) {
