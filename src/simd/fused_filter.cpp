@@ -7,6 +7,9 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+// Where a vector holds a vertex at both ends of the step, and hn::Compress is one instruction.
+#define DCCD_WHOLE_VERTEX (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3)
+
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
 namespace simd {
@@ -76,21 +79,42 @@ HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const
   return hn::And(hn::Gt(o.largest_lo, margin), hn::Lt(o.smallest_hi, hn::Neg(margin)));
 }
 
-// Differences of one pair to its origin point, rounded once in double and once to float:
-// out[time * 3 + point][lane * 4 + axis]; the fourth value is 0.
+// The six vectors of a block of pairs, four values a lane (the fourth is 0).
+constexpr size_t BLOCK_SIZE = 6 * 4 * MAX_LANES;
+
+// Differences of one pair to its origin point, rounded once in double and once to float. In a block lie, each lane by
+// lane: the points at t0, then at t1; or, where a vector holds both, each point at t0 and t1.
 template <bool EDGE_EDGE>
 HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
-                       float (*HWY_RESTRICT out)[4 * MAX_LANES]) {
-  const hn::CappedTag<double, 4> dd;
+                       float* HWY_RESTRICT block) {
+  const hn::CappedTag<double, DCCD_WHOLE_VERTEX ? 8 : 4> dd;
   const hn::Rebind<float, decltype(dd)> df;
   const double* o = vertices + size_t{quad[EDGE_EDGE ? 3 : 0]} * 8;
   for (size_t k = 0; k < 8; k += hn::Lanes(dd)) {
     const auto origin = hn::Load(dd, o + k);
     for (size_t i = 0; i < 3; ++i) {
       const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
-      hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, v + k), origin)), df, out[k / 4 * 3 + i] + lane * 4 + k % 4);
+      float* to = DCCD_WHOLE_VERTEX ? block + (i * MAX_LANES + lane) * 8
+                                    : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
+      hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, v + k), origin)), df, to);
     }
   }
+}
+
+// Of point i, at t0 and t1.
+HWY_INLINE void loadPoint(const float* HWY_RESTRICT block, size_t i, Vec3V& p0, Vec3V& p1) {
+  const DF d;
+  VF unused;
+#if DCCD_WHOLE_VERTEX
+  Vec3V low, high;  // the first half of the lanes, each at t0 and t1, and the other half
+  hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES, low.x, low.y, low.z, unused);
+  hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES + 4 * MAX_LANES, high.x, high.y, high.z, unused);
+  p0 = {hn::ConcatEven(d, high.x, low.x), hn::ConcatEven(d, high.y, low.y), hn::ConcatEven(d, high.z, low.z)};
+  p1 = {hn::ConcatOdd(d, high.x, low.x), hn::ConcatOdd(d, high.y, low.y), hn::ConcatOdd(d, high.z, low.z)};
+#else
+  hn::LoadInterleaved4(d, block + i * 4 * MAX_LANES, p0.x, p0.y, p0.z, unused);
+  hn::LoadInterleaved4(d, block + (3 + i) * 4 * MAX_LANES, p1.x, p1.y, p1.z, unused);
+#endif
 }
 
 // Motion of the first feature's centre relative to the other's, times a constant; a, b, c are relative to the origin.
@@ -104,14 +128,13 @@ HWY_INLINE Vec3V relativeMotion(const Vec3V* p0, const Vec3V* p1) {
 }
 
 template <bool EDGE_EDGE>
-HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], FusedPlanes planes) {
+HWY_INLINE hn::Mask<DF> rejected(const float* HWY_RESTRICT block, FusedPlanes planes) {
   const DF d;
   Vec3V p[2][3];
   VF M = hn::Zero(d);
-  for (size_t t = 0; t < 2; ++t) {
-    for (size_t i = 0; i < 3; ++i) {
-      VF unused;
-      hn::LoadInterleaved4(d, in[t * 3 + i], p[t][i].x, p[t][i].y, p[t][i].z, unused);
+  for (size_t i = 0; i < 3; ++i) {
+    loadPoint(block, i, p[0][i], p[1][i]);
+    for (size_t t = 0; t < 2; ++t) {
       M = hn::Max(M, hn::Max(hn::Max(hn::Abs(p[t][i].x), hn::Abs(p[t][i].y)), hn::Abs(p[t][i].z)));
     }
   }
@@ -167,22 +190,39 @@ HWY_INLINE hn::Mask<DF> rejected(const float (*HWY_RESTRICT in)[4 * MAX_LANES], 
   return hn::And(out, hn::Le(M, hn::Set(d, LARGEST_M)));
 }
 
+// Writes the numbers of the lanes that are not rejected, from `first` on. Returns how many there are.
+HWY_INLINE size_t writeKept(hn::Mask<DF> rejected, size_t first, size_t count, uint32_t* HWY_RESTRICT kept) {
+  const DF d;
+#if DCCD_WHOLE_VERTEX
+  const hn::RebindToUnsigned<DF> du;
+  if (count == hn::Lanes(d)) {
+    HWY_ALIGN static constexpr uint32_t LANES[MAX_LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const auto lanes = hn::Add(hn::Load(du, LANES), hn::Set(du, static_cast<uint32_t>(first)));
+    const auto left = hn::RebindMask(du, hn::Not(rejected));
+    hn::StoreU(hn::Compress(lanes, left), du, kept);  // CompressStore() takes many times as long on some processors
+    return hn::CountTrue(du, left);
+  }
+#endif
+  uint8_t bits[8] = {0};
+  hn::StoreMaskBits(d, rejected, bits);
+  size_t out = 0;
+  for (size_t lane = 0; lane < count; ++lane) {
+    kept[out] = static_cast<uint32_t>(first + lane);
+    out += 1 - ((bits[lane / 8] >> (lane % 8)) & 1);
+  }
+  return out;
+}
+
 template <bool EDGE_EDGE>
 HWY_INLINE size_t filterAll(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quads, size_t count,
                             FusedPlanes planes, uint32_t* HWY_RESTRICT kept) {
-  const DF d;
-  const size_t lanes = hn::Lanes(d);
-  HWY_ALIGN_MAX float in[6][4 * MAX_LANES] = {};
+  const size_t lanes = hn::Lanes(DF());
+  HWY_ALIGN_MAX float block[BLOCK_SIZE] = {};
   size_t out = 0;
   for (size_t first = 0; first < count; first += lanes) {
     const size_t n = count - first < lanes ? count - first : lanes;
-    for (size_t lane = 0; lane < n; ++lane) gather<EDGE_EDGE>(vertices, quads + 4 * (first + lane), lane, in);
-    uint8_t bits[8] = {0};
-    hn::StoreMaskBits(d, rejected<EDGE_EDGE>(in, planes), bits);
-    for (size_t lane = 0; lane < n; ++lane) {
-      kept[out] = static_cast<uint32_t>(first + lane);
-      out += 1 - ((bits[lane / 8] >> (lane % 8)) & 1);
-    }
+    for (size_t lane = 0; lane < n; ++lane) gather<EDGE_EDGE>(vertices, quads + 4 * (first + lane), lane, block);
+    out += writeKept(rejected<EDGE_EDGE>(block, planes), first, n, kept + out);
   }
   return out;
 }

@@ -1,6 +1,7 @@
 #include "step/pair_worker.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "obstacle/burst.h"
 #include "projection/toc_bound.h"
@@ -249,9 +250,11 @@ void PairWorker::makeCanonical() {
       continue;
     }
     // Without a branch: of two edges, which one is first nothing foretells.
-    const Quad q = quads_[i];
-    const std::size_t first = rank_b < rank_a ? 2 : 0, second = 2 - first;
-    quads_[i] = {q[first], q[first + 1], q[second], q[second + 1]};
+    std::uint64_t edges[2];
+    std::memcpy(edges, &quads_[i], sizeof edges);
+    const std::uint64_t first = rank_b < rank_a ? edges[1] : edges[0], second = rank_b < rank_a ? edges[0] : edges[1];
+    std::memcpy(&quads_[i], &first, sizeof first);
+    std::memcpy(&quads_[i][2], &second, sizeof second);
     keys_[i] = std::min(rank_a, rank_b) << 32 | std::max(rank_a, rank_b);
   }
 }
