@@ -252,7 +252,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
 
 HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
   const int16_t* next = view.soa + size_t{group} * SOA_SIZE;
-  for (size_t line = 0; line < SOA_SIZE; line += 128) hwy::Prefetch(next + line);
+  for (size_t line = 0; line < SOA_SIZE; line += 32) hwy::Prefetch(next + line);
 }
 
 // leaveOutOf(g, h): what is left out of a pair of groups.
@@ -264,9 +264,9 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
   size_t p = 0;
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
-    if (p + 1 < count) {
-      prefetch(a, group_pairs[2 * p + 2]);
-      prefetch(b, group_pairs[2 * p + 3]);
+    if (p + 2 < count) {
+      prefetch(a, group_pairs[2 * p + 4]);
+      prefetch(b, group_pairs[2 * p + 5]);
     }
     o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, leaveOutOf(g, h), o);
   }
