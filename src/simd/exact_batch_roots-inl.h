@@ -205,19 +205,45 @@ inline void copyPair(const RootBlock& from, std::size_t i, RootBlock& to, std::s
   to.pair[j] = from.pair[i];
 }
 
-inline void copySplit(const SplitBlock& from, std::size_t i, SplitBlock& to, std::size_t j) {
-  copyPair(from, i, to, j);
-  for (int k = 0; k < 4; ++k) to.end[k][j] = from.end[k][i];
-  for (int k = 0; k < 3; ++k) {
-    to.value[k][j] = from.value[k][i];
-    to.piece[k][j] = from.piece[k][i];
-  }
-  to.lo[j] = from.lo[i];
-  to.hi[j] = from.hi[i];
-  to.at_lo[j] = from.at_lo[i];
-  to.outcome[j] = from.outcome[i];
-  to.current[j] = from.current[i];
+/// What is done to every plane of a block that its next root does not set.
+template <class Do>
+HWY_INLINE void onPlanes(RootBlock& roots, const Do& act) {
+  for (int k = 0; k < MOTION_PLANES; ++k) act(roots.motion[k]);
+  for (int k = 0; k < 4; ++k) act(roots.coefficient[k]);
+  for (int k = 0; k < 3; ++k) act(roots.size[k]);
+  act(roots.error);
 }
+template <class Do>
+HWY_INLINE void onPlanes(SplitBlock& roots, const Do& act) {
+  onPlanes(static_cast<RootBlock&>(roots), act);
+  for (int k = 0; k < 4; ++k) act(roots.end[k]);
+  for (int k = 0; k < 3; ++k) act(roots.value[k]);
+  for (int k = 0; k < 3; ++k) act(roots.piece[k]);
+  act(roots.lo);
+  act(roots.hi);
+  act(roots.at_lo);
+  act(roots.outcome);
+  act(roots.current);
+}
+
+/// Copies of the last pair up to a whole vector.
+struct FillUp {
+  std::size_t count;
+  HWY_INLINE void operator()(double* plane) const { hn::StoreU(constant(plane[count - 1]), Tag(), plane + count); }
+};
+template <class Block>
+HWY_INLINE void fillUp(Block& roots) {
+  if (roots.count % lanes() != 0) onPlanes(roots, FillUp{roots.count});
+}
+
+/// The lanes of the vector at `from` that `front` lists, to `to`, which is not behind it. A whole vector is written.
+struct MoveTogether {
+  decltype(hn::SetTableIndices(Tag(), FRONT_TABLE.row[0])) front;
+  std::size_t from, to;
+  HWY_INLINE void operator()(double* plane) const {
+    hn::StoreU(hn::TableLookupLanes(load(plane, from), front), Tag(), plane + to);
+  }
+};
 
 HWY_INLINE void writeOut(const RootBlock& roots, std::size_t j, double cells, const BatchOutput& out) {
   const std::size_t pair = roots.pair[j];
@@ -240,7 +266,7 @@ HWY_INLINE void leave(const RootBlock& roots, std::size_t j, double cells, RootB
 /// Pairs with certainly one root in the step that a few steps did not bracket.
 template <BatchKind KIND>
 HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
-  for (std::size_t j = roots.count; j % lanes() != 0; ++j) copyPair(roots, roots.count - 1, roots, j);
+  fillUp(roots);
   for (std::size_t i = 0; i < roots.count; i += lanes()) refine<true, KIND, true, PATIENT_STEPS>(roots, i, cells);
   for (std::size_t j = 0; j < roots.count; ++j) {
     if (roots.outcome[j] == ROOT_UNCERTAIN || roots.outcome[j] == ROOT_NOT_BRACKETED) {
@@ -254,7 +280,7 @@ HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard,
 /// Pairs with certainly one root in the step: a few Halley steps, and more for those that these did not bring close.
 template <bool CERTIFIED, BatchKind KIND>
 HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
-  for (std::size_t j = roots.count; j % lanes() != 0; ++j) copyPair(roots, roots.count - 1, roots, j);
+  fillUp(roots);
   for (std::size_t i = 0; i < roots.count; i += lanes()) refine<CERTIFIED, KIND, true, QUICK_STEPS>(roots, i, cells);
   std::size_t again = 0;
   for (std::size_t j = 0; j < roots.count; ++j) {
@@ -272,16 +298,26 @@ HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, con
   roots.count = 0;
 }
 
-/// Makes the first piece from `piece` on that is not free the current one, or settles the pair.
-inline void selectPiece(SplitBlock& roots, std::size_t j, int piece) {
-  while (piece < 3 && roots.piece[piece][j] == PIECE_FREE) ++piece;
-  roots.current[j] = static_cast<std::uint8_t>(piece);
-  roots.outcome[j] = ROOT_NO_CONTACT;
-  if (piece >= 3) return;
-  roots.outcome[j] = roots.piece[piece][j] == PIECE_ROOT ? ROOT_PENDING : ROOT_UNCERTAIN;
-  roots.lo[j] = roots.end[piece][j];
-  roots.hi[j] = roots.end[piece + 1][j];
-  roots.at_lo[j] = roots.value[piece][j];
+/// Where the last root was no contact, makes the next piece that is not free the current one, or settles the pair.
+HWY_INLINE void selectPiece(SplitBlock& roots, std::size_t i) {
+  const V previous = load(roots.outcome, i), last = load(roots.current, i);
+  V current = constant(3), outcome = constant(ROOT_NO_CONTACT);
+  V lo = hn::Zero(Tag()), hi = lo, at_lo = lo;
+  for (int k = 2; k >= 0; --k) {
+    const V piece = load(roots.piece[k], i);
+    const M next = hn::And(hn::Gt(constant(k), last), hn::Gt(piece, constant(PIECE_FREE)));
+    const M root = hn::Eq(piece, constant(PIECE_ROOT));
+    current = choose(next, constant(k), current);
+    outcome = choose(next, choose(root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), outcome);
+    lo = choose(next, load(roots.end[k], i), lo);
+    hi = choose(next, load(roots.end[k + 1], i), hi);
+    at_lo = choose(next, load(roots.value[k], i), at_lo);
+  }
+  store(choose(hn::Eq(previous, constant(ROOT_NO_CONTACT)), outcome, previous), roots.outcome, i);
+  store(current, roots.current, i);
+  store(lo, roots.lo, i);
+  store(hi, roots.hi, i);
+  store(at_lo, roots.at_lo, i);
 }
 
 /// Splits the step of one vector of pairs at the extrema of f, and says what each piece holds.
@@ -304,30 +340,39 @@ HWY_INLINE void split(SplitBlock& roots, std::size_t i) {
     store(pieceOf<CERTIFIED, !CERTIFIED>(c0, c1, c2, c3, error), roots.piece[k], i);
     store(c0, roots.value[k], i);
   }
+  store(constant(-1), roots.current, i);
+  store(constant(ROOT_NO_CONTACT), roots.outcome, i);
 }
 
 /// Pairs with perhaps several roots: one after the other, until one is a contact or none is left.
 template <bool CERTIFIED, BatchKind KIND>
 HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
   if (roots.count == 0) return;
-  for (std::size_t j = roots.count; j % lanes() != 0; ++j) copyPair(roots, roots.count - 1, roots, j);
+  fillUp(roots);
   for (std::size_t i = 0; i < roots.count; i += lanes()) split<CERTIFIED>(roots, i);
-  for (std::size_t j = 0; j < roots.count; ++j) selectPiece(roots, j, 0);
   while (roots.count != 0) {
     std::size_t pending = 0;
-    for (std::size_t j = 0; j < roots.count; ++j) {
-      if (roots.outcome[j] == ROOT_NO_CONTACT) selectPiece(roots, j, roots.current[j] + 1);
-      if (roots.outcome[j] == ROOT_PENDING) {
-        if (pending != j) copySplit(roots, j, roots, pending);
-        ++pending;
-      } else if (CERTIFIED && (roots.outcome[j] == ROOT_UNCERTAIN || roots.outcome[j] == ROOT_NOT_BRACKETED)) {
-        leave<KIND>(roots, j, cells, hard, out);
-      } else {
-        writeOut(roots, j, cells, out);
+    for (std::size_t i = 0; i < roots.count; i += lanes()) {
+      selectPiece(roots, i);
+      const V outcome = load(roots.outcome, i);
+      const unsigned all = roots.count - i < lanes() ? (1u << (roots.count - i)) - 1 : (1u << lanes()) - 1;
+      const unsigned waiting = all & bitsOf(hn::Eq(outcome, constant(ROOT_PENDING)));
+      const M left = hn::Or(hn::Eq(outcome, constant(ROOT_UNCERTAIN)), hn::Eq(outcome, constant(ROOT_NOT_BRACKETED)));
+      const unsigned uncertain = CERTIFIED ? all & bitsOf(left) : 0;
+      for (unsigned bits = uncertain; bits != 0; bits &= bits - 1) {
+        leave<KIND>(roots, i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits), cells, hard, out);
+      }
+      for (unsigned bits = all & ~waiting & ~uncertain; bits != 0; bits &= bits - 1) {
+        writeOut(roots, i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits), cells, out);
+      }
+      if (waiting == 0) continue;
+      onPlanes(roots, MoveTogether{hn::SetTableIndices(Tag(), FRONT_TABLE.row[waiting]), i, pending});
+      for (unsigned bits = waiting; bits != 0; bits &= bits - 1) {
+        roots.pair[pending++] = roots.pair[i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)];
       }
     }
     roots.count = pending;
-    for (std::size_t j = pending; j % lanes() != 0; ++j) copySplit(roots, pending - 1, roots, j);
+    fillUp(roots);
     for (std::size_t i = 0; i < pending; i += lanes()) refine<CERTIFIED, KIND, false, SPLIT_STEPS>(roots, i, cells);
   }
 }

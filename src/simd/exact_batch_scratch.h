@@ -50,10 +50,10 @@ struct alignas(64) RootBlock {
 
 /// The same with the step split at the extrema of f.
 struct alignas(64) SplitBlock : RootBlock {
-  alignas(64) BatchPlane end[4];       ///< 0, the two places, 1; without alignas it begins in the base's tail padding
-  BatchPlane value[3];                 ///< f at the first three
-  BatchPlane piece[3];                 ///< PIECE_*
-  std::uint8_t current[BATCH_STRIDE];  ///< piece in work; 3: none is left
+  alignas(64) BatchPlane end[4];  ///< 0, the two places, 1; without alignas it begins in the base's tail padding
+  BatchPlane value[3];            ///< f at the first three
+  BatchPlane piece[3];            ///< PIECE_*
+  BatchPlane current;             ///< piece in work; -1: none yet, 3: none is left
 };
 
 /// Row b lists the positions of b's set bits in ascending order, then zeros: the lane indices that move the lanes of
