@@ -1,14 +1,12 @@
 #include "simd/fused_filter.h"
 
 #include "dccd/tolerances.h"
+#include "simd/targets.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/fused_filter.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-
-// Where a vector holds a vertex at both ends of the step, and hn::Compress is one instruction.
-#define DCCD_WHOLE_VERTEX (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3)
 
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
@@ -83,19 +81,19 @@ HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const
 constexpr size_t BLOCK_SIZE = 6 * 4 * MAX_LANES;
 
 // Differences of one pair to its origin point, rounded once in double and once to float. In a block lie, each lane by
-// lane: the points at t0, then at t1; or, where a vector holds both, each point at t0 and t1.
+// lane: the points at t0, then at t1; with AVX-512, where a vector holds both, each point at t0 and t1.
 template <bool EDGE_EDGE>
 HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
                        float* HWY_RESTRICT block) {
-  const hn::CappedTag<double, DCCD_WHOLE_VERTEX ? 8 : 4> dd;
+  const hn::CappedTag<double, DCCD_AVX512 ? 8 : 4> dd;
   const hn::Rebind<float, decltype(dd)> df;
   const double* o = vertices + size_t{quad[EDGE_EDGE ? 3 : 0]} * 8;
   for (size_t k = 0; k < 8; k += hn::Lanes(dd)) {
     const auto origin = hn::Load(dd, o + k);
     for (size_t i = 0; i < 3; ++i) {
       const double* v = vertices + size_t{quad[EDGE_EDGE ? i : i + 1]} * 8;
-      float* to = DCCD_WHOLE_VERTEX ? block + (i * MAX_LANES + lane) * 8
-                                    : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
+      float* to =
+          DCCD_AVX512 ? block + (i * MAX_LANES + lane) * 8 : block + ((k / 4 * 3 + i) * MAX_LANES + lane) * 4 + k % 4;
       hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, v + k), origin)), df, to);
     }
   }
@@ -105,7 +103,7 @@ HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_
 HWY_INLINE void loadPoint(const float* HWY_RESTRICT block, size_t i, Vec3V& p0, Vec3V& p1) {
   const DF d;
   VF unused;
-#if DCCD_WHOLE_VERTEX
+#if DCCD_AVX512
   Vec3V low, high;  // the first half of the lanes, each at t0 and t1, and the other half
   hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES, low.x, low.y, low.z, unused);
   hn::LoadInterleaved4(d, block + i * 8 * MAX_LANES + 4 * MAX_LANES, high.x, high.y, high.z, unused);
@@ -193,7 +191,7 @@ HWY_INLINE hn::Mask<DF> rejected(const float* HWY_RESTRICT block, FusedPlanes pl
 // Writes the numbers of the lanes that are not rejected, from `first` on. Returns how many there are.
 HWY_INLINE size_t writeKept(hn::Mask<DF> rejected, size_t first, size_t count, uint32_t* HWY_RESTRICT kept) {
   const DF d;
-#if DCCD_WHOLE_VERTEX
+#if DCCD_AVX512
   const hn::RebindToUnsigned<DF> du;
   if (count == hn::Lanes(d)) {
     HWY_ALIGN static constexpr uint32_t LANES[MAX_LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cstring>
 
+#include "simd/targets.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/group_pairs.cpp"
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-
-// Where hn::Compress is one instruction.
-#define DCCD_COMPRESS (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3)
 
 HWY_BEFORE_NAMESPACE();
 namespace dccd {
@@ -104,7 +103,7 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
 #endif
 
 // A group's nodes, of which the nodes of another one are compared with all.
-#if DCCD_COMPRESS
+#if DCCD_AVX512
 class GroupLanes {  // 16 of the 32 registers
   using D = hn::FixedTag<int16_t, 2 * GROUP>;
 
@@ -140,7 +139,7 @@ class GroupLanes {
 // `base`.
 HWY_INLINE uint32_t* writePairs(uint32_t node, uint32_t base, uint32_t mask, bool node_first,
                                 uint32_t* HWY_RESTRICT o) {
-#if DCCD_COMPRESS
+#if DCCD_AVX512
   // Without a branch on how many there are, which nothing foretells: whole vectors are stored, o moves on less.
   const hn::FixedTag<uint32_t, GROUP> d;
   const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
