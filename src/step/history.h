@@ -140,7 +140,7 @@ struct History::Impl {
   bool isStartKnown() const;
   /// all_pairs: no pair of meshes was left out.
   void runStartState(const Part& part, Deadline::Clock::time_point begin, bool all_pairs);
-  bool listStart(const Part& part, const StartStateSearch::IsOver& is_over, std::vector<StartIntersection>& met);
+  bool listStart(const Part& part, const Deadline& deadline, std::vector<StartIntersection>& met);
   void findPatches(Outcome& outcome);
   template <class Function>
   void parallel(std::size_t n, std::size_t piece, const Function& function);

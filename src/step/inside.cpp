@@ -80,16 +80,16 @@ bool InsideSearch::isInside(const SceneArrays& scene, const Question& question, 
   return touched || enclosed;
 }
 
-const std::vector<StartIntersection>& InsideSearch::run(const SceneArrays& scene, bool continues, const IsOver& is_over,
-                                                        StepStats& stats) {
+const std::vector<StartIntersection>& InsideSearch::run(const SceneArrays& scene, bool continues,
+                                                        const Deadline& deadline, StepStats& stats) {
   asked_ = 0;
   // With vertices left out the pieces are others: such a step is asked anew, and so is the next.
   const bool all_finite = stats.unchecked_vertices == 0;
   if (!(all_finite && pieces_of_all_)) forgetBodies();
   pieces_of_all_ = all_finite;
   if (!(continues && known_ && all_finite)) clear();
-  askOpen(scene, is_over);
-  if (!searched_) search(scene, is_over);
+  askOpen(scene, deadline);
+  if (!searched_) search(scene, deadline);
   whole_ = searched_ && open_.empty();
   known_ = false;  // until remember() has this step's contacts
   std::sort(inside_.begin(), inside_.end());
@@ -102,14 +102,15 @@ const std::vector<StartIntersection>& InsideSearch::run(const SceneArrays& scene
   return intersections_;
 }
 
-bool InsideSearch::listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out) const {
+bool InsideSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,
+                           std::vector<StartIntersection>& out) const {
   std::vector<Question> inside;
   for (const Question& q : inside_) {
     if (!std::binary_search(open_.begin(), open_.end(), q)) inside.push_back(q);
   }
   bool whole = true;
   for (const Question& q : open_) {
-    whole = whole && !(is_over && is_over());
+    whole = whole && !deadline.isOver();
     if (whole && isInside(scene, q, 1)) inside.push_back(q);
   }
   std::sort(inside.begin(), inside.end());
@@ -132,17 +133,17 @@ void InsideSearch::ask(const SceneArrays& scene, const Question& question) {
   if (isInside(scene, question, 0)) inside_.push_back(question);
 }
 
-void InsideSearch::askOpen(const SceneArrays& scene, const IsOver& is_over) {
+void InsideSearch::askOpen(const SceneArrays& scene, const Deadline& deadline) {
   inside_.erase(std::remove_if(inside_.begin(), inside_.end(),
                                [&](const Question& q) { return std::binary_search(open_.begin(), open_.end(), q); }),
                 inside_.end());
   for (; !open_.empty(); open_.pop_back()) {
-    if (is_over && open_.size() % QUESTIONS_PER_LOOK_AT_THE_CLOCK == 0 && is_over()) return;
+    if (open_.size() % QUESTIONS_PER_LOOK_AT_THE_CLOCK == 0 && deadline.isOver()) return;
     ask(scene, open_.back());
   }
 }
 
-void InsideSearch::search(const SceneArrays& scene, const IsOver& is_over) {
+void InsideSearch::search(const SceneArrays& scene, const Deadline& deadline) {
   const std::vector<SceneBody>& bodies = scene.bodies();
   body_pairs_.clear();
   overlapping_.clear();
@@ -161,16 +162,16 @@ void InsideSearch::search(const SceneArrays& scene, const IsOver& is_over) {
        ++pair) {
     if (*pair != next_pair_) next_piece_ = 0;
     next_pair_ = *pair;
-    if (!searchBodies(scene, is_over)) return;
+    if (!searchBodies(scene, deadline)) return;
   }
   searched_ = true;
 }
 
 /// Goes on at next_piece_; false: it was ended there.
-bool InsideSearch::searchBodies(const SceneArrays& scene, const IsOver& is_over) {
+bool InsideSearch::searchBodies(const SceneArrays& scene, const Deadline& deadline) {
   const std::vector<Piece>& pieces = piecesOf(scene, next_pair_[0]);
   for (; next_piece_ < pieces.size(); ++next_piece_) {
-    if (is_over && next_piece_ % QUESTIONS_PER_LOOK_AT_THE_CLOCK == 0 && is_over()) return false;
+    if (next_piece_ % QUESTIONS_PER_LOOK_AT_THE_CLOCK == 0 && deadline.isOver()) return false;
     const Piece& piece = pieces[next_piece_];
     ask(scene, {next_pair_[0], piece.vertex, next_pair_[1], piece.internal});
   }

@@ -38,13 +38,11 @@ Sight sightOf(const double* point, const double* a, const double* b, const doubl
 /// Needs the records and bounds of SceneArrays::refit() wherever there are two bodies or more.
 class InsideSearch {
  public:
-  using IsOver = std::function<bool()>;
-
   /// All pairs unless `continues` (t=0 is t=1 of the step given to remember()), that step's contacts are known and all
   /// vertices of this one are finite. Sorted by vertex (body, number), then by the other body. Adds to in and out of
-  /// stage and effect START_STATE; reads unchecked_vertices. Nothing more is asked once is_over() says so; isWhole() is
-  /// false then. Empty: there is no deadline.
-  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const IsOver& is_over,
+  /// stage and effect START_STATE; reads unchecked_vertices. Nothing more is asked once the deadline is over; isWhole()
+  /// is false then.
+  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const Deadline& deadline,
                                             StepStats& stats);
 
   /// Whether the last run() came to all pairs: what it did not list is outside at t=0.
@@ -55,8 +53,9 @@ class InsideSearch {
 
   /// After remember(): whether listEnd() can tell what is inside at t=1.
   bool knowsEnd() const { return known_ && searched_; }
-  /// What is inside at t=1, listed as run() would for a step that continues. False: is_over ended it. Changes nothing.
-  bool listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out) const;
+  /// What is inside at t=1, listed as run() would for a step that continues. False: the deadline ended it. Changes
+  /// nothing.
+  bool listEnd(const SceneArrays& scene, const Deadline& deadline, std::vector<StartIntersection>& out) const;
 
   /// Nothing is known of a step before: the next run() asks about all pairs.
   void clear();
@@ -82,9 +81,9 @@ class InsideSearch {
 
   static void list(const std::vector<Question>& inside, std::vector<StartIntersection>& out);
   static bool isInside(const SceneArrays& scene, const Question& question, int at);  ///< at: 0 or 1, of the step's ends
-  void askOpen(const SceneArrays& scene, const IsOver& is_over);
-  void search(const SceneArrays& scene, const IsOver& is_over);
-  bool searchBodies(const SceneArrays& scene, const IsOver& is_over);
+  void askOpen(const SceneArrays& scene, const Deadline& deadline);
+  void search(const SceneArrays& scene, const Deadline& deadline);
+  bool searchBodies(const SceneArrays& scene, const Deadline& deadline);
   void ask(const SceneArrays& scene, const Question& question);
   const std::vector<Piece>& piecesOf(const SceneArrays& scene, std::size_t body);
 

@@ -3,13 +3,8 @@
 #include "step/history.h"
 
 namespace dccd {
-namespace {
 
 using Clock = Deadline::Clock;
-
-constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
-
-}  // namespace
 
 void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_pairs) {
   const auto forget = [&] {
@@ -20,23 +15,17 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   if (!checksStartState(part) || !(scene.hasFaces() || map_reduced)) return forget();
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
-  StartStateSearch::IsOver is_over;
-  if (part.deadline.canEnd()) {
-    Deadline deadline = part.deadline;
-    if (!deadline.isNever()) {
-      // Later parts need as much time for their pairs; what is over that is shared.
-      const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
-      const Clock::duration slack = deadline.at() - start - later * (start - begin);
-      // Contacts are still to be joined, counted and cut.
-      const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size());
-      deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
-    }
-    is_over = [this, deadline] {
-      return deadline.movedBy(-LISTING_AN_INTERSECTION * carried.start_state.foundCount()).isOver();
-    };
+  Deadline deadline = part.deadline;
+  if (!deadline.isNever()) {
+    // Later parts need as much time for their pairs; what is over that is shared.
+    const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
+    const Clock::duration slack = deadline.at() - start - later * (start - begin);
+    // Contacts are still to be joined, counted and cut.
+    const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size());
+    deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
   }
   std::vector<StartIntersection> met;
-  result.start_state_complete = listStart(part, is_over, met) && result.start_state_complete;
+  result.start_state_complete = listStart(part, deadline, met) && result.start_state_complete;
   if (!met.empty()) {
     result.start_state = StartState::INTERSECTING;
   } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
@@ -57,18 +46,17 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
 }
 
-/// What meets or is inside at t=0. False: is_over ended it. The vertices come first, for they are few.
-bool History::Impl::listStart(const Part& part, const StartStateSearch::IsOver& is_over,
-                              std::vector<StartIntersection>& met) {
+/// What meets or is inside at t=0. False: the deadline ended it. The vertices come first, for they are few.
+bool History::Impl::listStart(const Part& part, const Deadline& deadline, std::vector<StartIntersection>& met) {
   std::vector<StartIntersection> inside;
   bool whole = false;
   if (isStartKnown()) {
     const SceneArrays& before = begins_at->scene;
-    whole = begins_at->carried.inside.listEnd(before, is_over, inside);
-    whole = begins_at->carried.start_state.listEnd(before, is_over, met) && whole;
+    whole = begins_at->carried.inside.listEnd(before, deadline, inside);
+    whole = begins_at->carried.start_state.listEnd(before, deadline, met) && whole;
   } else {
-    inside = carried.inside.run(scene, part.continues, is_over, result.stats);
-    met = carried.start_state.run(scene, part.continues, is_over, result.stats, foundLimit());
+    inside = carried.inside.run(scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
+    met = carried.start_state.run(scene, part.continues, deadline, result.stats, foundLimit());
     if (carried.start_state.isCut()) result.cut = true;
     whole = carried.inside.isWhole() && carried.start_state.isWhole();
   }

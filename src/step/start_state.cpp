@@ -14,6 +14,7 @@ constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before 
 // A group that is begun may go on for this many tests, so that a search comes to its end in the end.
 constexpr std::uint64_t TESTS_PER_LOOK_AT_THE_CLOCK = 64, TESTS_IN_ANY_CASE = 1024;
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
+constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
 
 bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
 bool shareVertex(const Index* edge, const Index* face) { return contains(face, edge[0]) | contains(face, edge[1]); }
@@ -39,7 +40,7 @@ void StartStateSearch::SlotsAtVertex::build(const SceneBody& body, FeatureKind k
 }
 
 const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& scene, bool continues,
-                                                            const IsOver& is_over, StepStats& stats,
+                                                            const Deadline& deadline, StepStats& stats,
                                                             std::size_t most_found) {
   releaseBurst(found_);
   releaseBurst(candidates_);
@@ -51,10 +52,10 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
   tested_ = 0;
   cut_ = false;
   most_found_ = most_found;
-  has_deadline_ = static_cast<bool>(is_over);
+  has_deadline_ = deadline.canEnd();
   if (!(continues && known_)) clear();
-  testCandidates(scene, is_over);
-  if (!searched_ && !hasEnough()) search(scene, is_over);
+  testCandidates(scene, deadline);
+  if (!searched_ && !hasEnough()) search(scene, deadline);
   cut_ = cut_ || hasEnough();
   if (hasEnough()) found_.resize(most_found_);
   whole_ = searched_ && !cut_ && candidates_.empty() && touched_.empty();
@@ -66,6 +67,10 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
   stats[Effect::START_STATE].in += tested_;
   stats[Effect::START_STATE].out += found_.size();
   return intersections_;
+}
+
+Deadline StartStateSearch::beforeListing(const std::vector<EdgeFace>& found, const Deadline& deadline) {
+  return deadline.movedBy(-LISTING_AN_INTERSECTION * static_cast<std::int64_t>(found.size()));
 }
 
 void StartStateSearch::list(const SceneArrays& scene, std::vector<EdgeFace>& pairs,
@@ -88,12 +93,13 @@ void StartStateSearch::list(const SceneArrays& scene, std::vector<EdgeFace>& pai
   }
 }
 
-bool StartStateSearch::listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out) {
+bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,
+                               std::vector<StartIntersection>& out) {
   std::vector<EdgeFace> pairs = candidates_, met;
   pairs.insert(pairs.end(), found_.begin(), found_.end());
   std::size_t expanded = 0;
   const bool whole = inBlocks(
-      pairs, is_over, [&] { return expanded < touched_.size(); },
+      pairs, met, deadline, [&] { return expanded < touched_.size(); },
       [&] { addCandidates(scene, touched_[expanded++], pairs); },
       [&](const EdgeFace& pair) {
         if (isChecked(scene, pair) && meet(scene, pair, 1)) met.push_back(pair);
@@ -109,15 +115,16 @@ bool StartStateSearch::isChecked(const SceneArrays& scene, const EdgeFace& pair)
 }
 
 /// Takes the pairs from the back, a block at a time, and calls test with each: sorted, many are the same and those that
-/// follow each other lie together. expand() adds pairs as long as hasMore(). False: is_over, or a test that returned
-/// false, ended it.
+/// follow each other lie together. expand() adds pairs as long as hasMore(). False: the deadline before the listing of
+/// what is found, or a test that returned false, ended it.
 template <class HasMore, class Expand, class Test>
-bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore,
-                                const Expand& expand, const Test& test) {
-  const std::size_t block = is_over ? PAIRS_PER_LOOK_AT_THE_CLOCK : LARGEST_BLOCK;
+bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const std::vector<EdgeFace>& found,
+                                const Deadline& deadline, const HasMore& hasMore, const Expand& expand,
+                                const Test& test) {
+  const std::size_t block = deadline.canEnd() ? PAIRS_PER_LOOK_AT_THE_CLOCK : LARGEST_BLOCK;
   for (;;) {
     if (pairs.empty() && !hasMore()) return true;
-    if (is_over && is_over()) return false;
+    if (beforeListing(found, deadline).isOver()) return false;
     while (pairs.size() < block && hasMore()) expand();
     const auto first = pairs.end() - static_cast<std::ptrdiff_t>(std::min(block, pairs.size()));
     std::sort(first, pairs.end());
@@ -127,11 +134,11 @@ bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_o
   }
 }
 
-void StartStateSearch::testCandidates(const SceneArrays& scene, const IsOver& is_over) {
+void StartStateSearch::testCandidates(const SceneArrays& scene, const Deadline& deadline) {
   candidates_.insert(candidates_.end(), found_.begin(), found_.end());
   found_.clear();
   inBlocks(
-      candidates_, is_over, [&] { return !touched_.empty(); },
+      candidates_, found_, deadline, [&] { return !touched_.empty(); },
       [&] {
         addCandidates(scene, touched_.back(), candidates_);
         touched_.pop_back();
@@ -142,7 +149,7 @@ void StartStateSearch::testCandidates(const SceneArrays& scene, const IsOver& is
       });
 }
 
-void StartStateSearch::search(const SceneArrays& scene, const IsOver& is_over) {
+void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline) {
   const std::vector<SceneBody>& bodies = scene.bodies();
   body_pairs_.clear();
   for (std::uint32_t b = 0; b < bodies.size(); ++b) {
@@ -161,19 +168,19 @@ void StartStateSearch::search(const SceneArrays& scene, const IsOver& is_over) {
        ++pair) {
     if (*pair != next_bodies_) next_group_ = 0;
     next_bodies_ = *pair;
-    if (!searchBodies(scene, is_over)) return;
+    if (!searchBodies(scene, deadline)) return;
   }
   searched_ = true;
 }
 
 /// Goes on at next_group_ of the edges' tree, by one group at the least; false: it was ended, and next_group_ says
 /// where.
-bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_over) {
+bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& deadline) {
   const std::uint32_t edge_body = next_bodies_[0], face_body = next_bodies_[1];
   const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
   const ClusterTree& faces = scene.bodies()[face_body].tree(FeatureKind::FACE);
   if (edges.featureCount() == 0 || faces.featureCount() == 0) return true;
-  if (is_over && is_over()) return false;
+  if (beforeListing(deadline).isOver()) return false;
   TreePair trees;
   trees.a = &edges;
   trees.b = &faces;
@@ -190,7 +197,7 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
   stream_.clearCounters();
   for (std::size_t first = 0, last = 0; first < by_group_.size(); first = last) {
     next_group_ = by_group_[first][0];
-    if (first > 0 && is_over && is_over()) return false;
+    if (first > 0 && beforeListing(deadline).isOver()) return false;
     while (last < by_group_.size() && by_group_[last][0] == next_group_) ++last;
     const std::uint64_t tested_before = tested_;
     bool late = false;
@@ -198,8 +205,8 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const IsOver& is_o
       for (std::size_t i = 0; i < count; ++i) {
         test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
         const std::uint64_t tested = tested_ - tested_before;
-        if (!is_over || tested < TESTS_IN_ANY_CASE || tested % TESTS_PER_LOOK_AT_THE_CLOCK != 0) continue;
-        if ((late = is_over())) break;
+        if (tested < TESTS_IN_ANY_CASE || tested % TESTS_PER_LOOK_AT_THE_CLOCK != 0) continue;
+        if ((late = beforeListing(deadline).isOver())) break;
       }
       return !late && !hasEnough();
     });

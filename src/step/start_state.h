@@ -3,12 +3,12 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <tuple>
 #include <vector>
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
+#include "dccd/deadline.h"
 #include "step/found_limit.h"
 
 namespace dccd {
@@ -36,21 +36,19 @@ bool segmentMeetsTriangle(const double* p, const double* q, const double* a, con
 /// what it was past is carried over, what it had not come to is looked at then.
 class StartStateSearch {
  public:
-  using IsOver = std::function<bool()>;
-
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
   /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
-  /// effect START_STATE. Nothing more is tested once is_over() says so; isWhole() is false then. Empty: there is
-  /// no deadline. Of more than most_found the first ones to be found are listed; isCut() is true then, and the next
-  /// run() begins anew.
-  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const IsOver& is_over,
+  /// effect START_STATE. Nothing more is tested once the deadline is over, but for what it takes to list what is
+  /// found; isWhole() is false then. Of more than most_found the first ones to be found are listed; isCut() is true
+  /// then, and the next run() begins anew.
+  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const Deadline& deadline,
                                             StepStats& stats, std::size_t most_found = FoundLimit::NONE);
 
   /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
   bool isWhole() const { return whole_; }
   bool isCut() const { return cut_; }
-  /// So far, by a run() that has not ended.
-  std::size_t foundCount() const { return found_.size(); }
+  /// For what comes before run(): what the run() before found is listed again first.
+  Deadline beforeListing(const Deadline& deadline) const { return beforeListing(found_, deadline); }
 
   /// Whether run() would search the bodies' trees.
   bool needsTrees(bool continues) const { return !(continues && known_ && searched_); }
@@ -60,8 +58,8 @@ class StartStateSearch {
 
   /// After remember(): whether listEnd() can tell what meets at t=1.
   bool knowsEnd() const { return known_ && searched_; }
-  /// What meets at t=1, listed as run() would for a step that continues. False: is_over ended it. Changes nothing.
-  bool listEnd(const SceneArrays& scene, const IsOver& is_over, std::vector<StartIntersection>& out);
+  /// What meets at t=1, listed as run() would for a step that continues. False: the deadline ended it. Changes nothing.
+  bool listEnd(const SceneArrays& scene, const Deadline& deadline, std::vector<StartIntersection>& out);
 
   /// Nothing is known of a step before: the next run() is a full test.
   void clear();
@@ -97,12 +95,13 @@ class StartStateSearch {
   };
   using BodyPair = std::array<std::uint32_t, 2>;  // of the edge, of the face
 
+  static Deadline beforeListing(const std::vector<EdgeFace>& found, const Deadline& deadline);
   template <class HasMore, class Expand, class Test>
-  static bool inBlocks(std::vector<EdgeFace>& pairs, const IsOver& is_over, const HasMore& hasMore,
-                       const Expand& expand, const Test& test);
-  void testCandidates(const SceneArrays& scene, const IsOver& is_over);
-  void search(const SceneArrays& scene, const IsOver& is_over);
-  bool searchBodies(const SceneArrays& scene, const IsOver& is_over);
+  static bool inBlocks(std::vector<EdgeFace>& pairs, const std::vector<EdgeFace>& found, const Deadline& deadline,
+                       const HasMore& hasMore, const Expand& expand, const Test& test);
+  void testCandidates(const SceneArrays& scene, const Deadline& deadline);
+  void search(const SceneArrays& scene, const Deadline& deadline);
+  bool searchBodies(const SceneArrays& scene, const Deadline& deadline);
   void test(const SceneArrays& scene, const EdgeFace& pair);
   static bool meet(const SceneArrays& scene, const EdgeFace& pair, int at);  ///< at: 0 or 1, of the step's ends
   /// What was checked in the step before need not be in this one.

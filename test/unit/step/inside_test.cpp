@@ -220,9 +220,8 @@ TEST(Inside, ASearchThatIsCutGoesOnAndNeverSaysOutside) {
   std::size_t before = 0;
   int cuts = 0;
   for (bool whole = false; !whole; ++cuts) {
-    int looks = 1;
-    const auto listed = search.run(
-        scene, cuts > 0, [&] { return looks-- <= 0; }, stats);
+    std::atomic<std::int64_t> looks{1};
+    const auto listed = search.run(scene, cuts > 0, Deadline::afterLooks(looks), stats);
     whole = search.isWhole();
     ASSERT_GT(listed.size() + whole, before) << "it goes on";
     ASSERT_LE(listed.size(), expected.size());
@@ -234,10 +233,7 @@ TEST(Inside, ASearchThatIsCutGoesOnAndNeverSaysOutside) {
   EXPECT_EQ(before, expected.size());
   EXPECT_GT(cuts, 5);
   InsideSearch ended;
-  EXPECT_TRUE(ended
-                  .run(
-                      scene, false, [] { return true; }, stats)
-                  .empty());
+  EXPECT_TRUE(ended.run(scene, false, Deadline(Deadline::Clock::now()), stats).empty());
   EXPECT_FALSE(ended.isWhole());
   ended.remember(scene, {}, false);
   EXPECT_FALSE(ended.knowsEnd());

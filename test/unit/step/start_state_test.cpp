@@ -105,7 +105,7 @@ TEST(SegmentTriangle, AgreesWithTheOracleWhereItIsClose) {
 
 // --- the whole test --------------------------------------------------------------------------------------------------
 
-const StartStateSearch::IsOver NO_DEADLINE;
+const Deadline NO_DEADLINE;
 
 bool same(const std::vector<StartIntersection>& x, const std::vector<StartIntersection>& y) {
   return std::equal(x.begin(), x.end(), y.begin(), y.end(),
@@ -239,10 +239,9 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
     StartStateSearch test;
     bool whole = false;
     for (int i = 0; i < 20; ++i) {
-      int looks = draw(0, 3);
+      std::atomic<std::int64_t> looks{draw(0, 3)};
       StepStats stats;
-      const auto listed = test.run(
-          scene.arrays, i > 0, [&] { return looks-- <= 0; }, stats);
+      const auto listed = test.run(scene.arrays, i > 0, Deadline::afterLooks(looks), stats);
       const auto expected = trueIntersections(step);
       if (test.isWhole()) {
         ASSERT_TRUE(same(listed, expected)) << "seed " << seed << ", step " << i;
@@ -294,10 +293,9 @@ TEST(StartState, PartsOfASearchAreTheWhole) {
     int steps = 0;
     for (bool whole = false; !whole && steps < 1000; ++steps) {
       // What was found is looked at again first, at one look at the clock for many of them.
-      int looks = looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) + 1 : 0);
+      std::atomic<std::int64_t> looks{looks_a_step + (steps > 0 ? static_cast<int>(expected.size() / 1024) + 1 : 0)};
       StepStats stats;
-      listed = test.run(
-          scene.arrays, steps > 0, [&] { return looks-- <= 0; }, stats);
+      listed = test.run(scene.arrays, steps > 0, Deadline::afterLooks(looks), stats);
       whole = test.isWhole();
       test.remember(scene.arrays, {}, true);
     }
