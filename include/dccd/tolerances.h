@@ -3,7 +3,9 @@
 //
 // A *margin* covers rounding: larger is safe and sends more pairs to a dearer stage, smaller loses contacts. A *guard*
 // bounds the numbers for which a margin holds: outside, exact arithmetic decides; narrower guards cost time, wider ones
-// certainty. A *default* is the user's to change (doc/interface.md).
+// certainty. A *slack* is a margin that no test cuts: another one stands in for it, or it is many times as wide as its
+// proof asks. Larger and smaller mean for it what they mean for a margin. A *default* is the user's to change
+// (doc/interface.md).
 //
 // test/margins cuts each margin in turn and shows a test that fails then; for this it builds the core with margins that
 // are variables.
@@ -43,13 +45,29 @@ constexpr double OCTOMAP_HEADER = 1e-5;
 constexpr double SQRT2_UP = 1.4142135623730952;  ///< [1] length of the diagonal directions, rounded up
 /// [1] Margin of a bound on the time of contact, for its few roundings. Larger: bounds are earlier, nothing else.
 DCCD_MARGIN double TOC_BOUND = 8 * HALF_ULP;
+/// [1] Slack of the same: of the larger of two projections, whose sums are rounded; twice where a separation is taken.
+constexpr double TOC_BOUND_GAP = 2 * HALF_ULP;
+/// [1] Slack of a bound on the time of contact of two groups: whole numbers, and one quotient.
+constexpr double GROUP_TOC_BOUND = 1e-15;
 /// [1] Of the scene's extent: how much wider the records' range is on either side where a body rests, so that others
 /// may move within it. Larger: resting bodies are kept longer, all bounds are coarser.
 constexpr double RECORD_PADDING = 0.5;
 /// [1] Of the records' range: what the scene must fill. Smaller: bodies are kept longer, all bounds are coarser.
 constexpr double RECORD_SHARE = 0.125;
+/// [1] Slack of a margin in records, of the largest coordinate: the roundings of both its sums.
+constexpr double RECORD_MARGIN = 4 * HALF_ULP;
+/// [1] Slack of the length that a record's unit stands for: within the guard it is off by less than 2^-12.
+constexpr double RECORD_UNIT = 0x1p-11;
+constexpr double RECORD_SMALLEST_RANGE = 0x1p-20;  ///< [1] guard on the records' range, of the largest coordinate
 /// [1] Margin of a separation that is a sum of several, which must not come out too small.
 DCCD_MARGIN double SEPARATION_SUM = 0x1p-50;
+/// [1] Slack of a length that is a root of a sum of a few products, and of a cosine; these are off by less than 2^-46.
+constexpr double LENGTH = 0x1p-40;
+/// [1] Slack of a residual and of a distance between two points, of the scene's size: these are off by 2^-46 of it.
+constexpr double RESIDUAL = 0x1p-44;
+/// [1] What is added to a sum of squares so that points on one line have a rotation, too. No bound depends on it, for
+/// residuals are measured. Larger: the rotation fits less well. Smaller: on a line it is mostly rounding.
+constexpr double ROTATION_FIT = 1e-9;
 
 // --- filters ---------------------------------------------------------------------------------------------------------
 // Planar filter (simd/fused_filter.cpp), in float on differences.
@@ -61,6 +79,7 @@ DCCD_MARGIN float FUSED_UNDERFLOW = 0x1p-100f;
 constexpr float FUSED_LARGEST_M = 1073741824.0f;  ///< [m] guard, 2^30: cubes of differences stay finite
 // No fold (culling/unfolded.cpp).
 DCCD_MARGIN double UNFOLDED_COORDINATE = 0x1p-51;  ///< [1] margin of a projected coordinate, of the largest |x|+|y|+|z|
+constexpr double UNFOLDED_PRODUCT = 20;  ///< [1] slack of a difference of two products, times error (extent + error)
 constexpr double UNFOLDED_SMALLEST_NORMAL = 1e-200, UNFOLDED_LARGEST_NORMAL = 1e200;  ///< [m^2] guard
 constexpr double UNFOLDED_SMALLEST_M = 1e-100, UNFOLDED_LARGEST_M = 1e100;            ///< [m] guard
 // Start state (step/segment_triangle.cpp), in double.
@@ -74,12 +93,22 @@ constexpr double SEGMENT_LARGEST_M = 0x1p30;  ///< [m] guard: keeps the underflo
 // --- elementary tests ------------------------------------------------------------------------------------------------
 // Batched exact test (simd/exact_batch_bounds.h). Margins, each rounded up by more than 0.5 %.
 DCCD_MARGIN double BATCH_VALUE = 107 * HALF_ULP;        ///< [1] of f(t) and f's coefficients, times U V W
-DCCD_MARGIN double BATCH_MINOR = 8.0625;                ///< [1] of a minor, times (h + 2.5 HALF_ULP) X Y
+DCCD_MARGIN double BATCH_MINOR = 8.0625;                ///< [1] of a minor, times (h + BATCH_TIME) X Y
 DCCD_MARGIN double BATCH_SEPARATION = 22.5 * HALF_ULP;  ///< [1] of a minor's coefficient over [a, b], times X Y
+constexpr double BATCH_TIME = 2.5 * HALF_ULP;           ///< [step] slack of h, half a bracket's width
 DCCD_MARGIN double SIMPLE_TIME = 155 * HALF_ULP;        ///< [1] of f's coefficients up to a rounded time, times U V W
 constexpr double BATCH_SMALLEST_M = 0x1p-150, BATCH_LARGEST_M = 0x1p150;  ///< [m] guard on U, V, W
 /// [step] Subdivision ends here and leaves the pair to the next tier. Smaller: fewer pairs there, more steps here.
 constexpr double BATCH_SMALLEST_INTERVAL = 0x1p-12;
+/// [step] By how much a root's bracket reaches beyond what f's error says. f's signs at its ends prove it. Larger:
+/// inside tests are less sharp. Smaller: brackets without a proof, which go to the next tier.
+constexpr double BATCH_BRACKET = 0x1p-50;
+/// [step] Where a narrower bracket leaves the inside test open, every interval around it would. Larger: pairs are left
+/// to the next tier that more steps had decided. Smaller: steps that decide nothing.
+constexpr double BATCH_NARROW_BRACKET = 0x1p-30;
+/// [step] An estimate this close to p/q is tried as p/q; others differ by 2^-20. Integers prove it. Larger: more are
+/// tried in vain. Smaller: estimates miss their p/q, and dearer integers decide.
+constexpr double SAME_TIME = 0x1p-30;
 // Tiers in double and in pairs of doubles (elementary/exact_refined.cpp, exact_double_double.cpp).
 /// [step] Half the least width around an extremum of f on which its sign is not asked for.
 constexpr double EXTREMUM_ZONE = 0x1p-40;
@@ -87,12 +116,33 @@ DCCD_MARGIN double INSIDE_MINOR = 48 * HALF_ULP;                   ///< [1] marg
 DCCD_MARGIN double CUBIC_VALUE = 102 * HALF_ULP;                   ///< [1] of f in doubles, times U V W
 DCCD_MARGIN double CUBIC_VALUE_PAIRS = 360 * HALF_ULP * HALF_ULP;  ///< [1] of f in pairs of doubles, times U V W
 DCCD_MARGIN double CUBIC_SLOPE = 656 * HALF_ULP;                   ///< [1] of f' in doubles, times U V W
-DCCD_MARGIN double SUBDIVISION = 0x1p-50;  ///< [1] of the difference of two projections, times the largest
-DCCD_MARGIN double QUADRATIC_SIGN = 2.5;   ///< [1] of a quadratic, times (radius + 2^-51), times its coefficients
+constexpr double BOUND_OF_BOUNDS = 1.0625;                         ///< [1] slack of a sum of such bounds, times it
+constexpr double TANGENT_VALUE = 4 * HALF_ULP;       ///< [1] slack of f along its tangent, of its value and its change
+DCCD_MARGIN double SUBDIVISION = 0x1p-50;            ///< [1] of the difference of two projections, times the largest
+constexpr double SUBDIVISION_UNDERFLOW = 0x1p-1070;  ///< [m] slack of the same, for what underflows
+/// [1] Margin of a quadratic, times (radius + QUADRATIC_TIME), times its coefficients.
+DCCD_MARGIN double QUADRATIC_SIGN = 2.5;
+constexpr double QUADRATIC_TIME = 4 * HALF_ULP;   ///< [step] slack of the radius: 3 half ulps for the coefficients
+constexpr double QUADRATIC_UNDERFLOW = 0x1p-990;  ///< [1] slack of the same, for what underflows
+/// [step] By how much a root's first bracket reaches beyond its estimate. f's signs at its ends prove it. Larger: more
+/// steps to the root's cell. Smaller: the bracket misses the root and is dropped, which takes more steps, too.
+constexpr double ROOT_BRACKET = 0x1p-44;
 constexpr double CUBIC_SMALLEST_M3 = 0x1p-300, CUBIC_LARGEST_M3 = 0x1p300;  ///< [m^3] guard on the coefficients
 constexpr double TIME_GRID = 0x1p-52;  ///< [step] times are multiples of it, so that 1 - t is exact
+// Integers that are computed where they have to be (elementary/exact_lazy_integer.h). [1] Of numbers in [1/2, 1).
+constexpr double LAZY_ROUNDING = 0x1p-102;  ///< slack of a sum and of a product, below 2^-104
+constexpr int LAZY_FAR_BITS = 200;          ///< an addend smaller by 2^-200 goes into the error. Smaller: larger errors
+constexpr double LAZY_BOUND_OF_BOUNDS = 1.001;  ///< slack of a sum of errors, times it
+constexpr double LAZY_SIGN = 0.999;             ///< slack of a number that is compared with its error, times it
+/// Of a larger error the number is computed by GMP before others are made of it. Larger: signs are asked of GMP more
+/// often. Smaller: numbers are computed of which no sign is asked.
+constexpr double LAZY_SHARP = 0x1p-70;
+/// Of a larger error the number is computed before its double is taken, which has 2^-53 of its own. Larger: bounds on
+/// polynomials do not hold.
+constexpr double LAZY_DOUBLE = 0x1p-60;
 // Conservative advancement (elementary/conservative_advance.cpp).
 DCCD_MARGIN double ADVANCE_SEPARATION = 11 * HALF_ULP;  ///< [1] margin of n.w against d |n|, times |n|_1 M
+constexpr double CLOSING_SPEED = 0x1p-50;               ///< [1] slack of a closing speed times a bracket's width
 DCCD_MARGIN double ADVANCE_POINT = 44 * HALF_ULP;       ///< [1] margin of the distance of two points, times M
 constexpr double ADVANCE_SMALLEST_M = 1e-140;           ///< [m] guard: products of lengths do not vanish
 constexpr double ADVANCE_LARGEST_M = 1e70;              ///< [m] guard: products of four lengths stay finite

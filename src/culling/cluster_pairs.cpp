@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dccd/tolerances.h"
+
 namespace dccd {
 
 namespace {
@@ -17,7 +19,7 @@ double tocBound(const TreePair& trees, std::size_t level, std::uint32_t a, std::
     gap1 -= 2;
     if (gap0 <= 0) return 0.0;
     if (gap1 > 0) return 1.0;
-    return static_cast<double>(gap0) / (gap0 - gap1) * (1 - 1e-15);
+    return static_cast<double>(gap0) / (gap0 - gap1) * (1 - tolerance::GROUP_TOC_BOUND);
   };
   double latest = 0;
   for (int d = 0; d < 8; ++d) {

@@ -202,7 +202,8 @@ void SceneArrays::setMargin(const SceneBody& body, double reach_m, std::int16_t*
     // The rounding of both sums, enough where one side alone is widened, and a unit for the truncation of both values.
     // Strict comparisons of whole numbers need nothing of that unit, so that it also holds the five roundings of the
     // distance itself, which are below 2^-35 units.
-    const double rounding = std::ldexp(std::max(std::abs(range_min_[d]), std::abs(range_max_[d])), -51) * scale_[d];
+    const double rounding =
+        tolerance::RECORD_MARGIN * std::max(std::abs(range_min_[d]), std::abs(range_max_[d])) * scale_[d];
     const double units = std::ceil(reach_m * length * scale_[d] + rounding) + 1;
     margin16[k] = static_cast<std::int16_t>(scale_[d] > 0 ? std::min<double>(units, simd::UNBOUNDED) : 0);
   }
@@ -246,8 +247,8 @@ double SceneArrays::unit(int d) const {
   // The scaled number is off by the roundings of a sum, a difference and a product, each below 2^-53 of twice the size
   // in that direction: of two numbers, together below 2^-49 of it, against a unit of at least 2^-17 of the range.
   const double range = range_max_[d] - range_min_[d], size = std::max(std::abs(range_min_[d]), std::abs(range_max_[d]));
-  if (!(scale_[d] > 0) || !(range > 0x1p-20 * size)) return 0;
-  return (1 - 0x1p-11) / scale_[d];
+  if (!(scale_[d] > 0) || !(range > tolerance::RECORD_SMALLEST_RANGE * size)) return 0;
+  return (1 - tolerance::RECORD_UNIT) / scale_[d];
 }
 
 void SceneArrays::ballAtStart(const std::int16_t* aos, double* centre, double& radius) const {
@@ -266,7 +267,7 @@ void SceneArrays::ballAtStart(const std::int16_t* aos, double* centre, double& r
     const double half = 0.5 * (high - low);
     squared += half * half;
   }
-  radius = std::sqrt(squared) * (1 + 0x1p-40);
+  radius = std::sqrt(squared) * (1 + tolerance::LENGTH);
 }
 
 }  // namespace dccd

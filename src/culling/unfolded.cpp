@@ -124,7 +124,7 @@ bool UnfoldedProof::run(const SceneBody& body, const VertexMotion* vertices) {
   // Differences are at most L = extent, and off by 2 error + 2^-53 L <= 2.5 error; so a product of two by 5 L error and
   // 7 error^2, twice for two products, and their three roundings add less than 3 L error: below 20 error (L + error).
   const double extent = std::max(high[0] - low[0], high[1] - low[1]);
-  product_error_ = 20 * error_ * (extent + error_);
+  product_error_ = tolerance::UNFOLDED_PRODUCT * error_ * (extent + error_);
   return facesKeepOrientation(body) && contourIsSimple();
 }
 

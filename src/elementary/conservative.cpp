@@ -8,6 +8,7 @@
 #include <string>
 
 #include "dccd/elementary.h"
+#include "dccd/tolerances.h"
 #include "elementary/conservative_advance.h"
 #include "elementary/exact_tiers.h"
 #include "simd/exact_batch.h"
@@ -52,7 +53,7 @@ ElementaryResult ConservativeRung::fromBatch(PairKind kind, const conservative::
   }
   if (output.verdict[i] == simd::BATCH_YES || output.verdict[i] == simd::BATCH_YES_BRACKET) {
     const double width = output.hi[i] - output.lo[i];  // exact: both are multiples of 2^-52
-    if (conservative::closingSpeed(kind, corners) * width * (1 + 0x1p-50) <= options_.tolerance_m) {
+    if (conservative::closingSpeed(kind, corners) * width * (1 + tolerance::CLOSING_SPEED) <= options_.tolerance_m) {
       result.verdict = Verdict::CONTACT;
       result.toc_lower = output.lo[i];
       result.toc_upper = output.hi[i];
@@ -67,7 +68,8 @@ ElementaryResult ConservativeRung::sharpened(const PairBatch& batch, std::size_t
   constexpr int TOC_BITS = 52;
   const PairMotion motion = exact::motionOf(batch.vertices, batch.pairs[i]);
   const ElementaryResult result = exact::decideUncertain(batch.kind, motion, TOC_BITS);
-  const double moved = conservative::closingSpeed(batch.kind, corners) * (0x1p-52 * (1 + 0x1p-50));
+  const double moved =
+      conservative::closingSpeed(batch.kind, corners) * (tolerance::TIME_GRID * (1 + tolerance::CLOSING_SPEED));
   if (result.verdict == Verdict::NO_CONTACT || moved <= options_.tolerance_m) return result;
   return {near.toc_lower, 1, Verdict::UNDECIDED, near.tier};
 }

@@ -188,7 +188,7 @@ double leastSeparation(const Differences& pair, const Vec& n, double t) {
   return least;
 }
 
-double onGrid(double t) { return std::floor(t * 0x1p52) * 0x1p-52; }
+double onGrid(double t) { return std::floor(t / tolerance::TIME_GRID) * tolerance::TIME_GRID; }
 
 /// About the time, not after 1, at which the first n.w_ij falls to `target`, going on from t.
 double timeOf(const Separations& from, double t, double target) {

@@ -95,12 +95,13 @@ struct Enclosure {
 
 /// Sign of q on all of the enclosure, or 0 when doubles cannot tell. With S = sum |c_i|: moving by the radius changes q
 /// by at most 2 S radius, coefficients and Horner's scheme err by less than (2^-52 + 4 * 2^-53) S: as much as another
-/// 3 * 2^-53 of radius. 2^-51 is used, and 2.5 for 2, which covers the rounding of the bound itself, too.
+/// 3 * 2^-53 of radius. QUADRATIC_TIME is used, and 2.5 for 2, which covers the rounding of the bound itself, too.
 template <class Z>
 int filteredSign(const Quadratic<Z>& q, const Enclosure& enclosure) {
   const DoublePolynomial<2> p(q);
   const double sum = std::fabs(p.c[0]) + std::fabs(p.c[1]) + std::fabs(p.c[2]);
-  const double bound = tolerance::QUADRATIC_SIGN * sum * (enclosure.radius + 0x1p-51) + 0x1p-990;
+  const double bound =
+      tolerance::QUADRATIC_SIGN * sum * (enclosure.radius + tolerance::QUADRATIC_TIME) + tolerance::QUADRATIC_UNDERFLOW;
   const double value = p.at(enclosure.middle);
   return value > bound ? 1 : value < -bound ? -1 : 0;
 }

@@ -167,9 +167,9 @@ struct Tangent {
     const double h = t - x;  // exact where it matters: both are multiples of 2^-52 in [0,1]
     const double at_t = value + slope * h;
     const double change = std::fabs(slope * h);
-    const double error = f.error() + 0x1p-51 * (std::fabs(value) + change) +
+    const double error = f.error() + tolerance::TANGENT_VALUE * (std::fabs(value) + change) +
                          std::fabs(h) * (f.slopeError() + f.mostCurvature() * std::fabs(h));
-    return sign * at_t > 1.0625 * error;
+    return sign * at_t > tolerance::BOUND_OF_BOUNDS * error;
   }
 };
 

@@ -9,8 +9,8 @@
 //   Product: of the leading parts exactly, p + q; the two cross terms, each at most 2^-54, err by 2^-108 each and their
 //     sum by 2^-107, q plus that by 2^-106; the product of the trailing parts, 2^-108, is dropped: below 2^-104.
 //   Sum: of the leading parts exactly, s + t, |s| < 2; the trailing parts' sum, at most 2^-53, errs by 2^-107, t plus
-//     that, at most 2^-52, by 2^-106: below 2^-104. An addend 2^200 times smaller goes into the error.
-// ROUNDING = 2^-102 is used, before the result is brought to [1/2, 1). Where no trailing part is there nothing is
+//     that, at most 2^-52, by 2^-106: below 2^-104. An addend 2^LAZY_FAR_BITS times smaller goes into the error.
+// LAZY_ROUNDING is used, before the result is brought to [1/2, 1). Where no trailing part is there nothing is
 // rounded: differences of coordinates and their products are exact, and so are their zeros.
 #pragma once
 
@@ -20,6 +20,7 @@
 #include <deque>
 #include <vector>
 
+#include "dccd/tolerances.h"
 #include "elementary/exact_integer.h"
 
 namespace dccd {
@@ -64,8 +65,7 @@ class LazyInteger {
   };
   explicit LazyInteger(Index index) : index_(index.value) {}
 
-  static constexpr double ROUNDING = 0x1p-102;
-  static constexpr long FAR = 200;  ///< bits by which an addend is too small to count
+  static constexpr double BOUND_OF_BOUNDS = tolerance::LAZY_BOUND_OF_BOUNDS;
 
   struct Approximation {
     double high = 0, low = 0, error = 0;
@@ -135,7 +135,8 @@ class LazyInteger {
       const double rest = q + (x.high * y.low + x.low * y.high);
       const double high = p + rest, low = rest - (high - p);  // |rest| is far below |p|
       // |x|, |y| <= 1.
-      const double error = 1.001 * (x.error + y.error + x.error * y.error) + (is_exact ? 0 : ROUNDING);
+      const double error =
+          BOUND_OF_BOUNDS * (x.error + y.error + x.error * y.error) + (is_exact ? 0 : tolerance::LAZY_ROUNDING);
       number.about = normalized(high, low, error, x.exponent + y.exponent);
       return add(number);
     }
@@ -151,8 +152,8 @@ class LazyInteger {
       y.low *= sign_of_b;
       if (x.exponent < y.exponent) std::swap(x, y);
       const long apart = x.exponent - y.exponent;
-      if (apart > FAR) {
-        x.error = 1.001 * (x.error + (1.001 + y.error) * 0x1p-200);
+      if (apart > tolerance::LAZY_FAR_BITS) {
+        x.error = BOUND_OF_BOUNDS * (x.error + (BOUND_OF_BOUNDS + y.error) * powerOfTwo(-tolerance::LAZY_FAR_BITS));
         number.about = x;
         return add(number);
       }
@@ -162,27 +163,27 @@ class LazyInteger {
       const bool is_exact = x.low == 0 && yl == 0;
       const double rest = t + (x.low + yl);
       const double high = s + rest, back = high - s, low = (s - (high - back)) + (rest - back);
-      const double error = 1.001 * (x.error + y.error * scale) + (is_exact ? 0 : ROUNDING);
+      const double error = BOUND_OF_BOUNDS * (x.error + y.error * scale) + (is_exact ? 0 : tolerance::LAZY_ROUNDING);
       number.about = normalized(high, low, error, x.exponent);
       return add(number);
     }
 
     int sign(std::int32_t a) {
       const Approximation& x = numbers_[a].about;
-      if (std::fabs(x.high) * 0.999 > x.error) return x.high > 0 ? 1 : -1;
+      if (std::fabs(x.high) * tolerance::LAZY_SIGN > x.error) return x.high > 0 ? 1 : -1;
       return x.isZero() ? 0 : mpz_sgn(exact(a));
     }
 
     void sharpen(std::int32_t a) {
       const Approximation& x = numbers_[a].about;
-      if (x.error > 0x1p-70 || (x.high == 0 && !x.isZero())) exact(a);
+      if (x.error > tolerance::LAZY_SHARP || (x.high == 0 && !x.isZero())) exact(a);
     }
 
     ScaledDouble approximate(std::int32_t a) {
       const Approximation& x = numbers_[a].about;
       ScaledDouble result;
       if (x.isZero()) return result;
-      if (std::fabs(x.high) > 0 && x.error <= 0x1p-60) {
+      if (std::fabs(x.high) > 0 && x.error <= tolerance::LAZY_DOUBLE) {
         result.mantissa = x.high;
         result.exponent = x.exponent;
       } else {

@@ -20,6 +20,7 @@ namespace dccd {
 namespace exact {
 namespace {
 
+using tolerance::BOUND_OF_BOUNDS, tolerance::ROOT_BRACKET;
 constexpr double LEAST_ZONE = tolerance::EXTREMUM_ZONE;  ///< half the width around an extremum, see setExtrema()
 constexpr int HALVINGS = 6;                              ///< of a piece on which f' is uncertain
 
@@ -101,8 +102,8 @@ class RefinedDecision {
       return before == after ? Outcome::FREE : decideRoot(a, b, before);
     }
     const double middle = onGrid(0.5 * (a + b));
-    const double most_change = 1.0625 * (std::max(-least, most) + f_.slopeError()) * (b - a);
-    if (std::fabs(f_.valueAt(middle)) > 1.0625 * (f_.error() + most_change)) return Outcome::FREE;
+    const double most_change = BOUND_OF_BOUNDS * (std::max(-least, most) + f_.slopeError()) * (b - a);
+    if (std::fabs(f_.valueAt(middle)) > BOUND_OF_BOUNDS * (f_.error() + most_change)) return Outcome::FREE;
     if (halvings == 0 || middle == a || middle == b) return Outcome::UNCERTAIN;
     const Outcome outcome = decidePiece(a, middle, halvings - 1);
     return outcome == Outcome::FREE ? decidePiece(middle, b, halvings - 1) : outcome;
@@ -121,7 +122,8 @@ class RefinedDecision {
       const double middle = 0.5 * (low + high);
       ((roughValueAt(middle) > 0) == (before > 0) ? low : high) = middle;
     }
-    const double close_low = std::max(a, onGrid(low - 0x1p-44)), close_high = std::min(b, onGrid(high + 0x1p-44));
+    const double close_low = std::max(a, onGrid(low - ROOT_BRACKET)),
+                 close_high = std::min(b, onGrid(high + ROOT_BRACKET));
     if (f_.signAt(close_low) == before) a = close_low;
     if (f_.signAt(close_high) == -before) b = close_high;
     cell52_ = a < b ? cellOfRoot(f_, a, b, 52) : -1;

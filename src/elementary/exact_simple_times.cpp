@@ -19,7 +19,7 @@ namespace exact {
 namespace {
 
 constexpr std::int64_t LARGEST_DENOMINATOR = 1024;
-constexpr double SAME_TIME = 0x1p-30;  ///< an estimate this close to p/q is tried as p/q; others differ by 2^-20
+using tolerance::SAME_TIME;
 
 /// The rational of the smallest denominator within SAME_TIME of t in [0,1], by continued fractions; q = 0 for none.
 SimpleTime simpleTimeAt(double t) {

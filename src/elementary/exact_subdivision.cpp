@@ -46,7 +46,7 @@ class Separation {
       for (const auto& time : pair.x) {
         for (const auto& point : time) largest = std::max(largest, std::fabs(point[k]));
       }
-      margin_[k] = tolerance::SUBDIVISION * largest + 0x1p-1070;
+      margin_[k] = tolerance::SUBDIVISION * largest + tolerance::SUBDIVISION_UNDERFLOW;
     }
   }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dccd/tolerances.h"
 #include "obstacle/obstacle_check_impl.h"
 #include "obstacle/start_contact.h"
 #include "obstacle/static_filters.h"
@@ -107,8 +108,8 @@ void ObstacleCheck::Impl::setTime(Contact& contact, const CrossingTime& time) {
     contact.toc_upper = std::min(1.0, time.approximate * (1 + tolerance::CROSSING_TIME));
   } else {
     const double k = static_cast<double>(timeCell(time, 52));
-    contact.toc_lower = k * 0x1p-52;
-    contact.toc_upper = (k + 1) * 0x1p-52;
+    contact.toc_lower = k * tolerance::TIME_GRID;
+    contact.toc_upper = (k + 1) * tolerance::TIME_GRID;
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "dccd/tolerances.h"
 #include "simd/directions.h"
@@ -15,9 +14,9 @@ using tolerance::SQRT2_UP;
 // First time at which the point u -> (1-t) u0 + t u1 is not above l -> (1-t) l0 + t l1 + margin, rounded down; 2 if
 // never.
 double meets(double u0, double u1, double l0, double l1, double margin) {
-  // The projections' sums are rounded, by at most epsilon / 2 of their size each. A difference of nearly equal numbers
-  // is not; but where a margin is taken from it, its rounding counts, too: by at most epsilon / 2 of twice the size.
-  const double factor = (margin == 0 ? 1 : 2) * std::numeric_limits<double>::epsilon();
+  // The projections' sums are rounded, by at most HALF_ULP of their size each. A difference of nearly equal numbers
+  // is not; but where a margin is taken from it, its rounding counts, too: by at most HALF_ULP of twice the size.
+  const double factor = (margin == 0 ? 1 : 2) * tolerance::TOC_BOUND_GAP;
   const double slack0 = factor * std::max(std::abs(u0), std::abs(l0));
   const double slack1 = factor * std::max(std::abs(u1), std::abs(l1));
   // Strict comparison of the rounded sums is exact evidence of order; the slack only enters the time.

@@ -53,8 +53,7 @@
 namespace dccd {
 namespace simd {
 
-using tolerance::BATCH_MINOR, tolerance::BATCH_SEPARATION, tolerance::BATCH_VALUE;
-constexpr double BATCH_ROUNDING_TIME = 2.5 * tolerance::HALF_ULP;
+using tolerance::BATCH_MINOR, tolerance::BATCH_SEPARATION, tolerance::BATCH_TIME, tolerance::BATCH_VALUE;
 constexpr double BATCH_SMALLEST = tolerance::BATCH_SMALLEST_M, BATCH_LARGEST = tolerance::BATCH_LARGEST_M;
 
 }  // namespace simd

@@ -91,7 +91,7 @@ HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& t
   V error_n = hn::Zero(Tag()), error_b = error_n, error_c = error_n;
   if (CERTIFIED) {
     const V size_u = load(roots.size[0], i), size_v = load(roots.size[1], i), size_w = load(roots.size[2], i);
-    const V relative = hn::Mul(constant(BATCH_MINOR), hn::Add(h, constant(BATCH_ROUNDING_TIME)));
+    const V relative = hn::Mul(constant(BATCH_MINOR), hn::Add(h, constant(BATCH_TIME)));
     error_n = hn::Mul(hn::Mul(size_u, size_v), relative);
     error_b = hn::Mul(hn::Mul(size_v, size_w), relative);
     error_c = hn::Mul(hn::Mul(size_u, size_w), relative);
@@ -166,7 +166,7 @@ HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
       reach = hn::Mul(constant(4), reach);
       reach = choose(hn::Lt(parabola, reach), parabola, reach);
     }
-    reach = hn::Add(reach, constant(0x1p-50));
+    reach = hn::Add(reach, constant(tolerance::BATCH_BRACKET));
     const V below = onGrid(hn::Sub(x, reach)), above = onGrid(hn::Add(x, reach));
     root_lo = choose(hn::Gt(below, lo), below, lo);
     root_hi = choose(hn::Lt(above, hi), above, hi);

@@ -107,7 +107,7 @@ void ClusterMotion::Block::fit(const VertexMotion* v, std::size_t n) {
     right[2] += sum[0] * difference[1] - sum[1] * difference[0];
   }
   // (|s|^2 I - s s') w = s x d, summed up; by the adjugate. A little is added where all points lie on a line.
-  const double little = 1e-9 * (xx + yy + zz);
+  const double little = tolerance::ROTATION_FIT * (xx + yy + zz);
   const double a = yy + zz + little, d = xx + zz + little, f = xx + yy + little;
   const double p = d * f - yz * yz, q = yz * xz + xy * f, r = xy * yz + d * xz;
   const double determinant = a * p - xy * q - xz * r;
@@ -141,7 +141,7 @@ void ClusterMotion::Block::measure(const VertexMotion* v, std::size_t n) {
       finite = finite && squared < std::numeric_limits<double>::infinity();
       most = std::max(most, squared);
     }
-    residual[piece] = finite ? std::sqrt(most) * (1 + 0x1p-40) : std::numeric_limits<double>::infinity();
+    residual[piece] = finite ? std::sqrt(most) * (1 + tolerance::LENGTH) : std::numeric_limits<double>::infinity();
   }
 }
 

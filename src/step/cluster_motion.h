@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "culling/scene_arrays.h"
+#include "dccd/tolerances.h"
 
 namespace dccd {
 
@@ -41,7 +42,7 @@ class ClusterMotion {
   void run(const SceneArrays& scene, const Pieces& pieces) {
     // Each residual is the length of a sum of products below 8 times the size, each rounded less than 8 times; a pair
     // has three of them and a difference of rotations. Together below 2^-46 of the size.
-    slop_m_ = 0x1p-44 * scene.size();
+    slop_m_ = tolerance::RESIDUAL * scene.size();
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const bool was_still = bodies_[b].still;
       bodies_[b].still = scene.bodies()[b].kept && (was_still || isStill(scene, b));
@@ -65,7 +66,7 @@ class ClusterMotion {
     const Block& to = other.still ? at_rest : other.blocks[q.block];
     double residual = (one.still ? 0 : p.residual) + (other.still ? 0 : q.residual) + slop_m_;
     if (&from != &to) residual += from.misses(to, q);
-    return {residual, from.half_cosine * (1 - 0x1p-40)};
+    return {residual, from.half_cosine * (1 - tolerance::LENGTH)};
   }
 
   /// Rounding of a distance between two points of the scene, from above.
@@ -104,7 +105,7 @@ class ClusterMotion {
       double shift = 0, turn = 0;
       for (int i = 0; i < 3; ++i) shift += (here[i] - there[i]) * (here[i] - there[i]);
       for (int i = 0; i < 9; ++i) turn += (rotation[i] - other.rotation[i]) * (rotation[i] - other.rotation[i]);
-      return (std::sqrt(shift) + std::sqrt(turn) * of.radius) * (1 + 0x1p-40);
+      return (std::sqrt(shift) + std::sqrt(turn) * of.radius) * (1 + tolerance::LENGTH);
     }
   };
   struct BodyMotion {

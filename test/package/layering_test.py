@@ -41,6 +41,10 @@ ROS_OR_PCL = re.compile(r'^(ros/|ros\.h|tf2|pcl|rosbag|roslib|nodelet|pluginlib|
 OCTOMAP = re.compile(r'^octomap/(?!.*\.hh)')
 INTRINSICS = re.compile(r'\b_mm(?:256|512)?_[a-z]|\b__m(?:128|256|512)|immintrin\.h|arm_neon\.h|hwy/highway\.h|'
                         r'hwy/foreach_target\.h|HWY_NAMESPACE')
+# The rooms that compute with rounding, and what a tolerance looks like there: a small power, or a factor of nearly 1.
+ROUNDED = ('projection', 'culling', 'simd', 'elementary', 'obstacle', 'step')
+SMALL_NUMBER = re.compile(r"\b0x1p-(?!64\b)\d+|\b\d+e-\d+\b|\b(?:1\.0\d+|0\.99\d*)\b|epsilon\(\)")
+WITH_TOLERANCES = ('src/step/pair_memory.cpp', 'src/step/remembered_pairs.cpp')
 
 
 def includes(path):
@@ -91,6 +95,17 @@ class LayeringTest(unittest.TestCase):
         wrong = [name(p) for folder in CORE for p in code_under('src/' + folder) if words.search(p.read_text(errors='replace'))]
         self.assertEqual(wrong, [])
 
+    def test_every_tolerance_is_in_its_header(self):
+        wrong = []
+        for folder in ROUNDED:
+            for path in code_under('src/' + folder):
+                for number, line in enumerate(path.read_text().splitlines(), 1):
+                    code = re.sub(r'"[^"]*"', '""', line.split('//')[0])
+                    if name(path) not in WITH_TOLERANCES and SMALL_NUMBER.search(code):
+                        wrong.append('%s:%d: %s' % (name(path), number, line.strip()))
+        self.assertEqual(wrong, [])
+        self.assertTrue(SMALL_NUMBER.search('x * (1 + 0x1p-50)') and SMALL_NUMBER.search('1e-12') and SMALL_NUMBER.search('0.999 * x'))
+
     def test_production_classes_do_not_end_in_test(self):
         found = [m for folder in ('src', 'include') for p in code_under(folder)
                  for m in re.findall(r'^(?:class|struct) (?:DCCD_EXPORT )?(\w*Test)\b', p.read_text(), re.M)]
@@ -107,6 +122,11 @@ class LayeringTest(unittest.TestCase):
         files = [p for p in code_under('src') if p.relative_to(CHECKOUT).parts[1] not in ROS_ROOMS]
         wrong = ['%s includes %s' % (name(path), target) for path in files for _, target in includes(path)
                  if ROS_OR_PCL.match(target)]
+        self.assertEqual(wrong, [])
+
+    def test_pcl_stays_as_loud_as_the_process_wants_it(self):
+        wrong = [name(path) for folder in ('src', 'include') for path in code_under(folder)
+                 if 'pcl/console' in path.read_text() or 'setVerbosityLevel' in path.read_text()]
         self.assertEqual(wrong, [])
 
     def test_liboctomap_only_under_octomap(self):
