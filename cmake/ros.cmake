@@ -7,7 +7,6 @@ if(OCTOMAP_SOURCES)
   target_include_directories(deformable_ccd_octomap PUBLIC include PRIVATE src)
   target_include_directories(deformable_ccd_octomap SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
   target_link_libraries(deformable_ccd_octomap PUBLIC deformable_ccd ${OCTOMAP_LIBRARIES})
-  set_target_properties(deformable_ccd_octomap PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${API_VERSION})
   list(APPEND ROS_LINK_LIBRARIES deformable_ccd_octomap)
 endif()
 
@@ -23,7 +22,6 @@ if(ROS_SOURCES)
   target_include_directories(deformable_ccd_ros SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
   # The headers that nearly every file of this library reads, compiled once.
   target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> <map> <string> <vector>)
-  set_target_properties(deformable_ccd_ros PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${API_VERSION})
   target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb PRIVATE deformable_ccd_report)
   # PCL's headers are the slowest to read: only for the files that use them. The compiler's own folders must not come
   # with them, since their order matters to it.
