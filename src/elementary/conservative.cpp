@@ -4,14 +4,12 @@
 // minimum separation the exact tiers decide.
 #include <algorithm>
 #include <cstring>
-#include <stdexcept>
-#include <string>
 
 #include "dccd/elementary.h"
 #include "dccd/tolerances.h"
+#include "elementary/batch_input.h"
 #include "elementary/conservative_advance.h"
 #include "elementary/exact_tiers.h"
-#include "simd/exact_batch.h"
 #include "simd/float_mode.h"
 
 namespace dccd {
@@ -76,20 +74,12 @@ ElementaryResult ConservativeRung::sharpened(const PairBatch& batch, std::size_t
 
 void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   const ScopedFloatMode mode;
-  if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
-    throw std::invalid_argument(std::string("conservative test: kind ") + toString(batch.kind) +
-                                " is not vertex-face or edge-edge");
-  }
-  static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
   BlockOutput output;
-  simd::BatchInput input;
-  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
+  simd::BatchInput input = inputOf(batch, Accuracy::CONSERVATIVE);
   input.toc_bits = BATCH_TOC_BITS;
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
     const double* separation = batch.minimum_separation_m == nullptr ? nullptr : batch.minimum_separation_m + begin;
-    input.vertices = batch.vertices->t0;
-    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
-    input.count = std::min(BLOCK, batch.count - begin);
+    setBlock(batch, begin, BLOCK, input);
     const bool batched =
         separation == nullptr || std::find(separation, separation + input.count, 0.0) != separation + input.count;
     if (batched) simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});

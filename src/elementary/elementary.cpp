@@ -1,5 +1,6 @@
 #include "dccd/elementary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -7,6 +8,7 @@
 #include <string>
 
 #include "dccd/accuracy.h"
+#include "elementary/batch_input.h"
 
 namespace dccd {
 
@@ -75,6 +77,28 @@ bool holdsDistance(Accuracy rung) {
 bool provesAnswers(Accuracy rung) {
   const RungRow* row = rowOf(rung);
   return row && row->proves;
+}
+
+simd::BatchInput inputOf(const PairBatch& batch, Accuracy rung) {
+  const auto refuse = [&](const std::string& what) {
+    throw std::invalid_argument(std::string(toString(rung)) + " test: " + what);
+  };
+  if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
+    refuse(std::string("kind ") + toString(batch.kind) + " is not vertex-face or edge-edge");
+  }
+  if (batch.minimum_separation_m != nullptr && !holdsDistance(rung)) {
+    refuse("a minimum separation needs the rung conservative");
+  }
+  simd::BatchInput input;
+  input.vertices = reinterpret_cast<const double*>(batch.vertices);
+  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
+  return input;
+}
+
+void setBlock(const PairBatch& batch, std::size_t begin, std::size_t most, simd::BatchInput& input) {
+  static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
+  input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
+  input.count = std::min(most, batch.count - begin);
 }
 
 ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pair) {

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "dccd/elementary.h"
+#include "elementary/batch_input.h"
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
-#include "simd/exact_batch.h"
 #include "simd/float_mode.h"
 
 namespace dccd {
@@ -47,24 +45,13 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
 
 void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   const ScopedFloatMode mode;
-  if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
-    throw std::invalid_argument(std::string("exact test: kind ") + toString(batch.kind) +
-                                " is not vertex-face or edge-edge");
-  }
-  if (batch.minimum_separation_m != nullptr) {
-    throw std::invalid_argument("exact test: a minimum separation needs the rung conservative");
-  }
-  static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
   BlockOutput output{};
-  simd::BatchInput input;
-  input.vertices = reinterpret_cast<const double*>(batch.vertices);
-  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
+  simd::BatchInput input = inputOf(batch, Accuracy::EXACT);
   input.toc_bits = toc_bits_;
   const ElementaryResult no_contact = exact::noContact(Tier::DOUBLE_BATCH);
   const double width = std::ldexp(1.0, -toc_bits_);
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
-    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
-    input.count = std::min(BLOCK, batch.count - begin);
+    setBlock(batch, begin, BLOCK, input);
     if (batch.deadline && batch.deadline->movedBy(TIME_FOR_BATCHES).isOver()) {
       std::fill_n(results + begin, input.count, exact::undecided(Tier::DOUBLE_BATCH));
       counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)] += input.count;

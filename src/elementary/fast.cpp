@@ -1,11 +1,9 @@
 // The rung `fast`: the batched kernel of the exact test without its bounds. Floating point all the way: an answer near
 // a tie may be wrong either way, and the TOC is approximate.
 #include <algorithm>
-#include <stdexcept>
-#include <string>
 
 #include "dccd/elementary.h"
-#include "simd/exact_batch.h"
+#include "elementary/batch_input.h"
 #include "simd/float_mode.h"
 
 namespace dccd {
@@ -20,23 +18,12 @@ class FastRung : public Rung {
 
 void FastRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   const ScopedFloatMode mode;
-  if (batch.kind != PairKind::VERTEX_FACE && batch.kind != PairKind::EDGE_EDGE) {
-    throw std::invalid_argument(std::string("fast test: kind ") + toString(batch.kind) +
-                                " is not vertex-face or edge-edge");
-  }
-  if (batch.minimum_separation_m != nullptr) {
-    throw std::invalid_argument("fast test: a minimum separation needs the rung conservative");
-  }
-  static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
   std::uint8_t verdict[BLOCK];
   std::uint64_t cell[BLOCK];
   double lo[BLOCK], hi[BLOCK];
-  simd::BatchInput input;
-  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
+  simd::BatchInput input = inputOf(batch, Accuracy::FAST);
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
-    input.vertices = batch.vertices->t0;
-    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
-    input.count = std::min(BLOCK, batch.count - begin);
+    setBlock(batch, begin, BLOCK, input);
     simd::fastBatch(input, {verdict, cell, lo, hi});
     for (std::size_t i = 0; i < input.count; ++i) {
       ElementaryResult& result = results[begin + i];

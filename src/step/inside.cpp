@@ -157,14 +157,7 @@ void InsideSearch::search(const SceneArrays& scene, const Deadline& deadline) {
     if (bodies[b].hasInside()) body_pairs_.push_back({a, b});
     if (bodies[a].hasInside()) body_pairs_.push_back({b, a});
   }
-  std::sort(body_pairs_.begin(), body_pairs_.end());
-  for (auto pair = std::lower_bound(body_pairs_.begin(), body_pairs_.end(), next_pair_); pair != body_pairs_.end();
-       ++pair) {
-    if (*pair != next_pair_) next_piece_ = 0;
-    next_pair_ = *pair;
-    if (!searchBodies(scene, deadline)) return;
-  }
-  searched_ = true;
+  searched_ = goOn(body_pairs_, next_pair_, next_piece_, [&] { return searchBodies(scene, deadline); });
 }
 
 /// Goes on at next_piece_; false: it was ended there.

@@ -163,14 +163,7 @@ void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline
     body_pairs_.push_back({a, b});
     body_pairs_.push_back({b, a});
   }
-  std::sort(body_pairs_.begin(), body_pairs_.end());
-  for (auto pair = std::lower_bound(body_pairs_.begin(), body_pairs_.end(), next_bodies_); pair != body_pairs_.end();
-       ++pair) {
-    if (*pair != next_bodies_) next_group_ = 0;
-    next_bodies_ = *pair;
-    if (!searchBodies(scene, deadline)) return;
-  }
-  searched_ = true;
+  searched_ = goOn(body_pairs_, next_bodies_, next_group_, [&] { return searchBodies(scene, deadline); });
 }
 
 /// Goes on at next_group_ of the edges' tree, by one group at the least; false: it was ended, and next_group_ says

@@ -1,6 +1,7 @@
 // The start state of a step (doc/algorithm.md): do an edge and a face already meet at t=0?
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <tuple>
@@ -16,6 +17,21 @@ namespace dccd {
 /// Exact: do the closed segment pq and the closed triangle abc meet? Any finite doubles, degenerate ones included.
 /// Each argument: x, y, z.
 bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c);
+
+/// Goes on with a search that a deadline cut: through the pairs of bodies in ascending order from `next` on, of which
+/// the first one begins at `place`, all later ones at 0. search() says whether it came to its pair's end. False: to the
+/// last one's it did not, and `next` and `place` are where it goes on.
+template <class Place, class Search>
+bool goOn(std::vector<std::array<std::uint32_t, 2>>& pairs, std::array<std::uint32_t, 2>& next, Place& place,
+          const Search& search) {
+  std::sort(pairs.begin(), pairs.end());
+  for (auto pair = std::lower_bound(pairs.begin(), pairs.end(), next); pair != pairs.end(); ++pair) {
+    if (*pair != next) place = 0;
+    next = *pair;
+    if (!search()) return false;
+  }
+  return true;
+}
 
 /// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those
 /// of the bodies' setups: within bodies with self_collision, between bodies with against_bodies.
