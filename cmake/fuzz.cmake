@@ -29,11 +29,7 @@ find_path(OWN_MESSAGES deformable_ccd/ContactArray.h REQUIRED)
 find_path(ROS_MESSAGES std_msgs/Header.h REQUIRED)
 #catkin_lint: ignore_once duplicate_find
 find_package(PCL REQUIRED COMPONENTS common)
-find_library(PCL_IO_LIBRARY pcl_io REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
-find_library(PCL_FILTERS_LIBRARY pcl_filters REQUIRED HINTS ${PCL_LIBRARY_DIRS})
-find_library(PCL_SEARCH_LIBRARY pcl_search REQUIRED HINTS ${PCL_LIBRARY_DIRS})
-find_library(PCL_SURFACE_LIBRARY pcl_surface REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 foreach(library rosconsole roscpp_serialization rostime)
   find_library(${library}_LIBRARY ${library} REQUIRED)
   list(APPEND HEADER_LIBRARIES ${${library}_LIBRARY})
@@ -51,8 +47,7 @@ add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
-  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY}
-  ${PCL_FILTERS_LIBRARY} ${PCL_SEARCH_LIBRARY} ${PCL_SURFACE_LIBRARY})
+  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${PCL_IO_PLY_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
 add_custom_target(fuzzers)

@@ -1,3 +1,5 @@
+// Compiled here, not taken from PCL's library, which would bring VTK into every program.
+#define PCL_NO_PRECOMPILE
 #include "input/depth_surface.h"
 
 #include <pcl/filters/median_filter.h>

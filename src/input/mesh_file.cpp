@@ -1,8 +1,6 @@
 #include "input/mesh_file.h"
 
-#include <pcl/PolygonMesh.h>
-#include <pcl/console/print.h>
-#include <pcl/io/ply_io.h>
+#include <pcl/io/ply/ply_parser.h>
 
 #include <algorithm>
 #include <array>
@@ -21,49 +19,8 @@ namespace {
 
 constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{512} << 20;
 
-double coordinate(const pcl::PCLPointCloud2& cloud, const pcl::PCLPointField& field, std::size_t point) {
-  const std::uint8_t* at = cloud.data.data() + point * cloud.point_step + field.offset;
-  if (field.datatype == pcl::PCLPointField::FLOAT64) {
-    double x;
-    std::memcpy(&x, at, sizeof x);
-    return x;
-  }
-  float x;
-  std::memcpy(&x, at, sizeof x);
-  return x;
-}
-
-Positions positionsOf(const pcl::PCLPointCloud2& cloud, const std::string& path) {
-  const pcl::PCLPointField* fields[3] = {nullptr, nullptr, nullptr};
-  for (const pcl::PCLPointField& f : cloud.fields) {
-    if (f.name.size() == 1 && f.name[0] >= 'x' && f.name[0] <= 'z') fields[f.name[0] - 'x'] = &f;
-  }
-  for (int axis = 0; axis < 3; ++axis) {
-    const char name = static_cast<char>('x' + axis);
-    if (!fields[axis]) throw MeshFileError(path + ": the vertices have no property '" + name + "'");
-    const auto type = fields[axis]->datatype;
-    if (type != pcl::PCLPointField::FLOAT32 && type != pcl::PCLPointField::FLOAT64) {
-      throw MeshFileError(path + ": vertex property '" + name + "' is neither float nor double");
-    }
-    const std::size_t size = type == pcl::PCLPointField::FLOAT64 ? 8 : 4;
-    if (fields[axis]->offset + size > cloud.point_step) {
-      throw MeshFileError(path + ": the vertex layout is inconsistent");
-    }
-  }
-  const std::size_t n = std::size_t{cloud.width} * cloud.height;
-  if (n == 0) throw MeshFileError(path + ": no vertices");
-  if (cloud.data.size() < n * cloud.point_step) throw MeshFileError(path + ": fewer vertices than the header says");
-  Positions positions(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    positions[i] = {coordinate(cloud, *fields[0], i), coordinate(cloud, *fields[1], i),
-                    coordinate(cloud, *fields[2], i)};
-  }
-  return positions;
-}
-
-/// PCL allocates what a PLY header claims before it reads on, and ends the program on headers of shapes that it does
-/// not expect. So a header is read here first, strictly: known words and types only, lists in faces only, no element
-/// without properties, and no more elements than the file has bytes.
+/// PCL takes whatever a PLY header claims. So a header is read here first, strictly: known words and types only, lists
+/// in faces only, no element without properties, and no more elements than the file has bytes.
 class PlyHeaderCheck {
  public:
   explicit PlyHeaderCheck(const std::string& path) : path_(path) {}
@@ -159,17 +116,92 @@ class PlyHeaderCheck {
   bool in_element_ = false, in_faces_ = false;
 };
 
-/// While it lives PCL prints nothing: what it finds is reported here, once. The level is the process's, so that it must
-/// not stay changed for whoever else uses PCL.
-class QuietPcl {
+using pcl::io::ply::ply_parser;
+
+/// What a mesh needs of a PLY file. By PCL's parser: its reader of whole files lies in a library that brings VTK into
+/// every program, which then takes twice as long to start.
+class PlyReader {
  public:
-  QuietPcl() { pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS); }
-  ~QuietPcl() { pcl::console::setVerbosityLevel(before_); }
-  QuietPcl(const QuietPcl&) = delete;
-  QuietPcl& operator=(const QuietPcl&) = delete;
+  explicit PlyReader(const std::string& path) : path_(path) {}
+
+  MeshFile read() {
+    ply_parser parser;
+    parser.element_definition_callback([this](const std::string& element, std::size_t count) {
+      if (element != "vertex") return ply_parser::element_callbacks_type();
+      vertices_ += count;
+      return ply_parser::element_callbacks_type([this] { mesh_.positions.push_back(Vec3::Zero()); }, nullptr);
+    });
+    Scalars scalars;
+    takeCoordinates<float>(scalars);
+    takeCoordinates<double>(scalars);
+    parser.scalar_property_definition_callbacks(scalars);
+    Lists lists;
+    takePolygons<std::uint8_t>(lists);
+    takePolygons<std::uint16_t>(lists);
+    takePolygons<std::uint32_t>(lists);
+    parser.list_property_definition_callbacks(lists);
+    if (!parser.parse(path_) || mesh_.positions.size() != vertices_) {
+      throw MeshFileError(path_ + ": not a readable .ply mesh");
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (has_axis_[axis]) continue;
+      throw MeshFileError(path_ + ": the vertices have no property '" + AXES[axis] + "' of float or double");
+    }
+    if (vertices_ == 0) throw MeshFileError(path_ + ": no vertices");
+    return std::move(mesh_);
+  }
 
  private:
-  const pcl::console::VERBOSITY_LEVEL before_ = pcl::console::getVerbosityLevel();
+  using Scalars = ply_parser::scalar_property_definition_callbacks_type;
+  using Lists = ply_parser::list_property_definition_callbacks_type;
+  static constexpr const char* AXES[] = {"x", "y", "z"};
+
+  template <class Real>
+  void takeCoordinates(Scalars& scalars) {
+    using Take = typename ply_parser::scalar_property_callback_type<Real>::type;
+    scalars.get<Real>() = [this](const std::string& element, const std::string& property) -> Take {
+      const auto axis = std::find(std::begin(AXES), std::end(AXES), property) - std::begin(AXES);
+      if (element != "vertex" || axis == std::size(AXES)) return nullptr;
+      has_axis_[static_cast<std::size_t>(axis)] = true;
+      return [this, axis](Real x) { mesh_.positions.back()[axis] = x; };
+    };
+  }
+
+  template <class Count>
+  void takePolygons(Lists& lists) {
+    takePolygonsOf<Count, std::int8_t, std::int16_t, std::int32_t, std::uint8_t, std::uint16_t, std::uint32_t>(lists);
+  }
+  /// The header check has left no other lists than those of the faces.
+  template <class Count, class... Vertex>
+  void takePolygonsOf(Lists& lists) {
+    ((lists.get<Count, Vertex>() =
+          [this](const std::string&, const std::string&) {
+            return std::make_tuple([this](Count) { polygon_.clear(); },
+                                   [this](Vertex v) { addCorner(static_cast<std::int64_t>(v)); },
+                                   [this] { endPolygon(); });
+          }),
+     ...);
+  }
+
+  void addCorner(std::int64_t v) {
+    if (v < 0 || v >= static_cast<std::int64_t>(vertices_)) {
+      throw MeshFileError(path_ + ": polygon " + std::to_string(polygons_) + " names vertex " + std::to_string(v) +
+                          " of " + std::to_string(vertices_));
+    }
+    polygon_.push_back(static_cast<Index>(v));
+  }
+  void endPolygon() {
+    for (std::size_t k = 2; k < polygon_.size(); ++k) {
+      mesh_.faces.push_back({polygon_[0], polygon_[k - 1], polygon_[k]});
+    }
+    ++polygons_;
+  }
+
+  const std::string& path_;
+  MeshFile mesh_;
+  std::size_t vertices_ = 0, polygons_ = 0;  // as the header says; as read so far
+  bool has_axis_[3] = {false, false, false};
+  std::vector<Index> polygon_;
 };
 
 }  // namespace
@@ -213,37 +245,13 @@ MeshFile weldTriangles(const Positions& corners, const std::string& path) {
 
 MeshFile loadMeshFile(const std::string& path) {
   requireReadable(path);
-  const QuietPcl quiet;
-  pcl::PolygonMesh mesh;
   const std::string type = fileEnding(path);
-  int result = -1;
-  if (type != "ply" && type != "obj") {
+  if (type == "obj") return loadObjFile(path);
+  if (type != "ply") {
     throw MeshFileError(path + ": unknown mesh format '" + type + "'; .ply and .obj can be read");
   }
-  if (type == "obj") return loadObjFile(path);
   PlyHeaderCheck(path).run();
-  try {
-    result = pcl::io::loadPLYFile(path, mesh);
-  } catch (const std::exception& error) {
-    throw MeshFileError(path + ": not a readable .ply mesh: " + error.what());
-  }
-  if (result < 0) throw MeshFileError(path + ": not a readable .ply mesh");
-  MeshFile file;
-  file.positions = positionsOf(mesh.cloud, path);
-  for (std::size_t i = 0; i < mesh.polygons.size(); ++i) {
-    const auto& corners = mesh.polygons[i].vertices;
-    for (const auto v : corners) {
-      if (static_cast<std::size_t>(v) >= file.positions.size()) {
-        throw MeshFileError(path + ": polygon " + std::to_string(i) + " names vertex " + std::to_string(v) + " of " +
-                            std::to_string(file.positions.size()));
-      }
-    }
-    for (std::size_t k = 2; k < corners.size(); ++k) {
-      file.faces.push_back(
-          {static_cast<Index>(corners[0]), static_cast<Index>(corners[k - 1]), static_cast<Index>(corners[k])});
-    }
-  }
-  return file;
+  return PlyReader(path).read();
 }
 
 }  // namespace dccd

@@ -1,4 +1,4 @@
-// Mesh files: PLY by PCL's reader (ASCII, binary of either byte order), OBJ by our own (obj_file.h).
+// Mesh files: PLY by PCL's parser (ASCII, binary of either byte order), OBJ by our own (obj_file.h).
 #pragma once
 
 #include <map>

@@ -100,6 +100,16 @@ class LibraryTest(unittest.TestCase):
         self.assertIn('dccd::detect(', shown)
         self.assertEqual([line for line in shown.splitlines() if '::Impl::' in line], [])
 
+    def test_only_the_study_of_accuracy_loads_vtk(self):
+        """Thirty libraries and more, for which every program and the nodelet would take three times as long to start."""
+        found = [path for path in (TOOLS / 'check_step', TOOLS.parent / 'libdeformable_ccd_ros.so') if path.is_file()]
+        if not found:
+            self.skipTest('nothing is built')
+        for path in found:
+            loaded = subprocess.run(['ldd', str(path)], capture_output=True, text=True, check=True).stdout
+            self.assertIn('libdeformable_ccd.so', loaded)
+            self.assertNotIn('libvtk', loaded, path)
+
 
 if __name__ == '__main__':
     unittest.main()
