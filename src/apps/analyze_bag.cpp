@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <iomanip>
 #include <iostream>
 #include <limits>
@@ -251,12 +252,16 @@ int merge(const Arguments& a) {
   const auto missing = [&](const std::string& to) {
     report.addMissing("the range from " + seconds(reached_s) + " to " + to + " is missing");
   };
+  // Most of a join is to copy tables, and nothing else needs what is in them.
+  std::future<void> tables = std::async(std::launch::async, [&] {
+    for (const RangeResult& range : ranges) report.appendTables(range.folder);
+  });
   for (const RangeResult& range : ranges) {
     if (range.frames.first > next) {
       missing(seconds(range.from_s));
       join.gap();
     }
-    report.append(range.folder, range.report);
+    report.append(range.report);
     join.add(range.folder + "/" + RANGE_LOG, [&](const Outcome& outcome) { report.addPatches(outcome, bodies); });
     if (!range.isEmpty()) next = range.frames.last + 1;
     reached_s = range.to_s;
@@ -265,6 +270,7 @@ int merge(const Arguments& a) {
   BagReplaySummary summary = joined(ranges);
   summary.look_ahead = join.lookAhead();
   describe(a, config, summary, ranges.back().effects, ranges.size(), report);
+  tables.get();
   report.finish();
   return conclude(a, summary, report, report.anyAnswered());
 }

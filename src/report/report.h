@@ -34,9 +34,11 @@ class Report {
   void setOrigin(StampNs origin_ns);
   /// Of a range of a recording: all that append() needs beside the tables.
   nlohmann::json state() const;
-  /// What a Report of the range that comes next left in the folder, and its state(). Its patches and events are added
-  /// by addPatches(), an outcome each. Throws std::runtime_error naming the file.
-  void append(const std::string& folder, const nlohmann::json& state);
+  /// state() of the range that comes next. Its patches and events are added by addPatches(), an outcome each.
+  void append(const nlohmann::json& state);
+  /// The tables that a Report of the range that comes next left in the folder: contacts, steps and times. May run while
+  /// another thread calls append() and addPatches(). Throws std::runtime_error naming the file.
+  void appendTables(const std::string& folder);
   void addPatches(const Outcome& outcome, const std::vector<Body>& bodies);
   /// What has no answer because its range is missing, in words.
   void addMissing(const std::string& what) { missing_.push_back(what); }

@@ -41,15 +41,17 @@ void addAll(const Json& from, std::vector<T>& to) {
   for (const Json& value : from) to.push_back(value.get<T>());
 }
 
-/// The table without its first line. In blocks: joining ranges is little more than this.
+/// The table without its first line. In blocks: joining ranges is little more than this. That it could not be written,
+/// close() says.
 void copyRows(const std::string& path, std::ofstream& to) {
   std::ifstream from(path, std::ios::binary);
   from.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
   if (!from) throw std::runtime_error(path + ": cannot be read");
   std::vector<char> block(std::size_t{1} << 17);
-  while (from.read(block.data(), static_cast<std::streamsize>(block.size())) || from.gcount() > 0) {
+  while (to && (from.read(block.data(), static_cast<std::streamsize>(block.size())) || from.gcount() > 0)) {
     to.write(block.data(), from.gcount());
   }
+  if (from.bad()) throw std::runtime_error(path + ": cannot be read to its end");
 }
 
 }  // namespace
@@ -77,10 +79,13 @@ Json Report::state() const {
   return j;
 }
 
-void Report::append(const std::string& folder, const Json& j) {
+void Report::appendTables(const std::string& folder) {
   copyRows(folder + "/contacts.csv", contacts_);
   copyRows(folder + "/steps.csv", steps_);
   copyRows(folder + "/timing.csv", timing_);
+}
+
+void Report::append(const Json& j) {
   for (const auto& [what, steps] : j.at("lasting").items()) lasting_[what] += steps.get<std::size_t>();
   for (const auto& [kind, found] : j.at("unproved").items()) {
     const auto at = unproved_.emplace(kind, std::make_pair(found.at(0).get<std::string>(), std::size_t{0})).first;
