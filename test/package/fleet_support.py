@@ -1,0 +1,37 @@
+"""Scenes and commands for the tests of cut bags and of fleets."""
+import sqlite3
+import subprocess
+
+import rosbag
+
+from checkout import CHECKOUT, TOOLS
+
+TABLES = ('contacts.csv', 'steps.csv', 'patches.csv', 'events.csv')
+
+
+def run(*words, environment=None):
+    return subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False,
+                          env=environment)
+
+
+def messages_of(path):
+    with rosbag.Bag(str(path)) as bag:
+        return list(bag.read_messages())
+
+
+def make_scene(folder, name, scene, *words):
+    """Bag and parameters."""
+    bag, params = folder / (name + '.bag'), folder / (name + '.yaml')
+    ran = run(TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes' / (scene + '.yaml'), bag, '--quiet', '--monitor-config', params, *words)
+    assert ran.returncode == 0, ran.stderr
+    return bag, params
+
+
+def fleet(*words, environment=None):
+    # By the Python that ROS is installed for, whatever stands first in PATH.
+    return run('/usr/bin/python3', TOOLS / 'analyze_fleet', *words, environment=environment)
+
+
+def rows_of(out, query):
+    with sqlite3.connect(str(out / 'fleet.sqlite')) as database:
+        return database.execute(query).fetchall()
