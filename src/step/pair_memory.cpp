@@ -11,13 +11,15 @@ namespace dccd {
 namespace {
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr double DOWN = 1 - 0x1p-40;                  // more than all roundings of a product
-constexpr double SHORTEST_DIRECTION = 1e-150;         // of which the squares and products do not vanish
-constexpr double STEPS_AHEAD = 2;                     // that a certificate is to last, as far as they are like this one
-constexpr double WORTH_A_CERTIFICATE = 1.5;           // residuals of this step that it must have
-constexpr double WORTH_A_TRY = 0.8, WORTH_IT = 0.75;  // share of the pairs that are known to be apart
-constexpr std::size_t WORTH_MEASURING = 6;            // distances of features, of which one takes as long as a row
-constexpr std::size_t PAIRS_PER_EDGE = 2;             // that may be kept: 144 bytes a triangle
+constexpr double DOWN = 1 - 0x1p-40;           // more than all roundings of a product
+constexpr double SHORTEST_DIRECTION = 1e-150;  // of which the squares and products do not vanish
+constexpr double STEPS_AHEAD = 2;              // that a certificate is to last, as far as they are like this one
+constexpr double WORTH_A_CERTIFICATE = 1.5;    // residuals of this step that it must have
+// Shares of the pairs that are known to be apart. Pairs are tested so fast that fewer are not worth asking for; what it
+// takes to begin is more than what it takes to go on.
+constexpr double WORTH_A_TRY = 0.93, WORTH_IT = 0.75;
+constexpr std::size_t WORTH_MEASURING = 6;  // distances of features, of which one takes as long as a row
+constexpr std::size_t PAIRS_PER_EDGE = 2;   // that may be kept: 144 bytes a triangle
 constexpr std::size_t PAIRS_IN_ANY_CASE = 4096;
 
 /// A certain lower bound of the distance of two convex hulls: how far they are apart along a direction, whatever it is.
