@@ -1,6 +1,7 @@
 """analyze_fleet: many bags come to one database and page, whatever happens to the jobs."""
 import copy
 import csv
+import json
 import os
 import pathlib
 import shutil
@@ -176,6 +177,17 @@ class FleetTest(FolderTestCase):
     def half_length(self):
         with rosbag.Bag(str(self.first)) as bag:
             return repr(round((bag.get_end_time() - bag.get_start_time()) / 2 + 1e-3, 3))
+
+    def test_ranges_that_take_equally_long(self):
+        """Where a bag is cut for the cores: the second range also reads the first one, and so is shorter."""
+        out = self.folder / 'cores'
+        self.assertEqual(fleet(self.first, '--params', self.params, '--out', out, '--cores', 2).returncode, 0)
+        first, second = json.loads((out / 'fleet.json').read_text())['recordings'][0]['ranges']
+        with rosbag.Bag(str(self.first)) as bag:
+            length_s = bag.get_end_time() - bag.get_start_time()
+        self.assertEqual((first['to_s'], second['to_s']), (second['from_s'], None))
+        self.assertGreater(first['to_s'], 0.505 * length_s)
+        self.assertLess(first['to_s'], 0.52 * length_s)
 
     def test_bad_input(self):
         active = self.folder / 'now.bag.active'
