@@ -11,10 +11,9 @@ namespace dccd {
 namespace {
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr double DOWN = 1 - 0x1p-40;           // more than all roundings of a product
-constexpr double SHORTEST_DIRECTION = 1e-150;  // of which the squares and products do not vanish
-constexpr double STEPS_AHEAD = 2;              // that a certificate is to last, as far as they are like this one
-constexpr double WORTH_A_CERTIFICATE = 1.5;    // residuals of this step that it must have
+constexpr double DOWN = 1 - tolerance::LENGTH;  // more than all roundings of a product
+constexpr double STEPS_AHEAD = 2;               // that a certificate is to last, as far as they are like this one
+constexpr double WORTH_A_CERTIFICATE = 1.5;     // residuals of this step that it must have
 // Shares of the pairs that are known to be apart. Pairs are tested so fast that fewer are not worth asking for; what it
 // takes to begin is more than what it takes to go on.
 constexpr double WORTH_A_TRY = 0.93, WORTH_IT = 0.75;
@@ -25,7 +24,7 @@ constexpr std::size_t PAIRS_IN_ANY_CASE = 4096;
 /// A certain lower bound of the distance of two convex hulls: how far they are apart along a direction, whatever it is.
 double gapAlong(const Vec3& direction, const Vec3* a, std::size_t n, const Vec3* b, std::size_t m) {
   const double length = direction.norm();
-  if (!(length > SHORTEST_DIRECTION)) return 0;
+  if (!(length > tolerance::SHORTEST_DIRECTION)) return 0;
   double low = INFINITE, high = -INFINITE;
   for (std::size_t i = 0; i < n; ++i) low = std::min(low, direction.dot(a[i]));
   for (std::size_t i = 0; i < m; ++i) high = std::max(high, direction.dot(b[i]));

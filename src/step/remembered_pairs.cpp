@@ -1,6 +1,7 @@
 // What a step takes from the memory of pairs, and leaves in it.
 #include <algorithm>
 
+#include "dccd/tolerances.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -9,9 +10,8 @@ using Clock = Deadline::Clock;
 
 namespace {
 
-constexpr double SMALLEST_SIZE_M = 1e-100, LARGEST_SIZE_M = 1e100;  // squares and products neither vanish nor overflow
-constexpr std::size_t GROUPS = 64;                                  // in a unit of work
-constexpr std::size_t FEWEST_GROUPS = 8;                            // pairs of them that are worth a memory
+constexpr std::size_t GROUPS = 64;        // in a unit of work
+constexpr std::size_t FEWEST_GROUPS = 8;  // pairs of them that are worth a memory
 
 }  // namespace
 
@@ -20,7 +20,7 @@ constexpr std::size_t FEWEST_GROUPS = 8;                            // pairs of 
 bool History::Impl::mayRemember(const Part& part) {
   const bool wanted = options->keep_bounds && !stopsAtFirst() && options->accuracy.rung != Accuracy::FAST &&
                       !observer && !aside && options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&
-                      scene.size() > SMALLEST_SIZE_M && scene.size() < LARGEST_SIZE_M;
+                      scene.size() > tolerance::REMEMBERED_SMALLEST_M && scene.size() < tolerance::REMEMBERED_LARGEST_M;
   if (!wanted) return false;
   if (carried.memory.state() == PairMemory::State::OFF) return true;
   return part.continues && std::none_of(scene.bodies().begin(), scene.bodies().end(),

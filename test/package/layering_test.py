@@ -44,7 +44,6 @@ INTRINSICS = re.compile(r'\b_mm(?:256|512)?_[a-z]|\b__m(?:128|256|512)|immintrin
 # The rooms that compute with rounding, and what a tolerance looks like there: a small power, or a factor of nearly 1.
 ROUNDED = ('projection', 'culling', 'simd', 'elementary', 'obstacle', 'step')
 SMALL_NUMBER = re.compile(r"\b0x1p-(?!64\b)\d+|\b\d+e-\d+\b|\b(?:1\.0\d+|0\.99\d*)\b|epsilon\(\)")
-WITH_TOLERANCES = ('src/step/pair_memory.cpp', 'src/step/remembered_pairs.cpp')
 
 
 def includes(path):
@@ -101,7 +100,7 @@ class LayeringTest(unittest.TestCase):
             for path in code_under('src/' + folder):
                 for number, line in enumerate(path.read_text().splitlines(), 1):
                     code = re.sub(r'"[^"]*"', '""', line.split('//')[0])
-                    if name(path) not in WITH_TOLERANCES and SMALL_NUMBER.search(code):
+                    if SMALL_NUMBER.search(code):
                         wrong.append('%s:%d: %s' % (name(path), number, line.strip()))
         self.assertEqual(wrong, [])
         self.assertTrue(SMALL_NUMBER.search('x * (1 + 0x1p-50)') and SMALL_NUMBER.search('1e-12') and SMALL_NUMBER.search('0.999 * x'))
