@@ -47,19 +47,18 @@ double tocBoundOfRest(const TreePair& trees, std::size_t level, const std::vecto
 
 }  // namespace
 
-double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch,
-                         std::size_t max_pairs, const std::function<bool()>& is_over) {
-  double left_out = std::numeric_limits<double>::infinity();
-  bool late = false;
+SearchRest superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs,
+                             std::vector<std::uint32_t>& scratch, std::size_t max_pairs, const Deadline& deadline) {
+  SearchRest rest;
   pairs.assign({0, 0});
   for (std::size_t l = trees.a->height() - 1; l > 1; --l) {
     scratch.clear();
     std::size_t done = 0;
     const std::size_t count = pairs.size() / 2;
     while (done < count) {
-      late = late || (done > 0 && is_over && is_over());
-      if ((late && done > 0) || scratch.size() / 2 > max_pairs) {
-        left_out = std::min(left_out, tocBoundOfRest(trees, l, pairs, done, late));
+      rest.late = rest.late || (done > 0 && deadline.isOver());
+      if ((rest.late && done > 0) || scratch.size() / 2 > max_pairs) {
+        rest.toc = std::min(rest.toc, tocBoundOfRest(trees, l, pairs, done, rest.late));
         break;
       }
       constexpr std::size_t STEP = 16 * simd::GROUP * simd::GROUP, PAIRS_PER_LOOK_AT_THE_CLOCK = 512;
@@ -75,10 +74,10 @@ double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pair
     }
     std::swap(pairs, scratch);
     if (pairs.size() / 2 <= max_pairs) continue;
-    left_out = std::min(left_out, tocBoundOfRest(trees, l - 1, pairs, max_pairs, late));
+    rest.toc = std::min(rest.toc, tocBoundOfRest(trees, l - 1, pairs, max_pairs, rest.late));
     pairs.resize(2 * max_pairs);
   }
-  return left_out;
+  return rest;
 }
 
 double superclusterTocBound(const TreePair& trees, std::uint32_t a, std::uint32_t b) {

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <vector>
 
 #include "culling/cluster_tree.h"
+#include "dccd/deadline.h"
 
 namespace dccd {
 
@@ -22,12 +22,19 @@ struct TreePair {
   simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
 };
 
+/// What of the pairs a search that was cut did not come to.
+struct SearchRest {
+  double toc = std::numeric_limits<double>::infinity();  ///< nothing of it can touch before; infinity: there is none
+  bool late = false;                                     ///< the deadline was over at a look
+};
+
 /// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads. Of more than max_pairs
-/// that many are kept, the first in the trees' order. Returns a time before which nothing of the rest can touch, as
-/// superclusterTocBound() does; infinity when all were kept. is_over ends the search as max_pairs does; null: never.
-double superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch,
-                         std::size_t max_pairs = std::numeric_limits<std::size_t>::max(),
-                         const std::function<bool()>& is_over = {});
+/// that many are kept, the first in the trees' order; the rest is bounded as by superclusterTocBound(). The deadline
+/// ends the search as max_pairs does; once it was over it is not asked again.
+SearchRest superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs,
+                             std::vector<std::uint32_t>& scratch,
+                             std::size_t max_pairs = std::numeric_limits<std::size_t>::max(),
+                             const Deadline& deadline = {});
 
 /// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
 /// overlap (to two record units) in all 8 directions at t=0. The end of the bounds when they never meet until then.

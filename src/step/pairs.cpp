@@ -41,15 +41,12 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
   const TreePair trees{&ta, &tb, same_tree, context.span};
   const bool limited = foundLimit() != FoundLimit::NONE;
   const std::size_t room = limited ? MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
-  bool late = false;
-  const double left_out_toc = superclusterPairs(trees, found_groups, scratch, room, [&] {
-    late = late || context.deadline.isOver();
-    return late;
-  });
-  if (left_out_toc <= 1) leaveOutAt(left_out_toc, !late);
+  const SearchRest rest = superclusterPairs(trees, found_groups, scratch, room, context.deadline);
+  if (rest.toc <= 1) leaveOutAt(rest.toc, !rest.late);
   if (share != Share::ALL) keepShare(share == Share::SAMPLE, found_groups);
   const auto ordering = ORDERING_A_PAIR * static_cast<std::int64_t>(found_groups.size() / 2);
-  late = late || (found_groups.size() / 2 > TASK_SUPERCLUSTERS && context.deadline.movedBy(-ordering).isOver());
+  const bool late =
+      rest.late || (found_groups.size() / 2 > TASK_SUPERCLUSTERS && context.deadline.movedBy(-ordering).isOver());
   task.by_bound = (limited || context.deadline.canEnd()) && !late;
   if (task.by_bound) orderByBound(trees);
   const std::uint32_t base = static_cast<std::uint32_t>(group_pairs.size() / 2);

@@ -180,7 +180,7 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   trees.span.times = Times::T0;
   trees.adjacent = edge_body == face_body;
   const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : MAX_SUPERCLUSTER_PAIRS;
-  cut_ = superclusterPairs(trees, groups_, scratch_, room) <= 1 || cut_;
+  cut_ = superclusterPairs(trees, groups_, scratch_, room).toc <= 1 || cut_;
   // By group of edges, so that all before the one that comes next are done.
   by_group_.clear();
   for (std::size_t p = 0; p < groups_.size(); p += 2) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <set>
 
@@ -182,14 +183,14 @@ TEST(ClusterPairs, EveryTargetStreamsTheSameInTheSameOrder) {
 // What is kept of a search that is cut are the first pairs of the whole list, and nothing else touches before the
 // bound.
 TEST(ClusterPairs, ASearchThatIsCutKeepsTheFirstAndBoundsTheRest) {
-  const Scene scene(crumpled(4, 1, 90));
+  const Scene scene(crumpled(4, 1, 450));
   const ClusterTree& edges = scene.arrays.bodies()[0].tree(FeatureKind::EDGE);
   TreePair trees;
   trees.a = trees.b = &edges;
   trees.self = true;
   ASSERT_GT(edges.height(), 2u);
   std::vector<std::uint32_t> all, scratch;
-  const double none_left = superclusterPairs(trees, all, scratch);
+  const double none_left = superclusterPairs(trees, all, scratch).toc;
   EXPECT_EQ(none_left, std::numeric_limits<double>::infinity());
   const std::size_t count = all.size() / 2;
   ASSERT_GT(count, 200u);
@@ -204,7 +205,7 @@ TEST(ClusterPairs, ASearchThatIsCutKeepsTheFirstAndBoundsTheRest) {
   std::vector<std::uint32_t> kept;
   std::size_t positive = 0;
   for (const std::size_t most : {std::size_t{0}, std::size_t{1}, std::size_t{17}, count / 2, count - 1, count}) {
-    const double bound = superclusterPairs(trees, kept, scratch, most);
+    const double bound = superclusterPairs(trees, kept, scratch, most).toc;
     EXPECT_LE(kept.size(), 2 * most);
     expectBounded(kept, bound, "at most " + std::to_string(most));
     positive += most > 0 && !kept.empty();
@@ -212,13 +213,18 @@ TEST(ClusterPairs, ASearchThatIsCutKeepsTheFirstAndBoundsTheRest) {
   EXPECT_EQ(positive, 5u);
   EXPECT_EQ(kept, all);
   // Time that is up ends it as well, at any look at the clock.
-  int looks = 0;
-  superclusterPairs(trees, kept, scratch, count, [&] { return ++looks < 0; });
+  constexpr std::int64_t ENOUGH = 1000000;
+  std::atomic<std::int64_t> left{ENOUGH};
+  EXPECT_FALSE(superclusterPairs(trees, kept, scratch, count, Deadline::afterLooks(left)).late);
   EXPECT_EQ(kept, all);
-  for (int last = 1; last <= looks; ++last) {
-    int look = 0;
-    const double bound = superclusterPairs(trees, kept, scratch, count, [&] { return ++look >= last; });
-    expectBounded(kept, bound, "cut at look " + std::to_string(last));
+  const std::int64_t looks = ENOUGH - left;
+  ASSERT_GE(looks, 2) << "the scene is too small for a look between two pieces";
+  for (std::int64_t last = 1; last <= looks; ++last) {
+    left = last - 1;
+    const SearchRest rest = superclusterPairs(trees, kept, scratch, count, Deadline::afterLooks(left));
+    EXPECT_TRUE(rest.late);
+    EXPECT_EQ(left, -1) << "once it was over it was asked again";
+    expectBounded(kept, rest.toc, "cut at look " + std::to_string(last));
   }
 }
 
