@@ -206,8 +206,7 @@ void removeRigidBodies(MonitorConfig& config) {
 std::vector<std::string> takenAway(const MonitorConfig& config) {
   std::vector<std::string> sentences;
   const auto add = [&](Effect effect, const std::string& what) {
-    const auto setting = config.effects.find(effect);
-    if (setting == config.effects.end() || setting->second != EffectSetting::OFF || what.empty()) return;
+    if (!config.monitor.detector.off.has(effect) || what.empty()) return;
     sentences.push_back(what + " by effects/" + toString(effect) + ": off");
   };
   std::string rigid;
@@ -225,8 +224,11 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
 
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
+  for (const auto& [effect, setting] : config.effects) {
+    if (setting == EffectSetting::OFF) config.monitor.detector.off.add(effect);
+  }
   config.monitor.detector.excluded = takenAway(config);
-  const auto off = [&](Effect effect) { return config.effects[effect] == EffectSetting::OFF; };
+  const auto off = [&](Effect effect) { return config.monitor.detector.off.has(effect); };
   if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {

@@ -281,6 +281,17 @@ void visitPatches(Archive& a, Recording& r) {
   a.array(r.answer.patch_of);
 }
 
+/// What version 6 added: effects that are off. One that is unknown here is of a later program, and cannot be replayed.
+template <typename Archive, typename Recording>
+void visitEffects(Archive& a, Recording& r) {
+  std::uint64_t bits = r.options.off.bits();
+  a.number(bits);
+  if constexpr (Archive::READS) {
+    r.options.off = EffectSet(bits);
+    if (r.options.off.bits() != bits) a.fail("an effect is off that this program does not know");
+  }
+}
+
 /// The file's fields in their order, for both directions.
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
@@ -323,6 +334,7 @@ void RecordingImage::build(const StepRecording& recording) {
   visitVerdict(writer, recording);
   visitExpected(writer, recording);
   visitPatches(writer, recording);
+  visitEffects(writer, recording);
 }
 
 bool RecordingImage::write(int descriptor) const noexcept {
@@ -406,6 +418,7 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   if (version >= 3) visitVerdict(reader, recording);
   if (version >= 4) visitExpected(reader, recording);
   if (version >= 5) visitPatches(reader, recording);
+  if (version >= 6) visitEffects(reader, recording);
   recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;

@@ -17,8 +17,9 @@
 namespace dccd {
 
 /// 1, without distances beyond the bodies' own, 2, without what an assurance follows from, 3, without expected
-/// contacts, and 4, without patches, can be read, too; of 1 not the first files, without Options::unfolded_test.
-constexpr std::uint32_t RECORDING_VERSION = 5;
+/// contacts, 4, without patches, and 5, without effects that are off, can be read, too; of 1 not the first files,
+/// without Options::unfolded_test.
+constexpr std::uint32_t RECORDING_VERSION = 6;
 
 /// A recording that cannot be read; the text names the input, the byte and the value.
 struct DCCD_EXPORT RecordingError : std::runtime_error {

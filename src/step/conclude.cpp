@@ -269,7 +269,7 @@ bool operator==(const Options& a, const Options& b) {
                     o.broad_phase, o.num_threads, o.step_budget_ms, o.max_compute_ms, o.earliest_only,
                     o.check_start_state, o.keep_bounds, o.unfolded_test, o.rigid_tolerance_m, o.max_substeps,
                     o.max_contacts, o.max_found, o.max_found_per_feature, o.suppress_initial, o.obstacle_expected,
-                    o.expected, o.patches, o.excluded);
+                    o.expected, o.off, o.patches, o.excluded);
   };
   return values(a) == values(b) &&
          std::equal(a.exclude_boxes.begin(), a.exclude_boxes.end(), b.exclude_boxes.begin(), b.exclude_boxes.end(),

@@ -45,7 +45,7 @@ EFFECT = {
         (' patches,\n};', ' patches, toy,\n};')],
     'src/step/detect.cpp': ('  if (options->patches) patches.list(outcome);\n',
                             '  if (options->patches) patches.list(outcome);\n'
-                            '  outcome.stats[Effect::TOY].in = step.bodies.size();\n'),
+                            '  if (!options->off.has(Effect::TOY)) outcome.stats[Effect::TOY].in = step.bodies.size();\n'),
     'msg/StepStats.msg': ('float64 patches_ms\n', 'float64 patches_ms\nuint64 toy_in\nuint64 toy_out\nfloat64 toy_ms\n'),
 }
 USER = r'''
@@ -72,12 +72,14 @@ int main() {
   options.accuracy.rung = accuracyFromString("toy");
   History history;
   const Outcome outcome = detect(step, options, history);
+  options.off.add(Effect::TOY);
+  const Outcome without = detect(step, options, history);
   EffectScene scene;
   scene.bodies = step.bodies;
   const EffectPlan plan(scene, {});
-  std::printf("%s %zu undecided %d %s, %d of them\n", toString(allRungs().back()), outcome.counts.undecided,
+  std::printf("%s %zu undecided %d %s, %d of them, %d when it is off\n", toString(allRungs().back()), outcome.counts.undecided,
               plan.running(Effect::TOY), plan.lines()[static_cast<std::size_t>(Effect::TOY)].c_str(),
-              static_cast<int>(outcome.stats[Effect::TOY].in));
+              static_cast<int>(outcome.stats[Effect::TOY].in), static_cast<int>(without.stats[Effect::TOY].in));
 }
 '''
 
@@ -130,7 +132,7 @@ class RecipesTest(unittest.TestCase):
                 ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
                 self.assertEqual(ran.returncode, 0, ran.stdout[-3000:] + ran.stderr[-3000:])
             said = subprocess.run([str(tree / 'user')], capture_output=True, text=True, check=True).stdout
-            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company, 2 of them$')
+            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company, 2 of them, 0 when it is off$')
             self.publish_toy(tree)
 
     def publish_toy(self, tree):

@@ -155,12 +155,38 @@ TEST(StepReplay, PatchesAreRecordedAndMadeAgain) {
   EXPECT_EQ(replayStep(read).differences.size(), 1u);
 }
 
+constexpr std::size_t EFFECTS_SIZE = 8;  // of what version 6 added
+
+TEST(StepRecording, EffectsThatAreOffAreKept) {
+  StepRecording r = recordScene();
+  r.options.off.add(Effect::OCTOMAP);
+  r.options.off.add(Effect::PATCHES);
+  std::vector<std::uint8_t> bytes = recordingBytes(r);
+  const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_TRUE(read.options == r.options);
+  EXPECT_FALSE(read.options == recordScene().options);
+  bytes.back() = 0x80;
+  EXPECT_NE(errorOf(bytes).find("an effect is off that this program does not know"), std::string::npos);
+}
+
+TEST(StepRecording, InAFileOfTheVersionBeforeEffectsNoneIsOff) {
+  StepRecording r = recordScene();
+  r.options.off.add(Effect::PATCHES);
+  std::vector<std::uint8_t> bytes = recordingBytes(r);
+  bytes[8] = 5;
+  bytes.resize(bytes.size() - EFFECTS_SIZE);
+  const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(read.version, 5u);
+  EXPECT_TRUE(read.options.off == EffectSet());
+  EXPECT_TRUE(replayStep(read).differences.empty());
+}
+
 constexpr std::size_t PATCHES_SIZE = 17;  // of a recording without any: a flag and two empty lists
 
 TEST(StepRecording, AFileOfTheVersionBeforePatchesIsRead) {
   std::vector<std::uint8_t> bytes = recordingBytes(recordScene());
   bytes[8] = 4;
-  bytes.resize(bytes.size() - PATCHES_SIZE);
+  bytes.resize(bytes.size() - EFFECTS_SIZE - PATCHES_SIZE);
   const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
   EXPECT_EQ(read.version, 4u);
   EXPECT_FALSE(read.options.patches);
@@ -240,7 +266,7 @@ TEST(StepReplay, PatchesOfExpectedContactsAreMadeAgain) {
 TEST(StepRecording, AFileWithoutExpectedContactsIsReadAndReplayed) {
   const StepRecording r = recordScene();
   std::vector<std::uint8_t> bytes = recordingBytes(r);
-  bytes.resize(bytes.size() - PATCHES_SIZE - expectedBytes(r.answer));
+  bytes.resize(bytes.size() - EFFECTS_SIZE - PATCHES_SIZE - expectedBytes(r.answer));
   bytes[8] = 3;
   const StepRecording old = readRecording(bytes.data(), bytes.size(), "FILE");
   EXPECT_EQ(old.version, 3u);
@@ -268,7 +294,7 @@ std::size_t distanceBytes(const StepRecording& r) {  // what version 2 added, wh
 /// A file as version 2 wrote it, whose flag `clear` stood for the verdict.
 std::vector<std::uint8_t> bytesOfVersion2(const StepRecording& r) {
   std::vector<std::uint8_t> bytes = recordingBytes(r);
-  bytes.resize(bytes.size() - PATCHES_SIZE - expectedBytes(r.answer) - verdictBytes(r));
+  bytes.resize(bytes.size() - EFFECTS_SIZE - PATCHES_SIZE - expectedBytes(r.answer) - verdictBytes(r));
   bytes[8] = 2;
   return bytes;
 }
@@ -307,7 +333,8 @@ TEST(StepRecording, AFileOfVersion1IsReadAndReplayed) {
       << "that byte is the flag: " << errorOf(bytes);
 }
 
-/// Files of versions 1, 2 and 5 as programs of that time wrote them; one that is refused early is no seed for a fuzzer.
+/// Files of versions 1, 2, 5 and 6 as programs of that time wrote them; one that is refused early is no seed for a
+/// fuzzer.
 TEST(StepRecording, TheSeedsOfTheFuzzerAreRead) {
   std::set<std::uint32_t> versions;
   for (const auto& seed : fs::directory_iterator(DEFORMABLE_CCD_SOURCE_DIR "/test/fuzz/corpus/recording")) {
@@ -319,7 +346,7 @@ TEST(StepRecording, TheSeedsOfTheFuzzerAreRead) {
       EXPECT_EQ(seed.path().filename(), "screen_without_answer") << error.what();
     }
   }
-  EXPECT_EQ(versions, (std::set<std::uint32_t>{1, 2, 5}));
+  EXPECT_EQ(versions, (std::set<std::uint32_t>{1, 2, 5, 6}));
 }
 
 TEST(StepRecording, AnyByteMayLie) {
