@@ -28,6 +28,14 @@ ExactDifference exactDifference(double a, double b) {
   return {high, (a - virtual_a) + (virtual_b - b)};
 }
 
+void checkPositions(const SceneBody& body, const Body& motion) {
+  const std::size_t n = body.setup.topology->vertexCount();
+  if (motion.t0 && motion.t1 && motion.t0->size() == n && motion.t1->size() == n) return;
+  throw std::invalid_argument("body '" + body.setup.name + "' needs " + std::to_string(n) +
+                              " positions at t0 and t1, got " + std::to_string(motion.t0 ? motion.t0->size() : 0) +
+                              " and " + std::to_string(motion.t1 ? motion.t1->size() : 0));
+}
+
 bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
   for (std::size_t i = 1; i < n; ++i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -66,12 +74,7 @@ bool SceneArrays::recordRadii(SceneBody& body, const Body& motion) {
 }
 
 void SceneArrays::recordBody(SceneBody& body, const Body& motion, bool bounds_valid, StepStats& stats) {
-  const std::size_t n = body.setup.topology->vertexCount();
-  if (!motion.t0 || !motion.t1 || motion.t0->size() != n || motion.t1->size() != n) {
-    throw std::invalid_argument("body '" + body.setup.name + "' needs " + std::to_string(n) +
-                                " positions at t0 and t1, got " + std::to_string(motion.t0 ? motion.t0->size() : 0) +
-                                " and " + std::to_string(motion.t1 ? motion.t1->size() : 0));
-  }
+  checkPositions(body, motion);
   const Vec3* x0 = motion.t0->data();
   const Vec3* x1 = motion.t1->data();
   // What moves differs at its first vertex already, so that the comparison costs nothing there.
