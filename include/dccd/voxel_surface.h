@@ -71,7 +71,7 @@ struct ObstacleQuery {
   /// Uncertainty per vertex, 0 or more; null: none. The largest one of a feature adds to the separation, which only
   /// conservative can hold.
   const double* vertex_radius_m = nullptr;
-  Deadline deadline;  ///< features that have not been begun by then are left out
+  Deadline deadline{};  ///< features that have not been begun by then are left out
   /// So many contacts at most are appended; of more, those found first.
   std::size_t most_found = std::numeric_limits<std::size_t>::max();
 };
