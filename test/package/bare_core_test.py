@@ -5,6 +5,7 @@ import re
 import subprocess
 import unittest
 
+import checkout  # noqa: F401 (it puts scripts/lib on the path)
 from bare_root import CannotMake, bare_root, host_release
 
 TOOLS = 'cmake g++ make pkg-config'

@@ -104,7 +104,7 @@ class SequenceTest(unittest.TestCase):
     """A sheet that is rolled up, turns and is rolled tighter, slowly, then until its layers meet: more than two frames are steps."""
 
     N = 40
-    TIGHTER = (0, 1e-5, 2e-5, 3e-5, 4e-5, 5e-5, 2.4e-3)
+    TIGHTER = (0, 1e-6, 2e-6, 3e-6, 4e-6, 5e-6, 2.4e-3)
 
     def frame(self, k):
         points = []
@@ -112,7 +112,7 @@ class SequenceTest(unittest.TestCase):
             for c in range(self.N):
                 angle = 10.0 * c / self.N
                 radius = 0.2 + (0.002 - self.TIGHTER[k]) * angle + 0.0001 * math.sin(5 * r + 3 * c)
-                turned = angle + 0.1 * k
+                turned = angle + 0.01 * k
                 points.append((radius * math.cos(turned), radius * math.sin(turned), r / self.N))
         return points
 
