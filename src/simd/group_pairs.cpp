@@ -104,15 +104,19 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
 
 // A group's nodes, of which the nodes of another one are compared with all.
 #if DCCD_AVX512
+template <bool T0_ONLY>
 class GroupLanes {  // 16 of the 32 registers
   using D = hn::FixedTag<int16_t, 2 * GROUP>;
 
  public:
   HWY_INLINE explicit GroupLanes(const int16_t* HWY_RESTRICT lanes) {
-    for (size_t i = 0; i < RECORD; ++i) vectors_[i] = hn::Load(D(), lanes + i * 2 * GROUP);
+    for (size_t i = 0; i < RECORD; ++i) {
+      // With one time alone nothing is read of the other: the callers' arrays may end before it.
+      const size_t at = i * 2 * GROUP;
+      if (!T0_ONLY || at % (RECORD * GROUP) < SOA_T1) vectors_[i] = hn::Load(D(), lanes + at);
+    }
   }
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return vectors_[at / (2 * GROUP)]; }
-  template <bool T0_ONLY>
   HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
     return meetingIn<T0_ONLY>(D(), lo, hi, GROUP, *this);
   }
@@ -121,10 +125,10 @@ class GroupLanes {  // 16 of the 32 registers
   hn::Vec<D> vectors_[RECORD];
 };
 #else
+template <bool T0_ONLY>
 class GroupLanes {
  public:
   HWY_INLINE explicit GroupLanes(const int16_t* HWY_RESTRICT lanes) : lanes_(lanes) {}
-  template <bool T0_ONLY>
   HWY_INLINE uint32_t meets(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi) const {
     return meeting<T0_ONLY>(lo, hi, GROUP, lanes_);
   }
@@ -230,7 +234,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   // Broadcast the nodes of the side with fewer left.
   const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
   const int16_t* HWY_RESTRICT outer = by_rows ? sa : sb;
-  const GroupLanes lanes(by_rows ? sb : sa);
+  const GroupLanes<T0_ONLY> lanes(by_rows ? sb : sa);
   uint32_t outer_left = by_rows ? rows : cols;
   const uint32_t inner_mask = by_rows ? cols : rows;
   const uint32_t base_outer = (by_rows ? g : h) * GROUP, base_inner = (by_rows ? h : g) * GROUP;
@@ -242,7 +246,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     mask = leave_out.before(by_rows, i, mask);
     if (mask == 0) continue;
-    mask &= lanes.template meets<T0_ONLY>(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
+    mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
     mask = leave_out.after(by_rows, i, mask);
     if (mask) o = writePairs(base_outer + i, base_inner, mask, by_rows, o);
   }

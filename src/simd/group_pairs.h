@@ -19,7 +19,8 @@ enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UP
 
 /// Linear filter between the nodes of each group pair (a[2p], b[2p+1]). Writes the surviving node pairs as
 /// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs), stops before it could overflow.
-/// diagonal applies to pairs with equal indices when self is true. times: 2 tests t0 and t1, 1 tests t0 alone.
+/// diagonal applies to pairs with equal indices when self is true. t0_only: nothing is read of t1, so that arrays that
+/// begin with the values at t1 test t1 alone.
 /// Returns the number of pairs written; *consumed is the number of group pairs done.
 std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                            std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,

@@ -3,10 +3,15 @@
 
 #include <gtest/gtest.h>
 #include <hwy/aligned_allocator.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <new>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "support/step_support.h"
@@ -121,16 +126,16 @@ Pairs referencePairs(const Groups& a, const Groups& b, const std::vector<std::ui
   return pairs;
 }
 
-Pairs kernelPairs(const Groups& a, const Groups& b, const std::vector<std::uint32_t>& group_pairs, bool self,
-                  simd::Diagonal diagonal, bool t0_only, std::size_t capacity) {
+Pairs kernelPairs(const simd::GroupsView& a, const simd::GroupsView& b, const std::vector<std::uint32_t>& group_pairs,
+                  bool self, simd::Diagonal diagonal, bool t0_only, std::size_t capacity) {
   Pairs pairs;
   std::vector<std::uint32_t> out(2 * capacity + 2, 0xdeadbeef);
   std::size_t done = 0;
   const std::size_t count = group_pairs.size() / 2;
   while (done < count) {
     std::size_t consumed = 0;
-    const std::size_t n = simd::testGroupPairs(a.view(), b.view(), group_pairs.data() + 2 * done, count - done, self,
-                                               diagonal, t0_only, out.data(), capacity, &consumed);
+    const std::size_t n = simd::testGroupPairs(a, b, group_pairs.data() + 2 * done, count - done, self, diagonal,
+                                               t0_only, out.data(), capacity, &consumed);
     EXPECT_GT(consumed, 0u) << "no progress";
     EXPECT_LE(n, capacity);
     EXPECT_EQ(out[2 * capacity], 0xdeadbeef) << "written beyond the capacity";
@@ -169,7 +174,8 @@ TEST(GroupPairs, PairsOfTwoTreesAreThoseOfTheDefinition) {
                    b = randomGroups(random, 1 + random() % 4, range, size);
       for (const bool t0_only : {false, true}) {
         const auto groups = allGroupPairs(a.count, b.count, false);
-        Pairs found = kernelPairs(a, b, groups, false, simd::Diagonal::ALL, t0_only, 256 + random() % 300);
+        Pairs found =
+            kernelPairs(a.view(), b.view(), groups, false, simd::Diagonal::ALL, t0_only, 256 + random() % 300);
         std::sort(found.begin(), found.end());
         ASSERT_EQ(found, referencePairs(a, b, groups, false, simd::Diagonal::ALL, t0_only))
             << target << ", round " << round;
@@ -189,7 +195,7 @@ TEST(GroupPairs, EachPairOfATreeWithItselfOnce) {
       const Groups a = randomGroups(random, 1 + random() % 4, 50, 40);
       const auto groups = allGroupPairs(a.count, a.count, true);
       for (const simd::Diagonal diagonal : {simd::Diagonal::UPPER_WITH_DIAGONAL, simd::Diagonal::STRICT_UPPER}) {
-        Pairs found = kernelPairs(a, a, groups, true, diagonal, false, 256);
+        Pairs found = kernelPairs(a.view(), a.view(), groups, true, diagonal, false, 256);
         std::sort(found.begin(), found.end());
         ASSERT_EQ(found, referencePairs(a, a, groups, true, diagonal, false)) << target;
         EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
@@ -198,13 +204,60 @@ TEST(GroupPairs, EachPairOfATreeWithItselfOnce) {
   });
 }
 
+/// A copy of values that ends where the process may read no further.
+class AtTheEndOfMemory {
+ public:
+  AtTheEndOfMemory(const std::int16_t* values, std::size_t count) {
+    const std::size_t bytes = count * sizeof *values;
+    size_ = (bytes + PAGE - 1) / PAGE * PAGE;
+    base_ =
+        static_cast<char*>(::mmap(nullptr, size_ + PAGE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+    if (base_ == MAP_FAILED) throw std::bad_alloc();
+    if (::mprotect(base_ + size_, PAGE, PROT_NONE) != 0) throw std::runtime_error("mprotect failed");
+    copy_ = base_ + size_ - bytes;
+    std::memcpy(copy_, values, bytes);
+  }
+  ~AtTheEndOfMemory() { ::munmap(base_, size_ + PAGE); }
+  AtTheEndOfMemory(const AtTheEndOfMemory&) = delete;
+  AtTheEndOfMemory& operator=(const AtTheEndOfMemory&) = delete;
+  const std::int16_t* data() const { return reinterpret_cast<const std::int16_t*>(copy_); }
+
+ private:
+  static constexpr std::size_t PAGE = 1 << 16;  // no system's pages are larger than that
+  std::size_t size_ = 0;
+  char *base_ = nullptr, *copy_ = nullptr;
+};
+
+// One time alone may be either: the arrays then begin with the values at t1, and end a quarter earlier.
+TEST(GroupPairs, WithOneTimeAloneNothingIsReadOfTheOther) {
+  Random random(12);
+  const Groups both = randomGroups(random, 3, 50, 100);
+  Groups at_end;
+  at_end.nodes = both.nodes;
+  at_end.count = both.count;
+  for (Node& n : at_end.nodes) {
+    std::copy(n.lo.begin() + 8, n.lo.end(), n.lo.begin());
+    std::copy(n.hi.begin() + 8, n.hi.end(), n.hi.begin());
+  }
+  const AtTheEndOfMemory soa(both.soa.get(), both.count * SOA_SIZE), aos(both.aos.get(), both.count * AOS_SIZE);
+  const simd::GroupsView view{soa.data() + simd::SOA_T1, aos.data() + simd::DIRECTIONS};
+  const auto groups = allGroupPairs(both.count, both.count, true);
+  const Pairs expected = referencePairs(at_end, at_end, groups, true, simd::Diagonal::STRICT_UPPER, true);
+  ASSERT_FALSE(expected.empty());
+  forEachSimdTarget([&](const std::string& target) {
+    Pairs found = kernelPairs(view, view, groups, true, simd::Diagonal::STRICT_UPPER, true, 1000);
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, expected) << target;
+  });
+}
+
 TEST(GroupPairs, EveryTargetGivesTheSameOrder) {
   Random random(13);
   const Groups a = randomGroups(random, 6, 60, 50), b = randomGroups(random, 6, 60, 50);
   const auto groups = allGroupPairs(a.count, b.count, false);
-  const Pairs expected = kernelPairs(a, b, groups, false, simd::Diagonal::ALL, false, 1000);
+  const Pairs expected = kernelPairs(a.view(), b.view(), groups, false, simd::Diagonal::ALL, false, 1000);
   forEachSimdTarget([&](const std::string& target) {
-    EXPECT_EQ(kernelPairs(a, b, groups, false, simd::Diagonal::ALL, false, 1000), expected) << target;
+    EXPECT_EQ(kernelPairs(a.view(), b.view(), groups, false, simd::Diagonal::ALL, false, 1000), expected) << target;
   });
 }
 
@@ -233,7 +286,7 @@ TEST(GroupPairs, StrictAndOneUnitEitherSide) {
             b.pack();
             const bool want_both = !(gap0 > 0 && gap1 > 0), want_t0 = !(gap0 > 0);
             const auto count = [&](const Groups& x, const Groups& y, bool t0_only) {
-              return kernelPairs(x, y, {0, 0}, false, simd::Diagonal::ALL, t0_only, 256).size();
+              return kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, t0_only, 256).size();
             };
             ASSERT_EQ(count(a, b, false), want_both ? 1u : 0u) << target << " d " << d << " at " << at << gap0 << gap1;
             ASSERT_EQ(count(b, a, false), want_both ? 1u : 0u) << target << " d " << d << " at " << at << gap0 << gap1;
@@ -264,8 +317,8 @@ TEST(GroupPairs, PassingEachOtherIsKept) {
   x.pack();
   y.pack();
   forEachSimdTarget([&](const std::string& target) {
-    EXPECT_EQ(kernelPairs(x, y, {0, 0}, false, simd::Diagonal::ALL, false, 256).size(), 1u) << target;
-    EXPECT_EQ(kernelPairs(x, y, {0, 0}, false, simd::Diagonal::ALL, true, 256).size(), 0u) << target;
+    EXPECT_EQ(kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, false, 256).size(), 1u) << target;
+    EXPECT_EQ(kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, true, 256).size(), 0u) << target;
   });
 }
 
@@ -364,11 +417,12 @@ TEST(GroupPairs, WidenedNodesStillMeetWhatTheyTouch) {
     const Groups none = widened(0);
     for (const int m : {0, 32763, 32764, 32766, int{simd::UNBOUNDED}}) {
       const Groups groups = widened(m);
-      const auto pairs = kernelPairs(groups, groups, {0, 0}, true, simd::Diagonal::UPPER_WITH_DIAGONAL, false, 256);
+      const auto pairs =
+          kernelPairs(groups.view(), groups.view(), {0, 0}, true, simd::Diagonal::UPPER_WITH_DIAGONAL, false, 256);
       // Each lane meets itself; the two meet when 2 m reaches the distance of 65528.
       EXPECT_EQ(pairs.size(), m >= 32764 ? 3u : 2u) << target << ", margin " << m;
       // On one side alone the largest margin with an end is half the distance.
-      const auto across = kernelPairs(groups, none, {0, 0}, false, simd::Diagonal::ALL, false, 256);
+      const auto across = kernelPairs(groups.view(), none.view(), {0, 0}, false, simd::Diagonal::ALL, false, 256);
       EXPECT_EQ(across.size(), m == simd::UNBOUNDED ? 4u : 2u) << target << ", margin " << m;
     }
   });
