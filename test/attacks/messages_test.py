@@ -8,7 +8,7 @@ import unittest
 import dynamic_reconfigure.msg
 import dynamic_reconfigure.srv
 import rospy
-from attack import COLS, ROWS, AttackTest, cloud_of, flat_cloud, resident_kb, stamped, wait_for
+from attack import COLS, ROWS, SLOW, AttackTest, cloud_of, flat_cloud, resident_kb, stamped, wait_for
 from deformable_ccd.msg import ContactArray
 from geometry_msgs.msg import TransformStamped
 from std_srvs.srv import SetBool, Trigger
@@ -58,7 +58,8 @@ class MessagesTest(AttackTest):
         after = self.outcomes_of(self.publisher, [flat_cloud(200 + i) for i in range(2)])
         self.assertTrue(after[1].answered or after[0].answered, after[1].reason)
         # The frame that came, the decoded one and no copy of it in a text; and it is given back.
-        self.assertLess(resident_kb(node.pid) - start_kb, 60000)
+        if SLOW == 1:  # under sanitizers what is freed stays a while
+            self.assertLess(resident_kb(node.pid) - start_kb, 60000)
         self.assert_quiet(time.monotonic() - begin, 4)
 
     def test_a_stream_of_frames_without_a_place(self):

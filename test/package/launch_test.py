@@ -10,7 +10,7 @@ import rosgraph
 import yaml
 
 from checkout import CHECKOUT, TOOLS
-from ros_process import free_port, stop, wait_for
+from ros_process import SLOW, free_port, stop, wait_for
 
 NODE = '/collision_monitor/'
 BODIES = '''
@@ -177,8 +177,9 @@ class LaunchTest(unittest.TestCase):
         for name in ('demo.launch', 'replay.launch'):
             starts[name] += ('bag:=%s' % scene, self.file('{}'))
         starts['node'] = (str(TOOLS / 'collision_monitor_node'), '__name:=collision_monitor')
-        starts['nodelet'] = ('rosrun', 'nodelet', 'nodelet', 'standalone', 'deformable_ccd/CollisionMonitor',
-                             '__name:=collision_monitor')
+        if SLOW == 1:  # a library built with a sanitizer cannot be loaded by ROS's own program
+            starts['nodelet'] = ('rosrun', 'nodelet', 'nodelet', 'standalone', 'deformable_ccd/CollisionMonitor',
+                                 '__name:=collision_monitor')
         for name, words in starts.items():
             with self.subTest(name):
                 started = self.start(*words)

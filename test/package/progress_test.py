@@ -34,6 +34,7 @@ def on_a_terminal(command):
     return status, ''.join(said)
 
 
+@unittest.skipIf(os.environ.get('DEFORMABLE_CCD_SANITIZED'), "OctoMap's headers say what they write where assertions are on")
 class ProgressTest(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())

@@ -322,7 +322,8 @@ class RealMachineTest(Machine):
         script = '%s\nexec "$0"' % preparation
         once = self.folder / 'apt.conf'
         once.write_text('Acquire::Retries "0";')
-        environment = {k: v for k, v in os.environ.items() if k not in ('CMAKE_PREFIX_PATH', 'ROS_ROOT')}
+        of_this_build = ('CMAKE_PREFIX_PATH', 'ROS_ROOT', 'DEFORMABLE_CCD_WORKSPACE')
+        environment = {k: v for k, v in os.environ.items() if k not in of_this_build}
         environment['APT_CONFIG'] = str(once)
         command = ['unshare', '--mount', *namespace, 'bash', '-e', '-c', script + ' --any-release',
                    str(self.checkout / 'scripts/setup')]
