@@ -238,7 +238,10 @@ struct Outcome {
   double duration_s() const { return secondsBetween(start_ns, stamp_ns); }
   /// A stamp that is not later than this time of the step [1].
   StampNs stampBefore(double toc) const {
-    return start_ns + static_cast<StampNs>(std::floor(toc * static_cast<double>(stamp_ns - start_ns)));
+    const auto step_ns = static_cast<double>(stamp_ns - start_ns);
+    const double whole_ns = std::floor(toc * step_ns);
+    // The product may have been rounded up to a whole nanosecond; what fma() leaves has its true sign.
+    return start_ns + static_cast<StampNs>(std::fma(toc, step_ns, -whole_ns) < 0 ? whole_ns - 1 : whole_ns);
   }
   /// A stamp that is not earlier, and not past the step's end.
   StampNs stampAfter(double toc) const {
