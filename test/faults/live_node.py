@@ -127,6 +127,8 @@ class LiveNodeTest(unittest.TestCase):
         node.wait()
 
     def assert_adds_up(self, s):
+        # What waits is reckoned as what is left: no more can wait than 64 steps and a frame of each body.
+        self.assertLessEqual(s.frames_waiting, 80)
         self.assertEqual(s.frames_received, s.frames_processed + s.frames_started + s.frames_skipped + s.frames_waiting)
         self.assertEqual(s.frames_skipped, s.skipped_duplicate + s.skipped_vertex_count + s.skipped_bad_message +
                          s.skipped_no_transform + s.skipped_no_body + s.skipped_queue_full + s.skipped_disabled +
