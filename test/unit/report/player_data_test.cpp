@@ -122,6 +122,33 @@ TEST(PlayerData, AVertexWithoutAPositionIsMarkedAndABodyAtRestCostsAByte) {
   EXPECT_EQ(frames[4][4], frames[0][4]);
 }
 
+/// Of more contacts than a frame has room for it shows the new ones, the earliest of them first.
+TEST(PlayerData, AFrameShowsSoManyContactsAndPatchesTheNewOnesFirst) {
+  Falling run;
+  PlayerData player;
+  Outcome o = run.next();
+  constexpr std::size_t CONTACTS = 300, PATCHES = 100, NEW = 20;
+  for (std::size_t i = 0; i < CONTACTS; ++i) {
+    Contact contact;
+    contact.vertex = {0, 1, 2, 3};
+    const bool is_new = i >= CONTACTS - NEW;  // the last in the list
+    contact.initial = !is_new;
+    contact.toc_lower = is_new ? 0.9 - 0.01 * static_cast<double>(i - (CONTACTS - NEW)) : 0;
+    o.contacts.push_back(contact);
+  }
+  o.patches.resize(PATCHES);
+  player.add(o, run.bodies, 0, true);
+  const json data = json::parse(player.json());
+  const json details = data["frames"].back().back(), contacts = details["c"], patches = details["p"];
+  ASSERT_EQ(contacts.size(), 48u) << details.dump().substr(0, 300);
+  EXPECT_EQ(patches.size(), 32u);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const bool is_initial = (contacts[i][4].get<int>() & 2) != 0;
+    EXPECT_EQ(is_initial, i >= NEW) << i;
+    if (i > 0 && i < NEW) EXPECT_LE(contacts[i - 1][5].get<double>(), contacts[i][5].get<double>());
+  }
+}
+
 TEST(PlayerData, OverTheBudgetQuietFramesGoFirstAndFirstContactsStay) {
   Falling run;
   constexpr std::size_t BUDGET = 40'000;

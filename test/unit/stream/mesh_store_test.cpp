@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace dccd {
@@ -147,6 +148,20 @@ TEST(PoseInterpolation, GoesOnBeyondTheEnd) {
   const Eigen::Isometry3d c = interpolate(a, b, 3);
   EXPECT_NEAR(Eigen::AngleAxisd(c.linear()).angle(), 0.6, 1e-12);
   EXPECT_NEAR(c.translation().x(), 3, 1e-12);
+}
+
+/// A frame's own positions are the truth at its stamp: what a sum with a product of zero or one makes of them is not.
+TEST(PositionInterpolation, EndsAreReproducedBitForBit) {
+  const double lost = std::numeric_limits<double>::quiet_NaN();
+  const Positions a{{0.1, -0.0, 1e300}, {lost, 1, 2}, {0x1p-1074, 3, 1e16}},
+      b{{0.7, 0.0, -1e300}, {1, 2, 3}, {1, lost, 1}};
+  Positions out;
+  for (const bool end : {false, true}) {
+    interpolate(a, b, end ? 1 : 0, out);
+    const Positions& own = end ? b : a;
+    ASSERT_EQ(out.size(), own.size());
+    EXPECT_EQ(std::memcmp(out.data(), own.data(), own.size() * sizeof(Vec3)), 0) << (end ? "its end" : "its start");
+  }
 }
 
 }  // namespace
