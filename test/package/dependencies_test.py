@@ -100,6 +100,15 @@ class LibraryTest(unittest.TestCase):
         self.assertIn('dccd::detect(', shown)
         self.assertEqual([line for line in shown.splitlines() if '::Impl::' in line], [])
 
+    def test_its_soname_counts_with_its_interface(self):
+        """So that a program is never run with a library that it was not built for (doc/interface.md)."""
+        library = TOOLS.parent / 'libdeformable_ccd.so'
+        if not library.is_file():
+            self.skipTest('%s is not built' % library.name)
+        version = re.search(r'define DCCD_API_VERSION (\d+)', (CHECKOUT / 'include/dccd/export.h').read_text()).group(1)
+        dynamic = subprocess.run(['readelf', '-d', str(library)], capture_output=True, text=True, check=True).stdout
+        self.assertIn('soname: [libdeformable_ccd.so.%s]' % version, dynamic)
+
     def test_only_the_study_of_accuracy_loads_vtk(self):
         """Thirty libraries and more, for which every program and the nodelet would take three times as long to start."""
         found = [path for path in (TOOLS / 'check_step', TOOLS.parent / 'libdeformable_ccd_ros.so') if path.is_file()]
