@@ -99,7 +99,8 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
   body.input.type = reader.choice("type", "auto", types);
   body.input.frame_id = reader.get("frame_id", std::string());
   body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
-  body.input.max_vertices = static_cast<std::size_t>(reader.integer("max_vertices", 1000000, 1, MANY));
+  body.input.max_vertices =
+      static_cast<std::size_t>(reader.integer("max_vertices", static_cast<int>(body.input.max_vertices), 1, MANY));
   readTopology(reader.section("topology"), body);
   if (reader.has("marker")) {
     ParameterReader marker = reader.section("marker");

@@ -70,7 +70,8 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
   monitor.patch_gap_s = reader.number("patch_gap_s", monitor.patch_gap_s, 0, LARGE);
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
-  monitor.detector.max_contacts = static_cast<std::size_t>(reader.integer("max_contacts", 10000, 1, MANY));
+  monitor.detector.max_contacts = static_cast<std::size_t>(
+      reader.integer("max_contacts", static_cast<int>(monitor.detector.max_contacts), 1, MANY));
   monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
   monitor.detector.earliest_only = reader.get("earliest_only", false);
   if (monitor.detector.earliest_only && reader.has("expected_contacts")) {
@@ -87,15 +88,18 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   }
   monitor.detector.rigid_tolerance_m =
       reader.number("rigid_tolerance_m", monitor.detector.rigid_tolerance_m, 1e-9, LARGE);
-  monitor.detector.max_substeps = static_cast<std::size_t>(reader.integer("max_substeps", 64, 1, 100000));
-  monitor.look_ahead_s = reader.number("look_ahead_s", 0.0, 0, 3600);
+  monitor.detector.max_substeps = static_cast<std::size_t>(
+      reader.integer("max_substeps", static_cast<int>(monitor.detector.max_substeps), 1, 100000));
+  monitor.look_ahead_s = reader.number("look_ahead_s", monitor.look_ahead_s, 0, 3600);
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.answer_timeout_s = reader.number("answer_timeout_s", config.answer_timeout_s, 1e-3, LARGE);
-  config.queue_size = static_cast<std::size_t>(reader.integer("queue_size", 8, 1, 100000));
+  config.queue_size =
+      static_cast<std::size_t>(reader.integer("queue_size", static_cast<int>(config.queue_size), 1, 100000));
   config.queue_policy = reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST
                                                                                                   : QueuePolicy::OLDEST;
-  config.simd_target = reader.get("simd_target", std::string("auto"));
-  config.record_steps = static_cast<std::size_t>(reader.integer("record_steps", 1, 0, 10000));
+  config.simd_target = reader.get("simd_target", config.simd_target);
+  config.record_steps =
+      static_cast<std::size_t>(reader.integer("record_steps", static_cast<int>(config.record_steps), 0, 10000));
   config.record_folder = reader.get("record_folder", std::string());
 }
 
@@ -114,8 +118,10 @@ void limitTime(MonitorConfig& config) { config.monitor.detector.max_compute_ms =
 
 /// A tool has the limits that it is given, the node all of them (limitLive).
 void readLimits(ParameterReader& reader, MonitorConfig& config) {
-  config.max_memory_bytes = static_cast<std::size_t>(reader.integer("max_memory_mb", 512, 16, 1 << 20)) << 20;
-  config.max_compute_s = reader.number("max_compute_s", 0.5, 0, LARGE);
+  config.max_memory_bytes = static_cast<std::size_t>(reader.integer(
+                                "max_memory_mb", static_cast<int>(config.max_memory_bytes >> 20), 16, 1 << 20))
+                            << 20;
+  config.max_compute_s = reader.number("max_compute_s", config.max_compute_s, 0, LARGE);
   if (reader.has("max_memory_mb")) limitMemory(config);
   if (reader.has("max_compute_s")) limitTime(config);
 }
@@ -128,7 +134,9 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   }
   config.octomap_file = reader.get("octomap_file", std::string());
   config.octomap_frame = reader.get("octomap_frame", std::string());
-  config.max_map_bytes = static_cast<std::size_t>(reader.integer("max_map_mb", 512, 1, 1 << 20)) << 20;
+  config.max_map_bytes =
+      static_cast<std::size_t>(reader.integer("max_map_mb", static_cast<int>(config.max_map_bytes >> 20), 1, 1 << 20))
+      << 20;
   if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
   config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
   const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});

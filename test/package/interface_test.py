@@ -131,6 +131,17 @@ class InterfaceTest(unittest.TestCase):
             for end, limit in zip(ends, expected):
                 self.assertEqual(float(numbers.get(end, end)), float(numbers.get(limit, limit)), name)
 
+    def test_live_defaults(self):
+        """What dynamic_reconfigure shows before it has heard of the node, and what its own server falls back on."""
+        live = re.findall(r'gen\.add\("(\w+)", (?:double|int)_t, 0, "[^"]*", ([\w.-]+),', (CHECKOUT / 'cfg/CollisionMonitor.cfg').read_text())
+        self.assertEqual(len(live), 7, 'all but the accuracy and the switches')
+        table = PAGE[PAGE.index('## Parameters'):PAGE.index('Per body, as')]
+        page = {name: default for line in table.splitlines() if names_of(line)
+                for name, default in zip(names_of(line), line.split(' | ')[1].split(', '))}
+        for name, default in live:
+            named = name.replace('marker_', 'markers/', 1)
+            self.assertEqual(float(default), float(page[named].split()[0]), name)
+
     def test_monitor_yaml_holds_defaults_that_are_read(self):
         text = (CHECKOUT / 'config/monitor.yaml').read_text()
         names = set(re.findall(r'(?m)^(\w+):', text))
