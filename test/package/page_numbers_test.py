@@ -62,6 +62,8 @@ NUMBERS = {
          lambda: constant('src/report/progress_bar.h', 'line_every', r'\b%s = std::chrono::seconds\((\d+)\)')),
         (r'Files of version (\d+) are written', lambda: constant('src/record/step_recording.h', 'RECORDING_VERSION')),
         (r'of versions 1 to (\d+) are', lambda: constant('src/record/step_recording.h', 'RECORDING_VERSION') - 1),
+        (r'of `exact`: (\d+) to \d+', lambda: constant('src/config/monitor_config.cpp', 'toc_bits', r'"%s", [^,]+, (\d+), \d+\)')),
+        (r'of `exact`: \d+ to (\d+)', lambda: constant('src/config/monitor_config.cpp', 'toc_bits', r'"%s", [^,]+, \d+, (\d+)\)')),
         (r'`DCCD_API_VERSION` \((\d+)\)', lambda: constant('include/dccd/export.h', 'DCCD_API_VERSION', r'define %s (\d+)')),
         (r'for `hold_s` \(([\d.]+)\)', lambda: constant('examples/stop_the_arm.py', 'hold_s', r'\b%s=([\d.]+)')),
     ],

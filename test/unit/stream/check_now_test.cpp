@@ -1,0 +1,41 @@
+// A question takes the time that it takes: what limits the steps does not cut its answer.
+#include <gtest/gtest.h>
+
+#include "dccd/stream.h"
+
+namespace dccd {
+namespace {
+
+constexpr StampNs MS = 1000000;
+
+/// A triangle, and one that stands on it with its tip below it.
+MeshFrame crossed(StampNs stamp_ns) {
+  MeshFrame frame;
+  frame.stamp_ns = stamp_ns;
+  frame.topology = share(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
+  frame.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, -0.5}, {0.5, 0, 0.5}, {-0.5, 0, 0.5}};
+  return frame;
+}
+
+TEST(CheckNow, NoLimitOfTheStepsCutsIt) {
+  for (const bool budget : {false, true}) {
+    MonitorOptions options;
+    (budget ? options.detector.step_budget_ms : options.detector.max_compute_ms) = 1e-6;
+    Body cloth;
+    cloth.name = "cloth";
+    Monitor monitor(options, {cloth});
+    for (const StampNs stamp_ns : {100 * MS, 133 * MS}) monitor.push(0, crossed(stamp_ns), 0);
+    Outcome outcome;
+    while (monitor.next(0, outcome)) continue;
+    ASSERT_EQ(outcome.status, StepStatus::DEADLINE) << "a step has no time at all";
+    const Outcome now = monitor.checkNow();
+    EXPECT_EQ(now.status, StepStatus::OK) << now.reason;
+    EXPECT_TRUE(now.complete);
+    EXPECT_EQ(now.start_state, StartState::INTERSECTING);
+    EXPECT_FALSE(now.intersections.empty());
+    EXPECT_TRUE(assuranceOf(now).proved) << describe(assuranceOf(now));
+  }
+}
+
+}  // namespace
+}  // namespace dccd
