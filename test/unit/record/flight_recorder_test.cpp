@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "record/step_replay.h"
+#include "support/folder_test.h"
 #include "support/recordings.h"
 
 namespace dccd {
@@ -17,16 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class FlightRecorderTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "recorder_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path folder_;
-};
+class FlightRecorderTest : public FolderTest {};
 
 TEST_F(FlightRecorderTest, KeepsTheLastSteps) {
   RecordedScene scene;

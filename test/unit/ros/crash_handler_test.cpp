@@ -4,29 +4,18 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "record/step_replay.h"
+#include "support/folder_test.h"
 #include "support/recordings.h"
 
 namespace dccd {
 namespace test {
 namespace {
 
-namespace fs = std::filesystem;
-
-class CrashHandlerTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "recorder_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path folder_;
-};
+class CrashHandlerTest : public FolderTest {};
 
 /// A process of its own that crashes in the middle of a step.
 class CrashInStep : public StepListener {

@@ -23,6 +23,7 @@
 #include "input/stl_file.h"
 #include "node/map_loader.h"
 #include "record/step_recording.h"
+#include "support/folder_test.h"
 
 namespace dccd {
 namespace {
@@ -206,14 +207,8 @@ TEST(HostileInput, MapsWithImpossibleNumbers) {
   EXPECT_TRUE(mentions(text, "4294967295")) << text;
 }
 
-class HostileFile : public ::testing::Test {
+class HostileFile : public test::FolderTest {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "hostile_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   /// The path of a file of this name that holds the bytes, or as many more zeros as are asked for.
   std::string write(const std::string& name, const std::string& bytes, std::size_t size = 0) {
     const fs::path path = folder_ / name;
@@ -221,7 +216,6 @@ class HostileFile : public ::testing::Test {
     if (size > bytes.size()) fs::resize_file(path, size);  // a file with a hole takes no disk
     return path.string();
   }
-  fs::path folder_;
 };
 
 TEST_F(HostileFile, ClaimsOfFourBillionTriangles) {

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "support/data.h"
+#include "support/folder_test.h"
 
 namespace dccd {
 namespace {
@@ -103,17 +104,14 @@ TEST(MeshResource, AnObjWithNormalsMaterialsAndIndicesFromTheEnd) {
   EXPECT_EQ(mesh.positions[1], Vec3(0.2, 0, 0.01)) << "in the file's order, every bit of the number";
 }
 
-class OddFiles : public ::testing::Test {
+class OddFiles : public test::FolderTest {
  protected:
   void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "meshes_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
+    FolderTest::SetUp();
     std::ifstream file(ours("pyramid_mm.dae"));
     dae_.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
     ASSERT_FALSE(dae_.empty());
   }
-  void TearDown() override { fs::remove_all(folder_); }
   std::string write(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return (folder_ / name).string();
@@ -124,7 +122,6 @@ class OddFiles : public ::testing::Test {
     EXPECT_NE(at, std::string::npos) << from;
     return write("a.dae", text.replace(at, from.size(), to));
   }
-  fs::path folder_;
   std::string dae_;
 };
 
