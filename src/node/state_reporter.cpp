@@ -13,8 +13,6 @@
 namespace dccd {
 namespace {
 
-// As deep as the other topics'.
-constexpr std::uint32_t QUEUE = 32;
 constexpr std::chrono::milliseconds PERIOD{20};
 
 }  // namespace
@@ -30,8 +28,8 @@ std::int64_t WatchClock::now() {
 }
 
 StateReporter::StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits)
-    : state_(private_node.advertise<deformable_ccd::State>("state", QUEUE, true)),
-      clear_(private_node.advertise<std_msgs::Bool>("clear", QUEUE, true)),
+    : state_(private_node.advertise<deformable_ccd::State>("state", TOPIC_QUEUE, true)),
+      clear_(private_node.advertise<std_msgs::Bool>("clear", TOPIC_QUEUE, true)),
       liveness_(limits) {
   forgotten("no frame has been answered yet");
   thread_ = std::thread([this] { watch(); });

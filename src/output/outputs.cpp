@@ -8,23 +8,22 @@ namespace dccd {
 namespace {
 
 // Deep enough for a subscriber that stalls for a second at camera rate; a slower one loses messages, not the node time.
-constexpr std::uint32_t QUEUE = 32;
 constexpr std::uint32_t EVENT_QUEUE = 4096;  // many may come of one step, a message each
 
 }  // namespace
 
 Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
-  contacts_ = node.advertise<deformable_ccd::ContactArray>("contacts", QUEUE);
-  first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", QUEUE);
-  stats_ = node.advertise<deformable_ccd::StepStats>("stats", QUEUE);
+  contacts_ = node.advertise<deformable_ccd::ContactArray>("contacts", TOPIC_QUEUE);
+  first_contact_ = node.advertise<deformable_ccd::FirstContact>("first_contact", TOPIC_QUEUE);
+  stats_ = node.advertise<deformable_ccd::StepStats>("stats", TOPIC_QUEUE);
   markers_ = node.advertise<visualization_msgs::MarkerArray>("markers", 2);
   effects_ = node.advertise<deformable_ccd::EffectArray>("effects", 1, true);
   if (config.monitor.look_ahead_s > 0) {
-    predicted_ = node.advertise<deformable_ccd::ContactArray>("predicted_contacts", QUEUE);
-    time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", QUEUE);
+    predicted_ = node.advertise<deformable_ccd::ContactArray>("predicted_contacts", TOPIC_QUEUE);
+    time_to_contact_ = node.advertise<deformable_ccd::TimeToContact>("time_to_contact", TOPIC_QUEUE);
   }
   if (config.monitor.detector.patches) {
-    patches_ = node.advertise<deformable_ccd::PatchArray>("patches", QUEUE);
+    patches_ = node.advertise<deformable_ccd::PatchArray>("patches", TOPIC_QUEUE);
     events_ = node.advertise<deformable_ccd::PatchEvent>("events", EVENT_QUEUE);
   }
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);

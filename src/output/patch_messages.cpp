@@ -4,6 +4,7 @@
 
 #include "dccd/new_contacts.h"
 #include "output/output_messages.h"
+#include "report/words.h"
 
 namespace dccd {
 namespace {
@@ -16,13 +17,9 @@ static_assert(static_cast<int>(PatchEventKind::ENDED) == static_cast<int>(EventM
 static_assert(static_cast<int>(PatchEventKind::SPLIT) == static_cast<int>(EventMessage::SPLIT));
 static_assert(static_cast<int>(PatchEventKind::UNEXPECTED) == static_cast<int>(EventMessage::UNEXPECTED));
 
-std::string nameOf(std::uint16_t body, const std::vector<Body>& bodies) {
-  return body == OBSTACLE_BODY ? "octomap" : bodies.at(body).name;
-}
-
 template <class Names>
 void fillNames(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies, Names& out) {
-  for (std::size_t side = 0; side < 2; ++side) out[side] = nameOf(body[side], bodies);
+  for (std::size_t side = 0; side < 2; ++side) out[side] = bodyName(body[side], bodies);
 }
 
 ros::Time knownTime(StampNs stamp_ns) { return stamp_ns == UNKNOWN_NS ? ros::Time() : toRosTime(stamp_ns); }
@@ -87,7 +84,7 @@ std::string summaryOf(const PatchEvent& event, const std::vector<Body>& bodies) 
 }  // namespace
 
 std::string pairOf(const std::array<std::uint16_t, 2>& body, const std::vector<Body>& bodies) {
-  return nameOf(body[0], bodies) + " and " + (body[0] == body[1] ? "itself" : nameOf(body[1], bodies));
+  return bodyName(body[0], bodies) + " and " + (body[0] == body[1] ? "itself" : bodyName(body[1], bodies));
 }
 
 deformable_ccd::PatchArray toPatchArray(const Outcome& outcome, const std::vector<Body>& bodies,
