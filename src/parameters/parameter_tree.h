@@ -50,7 +50,9 @@ const char* kindName(const ParameterTree& value);
 /// YAML text, typed as rosparam would; `name` stands for the text in messages. Throws ParameterError naming it and the
 /// line, also for what nests or repeats itself without end.
 ParameterTree parseYaml(const std::string& text, const std::string& name);
-ParameterTree readYaml(const std::string& file);  ///< a whole file
+/// A whole file. `what` it should be is said where it cannot be read.
+std::string yamlText(const std::string& file, const std::string& what = "a YAML file");
+ParameterTree readYaml(const std::string& file);
 
 /// The values below a name of the text's top level, as YAML, in the order and style of the text; empty: not there.
 std::string yamlBelow(const std::string& text, const std::string& name);

@@ -75,13 +75,15 @@ ParameterTree parseYaml(const std::string& text, const std::string& name) {
   }
 }
 
-ParameterTree readYaml(const std::string& file) {
+std::string yamlText(const std::string& file, const std::string& what) {
   const std::string problem = regularFileProblem(file, MAX_FILE_BYTES);
-  if (!problem.empty()) throw ParameterError(file + ": " + problem + "; name a YAML file");
+  if (!problem.empty()) throw ParameterError(file + ": " + problem + "; name " + what);
   std::ifstream stream(file);
-  if (!stream) throw ParameterError(file + ": cannot be read; name a YAML file");
-  return parseYaml({std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()}, file);
+  if (!stream) throw ParameterError(file + ": cannot be read; name " + what);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
+
+ParameterTree readYaml(const std::string& file) { return parseYaml(yamlText(file), file); }
 
 std::string yamlBelow(const std::string& text, const std::string& name) {
   const YAML::Node node = YAML::Load(text)[name];

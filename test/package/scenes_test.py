@@ -181,7 +181,7 @@ class MakeSceneBagTest(unittest.TestCase):
         self.assertIn('bad.yaml:%d: bodies[0]/mass_kg is a string, a number is needed' % line, result.stderr)
         result = run(TOOLS / 'make_scene_bag', self.folder / 'no.yaml', self.folder / 'e.bag')
         self.assertEqual(result.returncode, 1)
-        self.assertIn('cannot be read', result.stderr)
+        self.assertIn('no.yaml: cannot be opened: No such file or directory; name a scene file', result.stderr)
 
     def test_what_contradicts_itself_is_refused_before_anything_is_recorded(self):
         """The monitor's block is read as the node reads it: file, parameter, and what to write instead."""

@@ -1,17 +1,13 @@
 #include "scene/physics/scene_file.h"
 
 #include <algorithm>
-#include <fstream>
 #include <numeric>
-#include <sstream>
 
-#include "dccd/regular_file.h"
 #include "scene/physics/expectations.h"
 
 namespace dccd::scene {
 namespace {
 
-constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{16} << 20;
 constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
 
 Shape readSheet(ParameterReader map) {
@@ -254,12 +250,7 @@ SceneSpec parseScene(const std::string& text, const std::string& name) {
 }
 
 SceneSpec readSceneFile(const std::string& path) {
-  std::ifstream stream(path);
-  if (!stream || !regularFileProblem(path, MAX_FILE_BYTES).empty())
-    throw ParameterError(path + ": cannot be read; name a scene file, such as config/scenes/table_edge.yaml");
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return parseScene(text.str(), path);
+  return parseScene(yamlText(path, "a scene file, such as config/scenes/table_edge.yaml"), path);
 }
 
 }  // namespace dccd::scene
