@@ -13,9 +13,9 @@ class Deadline {
   using Clock = std::chrono::steady_clock;
   Deadline() = default;  ///< never
   explicit Deadline(Clock::time_point at) : at_(at) {}
-  /// From now on; 0: never.
+  /// From now on; 0, and more than the clock can count (30 years): never.
   static Deadline after(double ms) {
-    if (!(ms > 0)) return {};
+    if (!(ms > 0) || ms > 1e12) return {};
     return Deadline(Clock::now() +
                     std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::milli>(ms)));
   }
