@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "dccd/detect.h"
+#include "support/checkerboard.h"
 #include "support/heap.h"
 #include "support/step_support.h"
 
@@ -196,23 +197,7 @@ TEST(FoundLimit, TheBoundIsThatOfTheGroupsThatWereLeftOut) {
 }
 
 TEST(FoundLimit, TheMapIsCutAsWell) {
-  constexpr std::uint16_t SIZE = 40;
-  std::vector<OccupiedLeaf> leaves;
-  for (std::uint16_t x = 0; x < SIZE; ++x) {
-    for (std::uint16_t y = 0; y < SIZE; ++y) {
-      for (std::uint16_t z = 0; z < SIZE; ++z) {
-        if ((x + y + z) % 2 != 0) continue;
-        leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y),
-                           static_cast<std::uint16_t>(32768 + z)},
-                          1});
-      }
-    }
-  }
-  Body triangle;
-  triangle.name = "triangle";
-  triangle.topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
-  Step step = stepOf(triangle, {{-1, -1, -1}, {41, -1, 0}, {0, 41, 1}}, {{-1, -1, 40}, {41, -1, 41}, {0, 41, 42}});
-  step.map.surface = VoxelSurface::build(1.0, leaves);
+  const Step step = throughACheckerboard(40);
   const Outcome full = Detector().run(step);
   ASSERT_GT(full.contacts.size(), 5000u);
   Options options;

@@ -7,6 +7,7 @@
 
 #include "dccd/detect.h"
 #include "dccd/known_space.h"
+#include "support/checkerboard.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -62,25 +63,6 @@ Step collapse(std::size_t side) {
   return cloth(side, flat, [](std::size_t) { return Vec3(0.1, 0.2, 0.3); });
 }
 
-Step inACheckerboard() {
-  std::vector<OccupiedLeaf> leaves;
-  for (std::uint16_t i = 0; i < 24 * 24 * 24; ++i) {
-    const auto x = static_cast<std::uint16_t>(i % 24), y = static_cast<std::uint16_t>(i / 24 % 24),
-               z = static_cast<std::uint16_t>(i / 24 / 24);
-    if ((x + y + z) % 2 == 0) {
-      leaves.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y),
-                         static_cast<std::uint16_t>(32768 + z)},
-                        1});
-    }
-  }
-  Body triangle;
-  triangle.name = "triangle";
-  triangle.topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
-  Step step = stepOf(triangle, {{-1, -1, -1}, {25, -1, 0}, {0, 25, 1}}, {{-1, -1, 24}, {25, -1, 25}, {0, 25, 26}});
-  step.map.surface = VoxelSurface::build(1.0, leaves);
-  return step;
-}
-
 /// What takes time, and how much of it may lie between two looks: less than half a millisecond.
 std::map<std::string, std::pair<std::uint64_t, std::uint64_t>> workOf(const StepStats& stats) {
   std::uint64_t slow = 0;
@@ -99,7 +81,7 @@ TEST(LooksAtTheClock, BetweenTwoLiesLittleWork) {
   const std::pair<std::string, Step> attacks[] = {{"coordinates of any size", anySize(6)},
                                                   {"a cloth that collapses", collapse(10)},
                                                   {"crumpled sheets", crumpled(3, 2, 20).motion()},
-                                                  {"a checkerboard", inACheckerboard()}};
+                                                  {"a checkerboard", throughACheckerboard(24)}};
   constexpr int SAMPLES = 24;
   for (const auto& [name, step] : attacks) {
     const Options options;
