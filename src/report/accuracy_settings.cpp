@@ -6,8 +6,12 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "dccd/regular_file.h"
+
 namespace dccd {
 namespace {
+
+constexpr std::uint64_t MAX_TRUTH_BYTES = std::uint64_t{4} << 30;
 
 /// Kind, vertices and the times that follow; none for a line without a contact.
 struct Line {
@@ -80,6 +84,8 @@ KnownContacts::Pair KnownContacts::pairOf(PairKind kind, std::array<Index, 4> v)
 }
 
 KnownContacts KnownContacts::fromFile(const std::string& path) {
+  const std::string problem = regularFileProblem(path, MAX_TRUTH_BYTES);
+  if (!problem.empty()) throw std::runtime_error(path + ": " + problem);
   std::ifstream in(path);
   if (!in) throw std::runtime_error(path + ": cannot be read");
   KnownContacts known;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "dccd/regular_file.h"
 #include "report/report.h"
 
 namespace dccd {
@@ -44,6 +45,8 @@ void addAll(const Json& from, std::vector<T>& to) {
 /// The table without its first line. In blocks: joining ranges is little more than this. That it could not be written,
 /// close() says.
 void copyRows(const std::string& path, std::ofstream& to) {
+  const std::string problem = regularFileProblem(path);
+  if (!problem.empty()) throw std::runtime_error(path + ": " + problem);
   std::ifstream from(path, std::ios::binary);
   from.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
   if (!from) throw std::runtime_error(path + ": cannot be read");

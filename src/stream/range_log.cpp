@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "dccd/regular_file.h"
 #include "stream/patch_tracker.h"
 
 namespace dccd {
@@ -37,7 +38,9 @@ void putHead(std::string& out, const Outcome& outcome) {
 
 class Reader {
  public:
-  explicit Reader(const std::string& path) : path_(path), file_(path, std::ios::binary) {
+  explicit Reader(const std::string& path) : path_(path) {
+    if (const std::string problem = regularFileProblem(path); !problem.empty()) fail(problem);
+    file_.open(path, std::ios::binary);
     if (!file_) fail("cannot be read");
     if (get<std::uint64_t>() != LAYOUT) fail("was written by another version of the program");
   }

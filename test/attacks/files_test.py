@@ -60,6 +60,20 @@ class FilesTest(AttackTest):
             self.refused([self.tool('analyze_bag'), bag, '--report', self.folder + '/report', '--params', path], words)
         for path in self.special_files('.bag')[:2]:
             self.refused([self.tool('analyze_bag'), path, '--report', self.folder + '/report'], words)
+        for path in self.special_files('.bt')[:2]:  # a tool has no limit for a map that is not given
+            self.refused([self.tool('analyze_bag'), bag, '--report', self.folder + '/report', '--octomap', path], words)
+        for path in self.special_files('.yaml'):
+            self.refused([self.tool('make_scene_bag'), path, self.folder + '/scene.bag'], words)
+        frame = pathlib.Path(self.folder) / 'frame.obj'
+        frame.write_text('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')
+        for path in self.special_files('.txt'):
+            with self.subTest(truth=path.name):
+                self.refused([self.tool('check_step'), frame, frame, '--contacts', self.folder + '/contacts.csv', '--stats',
+                              self.folder + '/stats.json', '--accuracy', 'all', '--truth', path], words)
+        for path in self.special_files('.cbor'):
+            with self.subTest(range=path.name):
+                path.rename(path.with_name('range.cbor'))
+                self.refused([self.tool('analyze_bag'), bag, '--report', self.folder + '/report', '--merge', path.parent], words)
 
     def test_two_monitors_in_one_folder(self):
         folder = pathlib.Path(self.folder) / 'shared'

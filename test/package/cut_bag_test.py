@@ -166,7 +166,7 @@ class CutTest(FolderTestCase):
         table = ranges[1] / 'contacts.csv'
         table.rename(ranges[1] / 'moved.csv')
         ran = run(TOOLS / 'analyze_bag', self.bag, '--report', self.folder / 'no', '--merge', *ranges, '--params', self.params)
-        self.assertEqual((ran.returncode, ran.stderr), (1, 'analyze_bag: %s: cannot be read\n' % table))
+        self.assertEqual((ran.returncode, ran.stderr), (1, 'analyze_bag: %s: cannot be opened: No such file or directory\n' % table))
         (ranges[1] / 'range.cbor').unlink()
         ran = run(TOOLS / 'analyze_bag', self.bag, '--report', self.folder / 'no', '--merge', *ranges, '--params', self.params)
         self.assertIn('it is no finished range', ran.stderr)

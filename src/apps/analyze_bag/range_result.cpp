@@ -6,12 +6,15 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dccd/regular_file.h"
+
 namespace dccd {
 namespace {
 
 using nlohmann::json;
 
 constexpr int FORMAT = 2;
+constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{4} << 30;
 
 std::string fileOf(const std::string& folder) { return folder + "/range.cbor"; }
 
@@ -93,8 +96,10 @@ void writeRange(const RangeResult& range) {
 
 RangeResult readRange(const std::string& folder) {
   const std::string path = fileOf(folder);
+  const std::string problem = regularFileProblem(path, MAX_FILE_BYTES);
+  if (!problem.empty()) throw std::runtime_error(path + ": " + problem + "; it is no finished range of a bag");
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path + ": cannot be read; it is no finished range of a bag");
+  if (!file) throw std::runtime_error(path + ": cannot be read");
   try {
     json j = json::from_cbor(file);
     if (j.at("format").get<int>() != FORMAT) throw std::runtime_error("written by another version of the program");

@@ -16,6 +16,7 @@
 
 #include "apps/analyze_bag/thinned_mesh.h"
 #include "dccd/accuracy.h"
+#include "dccd/regular_file.h"
 #include "report/accuracy_settings.h"
 #include "statistics/quantile.h"
 
@@ -177,8 +178,9 @@ class StudyRunner {
   }
 
   static std::optional<RunRecord> read(const fs::path& file, const nlohmann::json& key) {
-    std::ifstream in(file);
-    if (!in) return std::nullopt;
+    std::ifstream in;
+    if (regularFileProblem(file).empty()) in.open(file);
+    if (!in.is_open()) return std::nullopt;
     try {
       const nlohmann::json kept = nlohmann::json::parse(in);
       if (kept.at("key") == key) return RunRecord::fromJson(kept.at("run"));

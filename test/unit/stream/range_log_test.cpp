@@ -219,7 +219,10 @@ TEST_F(RangeLogTest, FilesThatAreNone) {
       EXPECT_NE(std::string(error.what()).find(file(1)), std::string::npos) << error.what();
     }
   };
-  expectRefused("cannot be read");
+  expectRefused("cannot be opened");
+  std::filesystem::create_directory(file(1));
+  expectRefused("is no regular file");
+  std::filesystem::remove(file(1));
   std::ofstream(file(1)) << "not this one";
   expectRefused("was written by another version");
   {
