@@ -49,6 +49,7 @@ bool sameBits(const std::shared_ptr<const Positions>& a, const std::shared_ptr<c
 }  // namespace
 
 Outcome detect(const Step& step, const Options& options, History& history, Deadline deadline) {
+  const ScopedFloatMode mode;  // of all that follows on this thread; turning bodies are cut into parts with it, too
   return history.impl().run(step, options, deadline);
 }
 
@@ -151,7 +152,6 @@ void History::Impl::passOver(const Step& step, const Options& wanted) {
 }
 
 void History::Impl::findPatches(Outcome& outcome) {
-  const ScopedFloatMode mode;
   const Clock::time_point start = Clock::now();
   patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);
   StageStats& stats = outcome.stats[Effect::PATCHES];
@@ -248,7 +248,6 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
 
 /// One part, from records to contacts; what it says goes into the outcome.
 void History::Impl::runPart(const Part& part, Outcome& outcome) {
-  const ScopedFloatMode mode;
   const Clock::time_point begin = Clock::now();
   for (PairWorker& w : workers) w.beginStep();
   order.beginStep();

@@ -190,7 +190,6 @@ void History::Impl::findLeftOut(const Step& step) {
     body.radius_m = std::shared_ptr<const std::vector<double>>(body.reference, &body.reference->radius_m);
   }
   if (!any) return;
-  const ScopedFloatMode mode;
   result.stats = StepStats();
   scene.record(rest, result.stats);
   scene.refit([](std::size_t count, const auto& f) { f(0, count); }, result.stats);

@@ -32,17 +32,10 @@ MonitorOptions with(Accuracy rung) {
   return options;
 }
 
-/// A recorded step whose bodies all move straight, with its answer.
-StepRecording straightStep(Accuracy rung) {
-  StepRecording recorded = recordScene(with(rung));
-  for (Body& body : recorded.step.bodies) body.turns = false;
-  recorded.answer = replayStep(recorded).answer;
-  return recorded;
-}
-
 TEST(FloatMode, OfTheCallerChangesNoAnswerAndStays) {
   for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
-    const StepRecording recorded = straightStep(rung);
+    StepRecording recorded = recordScene(with(rung));  // with a body that turns
+    recorded.answer = replayStep(recorded).answer;     // whose counters are those of a step without one before it
     for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
       for (const int threads : {1, 3}) {
         StepReplay replay;
