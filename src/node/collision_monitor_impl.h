@@ -38,7 +38,8 @@ struct CollisionMonitor::Impl {
   tf2::BufferCore transforms;
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
-  const MonitorConfig& config;  // the pipeline's, of which it alone changes `monitor` and `markers`
+  // The pipeline's. The worker changes in it what can be changed live, which no other thread is to read.
+  const MonitorConfig& config;
   StepRecorder recorder;
   Outputs outputs;
   StateReporter state;

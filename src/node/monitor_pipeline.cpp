@@ -266,8 +266,8 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
   change(options, markers);
   effects_.decide(options);
   monitor_->setOptions(options);
-  config_.monitor = options;
-  config_.markers = markers;
+  // In place, so that nothing else is written: the threads of topics and maps read the rest of it meanwhile.
+  change(config_.monitor, config_.markers);
 }
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
