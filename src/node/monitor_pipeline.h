@@ -68,7 +68,8 @@ class MonitorPipeline {
   Outcome checkNow();
 
   /// Changes what can be changed while it runs. `change` is called twice, with a copy and, once all of it holds, with
-  /// the options themselves, of which it writes nothing but what it changes. Throws std::invalid_argument naming the option; all then stays.
+  /// the options themselves, of which it writes nothing but what it changes. Throws std::invalid_argument naming the
+  /// option; all then stays.
   void reconfigure(const std::function<void(MonitorOptions&, MarkerConfig&)>& change);
 
   /// The phase of the task that is on from the next step on. Throws ParameterError naming those that there are; all
