@@ -5,7 +5,7 @@ import time
 import unittest
 
 import rospy
-from attack import AttackTest, checkerboard, cloud_of, flat_cloud, wait_for
+from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, wait_for
 from deformable_ccd.msg import ContactArray
 from octomap_msgs.msg import Octomap
 
@@ -29,14 +29,15 @@ class BudgetTest(AttackTest):
         self.assert_adds_up(self.stats[-1])
 
     def test_doubles_from_denormal_to_a_decimetre(self):
-        self.start_node('doubles', step_budget_ms=10)
+        budget_ms = 10 * SLOW
+        self.start_node('doubles', step_budget_ms=budget_ms)
         rows, cols = 28, 28  # three and a half million pairs: more than any machine decides in the budget
         messages = []
         for i in range(20):
             points = [tuple(math.ldexp(((7 * k + 13 * a + i) % 31 - 15) / 16, -3 - (k * 37 + a * 11 + i * 5) % 1070) for a in range(3))
                       for k in range(rows * cols)]
             messages.append(cloud_of(i, points, rows, cols))
-        outcomes = self.run_frames(10, messages)
+        outcomes = self.run_frames(budget_ms, messages)
         self.assertFalse(any(s.clear for s in self.states[1:]))
         # A fast machine comes to the limit of what a step may find before it comes to the end of the budget.
         self.assertTrue(all(o.status in (ContactArray.DEADLINE, ContactArray.TRUNCATED) for o in outcomes[1:]),
