@@ -16,10 +16,11 @@
 
 namespace dccd {
 
-/// The nearest that a message can hold: 0 to 2^32 s.
-/// Messages of a topic that wait for a subscriber; where more come, the oldest go.
+/// Messages of a topic that wait for a subscriber; where more come, the oldest go. Deep enough for one that stalls for
+/// a second at camera rate: a slower one loses messages, not the node time.
 constexpr std::uint32_t TOPIC_QUEUE = 32;
 
+/// The nearest that a message can hold: 0 to 2^32 s.
 ros::Time toRosTime(StampNs stamp_ns);
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame);
 /// With its geometry; `patch`: identity of its patch, 0 for none.

@@ -7,7 +7,6 @@ namespace dccd {
 
 namespace {
 
-// Deep enough for a subscriber that stalls for a second at camera rate; a slower one loses messages, not the node time.
 constexpr std::uint32_t EVENT_QUEUE = 4096;  // many may come of one step, a message each
 
 }  // namespace

@@ -134,6 +134,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
 }
 
 void History::Impl::passOver(const Step& step, const Options& wanted) {
+  const ScopedFloatMode mode;  // what is made here, is made once for the steps that follow
   carried.clear();
   setOptions(wanted);
   setBodies(step);

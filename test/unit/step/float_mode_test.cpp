@@ -5,6 +5,7 @@
 #include <cfenv>
 
 #include "record/step_replay.h"
+#include "step/history.h"
 #include "support/flush_to_zero.h"
 #include "support/recordings.h"
 #include "support/step_support.h"
@@ -83,6 +84,32 @@ TEST(FloatMode, OfTheCallerChangesNoCounter) {
     for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY}) {
       EXPECT_EQ(outcome.stats[stage].out, usual.stats[stage].out) << toString(stage) << ", mode " << mode;
     }
+  }
+}
+
+/// What is made once for all later steps may be made by a step that is passed over: which pairs are left out of the
+/// separation, and how far apart these are.
+TEST(FloatMode, OfWhoPassesAStepOverChangesNoLaterAnswer) {
+  Step cloth = crumpled(5, 2, 40).motion();
+  Body& body = cloth.bodies[0];
+  const Edge& edge = body.topology->edges().front();
+  body.minimum_separation_m = ((*body.t0)[edge[0]] - (*body.t0)[edge[1]]).norm();
+  body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*body.t0, {}});
+  const auto distancesAfterPassingOver = [&](int mode) {
+    History history;
+    const RoundingMode rounding(mode);
+    history.impl().passOver(cloth, Options{});
+    EXPECT_EQ(std::fegetround(), mode);
+    std::vector<double> distances;
+    for (const auto& of_body : history.impl().left_out) {
+      distances.insert(distances.end(), of_body.distances_m.begin(), of_body.distances_m.end());
+    }
+    return distances;
+  };
+  const std::vector<double> usual = distancesAfterPassingOver(FE_TONEAREST);
+  ASSERT_GT(usual.size(), 100u);
+  for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
+    EXPECT_EQ(distancesAfterPassingOver(mode), usual) << "mode " << mode;
   }
 }
 
