@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cfenv>
+#include <cmath>
 
 #include "record/step_replay.h"
 #include "step/history.h"
@@ -95,15 +96,30 @@ TEST(FloatMode, OfWhoPassesAStepOverChangesNoLaterAnswer) {
   const Edge& edge = body.topology->edges().front();
   body.minimum_separation_m = ((*body.t0)[edge[0]] - (*body.t0)[edge[1]]).norm();
   body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*body.t0, {}});
+  Options options;
+  options.accuracy.rung = Accuracy::CONSERVATIVE;  // whose minimum separation may be above 0
   const auto distancesAfterPassingOver = [&](int mode) {
     History history;
     const RoundingMode rounding(mode);
-    history.impl().passOver(cloth, Options{});
+    history.impl().passOver(cloth, options);
     EXPECT_EQ(std::fegetround(), mode);
+    const LeftOutOfBody& left_out = history.impl().left_out[0];
+    const SceneBody& ranks = history.impl().scene.bodies()[0];
+    const Index vertices = static_cast<Index>(body.t0->size());
+    const Index edges = static_cast<Index>(body.topology->edges().size());
+    const Index faces = static_cast<Index>(body.topology->faces().size());
     std::vector<double> distances;
-    for (const auto& of_body : history.impl().left_out) {
-      distances.insert(distances.end(), of_body.distances_m.begin(), of_body.distances_m.end());
-    }
+    const auto collect = [&](PairKind kind, Index first, Index firsts, Index second, Index seconds) {
+      for (std::uint64_t i = first; i < first + firsts; ++i) {
+        for (std::uint64_t j = second; j < second + seconds; ++j) {
+          const double distance_m = left_out.distance(kind, i << 32 | j);
+          if (std::isfinite(distance_m)) distances.push_back(distance_m);
+        }
+      }
+    };
+    collect(PairKind::VERTEX_FACE, ranks.vertex_begin, vertices, ranks.face_begin, faces);
+    collect(PairKind::EDGE_EDGE, ranks.edge_begin, edges, ranks.edge_begin, edges);
+    EXPECT_EQ(distances.size(), history.leftOut().size());
     return distances;
   };
   const std::vector<double> usual = distancesAfterPassingOver(FE_TONEAREST);
