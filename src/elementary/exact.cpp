@@ -58,6 +58,7 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
       continue;
     }
     simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});
+    std::size_t finished = 0;  // after the batched tier
     for (std::size_t i = 0; i < input.count; ++i) {
       ElementaryResult& result = results[begin + i];
       if (output.verdict[i] <= simd::BATCH_YES) {  // inside the step: its cells are below 2^toc_bits
@@ -68,9 +69,11 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
         result = either[output.verdict[i]];
       } else {
         result = finish(batch, begin + i, output, i, toc_bits_);
+        ++counters.settled[static_cast<std::size_t>(result.tier)];
+        ++finished;
       }
-      ++counters.settled[static_cast<std::size_t>(result.tier)];
     }
+    counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)] += input.count - finished;
   }
 }
 

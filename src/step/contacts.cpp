@@ -10,6 +10,7 @@ using Clock = Deadline::Clock;
 
 constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
 constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
+constexpr std::size_t HITS_AHEAD = 48, FEATURES_AHEAD = 16;  // that are fetched from memory
 
 }  // namespace
 
@@ -46,7 +47,10 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
   }
   std::vector<const std::vector<Hit>*> parts;
   std::size_t base = 0;
+  std::size_t all = 0;
+  for (const PairWorker& w : workers) all += w.hits(PairKind::VERTEX_FACE).size() + w.hits(PairKind::EDGE_EDGE).size();
   result.contacts.clear();
+  result.contacts.reserve(all);
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     parts.clear();
     for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
@@ -57,10 +61,13 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
       for (std::size_t i = first; i < last; ++i) {
         if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
-        if (i + 16 < last) __builtin_prefetch(sorted[i + 16]);
-        if (i + 8 < last)
-          scene.prefetchFeature(secondKind(kind), sorted[i + 8]->bodies & 0xffff,
-                                static_cast<Index>(sorted[i + 8]->key));
+        if (i + HITS_AHEAD < last) {
+          __builtin_prefetch(sorted[i + HITS_AHEAD]);
+          __builtin_prefetch(&sorted[i + HITS_AHEAD]->certainty);  // half of them lie across two cache lines
+        }
+        if (i + FEATURES_AHEAD < last)
+          scene.prefetchFeature(secondKind(kind), sorted[i + FEATURES_AHEAD]->bodies & 0xffff,
+                                static_cast<Index>(sorted[i + FEATURES_AHEAD]->key));
         writeContact(kind, *sorted[i], step, late, result.contacts[base + i]);
       }
     });

@@ -42,25 +42,28 @@ void HitOrder::beginStep() {
 }
 
 const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
-  a_.clear();
+  std::size_t count = 0;
+  for (const auto* part : parts) count += part->size();
+  a_.resize(count);
+  Entry* entry = a_.data();
   std::uint64_t key_or = 0, key_and = ~std::uint64_t{0}, bodies_or = 0, bodies_and = ~std::uint64_t{0};
   for (const auto* part : parts) {
     for (const Hit& h : *part) {
-      a_.push_back({h.key, &h});
+      *entry++ = {h.key, &h};
       key_or |= h.key;
       key_and &= h.key;
       bodies_or |= h.bodies;
       bodies_and &= h.bodies;
     }
   }
-  most_ = std::max(most_, a_.size());
-  if (a_.size() < FEW) {
+  most_ = std::max(most_, count);
+  if (count < FEW) {
     std::sort(a_.begin(), a_.end(), [](const Entry& x, const Entry& y) {
       return x.hit->bodies != y.hit->bodies ? x.hit->bodies < y.hit->bodies : x.key < y.key;
     });
     return sorted();
   }
-  b_.resize(a_.size());
+  b_.resize(count);
   // The ranks fill few of their 32 bits; side by side they need fewer digits.
   int low_bits = 0;
   while (low_bits < 32 && (key_or & 0xffffffffu) >> low_bits) ++low_bits;

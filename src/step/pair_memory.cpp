@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "dccd/tolerances.h"
+#include "simd/group_gaps.h"
 #include "step/closest_points.h"
 
 namespace dccd {

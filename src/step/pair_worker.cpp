@@ -47,10 +47,11 @@ void PairWorker::beginStep() {
   unchecked_toc_lower_ = std::numeric_limits<double>::infinity();
 }
 
-Clock::time_point PairWorker::lap(Stage stage, Clock::time_point start) {
+/// All time since the last lap was the stage's.
+void PairWorker::lap(Stage stage) {
   const Clock::time_point now = Clock::now();
-  stats_[stage].ms += std::chrono::duration<double, std::milli>(now - start).count();
-  return now;
+  stats_[stage].ms += std::chrono::duration<double, std::milli>(now - lap_begun_).count();
+  lap_begun_ = now;
 }
 
 void PairWorker::dropHits(PairKind kind, std::size_t begin) {
@@ -72,6 +73,13 @@ void PairWorker::begin(StepContext& context, const PairTask& task, std::size_t i
                   : nullptr;
   count_ = 0;
   separated_ms_ = 0;
+  begun_ = lap_begun_ = Clock::now();
+}
+
+void PairWorker::end() {
+  flush();
+  const double all_ms = std::chrono::duration<double, std::milli>(lap_begun_ - begun_).count();
+  stats_[effect()].ms += all_ms - separated_ms_;
 }
 
 /// Features of the task, by their slots.
@@ -83,7 +91,6 @@ bool PairWorker::shareVertex(std::size_t i, std::size_t j) const {
 
 void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
   begin(context, task, index);
-  const Clock::time_point whole = Clock::now();
   const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
   const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(kindA(task.kind)).featureCount());
   const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(kindB(task.kind)).featureCount());
@@ -101,8 +108,7 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::
     }
   }
   take(slots, n);
-  flush();
-  stats_[effect()].ms += msSince(whole) - separated_ms_;
+  end();
 }
 
 void PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
@@ -110,38 +116,30 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   begin(context, task, index);
   const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
                        task.self && task.kind == PairKind::EDGE_EDGE, context.span, task.self};
-  const Clock::time_point whole = Clock::now();
-  Clock::time_point start = whole;
   const double contact_m = context.contactDistance(task.body_a, task.body_b);
   for (std::size_t p = task.first; p < task.last; ++p) {
     const bool whole_pair =
         !goesOn()        ? false
-        : context.memory ? testRemembered(context.memory->group(p), contact_m, start)
+        : context.memory ? testRemembered(context.memory->group(p), contact_m)
                          : stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
-                             start = lap(Stage::BROAD_PHASE, start);
                              take(slots, n);
-                             start = Clock::now();
                              return goesOn();
                            });
     if (whole_pair) continue;
     leaveOut(trees, pairs, p);
     break;
   }
-  lap(Stage::BROAD_PHASE, start);
-  flush();
-  stats_[effect()].ms += msSince(whole) - separated_ms_;
+  end();
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
 }
 
 /// What the memory says of a group is to be tested. False: it was not gone through.
-bool PairWorker::testRemembered(PairMemory::Group& group, double contact_m, Clock::time_point& start) {
+bool PairWorker::testRemembered(PairMemory::Group& group, double contact_m) {
   constexpr std::size_t MOST = simd::GROUP * simd::GROUP;
   std::size_t n = 0;
   const auto pass = [&] {
-    start = lap(Stage::BROAD_PHASE, start);
     take(remembered_slots_.data(), n);
-    start = Clock::now();
     n = 0;
     return goesOn();
   };
@@ -166,21 +164,22 @@ void PairWorker::leaveOut(const TreePair& trees, const std::vector<std::uint32_t
 }
 
 void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
-  const Clock::time_point start = Clock::now();
   std::size_t n = count_;
+  Quad* quads = quads_.data();
+  std::array<std::uint32_t, 2>* kept_slots = slots_.data();
   if (task_->kind == PairKind::EDGE_EDGE) {
-    const ClusterTree &ta = a_->tree(FeatureKind::EDGE), &tb = b_->tree(FeatureKind::EDGE);
+    const Index *edges_a = a_->tree(FeatureKind::EDGE).feature(0), *edges_b = b_->tree(FeatureKind::EDGE).feature(0);
     for (std::size_t i = 0; i < count; ++i, ++n) {
-      const Index *ea = ta.feature(slots[2 * i]), *eb = tb.feature(slots[2 * i + 1]);
-      quads_[n] = {ea[0], ea[1], eb[0], eb[1]};
-      slots_[n] = {slots[2 * i], slots[2 * i + 1]};
+      const Index *ea = edges_a + std::size_t{2} * slots[2 * i], *eb = edges_b + std::size_t{2} * slots[2 * i + 1];
+      quads[n] = {ea[0], ea[1], eb[0], eb[1]};
+      kept_slots[n] = {slots[2 * i], slots[2 * i + 1]};
     }
   } else {
-    const ClusterTree &ta = a_->tree(FeatureKind::VERTEX), &tb = b_->tree(FeatureKind::FACE);
+    const Index *vertices = a_->tree(FeatureKind::VERTEX).feature(0), *faces = b_->tree(FeatureKind::FACE).feature(0);
     for (std::size_t i = 0; i < count; ++i, ++n) {
-      const Index* f = tb.feature(slots[2 * i + 1]);
-      quads_[n] = {*ta.feature(slots[2 * i]), f[0], f[1], f[2]};
-      slots_[n] = {slots[2 * i], slots[2 * i + 1]};
+      const Index* f = faces + std::size_t{3} * slots[2 * i + 1];
+      quads[n] = {vertices[slots[2 * i]], f[0], f[1], f[2]};
+      kept_slots[n] = {slots[2 * i], slots[2 * i + 1]};
     }
   }
   (task_->kind == PairKind::EDGE_EDGE ? stats_.ee_candidates : stats_.vf_candidates) += n - count_;
@@ -190,13 +189,13 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
     context_->observer->onPairs(Stage::BROAD_PHASE, task_->kind, quads_.data() + count_, n - count_);
   }
   count_ = n;
-  lap(Stage::BROAD_PHASE, start);
   if (count_ >= CHUNK) flush();
 }
 
 void PairWorker::flush() {
+  lap(Stage::BROAD_PHASE);
   if (count_ == 0) return;
-  const Clock::time_point start = Clock::now();
+  const Clock::time_point start = lap_begun_;
   filter();
   makeCanonical();
   if (separated_) setSeparations();
@@ -210,10 +209,11 @@ void PairWorker::flush() {
   } else {
     decide();
   }
+  lap(Stage::ELEMENTARY);
   context_->hits += hits.size() - before;
   if (counts) enough_ = !context_->found->add(task_index_, hits.size() - before) || enough_;
   if (separated_) {
-    const double ms = msSince(start);
+    const double ms = std::chrono::duration<double, std::milli>(lap_begun_ - start).count();
     stats_[rule_.uncertain ? Effect::TRACKER_NOISE : Effect::MINIMUM_SEPARATION].ms += ms;
     separated_ms_ += ms;
   }
@@ -225,37 +225,47 @@ void PairWorker::filter() {
     if (context_->observer) context_->observer->onPlanarSkipped(task_->kind, quads_.data(), count_);
     return;
   }
-  const Clock::time_point start = Clock::now();
   stats_[Stage::PLANAR].in += count_;
   const std::size_t kept =
       simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_, task_->kind == PairKind::EDGE_EDGE,
                         simd::FusedPlanes::ADAPTIVE, kept_.data());
+  const Index *ranks_a = a_->rank(kindA(task_->kind)).data(), *ranks_b = b_->rank(kindB(task_->kind)).data();
   for (std::size_t i = 0; i < kept; ++i) {
     quads_[i] = quads_[kept_[i]];
     slots_[i] = slots_[kept_[i]];
+    __builtin_prefetch(ranks_a + slots_[i][0]);  // makeCanonical() reads them next
+    __builtin_prefetch(ranks_b + slots_[i][1]);
   }
   count_ = kept;
   stats_[Stage::PLANAR].out += kept;
   if (context_->observer) context_->observer->onPairs(Stage::PLANAR, task_->kind, quads_.data(), count_);
-  lap(Stage::PLANAR, start);
+  lap(Stage::PLANAR);
 }
 
 // Only what the filters kept needs its ranks, and the elementary test wants the features in canonical order.
 void PairWorker::makeCanonical() {
-  const std::vector<Index>&ra = a_->rank(kindA(task_->kind)), &rb = b_->rank(kindB(task_->kind));
-  for (std::size_t i = 0; i < count_; ++i) {
-    const std::uint64_t rank_a = ra[slots_[i][0]], rank_b = rb[slots_[i][1]];
-    if (task_->kind == PairKind::VERTEX_FACE) {
-      keys_[i] = rank_a << 32 | rank_b;
-      continue;
+  const Index *ranks_a = a_->rank(kindA(task_->kind)).data(), *ranks_b = b_->rank(kindB(task_->kind)).data();
+  const std::array<std::uint32_t, 2>* slots = slots_.data();
+  std::uint64_t* keys = keys_.data();
+  if (task_->kind == PairKind::VERTEX_FACE) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      keys[i] = std::uint64_t{ranks_a[slots[i][0]]} << 32 | ranks_b[slots[i][1]];
     }
-    // Without a branch: of two edges, which one is first nothing foretells.
+    return;
+  }
+  Quad* quads = quads_.data();
+  for (std::size_t i = 0, n = count_; i < n; ++i) {
+    const std::uint64_t rank_a = ranks_a[slots[i][0]], rank_b = ranks_b[slots[i][1]];
+    // Of two edges, which one is first nothing foretells: they change places by a mask, for compilers make a branch of
+    // a condition.
+    const std::uint64_t swap = std::uint64_t{0} - (rank_b < rank_a);
     std::uint64_t edges[2];
-    std::memcpy(edges, &quads_[i], sizeof edges);
-    const std::uint64_t first = rank_b < rank_a ? edges[1] : edges[0], second = rank_b < rank_a ? edges[0] : edges[1];
-    std::memcpy(&quads_[i], &first, sizeof first);
-    std::memcpy(&quads_[i][2], &second, sizeof second);
-    keys_[i] = std::min(rank_a, rank_b) << 32 | std::max(rank_a, rank_b);
+    std::memcpy(edges, quads + i, sizeof edges);
+    const std::uint64_t of_edges = (edges[0] ^ edges[1]) & swap, of_ranks = (rank_a ^ rank_b) & swap;
+    edges[0] ^= of_edges;
+    edges[1] ^= of_edges;
+    std::memcpy(quads + i, edges, sizeof edges);
+    keys[i] = (rank_a ^ of_ranks) << 32 | (rank_b ^ of_ranks);
   }
 }
 
@@ -307,7 +317,6 @@ double PairWorker::boundOf(std::size_t i, double distance_m) {
 }
 
 void PairWorker::keepUndecided() {
-  const Clock::time_point start = Clock::now();
   auto& hits = hits_[static_cast<int>(task_->kind)];
   const std::uint32_t bodies = std::uint32_t{task_->body_a} << 16 | task_->body_b;
   std::size_t out = 0;
@@ -319,11 +328,9 @@ void PairWorker::keepUndecided() {
     ++out;
   }
   stats_.undecided += out;
-  lap(Stage::ELEMENTARY, start);
 }
 
 void PairWorker::decide() {
-  const Clock::time_point start = Clock::now();
   PairBatch batch;
   batch.kind = task_->kind;
   batch.vertices = context_->scene->vertices();
@@ -345,18 +352,20 @@ void PairWorker::decide() {
     *hit = static_cast<std::uint32_t>(i);
     hit += (r.verdict != Verdict::NO_CONTACT) & !(r.toc_lower > context_->not_after);
   }
+  hits.resize(before + static_cast<std::size_t>(hit - kept_.data()));
+  Hit* written = hits.data() + before;
   for (const std::uint32_t* one = kept_.data(); one != hit; ++one) {
     const std::size_t i = *one;
     ElementaryResult& r = results_[i];
-    countOut(i);
+    if (separated_) countOut(i);
     const bool certain = r.verdict == Verdict::CONTACT;
     if (!certain) {
       // As tight as the linear filter allows; dropLate() decides by the same bound.
       const double bound = boundOf(i, separationOf(i) + context_->tolerance_m);
       r.toc_lower = std::max(r.toc_lower, std::min(bound, 1.0));
     }
-    hits.push_back({keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,
-                    certain ? Certainty::CERTAIN : Certainty::UNDECIDED});
+    *written++ = {keys_[i], r.toc_lower, certain ? r.toc_upper : 1, bodies,
+                  certain ? Certainty::CERTAIN : Certainty::UNDECIDED};
     stats_.undecided += !certain;
     if (certain && context_->earliest_only) {
       double best = context_->best_toc_upper.load(std::memory_order_relaxed);
@@ -364,9 +373,9 @@ void PairWorker::decide() {
       }
     }
   }
+  if (!separated_) stats_[effect()].out += hits.size() - before;
   stats_[Stage::ELEMENTARY].in += count_;
   stats_[Stage::ELEMENTARY].out += hits.size() - before;
-  lap(Stage::ELEMENTARY, start);
 }
 
 }  // namespace dccd

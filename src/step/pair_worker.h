@@ -105,8 +105,9 @@ class PairWorker {
 
  private:
   void begin(StepContext& context, const PairTask& task, std::size_t index);
+  void end();
   bool goesOn() const { return !enough_ && !context_->timeIsUp(); }
-  bool testRemembered(PairMemory::Group& group, const double contact_m, Deadline::Clock::time_point& start);
+  bool testRemembered(PairMemory::Group& group, double contact_m);
   bool shareVertex(std::size_t i, std::size_t j) const;
   /// Pairs of slots whose features share no vertex.
   void take(const std::uint32_t* slots, std::size_t count);
@@ -127,7 +128,7 @@ class PairWorker {
   void setSeparations();
   double separationOf(std::size_t i) const { return separated_ ? separations_[i] : 0; }
   void countOut(std::size_t i);
-  Deadline::Clock::time_point lap(Stage stage, Deadline::Clock::time_point start);
+  void lap(Stage stage);
 
   StepContext* context_ = nullptr;
   const PairTask* task_ = nullptr;
@@ -146,9 +147,10 @@ class PairWorker {
   bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
   const LeftOutOfBody* left_out_ = nullptr;
   std::size_t count_ = 0;
-  std::size_t bounds_ = 0;   // that were asked for in this step
-  bool late_ = false;        // there is no time for more
-  double separated_ms_ = 0;  // of the task, that count for a separation or an uncertainty
+  std::size_t bounds_ = 0;                         // that were asked for in this step
+  bool late_ = false;                              // there is no time for more
+  Deadline::Clock::time_point begun_, lap_begun_;  // the task, and what the clock was read for last
+  double separated_ms_ = 0;                        // of the task, that count for a separation or an uncertainty
   std::vector<Hit> hits_[2];
   StepStats stats_;
   double unchecked_toc_lower_ = std::numeric_limits<double>::infinity();  // workers may be made during a step

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "simd/group_pairs.h"
+#include "simd/group_gaps.h"
 #include "support/step_support.h"
 
 namespace dccd {
