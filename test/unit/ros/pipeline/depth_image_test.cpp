@@ -1,0 +1,94 @@
+// A body that is what a depth camera sees: the newest cloud counts, whatever its triangles.
+#include <gtest/gtest.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <array>
+#include <cstring>
+#include <limits>
+
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+/// A cloth over what a depth camera sees: 8 x 8 pixels 0.1 m apart, the camera's frame that of the world.
+struct Seen : Driven {
+  Seen() : Driven(bodies()) {}
+  static XmlRpcValue bodies() {
+    XmlRpcValue tree;
+    tree["max_vertex_step_m"] = 0.0;
+    tree["effects"]["octomap"] = "off";
+    tree["bodies"]["cloth"]["topic"] = "cloth";
+    tree["bodies"]["seen"]["topic"] = "points";
+    tree["bodies"]["seen"]["motion"] = "static";
+    tree["bodies"]["seen"]["topology"]["source"] = "depth_image";
+    tree["bodies"]["seen"]["topology"]["stride"] = 1;
+    tree["bodies"]["seen"]["topology"]["max_edge_m"] = 0.2;
+    return tree;
+  }
+  /// Heights by column, NaN for a lost pixel; the first pixel at the origin.
+  void see(double stamp_s, const std::array<float, 8>& z) {
+    sensor_msgs::PointCloud2 out;
+    out.header.stamp = ros::Time(stamp_s);
+    out.header.frame_id = "world";
+    out.height = out.width = 8;
+    for (const char* name : {"x", "y", "z", "rgb"}) {
+      sensor_msgs::PointField field;
+      field.name = name;
+      field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
+      field.datatype = sensor_msgs::PointField::FLOAT32;
+      field.count = 1;
+      out.fields.push_back(field);
+    }
+    out.point_step = 16;
+    out.row_step = 128;
+    out.data.resize(1024);
+    for (std::size_t i = 0; i < 64; ++i) {
+      const float p[4] = {0.1f * static_cast<float>(i % 8), 0.1f * static_cast<float>(i / 8), z[i % 8], 0};
+      std::memcpy(out.data.data() + 16 * i, p, 16);
+    }
+    pipeline.take(1, {"sensor_msgs/PointCloud2", bytesOf(out), 0, 0});
+    pipeline.nextOutcome(0, outcome);
+  }
+};
+constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
+
+TEST(DepthImage, TheNewestCloudHoldsWhateverItsTriangles) {
+  Seen scene;
+  scene.see(1, {0, 0, 0, 0, 0, 0, 0, 0});
+  scene.feed(1, 0.3f);
+  // The cloth, x from 0.15 to 0.25, goes from 0.3 to -0.1 and meets the plane z = 0 at 3/4 of the step.
+  EXPECT_NEAR(scene.feed(1.1, -0.1f).earliest_toc, 0.75, 1e-6);
+  EXPECT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+  EXPECT_EQ(scene.outcome.start_state, StartState::CLEAR);
+  // Another cloud with other triangles: the plane is 0.15 m higher, half of it.
+  scene.feed(1.2, 0.3f);
+  scene.see(1.25, {0.15f, 0.15f, 0.15f, 0.15f, LOST, LOST, LOST, LOST});
+  const Outcome& higher = scene.feed(1.3, 0.1f);
+  EXPECT_EQ(higher.status, StepStatus::OK) << higher.reason;
+  EXPECT_NEAR(higher.earliest_toc, 0.75, 1e-6) << "0.3 to 0.1 meets 0.15";
+  // The cloth now hangs over a hole in what is seen.
+  scene.see(1.35, {0, LOST, LOST, LOST, LOST, 0, 0, 0});
+  scene.feed(1.4, 0.3f);
+  const Outcome& hole = scene.feed(1.5, -0.1f);
+  EXPECT_EQ(hole.status, StepStatus::OK) << hole.reason;
+  EXPECT_TRUE(hole.contacts.empty());
+  EXPECT_EQ(scene.pipeline.monitor().counters(1).processed(), 3u);
+  EXPECT_EQ(scene.pipeline.monitor().counters(1).of(StepStatus::TOPOLOGY_CHANGED), 0u);
+}
+
+TEST(DepthImage, ACameraThatSeesNothingLeavesTheSurfaceBefore) {
+  Seen scene;
+  scene.see(1, {0, 0, 0, 0, 0, 0, 0, 0});
+  scene.see(1.05, {LOST, LOST, LOST, LOST, LOST, LOST, LOST, LOST});
+  EXPECT_EQ(scene.pipeline.monitor().counters(1).of(StepStatus::BAD_MESSAGE), 1u);
+  const std::string complaint = scene.pipeline.takeComplaint(1);
+  EXPECT_NE(complaint.find("no three of the 64 kept pixels"), std::string::npos) << complaint;
+  scene.feed(1.1, 0.3f);
+  EXPECT_NEAR(scene.feed(1.2, -0.1f).earliest_toc, 0.75, 1e-6);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

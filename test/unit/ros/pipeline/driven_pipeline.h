@@ -1,0 +1,116 @@
+// The pipeline that the node and analyze_bag share, driven by messages as bytes: a cloth, a map, transforms.
+#pragma once
+
+#include <geometry_msgs/TransformStamped.h>
+#include <gtest/gtest.h>
+#include <octomap/OcTree.h>
+#include <octomap_msgs/Octomap.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <cstring>
+#include <sstream>
+
+#include "node/map_loader.h"
+#include "node/monitor_pipeline.h"
+
+namespace dccd {
+namespace test {
+
+using XmlRpc::XmlRpcValue;
+
+template <typename Message>
+std::vector<std::uint8_t> bytesOf(const Message& message) {
+  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, message);
+  return bytes;
+}
+
+/// 2 x 2 points, 0.1 m apart, first corner at (0.15, 0.15, z), each point `tilt` above the one before; the field sigma
+/// where wanted.
+inline std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float>& sigma = {},
+                                       const std::string& frame = "world", float tilt = 0) {
+  sensor_msgs::PointCloud2 out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = frame;
+  out.height = out.width = 2;
+  for (const char* name : {"x", "y", "z", "sigma"}) {
+    if (sigma.empty() && std::string(name) == "sigma") continue;
+    sensor_msgs::PointField field;
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    out.fields.push_back(field);
+  }
+  out.point_step = 16;
+  out.row_step = 32;
+  out.data.resize(64);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const float p[4] = {0.15f + 0.1f * static_cast<float>(i % 2), 0.15f + 0.1f * static_cast<float>(i / 2),
+                        z + tilt * static_cast<float>(i), sigma.empty() ? 0 : sigma[i]};
+    std::memcpy(out.data.data() + 16 * i, p, 16);
+  }
+  return bytesOf(out);
+}
+
+/// Occupied below 0, free up to 0.2, unknown from there on; 0.1 m voxels over 0.5 m x 0.5 m.
+inline std::vector<std::uint8_t> map(double stamp_s) {
+  octomap_msgs::Octomap out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = "world";
+  out.binary = true;
+  out.id = "OcTree";
+  out.resolution = 0.1;
+  octomap::OcTree tree(0.1);
+  for (int x = 0; x < 5; ++x) {
+    for (int y = 0; y < 5; ++y) {
+      for (int z = -2; z < 2; ++z) tree.updateNode(0.1 * x + 0.05, 0.1 * y + 0.05, 0.1 * z + 0.05, z < 0);
+    }
+  }
+  std::ostringstream stream;
+  tree.writeBinaryData(stream);
+  const std::string bytes = stream.str();
+  out.data.assign(bytes.begin(), bytes.end());
+  return bytesOf(out);
+}
+
+struct Driven {
+  tf2::BufferCore transforms;
+  MonitorConfig config;
+  MonitorPipeline pipeline;
+  Outcome outcome;
+
+  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms) {}
+
+  void giveMap(double stamp_s) {
+    LoadedMap loaded = decodeMapMessage(map(stamp_s), config);
+    EXPECT_EQ(loaded.problem, "");
+    pipeline.setMap(std::move(loaded), 0);
+  }
+  /// The frame `child`, at all times `z` above the world.
+  void raise(const std::string& child, double z) {
+    geometry_msgs::TransformStamped transform;
+    transform.header.frame_id = "world";
+    transform.child_frame_id = child;
+    transform.transform.translation.z = z;
+    transform.transform.rotation.w = 1;
+    transforms.setTransform(transform, "test", true);
+  }
+  const Outcome& feed(double stamp_s, float z, const std::vector<float>& sigma = {}, const std::string& frame = "world",
+                      float tilt = 0) {
+    pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, z, sigma, frame, tilt), 0, 0});
+    EXPECT_TRUE(pipeline.nextOutcome(0, outcome));
+    return outcome;
+  }
+};
+
+inline XmlRpcValue scene() {
+  XmlRpcValue tree;
+  tree["fixed_frame"] = "world";
+  tree["max_vertex_step_m"] = 0.0;
+  return tree;
+}
+
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,159 @@
+// A static body whose frames are sent once: how they wait for their transform, and what the steps say meanwhile.
+#include <gtest/gtest.h>
+
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr std::int64_t SECOND_NS = 1000000000;
+
+/// A cloth in the world over a static table in a frame of its own, whose transform is not there.
+struct Tabled : Driven {
+  Tabled() : Driven(bodies()) {}
+  static XmlRpcValue bodies() {
+    XmlRpcValue tree;
+    tree["max_vertex_step_m"] = 0.0;
+    tree["effects"]["octomap"] = "off";
+    tree["bodies"]["cloth"]["topic"] = "cloth";
+    tree["bodies"]["table"]["topic"] = "table";
+    tree["bodies"]["table"]["motion"] = "static";
+    return tree;
+  }
+  void take(std::size_t body, double stamp_s, float z, std::int64_t now_ns) {
+    pipeline.take(body,
+                  {"sensor_msgs/PointCloud2", cloud(stamp_s, z, {}, body == TABLE ? "table" : "world"), 0, now_ns});
+  }
+  const FrameCounters& tables() const { return pipeline.monitor().counters(TABLE); }
+  static constexpr std::size_t CLOTH = 0, TABLE = 1;
+};
+
+TEST(StaticBodies, TheOnlyFrameWaitsForItsTransform) {
+  Tabled scene;
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  EXPECT_FALSE(scene.pipeline.nextOutcome(0, scene.outcome));
+  EXPECT_FALSE(scene.pipeline.idle(Tabled::TABLE)) << "a newer one waits its turn at first";
+  EXPECT_FALSE(scene.pipeline.nextOutcome(SECOND_NS, scene.outcome)) << "nobody knows the fixed frame yet";
+  EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "which is no mistake";
+
+  scene.take(Tabled::CLOTH, 2, 0.3f, 2 * SECOND_NS);
+  ASSERT_TRUE(scene.pipeline.nextOutcome(2 * SECOND_NS, scene.outcome));
+  const std::string complaint = scene.pipeline.takeComplaint(Tabled::TABLE);
+  EXPECT_EQ(complaint.rfind("waits: no transform from 'table' to 'world'", 0), 0u) << complaint;
+  scene.take(Tabled::CLOTH, 2.1, 0.3f, 3 * SECOND_NS);
+  scene.pipeline.nextOutcome(3 * SECOND_NS, scene.outcome);
+  ASSERT_TRUE(scene.pipeline.nextOutcome(4 * SECOND_NS, scene.outcome));
+  EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+  EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'table' to 'world'", 0), 0u) << scene.outcome.reason;
+  EXPECT_EQ(scene.pipeline.takeComplaint(Tabled::TABLE), "") << "said once";
+  EXPECT_EQ(scene.pipeline.checkNow().reason, scene.outcome.reason);
+  EXPECT_EQ(scene.tables().waiting(), 1u);
+
+  ASSERT_TRUE(scene.pipeline.idle(Tabled::TABLE));
+  scene.take(Tabled::TABLE, 1.5, 0, 5 * SECOND_NS);
+  EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u) << "the newer one takes its place";
+  EXPECT_EQ(scene.tables().waiting(), 1u);
+  scene.pipeline.reset(StepStatus::RESET);
+  EXPECT_EQ(scene.tables().waiting(), 1u) << "static bodies stay over a reset";
+
+  scene.raise("table", 0.1);
+  scene.take(Tabled::CLOTH, 3, 0.3f, 6 * SECOND_NS);
+  ASSERT_TRUE(scene.pipeline.nextOutcome(6 * SECOND_NS, scene.outcome));
+  scene.take(Tabled::CLOTH, 3.1, -0.1f, 7 * SECOND_NS);
+  ASSERT_TRUE(scene.pipeline.nextOutcome(7 * SECOND_NS, scene.outcome));
+  ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+  EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+  EXPECT_EQ(scene.tables().processed(), 1u);
+  EXPECT_EQ(scene.pipeline.monitor().total().waiting(), 0u);
+}
+
+TEST(StaticBodies, AreWhereTheyWereWhenTheFixedFrameIsLearntAnew) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  for (const double stamp_s : {2.0, 3.0}) {
+    scene.take(Tabled::CLOTH, stamp_s, 0.3f, 0);
+    ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+    EXPECT_EQ(scene.outcome.status, StepStatus::FIRST_FRAME);
+    scene.take(Tabled::CLOTH, stamp_s + 0.1, -0.1f, 0);
+    ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+    ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+    EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+    EXPECT_EQ(scene.tables().received, 1u);
+    EXPECT_EQ(scene.tables().processed(), 1u);
+    scene.pipeline.reset(StepStatus::RESET);
+    EXPECT_EQ(scene.pipeline.fixedFrame(), "");
+    EXPECT_EQ(scene.tables().waiting(), 1u);
+  }
+}
+
+TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  double stamp_s = 1;
+  const auto feed = [&](float z, std::int64_t now_ns) {
+    scene.take(Tabled::CLOTH, stamp_s += 0.1, z, now_ns);
+    return scene.pipeline.nextOutcome(now_ns, scene.outcome);
+  };
+  ASSERT_TRUE(feed(0.3f, 0));
+  ASSERT_TRUE(feed(0.3f, 0));
+  ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+
+  const auto moved = cloud(2, 0, {}, "lorry");
+  scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, SECOND_NS});
+  EXPECT_FALSE(feed(0.3f, SECOND_NS)) << "waits with the table's frame, as long as that may wait";
+  ASSERT_TRUE(scene.pipeline.nextOutcome(2 * SECOND_NS, scene.outcome));
+  EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+  EXPECT_FALSE(scene.outcome.answered);
+  EXPECT_EQ(scene.outcome.reason.rfind("no transform from 'lorry' to 'world'", 0), 0u) << scene.outcome.reason;
+  EXPECT_NE(scene.outcome.reason.find("body 'table'"), std::string::npos) << scene.outcome.reason;
+  const Outcome now = scene.pipeline.checkNow();
+  EXPECT_FALSE(now.answered);
+  EXPECT_EQ(now.status, StepStatus::NO_BODY);
+  EXPECT_EQ(now.reason, scene.outcome.reason);
+  scene.pipeline.take(Tabled::TABLE, {"sensor_msgs/PointCloud2", moved, 0, 3 * SECOND_NS});
+  ASSERT_TRUE(feed(0.3f, 3 * SECOND_NS)) << "what comes in a frame that is known to be missing holds nothing up again";
+  EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+
+  scene.raise("lorry", 0.1);
+  ASSERT_TRUE(feed(0.3f, 4 * SECOND_NS));
+  ASSERT_TRUE(feed(-0.1f, 4 * SECOND_NS));
+  ASSERT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+  EXPECT_NEAR(scene.outcome.earliest_toc, 0.5, 1e-6);
+  const FrameCounters total = scene.pipeline.monitor().total();
+  EXPECT_EQ(total.of(StepStatus::NO_BODY), 2u);
+  EXPECT_EQ(total.of(StepStatus::NO_TRANSFORM), 1u) << "the table's second frame gave way to the third";
+  EXPECT_EQ(total.waiting(), 0u);
+}
+
+TEST(StaticBodies, CloudsThatComeFasterThanTfFindTheirPlace) {
+  Tabled scene;
+  scene.take(Tabled::CLOTH, 1, 0.3f, 0);
+  ASSERT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  scene.pipeline.nextOutcome(SECOND_NS, scene.outcome);  // has waited in vain
+  ASSERT_TRUE(scene.pipeline.idle(Tabled::TABLE));
+  scene.take(Tabled::TABLE, 2, 0, SECOND_NS);
+  scene.pipeline.nextOutcome(SECOND_NS, scene.outcome);
+  EXPECT_FALSE(scene.pipeline.idle(Tabled::TABLE)) << "its transform may come in a moment";
+  scene.raise("table", 0.1);
+  scene.pipeline.nextOutcome(SECOND_NS + 1, scene.outcome);
+  EXPECT_EQ(scene.tables().processed(), 1u);
+  EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u);
+}
+
+TEST(StaticBodies, WhatStillWaitsAtTheEndIsCounted) {
+  Tabled scene;
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  scene.pipeline.nextOutcome(SECOND_NS, scene.outcome);
+  scene.pipeline.finish();
+  EXPECT_FALSE(scene.pipeline.nextOutcome(SECOND_NS, scene.outcome));
+  EXPECT_EQ(scene.tables().of(StepStatus::NO_TRANSFORM), 1u);
+  EXPECT_EQ(scene.tables().waiting(), 0u);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,115 @@
+// What the map does not know, as `unknown_space` has it: ignored, reported or an obstacle; never of a map that is too
+// old.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "dccd/assurance.h"
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+TEST(UnknownSpace, FreeIsWhatNobodyAskedAbout) {
+  Driven free(scene());
+  EXPECT_EQ(decodeMapMessage(map(1), free.config).known, nullptr) << "nothing is built of it";
+  free.giveMap(1);
+  free.feed(1, 0.35f);
+  const Outcome& outcome = free.feed(1.1, 0.15f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << "the unknown is no obstacle";
+  EXPECT_EQ(outcome.unknown_fraction, 0);
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 0u);
+  EXPECT_FALSE(free.pipeline.effects().plan().running(Effect::UNKNOWN_SPACE));
+}
+
+TEST(UnknownSpace, ReportGivesItsShareOfWhatIsSwept) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  Driven report(tree);
+  report.giveMap(1);
+  report.feed(1, 0.35f);
+  // Swept: 2 x 2 columns of voxels, z from 0.1 to 0.4; the upper two of three are unknown.
+  const Outcome& outcome = report.feed(1.1, 0.15f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << "reported, and no obstacle";
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 12u);
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].out, 8u);
+  EXPECT_NEAR(outcome.unknown_fraction, 2.0 / 3, 1e-12);
+  EXPECT_EQ(report.feed(1.2, 0.12f).unknown_fraction, 0) << "within what is known";
+  EXPECT_TRUE(report.pipeline.effects().plan().running(Effect::UNKNOWN_SPACE));
+}
+
+TEST(UnknownSpace, AShareOfAPartIsNotGivenOut) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  tree["max_step_s"] = 10.0;
+  Driven report(tree);
+  report.giveMap(1);
+  const auto spread = [&](double stamp_s, float reach) {
+    auto bytes = cloud(stamp_s, 0.35f);
+    const float far[3] = {reach, reach, reach};
+    std::memcpy(bytes.data() + bytes.size() - 1 - 16, far, sizeof far);  // the last point; is_dense follows
+    report.pipeline.take(0, {"sensor_msgs/PointCloud2", bytes, 0, 0});
+    EXPECT_TRUE(report.pipeline.nextOutcome(0, report.outcome));
+  };
+  spread(1, 0.5f);
+  spread(1.1, 2000);  // across 5000 blocks of voxels an axis
+  ASSERT_TRUE(report.outcome.answered) << report.outcome.reason;
+  EXPECT_TRUE(std::isnan(report.outcome.unknown_fraction)) << report.outcome.unknown_fraction;
+  spread(1.2, 2000);
+  spread(1.3, 0.5f);
+  spread(1.4, 0.5f);
+  EXPECT_GT(report.outcome.unknown_fraction, 0) << "and is there again as soon as all is counted";
+}
+
+TEST(UnknownSpace, MaskedVerticesSweepNothing) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  tree["vertex_mask"][0] = 0;  // of the two triangles of the grid one is left, or none
+  Driven masked(tree);
+  masked.giveMap(1);
+  masked.feed(1, 0.35f);
+  const std::uint64_t some = masked.feed(1.1, 0.15f).stats[Effect::UNKNOWN_SPACE].in;
+  EXPECT_LE(some, 12u);
+  for (int v = 0; v < 4; ++v) tree["vertex_mask"][v] = v;
+  Driven all(tree);
+  all.giveMap(1);
+  all.feed(1, 0.35f);
+  EXPECT_EQ(all.feed(1.1, 0.15f).stats[Effect::UNKNOWN_SPACE].in, 0u);
+  EXPECT_EQ(all.outcome.unknown_fraction, 0);
+}
+
+TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "occupied";
+  const double box[6] = {0, 0, 0, 0.5, 0.5, 0.6};
+  for (int i = 0; i < 6; ++i) tree["unknown_box"][i] = box[i];
+  Driven occupied(tree);
+  occupied.giveMap(1);
+  occupied.feed(1, 0.12f);
+  const Outcome& outcome = occupied.feed(1.1, 0.28f);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  ASSERT_FALSE(outcome.contacts.empty()) << "from the known into the unknown";
+  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-4);
+}
+
+TEST(UnknownSpace, AnOldMapIsNoMap) {
+  XmlRpcValue tree = scene();
+  tree["octomap_timeout_s"] = 1.0;
+  tree["unknown_space"] = "report";
+  Driven old(tree);
+  old.giveMap(1);
+  old.feed(1.8, 0.12f);
+  EXPECT_EQ(old.feed(1.9, 0.13f).status, StepStatus::OK);
+  const Outcome& late = old.feed(2.1, 0.14f);
+  EXPECT_EQ(late.status, StepStatus::NO_MAP);
+  EXPECT_NE(late.reason.find("octomap_timeout_s"), std::string::npos) << late.reason;
+  EXPECT_EQ(late.unknown_fraction, 0) << "of no map nothing is unknown";
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,54 @@
+// Triangles of a marker that share corners: what came apart stays apart until a reset welds anew.
+#include <gtest/gtest.h>
+#include <visualization_msgs/Marker.h>
+
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+/// Two triangles that share an edge; the second one's corner on it `apart` above the first one's.
+std::vector<std::uint8_t> soup(double stamp_s, double apart) {
+  visualization_msgs::Marker out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = "world";
+  out.type = visualization_msgs::Marker::TRIANGLE_LIST;
+  out.scale.x = out.scale.y = out.scale.z = out.pose.orientation.w = 1;
+  const double corners[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 1, apart}, {1, 0, apart}, {1, 1, 0}};
+  for (const auto& corner : corners) {
+    geometry_msgs::Point point;
+    point.x = corner[0];
+    point.y = corner[1];
+    point.z = corner[2];
+    out.points.push_back(point);
+  }
+  return bytesOf(out);
+}
+
+TEST(Weld, AResetWeldsAnew) {
+  Driven welded(scene());
+  double stamp_s = 1;
+  const auto vertices = [&](double apart) {
+    for (int frame = 0; frame < 2; ++frame) {
+      const auto bytes = soup(stamp_s += 0.1, apart);
+      welded.pipeline.take(0, {"visualization_msgs/Marker", bytes, 0, 0});
+      EXPECT_TRUE(welded.pipeline.nextOutcome(0, welded.outcome));
+    }
+    return welded.outcome.answered ? welded.outcome.step->bodies[0].topology->vertexCount() : 0;
+  };
+  EXPECT_EQ(vertices(0), 4u);
+  EXPECT_EQ(welded.pipeline.weldChanges(), 0u);
+  EXPECT_EQ(vertices(0.5), 6u);
+  EXPECT_EQ(welded.pipeline.weldChanges(), 2u) << "vertices that came apart, not frames";
+  EXPECT_EQ(vertices(0), 6u) << "what touches again is contact, not mesh";
+  welded.pipeline.reset(StepStatus::DISABLED);
+  EXPECT_EQ(vertices(0), 6u) << "references stay, too";
+  welded.pipeline.reset(StepStatus::RESET);
+  EXPECT_EQ(vertices(0), 4u) << "the first frame after a reset is a first frame";
+  EXPECT_EQ(welded.pipeline.weldChanges(), 2u);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
