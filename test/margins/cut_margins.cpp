@@ -19,6 +19,7 @@
 #include "dccd/tolerances.h"
 #include "simd/float_mode.h"
 #include "support/margin_checks.h"
+#include "support/margin_witnesses.h"
 #include "support/query_property.h"
 
 namespace dccd {

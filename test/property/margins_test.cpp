@@ -18,6 +18,7 @@
 #include "simd/float_mode.h"
 #include "support/generators.h"
 #include "support/margin_checks.h"
+#include "support/margin_witnesses.h"
 #include "support/query_property.h"
 
 namespace dccd {
