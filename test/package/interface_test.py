@@ -79,7 +79,7 @@ class InterfaceTest(unittest.TestCase):
     def test_units_of_a_bodys_parameters(self):
         """Metres where a name says so; what the code reads as a real number, and only that, has metres or metres per unit.
 
-        InterfacePage in test/unit/ros/parameters_test.cpp holds the defaults, through the node's own reader."""
+        InterfacePage in test/unit/ros/interface_page_test.cpp holds the defaults, through the node's own reader."""
         units = dict(body_parameters())
         self.assertGreater(len(units), 20, 'the search found too little to mean anything')
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})

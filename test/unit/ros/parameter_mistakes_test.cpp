@@ -1,0 +1,173 @@
+// Mistakes in the parameters of the node: each is refused with its name, its value or line, and what to write.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "unit/ros/parameter_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
+  XmlRpcValue tree;
+  tree["max_stp_s"] = 0.5;
+  EXPECT_TRUE(mentions(errorOf(tree), "~max_stp_s")) << errorOf(tree);
+  EXPECT_TRUE(mentions(errorOf(tree), "~max_step_s")) << errorOf(tree);
+  XmlRpcValue nested;
+  nested["topology"]["rwos"] = 3;
+  EXPECT_TRUE(mentions(errorOf(nested), "~topology/rwos")) << errorOf(nested);
+  EXPECT_TRUE(mentions(errorOf(nested), "~topology/rows")) << errorOf(nested);
+}
+
+TEST(Parameters, WrongTypesAreRefused) {
+  XmlRpcValue text;
+  text["tolerance_m"] = "1e-6";
+  EXPECT_TRUE(mentions(errorOf(text), "~tolerance_m is a string")) << errorOf(text);
+  EXPECT_TRUE(mentions(errorOf(text), "1.0e-6")) << "the usual mistake is named";
+  XmlRpcValue number;
+  number["num_threads"] = 1.5;
+  EXPECT_TRUE(mentions(errorOf(number), "integer")) << errorOf(number);
+  XmlRpcValue section;
+  section["topology"] = "grid";
+  EXPECT_TRUE(mentions(errorOf(section), "section")) << errorOf(section);
+}
+
+TEST(Parameters, ContradictionsSayWhatToWrite) {
+  struct Case {
+    const char* expected;
+    std::function<void(XmlRpcValue&)> set;
+  };
+  const Case cases[] = {
+      {"~accuracy is 'fast', which proves nothing and is no setting of a monitor; write exact",
+       [](XmlRpcValue& t) { t["accuracy"] = "fast"; }},
+      {"~accuracy is 'screen', which proves nothing and is no setting of a monitor; write exact",
+       [](XmlRpcValue& t) { t["accuracy"] = "screen"; }},
+      {"~accuracy is 'exactly', it must be one of conservative, exact; nearest is 'exact'",
+       [](XmlRpcValue& t) { t["accuracy"] = "exactly"; }},
+      // Names that were once taken.
+      {"~record_ring is not known; nearest is ~record_steps", [](XmlRpcValue& t) { t["record_ring"] = 3; }},
+      {"~record_directory is not known; nearest is ~record_folder",
+       [](XmlRpcValue& t) { t["record_directory"] = "steps"; }},
+      {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
+      {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
+       "separation: write accuracy: conservative",
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["minimum_separation_m"] = 0.01;
+       }},
+      {"~bodies/cloth/minimum_separation_m asks for a minimum separation: write accuracy: conservative",
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["bodies"]["cloth"]["minimum_separation_m"] = 0.01;
+       }},
+      {"~minimum_separation_pairs asks for",
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["minimum_separation_pairs"][0] = separationPair("mesh", "octomap", 0.01);
+       }},
+      {"~uncertainty asks for an uncertainty radius: write accuracy: conservative",
+       [](XmlRpcValue& t) {
+         t["accuracy"] = "exact";
+         t["uncertainty"]["radius_m"] = 0.01;
+       }},
+      {"~minimum_separation_m is -0.1, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
+      {"~minimum_separation_m is nan, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = NAN; }},
+      {"~minimum_separation_m is inf, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = INFINITY; }},
+      {"~bodies/cloth/minimum_separation_m is -1, it must be from 0",
+       [](XmlRpcValue& t) { t["bodies"]["cloth"]["minimum_separation_m"] = -1; }},
+      {"minimum_separation_pairs[0]/separation_m is nan",
+       [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("mesh", "mesh", NAN); }},
+      {"names 'mush', which is no body and not octomap; nearest is 'mesh'",
+       [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("mush", "octomap", 0.01); }},
+      {"names octomap twice",
+       [](XmlRpcValue& t) { t["minimum_separation_pairs"][0] = separationPair("octomap", "octomap", 0.01); }},
+      {"minimum_separation_pairs[1]/between names mesh and octomap, as minimum_separation_pairs[0] does",
+       [](XmlRpcValue& t) {
+         t["minimum_separation_pairs"][0] = separationPair("octomap", "mesh", 0.01);
+         t["minimum_separation_pairs"][1] = separationPair("mesh", "octomap", 0.01);
+       }},
+      {"minimum_separation_pairs[2]/between names finger and felt, as minimum_separation_pairs[0] does",
+       [](XmlRpcValue& t) {
+         t["bodies"]["felt"]["topic"] = "felt";
+         t["bodies"]["finger"]["topic"] = "finger";
+         t["minimum_separation_pairs"][0] = separationPair("felt", "finger", 0.004);
+         t["minimum_separation_pairs"][1] = separationPair("felt", "felt", 0.004);
+         t["minimum_separation_pairs"][2] = separationPair("finger", "felt", 0.01);
+       }},
+      {"~uncertainty/radius_m is -0.1", [](XmlRpcValue& t) { t["uncertainty"]["radius_m"] = -0.1; }},
+      {"~uncertainty/scale has no meaning without field", [](XmlRpcValue& t) { t["uncertainty"]["scale"] = 3.0; }},
+      {"nearest is 'exact'", [](XmlRpcValue& t) { t["accuracy"] = "exakt"; }},
+      {"topology/file", [](XmlRpcValue& t) { t["topology"]["source"] = "file"; }},
+      {"clock_body", [](XmlRpcValue& t) { t["clock_body"] = "sleeve"; }},
+      {"unknown_box", [](XmlRpcValue& t) { t["unknown_space"] = "occupied"; }},
+      {"rigid and cannot meet itself",
+       [](XmlRpcValue& t) {
+         t["bodies"]["cloth"]["topic"] = "cloth";
+         t["bodies"]["finger"]["rigid"]["mesh"] = "finger.stl";
+         t["bodies"]["finger"]["rigid"]["frame"] = "finger";
+         t["bodies"]["finger"]["self_collision"] = true;
+       }},
+      {"~topology/stride has no meaning without source: depth_image",
+       [](XmlRpcValue& t) { t["topology"]["stride"] = 2; }},
+      {"~bodies/seen/motion must be static with topology/source depth_image",
+       [](XmlRpcValue& t) { t["bodies"]["seen"]["topology"]["source"] = "depth_image"; }},
+      {"~bodies/seen/topology/median must be odd",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["topology"]["median"] = 4;
+       }},
+      {"~bodies/seen/topology/rows has no meaning for a depth image",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["topology"]["rows"] = 480;
+         t["bodies"]["seen"]["topology"]["cols"] = 640;
+       }},
+      {"~bodies/seen/topology/file has no meaning for a depth image",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["topology"]["file"] = "a.ply";
+       }},
+      {"~bodies/seen/vertex_mask has no meaning for a depth image",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["vertex_mask"][0] = 1;
+       }},
+      {"is one view of a surface and cannot meet itself",
+       [](XmlRpcValue& t) {
+         depthImage(t);
+         t["bodies"]["seen"]["self_collision"] = true;
+       }},
+      {"cannot be chosen: no body is a stream of meshes", [](XmlRpcValue& t) { depthImage(t); }},
+  };
+  for (const Case& one : cases) {
+    XmlRpcValue tree;
+    one.set(tree);
+    EXPECT_TRUE(mentions(errorOf(tree), one.expected)) << one.expected << ": " << errorOf(tree);
+  }
+}
+
+TEST(Parameters, OfAFileTheLineIsNamed) {
+  const auto errorIn = [](const std::string& text) -> std::string {
+    try {
+      readConfig(parseYaml(text, "p.yaml"), "");
+    } catch (const ParameterError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(errorIn("fixed_frame: world\ntopology: {source: grid, rows: 3, cols: 4}\n"), "accepted");
+  EXPECT_EQ(errorIn("fixed_frame: world\nmax_step_s: -1\n").find("p.yaml:2: max_step_s is -1, it must be from"), 0u);
+  EXPECT_EQ(errorIn("topology:\n  source: grid\n  rwos: 3\n"),
+            "p.yaml:3: topology/rwos is not known; nearest is topology/rows");
+  EXPECT_EQ(errorIn("\ntopology: grid\n"), "p.yaml:2: topology is a string, a section is needed");
+  EXPECT_EQ(errorIn("minimum_separation_pairs:\n  - {between: [mesh, mesh], separation_m: 1}\n  - {between: [mesh]}\n")
+                .find("p.yaml:3: minimum_separation_pairs[1]/between must name two bodies"),
+            0u);
+  EXPECT_NE(errorIn("fixed_frame: &a [*a]\n").find("p.yaml:1: nests too deeply"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
