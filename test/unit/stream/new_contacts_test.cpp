@@ -1,0 +1,162 @@
+// Which contacts of a stream are an alarm: those with which a patch begins that nobody expected, once.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dccd/assurance.h"
+#include "dccd/new_contacts.h"
+#include "unit/stream/patch_stream.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+TEST(NewContacts, APatchIsNewsOnceAndThenLasts) {
+  Stream stream({grid(5, 21)});
+  stream.setMap(table(0.05));
+  std::vector<Touching> said;
+  for (int k = 0; k < 8; ++k) {
+    // One column more touches in every frame: growth.
+    const Outcome outcome = stream.feed(
+        {strip(5, 21, 0.02, [&](std::size_t c) { return k == 0 || static_cast<int>(c) > k ? 0.01 : 0.0; })});
+    said.push_back(assuranceOf(outcome).touching);
+    const std::vector<NewContact> found = newContacts(outcome);
+    ASSERT_EQ(found.size(), k == 1 ? 1u : 0u) << k;
+    EXPECT_EQ(std::isfinite(earliestNewToc(outcome)), k == 1) << k;
+    if (k > 0) EXPECT_LT(outcome.counts.initial, outcome.total_contacts) << k << ": of itself each step has news";
+    if (k != 1) continue;
+    EXPECT_EQ(found[0].body, (std::array<std::uint16_t, 2>{0, OBSTACLE_BODY}));
+    EXPECT_EQ(found[0].patch, 1u);
+    EXPECT_EQ(found[0].contact.toc_lower, earliestNewToc(outcome));
+  }
+  EXPECT_EQ(said[1], Touching::NEW);
+  for (int k = 2; k < 8; ++k) EXPECT_EQ(said[static_cast<std::size_t>(k)], Touching::LASTING) << k;
+}
+
+TEST(NewContacts, TheEarliestOfEachPairOfPartners) {
+  Stream stream({grid(5, 5), grid(5, 5)});
+  stream.setMap(table(0.05));
+  const auto sheets = [](double lower, double upper) {
+    Positions second = strip(5, 5, 0.02, [&](std::size_t) { return upper; });
+    for (Vec3& p : second) p.x() += 0.0037;
+    return std::vector<Positions>{strip(5, 5, 0.02, [&](std::size_t) { return lower; }), second};
+  };
+  stream.feed(sheets(0.01, 0.02));
+  // The lower sheet passes the table's top at 1/2 and is met by the upper one at 1/4.
+  const Outcome outcome = stream.feed(sheets(-0.01, -0.04));
+  const std::vector<NewContact> found = newContacts(outcome);
+  ASSERT_EQ(found.size(), 3u) << "with the map each, and with each other";
+  EXPECT_EQ(found[0].body, (std::array<std::uint16_t, 2>{0, 1}));
+  EXPECT_NEAR(found[0].contact.toc_lower, 0.25, 1e-6);
+  for (std::size_t i = 1; i < 3; ++i) EXPECT_LE(found[i - 1].contact.toc_lower, found[i].contact.toc_lower);
+  EXPECT_EQ(earliestNewToc(outcome), found[0].contact.toc_lower);
+}
+
+TEST(NewContacts, WhatIsExpectedIsNoneUntilItGrowsBeyondThat) {
+  MonitorOptions options;
+  Expectation laid;
+  laid.partners[0].body = 0;
+  for (Index v = 0; v < 5 * 21; ++v) {
+    if (v % 21 < 6) laid.partners[0].vertices.push_back(v);  // the first columns
+  }
+  laid.partners[1].body = OBSTACLE_BODY;
+  options.detector.expected = {laid};
+  Stream stream({grid(5, 21)}, options);
+  stream.setMap(table(0.05));
+  std::vector<std::size_t> news;
+  Outcome outcome;
+  for (int k = 0; k < 12; ++k) {
+    outcome = stream.feed(
+        {strip(5, 21, 0.02, [&](std::size_t c) { return k == 0 || static_cast<int>(c) > k ? 0.01 : 0.0; })});
+    news.push_back(newContacts(outcome).size());
+    if (k >= 1 && k < 5) EXPECT_EQ(assuranceOf(outcome).touching, Touching::EXPECTED) << k;
+    if (k > 7) EXPECT_EQ(assuranceOf(outcome).touching, Touching::LASTING) << k;
+  }
+  EXPECT_EQ(std::count(news.begin(), news.end(), 0u), 11) << "one alarm";
+  EXPECT_EQ(stream.text(), "BEGAN 1, UNEXPECTED 1");
+  EXPECT_TRUE(stream.events()[0].expected);
+  EXPECT_NE(stream.events()[1].from_ns, UNKNOWN_NS);
+  ASSERT_EQ(outcome.patches.size(), 1u);
+  EXPECT_GT(outcome.patches[0].expected, 0u);
+  EXPECT_FALSE(outcome.patches[0].isExpected());
+}
+
+TEST(NewContacts, WhatIsNotExpectedIsRememberedWhereExpectedThingsTouchAsWell) {
+  // Each end of the rope may touch the sheet, but no expectation holds its edge.
+  MonitorOptions options;
+  for (Index v = 0; v < 2; ++v) {
+    Expectation end;
+    end.partners[0].vertices = {v};
+    end.partners[1].body = 1;
+    options.detector.expected.push_back(end);
+  }
+  Stream stream({share(Topology::polyline(2)), grid(2, 2)}, options);  // across the edge between two triangles
+  const Positions sheet = strip(2, 2, 0.1, [](std::size_t) { return 0.0; });
+  std::vector<std::size_t> news;
+  for (int k = 0; k < 9; ++k) {
+    const double z = k % 3 == 2 ? -0.001 : 0.01;  // down every third frame, well within the gap
+    news.push_back(newContacts(stream.feed({{Vec3(0.02, 0.05, z), Vec3(0.09, 0.06, z)}, sheet})).size());
+  }
+  EXPECT_EQ(news, (std::vector<std::size_t>{0, 0, 1, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(stream.text(), "BEGAN 1");
+}
+
+TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsNone) {
+  MonitorOptions options;
+  Expectation anywhere;
+  anywhere.partners[1].body = OBSTACLE_BODY;
+  options.detector.expected = {anywhere};
+  Stream stream({grid(5, 5)}, options);
+  stream.setMap(table(0.05));
+  const Positions above = strip(5, 5, 0.02, [](std::size_t) { return 0.01; });
+  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
+  stream.feed({above});
+  for (int k = 0; k < 3; ++k) EXPECT_TRUE(newContacts(stream.feed({resting})).empty());
+  stream.options().detector.expected.clear();  // the next phase of the task
+  stream.monitor().setOptions(stream.options());
+  const Outcome outcome = stream.feed({resting});
+  EXPECT_TRUE(newContacts(outcome).empty());
+  EXPECT_EQ(assuranceOf(outcome).touching, Touching::LASTING);
+  for (int k = 0; k < 12; ++k) stream.feed({above});
+  EXPECT_EQ(newContacts(stream.feed({resting})).size(), 1u) << "it comes back";
+}
+
+TEST(NewContacts, OfAPredictionWhatDoesNotLastYet) {
+  MonitorOptions options;
+  options.look_ahead_s = 0.2;
+  Stream stream({grid(5, 5), share(Topology::fromTriangles(3, {{0, 1, 2}}))}, options);
+  stream.setMap(table(0.05));
+  std::size_t seen = 0;
+  for (int k = 0; k < 22; ++k) {
+    Positions falling = {Vec3(0.02, 0.02, 0.1), Vec3(0.05, 0.02, 0.2), Vec3(0.02, 0.05, 0.2)};
+    for (Vec3& p : falling) p.z() -= 0.004 * k;
+    const Positions cloth = strip(5, 5, 0.02, [&](std::size_t) { return k == 0 ? 0.01 : 0.0; });
+    stream.feed({cloth, falling});
+    if (k < 3) continue;
+    const Outcome prediction = stream.monitor().predict();
+    EXPECT_GT(prediction.total_contacts, 0u) << "the cloth rests";
+    for (const NewContact& one : newContacts(prediction)) {
+      EXPECT_NE(one.body, (std::array<std::uint16_t, 2>{0, OBSTACLE_BODY})) << k << ": the cloth rests on the table";
+      EXPECT_EQ(one.patch, 0u);
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 0u);
+}
+
+TEST(NewContacts, WithoutPatchesAllThatIsNotExpected) {
+  Stream stream({grid(5, 5)});
+  stream.setMap(table(0.05));
+  stream.options().detector.patches = false;
+  stream.monitor().setOptions(stream.options());
+  const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
+  stream.feed({resting});
+  const Outcome outcome = stream.feed({resting});
+  EXPECT_EQ(newContacts(outcome).size(), 1u);
+  EXPECT_EQ(earliestNewToc(outcome), 0);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
