@@ -1,12 +1,19 @@
-// A question takes the time that it takes: what limits the steps does not cut its answer.
+// A question looks at the newest frame and takes the time that it takes: what limits the steps does not cut its answer.
 #include <gtest/gtest.h>
 
-#include "dccd/stream.h"
+#include "unit/stream/monitor_support.h"
 
 namespace dccd {
+namespace test {
 namespace {
 
-constexpr StampNs MS = 1000000;
+TEST_F(OneBody, CheckNowLooksAtTheNewestFrame) {
+  EXPECT_FALSE(monitor.checkNow().answered);
+  feed(pair(0, 0));
+  const Outcome touching = monitor.checkNow();
+  EXPECT_TRUE(touching.answered);
+  EXPECT_FALSE(touching.contacts.empty());
+}
 
 /// A triangle, and one that stands on it with its tip below it.
 MeshFrame crossed(StampNs stamp_ns) {
@@ -38,4 +45,5 @@ TEST(CheckNow, NoLimitOfTheStepsCutsIt) {
 }
 
 }  // namespace
+}  // namespace test
 }  // namespace dccd

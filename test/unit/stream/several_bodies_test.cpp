@@ -1,0 +1,165 @@
+// Several bodies in one stream: one is the clock, the others are interpolated, waited for, or static.
+#include <gtest/gtest.h>
+
+#include "unit/stream/monitor_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+class TwoBodies : public ::testing::Test {
+ protected:
+  Monitor monitor{loose(), {named("floor"), named("tip")}};  // the floor is the clock
+  void feed(std::size_t body, MeshFrame frame, std::int64_t now = NOW) {
+    monitor.countReceived(body);
+    monitor.push(body, std::move(frame), now);
+  }
+};
+
+TEST_F(TwoBodies, OthersAreInterpolatedAtBothEnds) {
+  feed(0, floor(100 * MS, 0));
+  EXPECT_EQ(only(monitor).status, StepStatus::FIRST_FRAME);
+  feed(1, tip(0, 4));
+  feed(0, floor(200 * MS, 0));
+  Outcome outcome;
+  EXPECT_FALSE(monitor.next(NOW, outcome)) << "waits for the tip";
+  EXPECT_TRUE(monitor.waiting());
+  feed(1, tip(400 * MS, -4));  // 2 at 100 ms, 0 at 200 ms
+  outcome = only(monitor);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_NEAR((*outcome.step->bodies[1].t0)[0].z(), 2, 1e-12);
+  EXPECT_NEAR(outcome.earliest_toc, 1, 1e-9);
+  EXPECT_EQ(outcome.contacts[0].body, (std::array<std::uint16_t, 2>{1, 0}));
+  expectAddsUp(monitor);
+}
+
+// Seen through the floor and back between two frames of it: whatever the straight path says, that is not clear.
+TEST_F(TwoBodies, FramesBetweenTheEndsThatLeaveThePathAreNoClearStep) {
+  const auto lastOf = [](double middle) {
+    Monitor two(loose(), {named("floor"), named("tip")});
+    two.push(1, tip(0, 1), NOW);
+    two.push(0, floor(0, 0), NOW);
+    only(two);
+    two.push(1, tip(50 * MS, middle), NOW);
+    two.push(1, tip(100 * MS, 1), NOW);
+    two.push(0, floor(100 * MS, 0), NOW);
+    return only(two);
+  };
+  const Outcome straight = lastOf(1.0005);
+  EXPECT_EQ(straight.status, StepStatus::OK);
+  EXPECT_TRUE(assuranceOf(straight).clear());
+  const Outcome through = lastOf(-1);
+  EXPECT_EQ(through.status, StepStatus::PARTIAL);
+  EXPECT_FALSE(assuranceOf(through).clear());
+  EXPECT_NE(through.reason.find("body 'tip' was seen up to 2 m off the path"), std::string::npos) << through.reason;
+}
+
+TEST_F(TwoBodies, MissingBodyIsNoAnswerAfterTheTimeout) {
+  feed(0, floor(100 * MS, 0));
+  only(monitor);
+  feed(0, floor(200 * MS, 0));
+  Outcome outcome;
+  EXPECT_FALSE(monitor.next(NOW, outcome));
+  outcome = only(monitor, LATER);
+  EXPECT_EQ(outcome.status, StepStatus::NO_BODY);
+  EXPECT_NE(outcome.reason.find("tip"), std::string::npos);
+  EXPECT_FALSE(assuranceOf(outcome).clear());
+  expectAddsUp(monitor);
+}
+
+TEST_F(TwoBodies, SeamOfAnotherBodyIsASeamOfTheStep) {
+  feed(0, floor(1000 * MS, 0));
+  feed(1, tip(0, 4));
+  feed(1, tip(1100 * MS, 4));
+  only(monitor);
+  feed(0, floor(1050 * MS, 0));
+  const Outcome outcome = only(monitor);
+  EXPECT_EQ(outcome.status, StepStatus::GAP);
+  EXPECT_NE(outcome.reason.find("tip"), std::string::npos);
+}
+
+// The other body has gone on to another topology while the step waited; the step is still in the one before.
+TEST_F(TwoBodies, TopologyIsThatOfTheStepNotTheNewest) {
+  // Of the same four vertices, the first topology takes the tip and the second does not.
+  const auto with_tip = std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 1, 2}}));
+  const auto without = std::make_shared<const Topology>(Topology::fromTriangles(4, {{1, 2, 3}}));
+  const auto four = [](StampNs stamp_ns, const std::shared_ptr<const Topology>& topology, double z) {
+    return MeshFrame{stamp_ns, topology, {{0, 0, z}, {0.5, 0, z + 5}, {-0.5, 0, z + 5}, {0, 0.5, z + 5}}};
+  };
+  const MeshFrame fewer = tip(200 * MS, 9);
+  for (const MeshFrame& newest : {four(200 * MS, without, 9), fewer}) {
+    monitor.reset();
+    feed(0, floor(0, 0));
+    only(monitor);
+    feed(1, four(0, with_tip, 1));
+    feed(1, four(100 * MS, with_tip, -1));
+    feed(1, newest);
+    feed(0, floor(100 * MS, 0));
+    const Outcome outcome = only(monitor);
+    ASSERT_EQ(outcome.status, StepStatus::PARTIAL) << "vertex 3 belongs to no face";
+    EXPECT_EQ(outcome.stats.unchecked_vertices, 1u);
+    EXPECT_EQ(outcome.step->bodies[1].topology, with_tip);
+    ASSERT_FALSE(outcome.contacts.empty());
+    EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
+    // From the seam on it is the new one that counts.
+    feed(0, floor(200 * MS, 0));
+    EXPECT_EQ(only(monitor).status, StepStatus::TOPOLOGY_CHANGED);
+    MeshFrame last = newest;
+    last.stamp_ns = 300 * MS;
+    feed(1, last);
+    feed(0, floor(300 * MS, 0));
+    const Outcome next = only(monitor);
+    EXPECT_TRUE(next.answered) << next.reason;
+    EXPECT_EQ(*next.step->bodies[1].topology, *newest.topology);
+    EXPECT_TRUE(next.contacts.empty());
+  }
+  expectAddsUp(monitor);
+}
+
+TEST_F(TwoBodies, TimeJumpDropsWhatWaits) {
+  feed(0, floor(1000 * MS, 0));
+  only(monitor);
+  feed(0, floor(1050 * MS, 0));
+  feed(0, floor(10 * MS, 0));
+  Outcome outcome;
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::NO_BODY);
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  EXPECT_EQ(outcome.status, StepStatus::TIME_JUMP);
+  expectAddsUp(monitor);
+}
+
+TEST(StaticBody, HoldsAtAllTimes) {
+  Body table = named("table");
+  table.motion = BodyMotionKind::STATIC;
+  Monitor monitor(loose(), {named("tip"), table});
+  Outcome outcome;
+  monitor.push(0, tip(0, 1), NOW);
+  monitor.push(1, floor(5, 0), NOW);
+  monitor.push(0, tip(100 * MS, -1), NOW);
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  ASSERT_TRUE(monitor.next(NOW, outcome));
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
+}
+
+// A static body's frame that cannot be used leaves the one before in its place.
+TEST(StaticBody, KeepsItsPlaceWhenAFrameIsRefused) {
+  Body table = named("table");
+  table.motion = BodyMotionKind::STATIC;
+  Monitor monitor(loose(), {named("tip"), table});
+  monitor.push(1, floor(0, 0), NOW);
+  monitor.push(0, tip(100 * MS, 1), NOW);
+  only(monitor);
+  MeshFrame bad = floor(0, 0);
+  bad.positions.pop_back();
+  EXPECT_EQ(monitor.push(1, bad, NOW), StepStatus::VERTEX_COUNT);
+  monitor.push(0, tip(200 * MS, -1), NOW);
+  const Outcome outcome = only(monitor);
+  ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
