@@ -99,12 +99,15 @@ if(TARGET deformable_ccd_physics)
 endif()
 
 if(CATKIN_ENABLE_TESTING)
-  # Each test/ros/NAME_test.cpp is the executable NAME_test, started by one or more of test/ros/*.test.
+  # Each test/ros/NAME_test.cpp, with what lies in test/ros/NAME/, is the executable NAME_test, started by one or more of
+  # test/ros/*.test.
   file(GLOB ROSTEST_SOURCES CONFIGURE_DEPENDS test/ros/*_test.cpp)
   file(GLOB ROSTEST_SUPPORT CONFIGURE_DEPENDS test/ros/support/*.cpp)
   foreach(source ${ROSTEST_SOURCES})
     get_filename_component(name ${source} NAME_WE)
-    add_executable(${name} EXCLUDE_FROM_ALL ${source} ${ROSTEST_SUPPORT})
+    string(REGEX REPLACE "_test$" "" part ${name})
+    file(GLOB part_sources CONFIGURE_DEPENDS test/ros/${part}/*_test.cpp)
+    add_executable(${name} EXCLUDE_FROM_ALL ${source} ${part_sources} ${ROSTEST_SUPPORT})
     add_dependencies(${name} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
     target_include_directories(${name} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
     target_link_libraries(${name} ${ROS_LINK_LIBRARIES} deformable_ccd_test_support GTest::gtest_main)

@@ -1,4 +1,5 @@
-// The live node: messages in, contacts or the reason why there are none out.
+// The live node with one mesh: messages of any type in, contacts or the reason why there are none out. With a map, and
+// with several bodies: in monitor/.
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/FirstContact.h>
@@ -11,25 +12,19 @@
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <dynamic_reconfigure/Reconfigure.h>
-#include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
-#include <octomap_msgs/Octomap.h>
 #include <ros/ros.h>
 #include <std_msgs/Bool.h>
 #include <std_srvs/SetBool.h>
-#include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "ros/monitor/monitors.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
 namespace dccd {
 namespace test {
 namespace {
-
-constexpr std::size_t MONITORS = 4;  // in monitor.test; each listens to /tf
-
-// --- any mesh type ---------------------------------------------------------------------------------------------------
 
 struct Plain : MonitorTest {
   Plain() : MonitorTest("/plain") {}
@@ -344,264 +339,6 @@ TEST_F(Plain, Diagnostics) {
   Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
   ASSERT_TRUE(waitUntil([&] { return diagnostics.count() > 0; }));
   EXPECT_FALSE(diagnostics.last().status.empty());
-}
-
-// --- a grid over an octomap ------------------------------------------------------------------------------------------
-
-struct Grid : MonitorTest {
-  Grid() : MonitorTest("/grid") {}
-  ros::Publisher mesh = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/grid/mesh");
-  ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/grid/octomap", true);
-
-  void giveMap(const octomap_msgs::Octomap& message) {
-    const Stats before = stats.last();
-    map.publish(message);
-    // Frames that touch nothing, until one has seen the map.
-    double stamp_s = 1;
-    ASSERT_TRUE(waitUntil([&] {
-      send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
-      const Stats now = stats.last();
-      return now.maps_received > before.maps_received && now.map_present;
-    }));
-  }
-};
-
-TEST_F(Grid, AMissingMapIsNoAnswerAboutIt) {
-  // The first case of this monitor, before it has had any map.
-  send(mesh, cloud(gridAt(3, 4, 0.3), 10));
-  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.2), 10.1));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP);
-  EXPECT_TRUE(outcome.answered) << "about the mesh alone";
-  EXPECT_FALSE(clear.last().data);
-}
-
-TEST_F(Grid, OctomapBinaryAndFull) {
-  for (const bool binary : {true, false}) {
-    giveMap(blockBelowZero(binary));
-    send(mesh, cloud(gridAt(3, 4, 0.3), 100));
-    const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, -0.1), 100.1));
-    ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-    EXPECT_EQ(outcome.start_state, deformable_ccd::ContactArray::CLEAR);
-    ASSERT_FALSE(outcome.contacts.empty());
-    double earliest = 1;
-    std::size_t vertices = 0;
-    for (const auto& contact : outcome.contacts) {
-      earliest = std::min(earliest, contact.toc_lower);
-      vertices += contact.kind == decltype(outcome.contacts)::value_type::VERTEX_VOXEL_FACE;
-      EXPECT_EQ(contact.body[1], 65535);
-    }
-    EXPECT_NEAR(earliest, 0.75, 1e-6) << "float coordinates";
-    EXPECT_EQ(vertices, 12u) << "each vertex falls on one face";
-    send(mesh, cloud(gridAt(3, 4, 0.3), 100.2));
-  }
-}
-
-TEST_F(Grid, UnknownSpaceIsReported) {
-  giveMap(blockBelowZero(true, 90));
-  send(mesh, cloud(gridAt(3, 4, 0.35), 100));
-  send(mesh, cloud(gridAt(3, 4, 0.15), 100.1));
-  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.1); }));
-  const Stats swept = stats.last();
-  EXPECT_EQ(swept.unknown_fraction, 1) << "the map knows what is occupied, and nothing of the air";
-  EXPECT_GT(swept.unknown_space_in, 0u);
-  EXPECT_EQ(swept.unknown_space_out, swept.unknown_space_in);
-  EXPECT_GT(swept.unknown_space_ms, 0);
-  EXPECT_NEAR(swept.map_age, 10.1, 1e-6);
-  send(mesh, cloud(gridAt(3, 4, -0.05), 100.2));
-  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.2); }));
-  EXPECT_LT(stats.last().unknown_fraction, 1) << "into what is known";
-}
-
-TEST_F(Grid, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {
-  giveMap(blockBelowZero(true));
-  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
-  const auto ofGrid = [&] {
-    std::vector<diagnostic_msgs::DiagnosticStatus> found;
-    for (const auto& array : diagnostics.all()) {
-      for (const auto& status : array.status) {
-        if (status.name == "/grid: steps") found.push_back(status);
-      }
-    }
-    return found;
-  };
-  double stamp_s = 600;
-  ASSERT_TRUE(waitUntil([&] {
-    send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
-    for (int i = 0; i < 10; ++i) {  // so that one of these is nearly always the newest
-      EXPECT_EQ(send(mesh, cloud(gridAt(3, 4, 5), stamp_s)).status, deformable_ccd::ContactArray::DUPLICATE);
-    }
-    return ofGrid().size() > 3;
-  }));
-  const auto found = ofGrid();
-  for (std::size_t i = 1; i < found.size(); ++i) {  // the first may tell of the time before
-    EXPECT_EQ(found[i].level, diagnostic_msgs::DiagnosticStatus::OK) << found[i].message;
-  }
-}
-
-TEST_F(Grid, MalformedMapsAreRefused) {
-  giveMap(blockBelowZero(true));
-  const std::uint64_t refused = stats.last().maps_refused;
-  octomap_msgs::Octomap bad = blockBelowZero(true);
-  bad.data.resize(bad.data.size() / 2);
-  bad.resolution = std::numeric_limits<double>::quiet_NaN();
-  map.publish(bad);
-  double stamp_s = 200;
-  ASSERT_TRUE(waitUntil([&] {
-    send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
-    return stats.last().maps_refused > refused;
-  }));
-  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 5), stamp_s + 0.1));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP) << "no map is better than an old one";
-  EXPECT_NE(outcome.reason.find("refused"), std::string::npos) << outcome.reason;
-  giveMap(blockBelowZero(true));
-  EXPECT_EQ(contacts.last().status, deformable_ccd::ContactArray::OK);
-}
-
-TEST_F(Grid, VertexCountMismatch) {
-  send(mesh, cloud(gridAt(3, 4, 1), 10));
-  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 5, 1), 10.1));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::VERTEX_COUNT);
-  EXPECT_FALSE(outcome.answered);
-  EXPECT_NE(outcome.reason.find("3 x 4"), std::string::npos) << outcome.reason;
-  EXPECT_TRUE(send(mesh, cloud(gridAt(3, 4, 1), 10.2)).answered);
-  expectAddsUp();
-}
-
-TEST_F(Grid, LyingCloudsAreRefused) {
-  auto lying = cloud(gridAt(3, 4, 1), 10);
-  lying.width = 1u << 31;
-  EXPECT_EQ(send(mesh, lying).status, deformable_ccd::ContactArray::BAD_MESSAGE);
-  lying = cloud(gridAt(3, 4, 1), 10);
-  lying.fields[2].offset = 1u << 30;
-  EXPECT_EQ(send(mesh, lying).status, deformable_ccd::ContactArray::BAD_MESSAGE);
-  lying = cloud(gridAt(3, 4, 1), 10);
-  lying.fields[1].datatype = 2;
-  const deformable_ccd::ContactArray outcome = send(mesh, lying);
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::BAD_MESSAGE);
-  EXPECT_NE(outcome.reason.find("'y'"), std::string::npos) << outcome.reason;
-  lying = cloud(gridAt(3, 4, 1), 10);
-  lying.point_step = 0;
-  EXPECT_EQ(send(mesh, lying).status, deformable_ccd::ContactArray::BAD_MESSAGE);
-  expectAddsUp();
-}
-
-// --- several bodies --------------------------------------------------------------------------------------------------
-
-bool isAdvertised(const std::string& topic) {
-  ros::master::V_TopicInfo topics;
-  EXPECT_TRUE(ros::master::getTopics(topics));
-  return std::any_of(topics.begin(), topics.end(), [&](const auto& info) { return info.name == topic; });
-}
-
-Mesh floorAt(double z) { return {{{-1, -1, z}, {1, -1, z}, {0, 1, z}}, {{0, 1, 2}}}; }
-Mesh tipAt(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}}}; }
-
-struct Pair : MonitorTest {
-  Pair() : MonitorTest("/pair") {}
-  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/cloth");
-  ros::Publisher gripper = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/gripper");
-  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
-
-  void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
-};
-
-// What is off has no topic, neither to listen to nor to speak on.
-TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
-  const auto wanted = node.advertise<octomap_msgs::Octomap>("/octomap_binary", 1);
-  const auto unwanted = node.advertise<octomap_msgs::Octomap>("/pair/octomap", 1);
-  const auto rigid = node.advertise<deformable_ccd::MeshStamped>("/pair/finger", 1);
-  EXPECT_TRUE(waitUntil([&] { return wanted.getNumSubscribers() > 0; })) << "auto listens for a map";
-  EXPECT_EQ(unwanted.getNumSubscribers(), 0u) << "octomap: off";
-  EXPECT_EQ(rigid.getNumSubscribers(), 0u) << "a rigid body has no stream";
-  EXPECT_TRUE(isAdvertised("/plain/time_to_contact"));
-  EXPECT_FALSE(isAdvertised("/pair/time_to_contact")) << "no look-ahead";
-  EXPECT_FALSE(isAdvertised("/pair/predicted_contacts"));
-  EXPECT_FALSE(isAdvertised("/pair/left_out")) << "no separation";
-}
-
-TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
-  finger(300, -5);
-  finger(300.4, -5);
-  cloth.publish(meshStamped(floorAt(0), 300));
-  gripper.publish(meshStamped(tipAt(4), 299.9));
-  ASSERT_TRUE(waitUntil([&] { return contacts.count() > 0; }));
-  const std::size_t seen = contacts.count();
-  cloth.publish(meshStamped(floorAt(0), 300.1));
-  ros::Duration(0.05).sleep();
-  EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
-  gripper.publish(meshStamped(tipAt(-4), 300.3));  // 2 at 300, 0 at 300.1
-  const deformable_ccd::ContactArray outcome = contacts.after(seen);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  ASSERT_EQ(outcome.bodies.size(), 3u);
-  EXPECT_FALSE(outcome.contacts.empty());
-
-  const deformable_ccd::ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
-  EXPECT_EQ(late.status, deformable_ccd::ContactArray::NO_BODY);
-  EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
-  expectAddsUp();
-}
-
-TEST_F(Pair, RigidBodiesMoveByTf) {
-  finger(400, 2);
-  finger(400.2, -2);
-  gripper.publish(meshStamped(tipAt(50), 400));
-  gripper.publish(meshStamped(tipAt(50), 400.3));
-  ros::Duration(0.1).sleep();
-  send(cloth, meshStamped(floorAt(0), 400));
-  const deformable_ccd::ContactArray outcome = send(cloth, meshStamped(floorAt(0), 400.2));
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  ASSERT_FALSE(outcome.contacts.empty());
-  double earliest = 1;
-  for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
-  EXPECT_NEAR(earliest, 0.5, 1e-6);
-}
-
-// --- a static body, whose frames are sent once -----------------------------------------------------------------------
-
-struct Tabled : MonitorTest {
-  Tabled() : MonitorTest("/tabled") {}
-  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/cloth");
-  ros::Publisher table = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/table", true);
-  double stamp_s = 10;
-
-  void enable(bool on) {
-    std_srvs::SetBool call;
-    call.request.data = on;
-    ASSERT_TRUE(ros::service::call("/tabled/enable", call));
-  }
-  /// A step of the cloth, four metres through the height 0.
-  deformable_ccd::ContactArray fall() {
-    send(cloth, meshStamped(tipAt(2), stamp_s += 1));
-    return send(cloth, meshStamped(tipAt(-2), stamp_s += 0.1));
-  }
-  bool meetsTheTable() {
-    const deformable_ccd::ContactArray step = fall();
-    return step.status == deformable_ccd::ContactArray::OK && !step.contacts.empty();
-  }
-  bool isPastTheTable() {
-    const deformable_ccd::ContactArray step = fall();
-    return step.status == deformable_ccd::ContactArray::OK && step.contacts.empty();
-  }
-};
-
-TEST_F(Tabled, AStaticBodysOnlyFrameCountsWhileTheMonitorIsDisabled) {
-  table.publish(meshStamped(floorAt(0), 1));
-  ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
-  enable(false);
-  table.publish(meshStamped(floorAt(-20), 2));
-  ros::Duration(0.2).sleep();
-  enable(true);
-  EXPECT_TRUE(isPastTheTable()) << "the table is where it was last said to be";
-}
-
-TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
-  table.publish(meshStamped(floorAt(0), 1));
-  ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
-  table.publish(meshStamped(floorAt(0), 2, "nowhere"));  // waits for its transform, and the next one behind it
-  table.publish(meshStamped(floorAt(-20), 3));
-  ros::Duration(0.2).sleep();
-  ASSERT_TRUE(trigger("reset").success);
-  EXPECT_TRUE(waitUntil([&] { return isPastTheTable(); }));
 }
 
 }  // namespace

@@ -1,0 +1,136 @@
+// The live node with several bodies: one is the clock, one is moved by tf, one is static and sent once.
+#include <deformable_ccd/ContactArray.h>
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+#include <octomap_msgs/Octomap.h>
+#include <ros/ros.h>
+#include <std_srvs/SetBool.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "ros/monitor/monitors.h"
+#include "ros/support/monitor_fixture.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+bool isAdvertised(const std::string& topic) {
+  ros::master::V_TopicInfo topics;
+  EXPECT_TRUE(ros::master::getTopics(topics));
+  return std::any_of(topics.begin(), topics.end(), [&](const auto& info) { return info.name == topic; });
+}
+
+Mesh floorAt(double z) { return {{{-1, -1, z}, {1, -1, z}, {0, 1, z}}, {{0, 1, 2}}}; }
+Mesh tipAt(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {{0, 1, 2}}}; }
+
+struct Pair : MonitorTest {
+  Pair() : MonitorTest("/pair") {}
+  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/cloth");
+  ros::Publisher gripper = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/gripper");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
+
+  void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
+};
+
+// What is off has no topic, neither to listen to nor to speak on.
+TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
+  const auto wanted = node.advertise<octomap_msgs::Octomap>("/octomap_binary", 1);
+  const auto unwanted = node.advertise<octomap_msgs::Octomap>("/pair/octomap", 1);
+  const auto rigid = node.advertise<deformable_ccd::MeshStamped>("/pair/finger", 1);
+  EXPECT_TRUE(waitUntil([&] { return wanted.getNumSubscribers() > 0; })) << "auto listens for a map";
+  EXPECT_EQ(unwanted.getNumSubscribers(), 0u) << "octomap: off";
+  EXPECT_EQ(rigid.getNumSubscribers(), 0u) << "a rigid body has no stream";
+  EXPECT_TRUE(isAdvertised("/plain/time_to_contact"));
+  EXPECT_FALSE(isAdvertised("/pair/time_to_contact")) << "no look-ahead";
+  EXPECT_FALSE(isAdvertised("/pair/predicted_contacts"));
+  EXPECT_FALSE(isAdvertised("/pair/left_out")) << "no separation";
+}
+
+TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
+  finger(300, -5);
+  finger(300.4, -5);
+  cloth.publish(meshStamped(floorAt(0), 300));
+  gripper.publish(meshStamped(tipAt(4), 299.9));
+  ASSERT_TRUE(waitUntil([&] { return contacts.count() > 0; }));
+  const std::size_t seen = contacts.count();
+  cloth.publish(meshStamped(floorAt(0), 300.1));
+  ros::Duration(0.05).sleep();
+  EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
+  gripper.publish(meshStamped(tipAt(-4), 300.3));  // 2 at 300, 0 at 300.1
+  const deformable_ccd::ContactArray outcome = contacts.after(seen);
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
+  ASSERT_EQ(outcome.bodies.size(), 3u);
+  EXPECT_FALSE(outcome.contacts.empty());
+
+  const deformable_ccd::ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
+  EXPECT_EQ(late.status, deformable_ccd::ContactArray::NO_BODY);
+  EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
+  expectAddsUp();
+}
+
+TEST_F(Pair, RigidBodiesMoveByTf) {
+  finger(400, 2);
+  finger(400.2, -2);
+  gripper.publish(meshStamped(tipAt(50), 400));
+  gripper.publish(meshStamped(tipAt(50), 400.3));
+  ros::Duration(0.1).sleep();
+  send(cloth, meshStamped(floorAt(0), 400));
+  const deformable_ccd::ContactArray outcome = send(cloth, meshStamped(floorAt(0), 400.2));
+  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
+  ASSERT_FALSE(outcome.contacts.empty());
+  double earliest = 1;
+  for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
+  EXPECT_NEAR(earliest, 0.5, 1e-6);
+}
+
+struct Tabled : MonitorTest {
+  Tabled() : MonitorTest("/tabled") {}
+  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/cloth");
+  ros::Publisher table = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/table", true);
+  double stamp_s = 10;
+
+  void enable(bool on) {
+    std_srvs::SetBool call;
+    call.request.data = on;
+    ASSERT_TRUE(ros::service::call("/tabled/enable", call));
+  }
+  /// A step of the cloth, four metres through the height 0.
+  deformable_ccd::ContactArray fall() {
+    send(cloth, meshStamped(tipAt(2), stamp_s += 1));
+    return send(cloth, meshStamped(tipAt(-2), stamp_s += 0.1));
+  }
+  bool meetsTheTable() {
+    const deformable_ccd::ContactArray step = fall();
+    return step.status == deformable_ccd::ContactArray::OK && !step.contacts.empty();
+  }
+  bool isPastTheTable() {
+    const deformable_ccd::ContactArray step = fall();
+    return step.status == deformable_ccd::ContactArray::OK && step.contacts.empty();
+  }
+};
+
+TEST_F(Tabled, AStaticBodysOnlyFrameCountsWhileTheMonitorIsDisabled) {
+  table.publish(meshStamped(floorAt(0), 1));
+  ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
+  enable(false);
+  table.publish(meshStamped(floorAt(-20), 2));
+  ros::Duration(0.2).sleep();
+  enable(true);
+  EXPECT_TRUE(isPastTheTable()) << "the table is where it was last said to be";
+}
+
+TEST_F(Tabled, AStaticBodysFrameThatWaitsItsTurnStaysOverAReset) {
+  table.publish(meshStamped(floorAt(0), 1));
+  ASSERT_TRUE(waitUntil([&] { return meetsTheTable(); }));
+  table.publish(meshStamped(floorAt(0), 2, "nowhere"));  // waits for its transform, and the next one behind it
+  table.publish(meshStamped(floorAt(-20), 3));
+  ros::Duration(0.2).sleep();
+  ASSERT_TRUE(trigger("reset").success);
+  EXPECT_TRUE(waitUntil([&] { return isPastTheTable(); }));
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
