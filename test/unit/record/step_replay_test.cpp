@@ -1,0 +1,147 @@
+// A recorded step is answered again: the same bits on every rung, SIMD target and number of threads; one bit is a
+// difference.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "dccd/simd_target.h"
+#include "record/step_replay.h"
+#include "support/recordings.h"
+#include "unit/record/recording_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+TEST(StepReplay, EveryRungAndTargetAndNumberOfThreadsGivesTheSameBits) {
+  const std::string before = simdTarget();
+  for (const Accuracy rung : {Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+    const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(with(rung)));
+    const StepRecording r = readRecording(bytes.data(), bytes.size(), "FILE");
+    ASSERT_FALSE(r.answer.contacts.empty()) << toString(rung);
+    for (const std::string& target : simdTargets()) {
+      setSimdTarget(target);
+      for (const int threads : {1, 3}) {
+        const StepReplay replay = replayStep(r, threads);
+        EXPECT_TRUE(replay.differences.empty())
+            << toString(rung) << ' ' << target << ": " << replay.differences.front();
+        EXPECT_EQ(replay.answer.contacts.size(), r.answer.contacts.size());
+      }
+    }
+  }
+  setSimdTarget(before);
+}
+
+TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
+  const StepRecording without = recordScene(with(Accuracy::CONSERVATIVE));
+  StepRecording r = recordScene(with(Accuracy::CONSERVATIVE), true, true);
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
+  r = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(recordingBytes(r), bytes);
+  ASSERT_EQ(r.step.bodies[0].radius_m->size(), 20u);
+  EXPECT_EQ((*r.step.bodies[0].radius_m)[7], 3e-3);
+  ASSERT_TRUE(r.step.bodies[0].reference) << "its first frame";
+  EXPECT_NE(r.step.bodies[0].reference->positions, *r.step.bodies[0].t0);
+  ASSERT_EQ(r.step.bodies[2].separations.size(), 1u);
+  EXPECT_EQ(r.step.bodies[2].separations[0].separation_m, 0.15);
+  EXPECT_GT(r.answer.contacts.size(), without.answer.contacts.size());
+  for (const int threads : {1, 3}) {
+    const StepReplay replay = replayStep(r, threads);
+    EXPECT_TRUE(replay.differences.empty()) << replay.differences.front();
+  }
+  // Each of them matters: without it the answer is another.
+  const auto differs = [&r](const std::function<void(StepRecording&)>& change) {
+    StepRecording changed = r;
+    change(changed);
+    return !replayStep(changed).differences.empty();
+  };
+  EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[0].radius_m = share(std::vector<double>(20, 0.05)); }));
+  EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[2].separations.clear(); }));
+  EXPECT_TRUE(differs([](StepRecording& c) {
+    ReferenceFrame spread = *c.step.bodies[0].reference;
+    for (Vec3& p : spread.positions) p *= 10;  // nothing is close in it, so nothing is left out
+    c.step.bodies[0].reference = std::make_shared<const ReferenceFrame>(spread);
+  }));
+}
+
+TEST(StepReplay, WithoutAMapTheStatusIsTheSame) {
+  const StepRecording r = recordScene(with(Accuracy::EXACT), false);
+  EXPECT_EQ(r.answer.status, StepStatus::NO_MAP);
+  const StepReplay replay = replayStep(r);
+  EXPECT_EQ(replay.answer.status, StepStatus::NO_MAP);
+  EXPECT_TRUE(replay.differences.empty());
+}
+
+TEST(StepReplay, OneBitIsADifference) {
+  StepRecording r = recordScene();
+  ASSERT_FALSE(r.answer.contacts.empty());
+  r.answer.contacts.back().toc_lower = std::nextafter(r.answer.contacts.back().toc_lower, 2);
+  EXPECT_EQ(replayStep(r).differences.size(), 1u);
+  r.answer.contacts.pop_back();
+  EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+TEST(StepReplay, PatchesAreRecordedAndMadeAgain) {
+  MonitorOptions options;
+  options.detector.patches = true;
+  StepRecording r = recordScene(options);
+  ASSERT_FALSE(r.answer.patches.empty());
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
+  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_TRUE(read.options.patches);
+  EXPECT_EQ(read.answer.patch_of, r.answer.patch_of);
+  EXPECT_TRUE(replayStep(read).differences.empty());
+  read.answer.patches.back().area_m2 = std::nextafter(read.answer.patches.back().area_m2, 1);
+  EXPECT_EQ(replayStep(read).differences.size(), 1u);
+}
+
+TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
+  StepRecording r = recordScene();
+  r.answer.complete = false;
+  r.answer.status = StepStatus::DEADLINE;
+  r.answer.contacts.resize(1);
+  EXPECT_TRUE(replayStep(r).differences.empty()) << "the rest was left out, which is no contradiction";
+  r.answer.contacts[0].vertex[0] += 1;
+  EXPECT_FALSE(replayStep(r).differences.empty());
+}
+
+TEST(StepReplay, AStepWithoutAnAnswerIsComputed) {
+  StepRecording r = recordScene();
+  const std::size_t contacts = r.answer.contacts.size();
+  r.answer = Outcome();
+  r.has_answer = false;
+  const StepReplay replay = replayStep(r);
+  EXPECT_TRUE(replay.differences.empty());
+  EXPECT_EQ(replay.answer.contacts.size(), contacts);
+}
+
+TEST(StepReplay, PatchesOfExpectedContactsAreMadeAgain) {
+  MonitorOptions options = expecting();
+  options.detector.patches = true;
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(options));
+  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  const auto expected = std::find_if(read.answer.patches.begin(), read.answer.patches.end(),
+                                     [](const Patch& patch) { return patch.expected > 0; });
+  ASSERT_NE(expected, read.answer.patches.end());
+  EXPECT_TRUE(replayStep(read).differences.empty());
+  --expected->expected;
+  EXPECT_EQ(replayStep(read).differences.size(), 1u);
+}
+
+TEST(StepReplay, ImpossibleOptionsAreRefused) {
+  StepRecording r = recordScene();
+  r.options.max_substeps = 0;
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  r = recordScene();
+  r.step.bodies.clear();
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+  r = recordScene();
+  r.options.accuracy.toc_bits = 99;
+  EXPECT_THROW(replayStep(r), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
