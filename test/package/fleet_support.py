@@ -1,4 +1,4 @@
-"""Scenes and commands for the tests of cut bags and of fleets."""
+"""Scenes, bags and commands for the tests of bags: analysed, cut, and of fleets."""
 import sqlite3
 import subprocess
 

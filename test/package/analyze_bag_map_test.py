@@ -1,0 +1,113 @@
+"""Which map a bag is analysed against: wherever it was recorded, of a file, named, missing, refused, or named by nobody."""
+import copy
+import json
+import unittest
+
+import genpy
+import rosbag
+from visualization_msgs.msg import MarkerArray
+
+from analyze_bag_support import AnalyzeBagTestCase
+
+
+class AnalyzeBagMapTest(AnalyzeBagTestCase):
+    def test_a_map_that_was_recorded_last(self):
+        late = self.folder / 'late.bag'
+        with rosbag.Bag(str(late), 'w') as bag:
+            for topic, message, at in self.messages:
+                bag.write(topic, message, at if topic == '/cloth' else self.messages[-1][2] + genpy.Duration(1))
+        self.expect_same(self.analyze('late', late))
+
+    def test_a_map_from_a_file(self):
+        octomap = self.octomap()
+        self.assertEqual((octomap.id, octomap.binary), ('OcTree', True))
+        data = bytes(b & 0xff for b in octomap.data)
+        # Two bits for each child of a node that has children, 0 for none; the header counts the root, too.
+        nodes = 1 + sum((byte >> shift) & 3 != 0 for byte in data for shift in (0, 2, 4, 6))
+        header = '# Octomap OcTree binary file\nid OcTree\nsize %d\nres %r\ndata\n' % (nodes, octomap.resolution)
+        tree = self.folder / 'map.bt'
+        tree.write_bytes(header.encode() + data)
+        bare = self.bag_with('bare.bag')
+        self.expect_same(self.analyze('file', bare, '--octomap', tree))
+
+    def test_a_map_without_a_stamp_is_as_old_as_its_message(self):
+        unstamped, frames = self.folder / 'unstamped.bag', 0
+        octomap = copy.deepcopy(self.octomap())
+        octomap.header.stamp = genpy.Time()
+        with rosbag.Bag(str(unstamped), 'w') as bag:
+            start = next(at for topic, _, at in self.messages if topic == '/cloth')
+            bag.write('/octomap_binary', octomap, start)
+            for topic, message, at in self.messages:
+                if topic == '/cloth':
+                    bag.write(topic, message, at)
+                    frames += message.header.stamp - start > genpy.Duration.from_sec(0.31)
+        self.assertGreater(frames, 2)
+        statuses = self.analyzed('unstamped', unstamped, *self.params('max_step_s: 1.0\noctomap_timeout_s: 0.31\n'))[-1]
+        self.assertEqual(statuses['NO_MAP'], frames, statuses)
+        self.assertGreater(statuses['OK'], 2)
+
+    def test_a_named_map_that_the_bag_does_not_have(self):
+        for words in (self.params('octomap_topic: /octomap_binray\n'), self.params('octomap_topic: octomap\n')):
+            topic = '/octomap_binray' if 'binray' in words[1].read_text() else '/octomap'
+            status, _, said, steps = self.analyzed('misspelt', self.bag, *words)
+            self.assertEqual(status, 3, said)
+            self.assertIn('the bag has no octomap on %s, which octomap_topic names; it has them on /octomap_binary' % topic,
+                          said)
+            self.assertEqual(set(steps), {'FIRST_FRAME', 'NO_MAP'})
+            status, _, said, steps = self.analyzed('without', self.bag, *words, '--without-map')
+            self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), said)
+            self.assertNotIn('octomap', said)
+
+    def test_a_named_map_of_which_nothing_is_usable(self):
+        broken = copy.deepcopy(self.octomap())
+        broken.resolution = -1
+        bag = self.bag_with('broken.bag', ('/table', broken))
+        status, _, said, steps = self.analyzed('broken', bag, *self.params('octomap_topic: /table\n'))
+        self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'NO_MAP'}), said)
+        self.assertIn('octomap refused', said)
+        self.assertIn('no octomap on /table could be used', said)
+        nothing = self.bag_with('nothing.bag')
+        status, _, said, steps = self.analyzed('nothing', nothing, *self.params('effects: {octomap: "on"}\n'))
+        self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'NO_MAP'}), said)
+        self.assertIn('the bag has no octomap on /octomap_binary, which effects/octomap calls for; it has none', said)
+        status, _, said, steps = self.analyzed('nothing', nothing)
+        self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), 'nobody called for one: ' + said)
+
+    def test_a_refused_map_makes_the_one_before_void(self):
+        start = self.messages[0][2]
+        bag = self.folder / 'void.bag'
+        with rosbag.Bag(str(bag), 'w') as written:
+            written.write('/octomap_binary', self.octomap(), start)
+            for i, (topic, message, at) in enumerate(self.messages):
+                if i == len(self.messages) // 2:
+                    written.write('/octomap_binary', MarkerArray(), at)
+                if topic == '/cloth':
+                    written.write(topic, message, at)
+        status, _, said, steps = self.analyzed('void', bag)
+        self.assertEqual(status, 3)
+        self.assertGreater(steps['OK'], 10)
+        self.assertGreater(steps['NO_MAP'], 10, 'no map is better than an old one')
+        self.assertIn('octomap refused', said)
+
+    def test_the_map_that_nobody_named(self):
+        """The default's topic where the bag has it, else the bag's first one; what else there is is not passed over."""
+        other = copy.deepcopy(self.octomap())
+        table = self.bag_with('table.bag', ('/table', other), ('/later', other))
+        status, said, complaints, steps = self.analyzed('table', table)
+        self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), complaints)
+        self.assertIn('octomap: /table (the first of the bag; nobody named one)\n', said)
+        self.assertIn(['octomap', '/table (the first of the bag; nobody named one)'],
+                      json.loads((self.folder / 'table/report.json').read_text())['facts'])
+        self.assertIn('nobody listens to the octomaps on /later', complaints)
+        self.assertEqual((self.folder / 'table/contacts.csv').read_bytes(), (self.plain / 'contacts.csv').read_bytes())
+
+        both = self.bag_with('both.bag', ('/another', other), ('/octomap_binary', other))
+        status, said, complaints, _ = self.analyzed('both', both)
+        self.assertEqual(complaints.count('analyze_bag: '), 1, complaints)
+        self.assertIn('octomap: /octomap_binary (default)\n', said)
+        self.assertIn('nobody listens to the octomaps on /another', complaints)
+        self.assertEqual(self.analyzed('both', both, '--without-map')[2], '')
+
+
+if __name__ == '__main__':
+    unittest.main()

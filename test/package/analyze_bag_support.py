@@ -1,0 +1,74 @@
+"""A recorded scene and its analysis; for the tests of analyze_bag."""
+import collections
+import subprocess
+
+import rosbag
+
+from checkout import CHECKOUT, TOOLS, FolderTestCase
+from fleet_support import messages_of
+
+OWN = '/collision_monitor/'
+
+
+class AnalyzeBagTestCase(FolderTestCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.bag = cls.folder / 'scene.bag'
+        cls.tool('make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', cls.bag, '--frames', 40, '--quiet')
+        cls.messages = messages_of(cls.bag)
+        cls.plain = cls.analyze('plain', cls.bag)
+
+    @classmethod
+    def tool(cls, name, *words):
+        ran = subprocess.run([str(TOOLS / name)] + [str(w) for w in words], capture_output=True, text=True, check=False)
+        assert ran.returncode == 0, ran.stderr
+        return ran
+
+    @classmethod
+    def analyze(cls, name, bag, *words):
+        """The folder of the report, which has the contacts of some steps."""
+        report = cls.folder / name
+        cls.tool('analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words)
+        return report
+
+    def analyzed(self, name, bag, *words):
+        """Exit status, standard output and error, and the statuses of the steps; whatever comes of it."""
+        report = self.folder / name
+        command = [TOOLS / 'analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words]
+        ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+        self.assertIn(ran.returncode, (0, 3), ran.stderr)
+        return ran.returncode, ran.stdout, ran.stderr, self.statuses_of(report)
+
+    def params(self, text):
+        path = self.folder / 'given.yaml'
+        path.write_text('fixed_frame: world\n' + text)
+        return ['--params', path]
+
+    def bag_with(self, name, *maps):
+        """The scene's cloth and, at the bag's beginning, other messages: (topic, message)."""
+        path, start = self.folder / name, self.messages[0][2]
+        with rosbag.Bag(str(path), 'w') as bag:
+            for topic, message in maps:
+                bag.write(topic, message, start)
+            for topic, message, at in self.messages:
+                if topic == '/cloth':
+                    bag.write(topic, message, at)
+        return path
+
+    def octomap(self):
+        return next(message for topic, message, _ in self.messages if topic == '/octomap_binary')
+
+    def statuses(self, bag):
+        return self.analyzed('statuses', bag, *self.params('max_step_s: 1.0\n'))[-1]
+
+    @staticmethod
+    def statuses_of(report):
+        steps = [line.split(',') for line in (report / 'steps.csv').read_text().splitlines()]
+        return collections.Counter(row[steps[0].index('status')] for row in steps[1:])
+
+    def expect_same(self, report, names=('contacts.csv', 'steps.csv')):
+        for name in names:
+            expected = (self.plain / name).read_bytes()
+            self.assertGreater(expected.count(b'\n'), 20, 'too little to mean anything')
+            self.assertEqual((report / name).read_bytes(), expected, name)

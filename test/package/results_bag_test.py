@@ -1,0 +1,145 @@
+"""The bag of results that analyze_bag writes: every topic of the node, markers, diagnostics, beside what monitors recorded."""
+import collections
+import json
+import re
+import unittest
+
+import genpy
+import rosbag
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from visualization_msgs.msg import Marker
+
+from analyze_bag_support import OWN, AnalyzeBagTestCase
+from checkout import CHECKOUT
+from fleet_support import messages_of
+
+
+class ResultsBagTest(AnalyzeBagTestCase):
+    def test_the_bag_of_results(self):
+        out = self.folder / 'out.bag'
+        params = self.folder / 'markers.yaml'
+        params.write_text('markers: {mesh: true, obstacle_m: 0.3}\nlook_ahead_s: 0.1\n')
+        self.analyze('out', self.bag, '--params', params, '-o', out)
+        by_topic = collections.defaultdict(list)
+        for topic, message, _ in messages_of(out):
+            by_topic[topic].append(message)
+        frames = len(by_topic['/cloth'])
+        self.assertEqual(frames, sum(topic == '/cloth' for topic, _, _ in self.messages))
+        # Beside a step's markers come those of the prediction after it, where it has anything to show.
+        foreseen = sum(any(not c.initial for c in array.contacts) for array in by_topic[OWN + 'predicted_contacts'])
+        self.assertGreater(foreseen, 10)
+        for name, count in (('contacts', frames), ('first_contact', frames), ('clear', frames), ('stats', frames),
+                            ('markers', frames + foreseen), ('predicted_contacts', frames), ('time_to_contact', frames)):
+            self.assertEqual(len(by_topic[OWN + name]), count, name)
+        self.assertEqual([m.answered for m in by_topic[OWN + 'time_to_contact']], [False] + [True] * (frames - 1))
+        listed = sum(len(array.contacts) for array in by_topic[OWN + 'contacts'])
+        self.assertEqual(listed, (self.plain / 'contacts.csv').read_text().count('\n') - 1)
+        # The last frame with contacts of both kinds: those that the step began with, and new ones.
+        initial = [{c.initial for c in array.contacts} for array in by_topic[OWN + 'contacts']]
+        both = [i for i, kinds in enumerate(initial) if len(kinds) == 2]
+        steps = [array for array in by_topic[OWN + 'markers'] if array.markers[:1] and array.markers[0].action == Marker.DELETEALL]
+        self.assertEqual(len(steps), frames)
+        drawn = {marker.ns: marker for marker in steps[both[-1]].markers[1:]}
+        self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels', 'legend', 'began'}, set(drawn))
+        patches = by_topic[OWN + 'patches'][both[-1]].patches
+        self.assertEqual(len(drawn['normals'].points), 2 * len(patches), 'one of each patch')
+        self.assertEqual(len(drawn['voxels'].points) % 24, 0, 'the twelve edges of each, which hide nothing')
+        self.assertEqual(drawn['voxels'].type, Marker.LINE_LIST)
+        self.assertRegex(drawn['began'].text, r'^mesh and octomap, \d\.\d\d s ago$')
+        self.assertTrue(all(0 < marker.lifetime.to_sec() < 2 for marker in drawn.values()), 'nothing stays of a node that is gone')
+        ahead = {marker.ns: marker for array in by_topic[OWN + 'markers'] for marker in array.markers if array not in steps}
+        self.assertEqual(set(ahead), {'predicted', 'predicted first'})
+        self.assertNotEqual(ahead['predicted'].type, drawn['contacts'].type, 'a style of their own')
+        self.assertRegex(ahead['predicted first'].text, r'^mesh and (octomap|itself) in 0\.\d\d s$')
+        # What the statistics say beyond the step.
+        stats = by_topic[OWN + 'stats']
+        self.assertEqual([s.markers_built for s in stats], list(range(1, frames + 1)))
+        self.assertEqual({(s.maps_received, s.maps_refused) for s in stats}, {(1, 0)})
+        score = json.loads((self.folder / 'out/report.json').read_text())['look_ahead']
+        self.assertGreater(score['compared'], 0)
+        self.assertEqual(stats[-1].look_ahead_compared, min(score['compared'], 1000))
+        self.assertLess(stats[0].look_ahead_compared, stats[-1].look_ahead_compared)
+
+    def test_a_rope_is_drawn_as_a_tube_and_what_is_expected_apart(self):
+        rope, params, out = self.folder / 'rope.bag', self.folder / 'rope.yaml', self.folder / 'rope_out.bag'
+        self.tool('make_scene_bag', CHECKOUT / 'config/scenes/rope_through_ring.yaml', rope, '--monitor-config', params, '--quiet')
+        params.write_text(params.read_text() + '\nmarkers: {mesh: true}\nexpected_contacts:\n  - {between: [rope, octomap]}\n')
+        self.analyze('rope', rope, '--params', params, '--no-accuracy-table', '-o', out)
+        drawn = [{m.ns: m for m in message.markers} for topic, message, _ in messages_of(out) if topic == OWN + 'markers']
+        meshes = [markers['mesh/rope'] for markers in drawn if 'mesh/rope' in markers]
+        self.assertEqual({m.type for m in meshes}, {Marker.TRIANGLE_LIST})
+        self.assertEqual({len(m.points) % 36 for m in meshes}, {0}, 'six sides of two triangles an edge')
+        self.assertTrue(any('expected' in markers for markers in drawn))
+        self.assertFalse(any('contacts' in markers or 'initial' in markers for markers in drawn))
+
+    def test_the_bag_of_results_has_every_topic_of_the_node(self):
+        out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
+        params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\n')  # more than the cloth's edges
+        self.analyze('all', self.bag, '--params', params, '--no-accuracy-table', '-o', out)
+        by_topic = collections.defaultdict(list)
+        for topic, message, _ in messages_of(out):
+            by_topic[topic].append(message)
+        topics = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
+                  for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
+        self.assertGreater(len(topics), 10)
+        self.assertEqual({OWN + topic for topic in topics} - set(by_topic), set())
+        effects = by_topic[OWN + 'effects']
+        self.assertEqual({e.name for e in effects[-1].effects if e.running} & {'look_ahead', 'minimum_separation'},
+                         {'look_ahead', 'minimum_separation'})
+        self.assertLess(len(effects), 10, 'when the plan changes, and not in each step')
+        listed = len((self.folder / 'all/left_out.csv').read_text().splitlines()) - 1
+        self.assertEqual(len(by_topic[OWN + 'left_out'][-1].pairs), listed)
+
+    def test_the_bag_of_results_is_diagnosed_once_a_second_of_its_time(self):
+        """What a monitor said when the bag was recorded is not in it; what others said is."""
+        slow, out = self.folder / 'slow.bag', self.folder / 'slow_out.bag'
+        start, own = self.messages[0][2], DiagnosticStatus(name='/collision_monitor: steps', message='of before')
+        seconds = 8
+        stretch = seconds / (self.messages[-1][2] - start).to_sec()
+        with rosbag.Bag(str(slow), 'w') as bag:
+            for array in ([own, DiagnosticStatus(name='camera')], [own], [DiagnosticStatus(name='arm')]):
+                bag.write('/diagnostics', DiagnosticArray(status=array), start)
+            for topic, message, at in self.messages:
+                bag.write(topic, message, start + genpy.Duration.from_sec((at - start).to_sec() * stretch))
+        self.expect_same(self.analyze('slow', slow, '-o', out))
+        arrays = [(message, at) for topic, message, at in messages_of(out) if topic == '/diagnostics']
+        others = [status.name for array, _ in arrays for status in array.status if status.name != own.name]
+        self.assertEqual(others, ['camera', 'arm'])
+        said = [(array.status[0], array.header.stamp, at) for array, at in arrays if array.status[0].name == own.name]
+        self.assertTrue(all(stamp == at for _, stamp, at in said), 'of the time of the bag')
+        self.assertIn(len(said), (seconds, seconds + 1))
+        self.assertNotIn('of before', [status.message for status, _, _ in said])
+        self.assertEqual(said[0][0].message, 'no frames arrive', 'yet')
+        last = said[-1][0]
+        self.assertEqual((last.level, last.message), (DiagnosticStatus.OK, 'OK'))
+        values = {pair.key: pair.value for pair in last.values}
+        rows = re.findall(r'put\(status, "([^"]+)"', (CHECKOUT / 'src/output/diagnostics.cpp').read_text())
+        self.assertEqual(set(values), {row for row in rows if 'latency' not in row}, 'the rows of the node; nobody waited')
+        frames = sum(topic == '/cloth' for topic, _, _ in self.messages)
+        self.assertGreater(int(values['frames received']), frames // 2)
+        self.assertAlmostEqual(float(values['answers [Hz]']), frames / seconds, delta=1.5)
+        self.assertEqual((values['maps received'], values['maps refused'], values['frames dropped']), ('1', '0', '0'))
+
+    def test_a_bag_that_was_recorded_beside_monitors(self):
+        """As `rosbag record -a` does: their markers, of a mesh type, come before the tracker's topic."""
+        once, recorded, again = (self.folder / name for name in ('once.bag', 'recorded.bag', 'again.bag'))
+        self.analyze('once', self.bag, '-o', once)
+        results = messages_of(once)
+        with rosbag.Bag(str(recorded), 'w') as bag:
+            for own in (OWN, '/guard/'):
+                for topic, message, at in results:
+                    if topic.startswith(OWN):
+                        bag.write(topic.replace(OWN, own), message, at - genpy.Duration(1))
+            for topic, message, at in self.messages:
+                bag.write(topic, message, at)
+        self.expect_same(self.analyze('recorded', recorded, '-o', again))
+        # Of diagnostics there is one a second, and the recording is longer.
+        count, found = (collections.Counter(topic for topic, _, _ in messages if topic != '/diagnostics')
+                        for messages in (results, messages_of(again)))
+        self.assertGreater(count[OWN + 'markers'], 20)
+        self.assertEqual({t: n for t, n in found.items() if not t.startswith('/guard/')}, count, 'nothing twice')
+        self.assertEqual(found['/guard/contacts'], count[OWN + 'contacts'], 'of others, everything')
+
+
+if __name__ == '__main__':
+    unittest.main()
