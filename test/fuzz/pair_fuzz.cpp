@@ -15,6 +15,7 @@
 #include "fuzz/fuzz_target.h"
 #include "oracle/promises.h"
 #include "support/generators.h"
+#include "support/query_symmetries.h"
 #include "support/step_support.h"
 
 namespace {

@@ -13,6 +13,7 @@
 #include "support/flush_to_zero.h"
 #include "support/generators.h"
 #include "support/query_property.h"
+#include "support/query_symmetries.h"
 #include "support/simd_targets.h"
 
 namespace dccd {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "support/query_symmetries.h"
+
 namespace dccd {
 namespace test {
 namespace {
@@ -36,15 +38,6 @@ Query queryOf(PairKind kind, const Points& t0, const Points& t1) {
     std::copy(t1[point].begin(), t1[point].end(), query.motion.x[1][point]);
   }
   return query;
-}
-
-template <typename Change>
-void forEachCoordinate(Query& query, Change change) {
-  for (auto& points : query.motion.x) {
-    for (auto& point : points) {
-      for (double& value : point) change(value);
-    }
-  }
 }
 
 Point smallIntegers(RandomSource& random, int largest) {
@@ -280,29 +273,6 @@ Query extreme(RandomSource& random, PairKind kind) {
   return query;
 }
 
-/// The binary exponent of the largest coordinate; 0 where all are 0.
-int largestExponent(const Query& query) {
-  double largest = 0;
-  const double* values = &query.motion.x[0][0][0];
-  for (int i = 0; i < 24; ++i) largest = std::max(largest, std::abs(values[i]));
-  return largest > 0 ? std::ilogb(largest) : 0;
-}
-
-int significantBits(double value) {
-  int bits = 0, exponent = 0;
-  for (double rest = std::frexp(std::abs(value), &exponent); rest != 0; rest = 2 * rest - std::floor(2 * rest)) ++bits;
-  return bits;
-}
-
-/// How hard a query is to read: digits, coordinates that move, and a scale other than 1.
-int costOf(const Query& query) {
-  int cost = largestExponent(query) != 0;
-  const double* values = &query.motion.x[0][0][0];
-  for (int i = 0; i < 24; ++i) cost += 2 * significantBits(values[i]);  // more than what moves, so that zeros win
-  for (int i = 0; i < 12; ++i) cost += values[i] != values[i + 12];
-  return cost;
-}
-
 Query drawn(RandomSource& random, PairKind kind, Hardness hardness) {
   switch (hardness) {
     case Hardness::SMALL_GRID:
@@ -378,89 +348,6 @@ Query hardQuery(RandomSource& random) {
 Query hardQuery(RandomSource& random, PairKind kind) {
   const Hardness hardness = drawHardness(random);
   return hardQuery(random, kind, hardness);
-}
-
-std::vector<std::array<int, 4>> vertexPermutations(PairKind kind) {
-  if (kind == PairKind::VERTEX_FACE) {
-    return {{0, 1, 2, 3}, {0, 1, 3, 2}, {0, 2, 1, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {0, 3, 2, 1}};
-  }
-  return {{0, 1, 2, 3}, {1, 0, 2, 3}, {0, 1, 3, 2}, {1, 0, 3, 2},
-          {2, 3, 0, 1}, {3, 2, 0, 1}, {2, 3, 1, 0}, {3, 2, 1, 0}};
-}
-
-std::vector<AxisPermutation> axisPermutations() {
-  std::vector<AxisPermutation> result;
-  std::array<int, 3> axis = {0, 1, 2};
-  do {
-    for (int signs = 0; signs < 8; ++signs) {
-      AxisPermutation permutation{axis, {}};
-      for (int i = 0; i < 3; ++i) permutation.sign[i] = (signs & (1 << i)) != 0 ? -1 : 1;
-      result.push_back(permutation);
-    }
-  } while (std::next_permutation(axis.begin(), axis.end()));
-  return result;
-}
-
-Query permuted(const Query& query, const std::array<int, 4>& order) {
-  Query result = query;
-  for (int time = 0; time < 2; ++time) {
-    for (int i = 0; i < 4; ++i) std::copy_n(query.motion.x[time][order[i]], 3, result.motion.x[time][i]);
-  }
-  return result;
-}
-
-Query permuted(const Query& query, const AxisPermutation& axes) {
-  Query result = query;
-  for (int time = 0; time < 2; ++time) {
-    for (int point = 0; point < 4; ++point) {
-      for (int i = 0; i < 3; ++i) {
-        result.motion.x[time][point][i] = axes.sign[i] * query.motion.x[time][point][axes.axis[i]];
-      }
-    }
-  }
-  return result;
-}
-
-Query timeReversed(const Query& query) {
-  Query result = query;
-  std::copy_n(&query.motion.x[0][0][0], 12, &result.motion.x[1][0][0]);
-  std::copy_n(&query.motion.x[1][0][0], 12, &result.motion.x[0][0][0]);
-  return result;
-}
-
-bool scaledExactly(const Query& query, int exponent, Query& scaled) {
-  scaled = query;
-  bool exact = true;
-  forEachCoordinate(scaled, [&](double& value) {
-    const double result = std::ldexp(value, exponent);
-    exact = exact && std::isfinite(result) && std::ldexp(result, -exponent) == value;
-    value = result;
-  });
-  return exact;
-}
-
-std::vector<Query> simplerQueries(const Query& query) {
-  std::vector<Query> candidates;
-  for (int point = 0; point < 4; ++point) {
-    candidates.push_back(query);
-    std::copy_n(query.motion.x[0][point], 3, candidates.back().motion.x[1][point]);
-  }
-  const double* values = &query.motion.x[0][0][0];
-  for (int i = 0; i < 24; ++i) {
-    int exponent = 0;
-    const double mantissa = std::frexp(values[i], &exponent);
-    for (const int bits : {0, 1, 2, 4, 8, 16, 32}) {
-      candidates.push_back(query);
-      (&candidates.back().motion.x[0][0][0])[i] = std::ldexp(std::trunc(std::ldexp(mantissa, bits)), exponent - bits);
-    }
-  }
-  Query unscaled;
-  if (scaledExactly(query, -largestExponent(query), unscaled)) candidates.push_back(unscaled);
-  // Each step must lower the cost, else shrinking would not end.
-  const int cost = costOf(query);
-  const auto not_simpler = [cost](const Query& candidate) { return costOf(candidate) >= cost; };
-  candidates.erase(std::remove_if(candidates.begin(), candidates.end(), not_simpler), candidates.end());
-  return candidates;
 }
 
 }  // namespace test

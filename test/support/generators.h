@@ -1,11 +1,9 @@
-// Hard pairs made on purpose, and what must not change an answer. Free of any test framework: the property tests, the
-// fuzz targets and the tools draw from here.
+// Hard pairs made on purpose. Free of any test framework: the property tests, the fuzz targets and the tools draw from
+// here.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <random>
-#include <vector>
 
 #include "oracle/query_file.h"
 
@@ -43,26 +41,6 @@ using RandomSource = std::mt19937_64;
 Query hardQuery(RandomSource& random);
 Query hardQuery(RandomSource& random, PairKind kind);
 Query hardQuery(RandomSource& random, PairKind kind, Hardness hardness);
-
-/// Simpler pairs in the order to try: points at rest or at the origin, fewer digits, coordinates of zero.
-std::vector<Query> simplerQueries(const Query& query);
-
-/// Orders of the four points that name the same pair: 6 for vertex-face, 8 for edge-edge; the first is the identity.
-std::vector<std::array<int, 4>> vertexPermutations(PairKind kind);
-
-/// One of the 48 signed permutations of the axes: new axis i is the old axis[i] times sign[i].
-struct AxisPermutation {
-  std::array<int, 3> axis;
-  std::array<double, 3> sign;
-};
-std::vector<AxisPermutation> axisPermutations();
-
-Query permuted(const Query& query, const std::array<int, 4>& order);
-Query permuted(const Query& query, const AxisPermutation& axes);
-Query timeReversed(const Query& query);
-
-/// All coordinates times 2^exponent. False, and `scaled` undefined, where that is not exact.
-bool scaledExactly(const Query& query, int exponent, Query& scaled);
 
 }  // namespace test
 }  // namespace dccd

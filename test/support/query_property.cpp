@@ -11,6 +11,7 @@
 
 #include "oracle/oracle.h"
 #include "support/generators.h"
+#include "support/simpler_queries.h"
 
 namespace dccd {
 

@@ -15,6 +15,7 @@
 #include "oracle/query_file.h"
 #include "support/data.h"
 #include "support/generators.h"
+#include "support/query_symmetries.h"
 #include "support/scene_data.h"
 
 namespace dccd {

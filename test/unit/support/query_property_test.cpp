@@ -8,6 +8,7 @@
 
 #include "oracle/oracle.h"
 #include "support/generators.h"
+#include "support/query_symmetries.h"
 
 namespace dccd {
 namespace test {
