@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -63,9 +64,25 @@ class SceneArrays {
   /// Whether these are the bodies that were set, wherever they are now.
   bool holds(const std::vector<Body>& bodies) const;
 
-  /// Copies the positions, leaves out what is not finite or not active, and sets the record scale.
+  /// Copies the positions, leaves out what is not finite or not active, and sets the record scale. parallel(n, piece,
+  /// f): calls f(first, last) over [0, n), in parallel pieces of about that size or not.
   /// Throws std::invalid_argument naming the body when a frame has the wrong number of vertices.
-  void record(const Step& step, StepStats& stats);
+  template <class Parallel>
+  void record(const Step& step, StepStats& stats, const Parallel& parallel) {
+    const bool bounds_valid = beginRecord(step);
+    const std::size_t n = pieces_.size(), unit = piecesInAUnit();
+    parallel(n, unit, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) copyPiece(step, pieces_[i]);
+    });
+    const bool any_kept = closeCopies(step, bounds_valid, stats);
+    parallel(n, unit, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) spanPiece(pieces_[i]);
+    });
+    endRecord(any_kept);
+  }
+  void record(const Step& step, StepStats& stats) {
+    record(step, stats, [](std::size_t n, std::size_t, const auto& f) { f(std::size_t{0}, n); });
+  }
 
   /// Off: every body is refitted in every step.
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
@@ -184,7 +201,23 @@ class SceneArrays {
   void buildTrees(SceneBody& body, const Positions& rest);
   void makeRoom();
   void setReaches();
-  void recordBody(SceneBody& body, const Body& motion, bool bounds_valid, StepStats& stats);
+  /// Some vertices of a body, and what a step's positions are found to be there.
+  struct Piece {
+    std::size_t body, first, last;
+    bool same = false;     ///< as in the step before, bit for bit
+    bool changed = false;  ///< others are active
+    bool spans = false;    ///< its bounds are asked for
+    std::size_t unchecked = 0, active = 0, first_active = 0;
+    double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections
+  };
+  bool beginRecord(const Step& step);
+  std::size_t piecesInAUnit() const;
+  void copyPiece(const Step& step, Piece& piece);
+  bool closeCopies(const Step& step, bool bounds_valid, StepStats& stats);
+  void closeCopy(SceneBody& body, const Body& motion, const std::array<Piece*, 2>& pieces, bool bounds_valid,
+                 StepStats& stats);
+  void spanPiece(Piece& piece) const;
+  void endRecord(bool any_kept);
   bool recordRadii(SceneBody& body, const Body& motion);
   void setRange(bool keep);
   void setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const;
@@ -195,6 +228,7 @@ class SceneArrays {
   void refitBodies();
 
   std::vector<SceneBody> bodies_;
+  std::vector<Piece> pieces_;      // of the step that is recorded, by bodies
   std::vector<Index> face_order_;  // face rank -> face of the input (all bodies)
   hwy::AlignedFreeUniquePtr<VertexMotion[]> vertices_;
   AlignedRecords records_;

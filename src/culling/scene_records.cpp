@@ -1,5 +1,6 @@
 // A step's positions into the scene's arrays: vertices, the range of their records, and the bounds of what has moved.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -15,6 +16,8 @@ namespace {
 // Where a body rests: how much wider the records' range is on either side than the scene, so that others may move, and
 // how much of it the scene must fill, since the wider the range, the coarser the bounds (of 65,528 values a direction).
 constexpr double PADDING = tolerance::RECORD_PADDING, SMALLEST_SHARE = tolerance::RECORD_SHARE;
+
+constexpr std::size_t PIECE = 2048;  // vertices that are recorded in one go
 
 // a - b as an unevaluated sum without error (Knuth's two-sum); not finite when it overflows.
 struct ExactDifference {
@@ -73,19 +76,44 @@ bool SceneArrays::recordRadii(SceneBody& body, const Body& motion) {
   return body.uncertain;
 }
 
-void SceneArrays::recordBody(SceneBody& body, const Body& motion, bool bounds_valid, StepStats& stats) {
-  checkPositions(body, motion);
-  const Vec3* x0 = motion.t0->data();
-  const Vec3* x1 = motion.t1->data();
-  // What moves differs at its first vertex already, so that the comparison costs nothing there.
-  bool changed = false, masked = false, same = body.recorded && !body.masked;
-  std::uint64_t unchecked = 0;
-  constexpr std::size_t AHEAD = 24;
+/// Whether the bounds of the step before are those of what it recorded.
+bool SceneArrays::beginRecord(const Step& step) {
+  if (step.bodies.size() != bodies_.size()) {
+    throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the scene " +
+                                std::to_string(bodies_.size()));
+  }
+  const bool valid = bounds_valid_ && keep_bounds_;
+  bounds_valid_ = false;  // until refit(), also when a body is refused on the way
+  for (std::size_t b = 0; b < bodies_.size(); ++b) checkPositions(bodies_[b], step.bodies[b]);
+  uncertain_ = false;
+  std::fill(radii_.begin(), radii_.end(), 0.0);
+  pieces_.clear();
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    uncertain_ |= recordRadii(bodies_[b], step.bodies[b]);
+    const std::size_t n = bodies_[b].usedCount();
+    for (std::size_t first = 0; first < n; first += PIECE) pieces_.push_back({b, first, std::min(first + PIECE, n)});
+  }
+  return valid;
+}
+
+/// Small bodies share a unit of work.
+std::size_t SceneArrays::piecesInAUnit() const {
+  return std::max<std::size_t>(pieces_.size() * PIECE / std::max<std::size_t>(vertex_count_, 1), 1);
+}
+
+void SceneArrays::copyPiece(const Step& step, Piece& piece) {
+  SceneBody& body = bodies_[piece.body];
+  const Vec3* x0 = step.bodies[piece.body].t0->data();
+  const Vec3* x1 = step.bodies[piece.body].t1->data();
   VertexMotion* out = vertices_.get() + body.internal_begin;
-  std::size_t first_active = body.usedCount();
-  for (std::size_t i = 0; i < body.usedCount(); ++i) {
+  // What moves differs at its first vertex already, so that the comparison costs nothing there.
+  bool changed = false, same = body.recorded && !body.masked;
+  std::size_t unchecked = 0, active_count = 0;
+  piece.first_active = piece.last;
+  constexpr std::size_t AHEAD = 24;
+  for (std::size_t i = piece.first; i < piece.last; ++i) {
     // The vertices lie in the input's order, anywhere in memory: those that come next are fetched meanwhile.
-    const Index later = body.slot_vertex[std::min(i + AHEAD, body.usedCount() - 1)];
+    const Index later = body.slot_vertex[std::min(i + AHEAD, piece.last - 1)];
     __builtin_prefetch(&x0[later]);
     __builtin_prefetch(&x1[later]);
     const Index v = body.slot_vertex[i];
@@ -100,19 +128,53 @@ void SceneArrays::recordBody(SceneBody& body, const Body& motion, bool bounds_va
     const bool active = finite && (body.asked.empty() || body.asked[v]);
     changed |= body.active[i] != static_cast<std::uint8_t>(active);
     body.active[i] = active;
-    masked |= !active;
-    if (active && first_active == body.usedCount()) first_active = i;
+    active_count += active;
+    if (active && piece.first_active == piece.last) piece.first_active = i;
   }
+  piece.same = same;
+  piece.changed = changed;
+  piece.unchecked = unchecked;
+  piece.active = active_count;
+}
+
+/// Whether some body is kept.
+bool SceneArrays::closeCopies(const Step& step, bool bounds_valid, StepStats& stats) {
+  bool any_kept = false;
+  Piece* piece = pieces_.data();
+  Piece* const end = piece + pieces_.size();
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    Piece* const begin = piece;
+    while (piece != end && piece->body == b) ++piece;
+    closeCopy(bodies_[b], step.bodies[b], {begin, piece}, bounds_valid, stats);
+    any_kept |= bodies_[b].kept;
+  }
+  return any_kept;
+}
+
+void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::array<Piece*, 2>& pieces, bool bounds_valid,
+                            StepStats& stats) {
+  bool changed = false, same = body.recorded && !body.masked;
+  std::size_t unchecked = 0, active = 0, first_active = body.usedCount();
+  for (const Piece* piece = pieces[0]; piece != pieces[1]; ++piece) {
+    same = same && piece->same;
+    changed |= piece->changed;
+    unchecked += piece->unchecked;
+    active += piece->active;
+    if (piece->active > 0) first_active = std::min(first_active, piece->first_active);
+  }
+  VertexMotion* out = vertices_.get() + body.internal_begin;
+  const bool masked = active < body.usedCount();
   if (masked) {
     // What is left out must not widen the range of the records: it takes an active vertex's place.
     for (std::size_t i = 0; i < body.usedCount(); ++i) {
-      if (!body.active[i]) out[i] = first_active < body.usedCount() ? out[first_active] : VertexMotion{};
+      if (!body.active[i]) out[i] = active > 0 ? out[first_active] : VertexMotion{};
     }
   }
   body.unchanged = same && !masked && !body.uncertain;
   body.kept = body.unchanged && bounds_valid;
-  body.recorded = !body.uncertain;  // radii widen the bounds, and may be others in the next step
+  for (Piece* piece = pieces[0]; piece != pieces[1]; ++piece) piece->spans = !body.kept && active > 0;
   if (!body.kept) body.translates = !masked && sameDisplacement(out, body.usedCount());
+  body.recorded = !body.uncertain;  // radii widen the bounds, and may be others in the next step
   stats.unchecked_vertices += unchecked;
   body.mask_changed = changed || masked != body.masked;
   if (body.mask_changed) {
@@ -123,32 +185,33 @@ void SceneArrays::recordBody(SceneBody& body, const Body& motion, bool bounds_va
   }
   if (unchecked) {
     for (const Face& f : body.setup.topology->faces()) {
-      const auto bad = [&](Index v) { return !x0[v].allFinite() || !x1[v].allFinite(); };
+      const auto bad = [&](Index v) { return !(*motion.t0)[v].allFinite() || !(*motion.t1)[v].allFinite(); };
       stats.unchecked_faces += bad(f[0]) || bad(f[1]) || bad(f[2]);
     }
   }
-  if (body.kept) return;
-  std::fill_n(body.bounds_min, 8, std::numeric_limits<double>::infinity());
-  std::fill_n(body.bounds_max, 8, -std::numeric_limits<double>::infinity());
-  if (first_active < body.usedCount()) {
-    simd::projectionBounds(out->t0, body.usedCount(), body.bounds_min, body.bounds_max);
-  }
 }
 
-void SceneArrays::record(const Step& step, StepStats& stats) {
-  if (step.bodies.size() != bodies_.size()) {
-    throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the scene " +
-                                std::to_string(bodies_.size()));
+void SceneArrays::spanPiece(Piece& piece) const {
+  if (!piece.spans) return;
+  std::fill_n(piece.bounds_min, 8, std::numeric_limits<double>::infinity());
+  std::fill_n(piece.bounds_max, 8, -std::numeric_limits<double>::infinity());
+  const VertexMotion* vertices = vertices_.get() + bodies_[piece.body].internal_begin;
+  simd::projectionBounds(vertices[piece.first].t0, piece.last - piece.first, piece.bounds_min, piece.bounds_max);
+}
+
+void SceneArrays::endRecord(bool any_kept) {
+  for (SceneBody& body : bodies_) {
+    if (body.kept) continue;
+    std::fill_n(body.bounds_min, 8, std::numeric_limits<double>::infinity());
+    std::fill_n(body.bounds_max, 8, -std::numeric_limits<double>::infinity());
   }
-  uncertain_ = false;
-  std::fill(radii_.begin(), radii_.end(), 0.0);
-  bool any_kept = false;
-  const bool valid = bounds_valid_ && keep_bounds_;
-  bounds_valid_ = false;  // until refit(), also when a body is refused on the way
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    uncertain_ |= recordRadii(bodies_[b], step.bodies[b]);
-    recordBody(bodies_[b], step.bodies[b], valid, stats);
-    any_kept |= bodies_[b].kept;
+  for (const Piece& piece : pieces_) {
+    if (!piece.spans) continue;
+    SceneBody& body = bodies_[piece.body];
+    for (int d = 0; d < 8; ++d) {
+      body.bounds_min[d] = std::min(body.bounds_min[d], piece.bounds_min[d]);
+      body.bounds_max[d] = std::max(body.bounds_max[d], piece.bounds_max[d]);
+    }
   }
   setRange(any_kept);
   for (SceneBody& body : bodies_) {

@@ -1,5 +1,6 @@
 // From what the pairs found to the list of contacts, in their order.
 #include <algorithm>
+#include <array>
 
 #include "step/history.h"
 
@@ -9,6 +10,7 @@ namespace {
 using Clock = Deadline::Clock;
 
 constexpr std::size_t CONTACT_PIECE = 16384;  // contacts in a unit of writing them out
+constexpr std::size_t HITS_TO_SHARE = 4096;   // from here on the kinds are sorted side by side
 constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
 constexpr std::size_t HITS_AHEAD = 48, FEATURES_AHEAD = 16;  // that are fetched from memory
 
@@ -45,17 +47,24 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
     result.stats += w.stats();
     result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
   }
-  std::vector<const std::vector<Hit>*> parts;
-  std::size_t base = 0;
+  constexpr std::array<PairKind, 2> KINDS{PairKind::VERTEX_FACE, PairKind::EDGE_EDGE};
   std::size_t all = 0;
-  for (const PairWorker& w : workers) all += w.hits(PairKind::VERTEX_FACE).size() + w.hits(PairKind::EDGE_EDGE).size();
-  result.contacts.clear();
-  result.contacts.reserve(all);
-  for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
-    parts.clear();
-    for (const PairWorker& w : workers) parts.push_back(&w.hits(kind));
-    const std::vector<const Hit*>& sorted = order.sort(parts);
-    result.contacts.resize(base + sorted.size());
+  for (const PairWorker& w : workers) {
+    for (const PairKind kind : KINDS) all += w.hits(kind).size();
+  }
+  std::array<const std::vector<const Hit*>*, 2> in_order{};
+  parallel(2, all < HITS_TO_SHARE ? 2 : 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      std::vector<const std::vector<Hit>*> parts;
+      for (const PairWorker& w : workers) parts.push_back(&w.hits(KINDS[k]));
+      in_order[k] = &order[k].sort(parts);
+      if (KINDS[k] == PairKind::VERTEX_FACE) result.contacts.assign(all, Contact());  // there are fewer of these
+    }
+  });
+  std::size_t base = 0;
+  for (std::size_t k = 0; k < KINDS.size(); ++k) {
+    const PairKind kind = KINDS[k];
+    const std::vector<const Hit*>& sorted = *in_order[k];
     parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
       bool late = false;
       for (std::size_t i = first; i < last; ++i) {

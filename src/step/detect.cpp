@@ -251,7 +251,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
 void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const Clock::time_point begin = Clock::now();
   for (PairWorker& w : workers) w.beginStep();
-  order.beginStep();
+  for (HitOrder& kind : order) kind.beginStep();
   releaseBurst(result.contacts);
   releaseBurst(result.intersections);
   result.intersections.clear();
@@ -314,7 +314,7 @@ void History::Impl::leaveOutPart(const Part& part) {
 bool History::Impl::fill(const Part& part) {
   StepStats& stats = result.stats;
   Clock::time_point start = Clock::now();
-  scene.record(part.step, stats);
+  scene.record(part.step, stats, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
   for (std::size_t b = 0; b < carried.map.size(); ++b) {
     if (!scene.bodies()[b].unchanged) carried.map[b] = MapAnswer();
   }

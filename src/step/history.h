@@ -180,7 +180,7 @@ struct History::Impl {
   std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at
   std::vector<std::uint8_t> obstacle_active;
   Positions map_t0, map_t1;
-  HitOrder order;
+  std::array<HitOrder, 2> order;  // by PairKind
   PartResult result;
   PatchMaker patches;
   Deadline::Clock::duration patches_took{0};  // in the last step
