@@ -82,6 +82,12 @@ class ClusterTree {
   }
   /// Vertex indices of the feature in a slot; only slots below featureCount() hold one.
   const Index* feature(std::size_t slot) const { return features_.data() + slot * arity_; }
+  /// Once more, GROUP apart, beside those of the group's other slots: where the test of what shares a vertex has just
+  /// read them. ARITY: arity().
+  template <std::size_t ARITY>
+  const Index* lane(std::size_t slot) const {
+    return lanes_.get() + (slot / simd::GROUP * ARITY * simd::GROUP + slot % simd::GROUP);
+  }
   /// Those of a group's 16 slots as the bounds have them: without what is masked, NO_INDEX in empty ones.
   const Index* boundedGroup(std::size_t group) const {
     return (masked_.empty() ? features_ : masked_).data() + group * simd::GROUP * arity_;

@@ -167,18 +167,19 @@ void PairWorker::take(const std::uint32_t* slots, std::size_t count) {
   std::size_t n = count_;
   Quad* quads = quads_.data();
   std::array<std::uint32_t, 2>* kept_slots = slots_.data();
+  constexpr std::size_t NEXT = simd::GROUP;  // vertex of a lane
   if (task_->kind == PairKind::EDGE_EDGE) {
-    const Index *edges_a = a_->tree(FeatureKind::EDGE).feature(0), *edges_b = b_->tree(FeatureKind::EDGE).feature(0);
+    const ClusterTree &edges_a = a_->tree(FeatureKind::EDGE), &edges_b = b_->tree(FeatureKind::EDGE);
     for (std::size_t i = 0; i < count; ++i, ++n) {
-      const Index *ea = edges_a + std::size_t{2} * slots[2 * i], *eb = edges_b + std::size_t{2} * slots[2 * i + 1];
-      quads[n] = {ea[0], ea[1], eb[0], eb[1]};
+      const Index *ea = edges_a.lane<2>(slots[2 * i]), *eb = edges_b.lane<2>(slots[2 * i + 1]);
+      quads[n] = {ea[0], ea[NEXT], eb[0], eb[NEXT]};
       kept_slots[n] = {slots[2 * i], slots[2 * i + 1]};
     }
   } else {
-    const Index *vertices = a_->tree(FeatureKind::VERTEX).feature(0), *faces = b_->tree(FeatureKind::FACE).feature(0);
+    const ClusterTree &vertices = a_->tree(FeatureKind::VERTEX), &faces = b_->tree(FeatureKind::FACE);
     for (std::size_t i = 0; i < count; ++i, ++n) {
-      const Index* f = faces + std::size_t{3} * slots[2 * i + 1];
-      quads[n] = {vertices[slots[2 * i]], f[0], f[1], f[2]};
+      const Index* f = faces.lane<3>(slots[2 * i + 1]);
+      quads[n] = {*vertices.lane<1>(slots[2 * i]), f[0], f[NEXT], f[2 * NEXT]};
       kept_slots[n] = {slots[2 * i], slots[2 * i + 1]};
     }
   }
