@@ -354,6 +354,8 @@ deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double 
   out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(prediction));
   out.expected_contacts = static_cast<std::uint32_t>(prediction.counts.expected);
   out.seconds = toc * horizon_s;
+  // Rounded to the nearest it could be late.
+  if (out.contact && std::fma(toc, horizon_s, -out.seconds) < 0) out.seconds = std::nextafter(out.seconds, 0);
   return out;
 }
 

@@ -2,7 +2,6 @@
 built and installed there, and examples/library is built against it and finds its contacts."""
 import os
 import re
-import subprocess
 import unittest
 
 import checkout  # noqa: F401 (it puts scripts/lib on the path)

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace dccd {
@@ -92,6 +93,26 @@ Outcome resting(bool alarm) {
   }
   outcome.total_contacts = outcome.contacts.size();
   return outcome;
+}
+
+TEST(TimeToContact, IsNeverLate) {
+  // Of two odd numbers of 27 bits the product has 53 or 54, and of those with 54 a double loses the last one, which is
+  // a tie: it goes either way.
+  Outcome alarm = resting(true);
+  int inexact = 0;
+  for (std::uint64_t a = 100000001; a < 134217728; a += 3355444) {
+    for (std::uint64_t b = 100000003; b < 134217728; b += 3355442) {
+      const std::uint64_t product = a * b;
+      const double toc = std::ldexp(static_cast<double>(a), -27), horizon_s = std::ldexp(static_cast<double>(b), -26);
+      alarm.contacts[1].toc_lower = alarm.contacts[1].toc_upper = alarm.earliest_unexpected_toc = toc;
+      const double seconds = toTimeToContact(alarm, horizon_s, alarm.step->bodies, "world").seconds;
+      const std::uint64_t said = static_cast<std::uint64_t>(std::ldexp(seconds, 53));
+      EXPECT_LE(said, product);
+      EXPECT_LE(product - said, 1u) << "nor much too early";
+      inexact += said != product;
+    }
+  }
+  EXPECT_GT(inexact, 10);
 }
 
 TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
