@@ -133,7 +133,7 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   StatsContext context = statsContext();
   context.latency_s = latency_s;
   outputs.publishStats(outcome, context, frame);
-  diagnostics.add(outcome, context);
+  diagnostics.add(outcome, latency_s);
 }
 
 void CollisionMonitor::Impl::publishEffects(const ros::Time& stamp) {
@@ -213,9 +213,11 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   bool more = false;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
   lookIntoSilence();
-  const auto status = diagnostics.takeWhenDue(steadyNs(), ros::Time::now(), enabled,
-                                              pipeline.effects().mapExpected() ? log.mapSource() : "", log.hint());
-  if (status) diagnostics_publisher.publish(*status);
+  const std::int64_t now_ns = steadyNs();
+  if (diagnostics.isDue(now_ns)) {
+    const std::string map = pipeline.effects().mapExpected() ? log.mapSource() : "";
+    diagnostics_publisher.publish(diagnostics.take(now_ns, ros::Time::now(), statsContext(), enabled, map, log.hint()));
+  }
   return more;
 }
 

@@ -29,21 +29,20 @@ void put(DiagnosticStatus& status, const char* key, const T& value) {
 
 Diagnostics::Diagnostics(const std::string& monitor) : name_(monitor + ": steps") {}
 
-void Diagnostics::add(const Outcome& outcome, const StatsContext& context) {
+void Diagnostics::add(const Outcome& outcome, double latency_s) {
   ++outcomes_;
   answers_ += outcome.answered;
-  worst_latency_s_ = std::max(worst_latency_s_, context.latency_s);
-  if (context.latency_s > 0) latency_.add(context.latency_s);
+  worst_latency_s_ = std::max(worst_latency_s_, latency_s);
+  if (latency_s > 0) latency_.add(latency_s);
   status_ = outcome.status;
   reason_ = outcome.reason;
-  context_ = context;
   if (!outcome.answered) return;
   map_present_ = outcome.obstacle != nullptr;
   map_reason_ = outcome.reason;
   map_age_s_ = map_present_ ? secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns) : 0;
 }
 
-void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::string& map_topic,
+void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, const std::string& map_topic,
                         const std::string& hint) const {
   const auto raise = [&](decltype(status.level) level, const std::string& text) {
     if (level <= status.level) return;
@@ -61,7 +60,7 @@ void Diagnostics::judge(DiagnosticStatus& status, bool enabled, const std::strin
                                       (hint.empty() ? "" : "; " + hint));
   }
   if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
-  if (context_.frames.of(StepStatus::QUEUE_FULL) > dropped_before_) {
+  if (drops) {
     raise(DiagnosticStatus::WARN, "frames are dropped, steps take longer than frames come; " +
                                       adviceFor(StepStatus::QUEUE_FULL, {}, map_topic));
   }
@@ -78,33 +77,34 @@ void Diagnostics::putLatency(DiagnosticStatus& status) const {
   put(status, "latency since start: worst [s]", latency_.worst());
 }
 
-std::optional<diagnostic_msgs::DiagnosticArray> Diagnostics::takeWhenDue(std::int64_t now_ns, const ros::Time& stamp,
-                                                                         bool enabled, const std::string& map_topic,
-                                                                         const std::string& hint) {
-  if (now_ns - last_ns_ < PERIOD_NS) return std::nullopt;
+bool Diagnostics::isDue(std::int64_t now_ns) const { return now_ns - last_ns_ >= PERIOD_NS; }
+
+diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ros::Time& stamp,
+                                                   const StatsContext& context, bool enabled,
+                                                   const std::string& map_topic, const std::string& hint) {
   const double seconds = last_ns_ == 0 ? 1 : secondsBetween(last_ns_, now_ns);
   last_ns_ = now_ns;
   DiagnosticStatus status;
   status.name = name_;
   status.level = DiagnosticStatus::OK;
   status.message = toString(status_);
-  judge(status, enabled, map_topic, hint);
-  const std::uint64_t dropped = context_.frames.of(StepStatus::QUEUE_FULL);
+  const std::uint64_t dropped = context.frames.of(StepStatus::QUEUE_FULL);
+  judge(status, dropped > dropped_before_, enabled, map_topic, hint);
   dropped_before_ = dropped;
   put(status, "outcomes [Hz]", static_cast<double>(outcomes_) / seconds);
   put(status, "answers [Hz]", static_cast<double>(answers_) / seconds);
   putLatency(status);
-  put(status, "frames received", context_.frames.received);
-  put(status, "frames processed", context_.frames.processed());
-  put(status, "frames started anew", context_.frames.started());
-  put(status, "frames skipped", context_.frames.skipped());
+  put(status, "frames received", context.frames.received);
+  put(status, "frames processed", context.frames.processed());
+  put(status, "frames started anew", context.frames.started());
+  put(status, "frames skipped", context.frames.skipped());
   put(status, "frames dropped", dropped);
-  put(status, "time jumps", context_.frames.of(StepStatus::TIME_JUMP));
-  put(status, "gaps", context_.frames.of(StepStatus::GAP));
-  put(status, "steps not wholly published", context_.steps_unpublished);
-  put(status, "frames handed over in process", context_.frames_handed_over);
-  put(status, "maps received", context_.maps_received);
-  put(status, "maps refused", context_.maps_refused);
+  put(status, "time jumps", context.frames.of(StepStatus::TIME_JUMP));
+  put(status, "gaps", context.frames.of(StepStatus::GAP));
+  put(status, "steps not wholly published", context.steps_unpublished);
+  put(status, "frames handed over in process", context.frames_handed_over);
+  put(status, "maps received", context.maps_received);
+  put(status, "maps refused", context.maps_refused);
   put(status, "map age [s]", map_age_s_);
   outcomes_ = answers_ = 0;
   worst_latency_s_ = 0;

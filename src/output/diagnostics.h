@@ -3,7 +3,6 @@
 
 #include "output/output_messages.h"
 
-#include <optional>
 #include <string>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
@@ -21,14 +20,16 @@ class Diagnostics {
   explicit Diagnostics(const std::string& monitor);
   /// What its status is called.
   const std::string& name() const { return name_; }
-  void add(const Outcome& outcome, const StatsContext& context);
-  /// At most once a second by the clock of `now_ns`. `hint`: what looks like a mistake; `map_topic`: where the octomap
-  /// is looked for, or empty when none is expected.
-  std::optional<diagnostic_msgs::DiagnosticArray> takeWhenDue(std::int64_t now_ns, const ros::Time& stamp, bool enabled,
-                                                              const std::string& map_topic, const std::string& hint);
+  void add(const Outcome& outcome, double latency_s);
+  /// Once a second by the clock of `now_ns`.
+  bool isDue(std::int64_t now_ns) const;
+  /// `context`: of now, also where there has been no outcome since; `hint`: what looks like a mistake; `map_topic`:
+  /// where the octomap is looked for, or empty when none is expected.
+  diagnostic_msgs::DiagnosticArray take(std::int64_t now_ns, const ros::Time& stamp, const StatsContext& context,
+                                        bool enabled, const std::string& map_topic, const std::string& hint);
 
  private:
-  void judge(diagnostic_msgs::DiagnosticStatus& status, bool enabled, const std::string& map_topic,
+  void judge(diagnostic_msgs::DiagnosticStatus& status, bool drops, bool enabled, const std::string& map_topic,
              const std::string& hint) const;
   void putLatency(diagnostic_msgs::DiagnosticStatus& status) const;
 
@@ -45,7 +46,6 @@ class Diagnostics {
   std::string map_reason_;
   double map_age_s_ = 0;
   bool map_present_ = false;
-  StatsContext context_;
 };
 
 /// One sentence for people: status, contacts, earliest time.

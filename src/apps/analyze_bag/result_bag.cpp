@@ -26,9 +26,10 @@ void ResultBag::write(const char* name, const ros::Time& at, const Message& mess
 
 void ResultBag::copy(const rosbag::MessageInstance& m) {
   // With every message of the bag, so that frames that do not come are missed as they are live.
-  const auto status =
-      diagnostics_.takeWhenDue(static_cast<std::int64_t>(m.getTime().toNSec()), m.getTime(), true, map_source_, "");
-  if (status) bag_.write(DIAGNOSTICS_TOPIC, m.getTime(), *status);
+  const auto now_ns = static_cast<std::int64_t>(m.getTime().toNSec());
+  if (diagnostics_.isDue(now_ns)) {
+    bag_.write(DIAGNOSTICS_TOPIC, m.getTime(), diagnostics_.take(now_ns, m.getTime(), context_, true, map_source_, ""));
+  }
   const std::string own = std::string(MONITOR_NAMESPACE) + "/";
   if (m.getTopic().compare(0, own.size(), own) == 0) return;
   if (m.getTopic() == DIAGNOSTICS_TOPIC && copyOthersDiagnostics(m)) return;
@@ -97,15 +98,15 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
                     const ros::Time& at) {
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  const StatsContext context = contextOf(outcome, pipeline, so_far);
+  context_ = contextOf(outcome, pipeline, so_far);
   write("contacts", at, toContactArray(outcome, bodies, frame));
   addPlan(outcome, pipeline, at);
-  write("stats", at, toStepStats(outcome, context, frame));
+  write("stats", at, toStepStats(outcome, context_, frame));
   write("first_contact", at, toFirstContact(outcome, bodies, frame));
   addPatches(outcome, pipeline, at);
   addState(outcome, frame, at);
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
-  diagnostics_.add(outcome, context);
+  diagnostics_.add(outcome, context_.latency_s);
   const MonitorConfig& config = pipeline.config();
   const std::string& source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
   map_source_ = pipeline.effects().mapExpected() ? source : "";
