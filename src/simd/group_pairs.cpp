@@ -56,30 +56,49 @@ struct InMemory {
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return hn::Load(D(), lanes + at); }
 };
 
-// Above 0 in the lanes that are apart in direction k.
+// What is negative in the lanes that are apart in no direction looked at so far, and in those where both are. With
+// AVX-512 only the sign bits mean anything: one instruction puts three of them together, on more units than minima.
+template <class V>
+HWY_INLINE V apartAlso(V apart, V one, V other) {
+#if DCCD_AVX512
+  return hn::OrAnd(apart, one, other);
+#else
+  return hn::Min(apart, hn::Max(one, other));
+#endif
+}
+
+// Bit per lane of two directions: 1 where neither is negative.
+template <class D>
+HWY_INLINE uint32_t notApart(D d, hn::Vec<D> apart) {
+#if DCCD_AVX512
+  apart = hn::And(apart, hn::SignBit(d));
+#endif
+  const hn::RepartitionToWide<D> d32;
+  return bitsOf(d32, hn::Eq(hn::BitCast(d32, apart), hn::Zero(d32)));
+}
+
+// Negative in the lanes that are apart in direction k, or were before. A saturated difference has the true one's sign.
 template <bool T0_ONLY, class D, class Lanes>
-HWY_INLINE hn::Vec<D> gapIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
-                            size_t stride, const Lanes& lanes) {
+HWY_INLINE hn::Vec<D> apartIn(D d, size_t k, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi,
+                              size_t stride, const Lanes& lanes, hn::Vec<D> apart) {
   const size_t smallest = soaIndex(k, 0), largest = smallest + RECORD * GROUP;
-  auto above = hn::SaturatedSub(both(d, lo + k * stride), lanes(largest));
-  auto below = hn::SaturatedSub(lanes(smallest), both(d, hi + k * stride));
-  if (!T0_ONLY) {
-    const size_t t1 = (DIRECTIONS + k) * stride;
-    above = hn::Min(above, hn::SaturatedSub(both(d, lo + t1), lanes(largest + SOA_T1)));
-    below = hn::Min(below, hn::SaturatedSub(lanes(smallest + SOA_T1), both(d, hi + t1)));
-  }
-  return hn::Max(above, below);
+  const auto above0 = hn::SaturatedSub(lanes(largest), both(d, lo + k * stride));
+  const auto below0 = hn::SaturatedSub(both(d, hi + k * stride), lanes(smallest));
+  if (T0_ONLY) return apartAlso(apartAlso(apart, above0, above0), below0, below0);
+  const size_t t1 = (DIRECTIONS + k) * stride;
+  const auto above1 = hn::SaturatedSub(lanes(largest + SOA_T1), both(d, lo + t1));
+  const auto below1 = hn::SaturatedSub(both(d, hi + t1), lanes(smallest + SOA_T1));
+  return apartAlso(apartAlso(apart, above0, above1), below0, below1);
 }
 
 template <bool T0_ONLY, class D, class Lanes>
 HWY_INLINE uint32_t meetingIn(D d, const int16_t* HWY_RESTRICT lo, const int16_t* HWY_RESTRICT hi, size_t stride,
                               const Lanes& lanes) {
-  const hn::RepartitionToWide<D> d32;
-  auto gap = hn::Max(hn::Zero(d), gapIn<T0_ONLY>(d, 0, lo, hi, stride, lanes));
-  gap = hn::Max(gap, gapIn<T0_ONLY>(d, 2, lo, hi, stride, lanes));
-  gap = hn::Max(gap, gapIn<T0_ONLY>(d, 4, lo, hi, stride, lanes));
-  gap = hn::Max(gap, gapIn<T0_ONLY>(d, 6, lo, hi, stride, lanes));
-  return bitsOf(d32, hn::Eq(hn::BitCast(d32, gap), hn::Zero(d32)));
+  auto apart = apartIn<T0_ONLY>(d, 0, lo, hi, stride, lanes, hn::Zero(d));
+  apart = apartIn<T0_ONLY>(d, 2, lo, hi, stride, lanes, apart);
+  apart = apartIn<T0_ONLY>(d, 4, lo, hi, stride, lanes, apart);
+  apart = apartIn<T0_ONLY>(d, 6, lo, hi, stride, lanes, apart);
+  return notApart(d, apart);
 }
 
 template <bool T0_ONLY>
@@ -130,45 +149,74 @@ class GroupLanes {
 };
 #endif
 
-// Writes the pairs of one node with those lanes of the other group that are in the mask, node first or second, in the
-// order of lanes, and returns where the next one goes. There is room for all lanes from o on. Lanes are numbered from
-// `base`.
-HWY_INLINE uint32_t* writePairs(uint32_t node, uint32_t base, uint32_t mask, bool node_first,
-                                uint32_t* HWY_RESTRICT o) {
+// Writes the pairs of one node with those lanes of another group that are in a mask, node first or second, in the order
+// of lanes.
+class PairWriter {
+ public:
+  // Lanes are numbered from `base`.
+  HWY_INLINE PairWriter(bool node_first, uint32_t base);
+  // Returns where the next pair goes. There is room for all lanes from o on.
+  HWY_INLINE uint32_t* write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const;
+
+ private:
 #if DCCD_AVX512
-  // Without a branch on how many there are, which nothing foretells: whole vectors are stored, o moves on less.
-  const hn::FixedTag<uint32_t, GROUP> d;
-  const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
-  // From a table: Iota() is written to the stack lane by lane, and read back at once.
-  HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  const auto left = hn::Compress(hn::Load(d, LANES), hn::LoadMaskBits(d, packed));
-  const auto lanes = hn::Add(left, hn::Set(d, base)), nodes = hn::Set(d, node);
-  if (node_first) {
-    hn::StoreInterleaved2(nodes, lanes, d, o);
-  } else {
-    hn::StoreInterleaved2(lanes, nodes, d, o);
-  }
-  return o + 2 * hwy::PopCount(mask);
+  // A pair is a number of 64 bits, of which the node or the lane is the lower half.
+  using D = hn::FixedTag<uint32_t, GROUP>;
+  using Pairs = hn::FixedTag<uint64_t, GROUP / 2>;
+  hn::Vec<D> lanes_;
+  hn::Vec<Pairs> lane_shift_;
+  unsigned node_shift_;
 #else
+  bool node_first_;
+  uint32_t base_;
+#endif
+};
+
+#if DCCD_AVX512
+// From a table: Iota() is written to the stack lane by lane, and read back at once.
+HWY_ALIGN static constexpr uint32_t LANES[GROUP] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
+PairWriter::PairWriter(bool node_first, uint32_t base)
+    : lanes_(hn::Add(hn::Load(D(), LANES), hn::Set(D(), base))),
+      lane_shift_(hn::Set(Pairs(), node_first ? 32 : 0)),
+      node_shift_(node_first ? 0 : 32) {}
+
+// Without a branch on how many there are, which nothing foretells: whole vectors are stored, o moves on less.
+uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const {
+  const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
+  const auto lanes = hn::Compress(lanes_, hn::LoadMaskBits(D(), packed));
+  const auto nodes = hn::Set(Pairs(), uint64_t{node} << node_shift_);
+  const auto pairsOf = [&](hn::Vec<hn::Half<D>> half)
+                           HWY_ATTR { return hn::Or(hn::Shl(hn::PromoteTo(Pairs(), half), lane_shift_), nodes); };
+  hn::StoreU(hn::BitCast(D(), pairsOf(hn::LowerHalf(hn::Half<D>(), lanes))), D(), o);
+  hn::StoreU(hn::BitCast(D(), pairsOf(hn::UpperHalf(hn::Half<D>(), lanes))), D(), o + GROUP);
+  return o + 2 * hwy::PopCount(mask);
+}
+#else
+PairWriter::PairWriter(bool node_first, uint32_t base) : node_first_(node_first), base_(base) {}
+
+uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const {
   for (; mask; mask &= mask - 1) {
-    const uint32_t lane = base + static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
-    o[node_first ? 0 : 1] = node;
-    o[node_first ? 1 : 0] = lane;
+    const uint32_t lane = base_ + static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(mask));
+    o[node_first_ ? 0 : 1] = node;
+    o[node_first_ ? 1 : 0] = lane;
     o += 2;
   }
   return o;
-#endif
 }
+#endif
 
 // What of the surviving lanes of a pair of groups is left out. before(): of the lanes j of the other group, what is
 // known of node i without a test; after(): of those that are left. by_rows: i is of the first group.
 struct LeaveNoneOut {
+  static constexpr bool MAY_LEAVE_NONE = false;
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
   HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }
 };
 
 // By a mask for each node of the first group.
 struct LeaveMasksOut {
+  static constexpr bool MAY_LEAVE_NONE = true;
   const uint16_t* HWY_RESTRICT masks;
   HWY_INLINE uint32_t before(bool by_rows, uint32_t i, uint32_t mask) const {
     return by_rows ? mask & ~uint32_t{masks[i]} : mask;
@@ -202,14 +250,18 @@ HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const 
 // Features of A and B vertices that share one: their vertices lane by lane.
 template <size_t A, size_t B>
 struct LeaveAdjacentOut {
+  static constexpr bool MAY_LEAVE_NONE = false;
   const uint32_t* HWY_RESTRICT a;
   const uint32_t* HWY_RESTRICT b;
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
   HWY_INLINE uint32_t after(bool by_rows, uint32_t i, uint32_t mask) const {
-    if (mask == 0) return 0;
     return mask & ~(by_rows ? sharing<A, B>(a, i, b) : sharing<B, A>(b, i, a));
   }
 };
+
+// Whether a node meets any other is a branch that nothing foretells. Where a test takes no longer than that one, all
+// tests come first, and then what is left of them.
+constexpr bool WRITES_LATER = DCCD_AVX512;
 
 // The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
 template <bool T0_ONLY, class LeaveOut>
@@ -227,20 +279,30 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   const bool by_rows = hwy::PopCount(rows) <= hwy::PopCount(cols);
   const int16_t* HWY_RESTRICT outer = by_rows ? sa : sb;
   const GroupLanes<T0_ONLY> lanes(by_rows ? sb : sa);
-  uint32_t outer_left = by_rows ? rows : cols;
   const uint32_t inner_mask = by_rows ? cols : rows;
-  const uint32_t base_outer = (by_rows ? g : h) * GROUP, base_inner = (by_rows ? h : g) * GROUP;
-  while (outer_left) {
-    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(outer_left));
-    outer_left &= outer_left - 1;
+  const PairWriter writer(by_rows, (by_rows ? h : g) * GROUP);
+  const uint32_t base = (by_rows ? g : h) * GROUP;
+  const auto write = [&](uint32_t i, uint32_t mask)
+                         HWY_ATTR { o = writer.write(base + i, leave_out.after(by_rows, i, mask), o); };
+  uint32_t met[GROUP], to_write = 0;
+  for (uint32_t left = by_rows ? rows : cols; left; left &= left - 1) {
+    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
     uint32_t mask = inner_mask;
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     mask = leave_out.before(by_rows, i, mask);
-    if (mask == 0) continue;
+    if (LeaveOut::MAY_LEAVE_NONE && mask == 0) continue;
     mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
-    mask = leave_out.after(by_rows, i, mask);
-    if (mask) o = writePairs(base_outer + i, base_inner, mask, by_rows, o);
+    if (WRITES_LATER) {
+      met[i] = mask;
+      to_write |= static_cast<uint32_t>(mask != 0) << i;
+    } else if (mask) {
+      write(i, mask);
+    }
+  }
+  for (; to_write; to_write &= to_write - 1) {
+    const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(to_write));
+    write(i, met[i]);
   }
   return o;
 }
