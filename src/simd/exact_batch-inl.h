@@ -9,6 +9,7 @@
 #include "simd/exact_batch.h"
 #include "simd/exact_batch_bounds.h"
 #include "simd/exact_batch_scratch.h"
+#include "simd/targets.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace dccd {

@@ -4,28 +4,76 @@ namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 
+/// Which vertices of a quad the differences u, v, w are of: the first less the second.
+template <BatchKind KIND>
+constexpr int ENDS[3][2] = {{1, 0}, {3, 2}, {2, 0}};
+template <>
+constexpr int ENDS<BatchKind::VERTEX_FACE>[3][2] = {{2, 1}, {3, 1}, {0, 1}};
+
+HWY_INLINE void prefetchPair(const BatchInput& in, std::size_t pair) {
+  if (pair >= in.count) return;
+  for (int i = 0; i < 4; ++i) hwy::Prefetch(in.vertices + std::size_t{8} * in.quads[pair][i]);
+}
+constexpr std::size_t PAIRS_AHEAD = 16;  ///< whose vertices are fetched from memory
+
+#if DCCD_AVX512
+/// Columns 0, 1, 2 and 4, 5, 6 of eight rows, to planes from `to` and from `to_t1` on.
+HWY_INLINE void storeColumns(const V (&rows)[8], std::size_t at, BatchPlane* to, BatchPlane* to_t1) {
+  const Tag d;
+  V even[4], odd[4];  // of two rows each: columns 0, 2, 4, 6 and 1, 3, 5, 7, a block of 128 bits a column
+  for (int i = 0; i < 4; ++i) {
+    even[i] = hn::InterleaveLower(d, rows[2 * i], rows[2 * i + 1]);
+    odd[i] = hn::InterleaveUpper(d, rows[2 * i], rows[2 * i + 1]);
+  }
+  const auto firsts = [](V one, V other) HWY_ATTR { return hn::OddEvenBlocks(hn::SwapAdjacentBlocks(other), one); };
+  const auto seconds = [](V one, V other) HWY_ATTR { return hn::OddEvenBlocks(other, hn::SwapAdjacentBlocks(one)); };
+  const V even_04 = firsts(even[0], even[1]), later_even_04 = firsts(even[2], even[3]);
+  const V even_26 = seconds(even[0], even[1]), later_even_26 = seconds(even[2], even[3]);
+  const V odd_15 = firsts(odd[0], odd[1]), later_odd_15 = firsts(odd[2], odd[3]);
+  store(hn::ConcatLowerLower(d, later_even_04, even_04), to[0], at);
+  store(hn::ConcatLowerLower(d, later_odd_15, odd_15), to[1], at);
+  store(hn::ConcatLowerLower(d, later_even_26, even_26), to[2], at);
+  store(hn::ConcatUpperUpper(d, later_even_04, even_04), to_t1[0], at);
+  store(hn::ConcatUpperUpper(d, later_odd_15, odd_15), to_t1[1], at);
+  store(hn::ConcatUpperUpper(d, later_even_26, even_26), to_t1[2], at);
+}
+
+/// Differences of pairs first .. first+count-1 as planes; the last vector is filled up with copies of the last pair. A
+/// vertex at both ends of the step is one vector.
+template <BatchKind KIND>
+HWY_INLINE void gather(const BatchInput& in, std::size_t first, std::size_t count, MotionBlock& block) {
+  for (std::size_t j = 0; j < count; j += 8) {
+    const std::uint32_t* quads[8];
+    for (std::size_t lane = 0; lane < 8; ++lane) {
+      quads[lane] = in.quads[first + (j + lane < count ? j + lane : count - 1)];
+      prefetchPair(in, first + j + lane + PAIRS_AHEAD);
+    }
+    for (int vector = 0; vector < 3; ++vector) {
+      V rows[8];
+      for (int lane = 0; lane < 8; ++lane) {
+        const std::uint32_t to = quads[lane][ENDS<KIND>[vector][0]], from = quads[lane][ENDS<KIND>[vector][1]];
+        rows[lane] = hn::Sub(hn::Load(Tag(), in.vertices + std::size_t{8} * to),
+                             hn::Load(Tag(), in.vertices + std::size_t{8} * from));
+      }
+      storeColumns(rows, j, block.motion + 3 * vector, block.motion + U_T1 + 3 * vector);
+    }
+  }
+}
+#else
 /// Differences of pairs first .. first+count-1 as planes; the last vector is filled up with copies of the last pair.
 /// Plain doubles: scattered stores beat gather instructions on most machines.
 template <BatchKind KIND>
 HWY_INLINE void gather(const BatchInput& in, std::size_t first, std::size_t count, MotionBlock& block) {
-  constexpr std::size_t AHEAD = 16;
-  constexpr bool VF = KIND == BatchKind::VERTEX_FACE;
   for (std::size_t j = 0; j < count; ++j) {
     const std::uint32_t* quad = in.quads[first + j];
-    if (first + j + AHEAD < in.count) {
-      const std::uint32_t* later = in.quads[first + j + AHEAD];
-      for (int i = 0; i < 4; ++i) hwy::Prefetch(in.vertices + std::size_t{8} * later[i]);
-    }
-    const double* x0 = in.vertices + std::size_t{8} * quad[0];
-    const double* x1 = in.vertices + std::size_t{8} * quad[1];
-    const double* x2 = in.vertices + std::size_t{8} * quad[2];
-    const double* x3 = in.vertices + std::size_t{8} * quad[3];
-    for (int end = 0; end < 2; ++end) {
+    prefetchPair(in, first + j + PAIRS_AHEAD);
+    const double* x[4];
+    for (int i = 0; i < 4; ++i) x[i] = in.vertices + std::size_t{8} * quad[i];
+    for (int vector = 0; vector < 3; ++vector) {
+      const double *to = x[ENDS<KIND>[vector][0]], *from = x[ENDS<KIND>[vector][1]];
       for (int axis = 0; axis < 3; ++axis) {
-        const int k = 4 * end + axis, plane = 9 * end + axis;
-        block.motion[U_T0 + plane][j] = VF ? x2[k] - x1[k] : x1[k] - x0[k];
-        block.motion[V_T0 + plane][j] = VF ? x3[k] - x1[k] : x3[k] - x2[k];
-        block.motion[W_T0 + plane][j] = VF ? x0[k] - x1[k] : x2[k] - x0[k];
+        block.motion[3 * vector + axis][j] = to[axis] - from[axis];
+        block.motion[U_T1 + 3 * vector + axis][j] = to[4 + axis] - from[4 + axis];
       }
     }
   }
@@ -33,6 +81,7 @@ HWY_INLINE void gather(const BatchInput& in, std::size_t first, std::size_t coun
     for (int k = 0; k < MOTION_PLANES; ++k) block.motion[k][j] = block.motion[k][count - 1];
   }
 }
+#endif
 
 /// Largest absolute component of a difference over both ends of the step.
 HWY_INLINE V sizeOf(const BatchPlane* t0, const BatchPlane* t1, std::size_t i) {

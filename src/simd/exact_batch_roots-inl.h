@@ -6,7 +6,8 @@ namespace HWY_NAMESPACE {
 
 constexpr int QUICK_STEPS = 4;     ///< Halley steps that settle nearly every root
 constexpr int SPLIT_STEPS = 5;     ///< where one end is an extremum of f
-constexpr int PATIENT_STEPS = 20;  ///< for the others
+constexpr int MORE_STEPS = 8;      ///< for most of the others
+constexpr int PATIENT_STEPS = 20;  ///< for the rest
 
 /// Two places that split [0,1] into pieces on which the Bernstein coefficients of f are monotone: the extrema of f, or
 /// its inflection point where it has none. Any place is safe; these leave no piece uncertain without need.
@@ -113,7 +114,7 @@ HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& t
   misses = hn::And(n_certain, any_outside);
 }
 
-/// Approximate root in [lo, hi] by `steps` Halley steps that fall back to bisection, and |f'| there.
+/// Approximate root in [lo, hi] by `steps` Halley steps that fall back to bisection, and |f'| and |f''|/2 there.
 HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int steps, V& slope, V& curvature) {
   const V three = constant(3), half = constant(0.5), sign_bit = hn::SignBit(Tag());
   const V a1 = hn::Sub(f1, hn::Mul(three, f0));
@@ -140,16 +141,28 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int st
   return onGrid(x);
 }
 
-/// One vector: approximates the pending roots, certifies bracket and cell, and tests for contact. WHOLE: the root is
-/// the only one in [0,1], and lo, hi, at_lo need not be set.
-template <bool CERTIFIED, BatchKind KIND, bool WHOLE, int STEPS>
-HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
+/// One vector: approximates the pending roots. WHOLE: the root is the only one in [0,1], and lo, hi, at_lo need not be
+/// set.
+template <bool WHOLE, int STEPS>
+HWY_INLINE void approximate(RootBlock& roots, std::size_t i) {
   const V f0 = load(roots.coefficient[0], i), f1 = load(roots.coefficient[1], i);
   const V f2 = load(roots.coefficient[2], i), f3 = load(roots.coefficient[3], i);
   const V lo = WHOLE ? hn::Zero(Tag()) : load(roots.lo, i), at_lo = WHOLE ? f0 : load(roots.at_lo, i);
   const V hi = WHOLE ? constant(1) : load(roots.hi, i);
   V slope, curvature;
-  const V x = approximateRoot(f0, f1, f2, f3, lo, hi, at_lo, STEPS, slope, curvature);
+  store(approximateRoot(f0, f1, f2, f3, lo, hi, at_lo, STEPS, slope, curvature), roots.root_lo, i);
+  store(slope, roots.slope, i);
+  store(curvature, roots.curvature, i);
+}
+
+/// One vector: certifies bracket and cell of what was approximated, and tests for contact.
+template <bool CERTIFIED, BatchKind KIND, bool WHOLE, int STEPS>
+HWY_INLINE void certify(RootBlock& roots, std::size_t i, double cells) {
+  const V f0 = load(roots.coefficient[0], i), f1 = load(roots.coefficient[1], i);
+  const V f2 = load(roots.coefficient[2], i), f3 = load(roots.coefficient[3], i);
+  const V lo = WHOLE ? hn::Zero(Tag()) : load(roots.lo, i), at_lo = WHOLE ? f0 : load(roots.at_lo, i);
+  const V hi = WHOLE ? constant(1) : load(roots.hi, i);
+  const V x = load(roots.root_lo, i), slope = load(roots.slope, i);
   const V count = constant(cells), width = constant(1 / cells), one = constant(1);
   M touches, misses;
   V outcome = constant(ROOT_UNCERTAIN);
@@ -161,8 +174,8 @@ HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
     const V error = load(roots.error, i);
     const V flip = hn::And(at_lo, hn::SignBit(Tag()));
     V reach = hn::Div(hn::Mul(constant(4), error), slope);
-    if (STEPS == PATIENT_STEPS) {  // near a double root the curvature bounds the reach better than the slope
-      const V parabola = hn::Sqrt(hn::Div(hn::Mul(constant(16), error), curvature));
+    if (STEPS >= MORE_STEPS) {  // near a double root the curvature bounds the reach better than the slope
+      const V parabola = hn::Sqrt(hn::Div(hn::Mul(constant(16), error), load(roots.curvature, i)));
       reach = hn::Mul(constant(4), reach);
       reach = choose(hn::Lt(parabola, reach), parabola, reach);
     }
@@ -194,6 +207,14 @@ HWY_INLINE void refine(RootBlock& roots, std::size_t i, double cells) {
   store(outcome, roots.outcome, i);
   store(root_lo, roots.root_lo, i);
   store(root_hi, roots.root_hi, i);
+}
+
+/// Approximates the pending roots, certifies them and tests for contact. In two loops: each step of an approximation
+/// waits for the one before, and a processor looks ahead to more of them where there is nothing between them.
+template <bool CERTIFIED, BatchKind KIND, bool WHOLE, int STEPS>
+HWY_INLINE void refine(RootBlock& roots, double cells) {
+  for (std::size_t i = 0; i < roots.count; i += lanes()) approximate<WHOLE, STEPS>(roots, i);
+  for (std::size_t i = 0; i < roots.count; i += lanes()) certify<CERTIFIED, KIND, WHOLE, STEPS>(roots, i, cells);
 }
 
 /// Copies one lane, but for what its next root will set.
@@ -263,39 +284,36 @@ HWY_INLINE void leave(const RootBlock& roots, std::size_t j, double cells, RootB
   if (hard.count == BATCH_BLOCK) subdivideAll<KIND>(hard, cells, out);
 }
 
-/// Pairs with certainly one root in the step that a few steps did not bracket.
-template <BatchKind KIND>
-HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
-  fillUp(roots);
-  for (std::size_t i = 0; i < roots.count; i += lanes()) refine<true, KIND, true, PATIENT_STEPS>(roots, i, cells);
-  for (std::size_t j = 0; j < roots.count; ++j) {
-    if (roots.outcome[j] == ROOT_UNCERTAIN || roots.outcome[j] == ROOT_NOT_BRACKETED) {
-      leave<KIND>(roots, j, cells, hard, out);
-    } else {
-      writeOut(roots, j, cells, out);
-    }
-  }
-}
+/// Pairs with certainly one root in the step that fewer steps did not bracket.
+template <BatchKind KIND, int STEPS>
+HWY_NOINLINE void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out);
 
-/// Pairs with certainly one root in the step: a few Halley steps, and more for those that these did not bring close.
-template <bool CERTIFIED, BatchKind KIND>
+/// Pairs with certainly one root in the step: with a few Halley steps, and more for those that these did not bring
+/// close.
+template <bool CERTIFIED, BatchKind KIND, int STEPS = QUICK_STEPS>
 HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+  constexpr int NEXT_STEPS = STEPS < MORE_STEPS ? MORE_STEPS : PATIENT_STEPS;
   fillUp(roots);
-  for (std::size_t i = 0; i < roots.count; i += lanes()) refine<CERTIFIED, KIND, true, QUICK_STEPS>(roots, i, cells);
+  refine<CERTIFIED, KIND, true, STEPS>(roots, cells);
   std::size_t again = 0;
   for (std::size_t j = 0; j < roots.count; ++j) {
-    if (CERTIFIED && roots.outcome[j] == ROOT_NOT_BRACKETED) {
+    if (CERTIFIED && STEPS < PATIENT_STEPS && roots.outcome[j] == ROOT_NOT_BRACKETED) {
       if (again != j) copyPair(roots, j, roots, again);
       ++again;
-    } else if (CERTIFIED && roots.outcome[j] == ROOT_UNCERTAIN) {
+    } else if (CERTIFIED && (roots.outcome[j] == ROOT_UNCERTAIN || roots.outcome[j] == ROOT_NOT_BRACKETED)) {
       leave<KIND>(roots, j, cells, hard, out);
     } else {
       writeOut(roots, j, cells, out);
     }
   }
   roots.count = again;
-  if (again != 0) solveStubborn<KIND>(roots, cells, hard, out);
+  if (again != 0) solveStubborn<KIND, NEXT_STEPS>(roots, cells, hard, out);
   roots.count = 0;
+}
+
+template <BatchKind KIND, int STEPS>
+void solveStubborn(RootBlock& roots, double cells, RootBlock& hard, const BatchOutput& out) {
+  solveSingle<true, KIND, STEPS>(roots, cells, hard, out);
 }
 
 /// Where the last root was no contact, makes the next piece that is not free the current one, or settles the pair.
@@ -373,7 +391,7 @@ HWY_INLINE void solveSeveral(SplitBlock& roots, double cells, RootBlock& hard, c
     }
     roots.count = pending;
     fillUp(roots);
-    for (std::size_t i = 0; i < pending; i += lanes()) refine<CERTIFIED, KIND, false, SPLIT_STEPS>(roots, i, cells);
+    refine<CERTIFIED, KIND, false, SPLIT_STEPS>(roots, cells);
   }
 }
 

@@ -115,7 +115,8 @@ HWY_INLINE void subdivideVector(RootBlock& pairs, std::size_t i, double cells) {
     if (!hn::AllFalse(d, has_root)) {
       store(a, pairs.lo, i), store(b, pairs.hi, i), store(c0, pairs.at_lo, i);
       store(choose(has_root, constant(ROOT_PENDING), constant(ROOT_UNCERTAIN)), pairs.outcome, i);
-      refine<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
+      approximate<false, PATIENT_STEPS>(pairs, i);
+      certify<true, KIND, false, PATIENT_STEPS>(pairs, i, cells);
       const V outcome = load(pairs.outcome, i);
       const M contact =
           hn::Or(hn::Eq(outcome, constant(ROOT_CONTACT)), hn::Eq(outcome, constant(ROOT_CONTACT_NO_CELL)));
