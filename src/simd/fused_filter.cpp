@@ -215,12 +215,18 @@ template <bool EDGE_EDGE>
 HWY_INLINE size_t filterAll(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quads, size_t count,
                             FusedPlanes planes, uint32_t* HWY_RESTRICT kept) {
   const size_t lanes = hn::Lanes(DF());
-  HWY_ALIGN_MAX float block[BLOCK_SIZE] = {};
-  size_t out = 0;
-  for (size_t first = 0; first < count; first += lanes) {
-    const size_t n = count - first < lanes ? count - first : lanes;
+  HWY_ALIGN_MAX float blocks[2][BLOCK_SIZE] = {};
+  const auto fill = [&](size_t first, float* HWY_RESTRICT block) HWY_ATTR {
+    const size_t n = first >= count ? 0 : HWY_MIN(lanes, count - first);
     for (size_t lane = 0; lane < n; ++lane) gather<EDGE_EDGE>(vertices, quads + 4 * (first + lane), lane, block);
-    out += writeKept(rejected<EDGE_EDGE>(block, planes), first, n, kept + out);
+    return n;
+  };
+  // One block ahead: what is read in other pieces than it was written in waits until it has reached the cache.
+  size_t out = 0, now = 0;
+  for (size_t first = 0, n = fill(0, blocks[0]); n > 0; first += lanes, now = 1 - now) {
+    const size_t next = fill(first + lanes, blocks[1 - now]);
+    out += writeKept(rejected<EDGE_EDGE>(blocks[now], planes), first, n, kept + out);
+    n = next;
   }
   return out;
 }
