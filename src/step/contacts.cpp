@@ -52,7 +52,7 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
   for (const PairWorker& w : workers) {
     for (const PairKind kind : KINDS) all += w.hits(kind).size();
   }
-  std::array<const std::vector<const Hit*>*, 2> in_order{};
+  std::array<const std::vector<HitOrder::Entry>*, 2> in_order{};
   parallel(2, all < HITS_TO_SHARE ? 2 : 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       std::vector<const std::vector<Hit>*> parts;
@@ -64,20 +64,21 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
   std::size_t base = 0;
   for (std::size_t k = 0; k < KINDS.size(); ++k) {
     const PairKind kind = KINDS[k];
-    const std::vector<const Hit*>& sorted = *in_order[k];
+    const std::vector<HitOrder::Entry>& sorted = *in_order[k];
     parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
       bool late = false;
       for (std::size_t i = first; i < last; ++i) {
         if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
         if (i + HITS_AHEAD < last) {
-          __builtin_prefetch(sorted[i + HITS_AHEAD]);
-          __builtin_prefetch(&sorted[i + HITS_AHEAD]->certainty);  // half of them lie across two cache lines
+          __builtin_prefetch(sorted[i + HITS_AHEAD].hit);
+          __builtin_prefetch(&sorted[i + HITS_AHEAD].hit->certainty);  // half of them lie across two cache lines
         }
-        if (i + FEATURES_AHEAD < last)
-          scene.prefetchFeature(secondKind(kind), sorted[i + FEATURES_AHEAD]->bodies & 0xffff,
-                                static_cast<Index>(sorted[i + FEATURES_AHEAD]->key));
-        writeContact(kind, *sorted[i], step, late, result.contacts[base + i]);
+        if (i + FEATURES_AHEAD < last) {
+          const Hit& later = *sorted[i + FEATURES_AHEAD].hit;
+          scene.prefetchFeature(secondKind(kind), later.bodies & 0xffff, static_cast<Index>(later.key));
+        }
+        writeContact(kind, *sorted[i].hit, step, late, result.contacts[base + i]);
       }
     });
     base += sorted.size();

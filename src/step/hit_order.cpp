@@ -32,24 +32,22 @@ void HitOrder::sortByKey(std::uint64_t differing_bits) {
 }
 
 void HitOrder::beginStep() {
-  a_.clear();
-  b_.clear();
-  sorted_.clear();
-  releaseBurst(a_, most_);
-  releaseBurst(b_, most_);
-  releaseBurst(sorted_, most_);
+  for (auto* buffer : {&a_, &b_}) {
+    buffer->clear();
+    releaseBurst(*buffer, most_);
+  }
   most_ = 0;
 }
 
-const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
+const std::vector<HitOrder::Entry>& HitOrder::sort(const std::vector<const std::vector<Hit>*>& parts) {
   std::size_t count = 0;
   for (const auto* part : parts) count += part->size();
-  a_.resize(count);
-  Entry* entry = a_.data();
+  a_.clear();
+  a_.reserve(count);
   std::uint64_t key_or = 0, key_and = ~std::uint64_t{0}, bodies_or = 0, bodies_and = ~std::uint64_t{0};
   for (const auto* part : parts) {
     for (const Hit& h : *part) {
-      *entry++ = {h.key, &h};
+      a_.push_back({h.key, &h});
       key_or |= h.key;
       key_and &= h.key;
       bodies_or |= h.bodies;
@@ -61,7 +59,7 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
     std::sort(a_.begin(), a_.end(), [](const Entry& x, const Entry& y) {
       return x.hit->bodies != y.hit->bodies ? x.hit->bodies < y.hit->bodies : x.key < y.key;
     });
-    return sorted();
+    return a_;
   }
   b_.resize(count);
   // The ranks fill few of their 32 bits; side by side they need fewer digits.
@@ -75,13 +73,7 @@ const std::vector<const Hit*>& HitOrder::sort(const std::vector<const std::vecto
     for (Entry& e : a_) e.key = e.hit->bodies;
     sortByKey(bodies_or ^ bodies_and);
   }
-  return sorted();
-}
-
-const std::vector<const Hit*>& HitOrder::sorted() {
-  sorted_.resize(a_.size());
-  for (std::size_t i = 0; i < a_.size(); ++i) sorted_[i] = a_[i].hit;
-  return sorted_;
+  return a_;
 }
 
 }  // namespace dccd

@@ -12,20 +12,18 @@ namespace dccd {
 /// buffers.
 class HitOrder {
  public:
-  /// The result is valid until the next call; its elements point into the workers' vectors.
-  const std::vector<const Hit*>& sort(const std::vector<const std::vector<Hit>*>& parts);
+  struct Entry {
+    std::uint64_t key;  // what it was sorted by last
+    const Hit* hit;     // in a worker's vector
+  };
+  /// The result is valid until the next call.
+  const std::vector<Entry>& sort(const std::vector<const std::vector<Hit>*>& parts);
   /// A step begins: gives back what the last one had no use for.
   void beginStep();
 
  private:
-  struct Entry {
-    std::uint64_t key;
-    const Hit* hit;
-  };
   void sortByKey(std::uint64_t differing_bits);
-  const std::vector<const Hit*>& sorted();
   std::vector<Entry> a_, b_;
-  std::vector<const Hit*> sorted_;
   std::size_t most_ = 0;  // hits of a call since beginStep()
 };
 

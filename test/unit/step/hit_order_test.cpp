@@ -38,7 +38,8 @@ TEST(HitOrder, SortsByBodiesThenKeyAndKeepsEveryHit) {
       const auto same_keys = [](const Hit* x, const Hit* y) { return x->bodies == y->bodies && x->key == y->key; };
       std::sort(expected.begin(), expected.end(),
                 [](const Hit* x, const Hit* y) { return std::tie(x->bodies, x->key) < std::tie(y->bodies, y->key); });
-      std::vector<const Hit*> sorted = order.sort(pointers);
+      std::vector<const Hit*> sorted;
+      for (const HitOrder::Entry& entry : order.sort(pointers)) sorted.push_back(entry.hit);
       ASSERT_EQ(sorted.size(), count);
       EXPECT_TRUE(std::equal(sorted.begin(), sorted.end(), expected.begin(), same_keys))
           << hits << " hits, " << bits << " bits, " << bodies << " bodies";
@@ -54,7 +55,7 @@ TEST(HitOrder, NothingAndOne) {
   const std::vector<Hit> none, one(1);
   EXPECT_TRUE(order.sort({&none}).empty());
   ASSERT_EQ(order.sort({&none, &one}).size(), 1u);
-  EXPECT_EQ(order.sort({&one})[0], &one[0]);
+  EXPECT_EQ(order.sort({&one})[0].hit, &one[0]);
 }
 
 }  // namespace
