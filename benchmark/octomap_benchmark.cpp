@@ -1,6 +1,7 @@
 // A cloth against an occupied map: far away, hovering, resting on it; and the small meshes that trackers send. The same
 // surface as triangles is the rival. Both are exact, so their earliest contacts are compared before a time is written.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <fstream>
 #include <iostream>
 #include <map>
@@ -107,6 +108,50 @@ double earliest(const std::vector<Contact>& contacts) {
   return toc;
 }
 
+/// Steps to and fro between the two ends, with what the steps before have shown and without, in turns.
+nlohmann::json timeStream(const Case& c, const std::shared_ptr<const VoxelSurface>& surface, int repeat) {
+  Options options, forgetting;
+  forgetting.keep_bounds = false;
+  test::Detector detectors[2]{test::Detector(options), test::Detector(forgetting)};
+  Body cloth;
+  cloth.name = "cloth";
+  cloth.topology = std::make_shared<const Topology>(c.topology);
+  cloth.self_collision = false;
+  Step there = test::stepOf(cloth, c.t0, c.t1), back = test::stepOf(cloth, c.t1, c.t0);
+  there.map.surface = back.map.surface = surface;
+  std::vector<double> with_memory, without, ratio;
+  std::size_t contacts = 0;
+  for (int r = -2; r < repeat; ++r) {  // what is made once for the mesh and the map is in neither
+    const Step& step = (r & 1) == 0 ? there : back;
+    Outcome outcome[2];
+    double ms[2];
+    for (const int which : {r & 1, ~r & 1}) {  // each is first in turns
+      const Stopwatch watch;
+      outcome[which] = detectors[which].run(step);
+      ms[which] = watch.milliseconds();
+    }
+    const Outcome &with = outcome[0], &forgot = outcome[1];
+    const bool same = std::equal(with.contacts.begin(), with.contacts.end(), forgot.contacts.begin(),
+                                 forgot.contacts.end(), [](const Contact& x, const Contact& y) {
+                                   return !canonicalLess(x, y) && !canonicalLess(y, x) && x.toc_upper == y.toc_upper;
+                                 });
+    if (!same) throw std::runtime_error(c.name + ": memory changes the contacts");
+    if (r < 0) continue;
+    contacts = with.contacts.size();
+    with_memory.push_back(ms[0]);
+    without.push_back(ms[1]);
+    ratio.push_back(ms[0] / ms[1]);
+  }
+  return {{"case", c.name},
+          {"triangles", c.topology.faces().size()},
+          {"voxels", surface->leafCount()},
+          {"contacts", contacts},
+          {"required_ms", c.required_ms},
+          {"ms", spread(with_memory)},
+          {"forget_ms", spread(without)},
+          {"forget_ratio", quartiles(ratio)}};
+}
+
 /// The case through the detector, with the map as obstacle or as a second body of triangles.
 nlohmann::json timeSteps(const Case& c, const std::shared_ptr<const VoxelSurface>& surface, const Positions* triangles,
                          const std::shared_ptr<const Topology>& triangle_topology, int repeat,
@@ -211,8 +256,16 @@ nlohmann::json measure(int repeat) {
     std::cerr << run.dump() << '\n';
     out["runs"].push_back(run);
   }
-  out["runs"].push_back(measureBuild(repeat));
-  std::cerr << out["runs"].back().dump() << '\n';
+  Case still = cases[2];
+  still.name = "20,000 triangles in a stream, lying still";
+  still.t0 = still.t1;
+  Case stirring = cases[2];
+  stirring.name = "20,000 triangles in a stream, moving to and fro";
+  for (const nlohmann::json& run :
+       {timeStream(still, surface, repeat), timeStream(stirring, surface, repeat), measureBuild(repeat)}) {
+    out["runs"].push_back(run);
+    std::cerr << run.dump() << '\n';
+  }
   return out;
 }
 

@@ -86,6 +86,22 @@ def write_step(folder, rows):
                 "one just after.\n\n" + table(header, lines))
 
 
+def of_turns(ones, others):
+    """Of runs in turns: median times of both, the median of the ratios of neighbours, and what these span."""
+    ratios = sorted(one / other for one, other in zip(ones, others))
+    middle = len(ratios) // 2
+    return ["%.2f" % sorted(ones)[middle], "%.2f" % sorted(others)[middle], "%.3f" % ratios[middle], "%.3f" % ratios[0],
+            "%.3f" % ratios[-1]]
+
+
+def write_rod(folder, rows):
+    header = ["scene", "threads", "step, ms", "measuring rod, ms", "ratio", "from", "to"]
+    lines = [[r["scene"], str(r["threads"])] + of_turns(r["ms"], r["rod_ms"]) for r in rows]
+    write_rows(os.path.join(folder, "rod.csv"), header, lines)
+    return save(folder, "rod", "# The step against the measuring rod\n\nMedians of bests, of nine steps and of the rod's eight, in turns.\n\n" +
+                table(header, lines))
+
+
 def write_scaling(folder, result):
     header = ["triangles", "threads", "candidates a triangle", "contacts a triangle", "best ms", "median ms",
               "median ns a triangle", "bytes a triangle"]
@@ -118,13 +134,15 @@ def write_scaling(folder, result):
 
 def write_octomap(folder, result):
     header = ["case", "triangles", "voxels", "contacts", "best ms", "median ms", "required ms", "triangulated median ms",
-              "ratio"]
+              "ratio", "with --forget, median ms", "ratio to it (quartiles)"]
     rows = []
     for r in result["runs"]:
         t = r.get("triangulated_ms")
         rows.append([r["case"], str(r["triangles"]), str(r["voxels"]), str(r["contacts"]), "%.3f" % r["ms"]["best"],
                      "%.3f" % r["ms"]["median"], "%g" % r["required_ms"], "%.2f" % t["median"] if t else "",
-                     "%.1f" % (t["median"] / r["ms"]["median"]) if t else ""])
+                     "%.1f" % (t["median"] / r["ms"]["median"]) if t else "",
+                     "%.3f" % r["forget_ms"]["median"] if "forget_ms" in r else "",
+                     "%(median).3f (%(quartile_1).3f to %(quartile_3).3f)" % r["forget_ratio"] if "forget_ms" in r else ""])
     write_rows(os.path.join(folder, "octomap.csv"), header, rows)
     plt = pyplot()
     figure, axis = plt.subplots(figsize=(8, 0.45 * len(rows) + 1.2))
@@ -140,29 +158,20 @@ def write_octomap(folder, result):
 
 
 def write_first(folder, rows):
-    """Ratios are of neighbouring runs; their interval is what they span."""
-    header = ["scene", "threads", "contacts", "first ones", "their TOC", "all, ms", "the first, ms", "ratio", "from", "to"]
-    lines = []
-    for r in rows:
-        ratios = sorted(first / whole for first, whole in zip(r["first_ms"], r["all_ms"]))
-        lines.append([r["scene"], str(r["threads"]), str(r["all"]), str(r["first"]), "%.2g" % float(r["toc"]),
-                      "%.1f" % sorted(r["all_ms"])[len(r["all_ms"]) // 2],
-                      "%.1f" % sorted(r["first_ms"])[len(r["first_ms"]) // 2], "%.3f" % ratios[len(ratios) // 2],
-                      "%.3f" % ratios[0], "%.3f" % ratios[-1]])
+    header = ["scene", "threads", "contacts", "first ones", "their TOC", "the first, ms", "all, ms", "ratio", "from", "to"]
+    lines = [[r["scene"], str(r["threads"]), str(r["all"]), str(r["first"]), "%.2g" % float(r["toc"])] +
+             of_turns(r["first_ms"], r["all_ms"]) for r in rows]
     write_rows(os.path.join(folder, "first.csv"), header, lines)
     return save(folder, "first", "# The first contact only\n\n" + table(header, lines))
 
 
 def write_stream(folder, rows):
-    """Ratios are of neighbouring runs; their interval is what they span."""
     header = ["sequence", "steps", "threads", "contacts", "pairs of clusters known apart, a step", "mean ms a step",
               "the same with --forget", "ratio", "from", "to"]
     lines = []
     for r in rows:
-        ratios = sorted(with_memory / without for with_memory, without in zip(r["ms"], r["forget_ms"]))
-        lines.append([r["sequence"], str(r["steps"]), str(r["threads"]), str(r["contacts"]), "%.0f" % r["known_apart"],
-                      "%.2f" % sorted(r["ms"])[len(r["ms"]) // 2], "%.2f" % sorted(r["forget_ms"])[len(r["ms"]) // 2],
-                      "%.3f" % ratios[len(ratios) // 2], "%.3f" % ratios[0], "%.3f" % ratios[-1]])
+        lines.append([r["sequence"], str(r["steps"]), str(r["threads"]), str(r["contacts"]), "%.0f" % r["known_apart"]] +
+                     of_turns(r["ms"], r["forget_ms"]))
     write_rows(os.path.join(folder, "stream.csv"), header, lines)
     return save(folder, "stream", "# Streams with memory and without\n\n" + table(header, lines))
 

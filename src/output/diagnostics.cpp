@@ -59,11 +59,11 @@ void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, cons
     raise(DiagnosticStatus::WARN, (status_ == StepStatus::NO_MAP ? because("") : "no octomap: " + map_reason_) +
                                       (hint.empty() ? "" : "; " + hint));
   }
-  if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
   if (drops) {
     raise(DiagnosticStatus::WARN, "frames are dropped, steps take longer than frames come; " +
                                       adviceFor(StepStatus::QUEUE_FULL, {}, map_topic));
   }
+  if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
   if (status_ != StepStatus::OK && isAnswered(status_)) raise(DiagnosticStatus::WARN, because(""));
   if (!hint.empty()) raise(DiagnosticStatus::WARN, hint);
 }

@@ -23,7 +23,7 @@ class Diagnostics {
   void add(const Outcome& outcome, double latency_s);
   /// Once a second by the clock of `now_ns`.
   bool isDue(std::int64_t now_ns) const;
-  /// `context`: of now, also where there has been no outcome since; `hint`: what looks like a mistake; `map_topic`:
+  /// `context`: of now, whether or not there has been an outcome since; `hint`: what looks like a mistake; `map_topic`:
   /// where the octomap is looked for, or empty when none is expected.
   diagnostic_msgs::DiagnosticArray take(std::int64_t now_ns, const ros::Time& stamp, const StatsContext& context,
                                         bool enabled, const std::string& map_topic, const std::string& hint);

@@ -14,7 +14,7 @@ HWY_INLINE void prefetchPair(const BatchInput& in, std::size_t pair) {
   if (pair >= in.count) return;
   for (int i = 0; i < 4; ++i) hwy::Prefetch(in.vertices + std::size_t{8} * in.quads[pair][i]);
 }
-constexpr std::size_t PAIRS_AHEAD = 16;  ///< whose vertices are fetched from memory
+constexpr std::size_t PAIRS_AHEAD = 16;  ///< so far ahead vertices are fetched from memory
 
 #if DCCD_AVX512
 /// Columns 0, 1, 2 and 4, 5, 6 of eight rows, to planes from `to` and from `to_t1` on.

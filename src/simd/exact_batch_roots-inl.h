@@ -114,7 +114,8 @@ HWY_INLINE void insideTest(const RootBlock& roots, std::size_t i, V x, V h, M& t
   misses = hn::And(n_certain, any_outside);
 }
 
-/// Approximate root in [lo, hi] by `steps` Halley steps that fall back to bisection, and |f'| and |f''|/2 there.
+/// Approximate root in [lo, hi] by `steps` Halley steps that fall back to bisection; |f'| and |f''|/2 where
+/// the last of them began.
 HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int steps, V& slope, V& curvature) {
   const V three = constant(3), half = constant(0.5), sign_bit = hn::SignBit(Tag());
   const V a1 = hn::Sub(f1, hn::Mul(three, f0));
@@ -141,8 +142,8 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int st
   return onGrid(x);
 }
 
-/// One vector: approximates the pending roots. WHOLE: the root is the only one in [0,1], and lo, hi, at_lo need not be
-/// set.
+/// One vector: approximates a root of each lane; it counts where the lane is pending. WHOLE: the root is the only one
+/// in [0,1], and lo, hi, at_lo need not be set.
 template <bool WHOLE, int STEPS>
 HWY_INLINE void approximate(RootBlock& roots, std::size_t i) {
   const V f0 = load(roots.coefficient[0], i), f1 = load(roots.coefficient[1], i);
@@ -209,8 +210,8 @@ HWY_INLINE void certify(RootBlock& roots, std::size_t i, double cells) {
   store(root_hi, roots.root_hi, i);
 }
 
-/// Approximates the pending roots, certifies them and tests for contact. In two loops: each step of an approximation
-/// waits for the one before, and a processor looks ahead to more of them where there is nothing between them.
+/// Approximates the roots, certifies them and tests for contact. In two loops: each step of an approximation waits for
+/// the step before, and a processor works on several vectors at once only if no other work lies between them.
 template <bool CERTIFIED, BatchKind KIND, bool WHOLE, int STEPS>
 HWY_INLINE void refine(RootBlock& roots, double cells) {
   for (std::size_t i = 0; i < roots.count; i += lanes()) approximate<WHOLE, STEPS>(roots, i);
@@ -307,7 +308,9 @@ HWY_INLINE void solveSingle(RootBlock& roots, double cells, RootBlock& hard, con
     }
   }
   roots.count = again;
-  if (again != 0) solveStubborn<KIND, NEXT_STEPS>(roots, cells, hard, out);
+  if constexpr (STEPS < PATIENT_STEPS) {
+    if (again != 0) solveStubborn<KIND, NEXT_STEPS>(roots, cells, hard, out);
+  }
   roots.count = 0;
 }
 

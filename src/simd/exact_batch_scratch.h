@@ -43,8 +43,8 @@ struct alignas(64) RootBlock {
   BatchPlane error;                  ///< bound on f's values
   BatchPlane lo, hi, at_lo;          ///< where the root looked for now lies, and f at lo
   BatchPlane outcome;                ///< ROOT_*
-  BatchPlane root_lo, root_hi;       ///< its certified bracket; before that root_lo approximates it
-  BatchPlane slope, curvature;       ///< |f'| and |f''|/2 there
+  BatchPlane root_lo, root_hi;       ///< its certified bracket; root_lo holds the approximated root before
+  BatchPlane slope, curvature;       ///< |f'| and |f''|/2 where the last step to it began
   std::uint32_t pair[BATCH_STRIDE];  ///< position in the batch
   std::size_t count = 0;
 };

@@ -221,7 +221,8 @@ HWY_INLINE size_t filterAll(const double* HWY_RESTRICT vertices, const uint32_t*
     for (size_t lane = 0; lane < n; ++lane) gather<EDGE_EDGE>(vertices, quads + 4 * (first + lane), lane, block);
     return n;
   };
-  // One block ahead: what is read in other pieces than it was written in waits until it has reached the cache.
+  // A block is filled before the one ahead of it is tested: it is read in larger pieces than it was written in, and
+  // such a load waits until all of the stores have reached the cache.
   size_t out = 0, now = 0;
   for (size_t first = 0, n = fill(0, blocks[0]); n > 0; first += lanes, now = 1 - now) {
     const size_t next = fill(first + lanes, blocks[1 - now]);

@@ -56,8 +56,8 @@ struct InMemory {
   HWY_INLINE hn::Vec<D> operator()(size_t at) const { return hn::Load(D(), lanes + at); }
 };
 
-// What is negative in the lanes that are apart in no direction looked at so far, and in those where both are. With
-// AVX-512 only the sign bits mean anything: one instruction puts three of them together, on more units than minima.
+// Negative where `apart` is negative, and where both of the others are. With AVX-512 only the sign bits mean anything:
+// one instruction puts three of them together, and more of a processor's units do that than take minima.
 template <class V>
 HWY_INLINE V apartAlso(V apart, V one, V other) {
 #if DCCD_AVX512
@@ -209,14 +209,14 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 // What of the surviving lanes of a pair of groups is left out. before(): of the lanes j of the other group, what is
 // known of node i without a test; after(): of those that are left. by_rows: i is of the first group.
 struct LeaveNoneOut {
-  static constexpr bool MAY_LEAVE_NONE = false;
+  static constexpr bool LEAVES_OUT_BEFORE = false;
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
   HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }
 };
 
 // By a mask for each node of the first group.
 struct LeaveMasksOut {
-  static constexpr bool MAY_LEAVE_NONE = true;
+  static constexpr bool LEAVES_OUT_BEFORE = true;
   const uint16_t* HWY_RESTRICT masks;
   HWY_INLINE uint32_t before(bool by_rows, uint32_t i, uint32_t mask) const {
     return by_rows ? mask & ~uint32_t{masks[i]} : mask;
@@ -250,7 +250,7 @@ HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const 
 // Features of A and B vertices that share one: their vertices lane by lane.
 template <size_t A, size_t B>
 struct LeaveAdjacentOut {
-  static constexpr bool MAY_LEAVE_NONE = false;
+  static constexpr bool LEAVES_OUT_BEFORE = false;
   const uint32_t* HWY_RESTRICT a;
   const uint32_t* HWY_RESTRICT b;
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
@@ -259,8 +259,8 @@ struct LeaveAdjacentOut {
   }
 };
 
-// Whether a node meets any other is a branch that nothing foretells. Where a test takes no longer than that one, all
-// tests come first, and then what is left of them.
+// Whether a node meets any other nothing foretells. Where a test takes no longer than a branch that was foretold
+// wrongly, all nodes are tested first, and then what is left of them is written.
 constexpr bool WRITES_LATER = DCCD_AVX512;
 
 // The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
@@ -291,7 +291,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     mask = leave_out.before(by_rows, i, mask);
-    if (LeaveOut::MAY_LEAVE_NONE && mask == 0) continue;
+    if (LeaveOut::LEAVES_OUT_BEFORE && mask == 0) continue;
     mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
     if (WRITES_LATER) {
       met[i] = mask;

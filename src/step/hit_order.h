@@ -13,7 +13,7 @@ namespace dccd {
 class HitOrder {
  public:
   struct Entry {
-    std::uint64_t key;  // what it was sorted by last
+    std::uint64_t key;  // the sort's working space
     const Hit* hit;     // in a worker's vector
   };
   /// The result is valid until the next call.

@@ -186,7 +186,7 @@ class MessagesTest(AttackTest):
         for lot in range(10):
             for i in range(200):
                 self.publisher.publish(flat_cloud(2 + 200 * lot + i, 3, 3))
-            wait_for(lambda: counted and counted[-1]['frames received'] == 2 + 200 * (lot + 1), 5, 'a lot; %s' % counted[-1:])
+            wait_for(lambda: counted and counted[-1]['frames received'] == 2 + 200 * (lot + 1), 5, 'lot %d' % lot)
             self.assertEqual(counted[-1]['frames skipped'], 200 * (lot + 1))
         enable(True)
         self.outcomes_of(self.publisher, [flat_cloud(3000 + i) for i in range(2)])

@@ -34,7 +34,7 @@ class ResultBag {
   LookAheadScore look_ahead_;
   std::uint64_t markers_built_ = 0;
   Diagnostics diagnostics_;
-  StatsContext context_;    // of the newest outcome
+  StatsContext context_;    // of the newest outcome, and so the counters in /diagnostics
   std::string map_source_;  // where the octomap is looked for; empty when none is expected
 };
 
