@@ -108,15 +108,20 @@ double earliest(const std::vector<Contact>& contacts) {
   return toc;
 }
 
+Body bodyOf(const Case& c) {
+  Body cloth;
+  cloth.name = "cloth";
+  cloth.topology = std::make_shared<const Topology>(c.topology);
+  cloth.self_collision = false;  // what is measured is the map
+  return cloth;
+}
+
 /// Steps to and fro between the two ends, with what the steps before have shown and without, in turns.
 nlohmann::json timeStream(const Case& c, const std::shared_ptr<const VoxelSurface>& surface, int repeat) {
   Options options, forgetting;
   forgetting.keep_bounds = false;
   test::Detector detectors[2]{test::Detector(options), test::Detector(forgetting)};
-  Body cloth;
-  cloth.name = "cloth";
-  cloth.topology = std::make_shared<const Topology>(c.topology);
-  cloth.self_collision = false;
+  const Body cloth = bodyOf(c);
   Step there = test::stepOf(cloth, c.t0, c.t1), back = test::stepOf(cloth, c.t1, c.t0);
   there.map.surface = back.map.surface = surface;
   std::vector<double> with_memory, without, ratio;
@@ -160,10 +165,7 @@ nlohmann::json timeSteps(const Case& c, const std::shared_ptr<const VoxelSurface
   options.keep_bounds = false;  // the same step again and again
   options.check_start_state = false;
   test::Detector detector(options);
-  Body cloth;
-  cloth.name = "cloth";
-  cloth.topology = std::make_shared<const Topology>(c.topology);
-  cloth.self_collision = false;  // what is measured is the map
+  const Body cloth = bodyOf(c);
   Step step = test::stepOf(cloth, c.t0, c.t1);
   if (triangles) {
     Body table = cloth;

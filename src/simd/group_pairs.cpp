@@ -209,14 +209,12 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 // What of the surviving lanes of a pair of groups is left out. before(): of the lanes j of the other group, what is
 // known of node i without a test; after(): of those that are left. by_rows: i is of the first group.
 struct LeaveNoneOut {
-  static constexpr bool LEAVES_OUT_BEFORE = false;
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
   HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }
 };
 
 // By a mask for each node of the first group.
 struct LeaveMasksOut {
-  static constexpr bool LEAVES_OUT_BEFORE = true;
   const uint16_t* HWY_RESTRICT masks;
   HWY_INLINE uint32_t before(bool by_rows, uint32_t i, uint32_t mask) const {
     return by_rows ? mask & ~uint32_t{masks[i]} : mask;
@@ -250,7 +248,6 @@ HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const 
 // Features of A and B vertices that share one: their vertices lane by lane.
 template <size_t A, size_t B>
 struct LeaveAdjacentOut {
-  static constexpr bool LEAVES_OUT_BEFORE = false;
   const uint32_t* HWY_RESTRICT a;
   const uint32_t* HWY_RESTRICT b;
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
@@ -291,7 +288,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     mask = leave_out.before(by_rows, i, mask);
-    if (LeaveOut::LEAVES_OUT_BEFORE && mask == 0) continue;
+    if (mask == 0) continue;
     mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
     if (WRITES_LATER) {
       met[i] = mask;
