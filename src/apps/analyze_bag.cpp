@@ -206,8 +206,8 @@ int analyze(const Arguments& a) {
         answered = answered || outcome.answered;
         if (out) out->add(outcome, pipeline, so_far, at);
       },
-      [&](const rosbag::MessageInstance& m) {
-        if (out) out->copy(m);
+      [&](const rosbag::MessageInstance& m, const MonitorPipeline& pipeline, const BagReplaySummary& so_far) {
+        if (out) out->copy(m, pipeline, so_far);
       },
       [&](const Outcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);

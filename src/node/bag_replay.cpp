@@ -317,7 +317,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   ros::Time at = all.getBeginTime();
   for (const rosbag::MessageInstance& m : all) {
     at = m.getTime();
-    if (messages) messages(m);
+    if (messages) messages(m, run.pipeline, run.summary);
     const auto bodies = run.bodies_of_topic.find(m.getTopic());
     const bool is_mesh = bodies != run.bodies_of_topic.end() &&
                          run.frames_of_topic[m.getTopic()]++ % options_.variation.every_nth_frame == 0;

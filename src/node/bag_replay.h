@@ -54,7 +54,8 @@ class BagReplay {
   using Sink =
       std::function<void(const Outcome&, MonitorPipeline&, const BagReplaySummary& so_far, const ros::Time& at)>;
   /// Called for each message of the bag, in order, before its outcomes.
-  using MessageSink = std::function<void(const rosbag::MessageInstance&)>;
+  using MessageSink =
+      std::function<void(const rosbag::MessageInstance&, const MonitorPipeline&, const BagReplaySummary& so_far)>;
 
   /// Where nobody names a topic for the map, and the default one is not in the bag, the bag's first one is taken.
   /// Throws rosbag::BagException when the bag cannot be read, std::runtime_error when no body has a topic in it.

@@ -24,11 +24,23 @@ void ResultBag::write(const char* name, const ros::Time& at, const Message& mess
   bag_.write(std::string(MONITOR_NAMESPACE) + "/" + name, at, message);
 }
 
-void ResultBag::copy(const rosbag::MessageInstance& m) {
+/// What is counted of the run so far, with or without an outcome.
+static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplaySummary& so_far) {
+  StatsContext context;
+  context.frames = pipeline.monitor().total();
+  context.weld_changes = pipeline.weldChanges();
+  context.maps_received = so_far.maps;
+  context.maps_refused = so_far.maps_refused;
+  return context;
+}
+
+void ResultBag::copy(const rosbag::MessageInstance& m, const MonitorPipeline& pipeline,
+                     const BagReplaySummary& so_far) {
   // With every message of the bag, so that frames that do not come are missed as they are live.
   const auto now_ns = static_cast<std::int64_t>(m.getTime().toNSec());
   if (diagnostics_.isDue(now_ns)) {
-    bag_.write(DIAGNOSTICS_TOPIC, m.getTime(), diagnostics_.take(now_ns, m.getTime(), context_, true, map_source_, ""));
+    bag_.write(DIAGNOSTICS_TOPIC, m.getTime(),
+               diagnostics_.take(now_ns, m.getTime(), countersOf(pipeline, so_far), true, map_source_, ""));
   }
   const std::string own = std::string(MONITOR_NAMESPACE) + "/";
   if (m.getTopic().compare(0, own.size(), own) == 0) return;
@@ -51,11 +63,7 @@ bool ResultBag::copyOthersDiagnostics(const rosbag::MessageInstance& m) {
 
 StatsContext ResultBag::contextOf(const Outcome& outcome, const MonitorPipeline& pipeline,
                                   const BagReplaySummary& so_far) {
-  StatsContext context;
-  context.frames = pipeline.monitor().total();
-  context.weld_changes = pipeline.weldChanges();
-  context.maps_received = so_far.maps;
-  context.maps_refused = so_far.maps_refused;
+  StatsContext context = countersOf(pipeline, so_far);
   if (pipeline.config().monitor.look_ahead_s > 0) {
     look_ahead_.observe(outcome);
     context.look_ahead = look_ahead_.summary();
@@ -98,15 +106,15 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
                     const ros::Time& at) {
   const std::vector<Body>& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  context_ = contextOf(outcome, pipeline, so_far);
+  const StatsContext context = contextOf(outcome, pipeline, so_far);
   write("contacts", at, toContactArray(outcome, bodies, frame));
   addPlan(outcome, pipeline, at);
-  write("stats", at, toStepStats(outcome, context_, frame));
+  write("stats", at, toStepStats(outcome, context, frame));
   write("first_contact", at, toFirstContact(outcome, bodies, frame));
   addPatches(outcome, pipeline, at);
   addState(outcome, frame, at);
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
-  diagnostics_.add(outcome, context_.latency_s);
+  diagnostics_.add(outcome, context.latency_s);
   const MonitorConfig& config = pipeline.config();
   const std::string& source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
   map_source_ = pipeline.effects().mapExpected() ? source : "";

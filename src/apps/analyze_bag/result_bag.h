@@ -17,7 +17,7 @@ class ResultBag {
   /// Throws rosbag::BagException when the file cannot be written; so do the others.
   ResultBag(const std::string& path, const MonitorConfig& config);
   /// All but what a monitor said when the bag was recorded: that would stand beside the results, under their names.
-  void copy(const rosbag::MessageInstance& m);
+  void copy(const rosbag::MessageInstance& m, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at);
   void addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at);
 
@@ -34,7 +34,6 @@ class ResultBag {
   LookAheadScore look_ahead_;
   std::uint64_t markers_built_ = 0;
   Diagnostics diagnostics_;
-  StatsContext context_;    // of the newest outcome, and so the counters in /diagnostics
   std::string map_source_;  // where the octomap is looked for; empty when none is expected
 };
 
