@@ -1,0 +1,51 @@
+// What /diagnostics tells between outcomes: the counters of now, and the complaint that helps.
+#include "output/diagnostics.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace dccd {
+namespace {
+
+constexpr std::int64_t SECOND_NS = 1000000000;
+
+std::string valueOf(const diagnostic_msgs::DiagnosticArray& array, const std::string& key) {
+  for (const auto& value : array.status.at(0).values) {
+    if (value.key == key) return value.value;
+  }
+  return "no such key";
+}
+
+TEST(Diagnostics, CountersAreThoseOfNowWithoutAnOutcome) {
+  Diagnostics diagnostics("/monitor");
+  EXPECT_TRUE(diagnostics.isDue(SECOND_NS));
+  StatsContext context;
+  diagnostics.add(Outcome(), 0);
+  diagnostics.take(SECOND_NS, ros::Time(1), context, false, "", "");
+  EXPECT_FALSE(diagnostics.isDue(2 * SECOND_NS - 1));
+  EXPECT_TRUE(diagnostics.isDue(2 * SECOND_NS));
+  for (int i = 0; i < 7; ++i) {
+    ++context.frames.received;
+    context.frames.count(StepStatus::DISABLED);
+  }
+  const auto array = diagnostics.take(2 * SECOND_NS, ros::Time(2), context, false, "", "");
+  EXPECT_EQ(valueOf(array, "frames received"), "7");
+  EXPECT_EQ(valueOf(array, "frames skipped"), "7");
+  EXPECT_EQ(array.status.at(0).message, "disabled");
+}
+
+TEST(Diagnostics, FramesThatAreDroppedDoArrive) {
+  Diagnostics diagnostics("/monitor");
+  StatsContext context;
+  context.frames.received = 3;
+  context.frames.count(StepStatus::QUEUE_FULL);
+  const auto dropped = diagnostics.take(SECOND_NS, ros::Time(1), context, true, "", "");
+  EXPECT_EQ(dropped.status.at(0).message.rfind("frames are dropped", 0), 0u) << dropped.status.at(0).message;
+  // They were told of; now none comes.
+  const auto silent = diagnostics.take(2 * SECOND_NS, ros::Time(2), context, true, "", "");
+  EXPECT_EQ(silent.status.at(0).message, "no frames arrive");
+}
+
+}  // namespace
+}  // namespace dccd
