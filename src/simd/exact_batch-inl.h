@@ -1,8 +1,8 @@
 // The batched elementary test, compiled once per SIMD target (no include guards: foreach_target includes these anew).
 //   reject (exact_batch_reject-inl.h)        differences, Bernstein coefficients of f, quick "no"; what is left is
 //                                            sorted into "certainly one root" and "perhaps several", side by side;
-//   roots (exact_batch_roots-inl.h)          pieces with one root each; a few Halley steps, a bracket certified by
-//                                            signs, the inside test over the bracket;
+//   roots (exact_batch_roots-inl.h)          pieces with one root each; of each root (exact_batch_refine-inl.h) a few
+//                                            Halley steps, a bracket certified by signs, the inside test over it;
 //   subdivide (exact_batch_subdivide-inl.h)  what this leaves undecided, by intervals from left to right.
 // With CERTIFIED false all bounds are zero and nothing is certified; the rest is the same.
 // No MulAdd, no reciprocal estimate: every target computes the same bits.
@@ -77,6 +77,7 @@ HWY_INLINE M hasOneRoot(V c0, V c1, V c2, V c3, V end_error, V middle_error) {
 }  // namespace dccd
 HWY_AFTER_NAMESPACE();
 
+#include "simd/exact_batch_refine-inl.h"
 #include "simd/exact_batch_reject-inl.h"
 #include "simd/exact_batch_roots-inl.h"
 #include "simd/exact_batch_subdivide-inl.h"
