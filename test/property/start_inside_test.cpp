@@ -10,6 +10,7 @@
 #include "support/closed_meshes.h"
 #include "support/query_property.h"
 #include "support/step_judge.h"
+#include "support/step_truth.h"
 
 namespace dccd {
 namespace test {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "support/step_support.h"
+#include "support/step_truth.h"
 
 namespace dccd {
 namespace test {

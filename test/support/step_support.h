@@ -1,5 +1,4 @@
-// Small steps made to be hard, and their true contacts straight from the definition: what judges the detector as a
-// whole.
+// Small steps made to be hard, and how a test runs and describes one.
 #pragma once
 
 #include <cstdint>
@@ -58,26 +57,8 @@ Positions randomMotion(const Draw& draw, const Positions& t0, Coordinates coordi
 /// At most so many triangles, over at most 3 * triangles vertices.
 Topology randomTopology(const Draw& draw, int triangles);
 
-struct TrueContact {
-  Contact contact;  ///< toc 0 to 1
-  Root toc;
-};
-/// Every pair that the setups ask for, by the oracle, in canonical order.
-std::vector<TrueContact> trueContacts(const TestStep& step);
-
 /// The motion of a contact's four vertices.
 PairMotion motionOf(const TestStep& step, const Contact& contact);
-
-/// Whether the segment and the triangle meet, by the oracle: a vertex on its way from one end to the other.
-bool trulyMeet(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c);
-/// Every edge that meets a face at t=0, in the order that the detector lists them.
-std::vector<StartIntersection> trueIntersections(const TestStep& step);
-/// The first vertex of every piece of a body that lies in another, closed body at t=0, in the order that the detector
-/// lists them, after the edges.
-std::vector<StartIntersection> trueInsides(const TestStep& step);
-/// Both.
-std::vector<StartIntersection> trueStart(const TestStep& step);
-bool operator==(const StartIntersection& x, const StartIntersection& y);
 
 /// One step with a detector of its own, as a first step.
 Outcome runOnce(const TestStep& step, const Options& options);
@@ -92,6 +73,7 @@ void forEachSimdTarget(const std::function<void(const std::string& target)>& bod
 /// What differs, in words; empty where the contacts are the same bit for bit.
 std::string difference(const std::vector<Contact>& x, const std::vector<Contact>& y);
 std::string describe(const Contact& contact);
+bool operator==(const StartIntersection& x, const StartIntersection& y);
 
 }  // namespace test
 }  // namespace dccd

@@ -19,6 +19,7 @@
 #include "support/patch_oracle.h"
 #include "support/scene_data.h"
 #include "support/step_support.h"
+#include "support/step_truth.h"
 
 namespace dccd {
 namespace test {

@@ -10,6 +10,7 @@
 
 #include "culling/scene_arrays.h"
 #include "support/step_support.h"
+#include "support/step_truth.h"
 
 namespace dccd {
 namespace test {

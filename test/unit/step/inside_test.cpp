@@ -8,6 +8,7 @@
 
 #include "dccd/stream.h"
 #include "support/closed_meshes.h"
+#include "support/step_truth.h"
 
 namespace dccd {
 namespace test {

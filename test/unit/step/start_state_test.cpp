@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "support/step_support.h"
+#include "support/step_truth.h"
 
 namespace dccd {
 namespace test {
