@@ -63,6 +63,17 @@ struct Body {
   std::shared_ptr<const std::vector<double>> radius_m;
 };
 
+/// All but a body's way, and what is only counted: what a history makes its arrays of. A new field goes in here, or the
+/// next step is answered by the old one's arrays.
+inline bool sameBody(const Body& a, const Body& b) {
+  const bool same_mesh = a.topology == b.topology || (a.topology && b.topology && *a.topology == *b.topology);
+  return same_mesh && a.reference == b.reference && a.name == b.name && a.rigid == b.rigid &&
+         a.self_collision == b.self_collision && a.against_bodies == b.against_bodies &&
+         a.against_obstacle == b.against_obstacle && a.shell == b.shell &&
+         a.minimum_separation_m == b.minimum_separation_m && a.vertex_mask == b.vertex_mask &&
+         a.separations == b.separations;
+}
+
 /// What a step looks at. The flow asks these, and so does the effect plan.
 inline bool meetsItself(const Body& body) { return body.self_collision && !body.rigid; }
 inline bool meet(const Body& a, const Body& b) { return a.against_bodies && b.against_bodies; }

@@ -24,6 +24,7 @@ struct MeshFrame {
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
+  std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
   std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
 };
 
@@ -82,6 +83,9 @@ class DCCD_EXPORT MeshStore {
   /// between; empty when none of them has any.
   void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
 
+  /// The most faces that any of these frames has dropped.
+  std::uint64_t droppedFacesOver(StampNs from_ns, StampNs to_ns) const;
+
   /// How many frames lie between two stamps, neither included.
   std::size_t framesWithin(StampNs from_ns, StampNs to_ns) const;
   /// How far these frames are from the path that a step between the stamps takes, straight from t0 to t1 or, of a rigid
@@ -105,6 +109,8 @@ class DCCD_EXPORT MeshStore {
   StepStatus classify(const MeshFrame& frame) const;
   void forgetOldest();
   std::size_t firstAtOrAfter(StampNs stamp_ns) const;
+  /// The frames that stamps in [from, to] lie between: places of the first and the last one.
+  std::pair<std::size_t, std::size_t> framesOver(StampNs from_ns, StampNs to_ns) const;
 };
 
 /// Positions between two arrays of equal size, u in [0,1]; the ends are reproduced bit for bit.

@@ -198,8 +198,9 @@ struct Outcome {
   StepStatus status = StepStatus::FIRST_FRAME;
   std::string reason;  ///< one sentence; empty when OK
   StampNs start_ns = 0, stamp_ns = 0;
-  std::uint64_t sequence = 0;  ///< of the clock body's frames that were pushed or skipped, from 1
-  bool answered = false;       ///< the fields below hold a result
+  std::uint64_t sequence = 0;   ///< of the clock body's frames that were pushed or skipped, from 1
+  std::int64_t arrival_ns = 0;  ///< of the message that it is about: MeshFrame::arrival_ns
+  bool answered = false;        ///< the fields below hold a result
 
   std::vector<Contact> contacts;        ///< canonical order, filtered and cut as the options say; toc of the whole step
   std::size_t total_contacts = 0;       ///< before the cut to max_contacts; with `cut` there are at least so many

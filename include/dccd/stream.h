@@ -74,13 +74,16 @@ class DCCD_EXPORT Monitor {
   /// What a step may take, unknown space included, so that a prediction has its share of the time [ms]; 0: as long as
   /// it takes.
   double stepMs() const;
+  /// Until when what else belongs to the outcome's step may take, as long as cancel() is not called.
+  Deadline restOf(const Outcome& outcome) const;
   void setOptions(const MonitorOptions& options);  ///< from the next step on; clock_body must stay
   const std::vector<Body>& bodies() const;
 
   /// A frame of the body, in the fixed frame. Returns what it is to the frame before it.
   StepStatus push(std::size_t body, MeshFrame frame, std::int64_t now_ns);
   /// A frame that never became one (refused, no transform, ...). The clock body's yield an outcome with that status.
-  void skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason);
+  void skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason,
+            std::int64_t arrival_ns = 0);
   /// Counted only, without outcome: frames dropped by queues, or while disabled.
   void countDropped(std::size_t body, StepStatus status, std::uint64_t count = 1);
   void countReceived(std::size_t body, std::uint64_t count = 1, std::uint64_t receipt_stamps = 0);

@@ -70,15 +70,6 @@ void check(const Body& body, std::size_t bodies) {
   }
 }
 
-bool sameBody(const Body& a, const Body& b) {
-  const bool same_mesh = a.topology == b.topology || (a.topology && b.topology && *a.topology == *b.topology);
-  return same_mesh && a.reference == b.reference && a.name == b.name && a.rigid == b.rigid &&
-         a.self_collision == b.self_collision && a.against_bodies == b.against_bodies &&
-         a.against_obstacle == b.against_obstacle && a.shell == b.shell &&
-         a.minimum_separation_m == b.minimum_separation_m && a.vertex_mask == b.vertex_mask &&
-         a.separations == b.separations;
-}
-
 }  // namespace
 
 bool SceneArrays::holds(const std::vector<Body>& bodies) const {

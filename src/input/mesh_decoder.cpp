@@ -177,10 +177,10 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
   }
   if (config_.source == TopologySource::POLYLINE) {
     if (points < 2) mismatch("a polyline needs 2");
-    if (!topology_ || topology_->vertexCount() != points) {
-      topology_ = std::make_shared<const Topology>(Topology::polyline(points));
+    if (!known_.topology || known_.topology->vertexCount() != points) {
+      known_ = {std::make_shared<const Topology>(Topology::polyline(points)), {}, 0};
     }
-    return topology_;
+    return known_.topology;
   }
   const std::size_t rows = config_.rows ? config_.rows : grid_rows, cols = config_.cols ? config_.cols : grid_cols;
   if (rows * cols != points) {
@@ -188,19 +188,24 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
              std::to_string(rows * cols));
   }
   if (rows >= 2 && cols >= 2) checkFaces(2 * (rows - 1) * (cols - 1));
-  if (!topology_ || last_faces_.size() != 1 ||
-      last_faces_[0] != Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}) {
-    topology_ = std::make_shared<const Topology>(Topology::grid(rows, cols));
-    last_faces_ = {Face{static_cast<Index>(rows), static_cast<Index>(cols), 0}};  // stands for the grid's shape
+  // One face stands for the grid's shape. It repeats a vertex, as no proper one does that a message brings.
+  const Face shape{static_cast<Index>(rows), static_cast<Index>(rows), static_cast<Index>(cols)};
+  if (!known_.topology || known_.faces.size() != 1 || known_.faces[0] != shape) {
+    known_ = {std::make_shared<const Topology>(Topology::grid(rows, cols)), {shape}, 0};
   }
-  return topology_;
+  return known_.topology;
 }
 
-std::shared_ptr<const Topology> MeshDecoder::fromFaces(std::size_t points, std::vector<Face> faces) {
-  if (topology_ && topology_->vertexCount() == points && faces == last_faces_) return topology_;
-  topology_ = std::make_shared<const Topology>(Topology::fromTriangles(points, faces));
-  last_faces_ = std::move(faces);
-  return topology_;
+void MeshDecoder::takeFaces(std::size_t points, std::vector<Face> proper, const std::vector<Face>& repeating,
+                            DecodedMesh& mesh) {
+  if (!known_.topology || known_.topology->vertexCount() != points || known_.faces != proper) {
+    auto topology = std::make_shared<const Topology>(Topology::fromTriangles(points, proper));
+    requireSomething(*topology, proper.size() + repeating.size());
+    known_ = {std::move(topology), std::move(proper), 0};
+  }
+  known_.dropped_faces = countDropped(repeating, *known_.topology);
+  mesh.topology = known_.topology;
+  mesh.dropped_faces = known_.dropped_faces;
 }
 
 DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
@@ -259,19 +264,17 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
     if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
     checkFaces(faceCount(view));
     SentFaces sent = triangulated(view, count);
-    const std::size_t faces = sent.proper.size() + sent.repeating.size();
-    mesh.topology = fromFaces(count, std::move(sent.proper));
-    requireSomething(*mesh.topology, faces);
-    mesh.dropped_faces = countDropped(sent.repeating, *mesh.topology);
+    takeFaces(count, std::move(sent.proper), sent.repeating, mesh);
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
-    // A publisher may send the triangles once and vertices ever after.
-    if (!topology_) refuse("the message has no triangles and no topology is known yet");
-    if (topology_->vertexCount() != count) {
+    // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as long.
+    if (!known_.topology) refuse("the message has no triangles and no topology is known yet");
+    if (known_.topology->vertexCount() != count) {
       throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) +
                                                     " vertices without triangles, but the last topology has " +
-                                                    std::to_string(topology_->vertexCount()));
+                                                    std::to_string(known_.topology->vertexCount()));
     }
-    mesh.topology = topology_;
+    mesh.topology = known_.topology;
+    mesh.dropped_faces = known_.dropped_faces;
   } else {
     mesh.topology = fixedTopology(count, 0, 0);
   }
@@ -330,6 +333,7 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     const auto p = marker.points[i];
     corners[i] = Vec3(p[0], p[1], p[2]);
   }
+  const bool welds_anew = weld_.vertexOfCorner().size() != count;
   if (config_.weld && config_.source != TopologySource::FILE) {
     mesh.weld_changes = weld_.weld(corners);
   } else {
@@ -342,9 +346,12 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
     sent.proper.reserve(count / 3);
     const std::vector<Index>& vertex = weld_.vertexOfCorner();
     for (std::size_t c = 0; c < count; c += 3) sent.add({vertex[c], vertex[c + 1], vertex[c + 2]});
-    mesh.topology = fromFaces(weld_.cornerOfVertex().size(), std::move(sent.proper));
-    requireSomething(*mesh.topology, count / 3);
-    mesh.dropped_faces = countDropped(sent.repeating, *mesh.topology);
+    try {
+      takeFaces(weld_.cornerOfVertex().size(), std::move(sent.proper), sent.repeating, mesh);
+    } catch (...) {
+      if (welds_anew) weld_.forget();  // a soup that is refused does not say which corners of the next one are one
+      throw;
+    }
   }
   mesh.positions.reserve(weld_.cornerOfVertex().size());
   for (const Index corner : weld_.cornerOfVertex()) mesh.positions.push_back(transform * corners[corner]);

@@ -68,8 +68,13 @@ class MeshDecoder {
 
  private:
   MeshInputConfig config_;
-  std::vector<Face> last_faces_;
-  std::shared_ptr<const Topology> topology_;  // of the last message
+  /// Of the last message that was taken.
+  struct Known {
+    std::shared_ptr<const Topology> topology;
+    std::vector<Face> faces;          // of which it was made
+    std::uint64_t dropped_faces = 0;  // that came with them
+  };
+  Known known_;
   SoupWeld weld_;
 
   template <typename View>
@@ -85,7 +90,8 @@ class MeshDecoder {
   /// `pixel` has the number in the cloud of each vertex; null: they are the same.
   void addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel = nullptr) const;
   std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
-  std::shared_ptr<const Topology> fromFaces(std::size_t points, std::vector<Face> faces);
+  /// Faces that a message brings: those that span a surface, and those that repeat a vertex.
+  void takeFaces(std::size_t points, std::vector<Face> proper, const std::vector<Face>& repeating, DecodedMesh& mesh);
 };
 
 }  // namespace dccd

@@ -26,7 +26,8 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
   MonitorConfig config = readConfig(tree);
   takeRemappings(node, config);
   limitLive(config);
-  setSimdTarget(config.simd_target);
+  // It is the process's: another nodelet may have named one, and its worker may be at it.
+  if (config.simd_target != "auto") setSimdTarget(config.simd_target);
   return config;
 }
 

@@ -148,10 +148,7 @@ std::string MonitorPipeline::phaseInWords() const {
 void MonitorPipeline::measureUnknown(Outcome& outcome) const {
   if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return;
   const auto start = std::chrono::steady_clock::now();
-  const double limit_ms = monitor_->stepMs();
-  // The clock is past the budget where none is left: 0 would be none.
-  const Deadline deadline =
-      limit_ms > 0 ? Deadline::after(std::max(1e-6, limit_ms - outcome.stats.total_ms)) : Deadline();
+  const Deadline deadline = monitor_->restOf(outcome);
   SweptSpace sum;
   Positions map_t0, map_t1;
   std::vector<std::uint8_t> active;
@@ -180,9 +177,8 @@ void MonitorPipeline::measureUnknown(Outcome& outcome) const {
 void MonitorPipeline::skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
                            const std::string& reason) {
   const std::string text = shortText(reason);
-  monitor_->skip(body, status, stamp_ns, text);
+  monitor_->skip(body, status, stamp_ns, text, arrival_ns);
   complaints_[body] = "refused: " + text;
-  if (body == config_.monitor.clock_body) arrivals_.push_back(arrival_ns);
 }
 
 std::string MonitorPipeline::indexProblem(std::size_t body, const Topology& topology) const {
@@ -291,8 +287,6 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);
   measureUnknown(outcome);
-  outcome_arrival_ns_ = arrivals_.empty() ? now_ns : arrivals_.front();
-  if (!arrivals_.empty()) arrivals_.pop_front();
   return true;
 }
 
@@ -323,7 +317,6 @@ void MonitorPipeline::reset(StepStatus status) {
     waiting_[b].reset();
   }
   monitor_->reset(status);
-  arrivals_.clear();
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
   learnAnew(status);

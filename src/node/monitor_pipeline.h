@@ -2,7 +2,6 @@
 // The node drives it with a steady clock, analyze_bag with the bag's; there is no other difference between the two.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -89,8 +88,6 @@ class MonitorPipeline {
   const EffectTracker& effects() const { return effects_; }
   const std::string& fixedFrame() const { return fixed_frame_; }
   std::uint64_t weldChanges() const { return weld_changes_; }
-  /// Arrival, on the driving clock, of the frame that the last outcome was about.
-  std::int64_t arrivalOfOutcome() const { return outcome_arrival_ns_; }
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
@@ -126,8 +123,6 @@ class MonitorPipeline {
   std::optional<LoadedMap> unplaced_map_;
   std::shared_ptr<const KnownSpace> known_;  // of the map in use
   std::int64_t unplaced_since_ns_ = 0;
-  std::deque<std::int64_t> arrivals_;  // of the clock body's frames inside the monitor
-  std::int64_t outcome_arrival_ns_ = 0;
   std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;

@@ -119,10 +119,10 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   frame.topology = std::move(done.mesh.topology);
   frame.positions = std::move(done.mesh.positions);
   frame.radius_m = std::move(done.mesh.radius_m);
+  frame.arrival_ns = done.arrival_ns;
   frame.dropped_faces = done.mesh.dropped_faces;
   transform(fixed_from_mesh, frame.positions);
   monitor_->push(body, std::move(frame), now_ns);
-  if (is_clock) arrivals_.push_back(done.arrival_ns);
   placed_[body] = isStatic(body);
   return true;
 }
@@ -162,7 +162,6 @@ void MonitorPipeline::learnAnew(StepStatus status) {
   fixed_frame_.clear();
   frame_answered_ = false;
   monitor_->reset(status);
-  arrivals_.clear();
   for (std::size_t b = 0; b < static_meshes_.size(); ++b) {
     if (!static_meshes_[b]) continue;
     monitor_->withdraw(b);

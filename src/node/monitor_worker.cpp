@@ -48,7 +48,7 @@ void CollisionMonitor::Impl::accountDropped() {
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
     log.complain(b, "queue",
                  std::to_string(dropped[b]) +
-                     " frames dropped, steps take longer than frames come or frames are too large for max_memory_mb; " +
+                     " frames dropped: steps take longer than the time between frames, or frames are too large for max_memory_mb; " +
                      adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
   }
 }
@@ -121,9 +121,9 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
   newest_ns = outcome.stamp_ns;
-  state.tell(outcome, pipeline.arrivalOfOutcome(), frame);
+  state.tell(outcome, outcome.arrival_ns, frame);
   outputs.publishResult(outcome, bodies, frame);
-  const double latency_s = secondsBetween(pipeline.arrivalOfOutcome(), steadyNs());
+  const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
   publishEffects(toRosTime(outcome.stamp_ns));
   if (pipeline.effects().takeNewLeftOut(pipeline.monitor())) {

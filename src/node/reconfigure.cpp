@@ -87,7 +87,9 @@ struct Reconfigure::Impl {
     MarkerConfig markers = start.markers;
     fromLive(live, options, markers);
     const Accuracy rung = options.detector.accuracy.rung;
-    if (rung == Accuracy::FAST) return "fast proves nothing and is no setting of a monitor; write exact";
+    if (!provesAnswers(rung)) {
+      return std::string(toString(rung)) + " proves nothing and is no setting of a monitor; write exact";
+    }
     try {
       check(options.detector, bodies);
       const MeshStore store(options.store);

@@ -44,6 +44,7 @@ void Diagnostics::add(const Outcome& outcome, double latency_s) {
 
 void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, const std::string& map_topic,
                         const std::string& hint) const {
+  // Of several with the same level the first stands, so they come in the order in which they are to be mended.
   const auto raise = [&](decltype(status.level) level, const std::string& text) {
     if (level <= status.level) return;
     status.level = level;
@@ -60,7 +61,7 @@ void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, cons
                                       (hint.empty() ? "" : "; " + hint));
   }
   if (drops) {
-    raise(DiagnosticStatus::WARN, "frames are dropped, steps take longer than frames come; " +
+    raise(DiagnosticStatus::WARN, "frames are dropped: steps take longer than the time between frames; " +
                                       adviceFor(StepStatus::QUEUE_FULL, {}, map_topic));
   }
   if (outcomes_ == 0 && enabled) raise(DiagnosticStatus::WARN, "no frames arrive" + (hint.empty() ? "" : ": " + hint));
@@ -82,6 +83,7 @@ bool Diagnostics::isDue(std::int64_t now_ns) const { return now_ns - last_ns_ >=
 diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ros::Time& stamp,
                                                    const StatsContext& context, bool enabled,
                                                    const std::string& map_topic, const std::string& hint) {
+  // The first status has no period before it: as if of one second.
   const double seconds = last_ns_ == 0 ? 1 : secondsBetween(last_ns_, now_ns);
   last_ns_ = now_ns;
   DiagnosticStatus status;
@@ -105,7 +107,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   put(status, "frames handed over in process", context.frames_handed_over);
   put(status, "maps received", context.maps_received);
   put(status, "maps refused", context.maps_refused);
-  put(status, "map age [s]", map_age_s_);
+  if (map_present_) put(status, "map age [s]", map_age_s_);
   outcomes_ = answers_ = 0;
   worst_latency_s_ = 0;
   diagnostic_msgs::DiagnosticArray array;

@@ -23,7 +23,8 @@ class Diagnostics {
   void add(const Outcome& outcome, double latency_s);
   /// Once a second by the clock of `now_ns`.
   bool isDue(std::int64_t now_ns) const;
-  /// `context`: of now, whether or not there has been an outcome since; `hint`: what looks like a mistake; `map_topic`:
+  /// The status since the last call; begins the next period. `context`: the state of now, whether or not there has been
+  /// an outcome; `hint`: what looks like a mistake; `map_topic`:
   /// where the octomap is looked for, or empty when none is expected.
   diagnostic_msgs::DiagnosticArray take(std::int64_t now_ns, const ros::Time& stamp, const StatsContext& context,
                                         bool enabled, const std::string& map_topic, const std::string& hint);
@@ -36,9 +37,10 @@ class Diagnostics {
   std::string name_;
   std::int64_t last_ns_ = 0;
   // Since the last status.
-  std::uint64_t outcomes_ = 0, answers_ = 0, dropped_before_ = 0;
+  std::uint64_t outcomes_ = 0, answers_ = 0;
   double worst_latency_s_ = 0;
-  LatencyHistogram latency_;  // since the start
+  std::uint64_t dropped_before_ = 0;  // frames dropped in all, at the last status
+  LatencyHistogram latency_;          // since the start
   // Of the newest outcome.
   StepStatus status_ = StepStatus::FIRST_FRAME;
   std::string reason_;

@@ -113,7 +113,7 @@ class PairExplanation : Explanation {
       const bool held = conservative.at(part_).separation.total_m > 0;
       for (const Accuracy rung : allRungs()) {
         if (!held) tellRung(rung, rungs.at(rung).at(part_));
-        if (held && rung == Accuracy::CONSERVATIVE) tellRung(rung, conservative.at(part_));
+        if (held && holdsDistance(rung)) tellRung(rung, conservative.at(part_));
       }
     }
     return lines_;

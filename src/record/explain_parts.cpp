@@ -78,11 +78,13 @@ void removeDistances(Step& step) {
 
 Options plain(Options options) {
   options.num_threads = 1;
-  options.step_budget_ms = 0;
+  options.step_budget_ms = options.max_compute_ms = 0;
+  options.max_found = options.max_found_per_feature = 0;
   options.earliest_only = false;
   options.check_start_state = false;
   options.suppress_initial = false;
   options.max_contacts = Options().max_contacts;
+  options.patches = false;
   return options;
 }
 

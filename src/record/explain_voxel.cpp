@@ -52,7 +52,7 @@ class VoxelExplanation : Explanation {
     single.map.surface = VoxelSurface::build(step_.map.surface->resolution(), {*leaf});
     for (part_ = 0; part_ < parts_; ++part_) tellBounds(*leaf);
     for (const Accuracy rung : allRungs()) {
-      if (distance_m_ > 0 && rung != Accuracy::CONSERVATIVE) continue;
+      if (distance_m_ > 0 && !holdsDistance(rung)) continue;
       Options options = plain(options_);
       options.accuracy.rung = rung;
       tellRung(rung, *leaf, contacts(feature, options), contacts(single, options));

@@ -32,7 +32,9 @@ struct StepRecording {
   Step step;
   Options options;
   bool has_answer = false;  ///< false: the program ended in the step
-  Outcome answer;           ///< the file has what of it does not depend on the machine
+  /// The file has contacts, start state, patches and what they are judged by. Not: times, the tables of what it cost,
+  /// counts that follow from the contacts.
+  Outcome answer;
 };
 
 /// A recording as the pieces of memory that its file consists of; large arrays stay where they are in the recording.

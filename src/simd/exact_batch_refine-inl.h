@@ -5,12 +5,13 @@ namespace simd {
 namespace HWY_NAMESPACE {
 
 constexpr int QUICK_STEPS = 4;     ///< Halley steps that settle nearly every root
-constexpr int SPLIT_STEPS = 5;     ///< where one end is an extremum of f
-constexpr int MORE_STEPS = 8;      ///< for most of the others
-constexpr int PATIENT_STEPS = 20;  ///< for the rest
+constexpr int SPLIT_STEPS = 5;     ///< in pieces, where one end is an extremum of f
+constexpr int MORE_STEPS = 8;      ///< for a single root that QUICK_STEPS left without a bracket
+constexpr int PATIENT_STEPS = 20;  ///< for those that MORE_STEPS left, and in subdivision
 
 /// The inside test at t = x, for every t within h of it: lanes that certainly touch there and lanes that certainly
-/// do not. On the coordinate plane where n = u x v is largest; with B and C as below the closed features meet iff
+/// do not. On the plane across the largest component n of u x v; with B that component of w x v, and C that of u x w
+/// (VF) or of w x u (EE), the closed features meet iff
 ///   VF  B/n, C/n and (n-B-C)/n >= 0 (barycentric coordinates),
 ///   EE  B/n, C/n, (n-B)/n and (n-C)/n >= 0 (line parameters of both edges).
 template <bool CERTIFIED, BatchKind KIND>
@@ -94,7 +95,7 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int st
   return onGrid(x);
 }
 
-/// One vector: approximates a root of each lane; it counts where the lane is pending. WHOLE: the root is the only one
+/// One vector: approximates a root in each lane; the result means something in pending lanes alone. WHOLE: the root is the only one
 /// in [0,1], and lo, hi, at_lo need not be set.
 template <bool WHOLE, int STEPS>
 HWY_INLINE void approximate(RootBlock& roots, std::size_t i) {
@@ -121,11 +122,13 @@ HWY_INLINE void certify(RootBlock& roots, std::size_t i, double cells) {
   V outcome = constant(ROOT_UNCERTAIN);
   V root_lo = x, root_hi = x;
   if (!CERTIFIED) {
-    insideTest<CERTIFIED, KIND>(roots, i, x, x, touches, misses);
+    insideTest<CERTIFIED, KIND>(roots, i, x, hn::Zero(Tag()), touches, misses);
     outcome = choose(touches, constant(ROOT_CONTACT), constant(ROOT_NO_CONTACT));
   } else {
     const V error = load(roots.error, i);
     const V flip = hn::And(at_lo, hn::SignBit(Tag()));
+    // Any reach is safe, for the signs below decide. error / slope is how far f's error moves the root; four times that
+    // brackets nearly all. Later attempts take sixteen times, or four times what the curvature says where that is less.
     V reach = hn::Div(hn::Mul(constant(4), error), slope);
     if (STEPS >= MORE_STEPS) {  // near a double root the curvature bounds the reach better than the slope
       const V parabola = hn::Sqrt(hn::Div(hn::Mul(constant(16), error), load(roots.curvature, i)));

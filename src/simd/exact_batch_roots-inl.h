@@ -5,7 +5,8 @@ namespace simd {
 namespace HWY_NAMESPACE {
 
 /// Two places that split [0,1] into pieces on which the Bernstein coefficients of f are monotone: the extrema of f, or
-/// its inflection point where it has none. Any place is safe; these leave no piece uncertain without need.
+/// its inflection point where it has none. f1 and f2 are three times the coefficients, as RootBlock keeps them. Any
+/// place is safe; these leave no piece uncertain without need.
 HWY_INLINE void splits(V f0, V f1, V f2, V f3, V& first, V& second) {
   const V zero = hn::Zero(Tag()), one = constant(1), three = constant(3);
   const V a1 = hn::Sub(f1, hn::Mul(three, f0));
@@ -52,7 +53,7 @@ HWY_INLINE V pieceOf(V c0, V c1, V c2, V c3, V error) {
   return choose(one_root, constant(PIECE_ROOT), choose(free, constant(PIECE_FREE), constant(PIECE_UNCERTAIN)));
 }
 
-/// Copies one lane, but for what its next root will set.
+/// Copies one lane, except what the search for its next root sets.
 inline void copyPair(const RootBlock& from, std::size_t i, RootBlock& to, std::size_t j) {
   for (int k = 0; k < MOTION_PLANES; ++k) to.motion[k][j] = from.motion[k][i];
   for (int k = 0; k < 4; ++k) to.coefficient[k][j] = from.coefficient[k][i];
@@ -61,7 +62,7 @@ inline void copyPair(const RootBlock& from, std::size_t i, RootBlock& to, std::s
   to.pair[j] = from.pair[i];
 }
 
-/// What is done to every plane of a block that its next root does not set.
+/// Calls act() on every plane of a block except those that the search for its next root sets.
 template <class Do>
 HWY_INLINE void onPlanes(RootBlock& roots, const Do& act) {
   for (int k = 0; k < MOTION_PLANES; ++k) act(roots.motion[k]);
@@ -92,7 +93,8 @@ HWY_INLINE void fillUp(Block& roots) {
   if (roots.count % lanes() != 0) onPlanes(roots, FillUp{roots.count});
 }
 
-/// The lanes of the vector at `from` that `front` lists, to `to`, which is not behind it. A whole vector is written.
+/// Moves the lanes of the vector at `from` that `front` lists to `to` <= `from`. A whole vector is written, which ends no
+/// later than the one that was read.
 struct MoveTogether {
   decltype(hn::SetTableIndices(Tag(), FRONT_TABLE.row[0])) front;
   std::size_t from, to;
@@ -106,7 +108,7 @@ HWY_INLINE void writeOut(const RootBlock& roots, std::size_t j, double cells, co
   out.verdict[pair] = static_cast<std::uint8_t>(roots.outcome[j]);
   out.lo[pair] = roots.root_lo[j];
   out.hi[pair] = roots.root_hi[j];
-  const double lo = roots.root_lo[j];  // anything where there is no root in the step, and no cell then
+  const double lo = roots.root_lo[j];  // a leftover where no root was refined: the conversion is defined all the same
   out.cell[pair] = lo >= 0 && lo <= 1 ? static_cast<std::uint64_t>(lo * cells) : 0;
 }
 

@@ -37,7 +37,8 @@ HWY_INLINE VF dot(const Vec3V& a, const Vec3V& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
 
-// A quadratic vector in (unscaled) Bernstein form: values at t=0 and t=1 and twice the middle coefficient.
+// A quadratic vector in Bernstein form: A and C are its values at t=0 and t=1, B is twice the middle coefficient. Only
+// signs are asked of them, so the factor does no harm.
 struct Quadratic {
   Vec3V A, B, C;
 };
@@ -65,7 +66,6 @@ struct Opposite {
 template <bool EDGE_EDGE, class Component>
 HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const Quadratic& ab, const Quadratic& T,
                                  const Component& component, VF margin) {
-  const DF d;
   const auto range = [&](const Quadratic& q) { return rangeOf(component(q.A), component(q.B), component(q.C)); };
   const Range first = range(bc);
   Opposite o{first.lo, first.hi};
@@ -73,15 +73,14 @@ HWY_INLINE hn::Mask<DF> opposite(const Quadratic& bc, const Quadratic& ca, const
   const Range r = range(ab);
   o.add(EDGE_EDGE ? Range{hn::Neg(r.hi), hn::Neg(r.lo)} : r);
   o.add(range(T));
-  (void)d;
   return hn::And(hn::Gt(o.largest_lo, margin), hn::Lt(o.smallest_hi, hn::Neg(margin)));
 }
 
 // The six vectors of a block of pairs, four values a lane (the fourth is 0).
 constexpr size_t BLOCK_SIZE = 6 * 4 * MAX_LANES;
 
-// Differences of one pair to its origin point, rounded once in double and once to float. In a block lie, each lane by
-// lane: the points at t0, then at t1; with AVX-512, where a vector holds both, each point at t0 and t1.
+// Differences of one pair to its origin point, rounded once in double and once to float. A block is laid out as
+// [time][point][lane][4]; with AVX-512, where one vector holds both times, as [point][lane][time][4].
 template <bool EDGE_EDGE>
 HWY_INLINE void gather(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT quad, size_t lane,
                        float* HWY_RESTRICT block) {
@@ -197,6 +196,7 @@ HWY_INLINE size_t writeKept(hn::Mask<DF> rejected, size_t first, size_t count, u
     HWY_ALIGN static constexpr uint32_t LANES[MAX_LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     const auto lanes = hn::Add(hn::Load(du, LANES), hn::Set(du, static_cast<uint32_t>(first)));
     const auto left = hn::RebindMask(du, hn::Not(rejected));
+    // A whole vector is stored. It fits: no more pairs were kept than lie before `first`.
     hn::StoreU(hn::Compress(lanes, left), du, kept);  // CompressStore() takes many times as long on some processors
     return hn::CountTrue(du, left);
   }
@@ -221,8 +221,8 @@ HWY_INLINE size_t filterAll(const double* HWY_RESTRICT vertices, const uint32_t*
     for (size_t lane = 0; lane < n; ++lane) gather<EDGE_EDGE>(vertices, quads + 4 * (first + lane), lane, block);
     return n;
   };
-  // A block is filled before the one ahead of it is tested: it is read in larger pieces than it was written in, and
-  // such a load waits until all of the stores have reached the cache.
+  // The next block is filled before this one is tested: a block is read in larger pieces than it was written in, and
+  // such a load waits until the stores have reached the cache.
   size_t out = 0, now = 0;
   for (size_t first = 0, n = fill(0, blocks[0]); n > 0; first += lanes, now = 1 - now) {
     const size_t next = fill(first + lanes, blocks[1 - now]);

@@ -69,7 +69,8 @@ HWY_INLINE V apartAlso(V apart, V one, V other) {
 #endif
 }
 
-// Bit per lane of two directions: 1 where neither is negative.
+// Bit per lane of two directions: 1 where neither is negative. Without AVX-512 `apart` is never positive: it begins as
+// zero and only takes minima, so that what is not negative is zero.
 template <class D>
 HWY_INLINE uint32_t notApart(D d, hn::Vec<D> apart) {
 #if DCCD_AVX512
@@ -115,10 +116,10 @@ HWY_INLINE uint32_t meeting(const int16_t* HWY_RESTRICT lo, const int16_t* HWY_R
 }
 #endif
 
-// A group's nodes, of which the nodes of another one are compared with all.
+// The nodes of one group, kept at hand while each node of another group is compared with all of them.
 #if DCCD_AVX512
 template <bool T0_ONLY>
-class GroupLanes {  // 16 of the 32 registers
+class GroupLanes {  // in up to 16 of the 32 registers
   using D = hn::FixedTag<int16_t, 2 * GROUP>;
 
  public:
@@ -151,7 +152,8 @@ class GroupLanes {
 };
 #endif
 
-// Bit per lane: 1 where feature i of one group and the lane's of the other share a vertex. Empty ones share theirs.
+// Bit per lane: 1 where feature i of one group and the lane's of the other share a vertex. Two empty lanes do: both hold
+// UINT32_MAX.
 template <size_t ONE, size_t OTHER>
 HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const uint32_t* HWY_RESTRICT other) {
   const hn::CappedTag<uint32_t, GROUP> d;

@@ -27,7 +27,7 @@ class PairWriter {
 
  private:
 #if DCCD_AVX512
-  // A pair is a number of 64 bits, of which the node or the lane is the lower half.
+  // A pair is one number of 64 bits, of which the lower half, written first, is the node or the lane.
   using D = hn::FixedTag<uint32_t, GROUP>;
   using Pairs = hn::FixedTag<uint64_t, GROUP / 2>;
   hn::Vec<D> lanes_;
@@ -48,7 +48,8 @@ PairWriter::PairWriter(bool node_first, uint32_t base)
       lane_shift_(hn::Set(Pairs(), node_first ? 32 : 0)),
       node_shift_(node_first ? 0 : 32) {}
 
-// Without a branch on how many there are, which nothing foretells: whole vectors are stored, o moves on less.
+// Without a branch on the number of lanes, which is unpredictable: two whole vectors are stored, and o moves on by what
+// counts.
 uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT o) const {
   const uint8_t packed[8] = {static_cast<uint8_t>(mask), static_cast<uint8_t>(mask >> 8)};
   const auto lanes = hn::Compress(lanes_, hn::LoadMaskBits(D(), packed));
@@ -73,8 +74,9 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 }
 #endif
 
-// What of the surviving lanes of a pair of groups is left out. before(): of the lanes j of the other group, what is
-// known of node i without a test; after(): of those that are left. by_rows: i is of the first group.
+// Which pairs of nodes are not reported. Both functions take a mask of the lanes of the group opposite node i and return
+// those that stay: before() ahead of the test of bounds, where it costs little, after() of what has passed it. by_rows:
+// i is in the first group.
 struct LeaveNoneOut {
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
   HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }
@@ -106,8 +108,8 @@ struct LeaveAdjacentOut {
   }
 };
 
-// Whether a node meets any other nothing foretells. Where a test takes no longer than a branch that was foretold
-// wrongly, all nodes are tested first, and then what is left of them is written.
+// Whether a node meets anything is unpredictable. Where a test costs no more than a mispredicted branch, all nodes are
+// tested first, and then what met is written.
 constexpr bool WRITES_LATER = DCCD_AVX512;
 
 // The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
@@ -135,6 +137,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   for (uint32_t left = by_rows ? rows : cols; left; left &= left - 1) {
     const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
     uint32_t mask = inner_mask;
+    // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
     mask = leave_out.before(by_rows, i, mask);
@@ -166,6 +169,7 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
                             uint32_t* HWY_RESTRICT out, size_t capacity, size_t* consumed) {
   uint32_t* o = out;
   size_t p = 0;
+  // There is room for every pair of a pair of groups, so that testPair() need not look.
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
     if (p + 2 < count) {

@@ -18,7 +18,7 @@ struct GroupsView {
 enum class Diagonal : std::uint8_t { ALL = 0, UPPER_WITH_DIAGONAL = 1, STRICT_UPPER = 2 };
 
 /// Linear filter between the nodes of each group pair (a[2p], b[2p+1]). Writes the surviving node pairs as
-/// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs), stops before it could overflow.
+/// (a * 16 + i, b * 16 + j) to out (room for `capacity` pairs, 256 or more), stops before it could overflow.
 /// diagonal applies to pairs with equal indices when self is true. t0_only: nothing is read of t1, so that arrays that
 /// begin with the values at t1 test t1 alone.
 /// Returns the number of pairs written; *consumed is the number of group pairs done.

@@ -16,9 +16,10 @@ namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Bit i of the result: lane i of the mask. D has at most 32 lanes.
+/// Bit i of the result: lane i of the mask. D has fewer than 32 lanes.
 template <class D, class M>
 HWY_INLINE uint32_t bitsOf(D d, M mask) {
+  static_assert(hn::MaxLanes(D()) < 32, "the bits of a word");
   uint8_t packed[8] = {0};
   hn::StoreMaskBits(d, mask, packed);
   uint32_t word;

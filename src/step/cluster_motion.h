@@ -40,9 +40,7 @@ class ClusterMotion {
   /// Of the step whose records and bounds the scene has. pieces(n, f): calls f(first, last) over [0, n).
   template <class Pieces>
   void run(const SceneArrays& scene, const Pieces& pieces) {
-    // Each residual is the length of a sum of products below 8 times the size, each rounded less than 8 times; a pair
-    // has three of them and a difference of rotations. Together below 2^-46 of the size.
-    slop_m_ = tolerance::RESIDUAL * scene.size();
+    slop_m_ = slop(scene);
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const bool was_still = bodies_[b].still;
       bodies_[b].still = scene.bodies()[b].kept && (was_still || isStill(scene, b));
@@ -69,8 +67,10 @@ class ClusterMotion {
     return {residual, from.half_cosine * (1 - tolerance::LENGTH)};
   }
 
-  /// Rounding of a distance between two points of the scene, from above.
-  double slop() const { return slop_m_; }
+  /// Rounding of a distance between two points of the scene, and of what a pair consumes, from above: each residual is
+  /// the length of a sum of products below 8 times the size, each rounded less than 8 times; a pair has three of them
+  /// and a difference of rotations. Together that is below 2^-46 of the size.
+  static double slop(const SceneArrays& scene) { return tolerance::RESIDUAL * scene.size(); }
   std::size_t bytes() const;
 
  private:
@@ -120,7 +120,7 @@ class ClusterMotion {
   void boundClusters(const SceneArrays& scene, std::size_t body, int kind, std::size_t first, std::size_t last);
 
   std::vector<BodyMotion> bodies_;
-  double slop_m_ = 0;
+  double slop_m_ = 0;  ///< of the step that run() has seen
 };
 
 }  // namespace dccd

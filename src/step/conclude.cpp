@@ -57,12 +57,9 @@ void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   }
   contacts.resize(kept);
   contacts.shrink_to_fit();
-  if (!std::is_sorted(contacts.begin(), contacts.end(), canonicalLess)) {
-    std::sort(contacts.begin(), contacts.end(), canonicalLess);
-  }
 }
 
-/// Vertices that were sent, but are part of no surface and no line. A mesh file's are of no interest.
+/// Vertices that were sent but belong to no face and no edge, except masked ones. A mesh file's do not matter.
 std::uint64_t looseVertices(const Body& body) {
   const Topology& topology = *body.topology;
   if (body.rigid || topology.usedVertices().size() == topology.vertexCount()) return 0;
@@ -92,8 +89,8 @@ std::string takeUnchecked(const Step& step, StepStats& stats) {
   return text;
 }
 
-/// Why it is less than a whole answer, if it is. The status and its reason are those of the one that says most; what of
-/// them stands in the way of a proof goes into `unproved`.
+/// Why it is less than a whole answer, if it is. Reasons come in ascending order of weight, and the last one gives the
+/// status; each that stands in the way of a proof also goes into `unproved`.
 void judge(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
   outcome.status = StepStatus::OK;
   const auto say = [&](StepStatus status, const std::string& reason) {
@@ -108,19 +105,22 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
     say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
                                    std::to_string(outcome.total_contacts) + " contacts are listed");
   }
-  const std::string not_before =
-      "nothing that was left out touches before toc " + std::to_string(outcome.unchecked_toc_lower);
+  const auto notBefore = [&] {  // rounded down, as the bound is
+    const double toc = std::floor(outcome.unchecked_toc_lower * 1e6) / 1e6;
+    return "nothing that was left out touches before toc " + std::to_string(toc);
+  };
   const std::string ran_out =
       options.step_budget_ms > 0 ? "the step budget ran out" : "the time that a step may take without a budget ran out";
   if (outcome.cut) {
     const std::string text = "at least " + std::to_string(outcome.total_contacts) +
                              " contacts; the work was cut at the limit of what a step may find; " +
-                             (outcome.allPairs() ? "not all of the start state was looked at" : not_before);
+                             (outcome.allPairs() ? "not all of the start state was looked at" : notBefore());
+    // Not by say(): unlike a list that is cut, this TRUNCATED means that not everything was looked at.
     outcome.status = StepStatus::TRUNCATED;
     outcome.reason = text;
     outcome.unproved.push_back(text);
   } else if (!outcome.complete && !outcome.allPairs()) {
-    say(StepStatus::DEADLINE, ran_out + "; " + not_before);
+    say(StepStatus::DEADLINE, ran_out + "; " + notBefore());
   } else if (!outcome.complete) {
     say(StepStatus::DEADLINE,
         ran_out + " before all of the start state was looked at; no pair was left out of the contacts");
@@ -142,7 +142,7 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   }
 }
 
-/// What nobody is to miss who reads "proved".
+/// What was left out on request: whoever reads "proved" must see it.
 std::vector<std::string> excludedByChoice(const Options& options, const Step& step, std::uint64_t excluded_voxels) {
   std::vector<std::string> excluded = options.excluded;
   const auto add = [&](const Body& body, const std::string& what) {
@@ -161,7 +161,7 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
   return excluded;
 }
 
-/// What the start state is INTERSECTING for is an intersection that is listed or an initial contact with the map.
+/// INTERSECTING needs no case of its own: what crosses is a listed intersection or an initial contact with the map.
 Touching touchingOf(const Outcome& outcome, std::size_t suppressed_unexpected) {
   const ContactCounts& counts = outcome.counts;
   if (counts.unexpectedNew() > 0) return Touching::NEW;
@@ -172,7 +172,7 @@ Touching touchingOf(const Outcome& outcome, std::size_t suppressed_unexpected) {
   return touches ? Touching::EXPECTED : Touching::NONE;
 }
 
-/// Those with the map that are initial out of the list. How many of them are unexpected.
+/// Takes the initial contacts with the map off the list; returns how many of them were unexpected.
 std::size_t suppressInitial(Outcome& outcome) {
   auto& contacts = outcome.contacts;
   const auto goes = [](const Contact& c) { return c.initial && c.body[1] == OBSTACLE_BODY; };
@@ -184,15 +184,19 @@ std::size_t suppressInitial(Outcome& outcome) {
   return static_cast<std::size_t>(unexpected);
 }
 
+/// toc of part i of n as a fraction of the whole step, outwards. The quotient is rounded by half a unit in its last
+/// place, which one step covers; a sum that is rounded, too, adds up to one unit more, which the second step covers.
+double scale(double toc, std::size_t i, std::size_t n, double towards) {
+  const double before = static_cast<double>(i), sum = before + toc;
+  const double fraction = std::nextafter(sum / static_cast<double>(n), towards);
+  const bool exact = sum - before == toc;  // the difference is: the sum is at most 1 above
+  return std::clamp(exact ? fraction : std::nextafter(fraction, towards), 0.0, 1.0);
+}
+
 }  // namespace
 
-/// toc of part i of n as a fraction of the whole step. The division is rounded, so one step outwards.
-double scaleDown(double toc, std::size_t i, std::size_t n) {
-  return n == 1 ? toc : std::max(0.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 0.0));
-}
-double scaleUp(double toc, std::size_t i, std::size_t n) {
-  return n == 1 ? toc : std::min(1.0, std::nextafter((static_cast<double>(i) + toc) / static_cast<double>(n), 2.0));
-}
+double scaleDown(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 0.0); }
+double scaleUp(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 2.0); }
 
 void leaveOut(double toc, Outcome& outcome) {
   outcome.complete = false;
@@ -210,7 +214,6 @@ void addPart(std::size_t part, std::size_t parts, PartResult& result, Outcome& o
     outcome.contacts = std::move(result.contacts);
     result.contacts.clear();
   } else {
-    outcome.contacts.reserve(outcome.contacts.size() + result.contacts.size());
     for (Contact contact : result.contacts) {
       contact.toc_lower = scaleDown(contact.toc_lower, part, parts);
       contact.toc_upper = scaleUp(contact.toc_upper, part, parts);
@@ -258,7 +261,7 @@ void check(const Options& options, const std::vector<Body>& bodies) {
   require(!options.earliest_only || options.expected.empty(),
           "earliest_only with expected contacts: the first may be an expected one, which would hide all others");
   if (!bodies.empty()) checkPartners(options.expected, bodies.size());
-  makeRung(options.accuracy);
+  makeRung(options.accuracy);  // throws where a number of the accuracy is out of range
   const double separation_m = largestSeparation(bodies);
   if (separation_m > 0) checkHoldsDistance(options, "minimum_separation_m = " + std::to_string(separation_m));
 }
@@ -301,6 +304,7 @@ const char* toString(StartState state) {
 }
 
 void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {
+  // In this order: the counts are of all that is reported, listed or not, and judge() compares them with the list.
   const std::size_t suppressed_unexpected = options.suppress_initial ? suppressInitial(outcome) : 0;
   countContacts(outcome);
   keepEarliest(options.max_contacts, outcome.contacts);

@@ -10,6 +10,7 @@ namespace dccd {
 
 /// toc of part i of n as a fraction of the whole step, not later.
 double scaleDown(double toc, std::size_t i, std::size_t n);
+double scaleUp(double toc, std::size_t i, std::size_t n);
 
 /// The budget left out what does not touch before toc.
 void leaveOut(double toc, Outcome& outcome);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "dccd/accuracy.h"
 #include "obstacle/burst.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/conclude.h"
@@ -57,9 +58,12 @@ History::History() : impl_(std::make_unique<Impl>()) {}
 History::~History() = default;
 History::History(History&& other) noexcept = default;
 History& History::operator=(History&& other) noexcept = default;
-void History::clear() { impl_->carried.clear(); }
+void History::clear() {
+  impl_->carried.clear();
+  impl_->begins_at = nullptr;
+}
 void History::beginAt(History& other) { impl_->begins_at = other.impl_.get(); }
-bool History::isClear() const { return impl_->carried.isClear(); }
+bool History::isClear() const { return impl_->carried.isClear() && !impl_->begins_at; }
 const std::vector<LeftOutPair>& History::leftOut() const { return impl_->left_out_list; }
 
 void Carried::clear() {
@@ -82,12 +86,13 @@ bool Carried::isContinuedBy(const Step& step) const {
 Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline deadline) {
   // Whatever throws from here on leaves nothing behind that could be taken for known.
   struct Guard {
-    Carried& carried;
+    Impl& history;
     bool done = false;
     ~Guard() {
-      if (!done) carried.clear();
+      if (!done) history.carried.clear();
+      history.begins_at = nullptr;
     }
-  } guard{carried};
+  } guard{*this};
   aside = begins_at != nullptr;
   const Clock::time_point called = Clock::now();
   setOptions(wanted);
@@ -115,7 +120,6 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.substeps = parts;
   outcome.excluded_voxels = excluded_voxels;
   guard.done = runParts(step, continues, parts, deadline, outcome);
-  begins_at = nullptr;
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
@@ -277,7 +281,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   context.deadline = part.deadline;
   context.per_hit = per_hit;
   result.stats.left_out_listed = left_out_list.size();
-  if (options->accuracy.rung == Accuracy::CONSERVATIVE) context.tolerance_m = options->accuracy.tolerance_m;
+  if (holdsDistance(options->accuracy.rung)) context.tolerance_m = options->accuracy.tolerance_m;
   if (stopsAtFirst()) {
     runUntilFirst(context);
   } else {
@@ -291,7 +295,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const bool all_pairs = result.complete;
   if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (map_reduced && scene.meetsObstacle()) runMap(part);
-  rememberApart(all_pairs && !options->earliest_only && options->accuracy.rung != Accuracy::FAST);
+  rememberApart(all_pairs && !options->earliest_only && provesAnswers(options->accuracy.rung));
   if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
   runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
   addPart(part.index, part.count, result, outcome);
@@ -303,11 +307,7 @@ void History::Impl::leaveOutPart(const Part& part) {
   result.contacts.clear();
   leaveOutAt(0, false);
   result.start_state_complete = !checksStartState(part);
-  carried.apart.clear();
-  carried.start_state.clear();
-  carried.inside.clear();
-  carried.memory.clear();
-  carried.map.clear();
+  carried.clear();
 }
 
 /// The part's positions into the scene's arrays, and what of it needs bounds.

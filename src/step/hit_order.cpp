@@ -13,7 +13,7 @@ constexpr std::size_t BUCKETS = std::size_t{1} << BITS;
 constexpr std::size_t FEW = 1024;
 }  // namespace
 
-// Stable, so that sorting by the key first and by the bodies then sorts by both.
+// Stable: sorting by key first and by bodies afterwards orders by bodies, then by key.
 void HitOrder::sortByKey(std::uint64_t differing_bits) {
   for (int shift = 0; shift < 64; shift += BITS) {
     const std::uint64_t digit = (BUCKETS - 1) << shift;
@@ -68,7 +68,7 @@ const std::vector<HitOrder::Entry>& HitOrder::sort(const std::vector<const std::
   const auto packed = [low_bits](std::uint64_t key) { return key >> 32 << low_bits | (key & 0xffffffffu); };
   for (Entry& e : a_) e.key = packed(e.key);
   sortByKey(packed(key_or) ^ packed(key_and));
-  // Ranks go through all bodies, so that the first feature's body is in order already; the second's may not be.
+  // With several pairs of bodies the key is not enough: the second feature's body comes before the first one's rank.
   if (bodies_or != bodies_and) {
     for (Entry& e : a_) e.key = e.hit->bodies;
     sortByKey(bodies_or ^ bodies_and);

@@ -13,7 +13,7 @@ namespace dccd {
 class HitOrder {
  public:
   struct Entry {
-    std::uint64_t key;  // the sort's working space
+    std::uint64_t key;  // changed by the sort, and without a meaning in its result
     const Hit* hit;     // in a worker's vector
   };
   /// The result is valid until the next call.
@@ -24,7 +24,7 @@ class HitOrder {
  private:
   void sortByKey(std::uint64_t differing_bits);
   std::vector<Entry> a_, b_;
-  std::size_t most_ = 0;  // hits of a call since beginStep()
+  std::size_t most_ = 0;  // the largest number of hits in one call since beginStep()
 };
 
 }  // namespace dccd

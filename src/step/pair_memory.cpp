@@ -15,14 +15,15 @@ constexpr double INFINITE = std::numeric_limits<double>::infinity();
 constexpr double DOWN = 1 - tolerance::LENGTH;  // more than all roundings of a product
 constexpr double STEPS_AHEAD = 2;               // that a certificate is to last, as far as they are like this one
 constexpr double WORTH_A_CERTIFICATE = 1.5;     // residuals of this step that it must have
-// Shares of the pairs that are known to be apart. Pairs are tested so fast that fewer are not worth asking for; what it
-// takes to begin is more than what it takes to go on.
-constexpr double WORTH_A_TRY = 0.93, WORTH_IT = 0.75;
-constexpr std::size_t WORTH_MEASURING = 6;  // distances of features, of which one takes as long as a row
+// Shares of the pairs that are known to be apart. Pairs are tested so fast that smaller shares do not pay; what it takes
+// to begin is more than what it takes to go on.
+constexpr double SHARE_TO_TURN_ON = 0.93, SHARE_TO_STAY_ON = 0.75;
+constexpr std::size_t MOST_MEASURED = 6;    // distances for one certificate; one takes as long as a row of gaps
 constexpr std::size_t PAIRS_PER_EDGE = 2;   // that may be kept: 144 bytes a triangle
 constexpr std::size_t PAIRS_IN_ANY_CASE = 4096;
 
-/// A certain lower bound of the distance of two convex hulls: how far they are apart along a direction, whatever it is.
+/// How far two convex hulls are apart along a direction, whatever it is: a lower bound of their distance but for
+/// rounding, which the caller takes off. 0 where the direction is too short to measure along.
 double gapAlong(const Vec3& direction, const Vec3* a, std::size_t n, const Vec3* b, std::size_t m) {
   const double length = direction.norm();
   if (!(length > tolerance::SHORTEST_DIRECTION)) return 0;
@@ -30,7 +31,7 @@ double gapAlong(const Vec3& direction, const Vec3* a, std::size_t n, const Vec3*
   for (std::size_t i = 0; i < n; ++i) low = std::min(low, direction.dot(a[i]));
   for (std::size_t i = 0; i < m; ++i) high = std::max(high, direction.dot(b[i]));
   const double gap = (low - high) / length;
-  return gap > 0 ? gap : 0;  // also where there is no direction
+  return gap > 0 ? gap : 0;  // 0 also for a gap that is no number
 }
 
 double gapOfEdges(const Vec3* a, const Vec3* b) {
@@ -161,7 +162,7 @@ void PairMemory::addGroup(const MemoryTrees& trees, std::uint32_t a, std::uint32
 }
 
 /// Takes from the certificate what the step consumes of it. A certificate that is no number holds nothing.
-bool PairMemory::holds(const Group& group, Pair& pair, double contact_m) const {
+bool PairMemory::consume(const Group& group, Pair& pair, double contact_m) const {
   const ClusterPairMotion motion = motion_.between(group.trees.body_a, group.trees.kindA(), clusterA(group, pair),
                                                    group.trees.body_b, group.trees.kindB(), clusterB(group, pair));
   pair.residual_m = static_cast<float>(motion.residual_m);
@@ -203,7 +204,7 @@ bool PairMemory::consult(const SceneArrays& scene, std::size_t g, double contact
   }
   std::size_t apart = 0;
   for (Pair& pair : group.pairs) {
-    pair.to_test = !holds(group, pair, contact_m);
+    pair.to_test = !consume(group, pair, contact_m);
     if (!pair.to_test) {
       ++apart;
       continue;
@@ -233,7 +234,7 @@ std::size_t PairMemory::test(const SceneArrays& scene, const Group& group, Pair&
                          clusterA(group, pair), clusterB(group, pair), group.trees.isSelf(), pair.shared, slots);
   if (pair.wait > 0) {
     --pair.wait;
-  } else if (left <= MOST_NEAR) {
+  } else if (left <= MOST_LEFT) {
     certify(scene, group, pair, contact_m);
     stats.pairs_shown_apart += pair.distance_m != UNKNOWN;
   }
@@ -243,26 +244,28 @@ std::size_t PairMemory::test(const SceneArrays& scene, const Group& group, Pair&
 /// By the directions of the bounds, and where these say little, by the features' distance.
 void PairMemory::certify(const SceneArrays& scene, const Group& group, Pair& pair, double contact_m) const {
   const ClusterTree &a = treeA(scene, group.trees), &b = treeB(scene, group.trees);
-  const auto targetOf = [&](double steps) {
-    const double units = std::min((contact_m + steps * pair.residual_m) / unit_m_ + 1, 32000.0);
-    return static_cast<std::int16_t>(units >= 1 ? units : 1);
-  };
-  std::uint8_t near[WORTH_MEASURING];
+  // What is farther apart than this needs no closer look; as an int16 below EMPTY_LO.
+  const double units = std::min((contact_m + STEPS_AHEAD * pair.residual_m) / unit_m_ + 1, 32000.0);
+  const auto target = static_cast<std::int16_t>(units >= 1 ? units : 1);
+  std::uint8_t near[MOST_MEASURED];
   std::size_t found = 0;
   const std::int16_t gap =
       simd::gapAtEnd(a.level(0).view(), b.level(0).view(), clusterA(group, pair), clusterB(group, pair),
-                     group.trees.isSelf(), pair.shared, weights_, targetOf(STEPS_AHEAD), near, WORTH_MEASURING, &found);
+                     group.trees.isSelf(), pair.shared, weights_, target, near, MOST_MEASURED, &found);
+  const double slop = ClusterMotion::slop(scene);
   double distance = gap == simd::EMPTY_LO ? INFINITE : gap * unit_m_ * DOWN;
-  if (found > WORTH_MEASURING) distance = 0;
+  if (found > MOST_MEASURED) distance = 0;
   const bool edges = group.trees.kind == PairKind::EDGE_EDGE;
-  for (std::size_t i = 0; i < std::min(found, WORTH_MEASURING) && distance > 0; ++i) {
+  for (std::size_t i = 0; i < std::min(found, MOST_MEASURED) && distance > 0; ++i) {
     const Index* fa = a.feature(clusterA(group, pair) * simd::GROUP + (near[i] >> 4));
     const Index* fb = b.feature(clusterB(group, pair) * simd::GROUP + (near[i] & 15));
     Vec3 x[2], y[3];
     for (std::size_t k = 0; k < a.arity(); ++k) x[k] = Eigen::Map<const Vec3>(scene.vertices()[fa[k]].t1);
     for (std::size_t k = 0; k < b.arity(); ++k) y[k] = Eigen::Map<const Vec3>(scene.vertices()[fb[k]].t1);
     const double apart = edges ? gapOfEdges(x, y) : gapOfVertexAndFace(x[0], y);
-    distance = std::min(distance, apart * DOWN - motion_.slop());
+    // DOWN covers the norm and the quotient, the slop the rounded sums along the direction: features that touch are
+    // not apart by a last bit. A trial certifies in a step whose motion nobody has looked at.
+    distance = std::min(distance, apart * DOWN - slop);
   }
   if (distance > contact_m + WORTH_A_CERTIFICATE * pair.residual_m) {
     pair.distance_m = distance;
@@ -275,8 +278,9 @@ void PairMemory::certify(const SceneArrays& scene, const Group& group, Pair& pai
 }
 
 void PairMemory::endStep() {
+  last_.clear();  // pairs of groups that this step did not have
   const std::size_t pairs = pair_count_;
-  const bool worth = first_ || static_cast<double>(known_apart_) >= WORTH_IT * static_cast<double>(pairs);
+  const bool worth = first_ || static_cast<double>(known_apart_) >= SHARE_TO_STAY_ON * static_cast<double>(pairs);
   first_ = false;
   if (worth) {
     next_rest_ = SHORTEST_REST;
@@ -287,6 +291,7 @@ void PairMemory::endStep() {
 }
 
 void PairMemory::beginTrial(const SceneArrays& scene) {
+  last_.clear();
   if (!motion_.isSet()) motion_.setBodies(scene);
   state_ = State::TRIAL;
   if (groups_.empty()) return turnOff(SHORTEST_REST);
@@ -299,6 +304,7 @@ void PairMemory::beginTrial(const SceneArrays& scene) {
       certify(scene, groups_[g], pair, 0);
     }
   }
+  // What all groups would take, by the sample.
   if (TRIAL_SHARE * pair_count_ > most_pairs_) turnOff(LONGEST_REST);
 }
 
@@ -308,12 +314,12 @@ void PairMemory::judgeTrial() {
     for (Pair& pair : group.pairs) {
       ++pairs;
       const double distance = pair.distance_m;
-      apart += holds(group, pair, 0);
+      apart += consume(group, pair, 0);
       pair.distance_m = distance;  // the step itself consumes it
       pair.wait = pair.failed = 0;
     }
   }
-  if (pairs > 0 && static_cast<double>(apart) < WORTH_A_TRY * static_cast<double>(pairs)) {
+  if (pairs > 0 && static_cast<double>(apart) < SHARE_TO_TURN_ON * static_cast<double>(pairs)) {
     turnOff(next_rest_);
     next_rest_ = std::min(2 * next_rest_, LONGEST_REST);
     return;

@@ -2,8 +2,8 @@
 // share a vertex.
 //
 // A certificate says that at the end of the last step no two features of the pair, one of each cluster, that share no
-// vertex are nearer to each other than distance_m. A step consumes of it what the clusters' motion is not rigid by
-// (cluster_motion.h), and as long as more than what counts as a contact is left, the pair has no contact in the step
+// vertex are nearer to each other than distance_m. Each step takes off it by how much the clusters' motion departs from
+// a rigid one (cluster_motion.h), and as long as more than what counts as a contact is left, the pair has no contact in the step
 // and is not looked at. So what a step finds, and in which order, is what it would find without.
 #pragma once
 
@@ -34,7 +34,7 @@ class PairMemory {
     float residual_m = 0;           ///< of this step's motion
     std::uint16_t lanes = 0;        ///< the clusters' places in their groups, a's << 4 | b's
     std::uint8_t wait = 0;          ///< steps until a certificate is tried again
-    std::uint8_t failed : 6;        ///< how often it was tried in vain
+    std::uint8_t failed : 6;        ///< how often it was tried in vain, up to 2
     std::uint8_t to_test : 1;       ///< in this step
     std::uint8_t has_shared : 1;    ///< the lanes below are known
     std::uint16_t shared[16] = {};  ///< of the features: which share a vertex
@@ -103,7 +103,7 @@ class PairMemory {
     std::size_t count[3] = {0, 0, 0};
   };
   static constexpr std::uint32_t SHORTEST_REST = 16, LONGEST_REST = 256;  // steps
-  static constexpr std::size_t MOST_NEAR = 24;  // features of a pair whose distance is worth to be measured
+  static constexpr std::size_t MOST_LEFT = 24;  // pairs of features that bounds leave; of more no certificate is tried
 
   void judgeTrial();
   void turnOff(std::uint32_t rest);
@@ -111,10 +111,11 @@ class PairMemory {
   void setWeights(const SceneArrays& scene);
   void shareVertices(const SceneArrays& scene, const Group& group, Pair& pair) const;
   void certify(const SceneArrays& scene, const Group& group, Pair& pair, double contact_m) const;
-  bool holds(const Group& group, Pair& pair, double contact_m) const;
+  /// Takes off the certificate what this step consumes of it. False: the pair may have a contact in the step.
+  bool consume(const Group& group, Pair& pair, double contact_m) const;
 
   State state_ = State::OFF;
-  bool first_ = false;  // step in which it is on
+  bool first_ = false;  // this is the first step in which it is on
   std::uint32_t rest_ = 0, next_rest_ = SHORTEST_REST;
   ClusterMotion motion_;
   std::vector<Group> groups_, last_;

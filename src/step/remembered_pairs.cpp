@@ -1,6 +1,7 @@
 // What a step takes from the memory of pairs, and leaves in it.
 #include <algorithm>
 
+#include "dccd/accuracy.h"
 #include "dccd/tolerances.h"
 #include "step/history.h"
 
@@ -15,10 +16,11 @@ constexpr std::size_t FEWEST_GROUPS = 8;  // pairs of them that are worth a memo
 
 }  // namespace
 
-/// `fast` may call apart what meets, and meeting what is apart: it has to see what it would see otherwise. So has who
+/// A rung that proves nothing may call apart what meets, and meeting what is apart: it has to see what it would see
+/// otherwise. So has who
 /// watches a pair. A step aside is alone, and uncertain vertices have other radii in each step.
 bool History::Impl::mayRemember(const Part& part) {
-  const bool wanted = options->keep_bounds && !stopsAtFirst() && options->accuracy.rung != Accuracy::FAST &&
+  const bool wanted = options->keep_bounds && !stopsAtFirst() && provesAnswers(options->accuracy.rung) &&
                       !observer && !aside && options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&
                       scene.size() > tolerance::REMEMBERED_SMALLEST_M && scene.size() < tolerance::REMEMBERED_LARGEST_M;
   if (!wanted) return false;

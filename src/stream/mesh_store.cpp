@@ -173,11 +173,22 @@ Eigen::Isometry3d MeshStore::poseAt(StampNs stamp_ns) const {
   return interpolate(a.pose, b.pose, fraction(a.stamp_ns, b.stamp_ns, stamp_ns));
 }
 
-void MeshStore::radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const {
-  out.clear();
+std::pair<std::size_t, std::size_t> MeshStore::framesOver(StampNs from_ns, StampNs to_ns) const {
   std::size_t first = firstAtOrAfter(from_ns);
   if (first > 0 && frames_[first].frame->stamp_ns != from_ns) --first;
-  const std::size_t last = std::min(firstAtOrAfter(to_ns), frames_.size() - 1);
+  return {first, std::min(firstAtOrAfter(to_ns), frames_.size() - 1)};
+}
+
+std::uint64_t MeshStore::droppedFacesOver(StampNs from_ns, StampNs to_ns) const {
+  const auto [first, last] = framesOver(from_ns, to_ns);
+  std::uint64_t most = 0;
+  for (std::size_t i = first; i <= last; ++i) most = std::max(most, frames_[i].frame->dropped_faces);
+  return most;
+}
+
+void MeshStore::radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const {
+  out.clear();
+  const auto [first, last] = framesOver(from_ns, to_ns);
   for (std::size_t i = first; i <= last; ++i) {
     const std::vector<double>& radius = frames_[i].frame->radius_m;
     if (out.empty()) {

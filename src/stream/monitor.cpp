@@ -1,5 +1,6 @@
 #include "dccd/stream.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -111,9 +112,10 @@ FrameCounters Monitor::total() const {
 StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns) {
   Impl& m = *impl_;
   const StampNs stamp_ns = frame.stamp_ns;
+  const std::int64_t arrival_ns = frame.arrival_ns;
   m.finishing = false;
   if (!m.isStream(body)) {
-    // The newest frame holds at all times; an older one, or the same again, is as good as any.
+    // In a store of its own, so that the newest push counts whatever its stamp: a static body's frame holds at all times.
     MeshStore store(m.options.store);
     const StepStatus status = store.push(std::move(frame));
     m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
@@ -128,37 +130,40 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
   const StepStatus status = store.push(std::move(frame));
   if (body == m.options.clock_body) {
     const std::string reason = before ? seamReason(status, *before, store.newest(), m.options.store) : "";
-    m.onClockFrame(status, stamp_ns, now_ns, reason);
+    Impl::Pending step = m.newPending(status, stamp_ns, arrival_ns, reason);
+    step.since_ns = now_ns;
+    m.onClockFrame(std::move(step));
   } else {
     m.counters[body].count(status);
   }
   return status;
 }
 
-Monitor::Impl::Pending Monitor::Impl::pendingOf(StepStatus status, StampNs stamp_ns, const std::string& reason) {
+Monitor::Impl::Pending Monitor::Impl::newPending(StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns,
+                                                 const std::string& reason) {
   Pending step;
   step.status = status;
   step.stamp_ns = stamp_ns;
+  step.arrival_ns = arrival_ns;
   step.sequence = ++sequence;
   step.reason = reason;
   return step;
 }
 
-void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, const std::string& reason) {
+void Monitor::Impl::onClockFrame(Pending step) {
   const MeshStore& store = stores[options.clock_body];
-  Pending step = pendingOf(status, stamp_ns, reason);
-  step.since_ns = now_ns;
-  if (status == StepStatus::OK) {
+  if (step.status == StepStatus::OK) {
     step.from = store.previous();
     step.to = store.newestShared();
-  } else if (status == StepStatus::TIME_JUMP) {
-    // What waits for other bodies will not get it any more, and frames of theirs from the old time are of no use.
+  } else if (step.status == StepStatus::TIME_JUMP) {
+    // Steps that wait for other bodies will not get them any more, and those bodies' frames from before the jump, whose
+    // stamps lie after its new time, are of no use.
     for (Pending& waiting : pending) {
       if (waiting.status == StepStatus::OK) drop(waiting, StepStatus::NO_BODY, "time jumped back while waiting");
     }
     for (std::size_t b = 0; b < stores.size(); ++b) {
       const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
-                         secondsBetween(stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
+                         secondsBetween(step.stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
       if (stale) stores[b].clear();
     }
   }
@@ -172,10 +177,11 @@ void Monitor::Impl::onClockFrame(StepStatus status, StampNs stamp_ns, std::int64
   pending.push_back(std::move(step));
 }
 
-void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason) {
+void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const std::string& reason,
+                   std::int64_t arrival_ns) {
   Impl& m = *impl_;
   if (body == m.options.clock_body) {
-    m.pending.push_back(m.pendingOf(status, stamp_ns, reason));
+    m.pending.push_back(m.newPending(status, stamp_ns, arrival_ns, reason));
   } else {
     m.counters.at(body).count(status);
   }
@@ -189,6 +195,12 @@ void Monitor::withdraw(std::size_t body) {
   m.forgetLast();
 }
 
+Deadline Monitor::restOf(const Outcome& outcome) const {
+  const double limit_ms = stepMs();
+  // A limit of 0 would be none.
+  return impl_->deadlineAfter(limit_ms > 0 ? std::max(1e-6, limit_ms - outcome.stats.total_ms) : 0);
+}
+
 void Monitor::cancel() { impl_->cancelled = true; }
 
 bool Monitor::waiting() const { return !impl_->pending.empty(); }
@@ -197,7 +209,9 @@ void Monitor::finish() { impl_->finishing = true; }
 
 void Monitor::reset(StepStatus status) {
   Impl& m = *impl_;
-  for (const auto& step : m.pending) m.counters[m.options.clock_body].count(step.to ? status : step.status);
+  for (const auto& step : m.pending) {
+    m.counters[m.options.clock_body].count(step.status == StepStatus::OK ? status : step.status);
+  }
   m.pending.clear();
   for (std::size_t b = 0; b < m.stores.size(); ++b) {
     if (m.isStream(b)) m.stores[b].clear();
@@ -216,7 +230,8 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   const Step step = place(pending);
   const bool passes = log && pending.sequence < log->range().first;
   if (held && !passes) computeHeld();
-  // Interpolated ends repeat bit for bit as long as every body stays in its run.
+  // A step continues the last one if it begins at that one's end and no body has begun a new run in between (ready() has
+  // set the runs): only then are interpolated positions at the stamp in common the same bits.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
   for (std::size_t b = 0; b < last_runs.size(); ++b) {
     if (last_runs[b] != runs[b]) tracker.seam(b);
@@ -236,7 +251,7 @@ Outcome Monitor::Impl::passOver(const Step& step) {
   try {
     if (held) history.impl().passOver(*held, options.detector);
   } catch (const std::exception&) {
-    history.clear();  // as of a step that failed; its range says so
+    history.clear();  // as after a step that failed: the range that computes it says so
   }
   Outcome outcome;
   outcome.status = StepStatus::OK;
@@ -249,8 +264,8 @@ Outcome Monitor::Impl::passOver(const Step& step) {
   return outcome;
 }
 
-/// All that may differ from one that was computed in its turn is carried over from the step before it, which changes no
-/// answer, and is the same again once it is done.
+/// In a whole run this step would carry over what is known of the one before it. That changes no answer, and what the
+/// step leaves to the next one is the same without it.
 void Monitor::Impl::computeHeld() {
   const std::shared_ptr<const Step> step = std::exchange(held, nullptr);
   try {
@@ -264,7 +279,12 @@ void Monitor::Impl::computeHeld() {
 void Monitor::Impl::follow(Outcome& outcome) {
   if (!options.detector.patches) return tracker.seam();
   const auto start = Deadline::Clock::now();
-  tracker.follow(history.impl().patches, options.patch_gap_s, outcome);
+  try {
+    tracker.follow(history.impl().patches, options.patch_gap_s, outcome);
+  } catch (...) {
+    tracker.forget();
+    throw;
+  }
   const double ms = msSince(start);
   outcome.stats[Effect::PATCHES].ms += ms;
   outcome.stats.total_ms += ms;
@@ -302,6 +322,7 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
     }
     m.tracker.tell(outcome);
   }
+  outcome.arrival_ns = step.arrival_ns;
   m.counters[m.options.clock_body].count(outcome.status);
   m.pending.pop_front();
   return true;

@@ -38,7 +38,7 @@ struct Monitor::Impl {
     StepStatus status = StepStatus::OK;
     std::shared_ptr<const MeshFrame> from, to;
     StampNs stamp_ns = 0;
-    std::int64_t since_ns = 0;
+    std::int64_t arrival_ns = 0, since_ns = 0;  // of the message, and when it was pushed
     std::uint64_t sequence = 0;
     std::string reason;
   };
@@ -75,13 +75,14 @@ struct Monitor::Impl {
   }
 
   Deadline deadlineAfter(double ms) const { return Deadline::after(ms).orWhen(cancelled); }
-  bool isStream(std::size_t body) const { return bodies[body].motion == BodyMotionKind::STREAM; }
+  bool isStream(std::size_t body) const { return bodies.at(body).motion == BodyMotionKind::STREAM; }
   void drop(Pending& step, StepStatus status, const std::string& reason) {
     step.status = status;
     step.reason = reason;
   }
-  Pending pendingOf(StepStatus status, StampNs stamp_ns, const std::string& reason);
-  void onClockFrame(StepStatus status, StampNs stamp_ns, std::int64_t now_ns, const std::string& reason);
+  /// With the next sequence number.
+  Pending newPending(StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
+  void onClockFrame(Pending step);
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   Step place(const Pending& pending);

@@ -110,7 +110,7 @@ Step Monitor::Impl::place(const Pending& pending) {
       const MeshFrame& frame = stores[b].frameAtOrAfter(step.stamp_ns);
       body.topology = frame.topology;
       body.turns = frame.rigid;
-      body.dropped_faces = frame.dropped_faces;
+      body.dropped_faces = stores[b].droppedFacesOver(step.start_ns, step.stamp_ns);
       placeStream(b, pending, body);
       lookBetween(b, step);
     } else {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "obstacle/burst.h"
 
@@ -51,10 +52,24 @@ void PatchTracker::seam(std::size_t body) {
   }
   std::swap(trace_, all_);
   trace_.clear();
+  if (body == ALL) {
+    has_last_ = false;
+    return;
+  }
   for (std::size_t i = 0; i < all_.spots.size(); ++i) {
     if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
   }
-  if (body == ALL) has_last_ = false;
+}
+
+void PatchTracker::forget() noexcept {
+  try {
+    seam();
+  } catch (const std::exception&) {
+    // There is no memory for telling what has ended either.
+  }
+  living_.clear();
+  trace_ = all_ = Trace();
+  has_last_ = false;
 }
 
 void PatchTracker::tell(Outcome& outcome) {
@@ -170,6 +185,7 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
   all_.clear();
   releaseBurst(before_);
   before_.clear();
+  if (std::exchange(half_merged_, true)) last_at_.clear();
   last_at_.resize(graph_.vertexCount(), NO_INDEX);
   const auto add = [&](const Touch& spot, const Known& known) {
     std::uint32_t& last = last_at_[spot.point[0]];
@@ -198,6 +214,7 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
     current_[at] = spot.patch;
   }
   for (const Touch& spot : all_.spots) last_at_[spot.point[0]] = NO_INDEX;
+  half_merged_ = false;
 }
 
 /// Which patches touch, when the step begins, a voxel that the map before did not have. Asked only where the map is

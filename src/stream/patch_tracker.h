@@ -30,6 +30,8 @@ class PatchTracker {
               const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
   void recognise(const PatchMaker& found, Outcome& outcome);
+  /// After an exception from one of these: what lives ends, as at a seam, and nothing half done is left.
+  void forget() noexcept;
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
   /// From now on patches get no identities: what they follow from goes into the log.
@@ -109,6 +111,7 @@ class PatchTracker {
   const std::vector<std::uint32_t>* part_of_ = nullptr;  // per one of these
   std::vector<std::uint32_t> last_at_;                   // per vertex: the last one of these there; NO_INDEX
   std::vector<std::uint32_t> before_;                    // per one of these: the one before it at the same vertex
+  bool half_merged_ = false;                             // a merge has not come to its end, and last_at_ is not as new
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
   std::vector<std::uint64_t> alive_;        // ascending

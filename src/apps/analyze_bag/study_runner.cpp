@@ -101,7 +101,7 @@ std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& refere
     if (reference.voxel_m > 0) add("map", std::to_string(n) + " times the voxel").variation.voxels = n;
   }
   for (const AccuracySetting& setting : accuracySettings()) {
-    if (whole.config.holdsDistance() && setting.accuracy.rung != Accuracy::CONSERVATIVE) continue;
+    if (whole.config.holdsDistance() && !holdsDistance(setting.accuracy.rung)) continue;
     AccuracyOptions accuracy = whole.config.monitor.detector.accuracy;
     if (isSame(setting.accuracy, accuracy)) continue;
     accuracy.rung = setting.accuracy.rung;

@@ -56,6 +56,22 @@ TEST(PairTrace, SaysWhyAPairIsRejected) {
   EXPECT_EQ(far.back().says, TraceLine::Says::REJECTED);
 }
 
+TEST(PairTrace, ALimitThatCutTheStepRejectsNoPair) {
+  StepRecording r = recordScene();
+  r.options.max_found = 1;
+  r.options.max_found_per_feature = 1;
+  std::size_t traced = 0;
+  for (const Contact& c : r.answer.contacts) {
+    if (c.body[1] == OBSTACLE_BODY) continue;
+    const std::vector<TraceLine> lines = explain(r.step, r.options, PairQuestion{c.kind, c.body, c.vertex});
+    EXPECT_TRUE(std::any_of(lines.begin(), lines.end(),
+                            [](const TraceLine& line) { return line.says == TraceLine::Says::CONTACT; }))
+        << describeContact(c, r.step.bodies);
+    traced += 1;
+  }
+  EXPECT_GT(traced, 1u);
+}
+
 /// What the traces of a question say at the rung of the recording, one word a part.
 std::vector<TraceLine::Says> atTheRung(const std::vector<TraceLine>& lines) {
   std::vector<TraceLine::Says> said;

@@ -116,6 +116,49 @@ TEST(MeshDecoder, KeepsOneTopologyWhileItIsTheSame) {
   EXPECT_NE(decode(decoder, MESH, mesh(SQUARE, {{0, 1, 2}})).topology, a.topology);
 }
 
+TEST(MeshDecoder, WhatTrianglesLackIsMissingAsLongAsTheyHold) {
+  MeshDecoder decoder({});
+  Positions five = SQUARE;
+  five.push_back({2, 2, 0});
+  const Bytes with_an_edge = mesh(five, {HALVES[0], HALVES[1], {2, 4, 4}});
+  EXPECT_EQ(decode(decoder, MESH, with_an_edge).dropped_faces, 1u) << "the edge from 2 to 4 is in no face";
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(decode(decoder, MESH, mesh(five, {})).dropped_faces, 1u) << "vertices alone";
+  EXPECT_EQ(decode(decoder, MESH, mesh(five, HALVES)).dropped_faces, 0u);
+  EXPECT_EQ(decode(decoder, MESH, mesh(five, {})).dropped_faces, 0u);
+}
+
+TEST(MeshDecoder, WhatIsRefusedLeavesItAsItWas) {
+  MeshDecoder decoder({});
+  const auto topology = decode(decoder, MESH, mesh(SQUARE, HALVES)).topology;
+  EXPECT_THROW(decode(decoder, MESH, mesh(SQUARE, {{1, 1, 2}, {3, 0, 0}})), MeshError) << "no triangle at all";
+  EXPECT_THROW(decode(decoder, MESH, mesh(SQUARE, {{0, 1, 9}})), MeshError);
+  EXPECT_EQ(decode(decoder, MESH, mesh(SQUARE, {})).topology, topology);
+  // A soup of which every triangle is a point says nothing about the next one, whose triangles share an edge.
+  MeshDecoder soups({});
+  EXPECT_THROW(decode(soups, MARKER, marker({SQUARE[0], SQUARE[0], SQUARE[0], SQUARE[1], SQUARE[1], SQUARE[1]})),
+               MeshError);
+  const Positions halves = {SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[0], SQUARE[2], SQUARE[3]};
+  EXPECT_EQ(decode(soups, MARKER, marker(halves)).positions.size(), 4u);
+}
+
+TEST(MeshDecoder, OneTriangleIsNotTheGridBeforeIt) {
+  MeshDecoder decoder({});
+  CloudSpec organised;
+  organised.height = 2;
+  organised.width = 2;
+  organised.row_step = 32;
+  decode(decoder, CLOUD, cloud(organised));
+  EXPECT_EQ(decode(decoder, MESH, mesh(SQUARE, {{2, 2, 2}, {0, 1, 2}})).topology->faces().size(), 1u);
+  Positions more = SQUARE;
+  for (int k = 0; k < 12; ++k) more.push_back({3.0 + k, 0, 0});
+  MeshInputConfig config;
+  config.rows = 4;
+  config.cols = 4;
+  MeshDecoder shaped(config);
+  EXPECT_EQ(decode(shaped, MESH, mesh(more, {})).topology->faces().size(), 18u);
+  EXPECT_EQ(decode(shaped, MESH, mesh(more, {{4, 5, 0}})).topology->faces().size(), 1u);
+}
+
 TEST(MeshDecoder, ReadsCloudsByNameTypeAndStride) {
   MeshDecoder decoder(grid(2, 2));
   CloudSpec spec;

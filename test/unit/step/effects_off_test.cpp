@@ -2,32 +2,10 @@
 // its statistics. Switched on, the same scene allocates and counts.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <functional>
-#include <new>
 
 #include "dccd/stream.h"
-
-namespace {
-std::atomic<std::uint64_t> allocations{0}, allocated_bytes{0};
-}  // namespace
-
-// Counted for the whole test program; forms with an alignment are the library's and not used by std::vector of ours.
-void* operator new(std::size_t size) {
-  ++allocations;
-  allocated_bytes += size;
-  if (void* p = std::malloc(size ? size : 1)) return p;
-  throw std::bad_alloc();
-}
-void* operator new(std::size_t size,
-                   const std::nothrow_t&) noexcept {  // std::stable_sort's; AddressSanitizer has its own
-  ++allocations;
-  allocated_bytes += size;
-  return std::malloc(size ? size : 1);
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+#include "unit/allocations.h"
 
 namespace dccd {
 namespace {
@@ -78,7 +56,7 @@ Cost costOf(const Scene& scene) {
   }
   Cost cost;
   Outcome outcome;
-  const std::uint64_t before = allocations, bytes_before = allocated_bytes;
+  const std::uint64_t before = test::allocations, bytes_before = test::allocated_bytes;
   Monitor monitor(scene.options, bodies);
   if (scene.map.surface) monitor.setMap(scene.map);
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -88,8 +66,8 @@ Cost costOf(const Scene& scene) {
     if (scene.predicts && outcome.answered)
       outcome.stats[Effect::LOOK_AHEAD].in = monitor.predict().stats.vf_candidates;
   }
-  cost.allocations = allocations - before;
-  cost.bytes = allocated_bytes - bytes_before;
+  cost.allocations = test::allocations - before;
+  cost.bytes = test::allocated_bytes - bytes_before;
   cost.stats = outcome.stats;
   cost.ok = cost.ok && outcome.answered;
   return cost;

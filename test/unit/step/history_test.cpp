@@ -93,6 +93,35 @@ TEST(History, EverySeamLeavesNothingBehind) {
   expectSame(detector.run(next.motion()), expected);
 }
 
+TEST(History, AStepAsideBeginsWhereItIsToldOnce) {
+  const TestStep first = clothsInABox(), next = nextOf(first);
+  Detector detector;
+  detector.run(first.motion());
+  Step broken = next.motion();
+  broken.bodies[1].t1 = share(Positions(3, Vec3::Zero()));
+  // Apart from all others: what the other history knows of the start would be wrong of it.
+  TestStep apart = next;
+  apart.bodies.pop_back();
+  for (Vec3& p : apart.bodies[1].t0) p += Vec3::Constant(100);
+  apart.bodies[1].t1 = apart.bodies[1].t0;
+  const Outcome alone = runOnce(apart, {});
+  const std::vector<std::pair<const char*, std::function<void(History&)>>> ends = {
+      {"it is answered", [&](History& aside) { detect(next.motion(), {}, aside); }},
+      {"it throws", [&](History& aside) { EXPECT_THROW(detect(broken, {}, aside), std::invalid_argument); }},
+      {"it is cleared", [](History& aside) { aside.clear(); }},
+  };
+  for (const auto& [name, end] : ends) {
+    SCOPED_TRACE(name);
+    History aside;
+    aside.beginAt(detector.history());
+    EXPECT_FALSE(aside.isClear());
+    end(aside);
+    aside.clear();
+    expectFresh(aside);
+    expectSame(detect(apart.motion(), {}, aside), alone);
+  }
+}
+
 TEST(History, WhatContinuesIsCarriedOverAndNothingElse) {
   const TestStep first = clothsInABox(), next = nextOf(first);
   const Outcome expected = runOnce(next, {});

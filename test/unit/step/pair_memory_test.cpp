@@ -198,6 +198,47 @@ TEST(PairMemory, RandomStreamsAreAnsweredAsWithoutMemory) {
   EXPECT_GT(cut, 0u);
 }
 
+/// A tilted sheet, and on it points at the very middle of edges: they touch, though no normal that is computed in
+/// doubles can say so. All coordinates are multiples of 2^-22, so that the middles are exact.
+TEST(PairMemory, WhatTouchesAtRestIsNotApartByALastBit) {
+  std::size_t contacts = 0;
+  std::uint64_t known = 0;
+  for (int seed = 1; seed <= 6; ++seed) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+    const auto grid = [](double x) { return std::ldexp(std::round(std::ldexp(x, 21)), -21); };
+    const Eigen::AngleAxisd tilt(0.7 + 0.1 * seed, Vec3(1, 2, -1.3).normalized());
+    constexpr std::size_t SIZE = 40;
+    Positions sheet, above;
+    for (std::size_t r = 0; r < SIZE; ++r) {
+      for (std::size_t c = 0; c < SIZE; ++c) {
+        const Vec3 p(static_cast<double>(r) / SIZE, static_cast<double>(c) / SIZE, 0.01 * std::sin(0.2 * static_cast<double>(r)));
+        sheet.push_back((tilt * p).unaryExpr(grid));
+        above.push_back((tilt * (p + Vec3(0, 0, 0.004))).unaryExpr(grid));
+      }
+    }
+    const Topology topology = Topology::grid(SIZE, SIZE);
+    // The sheet above hovers, but for a few points of it.
+    for (int k = 0; k < 12; ++k) {
+      const Edge& edge = topology.edges()[random() % topology.edges().size()];
+      above[edge[0]] = 0.5 * (sheet[edge[0]] + sheet[edge[1]]);
+    }
+    Detector remembers(options(true)), forgets(options(false));
+    for (int k = 0; k < 8; ++k) {
+      Step step;
+      step.bodies.push_back(moving(bodyOf(topology, "sheet"), sheet, sheet));
+      step.bodies.push_back(moving(bodyOf(topology, "above"), above, above));
+      for (Body& body : step.bodies) body.self_collision = false;
+      const Outcome with = remembers.run(step);
+      expectSame(with, forgets.run(step), "seed " + std::to_string(seed) + " step " + std::to_string(k));
+      if (HasFatalFailure()) return;
+      contacts += with.contacts.size();
+      known += with.stats.pairs_known_apart;
+    }
+  }
+  EXPECT_GT(contacts, 1000u);
+  EXPECT_GT(known, 1000u);
+}
+
 TEST(PairMemory, TakesNoMoreThanItMay) {
   const Roll roll(64);
   const Body body = bodyOf(roll.topology, "roll");

@@ -55,17 +55,21 @@ TEST_F(OneBody, NeverAcrossASeam) {
 TEST_F(OneBody, RefusedFramesYieldOutcomesInOrder) {
   feed(pair(0, 1));
   monitor.countReceived(0, 2);
-  monitor.skip(0, StepStatus::BAD_MESSAGE, 10 * MS, "index 7");
-  monitor.push(0, pair(20 * MS, 0.9), NOW);
+  monitor.skip(0, StepStatus::BAD_MESSAGE, 10 * MS, "index 7", 77);
+  MeshFrame next = pair(20 * MS, 0.9);
+  next.arrival_ns = 88;
+  monitor.push(0, std::move(next), NOW);
   Outcome outcome;
   ASSERT_TRUE(monitor.next(NOW, outcome));
   EXPECT_EQ(outcome.status, StepStatus::BAD_MESSAGE);
   EXPECT_EQ(outcome.reason, "index 7");
   EXPECT_FALSE(outcome.answered);
   EXPECT_FALSE(assuranceOf(outcome).clear());
+  EXPECT_EQ(outcome.arrival_ns, 77);
   ASSERT_TRUE(monitor.next(NOW, outcome));
   EXPECT_EQ(outcome.status, StepStatus::OK) << "from the frame before the refused one";
   EXPECT_EQ(outcome.start_ns, 0);
+  EXPECT_EQ(outcome.arrival_ns, 88);
   expectAddsUp(monitor);
 }
 

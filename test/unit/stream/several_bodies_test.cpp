@@ -54,6 +54,28 @@ TEST_F(TwoBodies, FramesBetweenTheEndsThatLeaveThePathAreNoClearStep) {
   EXPECT_NE(through.reason.find("body 'tip' was seen up to 2 m off the path"), std::string::npos) << through.reason;
 }
 
+// Of the frames that a step lies between one had a face that could not be used: then not all was looked at.
+TEST_F(TwoBodies, WhatAnyFrameOfTheStepLacksIsMissing) {
+  for (int lacking = 0; lacking < 5; ++lacking) {
+    Monitor two(loose(), {named("floor"), named("tip")});
+    std::vector<Outcome> outcomes;
+    for (int k = 0; k < 5; ++k) {  // the floor's frames lie in the middle between the tip's
+      MeshFrame frame = tip(100 * k * MS, 1);
+      frame.dropped_faces = k == lacking ? 3 : 0;
+      two.push(1, std::move(frame), NOW);
+      if (k == 0) continue;
+      two.push(0, floor((100 * k - 50) * MS, 0), NOW);
+      outcomes.push_back(only(two));
+    }
+    for (int step = 1; step < 4; ++step) {  // from the middle after frame step - 1 to the middle after frame step
+      const bool lacks = lacking >= step - 1 && lacking <= step + 1;
+      const Outcome& outcome = outcomes[static_cast<std::size_t>(step)];
+      EXPECT_EQ(outcome.stats.unchecked_faces, lacks ? 3u : 0u) << "step " << step << ", frame " << lacking;
+      EXPECT_EQ(assuranceOf(outcome).clear(), !lacks);
+    }
+  }
+}
+
 TEST_F(TwoBodies, MissingBodyIsNoAnswerAfterTheTimeout) {
   feed(0, floor(100 * MS, 0));
   only(monitor);
@@ -113,6 +135,22 @@ TEST_F(TwoBodies, TopologyIsThatOfTheStepNotTheNewest) {
     EXPECT_EQ(*next.step->bodies[1].topology, *newest.topology);
     EXPECT_TRUE(next.contacts.empty());
   }
+  expectAddsUp(monitor);
+}
+
+TEST_F(TwoBodies, WhatWaitedInVainAlreadyIsNotCountedAsReset) {
+  monitor.setOptions([] {
+    MonitorOptions options = loose();
+    options.max_waiting = 1;
+    return options;
+  }());
+  feed(0, floor(100 * MS, 0));
+  only(monitor);
+  feed(0, floor(200 * MS, 0));  // waits for the tip
+  feed(0, floor(300 * MS, 0));  // and gives way to this one: NO_BODY
+  monitor.reset(StepStatus::DISABLED);
+  EXPECT_EQ(monitor.total().of(StepStatus::NO_BODY), 1u);
+  EXPECT_EQ(monitor.total().of(StepStatus::DISABLED), 1u);
   expectAddsUp(monitor);
 }
 

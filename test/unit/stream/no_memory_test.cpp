@@ -1,0 +1,159 @@
+// An allocation that fails, wherever it is in a step, a prediction or a check, leaves nothing half done: the monitor
+// answers the next step as one to which nothing has happened.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <memory>
+#include <new>
+
+#include "dccd/stream.h"
+#include "support/step_support.h"
+#include "unit/allocations.h"
+#include "unit/stream/patch_stream.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr int BEFORE = 5, AFTER = 4;  // frames
+
+/// Two cloths on a table, of which one is bent onto the other in turns: patches begin, come apart, merge and end.
+Positions cloth(int frame, bool upper) {
+  return strip(6, 8, 0.02, [&](std::size_t column) {
+    const double wave = column < 3 || (column > 4 && frame % 2 == 0) ? -0.001 : 0.01;
+    return upper ? 0.012 + 2 * wave : 0.5 * wave;
+  });
+}
+
+MonitorOptions options() {
+  MonitorOptions options;
+  options.detector.patches = true;
+  options.look_ahead_s = 0.05;
+  options.patch_gap_s = 0.04;
+  return options;
+}
+
+class Cloths {
+ public:
+  Cloths() : topology_(grid(6, 8)) {
+    std::vector<Body> bodies(2);
+    bodies[0].name = "lower";
+    bodies[1].name = "upper";
+    monitor_ = std::make_unique<Monitor>(options(), bodies);
+    monitor_->setMap({table(0.05), 1, Eigen::Isometry3d::Identity(), {}});
+  }
+  Monitor& monitor() { return *monitor_; }
+  Outcome feed(int frame) {
+    push(frame);
+    return next();
+  }
+  void push(int frame) {
+    for (const std::size_t body : {1, 0}) {
+      MeshFrame made;
+      made.stamp_ns = PERIOD_NS * (frame + 1);
+      made.topology = topology_;
+      made.positions = cloth(frame, body == 1);
+      monitor_->push(body, std::move(made), 0);
+    }
+  }
+  Outcome next() {
+    Outcome outcome;
+    EXPECT_TRUE(monitor_->next(0, outcome));
+    return outcome;
+  }
+
+ private:
+  std::shared_ptr<const Topology> topology_;
+  std::unique_ptr<Monitor> monitor_;
+};
+
+/// What is said of contacts and the start, and whether patches are told apart.
+void expectSame(const Outcome& a, const Outcome& b) {
+  EXPECT_EQ(difference(a.contacts, b.contacts), "");
+  EXPECT_EQ(a.status, b.status);
+  EXPECT_EQ(a.start_state, b.start_state);
+  EXPECT_EQ(a.intersections.size(), b.intersections.size());
+  EXPECT_EQ(a.patch_of, b.patch_of);
+  ASSERT_EQ(a.patches.size(), b.patches.size());
+  for (const Patch& patch : a.patches) EXPECT_TRUE(!a.tracked || patch.id != 0);
+}
+
+/// Of each patch at most one beginning and one end, in this order.
+void expectInOrder(const Outcome& outcome, std::map<std::uint64_t, PatchEventKind>& last) {
+  for (const PatchEvent& event : outcome.patch_events) {
+    const auto known = last.find(event.id);
+    if (event.kind == PatchEventKind::BEGAN) EXPECT_EQ(known, last.end()) << event.id;
+    if (known != last.end()) EXPECT_NE(known->second, PatchEventKind::ENDED) << event.id;
+    last[event.id] = event.kind;
+  }
+}
+
+/// `act` with one allocation after the other failing, until it needs no more. Returns how many there were.
+template <class Act>
+int failingEverywhere(const Act& act) {
+  for (int n = 0;; ++n) {
+    if (!act(n)) return n;
+    if (testing::Test::HasFailure()) {
+      ADD_FAILURE() << "allocation " << n;
+      return n;
+    }
+  }
+}
+
+TEST(NoMemory, AStepThatFailsAnywhereLeavesNothingHalfDone) {
+  std::vector<Outcome> expected;
+  Cloths whole;
+  for (int k = 0; k <= BEFORE + AFTER; ++k) expected.push_back(whole.feed(k));
+  ASSERT_GT(expected[BEFORE].patches.size(), 1u);
+  ASSERT_FALSE(expected[BEFORE].patch_events.empty());
+  int failed = 0;
+  const int allocations_of_a_step = failingEverywhere([&](int n) {
+    Cloths cloths;
+    std::map<std::uint64_t, PatchEventKind> last;
+    for (int k = 0; k < BEFORE; ++k) expectInOrder(cloths.feed(k), last);
+    cloths.push(BEFORE);
+    allocations_until_failure = n;
+    const Outcome outcome = cloths.next();
+    const bool met = allocations_until_failure < 0;
+    allocations_until_failure = -1;
+    failed += outcome.status == StepStatus::INTERNAL_ERROR;
+    expectInOrder(outcome, last);
+    for (int k = BEFORE + 1; k <= BEFORE + AFTER; ++k) {
+      const Outcome later = cloths.feed(k);
+      expectSame(later, expected[static_cast<std::size_t>(k)]);
+      expectInOrder(later, last);
+    }
+    return met;
+  });
+  EXPECT_GT(allocations_of_a_step, 50);
+  EXPECT_GT(failed, 50) << "else the failures were not in the step";
+}
+
+TEST(NoMemory, QuestionsThatFailAnywhereLeaveNothingHalfDone) {
+  Cloths whole;
+  for (int k = 0; k < BEFORE; ++k) whole.feed(k);
+  const Outcome check = whole.monitor().checkNow(), prediction = whole.monitor().predict(), next = whole.feed(BEFORE);
+  const int allocations_of_a_question = failingEverywhere([&](int n) {
+    bool met = false;
+    for (const bool predicts : {true, false}) {
+      Cloths cloths;
+      for (int k = 0; k < BEFORE; ++k) cloths.feed(k);
+      allocations_until_failure = n;
+      try {
+        predicts ? cloths.monitor().predict() : cloths.monitor().checkNow();
+      } catch (const std::bad_alloc&) {
+      }
+      met = met || allocations_until_failure < 0;
+      allocations_until_failure = -1;
+      expectSame(cloths.monitor().checkNow(), check);
+      expectSame(cloths.monitor().predict(), prediction);
+      expectSame(cloths.feed(BEFORE), next);
+    }
+    return met;
+  });
+  EXPECT_GT(allocations_of_a_question, 50);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
