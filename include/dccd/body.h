@@ -2,11 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "dccd/contact.h"
 #include "dccd/topology.h"
 #include "dccd/types.h"
 
@@ -79,7 +81,29 @@ inline bool meetsItself(const Body& body) { return body.self_collision && !body.
 inline bool meet(const Body& a, const Body& b) { return a.against_bodies && b.against_bodies; }
 inline bool meetsMap(const Body& body) { return body.against_obstacle; }
 
-/// The largest separation that is asked for, of bodies or from the map [m].
+/// What the body names as its separation from another one, by its number (or itself, or OBSTACLE_BODY) [m]; null: none.
+inline const double* namedSeparation(const Body& body, std::size_t other) {
+  for (const SeparationFrom& from : body.separations) {
+    if (from.body == other) return &from.separation_m;
+  }
+  return nullptr;
+}
+
+/// The separation of the bodies number a and b, or of one from itself [m]. What either names for the other takes the
+/// place of the larger of their own, be it 0. Whether they meet at all is not its matter.
+inline double separationBetween(const Body& body_a, std::size_t a, const Body& body_b, std::size_t b) {
+  if (const double* named = namedSeparation(body_a, b)) return *named;
+  if (const double* named = namedSeparation(body_b, a)) return *named;
+  return std::max(body_a.minimum_separation_m, body_b.minimum_separation_m);
+}
+
+/// The same of a body and the map.
+inline double separationFromMap(const Body& body) {
+  const double* named = namedSeparation(body, OBSTACLE_BODY);
+  return named ? *named : body.minimum_separation_m;
+}
+
+/// The largest separation that is asked for [m], of bodies or from the map, be there a pair that carries it or not.
 inline double largestSeparation(const std::vector<Body>& bodies) {
   double largest_m = 0;
   for (const Body& body : bodies) {

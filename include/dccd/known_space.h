@@ -9,6 +9,7 @@
 
 #include "dccd/deadline.h"
 #include "dccd/export.h"
+#include "dccd/tolerances.h"
 #include "dccd/topology.h"
 #include "dccd/types.h"
 #include "dccd/voxel_surface.h"
@@ -44,7 +45,8 @@ class DCCD_EXPORT KnownSpace {
   /// The unknown voxels whose closed box meets the crop region, as few cubes: with a map's occupied leaves they make
   /// the surface for which the unknown is occupied. Throws std::length_error naming the limit when there are more, and
   /// std::invalid_argument for a crop box that is not finite.
-  std::vector<OccupiedLeaf> unknownLeaves(const Box& crop_m, std::size_t max_leaves = 2'000'000) const;
+  std::vector<OccupiedLeaf> unknownLeaves(const Box& crop_m,
+                                          std::size_t max_leaves = tolerance::MAX_UNKNOWN_LEAVES) const;
 
   static constexpr std::size_t MOST_BLOCKS = 1'000'000;
   /// Counts what the mesh's swept bounds touch. vertex_active as for ObstacleCheck::run. limit: blocks of 4^3

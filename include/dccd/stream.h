@@ -16,9 +16,6 @@
 
 namespace dccd {
 
-/// Of a step's time, what is kept for the prediction after it where there is one.
-constexpr double LOOK_AHEAD_SHARE = 0.25;
-
 /// How frames become steps.
 struct MonitorOptions {
   Options detector;  ///< how a step is answered

@@ -11,6 +11,8 @@
 // are variables.
 #pragma once
 
+#include <cstddef>
+
 #ifdef DEFORMABLE_CCD_VARIABLE_MARGINS
 #define DCCD_MARGIN inline
 #else
@@ -108,6 +110,9 @@ DCCD_MARGIN double SIMPLE_TIME = 155 * HALF_ULP;        ///< [1] of f's coeffici
 constexpr double BATCH_SMALLEST_M = 0x1p-150, BATCH_LARGEST_M = 0x1p150;  ///< [m] guard on U, V, W
 /// [step] Subdivision ends here and leaves the pair to the next tier. Smaller: fewer pairs there, more steps here.
 constexpr double BATCH_SMALLEST_INTERVAL = 0x1p-12;
+/// [step] The same where f is uncertain at an end of the step: what wide intervals do not show to be apart there,
+/// narrow ones seldom do. Smaller: more steps here for few pairs. Larger: more pairs go to the next tier.
+constexpr double BATCH_SMALLEST_INTERVAL_AT_ENDS = 0.25;
 /// [step] By how much a root's bracket reaches beyond what f's error says. f's signs at its ends prove it. Larger:
 /// inside tests are less sharp. Smaller: brackets without a proof, which go to the next tier.
 constexpr double BATCH_BRACKET = 0x1p-50;
@@ -172,6 +177,19 @@ constexpr double SIDE_SMALLEST_M = 0x1p-400, SIDE_LARGEST_M = 0x1p400;  ///< [m]
 DCCD_MARGIN double MAP_BOUND = 2 * HALF_ULP;  ///< [1] margin of a coordinate that was moved by a separation
 
 // --- streams and advice ----------------------------------------------------------------------------------------------
+/// [1] Of a step's time, what is kept for the prediction after it where there is one. Larger: steps are cut earlier.
+/// Smaller: predictions are.
+constexpr double LOOK_AHEAD_SHARE = 0.25;
+/// [1] Of a step's time, the most that is kept for its patches, which come last and are not cut. Larger: contacts are
+/// cut earlier in steps whose patches take long. Smaller: such steps run over their time.
+constexpr double PATCHES_SHARE = 0.4;
+/// [1] Frames of a body that are kept however many vertices they have, for steps that wait for a clock body which comes
+/// late. Larger: streams of large meshes take more memory. Smaller: steps find no frame of theirs any more.
+constexpr std::size_t FRAMES_ALWAYS_KEPT = 64;
+/// [1] Spots of what touched lately are all forgotten where they are more than the second, and more than the first for
+/// each spot that touches now: else a burst of contacts would cost every later step as much. Larger: steps after a
+/// burst take longer. Smaller: what touches again soon after a burst is told as new.
+constexpr std::size_t TRACE_PER_SPOT = 8, TRACE_ALWAYS = 1 << 16;
 /// [ns] tf stamps that go back further begin a recording anew: broadcasters of one tree are late by less.
 constexpr long long TF_JUMP_BACK_NS = 1000000000;
 /// [1] As tf2's own: a rotation whose squared norm is further from 1 is none, and is left out.
@@ -196,6 +214,12 @@ constexpr unsigned long long BYTES_PER_CONTACT = 1024;
 /// into a ball has 0.4, layers within a distance of several edges some tens; a mesh that collapses has half as many as
 /// it has features.
 constexpr unsigned long long CONTACTS_PER_FEATURE = 2, CONTACTS_PER_FEATURE_WITH_DISTANCE = 32;
+/// [1] Pairs of superclusters at which a step that is limited is cut: 40 MB while they are ordered. Larger: more
+/// memory. Smaller: steps in which much coincides are cut earlier.
+constexpr std::size_t MAX_SUPERCLUSTER_PAIRS = std::size_t{1} << 20;
+/// [1] Cubes of unknown space that become part of a map, which is refused where it needs more. Larger: more memory (see
+/// MAP_LEAF_ADDED) and time. Smaller: smaller regions of a map can be asked for.
+constexpr std::size_t MAX_UNKNOWN_LEAVES = 2'000'000;
 /// [bytes] What a leaf of a map takes in a list; in a tree while leaves are sorted (its list included), while nodes are
 /// made (included, too) and from then on; in a surface from then on. src/obstacle/voxel_tree.cpp asserts them.
 constexpr unsigned long long MAP_LEAF_LISTED = 12, MAP_LEAF_SORTING = 48, MAP_LEAF_BUILDING = 32, MAP_LEAF_IN_TREE = 12,

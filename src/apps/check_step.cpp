@@ -28,8 +28,8 @@ struct Arguments {
   std::vector<std::string> frames;
   std::string contacts, stats, truth;
   std::string accuracy = "exact", broad_phase = "clustered", simd = "auto";
-  double tolerance_m = 1e-6, budget_ms = 0;
-  int toc_bits = 32, threads = 1, repeat = 1;
+  double tolerance_m = AccuracyOptions().tolerance_m, budget_ms = 0;
+  int toc_bits = AccuracyOptions().toc_bits, threads = 1, repeat = 1;
   bool no_start_state = false, earliest_only = false, forget = false;
   bool isSequence() const { return frames.size() > 2; }
 };

@@ -184,14 +184,8 @@ void SceneArrays::setReaches() {
 }
 
 double SceneArrays::separation(std::size_t a, std::size_t b) const {
-  for (const SeparationFrom& from : bodies_[a].setup.separations) {
-    if (from.body == b) return from.separation_m;
-  }
-  if (b == OBSTACLE_BODY) return bodies_[a].setup.minimum_separation_m;
-  for (const SeparationFrom& from : bodies_[b].setup.separations) {
-    if (from.body == a) return from.separation_m;
-  }
-  return std::max(bodies_[a].setup.minimum_separation_m, bodies_[b].setup.minimum_separation_m);
+  if (b == OBSTACLE_BODY) return separationFromMap(bodies_[a].setup);
+  return separationBetween(bodies_[a].setup, a, bodies_[b].setup, b);
 }
 
 /// Of a direction in which the scene is small beside its coordinates, a record's roundings are no small part of a unit.

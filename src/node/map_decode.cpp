@@ -6,6 +6,7 @@
 
 #include "dccd/known_space.h"
 #include "dccd/octomap_decode.h"
+#include "dccd/tolerances.h"
 #include "input/known_types.h"
 #include "input/mesh_views.h"
 #include "input/wire.h"
@@ -16,8 +17,6 @@
 namespace dccd {
 
 namespace {
-
-constexpr std::size_t MAX_UNKNOWN_LEAVES = 2'000'000;
 
 /// `unknown`: how many cubes of unknown space there is room for, where `memory` is what counts.
 OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std::size_t& unknown) {
@@ -53,9 +52,9 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
 template <class Decode>
 void load(const MonitorConfig& config, const MapMemory* memory, LoadedMap& map, Decode decode) {
   try {
-    std::size_t max_unknown = MAX_UNKNOWN_LEAVES;
+    std::size_t max_unknown = tolerance::MAX_UNKNOWN_LEAVES;
     DecodedOctomap decoded = decode(limitsOf(config, memory, max_unknown));
-    build(std::move(decoded), config, memory, std::min(max_unknown, MAX_UNKNOWN_LEAVES), map);
+    build(std::move(decoded), config, memory, std::min(max_unknown, tolerance::MAX_UNKNOWN_LEAVES), map);
   } catch (const std::bad_alloc&) {
     map.problem = "there is not enough memory for this map";
   } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map

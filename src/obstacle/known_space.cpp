@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "dccd/tolerances.h"
+#include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
 namespace dccd {
@@ -146,9 +146,8 @@ struct KnownSpace::Impl {
 
 std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
                                                     const std::vector<OccupiedLeaf>& known_leaves) {
-  if (!(resolution_m >= tolerance::SMALLEST_RESOLUTION_M && resolution_m <= tolerance::LARGEST_RESOLUTION_M)) {
-    throw std::invalid_argument("resolution_m is " + std::to_string(resolution_m) +
-                                ", which is not a length from 1e-290 to 1e290 m");
+  if (!isResolution(resolution_m)) {
+    throw std::invalid_argument(noResolution("resolution_m", std::to_string(resolution_m)));
   }
   return std::shared_ptr<const KnownSpace>(new KnownSpace(std::make_unique<Impl>(resolution_m, known_leaves)));
 }

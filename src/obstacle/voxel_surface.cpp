@@ -5,20 +5,17 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "dccd/tolerances.h"
+#include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
 namespace dccd {
 namespace {
 
 double checkedResolution(double resolution_m) {
-  // The planes up to +-32768 resolutions and the reciprocal must be finite and normal.
-  if (!(resolution_m >= tolerance::SMALLEST_RESOLUTION_M && resolution_m <= tolerance::LARGEST_RESOLUTION_M)) {
-    std::ostringstream text;
-    text << "resolution_m is " << resolution_m << ", which is not a length from 1e-290 to 1e290 m";
-    throw std::invalid_argument(text.str());
-  }
-  return resolution_m;
+  if (isResolution(resolution_m)) return resolution_m;
+  std::ostringstream text;
+  text << resolution_m;
+  throw std::invalid_argument(noResolution("resolution_m", text.str()));
 }
 
 }  // namespace

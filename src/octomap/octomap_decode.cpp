@@ -11,6 +11,7 @@
 
 #include "dccd/regular_file.h"
 #include "dccd/tolerances.h"
+#include "obstacle/resolution.h"
 #include "obstacle/voxel_bits.h"
 #include "obstacle/voxel_tree.h"
 #include "octomap/octomap_header.h"
@@ -37,9 +38,7 @@ TreeKind treeKind(const std::string& id) {
 }
 
 void checkResolution(double resolution) {
-  if (!(resolution >= tolerance::SMALLEST_RESOLUTION_M && resolution <= tolerance::LARGEST_RESOLUTION_M)) {
-    throw OctomapError("octomap resolution is " + text(resolution) + ", which is not a length from 1e-290 to 1e290 m");
-  }
+  if (!isResolution(resolution)) throw OctomapError(noResolution("octomap resolution", text(resolution)));
 }
 
 /// The bytes of a stream, in order.

@@ -85,10 +85,7 @@ class VoxelExplanation : Explanation {
   }
 
   void tellSeparation() {
-    distance_m_ = body().minimum_separation_m;
-    for (const SeparationFrom& from : body().separations) {
-      if (from.body == OBSTACLE_BODY) distance_m_ = from.separation_m;
-    }
+    distance_m_ = separationFromMap(body());
     double radius_m = 0;
     for (const Index v : question_.vertex) radius_m = std::max(radius_m, body().radius_m ? (*body().radius_m)[v] : 0);
     distance_m_ += radius_m;

@@ -6,7 +6,7 @@ namespace HWY_NAMESPACE {
 
 constexpr int MAX_INTERVALS = 48;  ///< looked at per pair
 constexpr double SMALLEST_INTERVAL = tolerance::BATCH_SMALLEST_INTERVAL;
-constexpr double SMALLEST_INTERVAL_AT_ENDS = 0.25;  ///< where f is uncertain at an end of the step
+constexpr double SMALLEST_INTERVAL_AT_ENDS = tolerance::BATCH_SMALLEST_INTERVAL_AT_ENDS;
 constexpr double NARROW_BRACKET = tolerance::BATCH_NARROW_BRACKET;
 
 /// Interval ends: x in [0,1] to t in [0,1], monotone, but not dyadic, because hand-made inputs meet at 1/2 and 1/4,

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "dccd/accuracy.h"
+#include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/conclude.h"
@@ -19,7 +20,6 @@ namespace {
 
 using Clock = Deadline::Clock;
 
-constexpr double PATCHES_SHARE = 0.4;            // of a step's time at most
 constexpr double MOST_NS_PER_HIT = 2000;         // more is what the operating system took
 constexpr std::size_t FEWEST_TO_MEASURE = 1000;  // hits of a step that tell what one takes
 constexpr std::size_t PIECE = 256;             // groups or vertices in a unit of refitting, before a look at the clock
@@ -105,7 +105,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   deadline = deadline.movedBy(begun - called);
   if (options->patches && !deadline.isNever()) {
     // Patches come after all else and are not cut: what they took last time is kept for them, up to a share.
-    const auto share = std::chrono::duration_cast<Clock::duration>(PATCHES_SHARE * (deadline.at() - begun));
+    const auto share = std::chrono::duration_cast<Clock::duration>(tolerance::PATCHES_SHARE * (deadline.at() - begun));
     deadline =
         deadline.movedBy(-std::clamp(patches_took, Clock::duration::zero(), std::max(share, Clock::duration::zero())));
   }

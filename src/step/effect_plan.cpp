@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <sstream>
 #include <stdexcept>
@@ -10,15 +11,24 @@ namespace dccd {
 
 namespace {
 
-/// What the scene says about an effect before the user has a say.
-struct Finding {
-  bool wanted = false;
-  bool possible = true;
-  std::string reason;
-  bool idle = false;  ///< there is nothing to do as things stand, whatever the user asks for
+/// Whether a scene calls for an effect.
+enum class Need : std::uint8_t {
+  WANTED,      ///< it runs unless the user switches it off
+  NOT_WANTED,  ///< it runs only if the user switches it on
+  IDLE,        ///< there is nothing to do as things stand, whatever the user asks for
+  IMPOSSIBLE,  ///< the scene cannot have it: to switch it on is a mistake
 };
 
-Finding idle(const std::string& reason) { return {false, true, reason, true}; }
+/// What the scene says about an effect before the user has a say.
+struct Finding {
+  Need need = Need::NOT_WANTED;
+  std::string reason;
+};
+
+Finding wanted(const std::string& reason) { return {Need::WANTED, reason}; }
+Finding notWanted(const std::string& reason) { return {Need::NOT_WANTED, reason}; }
+Finding idle(const std::string& reason) { return {Need::IDLE, reason}; }
+Finding impossible(const std::string& reason) { return {Need::IMPOSSIBLE, reason}; }
 
 std::string metres(double value) {
   std::ostringstream text;
@@ -47,19 +57,19 @@ Finding selfCollision(const EffectScene& scene) {
   if (can.empty()) {
     const bool all_rigid = std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.rigid; });
     if (!all_rigid) return idle("it is switched off for every body that deforms");
-    return {false, false, scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid"};
+    return impossible(scene.bodies.size() == 1 ? "the body is rigid" : "all bodies are rigid");
   }
   can += deforming == 1 ? " deforms" : " deform";
-  return {true, true, can + (rope.empty() ? "" : "; of " + rope + " only edges, a polyline has no faces")};
+  return wanted(can + (rope.empty() ? "" : "; of " + rope + " only edges, a polyline has no faces"));
 }
 
 Finding bodyBody(const EffectScene& scene) {
   const std::vector<Body>& bodies = scene.bodies;
-  if (bodies.size() < 2) return {false, false, "there is only one body"};
+  if (bodies.size() < 2) return impossible("there is only one body");
   std::size_t able = 0;
   for (const Body& body : bodies) able += meet(body, body);
   if (able < 2) return idle("against_bodies is false for all of them but " + std::to_string(able));
-  return {true, true, "there are " + std::to_string(able) + " bodies"};
+  return wanted("there are " + std::to_string(able) + " bodies");
 }
 
 constexpr const char* NOBODY_MEETS_MAP = "against_obstacle is false for every body";
@@ -70,11 +80,9 @@ bool nobodyMeetsMap(const EffectScene& scene) {
 
 Finding octomap(const EffectScene& scene) {
   if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
-  if (scene.map_seen) return {true, true, "the map comes from " + scene.map_source};
-  if (scene.map_named) {
-    return {true, true, "octomap_topic names " + scene.map_source + ", from which no map has come"};
-  }
-  return {false, true, "nobody publishes " + scene.map_source + " and no octomap_file is given"};
+  if (scene.map_seen) return wanted("the map comes from " + scene.map_source);
+  if (scene.map_named) return wanted("octomap_topic names " + scene.map_source + ", from which no map has come");
+  return notWanted("nobody publishes " + scene.map_source + " and no octomap_file is given");
 }
 
 /// Of the bodies that one would take for solid and that others could be inside of, those for which that is not asked.
@@ -98,21 +106,20 @@ Finding startState(const EffectScene& scene) {
   if (ropesOnly(scene) && !scene.map_used) {
     return idle("edges alone cannot be inside of anything, and there is no map");
   }
-  return {true, true,
-          "surfaces that cross already at the start are invisible to continuous detection" + notSolid(scene)};
+  return wanted("surfaces that cross already at the start are invisible to continuous detection" + notSolid(scene));
 }
 
 Finding rigidBodies(const EffectScene& scene) {
   const auto count = std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.rigid; });
-  if (count == 0) return {false, false, "no body is rigid; give one under bodies/NAME/rigid"};
-  return {true, true, std::to_string(count) + (count == 1 ? " body moves" : " bodies move") + " by tf"};
+  if (count == 0) return impossible("no body is rigid; give one under bodies/NAME/rigid");
+  return wanted(std::to_string(count) + (count == 1 ? " body moves" : " bodies move") + " by tf");
 }
 
 Finding unknownSpace(const EffectScene& scene) {
-  if (!scene.unknown_space_counts) return {false, false, "unknown_space is free; set it to occupied or report"};
+  if (!scene.unknown_space_counts) return impossible("unknown_space is free; set it to occupied or report");
   if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
   if (!scene.map_used) return idle("unknown_space is not free, but there is no map that could know it");
-  return {true, true, "unknown_space is not free"};
+  return wanted("unknown_space is not free");
 }
 
 std::string leftOut(const EffectScene& scene) {
@@ -121,30 +128,73 @@ std::string leftOut(const EffectScene& scene) {
          " pairs of a body's own features are closer in its reference frame and left out of it";
 }
 
+/// The largest separations of the pairs that meet, of each kind of pair [m].
+struct CarriedSeparations {
+  double own_m = 0;     ///< of a body from itself
+  double bodies_m = 0;  ///< of two bodies
+  double map_m = 0;     ///< of a body from the map, be there one or not
+};
+
+CarriedSeparations carriedSeparations(const std::vector<Body>& bodies) {
+  CarriedSeparations carried;
+  const auto raise = [](double& largest_m, double separation_m) { largest_m = std::max(largest_m, separation_m); };
+  for (std::size_t a = 0; a < bodies.size(); ++a) {
+    if (meetsItself(bodies[a])) raise(carried.own_m, separationBetween(bodies[a], a, bodies[a], a));
+    if (meetsMap(bodies[a])) raise(carried.map_m, separationFromMap(bodies[a]));
+    for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+      if (meet(bodies[a], bodies[b])) raise(carried.bodies_m, separationBetween(bodies[a], a, bodies[b], b));
+    }
+  }
+  return carried;
+}
+
 Finding minimumSeparation(const EffectScene& scene) {
-  const double largest_m = largestSeparation(scene.bodies);
-  if (!(largest_m > 0)) return {false, false, "minimum_separation_m is 0; set it above"};
-  return {true, true, "contacts are reported from " + metres(largest_m) + " m" + leftOut(scene)};
+  if (!(largestSeparation(scene.bodies) > 0)) return impossible("minimum_separation_m is 0; set it above");
+  const CarriedSeparations carried = carriedSeparations(scene.bodies);
+  const double largest_m = std::max({carried.own_m, carried.bodies_m, scene.map_used ? carried.map_m : 0});
+  if (largest_m > 0) {
+    return wanted("contacts are reported from " + metres(largest_m) + " m" + (carried.own_m > 0 ? leftOut(scene) : ""));
+  }
+  if (carried.map_m > 0) return idle("only pairs with the map carry a separation, but there is no map");
+  return idle("a separation is set, but no pair that is tested carries it");
+}
+
+bool meetsAnotherBody(const std::vector<Body>& bodies, std::size_t b) {
+  for (std::size_t other = 0; other < bodies.size(); ++other) {
+    if (other != b && meet(bodies[b], bodies[other])) return true;
+  }
+  return false;
 }
 
 Finding trackerNoise(const EffectScene& scene) {
-  std::string all;
+  const std::vector<Body>& bodies = scene.bodies;
+  std::string carried;
+  bool any = false, any_own = false, any_map = false;
   for (std::size_t b = 0; b < scene.noise.size(); ++b) {
-    if (!scene.noise[b].empty()) append(all, "; ", scene.bodies[b].name + ": " + scene.noise[b]);
+    if (scene.noise[b].empty()) continue;
+    any = true;
+    any_map = any_map || meetsMap(bodies[b]);
+    if (!meetsItself(bodies[b]) && !meetsAnotherBody(bodies, b) && !(meetsMap(bodies[b]) && scene.map_used)) continue;
+    any_own = any_own || meetsItself(bodies[b]);
+    append(carried, "; ", bodies[b].name + ": " + scene.noise[b]);
   }
-  if (all.empty()) return {false, false, "no body has an uncertainty; give one under uncertainty"};
-  return {true, true, "vertices are only known to a radius (" + all + ")" + leftOut(scene)};
+  if (!any) return impossible("no body has an uncertainty; give one under uncertainty");
+  if (!carried.empty()) {
+    return wanted("vertices are only known to a radius (" + carried + ")" + (any_own ? leftOut(scene) : ""));
+  }
+  if (any_map) return idle("bodies with an uncertainty meet nothing but the map, and there is no map");
+  return idle("no body with an uncertainty meets anything");
 }
 
 Finding lookAhead(const EffectScene& scene) {
-  if (!(scene.look_ahead_s > 0)) return {false, false, "look_ahead_s is 0; set it above"};
+  if (!(scene.look_ahead_s > 0)) return impossible("look_ahead_s is 0; set it above");
   if (!scene.predictions_heard) return idle("nobody subscribes to predictions");
-  return {true, true, "predictions reach " + metres(scene.look_ahead_s) + " s ahead"};
+  return wanted("predictions reach " + metres(scene.look_ahead_s) + " s ahead");
 }
 
 Finding patches(const EffectScene& scene) {
-  if (scene.earliest_only) return {false, false, "earliest_only is true, and patches are made of all contacts"};
-  return {true, true, "contacts that belong together are told as one"};
+  if (scene.earliest_only) return impossible("earliest_only is true, and patches are made of all contacts");
+  return wanted("contacts that belong together are told as one");
 }
 
 /// By Effect: what a scene says of it.
@@ -159,16 +209,16 @@ EffectDecision decide(const std::string& name, EffectSetting setting, const Find
     case EffectSetting::OFF:
       return {name, setting, false, "switched off by effects/" + name};
     case EffectSetting::AUTO:
-      return {name, setting, finding.wanted, finding.reason};
+      return {name, setting, finding.need == Need::WANTED, finding.reason};
     case EffectSetting::ON:
       break;
   }
-  if (!finding.possible) {
+  if (finding.need == Need::IMPOSSIBLE) {
     throw std::invalid_argument("effects/" + name + " is on, but " + finding.reason + "; or write effects/" + name +
                                 ": auto");
   }
-  if (finding.idle) return {name, setting, false, finding.reason};
-  return {name, setting, true, finding.wanted ? finding.reason : "switched on by effects/" + name};
+  if (finding.need == Need::IDLE) return {name, setting, false, finding.reason};
+  return {name, setting, true, finding.need == Need::WANTED ? finding.reason : "switched on by effects/" + name};
 }
 
 }  // namespace

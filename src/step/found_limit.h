@@ -9,9 +9,6 @@
 
 namespace dccd {
 
-/// Of a step that is limited: 40 MB while they are ordered.
-constexpr std::size_t MAX_SUPERCLUSTER_PAIRS = std::size_t{1} << 20;
-
 /// Counts what the tasks of a step find. They are begun in their order, and each has one thread.
 class FoundLimit {
  public:

@@ -1,6 +1,7 @@
 // Which pairs of features a step tests: the tasks of each body and pair of bodies, and what is left out of them.
 #include <algorithm>
 
+#include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 #include "step/history.h"
 
@@ -40,7 +41,7 @@ void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, co
   }
   const TreePair trees{&ta, &tb, same_tree, context.span};
   const bool limited = foundLimit() != FoundLimit::NONE;
-  const std::size_t room = limited ? MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
+  const std::size_t room = limited ? tolerance::MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
   const SearchRest rest = superclusterPairs(trees, found_groups, scratch, room, context.deadline);
   if (rest.toc <= 1) leaveOutAt(rest.toc, !rest.late);
   if (share != Share::ALL) keepShare(share == Share::SAMPLE, found_groups);

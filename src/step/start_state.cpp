@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 
 namespace dccd {
@@ -179,7 +180,7 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   trees.b = &faces;
   trees.span.times = Times::T0;
   trees.adjacent = edge_body == face_body;
-  const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : MAX_SUPERCLUSTER_PAIRS;
+  const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : tolerance::MAX_SUPERCLUSTER_PAIRS;
   cut_ = superclusterPairs(trees, groups_, scratch_, room).toc <= 1 || cut_;
   // By group of edges, so that all before the one that comes next are done.
   by_group_.clear();

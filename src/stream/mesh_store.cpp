@@ -119,11 +119,12 @@ StepStatus MeshStore::push(MeshFrame frame) {
   }
   // A fast stream of few vertices may run far ahead of a clock body that comes late; large meshes may not fill the
   // memory.
-  constexpr std::size_t ALWAYS_KEPT = 64;
   vertices_ += frame.positions.size();
-  while (frames_.size() >= options_.capacity || (frames_.size() >= ALWAYS_KEPT && vertices_ > options_.max_vertices)) {
-    forgetOldest();
-  }
+  const auto full = [&] {
+    const bool may_forget = frames_.size() >= tolerance::FRAMES_ALWAYS_KEPT;
+    return frames_.size() >= options_.capacity || (may_forget && vertices_ > options_.max_vertices);
+  };
+  while (full()) forgetOldest();
   frames_.push_back({std::make_shared<const MeshFrame>(std::move(frame)), run_});
   return status;
 }

@@ -71,7 +71,7 @@ const MonitorOptions& Monitor::options() const { return impl_->options; }
 const std::vector<Body>& Monitor::bodies() const { return impl_->bodies; }
 double Monitor::stepMs() const {
   const double limit_ms = timeLimitMs(impl_->options.detector);
-  return impl_->options.look_ahead_s > 0 ? (1 - LOOK_AHEAD_SHARE) * limit_ms : limit_ms;
+  return impl_->options.look_ahead_s > 0 ? (1 - tolerance::LOOK_AHEAD_SHARE) * limit_ms : limit_ms;
 }
 const ObstacleMap& Monitor::map() const { return impl_->map; }
 const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->history.leftOut(); }

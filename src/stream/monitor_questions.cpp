@@ -41,7 +41,7 @@ Outcome Monitor::predict() {
     outcome.reason = "no step has been answered yet";
     return outcome;
   }
-  const Deadline deadline = m.deadlineAfter(LOOK_AHEAD_SHARE * timeLimitMs(m.options.detector));
+  const Deadline deadline = m.deadlineAfter(tolerance::LOOK_AHEAD_SHARE * timeLimitMs(m.options.detector));
   const double ahead = m.options.look_ahead_s / last_s;
   Step step = *m.last;
   step.start_ns = m.last->stamp_ns;

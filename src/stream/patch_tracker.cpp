@@ -5,14 +5,11 @@
 #include <tuple>
 #include <utility>
 
+#include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 
 namespace dccd {
 namespace {
-
-// After a burst of contacts the trace would cost every later step as much. So it is forgotten early where it has more
-// than TRACE_ALWAYS spots and TRACE_PER_SPOT times as many as touch now.
-constexpr std::size_t TRACE_PER_SPOT = 8, TRACE_ALWAYS = 1 << 16;
 
 bool isOf(const std::array<std::uint16_t, 2>& partners, std::size_t body) {
   return body == PatchTracker::ALL || partners[0] == body || partners[1] == body;
@@ -193,7 +190,9 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
     last = static_cast<std::uint32_t>(all_.spots.size());
     all_.push(spot, known);
   };
-  const bool burst = trace_.spots.size() > std::max(TRACE_PER_SPOT * spots.size(), TRACE_ALWAYS);
+  // After a burst of contacts the trace would cost every later step as much, so it is forgotten early.
+  const std::size_t kept = std::max(tolerance::TRACE_PER_SPOT * spots.size(), tolerance::TRACE_ALWAYS);
+  const bool burst = trace_.spots.size() > kept;
   for (std::size_t i = 0; !burst && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
   releaseBurst(current_);
   current_.assign(all_.spots.size(), NO_PATCH);

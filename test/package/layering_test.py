@@ -44,6 +44,9 @@ INTRINSICS = re.compile(r'\b_mm(?:256|512)?_[a-z]|\b__m(?:128|256|512)|immintrin
 # The rooms that compute with rounding, and what a tolerance looks like there: a small power, or a factor of nearly 1.
 ROUNDED = ('projection', 'culling', 'simd', 'elementary', 'obstacle', 'step')
 SMALL_NUMBER = re.compile(r"\b0x1p-(?!64\b)\d+|\b\d+e-\d+\b|\b(?:1\.0\d+|0\.99\d*)\b|epsilon\(\)")
+# A fraction with a name of its own. What is called WORTH_... says which work is worth its time, and decides no answer.
+FRACTION = re.compile(r'\bconstexpr (?:double|float) (?!WORTH_)(?:\w+ = [^,;]*, )*?\w+ = \d*\.0*[1-9]\d*f?\b')
+TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 
 
 def includes(path):
@@ -104,6 +107,24 @@ class LayeringTest(unittest.TestCase):
                         wrong.append('%s:%d: %s' % (name(path), number, line.strip()))
         self.assertEqual(wrong, [])
         self.assertTrue(SMALL_NUMBER.search('x * (1 + 0x1p-50)') and SMALL_NUMBER.search('1e-12') and SMALL_NUMBER.search('0.999 * x'))
+
+    def test_fractions_with_a_name_are_tolerances(self):
+        """They are shares of a step and the like, of which answers depend."""
+        files = [p for folder in CORE for p in code_under('src/' + folder)] + code_under('include')
+        wrong = ['%s:%d: %s' % (name(path), number, line.strip()) for path in files if path.name != 'tolerances.h'
+                 for number, line in enumerate(path.read_text().splitlines(), 1) if FRACTION.search(line.split('//')[0])]
+        self.assertEqual(wrong, [])
+        for line in ('constexpr double SHARE = 0.4;', '  static constexpr float A = B, C = .25f;', 'constexpr double N = 2.50;'):
+            self.assertTrue(FRACTION.search(line), line)
+        for line in ('constexpr double SPLIT = 134217729.0;', 'constexpr double WORTH_IT = 0.75;', 'constexpr double A = tolerance::B;'):
+            self.assertFalse(FRACTION.search(line), line)
+
+    def test_no_text_repeats_a_tolerance(self):
+        """Where a text names one, it is written from the constant."""
+        files = [p for folder in {*CORE, 'octomap'} for p in code_under('src/' + folder)]
+        wrong = ['%s: %s' % (name(path), text) for path in files for line in path.read_text().splitlines()
+                 for text in TEXT.findall(line.split('//')[0]) if SMALL_NUMBER.search(text)]
+        self.assertEqual(wrong, [])
 
     def test_production_classes_do_not_end_in_test(self):
         found = [m for folder in ('src', 'include') for p in code_under(folder)

@@ -40,7 +40,8 @@ RUNG = {
 EFFECT = {
     'include/dccd/outcome.h': ('ROW(PATCHES, patches)\n', 'ROW(PATCHES, patches) \\\n  ROW(TOY, toy)\n'),
     'src/step/effect_plan.cpp': [
-        ('/// By Effect:', 'Finding toy(const EffectScene& scene) {\n  return {scene.bodies.size() > 1, true, "toys like company"};\n}\n\n'
+        ('/// By Effect:', 'Finding toy(const EffectScene& scene) {\n'
+                          '  return scene.bodies.size() > 1 ? wanted("toys like company") : notWanted("a toy is alone");\n}\n\n'
                           '/// By Effect:'),
         (' patches,\n};', ' patches, toy,\n};')],
     'src/step/detect.cpp': ('  if (options->patches) patches.list(outcome);\n',

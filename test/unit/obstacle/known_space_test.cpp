@@ -77,6 +77,15 @@ TEST(KnownSpace, UnknownLeavesAreBounded) {
   EXPECT_TRUE(space->unknownLeaves(box(1e6, 1e6, 1e6, 2e6, 2e6, 2e6)).empty()) << "outside of the map";
 }
 
+TEST(KnownSpace, AResolutionThatIsNoneIsNamed) {
+  try {
+    KnownSpace::build(-0.5, {});
+    ADD_FAILURE();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "resolution_m is -0.500000, which is not a length from 1e-290 to 1e290 m");
+  }
+}
+
 TEST(KnownSpace, SweptSpaceCountsVoxelsOnce) {
   const auto space = KnownSpace::build(RESOLUTION, blockWithHole());
   // One triangle that sweeps keys 32769 to 32772 in x and y, 32769 to 32770 in z: 32 voxels, one of them the hole.

@@ -190,7 +190,11 @@ std::string refusal(double resolution_m, const std::vector<OccupiedLeaf>& leaves
 }
 
 TEST(VoxelSurface, RefusesWhatIsNoMapAndNamesIt) {
-  EXPECT_NE(refusal(0, {}).find("resolution_m is 0"), std::string::npos);
+  EXPECT_EQ(refusal(0, {}), "resolution_m is 0, which is not a length from 1e-290 to 1e290 m");
+  EXPECT_EQ(refusal(1e-290, {}), "");
+  EXPECT_EQ(refusal(1e290, {}), "");
+  EXPECT_NE(refusal(std::nextafter(1e-290, 0), {}), "");
+  EXPECT_NE(refusal(std::nextafter(1e290, 1e300), {}), "");
   EXPECT_NE(refusal(std::numeric_limits<double>::quiet_NaN(), {}).find("nan"), std::string::npos);
   EXPECT_NE(refusal(1, {leafAt(0, 0, 0, 3)}).find("size 3"), std::string::npos);
   EXPECT_NE(refusal(1, {leafAt(2, 0, 0, 4)}).find("multiple"), std::string::npos);

@@ -4,6 +4,8 @@
 
 #include <stdexcept>
 
+#include "dccd/detect.h"
+
 namespace dccd {
 namespace {
 
@@ -185,6 +187,178 @@ TEST(EffectPlan, ABodyWithABorderHasNoInside) {
   scene.bodies[1].shell = false;
   scene.bodies[0].against_bodies = false;
   EXPECT_EQ(said(), plain) << "nobody to be inside of it";
+}
+
+// --- what pairs carry ------------------------------------------------------------------------------------------------
+
+std::string saidOf(const EffectScene& scene, const std::string& name) { return reason(EffectPlan(scene, {}), name); }
+
+/// Runs neither by itself nor because the user asks for it, which is no mistake either.
+void expectIdle(const EffectScene& scene, Effect effect, const std::string& why) {
+  for (const EffectSetting setting : {EffectSetting::AUTO, EffectSetting::ON}) {
+    const EffectPlan plan(scene, {{effect, setting}});
+    EXPECT_FALSE(plan.running(effect)) << toString(setting);
+    EXPECT_EQ(reason(plan, toString(effect)), why) << toString(setting);
+  }
+}
+
+const char* const ONLY_THE_MAP_WOULD = "only pairs with the map carry a separation, but there is no map";
+const char* const NO_PAIR_CARRIES = "a separation is set, but no pair that is tested carries it";
+
+TEST(EffectPlan, ASeparationThatNoPairCarriesDoesNotRun) {
+  EffectScene scene = cloth();
+  scene.bodies[0].minimum_separation_m = 0.12;
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.12 m");
+  scene.bodies[0].self_collision = false;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, ONLY_THE_MAP_WOULD);
+  scene.map_named = scene.map_seen = true;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, ONLY_THE_MAP_WOULD);
+  scene.map_used = true;
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.12 m");
+  scene.bodies[0].against_obstacle = false;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
+  scene.bodies[0].self_collision = true;
+  scene.bodies[0].rigid = true;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
+}
+
+TEST(EffectPlan, ASeparationOfBodiesCountsWhereTheyMeet) {
+  EffectScene scene = cloth();
+  scene.bodies = {body("cloth"), body("finger", true)};
+  scene.bodies[0].self_collision = scene.bodies[0].against_obstacle = false;
+  scene.bodies[1].minimum_separation_m = 0.02;
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.02 m");
+  scene.bodies[0].against_bodies = false;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, ONLY_THE_MAP_WOULD);
+  scene.bodies[1].against_obstacle = false;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
+}
+
+TEST(EffectPlan, WhatPairsAreGivenTakesThePlaceOfTheBodiesOwn) {
+  EffectScene scene = cloth();
+  scene.bodies = {body("felt"), body("finger", true), body("table", true)};
+  scene.map_seen = scene.map_used = true;
+  for (Body& one : scene.bodies) one.minimum_separation_m = 0.12;
+  // Either of two bodies may name a pair; each pair that there is, but felt and table.
+  scene.bodies[0].separations = {{0, 0}, {1, 0}, {OBSTACLE_BODY, 0}};
+  scene.bodies[1].separations = {{OBSTACLE_BODY, 0}};
+  scene.bodies[2].separations = {{1, 0}, {OBSTACLE_BODY, 0}};
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.12 m");
+  scene.bodies[2].separations.push_back({0, 0});
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
+  EXPECT_EQ(largestSeparation(scene.bodies), 0.12) << "it is asked for, all the same";
+}
+
+TEST(EffectPlan, AnOverrideMayMakeOnePairAloneSeparated) {
+  EffectScene scene = cloth();
+  scene.bodies = {body("felt"), body("finger", true), body("table", true)};
+  scene.bodies[2].separations = {{0, 0.004}};
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.004 m");
+  scene.bodies[0].against_bodies = false;
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
+  scene.bodies[0].separations = {{OBSTACLE_BODY, 0.03}};
+  expectIdle(scene, Effect::MINIMUM_SEPARATION, ONLY_THE_MAP_WOULD);
+  scene.map_used = true;
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.03 m");
+  scene.bodies[0].separations.push_back({0, 0.001});
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.03 m") << "the largest one";
+  scene.map_used = false;
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.001 m") << "of those that are tested";
+}
+
+TEST(EffectPlan, AnUncertaintyCountsWhereItsBodyMeetsSomething) {
+  const char* const only_the_map = "bodies with an uncertainty meet nothing but the map, and there is no map";
+  EffectScene scene = cloth();
+  scene.noise = {"0.003 m"};
+  const std::string said = "vertices are only known to a radius (cloth: 0.003 m)";
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), said);
+  scene.bodies[0].self_collision = false;
+  expectIdle(scene, Effect::TRACKER_NOISE, only_the_map);
+  scene.map_named = scene.map_seen = true;
+  expectIdle(scene, Effect::TRACKER_NOISE, only_the_map);
+  scene.map_used = true;
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), said);
+  scene.bodies[0].against_obstacle = false;
+  expectIdle(scene, Effect::TRACKER_NOISE, "no body with an uncertainty meets anything");
+  scene.bodies.push_back(body("finger", true));
+  scene.noise.push_back("");
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), said) << "it meets the finger";
+  scene.bodies[1].against_bodies = false;
+  expectIdle(scene, Effect::TRACKER_NOISE, "no body with an uncertainty meets anything");
+  scene.bodies[0].self_collision = true;
+  scene.noise[1] = "0.001 m";
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), "vertices are only known to a radius (cloth: 0.003 m; finger: 0.001 m)");
+  scene.map_used = false;
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), said) << "the finger meets nothing but the map";
+  scene.noise = {"", ""};
+  EXPECT_THROW(EffectPlan(scene, {{Effect::TRACKER_NOISE, EffectSetting::ON}}), std::invalid_argument);
+}
+
+// Only a body's own features are left out, and only of what they carry.
+TEST(EffectPlan, WhatIsLeftOutIsToldWhereItWouldBeCarried) {
+  const std::string left_out =
+      "; 7 pairs of a body's own features are closer in its reference frame and left out of it";
+  EffectScene scene = cloth();
+  scene.bodies[0].separations = {{OBSTACLE_BODY, 0.03}};
+  scene.noise = {"0.003 m"};
+  scene.left_out_pairs = 7;
+  scene.map_used = true;
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.03 m") << "from the map alone";
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), "vertices are only known to a radius (cloth: 0.003 m)" + left_out);
+  scene.bodies[0].separations = {{0, 0.03}};
+  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.03 m" + left_out);
+  scene.bodies[0].self_collision = false;
+  EXPECT_EQ(saidOf(scene, "tracker_noise"), "vertices are only known to a radius (cloth: 0.003 m)");
+}
+
+/// Two triangles on top of each other and a voxel below them, all close together: each pair that may meet does.
+Step closeTogether(const std::vector<Body>& bodies, bool with_map) {
+  Step step;
+  step.bodies = bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const double z = 0.01 + 0.01 * static_cast<double>(b);
+    const Positions layers{{0, 0, z},         {0.1, 0, z},         {0, 0.1, z},
+                           {0, 0, 0.005 + z}, {0.1, 0, 0.005 + z}, {0, 0.1, 0.005 + z}};
+    step.bodies[b].topology = share(Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}}));
+    step.bodies[b].t0 = step.bodies[b].t1 = share(layers);
+  }
+  if (with_map) step.map.surface = VoxelSurface::build(0.1, {{{32768, 32768, 32767}, 1}});
+  return step;
+}
+
+/// What the plan tells is what the flow counts, whatever the bodies meet and whatever they carry.
+TEST(EffectPlan, RunsWhatTheFlowCounts) {
+  for (unsigned bits = 0; bits < 1u << 10; ++bits) {
+    const auto bit = [bits](unsigned i) { return (bits >> i & 1) != 0; };
+    std::vector<Body> bodies{body("cloth"), body("finger", true)};
+    bodies[0].self_collision = bit(0);
+    bodies[0].against_bodies = bit(1);
+    bodies[0].against_obstacle = bit(2);
+    bodies[1].against_obstacle = bit(3);
+    bodies[bit(4) ? 1 : 0].minimum_separation_m = 0.05;
+    if (bit(5)) bodies[0].separations.push_back({0, 0});
+    if (bit(6)) bodies[0].separations.push_back({OBSTACLE_BODY, 0});
+    if (bit(7)) bodies[1].separations.push_back({0, 0});
+    const bool with_map = bit(8), noise = bit(9);
+    Step step = closeTogether(bodies, with_map);
+    EffectScene scene = cloth();
+    scene.bodies = step.bodies;
+    scene.map_used = with_map;
+    if (noise) {
+      scene.noise = {"0.03 m", ""};
+      step.bodies[0].radius_m = share(std::vector<double>(6, 0.03));
+    }
+    Options options;
+    options.accuracy.rung = Accuracy::CONSERVATIVE;
+    History history;
+    const Outcome outcome = detect(step, options, history);
+    const EffectPlan plan(scene, {});
+    EXPECT_EQ(outcome.stats[Effect::TRACKER_NOISE].in > 0, plan.running(Effect::TRACKER_NOISE)) << bits;
+    // A pair with an uncertain vertex counts there alone.
+    if (noise) continue;
+    EXPECT_EQ(outcome.stats[Effect::MINIMUM_SEPARATION].in > 0, plan.running(Effect::MINIMUM_SEPARATION))
+        << bits << ": " << saidOf(scene, "minimum_separation");
+  }
 }
 
 TEST(EffectPlan, LinesSayOneThingEach) {
