@@ -163,14 +163,12 @@ nlohmann::json statsJson(const Arguments& a, const Run& run) {
     j["tiers"][toString(static_cast<Tier>(t))] = run.sum.tiers.settled[t];
   }
   j["steps"] = run.contacts.size();
-  j["pairs_known_apart"] = run.sum.pairs_known_apart;
-  j["pairs_shown_apart"] = run.sum.pairs_shown_apart;
+  for (const StepCounter& counter : STEP_COUNTERS) j[counter.name] = run.sum.*counter.value;
   j["threads"] = a.threads;
   j["simd_target"] = simdTarget();
   j["accuracy"] = run.name;
   j["contacts"] = run.contactCount();
-  j["undecided"] = run.sum.undecided;
-  j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
+  j["unchecked_vertices"] = run.result.stats.unchecked_vertices;  // of the last step, as what follows
   j["proved"] = run.assurance.proved;
   j["missing"] = run.assurance.missing;
   j["touching"] = toString(run.assurance.touching);

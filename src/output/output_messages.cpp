@@ -124,10 +124,9 @@ void fillContacts(const Outcome& outcome, StatsMessage& out) {
 
 void fillStages(const StepStats& stats, StatsMessage& out) {
   out.total_ms = stats.total_ms;
-  out.unchecked_vertices = static_cast<std::uint32_t>(stats.unchecked_vertices);
-  out.unchecked_faces = static_cast<std::uint32_t>(stats.unchecked_faces);
-  out.vf_candidates = stats.vf_candidates;
-  out.ee_candidates = stats.ee_candidates;
+#define DCCD_FILL_COUNTER(name, same_in_every_part) out.name = static_cast<decltype(out.name)>(stats.name);
+  DCCD_STEP_COUNTERS(DCCD_FILL_COUNTER)
+#undef DCCD_FILL_COUNTER
   out.broad_phase_in = stats[Stage::BROAD_PHASE].in;
   out.broad_phase_out = stats[Stage::BROAD_PHASE].out;
   out.planar_in = stats[Stage::PLANAR].in;
@@ -147,12 +146,6 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.name##_ms = stats[Effect::EFFECT].ms;
   DCCD_EFFECTS(DCCD_FILL_EFFECT)
 #undef DCCD_FILL_EFFECT
-  out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
-  out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
-  out.unfolded_bodies = static_cast<std::uint32_t>(stats.unfolded_bodies);
-  out.body_pairs = static_cast<std::uint32_t>(stats.body_pairs);
-  out.left_out_listed = stats.left_out_listed;
-  out.left_out_met = stats.left_out_met;
   const auto tier = [&](Tier t) { return stats.tiers.settled[static_cast<std::size_t>(t)]; };
   out.tier_coincidence = tier(Tier::COINCIDENCE);
   out.tier_double_batch = tier(Tier::DOUBLE_BATCH);
