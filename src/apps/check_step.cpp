@@ -83,7 +83,7 @@ void writeContacts(const std::string& path, const std::vector<std::vector<Contac
     // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
     for (const Contact& c : steps[step]) {
       if (sequence) out << step << ',';
-      out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
+      out << factsOf(c.kind).short_name;
       for (Index v : c.vertex) out << ',' << v;
       out << ',' << c.toc_lower << ',' << c.toc_upper << ','
           << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';

@@ -31,16 +31,15 @@ static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
 std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
   static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
-  static const std::size_t SIZES[][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}};
-  const std::size_t* size = SIZES[static_cast<std::size_t>(contact.kind)];
+  const auto& size = factsOf(contact.kind).vertices;
   std::string text;
   std::size_t next = 0;
-  for (int side = 0; side < 2; ++side) {
+  for (std::size_t side = 0; side < 2; ++side) {
     if (side == 1) text += " and ";
     if (size[side] == 0) return text + "the map";
     text += SIZED[size[side]];
     for (std::size_t i = 0; i < size[side]; ++i) text += (i ? "-" : "") + std::to_string(contact.vertex[next++]);
-    text += " of " + bodies.at(contact.body[static_cast<std::size_t>(side)]).name;
+    text += " of " + bodies.at(contact.body[side]).name;
   }
   return text;
 }
