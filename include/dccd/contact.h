@@ -39,6 +39,8 @@ struct Contact {
   bool initial = false;   ///< in contact or inside at t=0
   bool leaving = false;   ///< crossing outwards of what started inside an obstacle
   bool expected = false;  ///< by one of Options::expected: no alarm
+  /// The body that vertex[i] is of.
+  std::uint16_t bodyOf(std::size_t i) const { return body[factsOf(kind).sideOf(i)]; }
 };
 
 /// The canonical order of contacts: kind, bodies, vertex indices, voxel; independent of threads and targets.

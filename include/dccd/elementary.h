@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 
 #include "dccd/deadline.h"
@@ -22,6 +23,28 @@ enum class PairKind : std::uint8_t {
   EDGE_VOXEL_EDGE = 3,    ///< indices: the edge's two
   FACE_VOXEL_CORNER = 4   ///< indices: the face's three
 };
+
+/// What is known of a kind of pair. This table alone says it.
+struct PairKindFacts {
+  const char* name;                      ///< that of toString()
+  const char* short_name;                ///< in tables for programs
+  const char* words;                     ///< in sentences for people
+  std::array<std::uint8_t, 2> vertices;  ///< of each side's feature; none of the map's
+
+  constexpr bool isOnMap() const { return vertices[1] == 0; }
+  /// 0 or 1: the side that has the vertex at this place of the indices.
+  constexpr std::size_t sideOf(std::size_t place) const { return place < vertices[0] ? 0 : 1; }
+};
+/// By PairKind.
+inline constexpr PairKindFacts PAIR_KINDS[] = {
+    {"vertex-face", "VF", "vertex against face", {1, 3}},
+    {"edge-edge", "EE", "edge against edge", {2, 2}},
+    {"vertex-voxel-face", "vertex-voxel_face", "vertex against voxel face", {1, 0}},
+    {"edge-voxel-edge", "edge-voxel_edge", "edge against voxel edge", {2, 0}},
+    {"face-voxel-corner", "face-voxel_corner", "face against voxel corner", {3, 0}},
+};
+static_assert(std::size(PAIR_KINDS) == static_cast<std::size_t>(PairKind::FACE_VOXEL_CORNER) + 1, "a row for each");
+constexpr const PairKindFacts& factsOf(PairKind kind) { return PAIR_KINDS[static_cast<std::size_t>(kind)]; }
 
 /// Rungs of the accuracy ladder, cheapest first. Recordings hold the values; 0 was one that decided nothing.
 enum class Accuracy : std::uint8_t { FAST = 1, CONSERVATIVE = 2, EXACT = 3 };

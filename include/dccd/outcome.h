@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
@@ -126,30 +127,37 @@ struct StepStats {
   DCCD_EXPORT StepStats& operator+=(const StepStats& other);
 };
 
-/// The counters by name: sums and reports follow from this list.
+/// The counters of a step: sums, JSON and the fields of ~stats follow from these rows. The name is that of the member
+/// and the published one. true: a step that is cut in parts has the same in every part, so that it is not added up.
+#define DCCD_STEP_COUNTERS(COUNTER) \
+  COUNTER(vf_candidates, false)     \
+  COUNTER(ee_candidates, false)     \
+  COUNTER(undecided, false)         \
+  COUNTER(initial, false)           \
+  COUNTER(leaving, false)           \
+  COUNTER(unchecked_vertices, true) \
+  COUNTER(unchecked_faces, true)    \
+  COUNTER(unfolded_bodies, false)   \
+  COUNTER(bodies_refitted, false)   \
+  COUNTER(bodies_kept, false)       \
+  COUNTER(body_pairs, false)        \
+  COUNTER(pairs_known_apart, false) \
+  COUNTER(pairs_shown_apart, false) \
+  COUNTER(map_answers_kept, false)  \
+  COUNTER(left_out_listed, true)    \
+  COUNTER(left_out_met, false)
+
 struct StepCounter {
   const char* name;
   std::uint64_t StepStats::*value;
-  bool same_in_every_part;  ///< of a step that is cut in parts: not added up
+  bool same_in_every_part;
 };
-constexpr StepCounter STEP_COUNTERS[] = {
-    {"vf_candidates", &StepStats::vf_candidates, false},
-    {"ee_candidates", &StepStats::ee_candidates, false},
-    {"undecided", &StepStats::undecided, false},
-    {"initial", &StepStats::initial, false},
-    {"leaving", &StepStats::leaving, false},
-    {"unchecked_vertices", &StepStats::unchecked_vertices, true},
-    {"unchecked_faces", &StepStats::unchecked_faces, true},
-    {"unfolded_bodies", &StepStats::unfolded_bodies, false},
-    {"bodies_refitted", &StepStats::bodies_refitted, false},
-    {"bodies_kept", &StepStats::bodies_kept, false},
-    {"body_pairs", &StepStats::body_pairs, false},
-    {"pairs_known_apart", &StepStats::pairs_known_apart, false},
-    {"pairs_shown_apart", &StepStats::pairs_shown_apart, false},
-    {"map_answers_kept", &StepStats::map_answers_kept, false},
-    {"left_out_listed", &StepStats::left_out_listed, true},
-    {"left_out_met", &StepStats::left_out_met, false},
-};
+#define DCCD_STEP_COUNTER_ROW(name, same_in_every_part) {#name, &StepStats::name, same_in_every_part},
+constexpr StepCounter STEP_COUNTERS[] = {DCCD_STEP_COUNTERS(DCCD_STEP_COUNTER_ROW)};
+#undef DCCD_STEP_COUNTER_ROW
+static_assert(sizeof(StepStats) == sizeof(StepStats::stages) + sizeof(StepStats::effects) + sizeof(StepStats::tiers) +
+                                       sizeof(StepStats::total_ms) + sizeof(std::uint64_t) * std::size(STEP_COUNTERS),
+              "every counter has a row");
 
 /// Do surfaces already cross at t=0? (doc/algorithm.md)
 enum class StartState : std::uint8_t { CLEAR = 0, INTERSECTING = 1, NOT_CHECKED = 2 };

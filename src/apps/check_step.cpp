@@ -83,7 +83,7 @@ void writeContacts(const std::string& path, const std::vector<std::vector<Contac
     // Rows sorted as integers: kind VF before EE, then the vertices. The detector's order is that already.
     for (const Contact& c : steps[step]) {
       if (sequence) out << step << ',';
-      out << (c.kind == PairKind::VERTEX_FACE ? "VF" : "EE");
+      out << factsOf(c.kind).short_name;
       for (Index v : c.vertex) out << ',' << v;
       out << ',' << c.toc_lower << ',' << c.toc_upper << ','
           << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << '\n';
@@ -163,14 +163,12 @@ nlohmann::json statsJson(const Arguments& a, const Run& run) {
     j["tiers"][toString(static_cast<Tier>(t))] = run.sum.tiers.settled[t];
   }
   j["steps"] = run.contacts.size();
-  j["pairs_known_apart"] = run.sum.pairs_known_apart;
-  j["pairs_shown_apart"] = run.sum.pairs_shown_apart;
+  for (const StepCounter& counter : STEP_COUNTERS) j[counter.name] = run.sum.*counter.value;
   j["threads"] = a.threads;
   j["simd_target"] = simdTarget();
   j["accuracy"] = run.name;
   j["contacts"] = run.contactCount();
-  j["undecided"] = run.sum.undecided;
-  j["unchecked_vertices"] = run.result.stats.unchecked_vertices;
+  j["unchecked_vertices"] = run.result.stats.unchecked_vertices;  // of the last step, as what follows
   j["proved"] = run.assurance.proved;
   j["missing"] = run.assurance.missing;
   j["touching"] = toString(run.assurance.touching);

@@ -14,7 +14,15 @@
 
 namespace dccd {
 
-enum class FeatureKind : std::uint8_t { VERTEX = 0, EDGE = 1, FACE = 2 };
+enum class FeatureKind : std::uint8_t { VERTEX = 0, EDGE = 1, FACE = 2 };  // one less than it has vertices
+
+/// The features of a pair of meshes.
+constexpr FeatureKind firstKind(PairKind kind) { return static_cast<FeatureKind>(factsOf(kind).vertices[0] - 1); }
+constexpr FeatureKind secondKind(PairKind kind) { return static_cast<FeatureKind>(factsOf(kind).vertices[1] - 1); }
+static_assert(firstKind(PairKind::VERTEX_FACE) == FeatureKind::VERTEX);
+static_assert(secondKind(PairKind::VERTEX_FACE) == FeatureKind::FACE);
+static_assert(firstKind(PairKind::EDGE_EDGE) == FeatureKind::EDGE);
+static_assert(secondKind(PairKind::EDGE_EDGE) == FeatureKind::EDGE);
 
 /// One body: where its elements are in the scene's arrays.
 struct SceneBody {

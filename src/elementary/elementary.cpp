@@ -120,10 +120,7 @@ ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pai
 }
 
 const char* toString(PairKind kind) {
-  static const char* const NAMES[] = {"vertex-face", "edge-edge", "vertex-voxel-face", "edge-voxel-edge",
-                                      "face-voxel-corner"};
-  const std::size_t i = static_cast<std::size_t>(kind);
-  return i < std::size(NAMES) ? NAMES[i] : "unknown";
+  return static_cast<std::size_t>(kind) < std::size(PAIR_KINDS) ? factsOf(kind).name : "unknown";
 }
 
 const char* toString(Accuracy rung) {

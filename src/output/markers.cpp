@@ -78,10 +78,9 @@ std::string inSeconds(double s) {
 
 /// The mesh face that takes part, at the time of contact; nothing for edge pairs.
 void addFace(const Outcome& outcome, const Contact& contact, Marker& faces) {
-  int first = -1;
-  if (contact.kind == PairKind::VERTEX_FACE) first = 1;
-  if (contact.kind == PairKind::FACE_VOXEL_CORNER) first = 0;
-  if (first < 0) return;
+  const auto& size = factsOf(contact.kind).vertices;
+  if (size[0] != 3 && size[1] != 3) return;
+  const int first = size[0] == 3 ? 0 : size[0];
   for (int i = first; i < first + 3; ++i) {
     faces.points.push_back(point(vertexAtContact(outcome, contact, i)));
     faces.colors.push_back(faces.color);  // with colours of its own a list is drawn unlit, so that no side is black

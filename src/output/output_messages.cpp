@@ -31,16 +31,15 @@ static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
 
 std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
   static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
-  static const std::size_t SIZES[][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}};
-  const std::size_t* size = SIZES[static_cast<std::size_t>(contact.kind)];
+  const auto& size = factsOf(contact.kind).vertices;
   std::string text;
   std::size_t next = 0;
-  for (int side = 0; side < 2; ++side) {
+  for (std::size_t side = 0; side < 2; ++side) {
     if (side == 1) text += " and ";
     if (size[side] == 0) return text + "the map";
     text += SIZED[size[side]];
     for (std::size_t i = 0; i < size[side]; ++i) text += (i ? "-" : "") + std::to_string(contact.vertex[next++]);
-    text += " of " + bodies.at(contact.body[static_cast<std::size_t>(side)]).name;
+    text += " of " + bodies.at(contact.body[side]).name;
   }
   return text;
 }
@@ -124,10 +123,9 @@ void fillContacts(const Outcome& outcome, StatsMessage& out) {
 
 void fillStages(const StepStats& stats, StatsMessage& out) {
   out.total_ms = stats.total_ms;
-  out.unchecked_vertices = static_cast<std::uint32_t>(stats.unchecked_vertices);
-  out.unchecked_faces = static_cast<std::uint32_t>(stats.unchecked_faces);
-  out.vf_candidates = stats.vf_candidates;
-  out.ee_candidates = stats.ee_candidates;
+#define DCCD_FILL_COUNTER(name, same_in_every_part) out.name = static_cast<decltype(out.name)>(stats.name);
+  DCCD_STEP_COUNTERS(DCCD_FILL_COUNTER)
+#undef DCCD_FILL_COUNTER
   out.broad_phase_in = stats[Stage::BROAD_PHASE].in;
   out.broad_phase_out = stats[Stage::BROAD_PHASE].out;
   out.planar_in = stats[Stage::PLANAR].in;
@@ -147,12 +145,6 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.name##_ms = stats[Effect::EFFECT].ms;
   DCCD_EFFECTS(DCCD_FILL_EFFECT)
 #undef DCCD_FILL_EFFECT
-  out.bodies_refitted = static_cast<std::uint32_t>(stats.bodies_refitted);
-  out.bodies_kept = static_cast<std::uint32_t>(stats.bodies_kept);
-  out.unfolded_bodies = static_cast<std::uint32_t>(stats.unfolded_bodies);
-  out.body_pairs = static_cast<std::uint32_t>(stats.body_pairs);
-  out.left_out_listed = stats.left_out_listed;
-  out.left_out_met = stats.left_out_met;
   const auto tier = [&](Tier t) { return stats.tiers.settled[static_cast<std::size_t>(t)]; };
   out.tier_coincidence = tier(Tier::COINCIDENCE);
   out.tier_double_batch = tier(Tier::DOUBLE_BATCH);

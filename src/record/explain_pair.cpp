@@ -80,9 +80,9 @@ class PairExplanation : Explanation {
  public:
   PairExplanation(const Step& step, const Options& options, const PairQuestion& question)
       : Explanation(step, options), question_(question) {
-    const std::size_t first = question.kind == PairKind::VERTEX_FACE ? 1 : 2;
-    features_ = {featureOf(step, question.body[0], question.vertex.data(), first),
-                 featureOf(step, question.body[1], question.vertex.data() + first, 4 - first)};
+    const auto& size = factsOf(question.kind).vertices;
+    features_ = {featureOf(step, question.body[0], question.vertex.data(), size[0]),
+                 featureOf(step, question.body[1], question.vertex.data() + size[0], size[1])};
   }
 
   std::vector<TraceLine> run() {
@@ -149,8 +149,8 @@ class PairExplanation : Explanation {
 
   double linearBound(double separation_m) const {
     PairMotion pair{};
-    for (int i = 0; i < 4; ++i) {
-      const std::size_t body = question_.body[question_.kind == PairKind::VERTEX_FACE ? i > 0 : i > 1];
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t body = question_.body[factsOf(question_.kind).sideOf(i)];
       const Vec3 from = placeVertex(step_, body, question_.vertex[i], part_, parts_);
       const Vec3 to = placeVertex(step_, body, question_.vertex[i], part_ + 1, parts_);
       std::copy_n(from.data(), 3, pair.x[0][i]);

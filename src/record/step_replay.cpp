@@ -164,9 +164,7 @@ std::string describeContact(const Contact& c, const std::vector<Body>& bodies) {
            : body == OBSTACLE_BODY ? "octomap"
                                    : "body " + std::to_string(body);
   };
-  const std::size_t first = c.kind == PairKind::VERTEX_FACE || c.kind == PairKind::VERTEX_VOXEL_FACE ? 1
-                            : c.kind == PairKind::FACE_VOXEL_CORNER                                  ? 3
-                                                                                                     : 2;
+  const std::size_t first = factsOf(c.kind).vertices[0];
   text << toString(c.kind) << ' ' << name(c.body[0]);
   for (std::size_t i = 0; i < 4; ++i) {
     if (i == first && c.body[1] != OBSTACLE_BODY) text << " | " << name(c.body[1]);

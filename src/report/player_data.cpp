@@ -67,7 +67,7 @@ std::string PlayerData::tierOf(const Outcome& o, const Contact& c) const {
   if (c.body[1] == OBSTACLE_BODY) return "";
   PairMotion pair;
   for (int i = 0; i < 4; ++i) {
-    const Body& body = o.step->bodies[c.body[i < (c.kind == PairKind::VERTEX_FACE ? 1 : 2) ? 0 : 1]];
+    const Body& body = o.step->bodies[c.bodyOf(i)];
     if (body.turns || !body.t0 || !body.t1) return "";
     std::copy_n((*body.t0)[c.vertex[i]].data(), 3, pair.x[0][i]);
     std::copy_n((*body.t1)[c.vertex[i]].data(), 3, pair.x[1][i]);

@@ -15,8 +15,6 @@
 namespace dccd {
 namespace {
 
-const char* const KINDS[] = {"VF", "EE", "vertex-voxel_face", "edge-voxel_edge", "face-voxel_corner"};
-
 // Commas, quotes and line ends in a field are quoted (RFC 4180).
 std::string csvField(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
@@ -60,7 +58,7 @@ Report::Report(const std::string& folder) : folder_(folder) {
 void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodies) {
   for (const Contact& c : outcome.contacts) {
     const ContactGeometry g = contactGeometry(outcome, c);
-    contacts_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << KINDS[static_cast<int>(c.kind)] << ','
+    contacts_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << factsOf(c.kind).short_name << ','
               << csvField(bodyName(c.body[0], bodies)) << ',' << csvField(bodyName(c.body[1], bodies));
     for (Index v : c.vertex) {
       contacts_ << ',';
@@ -217,7 +215,7 @@ void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector
   std::ofstream file(folder_ + "/left_out.csv");
   file << "kind,body,v0,v1,v2,v3\n";
   for (const LeftOutPair& pair : pairs) {
-    file << KINDS[static_cast<int>(pair.kind)] << ',' << csvField(bodyName(pair.body, bodies));
+    file << factsOf(pair.kind).short_name << ',' << csvField(bodyName(pair.body, bodies));
     for (const Index v : pair.vertex) file << ',' << v;
     file << '\n';
   }

@@ -154,6 +154,7 @@ nlohmann::json Report::json() const {
     j["histogram"].push_back({{"upper_ms", bin.upper_s * 1e3}, {"steps", bin.count}});
   }
   j["effects"] = effectsJson();
+  for (const StepCounter& counter : STEP_COUNTERS) j["step_counters"][counter.name] = sum_.*counter.value;
   j["bounds"] = {{"bodies_refitted", sum_.bodies_refitted}, {"bodies_kept", sum_.bodies_kept}};
   j["left_out"] = {{"pairs", left_out_}, {"met", sum_.left_out_met}};
   j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};

@@ -3,12 +3,6 @@
 #include <algorithm>
 
 namespace dccd {
-namespace {
-
-const char* const KINDS_IN_WORDS[] = {"vertex against face", "edge against edge", "vertex against voxel face",
-                                      "edge against voxel edge", "face against voxel corner"};
-
-}  // namespace
 
 std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
   return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
@@ -20,7 +14,7 @@ int meshPoints(const Contact& c) {
 
 std::string contactInWords(const Contact& c, const std::vector<Body>& bodies) {
   std::string text = bodyName(c.body[0], bodies) + " meets " + bodyName(c.body[1], bodies) + " (" +
-                     KINDS_IN_WORDS[static_cast<int>(c.kind)] + (meshPoints(c) == 1 ? ", vertex" : ", vertices");
+                     factsOf(c.kind).words + (meshPoints(c) == 1 ? ", vertex" : ", vertices");
   for (int i = 0; i < meshPoints(c); ++i) text += ' ' + std::to_string(c.vertex[i]);
   return text + (c.certainty == Certainty::CERTAIN ? ", certain" : ", undecided") + (c.initial ? ", initial" : "") +
          ")";

@@ -21,9 +21,7 @@ bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
   if (c.toc_lower > 0) return false;
   if (scene.separation(c.body[0], c.body[1]) > 0 || scene.uncertain()) return true;
   const bool face = c.kind == PairKind::VERTEX_FACE;
-  const auto x = [&](std::size_t i) {
-    return (*step.bodies[c.body[i < (face ? 1u : 2u) ? 0 : 1]].t0)[c.vertex[i]].data();
-  };
+  const auto x = [&](std::size_t i) { return (*step.bodies[c.bodyOf(i)].t0)[c.vertex[i]].data(); };
   // A vertex is a segment without length, an edge a triangle without area.
   return face ? segmentMeetsTriangle(x(0), x(0), x(1), x(2), x(3)) : segmentMeetsTriangle(x(0), x(1), x(2), x(3), x(3));
 }
@@ -34,7 +32,7 @@ void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step
   c.toc_upper = hit.toc_upper;
   c.certainty = hit.certainty;
   c.body = {static_cast<std::uint16_t>(hit.bodies >> 16), static_cast<std::uint16_t>(hit.bodies)};
-  const int first_size = kind == PairKind::VERTEX_FACE ? 1 : 2;
+  const std::size_t first_size = factsOf(kind).vertices[0];
   scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
   scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
   c.initial = !(late && hit.certainty == Certainty::UNDECIDED) && meetAtStart(step, c);

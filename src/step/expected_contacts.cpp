@@ -17,21 +17,6 @@ std::string nameOf(const ExpectedPartner& partner, const std::vector<Body>& bodi
   return name + (partner.set.empty() ? " (" + count + ")" : " ('" + partner.set + "', " + count + ")");
 }
 
-/// How many of a contact's vertices are those of its first feature.
-std::size_t firstSize(PairKind kind) {
-  switch (kind) {
-    case PairKind::VERTEX_FACE:
-    case PairKind::VERTEX_VOXEL_FACE:
-      return 1;
-    case PairKind::EDGE_EDGE:
-    case PairKind::EDGE_VOXEL_EDGE:
-      return 2;
-    case PairKind::FACE_VOXEL_CORNER:
-      break;
-  }
-  return 3;
-}
-
 }  // namespace
 
 void checkPartners(const std::vector<Expectation>& expected, std::size_t bodies) {
@@ -107,7 +92,7 @@ bool ExpectedContacts::isExpected(const Feature& a, const Feature& b) const {
 }
 
 bool ExpectedContacts::isExpected(const Contact& contact) const {
-  const Index *begin = contact.vertex.data(), *second = begin + firstSize(contact.kind);
+  const Index *begin = contact.vertex.data(), *second = begin + factsOf(contact.kind).vertices[0];
   const Index* end = contact.body[1] == OBSTACLE_BODY ? second : begin + contact.vertex.size();
   return isExpected({contact.body[0], begin, second, true}, {contact.body[1], second, end, true});
 }

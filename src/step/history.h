@@ -30,11 +30,6 @@
 
 namespace dccd {
 
-inline FeatureKind firstKind(PairKind k) {
-  return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE;
-}
-inline FeatureKind secondKind(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
-
 /// One straight part of a step, of which the later ones begin where the one before ended.
 struct Part {
   const Step& step;

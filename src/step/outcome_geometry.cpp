@@ -95,19 +95,11 @@ struct Part {
   Vec3 to(std::size_t body, Index vertex) const { return placeVertex(step, body, vertex, part + 1, parts); }
 };
 
-/// Bodies of a mesh contact's four vertices; all of body[0] where the second feature is a voxel's.
-std::uint16_t bodyOf(const Contact& contact, int i) {
-  const int first = contact.kind == PairKind::VERTEX_FACE ? 1 : 2;  // points of body[0]
-  return contact.body[1] == OBSTACLE_BODY || i < first ? contact.body[0] : contact.body[1];
-}
-
 ContactGeometry obstacleGeometry(const Outcome& outcome, const Contact& contact) {
   const Part part(outcome, contact);
   const Eigen::Isometry3d& map_from_fixed = outcome.step->map.map_from_fixed;
   Feature feature;
-  const int points = contact.kind == PairKind::VERTEX_VOXEL_FACE ? 1
-                     : contact.kind == PairKind::EDGE_VOXEL_EDGE ? 2
-                                                                 : 3;
+  const int points = factsOf(contact.kind).vertices[0];
   for (int i = 0; i < points; ++i) {
     const Vec3 from = map_from_fixed * part.from(contact.body[0], contact.vertex[i]);
     const Vec3 to = map_from_fixed * part.to(contact.body[0], contact.vertex[i]);
@@ -137,7 +129,7 @@ ContactGeometry contactGeometry(const Outcome& outcome, const Contact& contact) 
   const Part part(outcome, contact);
   PairMotion pair;
   for (int i = 0; i < 4; ++i) {
-    const std::uint16_t body = bodyOf(contact, i);
+    const std::uint16_t body = contact.bodyOf(i);
     std::copy_n(part.from(body, contact.vertex[i]).data(), 3, pair.x[0][i]);
     std::copy_n(part.to(body, contact.vertex[i]).data(), 3, pair.x[1][i]);
   }
@@ -148,7 +140,7 @@ ContactGeometry contactGeometry(const Outcome& outcome, const Contact& contact) 
 
 Vec3 vertexAtContact(const Outcome& outcome, const Contact& contact, int i) {
   const Part part(outcome, contact);
-  const std::uint16_t body = bodyOf(contact, i);
+  const std::uint16_t body = contact.bodyOf(i);
   const Vec3 from = part.from(body, contact.vertex[i]);
   return from + part.toc * (part.to(body, contact.vertex[i]) - from);
 }

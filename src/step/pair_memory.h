@@ -21,8 +21,8 @@ namespace dccd {
 struct MemoryTrees {
   PairKind kind = PairKind::VERTEX_FACE;
   std::uint16_t body_a = 0, body_b = 0;
-  FeatureKind kindA() const { return kind == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
-  FeatureKind kindB() const { return kind == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
+  FeatureKind kindA() const { return firstKind(kind); }
+  FeatureKind kindB() const { return secondKind(kind); }
   bool isSelf() const { return body_a == body_b && kind == PairKind::EDGE_EDGE; }
 };
 

@@ -22,9 +22,6 @@ constexpr std::size_t BOUNDS_PER_LOOK_AT_THE_CLOCK = 64, BOUNDS_IN_ANY_CASE = 10
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
-FeatureKind kindA(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::VERTEX : FeatureKind::EDGE; }
-FeatureKind kindB(PairKind k) { return k == PairKind::VERTEX_FACE ? FeatureKind::FACE : FeatureKind::EDGE; }
-
 }  // namespace
 
 PairWorker::PairWorker()
@@ -84,7 +81,7 @@ void PairWorker::end() {
 
 /// Features of the task, by their slots.
 bool PairWorker::shareVertex(std::size_t i, std::size_t j) const {
-  const ClusterTree &ta = a_->tree(kindA(task_->kind)), &tb = b_->tree(kindB(task_->kind));
+  const ClusterTree &ta = a_->tree(firstKind(task_->kind)), &tb = b_->tree(secondKind(task_->kind));
   const Index *va = ta.feature(i), *vb = tb.feature(j);
   return std::find_first_of(va, va + ta.arity(), vb, vb + tb.arity()) != va + ta.arity();
 }
@@ -92,13 +89,13 @@ bool PairWorker::shareVertex(std::size_t i, std::size_t j) const {
 void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::size_t index) {
   begin(context, task, index);
   const bool same_tree = task.self && task.kind == PairKind::EDGE_EDGE;
-  const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(kindA(task.kind)).featureCount());
-  const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(kindB(task.kind)).featureCount());
+  const std::uint32_t na = static_cast<std::uint32_t>(a_->tree(firstKind(task.kind)).featureCount());
+  const std::uint32_t nb = static_cast<std::uint32_t>(b_->tree(secondKind(task.kind)).featureCount());
   std::uint32_t slots[2 * ClusterPairStream::CHUNK];
   std::size_t n = 0;
   for (std::uint32_t i = 0; i < na && !enough_; ++i) {
     for (std::uint32_t j = same_tree ? i + 1 : 0; j < nb; ++j) {
-      if (!a_->holds(kindA(task.kind), i) || !b_->holds(kindB(task.kind), j) || shareVertex(i, j)) continue;
+      if (!a_->holds(firstKind(task.kind), i) || !b_->holds(secondKind(task.kind), j) || shareVertex(i, j)) continue;
       slots[2 * n] = i;
       slots[2 * n + 1] = j;
       if (++n == ClusterPairStream::CHUNK) {
@@ -114,7 +111,7 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::
 void PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
                      const std::vector<std::uint32_t>& pairs) {
   begin(context, task, index);
-  const TreePair trees{&a_->tree(kindA(task.kind)), &b_->tree(kindB(task.kind)),
+  const TreePair trees{&a_->tree(firstKind(task.kind)), &b_->tree(secondKind(task.kind)),
                        task.self && task.kind == PairKind::EDGE_EDGE, context.span, task.self};
   const double contact_m = context.contactDistance(task.body_a, task.body_b);
   for (std::size_t p = task.first; p < task.last; ++p) {
@@ -230,7 +227,7 @@ void PairWorker::filter() {
   const std::size_t kept =
       simd::fusedFilter(context_->scene->vertices()->t0, quads_[0].data(), count_, task_->kind == PairKind::EDGE_EDGE,
                         simd::FusedPlanes::ADAPTIVE, kept_.data());
-  const Index *ranks_a = a_->rank(kindA(task_->kind)).data(), *ranks_b = b_->rank(kindB(task_->kind)).data();
+  const Index *ranks_a = a_->rank(firstKind(task_->kind)).data(), *ranks_b = b_->rank(secondKind(task_->kind)).data();
   for (std::size_t i = 0; i < kept; ++i) {
     quads_[i] = quads_[kept_[i]];
     slots_[i] = slots_[kept_[i]];
@@ -245,7 +242,7 @@ void PairWorker::filter() {
 
 // Only what the filters kept needs its ranks, and the elementary test wants the features in canonical order.
 void PairWorker::makeCanonical() {
-  const Index *ranks_a = a_->rank(kindA(task_->kind)).data(), *ranks_b = b_->rank(kindB(task_->kind)).data();
+  const Index *ranks_a = a_->rank(firstKind(task_->kind)).data(), *ranks_b = b_->rank(secondKind(task_->kind)).data();
   const std::array<std::uint32_t, 2>* slots = slots_.data();
   std::uint64_t* keys = keys_.data();
   if (task_->kind == PairKind::VERTEX_FACE) {

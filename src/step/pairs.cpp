@@ -232,7 +232,8 @@ void History::Impl::listLeftOut(std::size_t b, PairKind kind) {
     pair.kind = kind;
     pair.body = static_cast<std::uint16_t>(b);
     scene.featureVertices(firstKind(kind), b, static_cast<Index>(one.key >> 32), pair.vertex.data());
-    scene.featureVertices(secondKind(kind), b, static_cast<Index>(one.key), pair.vertex.data() + (vertices ? 1 : 2));
+    scene.featureVertices(secondKind(kind), b, static_cast<Index>(one.key),
+                          pair.vertex.data() + factsOf(kind).vertices[0]);
     one.distance_m =
         restDistance(kind, {at[pair.vertex[0]], at[pair.vertex[1]], at[pair.vertex[2]], at[pair.vertex[3]]});
     left_out_list.push_back(pair);

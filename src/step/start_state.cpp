@@ -227,7 +227,7 @@ void StartStateSearch::remember(const SceneArrays& scene, const std::vector<Cont
   const std::size_t limit =
       edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
   for (const Contact& contact : contacts) {
-    if (contact.kind != PairKind::VERTEX_FACE && contact.kind != PairKind::EDGE_EDGE) continue;
+    if (factsOf(contact.kind).isOnMap()) continue;
     touched_.push_back({contact.kind, contact.body[0], contact.body[1], contact.vertex});
     if (CANDIDATES_PER_CONTACT * touched_.size() + candidates_.size() > limit) return;
   }
@@ -238,9 +238,8 @@ void StartStateSearch::addCandidates(const SceneArrays& scene, const Touched& co
   learnNeighbourhoods(scene);
   const std::uint32_t a = contact.first_body, b = contact.second_body;
   Index v[4];  // internal numbers
-  for (int i = 0; i < 4; ++i) {
-    const bool first = i < (contact.kind == PairKind::VERTEX_FACE ? 1 : 2);
-    v[i] = neighbourhoods_[first ? a : b].internal_of_local[contact.vertex[i]];
+  for (std::size_t i = 0; i < 4; ++i) {
+    v[i] = neighbourhoods_[factsOf(contact.kind).sideOf(i) == 0 ? a : b].internal_of_local[contact.vertex[i]];
   }
   if (contact.kind == PairKind::EDGE_EDGE) {
     addFacesAtEdge(scene, a, v, b, v + 2, out);

@@ -31,11 +31,8 @@ LookAheadScore::LookAheadScore(double horizon_s, std::size_t max_samples)
 
 void LookAheadScore::vertexTimes(const Outcome& outcome, Times& first, std::set<Key>* touching) {
   for (const Contact& contact : outcome.contacts) {
-    const std::size_t own = contact.body[1] == OBSTACLE_BODY        ? contact.vertex.size()
-                            : contact.kind == PairKind::VERTEX_FACE ? 1
-                                                                    : 2;
     for (std::size_t i = 0; i < contact.vertex.size() && contact.vertex[i] != NO_INDEX; ++i) {
-      const std::size_t side = i < own ? 0 : 1;
+      const std::size_t side = factsOf(contact.kind).sideOf(i);
       const Key key = keyOf(contact.body[side], contact.body[1 - side], contact.vertex[i]);
       if (touching) touching->insert(key);
       if (contact.initial || contact.certainty != Certainty::CERTAIN) continue;

@@ -3,9 +3,12 @@ import json
 import math
 import os
 import pathlib
+import re
 import subprocess
 import tempfile
 import unittest
+
+from checkout import CHECKOUT
 
 NOT_PROVED = 3
 
@@ -135,6 +138,9 @@ class SequenceTest(unittest.TestCase):
             self.assertEqual(kept, run(frames, '--threads', '2')[0])
             self.assertGreater(stats['pairs_known_apart'], 0)
             self.assertEqual(without['pairs_known_apart'], 0)
+            counters = re.findall(r'  COUNTER\((\w+), ', (CHECKOUT / 'include/dccd/outcome.h').read_text())
+            self.assertGreater(len(counters), 10)
+            self.assertLessEqual(set(counters), set(stats))
             self.assertEqual(stats['steps'], 6)
             self.assertEqual(set(stats['ms']['total']), {'best', 'median', 'mean'})
             header, *rows = kept.splitlines()

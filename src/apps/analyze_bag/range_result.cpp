@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 
@@ -61,7 +62,11 @@ BagReplaySummary summaryFrom(const json& j) {
   s.passed = countersFrom(j.at("passed"));
   for (const json& one : j.at("left_out")) {
     LeftOutPair pair;
-    pair.kind = static_cast<PairKind>(one.at(0).get<int>());
+    const auto kind = one.at(0).get<std::int64_t>();
+    if (kind < 0 || kind >= static_cast<std::int64_t>(std::size(PAIR_KINDS))) {
+      throw std::runtime_error("left_out: " + std::to_string(kind) + " is no kind of pair");
+    }
+    pair.kind = static_cast<PairKind>(kind);
     one.at(1).get_to(pair.body);
     one.at(2).get_to(pair.vertex);
     s.left_out.push_back(pair);

@@ -65,6 +65,26 @@ TEST(Headline, ExpectedContactsAreToldApart) {
             "No unexpected contact in 2 answered steps; expected contacts in 1 of them.");
 }
 
+TEST(ReportJson, HoldsEachCounterOfTheSteps) {
+  const std::string folder = ::testing::TempDir() + "report_of_counters";
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  outcome.step = std::make_shared<Step>();
+  std::uint64_t value = 100;
+  for (const StepCounter& counter : STEP_COUNTERS) outcome.stats.*counter.value = ++value;
+  Report report(folder);
+  report.add(outcome, {});
+  report.add(outcome, {});
+  report.finish();
+  const auto data = nlohmann::json::parse(std::ifstream(folder + "/report.json"));
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(data["step_counters"].size(), std::size(STEP_COUNTERS));
+  for (const StepCounter& counter : STEP_COUNTERS) {
+    const std::uint64_t once = outcome.stats.*counter.value;
+    EXPECT_EQ(data["step_counters"].value(counter.name, std::uint64_t{0}), counter.same_in_every_part ? once : 2 * once)
+        << counter.name;
+  }
+}
+
 TEST(ReportJson, NoNameIsTakenForThePlaceOfTheSteps) {
   const std::string folder = ::testing::TempDir() + "report_of_odd_names";
   Outcome first = nothingFound(StepStatus::OK, StartState::CLEAR), second = first;

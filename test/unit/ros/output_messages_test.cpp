@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 namespace dccd {
 namespace {
@@ -53,6 +54,18 @@ TEST(Stats, EachEffectHasARowOfItsName) {
       line.replace(line.find('%'), 1, name);
       EXPECT_NE(definition.find(line), std::string::npos) << line;
     }
+  }
+}
+
+TEST(Stats, EachCounterOfAStepHasAFieldOfItsName) {
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  std::uint64_t value = 100;
+  for (const StepCounter& counter : STEP_COUNTERS) outcome.stats.*counter.value = ++value;
+  std::ostringstream text;
+  text << toStepStats(outcome, {}, "world");
+  for (const StepCounter& counter : STEP_COUNTERS) {
+    const std::string line = counter.name + (": " + std::to_string(outcome.stats.*counter.value)) + '\n';
+    EXPECT_NE(('\n' + text.str()).find('\n' + line), std::string::npos) << line;
   }
 }
 
