@@ -266,7 +266,8 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
     SentFaces sent = triangulated(view, count);
     takeFaces(count, std::move(sent.proper), sent.repeating, mesh);
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
-    // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as long.
+    // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as
+    // long.
     if (!known_.topology) refuse("the message has no triangles and no topology is known yet");
     if (known_.topology->vertexCount() != count) {
       throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(count) +

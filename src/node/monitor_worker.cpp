@@ -48,7 +48,8 @@ void CollisionMonitor::Impl::accountDropped() {
     pipeline.monitor().countDropped(b, StepStatus::QUEUE_FULL, dropped[b]);
     log.complain(b, "queue",
                  std::to_string(dropped[b]) +
-                     " frames dropped: steps take longer than the time between frames, or frames are too large for max_memory_mb; " +
+                     " frames dropped: steps take longer than the time between frames, or frames are too large for "
+                     "max_memory_mb; " +
                      adviceFor(StepStatus::QUEUE_FULL, {}, log.mapSource()));
   }
 }

@@ -95,8 +95,8 @@ HWY_INLINE V approximateRoot(V f0, V f1, V f2, V f3, V lo, V hi, V at_lo, int st
   return onGrid(x);
 }
 
-/// One vector: approximates a root in each lane; the result means something in pending lanes alone. WHOLE: the root is the only one
-/// in [0,1], and lo, hi, at_lo need not be set.
+/// One vector: approximates a root in each lane; the result means something in pending lanes alone. WHOLE: the root is
+/// the only one in [0,1], and lo, hi, at_lo need not be set.
 template <bool WHOLE, int STEPS>
 HWY_INLINE void approximate(RootBlock& roots, std::size_t i) {
   const V f0 = load(roots.coefficient[0], i), f1 = load(roots.coefficient[1], i);

@@ -93,8 +93,8 @@ HWY_INLINE void fillUp(Block& roots) {
   if (roots.count % lanes() != 0) onPlanes(roots, FillUp{roots.count});
 }
 
-/// Moves the lanes of the vector at `from` that `front` lists to `to` <= `from`. A whole vector is written, which ends no
-/// later than the one that was read.
+/// Moves the lanes of the vector at `from` that `front` lists to `to` <= `from`. A whole vector is written, which ends
+/// no later than the one that was read.
 struct MoveTogether {
   decltype(hn::SetTableIndices(Tag(), FRONT_TABLE.row[0])) front;
   std::size_t from, to;

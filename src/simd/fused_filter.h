@@ -47,8 +47,9 @@ enum class FusedPlanes : std::uint8_t {
   ALL = 2          ///< and the paper's other five
 };
 
-/// Tests `count` pairs; vertices: 8 doubles each (x0 y0 z0 0 x1 y1 z1 0), aligned to 64 bytes; quads: VF v f0 f1 f2, EE ea0 ea1 eb0 eb1.
-/// Writes the positions of the pairs that are kept, ascending, to kept (room for count); returns their number.
+/// Tests `count` pairs; vertices: 8 doubles each (x0 y0 z0 0 x1 y1 z1 0), aligned to 64 bytes; quads: VF v f0 f1 f2, EE
+/// ea0 ea1 eb0 eb1. Writes the positions of the pairs that are kept, ascending, to kept (room for count); returns their
+/// number.
 std::size_t fusedFilter(const double* vertices, const std::uint32_t* quads, std::size_t count, bool edge_edge,
                         FusedPlanes planes, std::uint32_t* kept);
 

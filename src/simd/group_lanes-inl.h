@@ -152,8 +152,8 @@ class GroupLanes {
 };
 #endif
 
-// Bit per lane: 1 where feature i of one group and the lane's of the other share a vertex. Two empty lanes do: both hold
-// UINT32_MAX.
+// Bit per lane: 1 where feature i of one group and the lane's of the other share a vertex. Two empty lanes do: both
+// hold UINT32_MAX.
 template <size_t ONE, size_t OTHER>
 HWY_INLINE uint32_t sharing(const uint32_t* HWY_RESTRICT one, uint32_t i, const uint32_t* HWY_RESTRICT other) {
   const hn::CappedTag<uint32_t, GROUP> d;

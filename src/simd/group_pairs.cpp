@@ -74,9 +74,9 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 }
 #endif
 
-// Which pairs of nodes are not reported. Both functions take a mask of the lanes of the group opposite node i and return
-// those that stay: before() ahead of the test of bounds, where it costs little, after() of what has passed it. by_rows:
-// i is in the first group.
+// Which pairs of nodes are not reported. Both functions take a mask of the lanes of the group opposite node i and
+// return those that stay: before() ahead of the test of bounds, where it costs little, after() of what has passed it.
+// by_rows: i is in the first group.
 struct LeaveNoneOut {
   HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
   HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }

@@ -83,13 +83,24 @@ bool Carried::isContinuedBy(const Step& step) const {
   return true;
 }
 
+void History::Impl::forgetMade() noexcept {
+  carried.clear();
+  options.reset();
+  bodies_made = expected_known = false;
+  obstacle_checks.clear();
+  map_given = map_reduced = nullptr;
+  excluded_voxels = 0;
+  scene.forgetBounds();
+  patches = PatchMaker();
+}
+
 Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline deadline) {
   // Whatever throws from here on leaves nothing behind that could be taken for known.
   struct Guard {
     Impl& history;
     bool done = false;
     ~Guard() {
-      if (!done) history.carried.clear();
+      if (!done) history.forgetMade();
       history.begins_at = nullptr;
     }
   } guard{*this};
@@ -119,7 +130,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.sequence = step.sequence;
   outcome.substeps = parts;
   outcome.excluded_voxels = excluded_voxels;
-  guard.done = runParts(step, continues, parts, deadline, outcome);
+  if (!runParts(step, continues, parts, deadline, outcome)) carried.clear();
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
@@ -134,6 +145,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
     const double measured_ns = std::min(MOST_NS_PER_HIT, 1.5e6 * after_ms / static_cast<double>(hits));
     per_hit = std::max(per_hit * 7 / 8, std::chrono::nanoseconds(static_cast<std::int64_t>(measured_ns)));
   }
+  guard.done = true;
   return outcome;
 }
 
@@ -168,7 +180,7 @@ void History::Impl::setOptions(const Options& wanted) {
   if (options && *options == wanted) return;
   check(wanted);
   std::unique_ptr<Rung> rung = makeRung(wanted.accuracy);
-  if (!arena || wanted.num_threads != options->num_threads) arena.emplace(wanted.num_threads);
+  if (!arena || !options || wanted.num_threads != options->num_threads) arena.emplace(wanted.num_threads);
   elementary = std::move(rung);
   scene.setKeepBounds(wanted.keep_bounds);
   obstacle_checks.clear();
@@ -180,7 +192,8 @@ void History::Impl::setOptions(const Options& wanted) {
 
 void History::Impl::setBodies(const Step& step) {
   check(*options, step.bodies);
-  if (scene.holds(step.bodies)) return;
+  if (bodies_made && scene.holds(step.bodies)) return;
+  bodies_made = false;
   carried.clear();
   carried.start_state.forgetBodies();
   carried.inside.forgetBodies();
@@ -190,6 +203,7 @@ void History::Impl::setBodies(const Step& step) {
   obstacle_checks.clear();
   expected_known = false;
   findLeftOut(step);
+  bodies_made = true;
 }
 
 void History::Impl::useMap(const ObstacleMap& map) {

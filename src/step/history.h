@@ -82,6 +82,8 @@ struct History::Impl {
   /// in them, the range of the records. Nothing is carried over from it. Throws what run() throws.
   void passOver(const Step& step, const Options& wanted);
 
+  /// What throws may leave half of it made: all that follows from options, bodies and map is made anew.
+  void forgetMade() noexcept;
   void setOptions(const Options& wanted);
   void setBodies(const Step& step);
   void useMap(const ObstacleMap& map);
@@ -148,6 +150,7 @@ struct History::Impl {
 
   // Made from options, bodies and map, again when these change.
   std::optional<Options> options;
+  bool bodies_made = false;  // scene and what follows from it are of the bodies that they hold
   std::unique_ptr<Rung> elementary;
   std::optional<tbb::task_arena> arena;
   SceneArrays scene;

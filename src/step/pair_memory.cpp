@@ -15,11 +15,11 @@ constexpr double INFINITE = std::numeric_limits<double>::infinity();
 constexpr double DOWN = 1 - tolerance::LENGTH;  // more than all roundings of a product
 constexpr double STEPS_AHEAD = 2;               // that a certificate is to last, as far as they are like this one
 constexpr double WORTH_A_CERTIFICATE = 1.5;     // residuals of this step that it must have
-// Shares of the pairs that are known to be apart. Pairs are tested so fast that smaller shares do not pay; what it takes
-// to begin is more than what it takes to go on.
+// Shares of the pairs that are known to be apart. Pairs are tested so fast that smaller shares do not pay; what it
+// takes to begin is more than what it takes to go on.
 constexpr double SHARE_TO_TURN_ON = 0.93, SHARE_TO_STAY_ON = 0.75;
-constexpr std::size_t MOST_MEASURED = 6;    // distances for one certificate; one takes as long as a row of gaps
-constexpr std::size_t PAIRS_PER_EDGE = 2;   // that may be kept: 144 bytes a triangle
+constexpr std::size_t MOST_MEASURED = 6;   // distances for one certificate; one takes as long as a row of gaps
+constexpr std::size_t PAIRS_PER_EDGE = 2;  // that may be kept: 144 bytes a triangle
 constexpr std::size_t PAIRS_IN_ANY_CASE = 4096;
 
 /// How far two convex hulls are apart along a direction, whatever it is: a lower bound of their distance but for

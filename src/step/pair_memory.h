@@ -3,8 +3,8 @@
 //
 // A certificate says that at the end of the last step no two features of the pair, one of each cluster, that share no
 // vertex are nearer to each other than distance_m. Each step takes off it by how much the clusters' motion departs from
-// a rigid one (cluster_motion.h), and as long as more than what counts as a contact is left, the pair has no contact in the step
-// and is not looked at. So what a step finds, and in which order, is what it would find without.
+// a rigid one (cluster_motion.h), and as long as more than what counts as a contact is left, the pair has no contact in
+// the step and is not looked at. So what a step finds, and in which order, is what it would find without.
 #pragma once
 
 #include <atomic>

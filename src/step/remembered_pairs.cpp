@@ -20,8 +20,8 @@ constexpr std::size_t FEWEST_GROUPS = 8;  // pairs of them that are worth a memo
 /// otherwise. So has who
 /// watches a pair. A step aside is alone, and uncertain vertices have other radii in each step.
 bool History::Impl::mayRemember(const Part& part) {
-  const bool wanted = options->keep_bounds && !stopsAtFirst() && provesAnswers(options->accuracy.rung) &&
-                      !observer && !aside && options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&
+  const bool wanted = options->keep_bounds && !stopsAtFirst() && provesAnswers(options->accuracy.rung) && !observer &&
+                      !aside && options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&
                       scene.size() > tolerance::REMEMBERED_SMALLEST_M && scene.size() < tolerance::REMEMBERED_LARGEST_M;
   if (!wanted) return false;
   if (carried.memory.state() == PairMemory::State::OFF) return true;

@@ -38,8 +38,8 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   } else {
     // With earliest_only the later contacts are unknown, and a rung may miss some, so nothing may be concluded about
     // the end of the step.
-    const bool complete = all_pairs && !options->earliest_only && stats.unchecked_vertices == 0 &&
-                          provesAnswers(options->accuracy.rung);
+    const bool complete =
+        all_pairs && !options->earliest_only && stats.unchecked_vertices == 0 && provesAnswers(options->accuracy.rung);
     carried.start_state.remember(scene, result.contacts, complete);
     carried.inside.remember(scene, result.contacts, complete);
   }

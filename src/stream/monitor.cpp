@@ -115,7 +115,8 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
   const std::int64_t arrival_ns = frame.arrival_ns;
   m.finishing = false;
   if (!m.isStream(body)) {
-    // In a store of its own, so that the newest push counts whatever its stamp: a static body's frame holds at all times.
+    // In a store of its own, so that the newest push counts whatever its stamp: a static body's frame holds at all
+    // times.
     MeshStore store(m.options.store);
     const StepStatus status = store.push(std::move(frame));
     m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
@@ -230,8 +231,8 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   const Step step = place(pending);
   const bool passes = log && pending.sequence < log->range().first;
   if (held && !passes) computeHeld();
-  // A step continues the last one if it begins at that one's end and no body has begun a new run in between (ready() has
-  // set the runs): only then are interpolated positions at the stamp in common the same bits.
+  // A step continues the last one if it begins at that one's end and no body has begun a new run in between (ready()
+  // has set the runs): only then are interpolated positions at the stamp in common the same bits.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
   for (std::size_t b = 0; b < last_runs.size(); ++b) {
     if (last_runs[b] != runs[b]) tracker.seam(b);

@@ -66,6 +66,7 @@ void PatchTracker::forget() noexcept {
   }
   living_.clear();
   trace_ = all_ = Trace();
+  graph_ = TouchGraph();
   has_last_ = false;
 }
 

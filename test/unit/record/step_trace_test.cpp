@@ -64,9 +64,9 @@ TEST(PairTrace, ALimitThatCutTheStepRejectsNoPair) {
   for (const Contact& c : r.answer.contacts) {
     if (c.body[1] == OBSTACLE_BODY) continue;
     const std::vector<TraceLine> lines = explain(r.step, r.options, PairQuestion{c.kind, c.body, c.vertex});
-    EXPECT_TRUE(std::any_of(lines.begin(), lines.end(),
-                            [](const TraceLine& line) { return line.says == TraceLine::Says::CONTACT; }))
-        << describeContact(c, r.step.bodies);
+    EXPECT_TRUE(std::any_of(lines.begin(), lines.end(), [](const TraceLine& line) {
+      return line.says == TraceLine::Says::CONTACT;
+    })) << describeContact(c, r.step.bodies);
     traced += 1;
   }
   EXPECT_GT(traced, 1u);

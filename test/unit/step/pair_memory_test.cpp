@@ -67,7 +67,7 @@ TEST(PairMemory, ARollThatTurnsAndBendsIsLookedAtInPart) {
   const Body body = bodyOf(roll.topology, "roll");
   Detector remembers(options(true)), forgets(options(false));
   std::uint64_t known = 0, tested = 0, all = 0;
-  for (int k = 0; k < 12; ++k) {
+  for (int k = 0; k < 40; ++k) {
     const Step step = stepOf(body, roll.at(0.1 * k, 2), roll.at(0.1 * (k + 1), 2));
     const Outcome with = remembers.run(step), without = forgets.run(step);
     expectSame(with, without, "step " + std::to_string(k));
@@ -199,26 +199,27 @@ TEST(PairMemory, RandomStreamsAreAnsweredAsWithoutMemory) {
 }
 
 /// A tilted sheet, and on it points at the very middle of edges: they touch, though no normal that is computed in
-/// doubles can say so. All coordinates are multiples of 2^-22, so that the middles are exact.
+/// doubles can say so. All coordinates are multiples of 2^-50, so that the middles are exact.
 TEST(PairMemory, WhatTouchesAtRestIsNotApartByALastBit) {
   std::size_t contacts = 0;
   std::uint64_t known = 0;
   for (int seed = 1; seed <= 6; ++seed) {
     std::mt19937_64 random(static_cast<std::uint64_t>(seed));
-    const auto grid = [](double x) { return std::ldexp(std::round(std::ldexp(x, 21)), -21); };
+    const auto grid = [](double x) { return std::ldexp(std::round(std::ldexp(x, 49)), -49); };
     const Eigen::AngleAxisd tilt(0.7 + 0.1 * seed, Vec3(1, 2, -1.3).normalized());
     constexpr std::size_t SIZE = 40;
     Positions sheet, above;
     for (std::size_t r = 0; r < SIZE; ++r) {
       for (std::size_t c = 0; c < SIZE; ++c) {
-        const Vec3 p(static_cast<double>(r) / SIZE, static_cast<double>(c) / SIZE, 0.01 * std::sin(0.2 * static_cast<double>(r)));
+        const Vec3 p(static_cast<double>(r) / SIZE, static_cast<double>(c) / SIZE,
+                     0.01 * std::sin(0.2 * static_cast<double>(r)));
         sheet.push_back((tilt * p).unaryExpr(grid));
-        above.push_back((tilt * (p + Vec3(0, 0, 0.004))).unaryExpr(grid));
+        above.push_back((tilt * (p + Vec3(0, 0, 0.03))).unaryExpr(grid));
       }
     }
     const Topology topology = Topology::grid(SIZE, SIZE);
     // The sheet above hovers, but for a few points of it.
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < 40; ++k) {
       const Edge& edge = topology.edges()[random() % topology.edges().size()];
       above[edge[0]] = 0.5 * (sheet[edge[0]] + sheet[edge[1]]);
     }

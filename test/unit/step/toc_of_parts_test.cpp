@@ -22,8 +22,8 @@ TEST(TocOfParts, BracketsTheTrueTime) {
     if (k % 4 == 3) toc = std::ldexp(std::floor(std::ldexp(toc, 32)), -32);
     const mpq_class exact = (mpq_class(static_cast<unsigned long>(i)) + mpq_class(toc)) / static_cast<unsigned long>(n);
     const double low = scaleDown(toc, i, n), high = scaleUp(toc, i, n);
-    ASSERT_LE(mpq_class(low), exact) << toc << " of part " << i << " of " << n;
-    ASSERT_GE(mpq_class(high), exact) << toc << " of part " << i << " of " << n;
+    ASSERT_TRUE(mpq_class(low) <= exact) << toc << " of part " << i << " of " << n;
+    ASSERT_TRUE(mpq_class(high) >= exact) << toc << " of part " << i << " of " << n;
     worst = std::max(worst, (high - low) / std::nextafter(high, 2.0) * 0x1p52);
   }
   EXPECT_LE(worst, 8) << "units in the last place";
