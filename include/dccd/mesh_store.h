@@ -24,8 +24,8 @@ struct MeshFrame {
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
-  std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
   std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
+  std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
 };
 
 struct MeshStoreOptions {
@@ -83,7 +83,7 @@ class DCCD_EXPORT MeshStore {
   /// between; empty when none of them has any.
   void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
 
-  /// The most faces that any of these frames has dropped.
+  /// The most faces that any of these frames (lookup READY) has dropped.
   std::uint64_t droppedFacesOver(StampNs from_ns, StampNs to_ns) const;
 
   /// How many frames lie between two stamps, neither included.

@@ -39,8 +39,7 @@ Ranges rangesAt(const PairMotion& pair, int first_points, double t) {
 
 class Separation {
  public:
-  Separation(PairKind kind, const PairMotion& pair)
-      : pair_(pair), first_points_(kind == PairKind::VERTEX_FACE ? 1 : 2) {
+  Separation(PairKind kind, const PairMotion& pair) : pair_(pair), first_points_(factsOf(kind).vertices[0]) {
     for (int k = 0; k < 3; ++k) {
       double largest = 0;
       for (const auto& time : pair.x) {

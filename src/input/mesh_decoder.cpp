@@ -343,11 +343,11 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   if (config_.source == TopologySource::FILE) {
     mesh.topology = fixedTopology(count, 0, 0);
   } else {
-    SentFaces sent;
-    sent.proper.reserve(count / 3);
-    const std::vector<Index>& vertex = weld_.vertexOfCorner();
-    for (std::size_t c = 0; c < count; c += 3) sent.add({vertex[c], vertex[c + 1], vertex[c + 2]});
     try {
+      SentFaces sent;
+      sent.proper.reserve(count / 3);
+      const std::vector<Index>& vertex = weld_.vertexOfCorner();
+      for (std::size_t c = 0; c < count; c += 3) sent.add({vertex[c], vertex[c + 1], vertex[c + 2]});
       takeFaces(weld_.cornerOfVertex().size(), std::move(sent.proper), sent.repeating, mesh);
     } catch (...) {
       if (welds_anew) weld_.forget();  // a soup that is refused does not say which corners of the next one are one

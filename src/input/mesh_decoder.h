@@ -68,7 +68,8 @@ class MeshDecoder {
 
  private:
   MeshInputConfig config_;
-  /// Of the last message that was taken.
+  /// Of the last triangles that were read. A message may be refused for something else after that: those that follow
+  /// without triangles mean these.
   struct Known {
     std::shared_ptr<const Topology> topology;
     std::vector<Face> faces;          // of which it was made

@@ -64,16 +64,17 @@ std::size_t SoupWeld::weldAnew(const Positions& corners, bool refine) {
   std::unordered_map<CornerKey, Index, CornerHash> groups;
   groups.reserve(corners.size());
   std::vector<Index> vertex(corners.size());
+  std::vector<Index> corner;
   std::vector<std::size_t> pieces(refine ? corner_.size() : 0, 0);  // of each vertex
-  corner_.clear();
   for (std::size_t c = 0; c < corners.size(); ++c) {
     const auto [it, fresh] =
-        groups.try_emplace(cornerKey(corners[c], refine ? vertex_[c] : 0), static_cast<Index>(corner_.size()));
-    if (fresh) corner_.push_back(static_cast<Index>(c));
+        groups.try_emplace(cornerKey(corners[c], refine ? vertex_[c] : 0), static_cast<Index>(corner.size()));
+    if (fresh) corner.push_back(static_cast<Index>(c));
     if (fresh && refine) ++pieces[vertex_[c]];
     vertex[c] = it->second;
   }
   vertex_ = std::move(vertex);
+  corner_ = std::move(corner);
   const auto apart = [](std::size_t count) { return count > 1; };
   return static_cast<std::size_t>(std::count_if(pieces.begin(), pieces.end(), apart));
 }

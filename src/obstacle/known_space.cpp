@@ -147,7 +147,7 @@ struct KnownSpace::Impl {
 std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
                                                     const std::vector<OccupiedLeaf>& known_leaves) {
   if (!isResolution(resolution_m)) {
-    throw std::invalid_argument(noResolution("resolution_m", std::to_string(resolution_m)));
+    throw std::invalid_argument(noResolution("resolution_m", resolution_m));
   }
   return std::shared_ptr<const KnownSpace>(new KnownSpace(std::make_unique<Impl>(resolution_m, known_leaves)));
 }

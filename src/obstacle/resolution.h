@@ -16,12 +16,13 @@ inline bool isResolution(double resolution_m) {
 }
 
 /// "NAME is VALUE, which is not a length from ... to ... m".
-inline std::string noResolution(const std::string& name, const std::string& value) {
-  std::ostringstream limits;
+inline std::string noResolution(const std::string& name, double resolution_m) {
+  std::ostringstream value, limits;
+  value << resolution_m;
   limits << tolerance::SMALLEST_RESOLUTION_M << " to " << tolerance::LARGEST_RESOLUTION_M;
   std::string range = limits.str();
   range.erase(std::remove(range.begin(), range.end(), '+'), range.end());  // of an exponent
-  return name + " is " + value + ", which is not a length from " + range + " m";
+  return name + " is " + value.str() + ", which is not a length from " + range + " m";
 }
 
 }  // namespace dccd

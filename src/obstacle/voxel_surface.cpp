@@ -1,7 +1,6 @@
 #include "dccd/voxel_surface.h"
 
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 #include <tuple>
 
@@ -13,9 +12,7 @@ namespace {
 
 double checkedResolution(double resolution_m) {
   if (isResolution(resolution_m)) return resolution_m;
-  std::ostringstream text;
-  text << resolution_m;
-  throw std::invalid_argument(noResolution("resolution_m", text.str()));
+  throw std::invalid_argument(noResolution("resolution_m", resolution_m));
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ TreeKind treeKind(const std::string& id) {
 }
 
 void checkResolution(double resolution) {
-  if (!isResolution(resolution)) throw OctomapError(noResolution("octomap resolution", text(resolution)));
+  if (!isResolution(resolution)) throw OctomapError(noResolution("octomap resolution", resolution));
 }
 
 /// The bytes of a stream, in order.

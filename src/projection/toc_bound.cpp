@@ -68,7 +68,7 @@ double linearTocBound(PairKind kind, const VertexMotion* vertices, const Quad& p
     simd::project(vertices[pair[i]].t0, p0[i]);
     simd::project(vertices[pair[i]].t1, p1[i]);
   }
-  return bound(p0, p1, kind == PairKind::VERTEX_FACE ? 1 : 2, minimum_separation_m);
+  return bound(p0, p1, factsOf(kind).vertices[0], minimum_separation_m);
 }
 
 double linearTocBound(PairKind kind, const PairMotion& pair, double minimum_separation_m) {
@@ -77,7 +77,7 @@ double linearTocBound(PairKind kind, const PairMotion& pair, double minimum_sepa
     simd::project(pair.x[0][i], p0[i]);
     simd::project(pair.x[1][i], p1[i]);
   }
-  return bound(p0, p1, kind == PairKind::VERTEX_FACE ? 1 : 2, minimum_separation_m);
+  return bound(p0, p1, factsOf(kind).vertices[0], minimum_separation_m);
 }
 
 }  // namespace dccd

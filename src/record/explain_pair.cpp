@@ -92,8 +92,12 @@ class PairExplanation : Explanation {
       return lines_;
     }
     // As it is; then with the pair alone and nothing culled, so that every stage is asked.
+    // As it is with the limits of what it may find: what was recorded for being too much is too much for this, too.
     const Options whole = plain(options_);
-    const auto seen = observe(step_, whole);
+    Options limited = whole;
+    limited.max_found = options_.max_found;
+    limited.max_found_per_feature = options_.max_found_per_feature;
+    const auto seen = observe(step_, limited, &cut_);
     Step pair = alone(step_, features_);
     pair.map = ObstacleMap();
     Options all = whole;
@@ -108,8 +112,10 @@ class PairExplanation : Explanation {
       rungs[rung] = observe(pair, all);
     }
     for (part_ = 0; part_ < parts_; ++part_) {
+      const auto at = seen.find(part_);  // a step that was cut may not have come to it
+      const Watch::Seen whole_step = at == seen.end() ? Watch::Seen() : at->second;
       say("rules", Says::KEPT, "a pair that the step asks about");
-      tellStages(seen.at(part_), conservative.at(part_), linearBound(conservative.at(part_).separation.total_m));
+      tellStages(whole_step, conservative.at(part_), linearBound(conservative.at(part_).separation.total_m));
       const bool held = conservative.at(part_).separation.total_m > 0;
       for (const Accuracy rung : allRungs()) {
         if (!held) tellRung(rung, rungs.at(rung).at(part_));
@@ -120,11 +126,12 @@ class PairExplanation : Explanation {
   }
 
  private:
-  std::map<std::size_t, Watch::Seen> observe(const Step& step, const Options& options) const {
+  std::map<std::size_t, Watch::Seen> observe(const Step& step, const Options& options, bool* cut = nullptr) const {
     Watch watch(question_.kind, features_);
     History history;
     history.impl().observer = &watch;
-    detect(step, options, history);
+    const Outcome outcome = detect(step, options, history);
+    if (cut) *cut = outcome.cut;
     return watch.parts;
   }
 
@@ -171,7 +178,9 @@ class PairExplanation : Explanation {
     text << "the projections overlap in all 8 directions at some time, not before toc " << bound;
     say("linear", bound > 1 ? Says::REJECTED : Says::KEPT,
         bound > 1 ? "in one of the 8 directions the projections stay apart during the whole step" : text.str());
-    if (seen.self_left_out.empty()) {
+    if (seen.self_left_out.empty() && !seen.streamed && cut_) {
+      say("broad phase", Says::UNDECIDED, "not known: the step was cut at the limit of what it may find");
+    } else if (seen.self_left_out.empty()) {
       say("broad phase", seen.streamed ? Says::KEPT : Says::REJECTED,
           seen.streamed ? "the clustered trees stream the pair"
                         : "the bounds of the pair, of clusters around it, or of the two bodies stay apart");
@@ -206,6 +215,7 @@ class PairExplanation : Explanation {
 
   const PairQuestion& question_;
   std::vector<Feature> features_;
+  bool cut_ = false;  // the step, at the limit of what it may find
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <type_traits>
 
 #include "dccd/accuracy.h"
 #include "dccd/tolerances.h"
@@ -85,13 +86,17 @@ bool Carried::isContinuedBy(const Step& step) const {
 
 void History::Impl::forgetMade() noexcept {
   carried.clear();
-  options.reset();
-  bodies_made = expected_known = false;
-  obstacle_checks.clear();
+  options.reset();  // so that all that follows from them is made, too
+  forgetMap();
+  expected_known = false;
+  scene.forgetBounds();
+  static_assert(std::is_nothrow_default_constructible_v<PatchMaker> && std::is_nothrow_move_assignable_v<PatchMaker>);
+  patches = PatchMaker();
+}
+
+void History::Impl::forgetMap() noexcept {
   map_given = map_reduced = nullptr;
   excluded_voxels = 0;
-  scene.forgetBounds();
-  patches = PatchMaker();
 }
 
 Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline deadline) {
@@ -186,7 +191,7 @@ void History::Impl::setOptions(const Options& wanted) {
   obstacle_checks.clear();
   carried.map.clear();
   expected_known = false;
-  map_given = nullptr;  // other boxes may be excluded
+  forgetMap();  // other boxes may be excluded
   options = wanted;
 }
 
@@ -209,16 +214,17 @@ void History::Impl::setBodies(const Step& step) {
 void History::Impl::useMap(const ObstacleMap& map) {
   const bool same_pose = map_pose.matrix() == map.map_from_fixed.matrix();
   if (map_given == map.surface && (same_pose || options->exclude_boxes.empty())) return;
-  map_reduced = map.surface;
-  excluded_voxels = 0;
+  forgetMap();
+  std::shared_ptr<const VoxelSurface> reduced = map.surface;
   if (map.surface && !options->exclude_boxes.empty()) {
     RemainingLeaves remaining = leavesOutside(map.surface->leaves(), map.surface->resolution(),
                                               map.map_from_fixed.inverse(), options->exclude_boxes);
-    excluded_voxels = remaining.excluded_voxels;
-    if (excluded_voxels > 0) {
-      map_reduced = VoxelSurface::build(map.surface->resolution(), std::move(remaining.leaves));
+    if (remaining.excluded_voxels > 0) {
+      reduced = VoxelSurface::build(map.surface->resolution(), std::move(remaining.leaves));
     }
+    excluded_voxels = remaining.excluded_voxels;
   }
+  map_reduced = std::move(reduced);
   map_given = map.surface;
   map_pose = map.map_from_fixed;
 }

@@ -82,8 +82,10 @@ struct History::Impl {
   /// in them, the range of the records. Nothing is carried over from it. Throws what run() throws.
   void passOver(const Step& step, const Options& wanted);
 
-  /// What throws may leave half of it made: all that follows from options, bodies and map is made anew.
+  /// What throws may leave half of it made: what follows from options and map is made anew, and from bodies, where
+  /// these were not done. Nothing is carried over.
   void forgetMade() noexcept;
+  void forgetMap() noexcept;
   void setOptions(const Options& wanted);
   void setBodies(const Step& step);
   void useMap(const ObstacleMap& map);

@@ -17,7 +17,7 @@ constexpr double STEPS_AHEAD = 2;               // that a certificate is to last
 constexpr double WORTH_A_CERTIFICATE = 1.5;     // residuals of this step that it must have
 // Shares of the pairs that are known to be apart. Pairs are tested so fast that smaller shares do not pay; what it
 // takes to begin is more than what it takes to go on.
-constexpr double SHARE_TO_TURN_ON = 0.93, SHARE_TO_STAY_ON = 0.75;
+constexpr double WORTH_TURNING_ON = 0.93, WORTH_STAYING_ON = 0.75;
 constexpr std::size_t MOST_MEASURED = 6;   // distances for one certificate; one takes as long as a row of gaps
 constexpr std::size_t PAIRS_PER_EDGE = 2;  // that may be kept: 144 bytes a triangle
 constexpr std::size_t PAIRS_IN_ANY_CASE = 4096;
@@ -280,7 +280,7 @@ void PairMemory::certify(const SceneArrays& scene, const Group& group, Pair& pai
 void PairMemory::endStep() {
   last_.clear();  // pairs of groups that this step did not have
   const std::size_t pairs = pair_count_;
-  const bool worth = first_ || static_cast<double>(known_apart_) >= SHARE_TO_STAY_ON * static_cast<double>(pairs);
+  const bool worth = first_ || static_cast<double>(known_apart_) >= WORTH_STAYING_ON * static_cast<double>(pairs);
   first_ = false;
   if (worth) {
     next_rest_ = SHORTEST_REST;
@@ -319,7 +319,7 @@ void PairMemory::judgeTrial() {
       pair.wait = pair.failed = 0;
     }
   }
-  if (pairs > 0 && static_cast<double>(apart) < SHARE_TO_TURN_ON * static_cast<double>(pairs)) {
+  if (pairs > 0 && static_cast<double>(apart) < WORTH_TURNING_ON * static_cast<double>(pairs)) {
     turnOff(next_rest_);
     next_rest_ = std::min(2 * next_rest_, LONGEST_REST);
     return;

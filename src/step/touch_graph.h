@@ -45,7 +45,7 @@ class TouchGraph {
  public:
   void setBodies(const std::vector<Body>& bodies);
   Index firstVertex(std::size_t body) const { return vertex_begin_[body]; }
-  std::size_t vertexCount() const { return vertex_begin_.back(); }
+  std::size_t vertexCount() const { return vertex_begin_.empty() ? 0 : vertex_begin_.back(); }
   std::size_t bodyCount() const { return topologies_.size(); }
   bool sameMesh(std::size_t body, const Body& now) const;
 
@@ -70,7 +70,7 @@ class TouchGraph {
   void nameComponents(const std::vector<Touch>& touches, const Group* first, const Group* last);
 
   std::vector<std::shared_ptr<const Topology>> topologies_;
-  std::vector<Index> vertex_begin_{0};
+  std::vector<Index> vertex_begin_;                           // per body, and where the last one ends
   std::vector<std::uint32_t> neighbours_begin_, neighbours_;  // per vertex: the other ends of its edges, ascending
 
   std::vector<Group> groups_;  // by partners

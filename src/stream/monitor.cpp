@@ -252,7 +252,7 @@ Outcome Monitor::Impl::passOver(const Step& step) {
   try {
     if (held) history.impl().passOver(*held, options.detector);
   } catch (const std::exception&) {
-    history.clear();  // as after a step that failed: the range that computes it says so
+    history.impl().forgetMade();  // as after a step that failed: the range that computes it says so
   }
   Outcome outcome;
   outcome.status = StepStatus::OK;
@@ -283,7 +283,7 @@ void Monitor::Impl::follow(Outcome& outcome) {
   try {
     tracker.follow(history.impl().patches, options.patch_gap_s, outcome);
   } catch (...) {
-    tracker.forget();
+    tracker.forget(outcome);
     throw;
   }
   const double ms = msSince(start);

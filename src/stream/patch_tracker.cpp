@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "dccd/tolerances.h"
@@ -58,8 +59,11 @@ void PatchTracker::seam(std::size_t body) {
   }
 }
 
-void PatchTracker::forget() noexcept {
+void PatchTracker::forget(Outcome& outcome) noexcept {
+  static_assert(std::is_nothrow_default_constructible_v<TouchGraph> && std::is_nothrow_move_assignable_v<TouchGraph>);
   try {
+    waiting_.insert(waiting_.end(), outcome.patch_events.begin(), outcome.patch_events.end());
+    outcome.patch_events.clear();
     seam();
   } catch (const std::exception&) {
     // There is no memory for telling what has ended either.
@@ -325,6 +329,7 @@ void PatchTracker::begin(Outcome& outcome) {
   }
   std::stable_sort(fresh.begin(), fresh.end(),
                    [](const Part* a, const Part* b) { return a->toc_lower < b->toc_lower; });
+  outcome.patch_events.reserve(outcome.patch_events.size() + fresh.size());  // what lives is told of
   for (Part* part : fresh) {
     part->id = next_id_++;
     Living& living = living_[part->id];
@@ -385,6 +390,8 @@ void PatchTracker::endWhatIsGone(Outcome& outcome) {
     if (event.kind == PatchEventKind::MERGED) merged.insert(merged.end(), event.others.begin(), event.others.end());
   }
   std::vector<PatchEvent> ends;
+  ends.reserve(living_.size());
+  outcome.patch_events.reserve(outcome.patch_events.size() + living_.size());  // what is gone is told of
   for (auto at = living_.begin(); at != living_.end();) {
     if (std::binary_search(alive_.begin(), alive_.end(), at->first)) {
       ++at;

@@ -30,8 +30,9 @@ class PatchTracker {
               const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
   void recognise(const PatchMaker& found, Outcome& outcome);
-  /// After an exception from one of these: what lives ends, as at a seam, and nothing half done is left.
-  void forget() noexcept;
+  /// After an exception from follow(): nothing half done is left, and what lives ends, as at a seam. What the outcome
+  /// already says has happened is told with the next one, as far as there is memory.
+  void forget(Outcome& outcome) noexcept;
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
   /// From now on patches get no identities: what they follow from goes into the log.

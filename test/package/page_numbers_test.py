@@ -80,8 +80,8 @@ NUMBERS = {
         (r'1 s or (\d+) messages', lambda: constant('src/input/mesh_subscription.cpp', 'SUBSCRIBER_QUEUE')),
     ],
     'doc/algorithm.md': [
-        (r'less than (\d+) % of it would hold', lambda: round(100 * memory('WORTH_A_TRY'))),
-        (r'holds less than (\d+) %', lambda: round(100 * memory('WORTH_IT'))),
+        (r'less than (\d+) % of it would hold', lambda: round(100 * memory('WORTH_TURNING_ON'))),
+        (r'holds less than (\d+) %', lambda: round(100 * memory('WORTH_STAYING_ON'))),
     ],
     'doc/fleet.md': [
         (r'job may take ([\d,]+) MB', lambda: fleet('mem-mb')),

@@ -7,18 +7,32 @@ namespace dccd {
 namespace test {
 
 std::atomic<std::uint64_t> allocations{0}, allocated_bytes{0};
-std::atomic<std::int64_t> allocations_until_failure{-1};
 
 namespace {
+
+std::atomic<bool> may_fail{false}, failure_lasts{false};
+std::atomic<std::int64_t> left{0};  // before the failure; then it counts on
 
 void* allocate(std::size_t size) {
   ++allocations;
   allocated_bytes += size;
-  if (allocations_until_failure >= 0 && allocations_until_failure-- == 0) return nullptr;
+  if (may_fail) {
+    const std::int64_t before = left--;
+    if (before == 0 || (before < 0 && failure_lasts)) return nullptr;
+  }
   return std::malloc(size ? size : 1);
 }
 
 }  // namespace
+
+AllocationFailure::AllocationFailure(int after, bool lasts) {
+  left = after;
+  failure_lasts = lasts;
+  may_fail = true;
+}
+AllocationFailure::~AllocationFailure() { may_fail = false; }
+bool AllocationFailure::met() const { return left < 0; }
+
 }  // namespace test
 }  // namespace dccd
 

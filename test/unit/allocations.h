@@ -8,8 +8,16 @@ namespace dccd {
 namespace test {
 
 extern std::atomic<std::uint64_t> allocations, allocated_bytes;
-/// The allocation after so many more throws std::bad_alloc, that one alone; negative: none does.
-extern std::atomic<std::int64_t> allocations_until_failure;
+/// While it lives, the allocation after `after` more throws std::bad_alloc, and where it lasts, so do all that follow.
+class AllocationFailure {
+ public:
+  AllocationFailure(int after, bool lasts);
+  ~AllocationFailure();
+  AllocationFailure(const AllocationFailure&) = delete;
+  AllocationFailure& operator=(const AllocationFailure&) = delete;
+  /// An allocation has failed.
+  bool met() const;
+};
 
 }  // namespace test
 }  // namespace dccd

@@ -82,7 +82,7 @@ TEST(KnownSpace, AResolutionThatIsNoneIsNamed) {
     KnownSpace::build(-0.5, {});
     ADD_FAILURE();
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "resolution_m is -0.500000, which is not a length from 1e-290 to 1e290 m");
+    EXPECT_STREQ(error.what(), "resolution_m is -0.5, which is not a length from 1e-290 to 1e290 m");
   }
 }
 

@@ -93,6 +93,25 @@ TEST(History, EverySeamLeavesNothingBehind) {
   expectSame(detector.run(next.motion()), expected);
 }
 
+/// Other options make what follows from the map anew: also where there is no map any more.
+TEST(History, AMapThatIsGoneIsNotKeptByOtherOptions) {
+  TestStep step = crumpled(3, 1, 9);
+  for (Positions* x : {&step.bodies[0].t0, &step.bodies[0].t1}) {
+    for (Vec3& p : *x) p *= 0.1;
+  }
+  Step with_map = step.motion();
+  with_map.map = {VoxelSurface::build(0.05, {{{32768, 32768, 32768}, 4}}), 1, Eigen::Isometry3d::Identity(), {}};
+  Options expecting, other;
+  expecting.obstacle_expected = other.obstacle_expected = true;
+  other.max_contacts = 5000;
+  History history;
+  ASSERT_GT(detect(with_map, expecting, history).counts.obstacle, 0u);
+  const Outcome without = detect(step.motion(), other, history);
+  EXPECT_EQ(without.status, StepStatus::NO_MAP);
+  EXPECT_EQ(without.counts.obstacle, 0u);
+  EXPECT_EQ(without.obstacle, nullptr);
+}
+
 TEST(History, AStepAsideBeginsWhereItIsToldOnce) {
   const TestStep first = clothsInABox(), next = nextOf(first);
   Detector detector;

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <new>
+#include <optional>
 
 #include "dccd/stream.h"
 #include "support/step_support.h"
@@ -17,7 +18,8 @@ namespace {
 
 constexpr int BEFORE = 4, AFTER = 5;  // frames; of the first two something is made that all later steps use
 
-/// Two cloths on a table, of which one end is lifted for two frames and lies for two: patches begin, come apart, merge and end.
+/// Two cloths on a table, of which one end is lifted for two frames and lies for two: patches begin, come apart, merge
+/// and end.
 Positions cloth(int frame, bool upper) {
   return strip(6, 8, 0.02, [&](std::size_t column) {
     const double wave = column < 3 || (column > 4 && frame / 2 % 2 == 0) ? -0.001 : 0.01;
@@ -110,17 +112,26 @@ TEST(NoMemory, AStepThatFailsAnywhereLeavesNothingHalfDone) {
   ASSERT_GT(expected[BEFORE].patches.size(), 1u);
   ASSERT_FALSE(expected[BEFORE].patch_events.empty());
   int failed = 0;
-  const auto failAt = [&](int before, int n) {
+  const auto failAt = [&](int before, int n, bool lasts) {
     Cloths cloths;
     std::map<std::uint64_t, PatchEventKind> last;
     for (int k = 0; k < before; ++k) expectInOrder(cloths.feed(k), last);
     cloths.push(before);
-    allocations_until_failure = n;
-    const Outcome outcome = cloths.next();
-    const bool met = allocations_until_failure < 0;
-    allocations_until_failure = -1;
-    failed += outcome.status == StepStatus::INTERNAL_ERROR;
-    expectInOrder(outcome, last);
+    bool met = false;
+    std::optional<Outcome> outcome;
+    {
+      const AllocationFailure failure(n, lasts);
+      try {
+        outcome.emplace();
+        cloths.monitor().next(0, *outcome);
+      } catch (const std::bad_alloc&) {
+        outcome.reset();  // not even what has failed could be told: it is done again
+      }
+      met = failure.met();
+    }
+    if (!outcome) outcome = cloths.next();
+    failed += outcome->status == StepStatus::INTERNAL_ERROR;
+    expectInOrder(*outcome, last);
     for (int k = before + 1; k <= before + AFTER; ++k) {
       const Outcome later = cloths.feed(k);
       expectSame(later, expected[static_cast<std::size_t>(k)]);
@@ -130,9 +141,11 @@ TEST(NoMemory, AStepThatFailsAnywhereLeavesNothingHalfDone) {
     return met;
   };
   for (const int before : {1, 2, BEFORE}) {
-    EXPECT_GT(failingEverywhere([&](int n) { return failAt(before, n); }), before == 1 ? 150 : 30) << before;
+    for (const bool lasts : {false, true}) {
+      EXPECT_GT(failingEverywhere([&](int n) { return failAt(before, n, lasts); }), before == 1 ? 150 : 30) << before;
+    }
   }
-  EXPECT_GT(failed, 200) << "else the failures were not in the step";
+  EXPECT_GT(failed, 400) << "else the failures were not in the step";
 }
 
 TEST(NoMemory, QuestionsThatFailAnywhereLeaveNothingHalfDone) {
@@ -141,16 +154,18 @@ TEST(NoMemory, QuestionsThatFailAnywhereLeaveNothingHalfDone) {
   const Outcome check = whole.monitor().checkNow(), prediction = whole.monitor().predict(), next = whole.feed(BEFORE);
   const int allocations_of_a_question = failingEverywhere([&](int n) {
     bool met = false;
-    for (const bool predicts : {true, false}) {
+    for (const int kind : {0, 1, 2, 3}) {
+      const bool predicts = kind % 2 == 0, lasts = kind / 2 == 0;
       Cloths cloths;
       for (int k = 0; k < BEFORE; ++k) cloths.feed(k);
-      allocations_until_failure = n;
-      try {
-        predicts ? cloths.monitor().predict() : cloths.monitor().checkNow();
-      } catch (const std::bad_alloc&) {
+      {
+        const AllocationFailure failure(n, lasts);
+        try {
+          predicts ? cloths.monitor().predict() : cloths.monitor().checkNow();
+        } catch (const std::bad_alloc&) {
+        }
+        met = met || failure.met();
       }
-      met = met || allocations_until_failure < 0;
-      allocations_until_failure = -1;
       expectSame(cloths.monitor().checkNow(), check);
       expectSame(cloths.monitor().predict(), prediction);
       expectSame(cloths.feed(BEFORE), next);
