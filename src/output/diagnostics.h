@@ -24,8 +24,8 @@ class Diagnostics {
   /// Once a second by the clock of `now_ns`.
   bool isDue(std::int64_t now_ns) const;
   /// The status since the last call; begins the next period. `context`: the state of now, whether or not there has been
-  /// an outcome; `hint`: what looks like a mistake; `map_topic`:
-  /// where the octomap is looked for, or empty when none is expected.
+  /// an outcome; `hint`: what looks like a mistake; `map_topic`: where the octomap is looked for, or empty when none is
+  /// expected.
   diagnostic_msgs::DiagnosticArray take(std::int64_t now_ns, const ros::Time& stamp, const StatsContext& context,
                                         bool enabled, const std::string& map_topic, const std::string& hint);
 

@@ -91,8 +91,8 @@ class PairExplanation : Explanation {
       for (part_ = 0; part_ < parts_; ++part_) say("rules", Says::REJECTED, rule);
       return lines_;
     }
-    // As it is; then with the pair alone and nothing culled, so that every stage is asked.
-    // As it is with the limits of what it may find: what was recorded for being too much is too much for this, too.
+    // First the whole step, with its limits of what it may find: what was recorded for being too much is too much here,
+    // too. Then the pair alone with nothing culled, so that every stage is asked.
     const Options whole = plain(options_);
     Options limited = whole;
     limited.max_found = options_.max_found;

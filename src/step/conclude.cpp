@@ -106,8 +106,10 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
                                    std::to_string(outcome.total_contacts) + " contacts are listed");
   }
   const auto notBefore = [&] {  // rounded down, as the bound is
-    const double toc = std::floor(outcome.unchecked_toc_lower * 1e6) / 1e6;
-    return "nothing that was left out touches before toc " + std::to_string(toc);
+    const double toc = outcome.unchecked_toc_lower, millionths = std::floor(toc * 1e6);
+    // The product may have been rounded up to a whole number; what fma() leaves has its true sign.
+    const double below = std::fma(toc, 1e6, -millionths) < 0 ? millionths - 1 : millionths;
+    return "nothing that was left out touches before toc " + std::to_string(below / 1e6);
   };
   const std::string ran_out =
       options.step_budget_ms > 0 ? "the step budget ran out" : "the time that a step may take without a budget ran out";

@@ -17,8 +17,7 @@ constexpr std::size_t FEWEST_GROUPS = 8;  // pairs of them that are worth a memo
 }  // namespace
 
 /// A rung that proves nothing may call apart what meets, and meeting what is apart: it has to see what it would see
-/// otherwise. So has who
-/// watches a pair. A step aside is alone, and uncertain vertices have other radii in each step.
+/// otherwise. So has who watches a pair. A step aside is alone, and uncertain vertices have other radii in each step.
 bool History::Impl::mayRemember(const Part& part) {
   const bool wanted = options->keep_bounds && !stopsAtFirst() && provesAnswers(options->accuracy.rung) && !observer &&
                       !aside && options->broad_phase == BroadPhase::CLUSTERED && !scene.uncertain() &&

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <tuple>
 #include <unordered_map>
@@ -16,10 +17,10 @@ namespace dccd {
 
 /// A contact, or an edge through a face, as the graph looks at it. Vertices are numbered through all bodies.
 struct Touch {
-  // Kinds beside the values of PairKind.
-  static constexpr std::uint8_t CROSSING = 5;
-  static constexpr std::uint8_t VERTICES = 6;  ///< one of each side, of something that touched
-  static constexpr std::uint8_t SIZES[7][2] = {{1, 3}, {2, 2}, {1, 0}, {2, 0}, {3, 0}, {2, 3}, {1, 1}};
+  // Kinds beside the values of PairKind, and the vertices of their sides.
+  static constexpr std::uint8_t CROSSING = std::size(PAIR_KINDS);
+  static constexpr std::uint8_t VERTICES = CROSSING + 1;  ///< one of each side, of something that touched
+  static constexpr std::array<std::uint8_t, 2> MORE_SIZES[] = {{2, 3}, {1, 1}};
 
   std::array<Index, 5> point{NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX};  ///< the leaf's key is in the last two
   std::array<std::uint16_t, 2> body{0, 0};
@@ -30,8 +31,11 @@ struct Touch {
   bool expected = false;
 
   /// How many vertices are on its sides; a leaf has none.
-  int firstSize() const { return SIZES[kind][0]; }
-  int secondSize() const { return SIZES[kind][1]; }
+  int firstSize() const { return sizes()[0]; }
+  int secondSize() const { return sizes()[1]; }
+  const std::array<std::uint8_t, 2>& sizes() const {
+    return kind < CROSSING ? PAIR_KINDS[kind].vertices : MORE_SIZES[kind - CROSSING];
+  }
   bool onMap() const { return body[1] == OBSTACLE_BODY; }
   VoxelKey voxel() const {
     return {static_cast<std::uint16_t>(point[3] >> 16), static_cast<std::uint16_t>(point[3]),

@@ -48,12 +48,13 @@ void PatchTracker::seam(std::size_t body) {
     waiting_.back().to_ns = at->second.released_ns;  // known only where it had been let go before the seam
     at = living_.erase(at);
   }
-  std::swap(trace_, all_);
-  trace_.clear();
   if (body == ALL) {
+    trace_.clear();
     has_last_ = false;
     return;
   }
+  std::swap(trace_, all_);
+  trace_.clear();
   for (std::size_t i = 0; i < all_.spots.size(); ++i) {
     if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
   }

@@ -185,6 +185,7 @@ TEST_F(Plain, MarkersAreBuiltForSubscribersOnly) {
   EXPECT_EQ(array.markers[0].action, visualization_msgs::Marker::DELETEALL);
   EXPECT_EQ(array.markers[0].header.frame_id, "world");
   EXPECT_TRUE(array.markers[0].ns.empty());
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(5.1); })) << "published after the markers";
   EXPECT_EQ(stats.last().markers_built, 2u);
   std_srvs::SetBool enable;
   enable.request.data = false;

@@ -35,6 +35,21 @@ TEST(Diagnostics, CountersAreThoseOfNowWithoutAnOutcome) {
   EXPECT_EQ(array.status.at(0).message, "disabled");
 }
 
+TEST(Diagnostics, AMapThatIsNotThereHasNoAge) {
+  Diagnostics diagnostics("/monitor");
+  Outcome outcome;
+  outcome.answered = true;
+  outcome.stamp_ns = 7 * SECOND_NS;
+  Step step;
+  step.map.stamp_ns = 4 * SECOND_NS;
+  outcome.step = share(step);
+  diagnostics.add(outcome, 0);
+  EXPECT_EQ(valueOf(diagnostics.take(SECOND_NS, ros::Time(1), {}, true, "", ""), "map age [s]"), "no such key");
+  outcome.obstacle = VoxelSurface::build(0.1, {{{0, 0, 0}, 1}});
+  diagnostics.add(outcome, 0);
+  EXPECT_EQ(valueOf(diagnostics.take(2 * SECOND_NS, ros::Time(2), {}, true, "", ""), "map age [s]"), "3");
+}
+
 TEST(Diagnostics, FramesThatAreDroppedDoArrive) {
   Diagnostics diagnostics("/monitor");
   StatsContext context;

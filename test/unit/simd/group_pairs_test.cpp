@@ -2,7 +2,6 @@
 #include "simd/group_pairs.h"
 
 #include <gtest/gtest.h>
-#include <hwy/aligned_allocator.h>
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -15,34 +14,11 @@
 #include <vector>
 
 #include "support/step_support.h"
+#include "unit/simd/node_groups.h"
 
 namespace dccd {
 namespace test {
 namespace {
-
-using simd::AOS_SIZE;
-using simd::EMPTY_HI;
-using simd::EMPTY_LO;
-using simd::GROUP;
-using simd::RECORD;
-using simd::SOA_SIZE;
-using Random = std::mt19937_64;
-
-std::int16_t anyRecordValue(Random& random, int range) {
-  return static_cast<std::int16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * range + 1)) - range);
-}
-
-/// Bounds of one node: lo and hi of the 16 record values.
-struct Node {
-  std::array<std::int16_t, RECORD> lo, hi;
-};
-
-Node emptyNode() {
-  Node n;
-  n.lo.fill(EMPTY_LO);
-  n.hi.fill(EMPTY_HI);
-  return n;
-}
 
 bool isEmpty(const Node& n) { return n.lo[0] == EMPTY_LO; }
 
@@ -55,57 +31,6 @@ bool apart(const Node& a, const Node& b, bool t0_only) {
   }
   return false;
 }
-
-struct Groups {
-  std::size_t count = 0;
-  std::vector<Node> nodes;  // 16 a group
-  hwy::AlignedFreeUniquePtr<std::int16_t[]> soa, aos;
-
-  simd::GroupsView view() const { return {soa.get(), aos.get()}; }
-  void pack() {
-    count = nodes.size() / GROUP;
-    soa = hwy::AllocateAligned<std::int16_t>(count * SOA_SIZE);
-    aos = hwy::AllocateAligned<std::int16_t>(count * AOS_SIZE);
-    for (std::size_t g = 0; g < count; ++g) {
-      for (std::size_t k = 0; k < RECORD; ++k) {
-        std::int16_t lo = EMPTY_LO, hi = EMPTY_HI;
-        for (std::size_t i = 0; i < GROUP; ++i) {
-          const Node& n = nodes[g * GROUP + i];
-          soa[g * SOA_SIZE + simd::soaIndex(k, i)] = n.lo[k];
-          soa[g * SOA_SIZE + RECORD * GROUP + simd::soaIndex(k, i)] = n.hi[k];
-          lo = std::min(lo, n.lo[k]);
-          hi = std::max(hi, n.hi[k]);
-        }
-        aos[g * AOS_SIZE + k] = lo;
-        aos[g * AOS_SIZE + RECORD + k] = hi;
-      }
-    }
-  }
-};
-
-/// range: of the values; small ones make ties. Some lanes, and now and then whole groups, are empty.
-Groups randomGroups(Random& random, std::size_t count, int range, int size) {
-  Groups groups;
-  for (std::size_t g = 0; g < count; ++g) {
-    const bool all_empty = random() % 16 == 0;
-    for (std::size_t i = 0; i < GROUP; ++i) {
-      Node n = emptyNode();
-      if (!all_empty && random() % 8 != 0) {
-        for (std::size_t k = 0; k < RECORD; ++k) {
-          const std::int16_t a = anyRecordValue(random, range);
-          const int b = a + static_cast<int>(random() % static_cast<unsigned>(size + 1));
-          n.lo[k] = a;
-          n.hi[k] = static_cast<std::int16_t>(std::min(b, 32766));
-        }
-      }
-      groups.nodes.push_back(n);
-    }
-  }
-  groups.pack();
-  return groups;
-}
-
-using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
 Pairs referencePairs(const Groups& a, const Groups& b, const std::vector<std::uint32_t>& group_pairs, bool self,
                      simd::Diagonal diagonal, bool t0_only) {
@@ -123,26 +48,6 @@ Pairs referencePairs(const Groups& a, const Groups& b, const std::vector<std::ui
     }
   }
   std::sort(pairs.begin(), pairs.end());
-  return pairs;
-}
-
-Pairs kernelPairs(const simd::GroupsView& a, const simd::GroupsView& b, const std::vector<std::uint32_t>& group_pairs,
-                  bool self, simd::Diagonal diagonal, bool t0_only, std::size_t capacity) {
-  Pairs pairs;
-  std::vector<std::uint32_t> out(2 * capacity + 2, 0xdeadbeef);
-  std::size_t done = 0;
-  const std::size_t count = group_pairs.size() / 2;
-  while (done < count) {
-    std::size_t consumed = 0;
-    const std::size_t n = simd::testGroupPairs(a, b, group_pairs.data() + 2 * done, count - done, self, diagonal,
-                                               t0_only, out.data(), capacity, &consumed);
-    EXPECT_GT(consumed, 0u) << "no progress";
-    EXPECT_LE(n, capacity);
-    EXPECT_EQ(out[2 * capacity], 0xdeadbeef) << "written beyond the capacity";
-    if (consumed == 0) break;
-    for (std::size_t i = 0; i < n; ++i) pairs.push_back({out[2 * i], out[2 * i + 1]});
-    done += consumed;
-  }
   return pairs;
 }
 
@@ -319,112 +224,6 @@ TEST(GroupPairs, PassingEachOtherIsKept) {
   forEachSimdTarget([&](const std::string& target) {
     EXPECT_EQ(kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, false, 256).size(), 1u) << target;
     EXPECT_EQ(kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, true, 256).size(), 0u) << target;
-  });
-}
-
-// --- groups ----------------------------------------------------------------------------------------------------------
-
-TEST(GroupPairs, LeavesHoldTheBoundsOfTheirVertices) {
-  forEachSimdTarget([](const std::string& target) {
-    Random random(17);
-    for (std::size_t arity = 1; arity <= 3; ++arity) {
-      for (const bool with_margin : {false, true}) {
-        const std::size_t vertices = 40, groups = 3;
-        std::vector<std::int16_t> records(vertices * RECORD);
-        for (auto& r : records) r = anyRecordValue(random, 32764);
-        std::int16_t margin[RECORD];
-        for (auto& m : margin) {
-          m = static_cast<std::int16_t>(random() % 3 == 0 ? 32766 + random() % 2 : random() % 1000);
-        }
-        std::vector<std::uint32_t> indices(groups * GROUP * arity);
-        for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint32_t>(random() % vertices);
-        for (std::size_t lane = 0; lane < groups * GROUP; lane += 1 + random() % 7) indices[lane * arity] = UINT32_MAX;
-
-        Groups expected;
-        for (std::size_t lane = 0; lane < groups * GROUP; ++lane) {
-          Node n = emptyNode();
-          for (std::size_t k = 0; k < RECORD && indices[lane * arity] != UINT32_MAX; ++k) {
-            int lo = 40000, hi = -40000;
-            for (std::size_t j = 0; j < arity; ++j) {
-              lo = std::min<int>(lo, records[indices[lane * arity + j] * RECORD + k]);
-              hi = std::max<int>(hi, records[indices[lane * arity + j] * RECORD + k]);
-            }
-            if (with_margin) {
-              lo = margin[k] == simd::UNBOUNDED ? -32766 : std::max(lo - margin[k], -32766);
-              hi = margin[k] == simd::UNBOUNDED ? 32766 : std::min(hi + margin[k], 32766);
-            }
-            n.lo[k] = static_cast<std::int16_t>(lo);
-            n.hi[k] = static_cast<std::int16_t>(hi);
-          }
-          expected.nodes.push_back(n);
-        }
-        expected.pack();
-        auto soa = hwy::AllocateAligned<std::int16_t>(groups * SOA_SIZE);
-        auto aos = hwy::AllocateAligned<std::int16_t>(groups * AOS_SIZE);
-        simd::buildLeaves(records.data(), indices.data(), arity, groups * GROUP, with_margin ? margin : nullptr,
-                          soa.get(), aos.get());
-        EXPECT_TRUE(std::equal(soa.get(), soa.get() + groups * SOA_SIZE, expected.soa.get())) << target << arity;
-        EXPECT_TRUE(std::equal(aos.get(), aos.get() + groups * AOS_SIZE, expected.aos.get())) << target << arity;
-      }
-    }
-  });
-}
-
-TEST(GroupPairs, UpperGroupsHoldTheBoundsOfTheirChildren) {
-  forEachSimdTarget([](const std::string& target) {
-    Random random(19);
-    for (std::size_t children = 1; children <= 40; ++children) {
-      const Groups below = randomGroups(random, children, 32764, 1000);
-      Groups expected;
-      for (std::size_t c = 0; c < (children + GROUP - 1) / GROUP * GROUP; ++c) {
-        Node n = emptyNode();
-        if (c < children) {
-          std::copy_n(below.aos.get() + c * AOS_SIZE, RECORD, n.lo.begin());
-          std::copy_n(below.aos.get() + c * AOS_SIZE + RECORD, RECORD, n.hi.begin());
-        }
-        expected.nodes.push_back(n);
-      }
-      expected.pack();
-      auto soa = hwy::AllocateAligned<std::int16_t>(expected.count * SOA_SIZE);
-      auto aos = hwy::AllocateAligned<std::int16_t>(expected.count * AOS_SIZE);
-      simd::buildUpper(below.aos.get(), children, soa.get(), aos.get());
-      EXPECT_TRUE(std::equal(soa.get(), soa.get() + expected.count * SOA_SIZE, expected.soa.get()))
-          << target << children;
-      EXPECT_TRUE(std::equal(aos.get(), aos.get() + expected.count * AOS_SIZE, expected.aos.get()))
-          << target << children;
-    }
-  });
-}
-
-// A margin that reaches the ends of the range must not make a feature look empty, or two overlapping ones apart.
-TEST(GroupPairs, WidenedNodesStillMeetWhatTheyTouch) {
-  forEachSimdTarget([](const std::string& target) {
-    std::vector<std::int16_t> records(2 * RECORD, 32764);
-    std::fill_n(records.begin(), RECORD, static_cast<std::int16_t>(-32764));
-    std::vector<std::uint32_t> indices(GROUP, UINT32_MAX);
-    indices[0] = 0;
-    indices[1] = 1;
-    const auto widened = [&](int m) {
-      std::int16_t margin[RECORD];
-      std::fill_n(margin, RECORD, static_cast<std::int16_t>(m));
-      Groups groups;
-      groups.count = 1;
-      groups.soa = hwy::AllocateAligned<std::int16_t>(SOA_SIZE);
-      groups.aos = hwy::AllocateAligned<std::int16_t>(AOS_SIZE);
-      simd::buildLeaves(records.data(), indices.data(), 1, GROUP, margin, groups.soa.get(), groups.aos.get());
-      return groups;
-    };
-    const Groups none = widened(0);
-    for (const int m : {0, 32763, 32764, 32766, int{simd::UNBOUNDED}}) {
-      const Groups groups = widened(m);
-      const auto pairs =
-          kernelPairs(groups.view(), groups.view(), {0, 0}, true, simd::Diagonal::UPPER_WITH_DIAGONAL, false, 256);
-      // Each lane meets itself; the two meet when 2 m reaches the distance of 65528.
-      EXPECT_EQ(pairs.size(), m >= 32764 ? 3u : 2u) << target << ", margin " << m;
-      // On one side alone the largest margin with an end is half the distance.
-      const auto across = kernelPairs(groups.view(), none.view(), {0, 0}, false, simd::Diagonal::ALL, false, 256);
-      EXPECT_EQ(across.size(), m == simd::UNBOUNDED ? 4u : 2u) << target << ", margin " << m;
-    }
   });
 }
 
