@@ -142,21 +142,15 @@ TEST(MeshDecoder, WhatIsRefusedLeavesItAsItWas) {
 }
 
 TEST(MeshDecoder, OneTriangleIsNotTheGridBeforeIt) {
-  MeshDecoder decoder({});
-  CloudSpec organised;
-  organised.height = 2;
-  organised.width = 2;
-  organised.row_step = 32;
-  decode(decoder, CLOUD, cloud(organised));
-  EXPECT_EQ(decode(decoder, MESH, mesh(SQUARE, {{2, 2, 2}, {0, 1, 2}})).topology->faces().size(), 1u);
-  Positions more = SQUARE;
-  for (int k = 0; k < 12; ++k) more.push_back({3.0 + k, 0, 0});
+  Positions points;
+  for (int k = 0; k < 16; ++k) points.push_back({k / 8 * 1.0, k % 8 * 1.0, 0});
   MeshInputConfig config;
-  config.rows = 4;
-  config.cols = 4;
-  MeshDecoder shaped(config);
-  EXPECT_EQ(decode(shaped, MESH, mesh(more, {})).topology->faces().size(), 18u);
-  EXPECT_EQ(decode(shaped, MESH, mesh(more, {{4, 5, 0}})).topology->faces().size(), 1u);
+  config.rows = 2;
+  config.cols = 8;
+  MeshDecoder decoder(config);
+  EXPECT_EQ(decode(decoder, MESH, mesh(points, {})).topology->faces().size(), 14u);
+  // Its indices are rows and columns.
+  EXPECT_EQ(decode(decoder, MESH, mesh(points, {{2, 8, 0}})).topology->faces().size(), 1u);
 }
 
 TEST(MeshDecoder, ReadsCloudsByNameTypeAndStride) {
