@@ -201,8 +201,24 @@ struct ContactCounts {
   std::size_t unexpectedInitial() const { return initial - expected_initial; }
 };
 
+/// What is found in a step, or in one of the parts that it is cut into.
+struct Findings {
+  std::vector<Contact> contacts;  ///< in canonical order
+  StartState start_state = StartState::NOT_CHECKED;
+  std::vector<StartIntersection> intersections;
+  bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
+  /// False: the step budget ran out, or max_found was reached, before the last pair or, of a whole step, before the
+  /// start state was known.
+  bool complete = true;
+  bool cut = false;  ///< there was more to find than Options::max_found
+  /// Pairs were left out, none of which can touch before this; otherwise infinity.
+  double unchecked_toc_lower = std::numeric_limits<double>::infinity();
+  StepStats stats;
+};
+
 /// What became of a step, or of a frame that made none. Shares what it names: it may be kept.
-struct Outcome {
+/// Its contacts are filtered and cut as the options say, their toc is that of the whole step.
+struct Outcome : Findings {
   StepStatus status = StepStatus::FIRST_FRAME;
   std::string reason;  ///< one sentence; empty when OK
   StampNs start_ns = 0, stamp_ns = 0;
@@ -210,27 +226,16 @@ struct Outcome {
   std::int64_t arrival_ns = 0;  ///< of the message that it is about: MeshFrame::arrival_ns
   bool answered = false;        ///< the fields below hold a result
 
-  std::vector<Contact> contacts;        ///< canonical order, filtered and cut as the options say; toc of the whole step
-  std::size_t total_contacts = 0;       ///< before the cut to max_contacts; with `cut` there are at least so many
-  ContactCounts counts;                 ///< of all of these
-  std::vector<Patch> patches;           ///< of all that was found, by its first contact; with Options::patches
-  std::vector<std::uint32_t> patch_of;  ///< per listed contact its patch; empty without Options::patches
-  bool tracked = false;                 ///< patches have identities: it is of a stream, or a prediction of one
+  std::size_t total_contacts = 0;        ///< before the cut to max_contacts; with `cut` there are at least so many
+  ContactCounts counts;                  ///< of all of these
+  std::vector<Patch> patches;            ///< of all that was found, by its first contact; with Options::patches
+  std::vector<std::uint32_t> patch_of;   ///< per listed contact its patch; empty without Options::patches
+  bool tracked = false;                  ///< patches have identities: it is of a stream, or a prediction of one
   std::vector<PatchEvent> patch_events;  ///< in a stream, in order; also of an outcome without a result, at a seam
   std::size_t suppressed = 0;            ///< initial contacts left out by choice
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
-  StartState start_state = StartState::NOT_CHECKED;
-  std::vector<StartIntersection> intersections;
-  bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
-  /// False: the step budget ran out, or max_found was reached, before the last pair or before the start state was
-  /// known.
-  bool complete = true;
-  bool cut = false;  ///< there was more to find than Options::max_found
-  /// Pairs were left out, none of which can touch before this; otherwise infinity.
-  double unchecked_toc_lower = std::numeric_limits<double>::infinity();
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out
   double earliest_unexpected_toc = std::numeric_limits<double>::infinity();  ///< the same without what is expected
-  StepStats stats;
   double unknown_fraction = 0;         ///< [1] of the swept voxels, those not known to the map; NaN: too many to count
   std::size_t substeps = 0;            ///< parts that the step was cut into
   Touching touching = Touching::NONE;  ///< of this step alone; assuranceOf() knows what lasts

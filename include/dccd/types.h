@@ -26,6 +26,7 @@ struct Box {
   Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity());
   Vec3 max = Vec3::Constant(-std::numeric_limits<double>::infinity());
   bool empty() const { return !(min.array() <= max.array()).all(); }
+  friend bool operator==(const Box& a, const Box& b) { return a.min == b.min && a.max == b.max; }
 };
 
 }  // namespace dccd

@@ -10,10 +10,13 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <tuple>
+#include <type_traits>
 
 #include "dccd/accuracy.h"
 #include "dccd/regular_file.h"
 #include "record/recording_archive.h"
+#include "step/option_rows.h"
 
 namespace dccd {
 
@@ -42,34 +45,73 @@ void visitPose(Archive& a, Pose& pose) {
   }
 }
 
-template <typename Archive, typename Options>
-void visitOptions(Archive& a, Options& o) {
-  std::size_t reserved = 0;
-  a.choice(o.accuracy.rung, allRungs().back());
+template <typename Archive, typename Expectations>
+void visitExpectations(Archive& a, Expectations& expected) {
+  a.count(expected, EXPECTATION_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& one : expected) {
+    for (auto& partner : one.partners) {
+      a.number(partner.body);
+      a.array(partner.vertices);
+      a.text(partner.set);
+    }
+    a.text(one.phase);
+  }
+}
+
+/// An effect that is unknown here is of a later program, which cannot be replayed.
+template <typename Archive, typename Effects>
+void visitEffects(Archive& a, Effects& off) {
+  std::uint64_t bits = off.bits();
+  a.number(bits);
   if constexpr (Archive::READS) {
-    if (o.accuracy.rung < allRungs().front()) {
+    off = EffectSet(bits);
+    if (off.bits() != bits) a.fail("an effect is off that this program does not know");
+  }
+}
+
+template <typename Archive, typename Rung>
+void visitRung(Archive& a, Rung& rung) {
+  a.choice(rung, allRungs().back());
+  if constexpr (Archive::READS) {
+    if (rung < allRungs().front()) {
       a.fail("it was made with accuracy screen, which decided nothing and is no rung any more");
     }
   }
-  a.number(o.accuracy.tolerance_m);
-  a.number(o.accuracy.toc_bits);
-  a.number(o.accuracy.max_subdivisions);
-  a.choice(o.broad_phase, BroadPhase::BRUTE_FORCE);
-  a.number(o.num_threads);
-  a.number(o.step_budget_ms);
-  a.flag(o.earliest_only);
-  a.flag(o.check_start_state);
-  a.flag(o.unfolded_test);
-  a.size(o.max_contacts);
-  a.flag(o.suppress_initial);
-  a.array(o.exclude_boxes);
-  a.flag(o.obstacle_expected);
-  a.number(o.rigid_tolerance_m);
-  a.size(o.max_substeps);
-  a.size(reserved);  // was the clock body, when a replay took frames
-  if constexpr (Archive::READS) {
-    if (o.max_substeps > MAX_SUBSTEPS) a.fail("max_substeps is " + std::to_string(o.max_substeps));
+}
+
+/// By its type.
+template <typename Archive, typename Value>
+void visitOption(Archive& a, Value& value) {
+  using Type = std::remove_const_t<Value>;
+  if constexpr (std::is_same_v<Type, bool>) {
+    a.flag(value);
+  } else if constexpr (std::is_same_v<Type, std::size_t>) {
+    a.size(value);
+  } else if constexpr (std::is_arithmetic_v<Type>) {
+    a.number(value);
+  } else if constexpr (std::is_same_v<Type, Accuracy>) {
+    visitRung(a, value);
+  } else if constexpr (std::is_same_v<Type, BroadPhase>) {
+    a.choice(value, BroadPhase::BRUTE_FORCE);
+  } else if constexpr (std::is_same_v<Type, EffectSet>) {
+    visitEffects(a, value);
+  } else if constexpr (std::is_same_v<Type, std::vector<Expectation>>) {
+    visitExpectations(a, value);
+  } else {
+    a.array(value);
   }
+}
+
+template <std::uint32_t VERSION, typename Archive, std::uint32_t SINCE, typename Value>
+void visitOptionOf(Archive& a, OptionRow<SINCE, Value>& row) {
+  if constexpr (SINCE == VERSION) visitOption(a, row.value);
+}
+
+/// Those that this version of the file added.
+template <std::uint32_t VERSION, typename Archive, typename Options>
+void visitOptions(Archive& a, Options& options) {
+  auto rows = optionRows(options);
+  std::apply([&](auto&... row) { (visitOptionOf<VERSION>(a, row), ...); }, rows);
 }
 
 template <typename Archive, typename Body>
@@ -217,8 +259,7 @@ constexpr std::size_t TEXT_BYTES = 4;
 /// What version 3 added: what an assurance follows from, and where the work was cut.
 template <typename Archive, typename Recording>
 void visitVerdict(Archive& a, Recording& r) {
-  a.size(r.options.max_found);
-  a.size(r.options.max_found_per_feature);
+  visitOptions<3>(a, r.options);
   a.flag(r.answer.cut);
   a.text(r.step.off_path);
   for (auto& body : r.step.bodies) {
@@ -232,23 +273,10 @@ void visitVerdict(Archive& a, Recording& r) {
   }
 }
 
-template <typename Archive, typename Recording>
-void visitExpectations(Archive& a, Recording& r) {
-  a.count(r.options.expected, EXPECTATION_BYTES, std::numeric_limits<std::size_t>::max());
-  for (auto& one : r.options.expected) {
-    for (auto& partner : one.partners) {
-      a.number(partner.body);
-      a.array(partner.vertices);
-      a.text(partner.set);
-    }
-    a.text(one.phase);
-  }
-}
-
 /// What version 4 added: which contacts are expected.
 template <typename Archive, typename Recording>
 void visitExpected(Archive& a, Recording& r) {
-  visitExpectations(a, r);
+  visitOptions<4>(a, r.options);
   for (auto& contact : r.answer.contacts) a.flag(contact.expected);
   for (auto& crossing : r.answer.intersections) a.flag(crossing.expected);
   a.number(r.answer.earliest_unexpected_toc);
@@ -266,7 +294,7 @@ void visitVector(Archive& a, Vector& v) {
 /// What version 5 added: patches. Which of them last is a matter of the stream, not of a step.
 template <typename Archive, typename Recording>
 void visitPatches(Archive& a, Recording& r) {
-  a.flag(r.options.patches);
+  visitOptions<5>(a, r.options);
   a.count(r.answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
   for (auto& patch : r.answer.patches) {
     for (auto& body : patch.body) a.number(body);
@@ -279,17 +307,6 @@ void visitPatches(Archive& a, Recording& r) {
     for (auto* vector : {&patch.centroid, &patch.normal, &patch.box.min, &patch.box.max}) visitVector(a, *vector);
   }
   a.array(r.answer.patch_of);
-}
-
-/// What version 6 added: effects that are off. One that is unknown here is of a later program, and cannot be replayed.
-template <typename Archive, typename Recording>
-void visitEffects(Archive& a, Recording& r) {
-  std::uint64_t bits = r.options.off.bits();
-  a.number(bits);
-  if constexpr (Archive::READS) {
-    r.options.off = EffectSet(bits);
-    if (r.options.off.bits() != bits) a.fail("an effect is off that this program does not know");
-  }
 }
 
 /// The file's fields in their order, for both directions.
@@ -305,7 +322,14 @@ void visit(Archive& a, Recording& r) {
              " ns");
     }
   }
-  visitOptions(a, r.options);
+  visitOptions<1>(a, r.options);
+  std::size_t reserved = 0;  // was the clock body, when a replay took frames
+  a.size(reserved);
+  if constexpr (Archive::READS) {
+    if (r.options.max_substeps > MAX_SUBSTEPS) {
+      a.fail("max_substeps is " + std::to_string(r.options.max_substeps));
+    }
+  }
   a.count(r.step.bodies, BODY_BYTES, MAX_BODIES);
   for (auto& body : r.step.bodies) {
     visitBody(a, body);
@@ -334,7 +358,7 @@ void RecordingImage::build(const StepRecording& recording) {
   visitVerdict(writer, recording);
   visitExpected(writer, recording);
   visitPatches(writer, recording);
-  visitEffects(writer, recording);
+  visitOptions<6>(writer, recording.options);  // effects that are off
 }
 
 bool RecordingImage::write(int descriptor) const noexcept {
@@ -418,7 +442,7 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   if (version >= 3) visitVerdict(reader, recording);
   if (version >= 4) visitExpected(reader, recording);
   if (version >= 5) visitPatches(reader, recording);
-  if (version >= 6) visitEffects(reader, recording);
+  if (version >= 6) visitOptions<6>(reader, recording.options);
   recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <tuple>
 
 #include "dccd/accuracy.h"
@@ -205,16 +204,15 @@ void leaveOut(double toc, Outcome& outcome) {
   outcome.unchecked_toc_lower = std::min(outcome.unchecked_toc_lower, toc);
 }
 
-void addPart(std::size_t part, std::size_t parts, PartResult& result, Outcome& outcome) {
+void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& outcome) {
   if (part == 0) {
     outcome.start_state = result.start_state;
     outcome.start_state_complete = result.start_state_complete;
     outcome.complete = outcome.complete && result.start_state_complete;
-    outcome.intersections = result.intersections;
+    outcome.intersections = std::move(result.intersections);
   }
   if (parts == 1) {
     outcome.contacts = std::move(result.contacts);
-    result.contacts.clear();
   } else {
     for (Contact contact : result.contacts) {
       contact.toc_lower = scaleDown(contact.toc_lower, part, parts);
@@ -239,70 +237,6 @@ void joinParts(std::vector<Contact>& contacts) {
     }
   }
   contacts.resize(kept);
-}
-
-void checkHoldsDistance(const Options& options, const std::string& what) {
-  if (holdsDistance(options.accuracy.rung)) return;
-  throw std::invalid_argument(std::string("accuracy = ") + toString(options.accuracy.rung) + " with " + what +
-                              "; a distance above 0 needs accuracy = conservative");
-}
-
-void check(const Options& options, const std::vector<Body>& bodies) {
-  const auto require = [](bool good, const std::string& text) {
-    if (!good) throw std::invalid_argument(text);
-  };
-  require(options.num_threads >= 1 && options.num_threads <= 1024,
-          "num_threads = " + std::to_string(options.num_threads) + " is out of range; 1 to 1024");
-  require(options.step_budget_ms >= 0 && options.step_budget_ms <= 1e9,
-          "step_budget_ms = " + std::to_string(options.step_budget_ms) + " is out of range; 0 (none) to 1e9");
-  require(options.max_compute_ms >= 0 && options.max_compute_ms <= 1e12,
-          "max_compute_ms = " + std::to_string(options.max_compute_ms) + " is out of range; 0 (none) to 1e12");
-  require(options.rigid_tolerance_m > 0, "rigid_tolerance_m must be above 0");
-  require(options.max_substeps >= 1, "max_substeps must be 1 or more");
-  for (const Box& box : options.exclude_boxes) require(!box.empty(), "exclude_boxes: a box's min exceeds its max");
-  require(!options.earliest_only || options.expected.empty(),
-          "earliest_only with expected contacts: the first may be an expected one, which would hide all others");
-  if (!bodies.empty()) checkPartners(options.expected, bodies.size());
-  makeRung(options.accuracy);  // throws where a number of the accuracy is out of range
-  const double separation_m = largestSeparation(bodies);
-  if (separation_m > 0) checkHoldsDistance(options, "minimum_separation_m = " + std::to_string(separation_m));
-}
-
-bool operator==(const Options& a, const Options& b) {
-  const auto values = [](const Options& o) {
-    return std::tie(o.accuracy.rung, o.accuracy.tolerance_m, o.accuracy.toc_bits, o.accuracy.max_subdivisions,
-                    o.broad_phase, o.num_threads, o.step_budget_ms, o.max_compute_ms, o.earliest_only,
-                    o.check_start_state, o.keep_bounds, o.unfolded_test, o.rigid_tolerance_m, o.max_substeps,
-                    o.max_contacts, o.max_found, o.max_found_per_feature, o.suppress_initial, o.obstacle_expected,
-                    o.expected, o.off, o.patches, o.excluded);
-  };
-  return values(a) == values(b) &&
-         std::equal(a.exclude_boxes.begin(), a.exclude_boxes.end(), b.exclude_boxes.begin(), b.exclude_boxes.end(),
-                    [](const Box& x, const Box& y) { return x.min == y.min && x.max == y.max; });
-}
-
-StepStats& StepStats::operator+=(const StepStats& other) {
-  for (std::size_t i = 0; i < stages.size(); ++i) stages[i] += other.stages[i];
-  for (std::size_t i = 0; i < effects.size(); ++i) effects[i] += other.effects[i];
-  tiers += other.tiers;
-  total_ms += other.total_ms;
-  for (const StepCounter& counter : STEP_COUNTERS) {
-    std::uint64_t& sum = this->*counter.value;
-    const std::uint64_t part = other.*counter.value;
-    sum = counter.same_in_every_part ? std::max(sum, part) : sum + part;
-  }
-  return *this;
-}
-
-const char* toString(Stage stage) {
-  static const char* const NAMES[] = {"record",     "bounds",   "broad_phase", "planar",
-                                      "elementary", "obstacle", "start_state", "sort"};
-  return NAMES[static_cast<std::size_t>(stage)];
-}
-
-const char* toString(StartState state) {
-  static const char* const NAMES[] = {"CLEAR", "INTERSECTING", "NOT_CHECKED"};
-  return NAMES[static_cast<std::size_t>(state)];
 }
 
 void conclude(const Options& options, const Step& step, std::size_t needed_parts, Outcome& outcome) {

@@ -15,7 +15,7 @@ double scaleUp(double toc, std::size_t i, std::size_t n);
 /// The budget left out what does not touch before toc.
 void leaveOut(double toc, Outcome& outcome);
 /// Appends a part's contacts, the start state of the first one, the statistics.
-void addPart(std::size_t part, std::size_t parts, PartResult& result, Outcome& outcome);
+void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& outcome);
 /// Contacts of several parts into canonical order, a pair once.
 void joinParts(std::vector<Contact>& contacts);
 /// What of the raw contacts is reported, and what the step may be called.

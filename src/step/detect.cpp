@@ -276,14 +276,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const Clock::time_point begin = Clock::now();
   for (PairWorker& w : workers) w.beginStep();
   for (HitOrder& kind : order) kind.beginStep();
-  releaseBurst(result.contacts);
-  releaseBurst(result.intersections);
-  result.intersections.clear();
-  result.start_state = StartState::NOT_CHECKED;
-  result.start_state_complete = result.complete = true;
-  result.cut = false;
-  result.unchecked_toc_lower = std::numeric_limits<double>::infinity();
-  result.stats = StepStats();
+  result = Findings();
   if (!fill(part)) {
     leaveOutPart(part);
     addPart(part.index, part.count, result, outcome);
@@ -324,7 +317,6 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
 /// There was no time for its bounds: of the part nothing is known, and of its end neither.
 void History::Impl::leaveOutPart(const Part& part) {
   scene.forgetBounds();
-  result.contacts.clear();
   leaveOutAt(0, false);
   result.start_state_complete = !checksStartState(part);
   carried.clear();

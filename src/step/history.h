@@ -38,18 +38,6 @@ struct Part {
   Deadline deadline;
 };
 
-/// What one part says.
-struct PartResult {
-  StartState start_state = StartState::NOT_CHECKED;
-  bool start_state_complete = true;
-  bool complete = true;  ///< of the contacts
-  bool cut = false;      ///< what was left out went over the limit of what may be found
-  double unchecked_toc_lower = std::numeric_limits<double>::infinity();
-  std::vector<Contact> contacts;
-  std::vector<StartIntersection> intersections;
-  StepStats stats;
-};
-
 /// The contacts of a body with the map, as long as neither changes.
 struct MapAnswer {
   std::shared_ptr<const VoxelSurface> map;  ///< null: none
@@ -181,7 +169,7 @@ struct History::Impl {
   std::vector<std::uint8_t> obstacle_active;
   Positions map_t0, map_t1;
   std::array<HitOrder, 2> order;  // by PairKind
-  PartResult result;
+  Findings result;                // of the part; whether it is complete is said of its pairs alone
   PatchMaker patches;
   Deadline::Clock::duration patches_took{0};  // in the last step
 };

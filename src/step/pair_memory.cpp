@@ -280,10 +280,11 @@ void PairMemory::certify(const SceneArrays& scene, const Group& group, Pair& pai
 void PairMemory::endStep() {
   last_.clear();  // pairs of groups that this step did not have
   const std::size_t pairs = pair_count_;
-  const bool worth = first_ || static_cast<double>(known_apart_) >= WORTH_STAYING_ON * static_cast<double>(pairs);
-  first_ = false;
+  const bool worth =
+      steps_on_ == 0 || static_cast<double>(known_apart_) >= WORTH_STAYING_ON * static_cast<double>(pairs);
   if (worth) {
-    next_rest_ = SHORTEST_REST;
+    // To turn it on costs what some steps with it save: only one that lasts makes the next rest short again.
+    if (++steps_on_ >= SHORTEST_REST) next_rest_ = SHORTEST_REST;
     return;
   }
   turnOff(next_rest_);
@@ -325,7 +326,7 @@ void PairMemory::judgeTrial() {
     return;
   }
   state_ = State::ON;
-  first_ = true;
+  steps_on_ = 0;
 }
 
 }  // namespace dccd

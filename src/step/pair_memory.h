@@ -115,7 +115,7 @@ class PairMemory {
   bool consume(const Group& group, Pair& pair, double contact_m) const;
 
   State state_ = State::OFF;
-  bool first_ = false;  // this is the first step in which it is on
+  std::uint32_t steps_on_ = 0;  // in which it was on, since it was turned on
   std::uint32_t rest_ = 0, next_rest_ = SHORTEST_REST;
   ClusterMotion motion_;
   std::vector<Group> groups_, last_;
