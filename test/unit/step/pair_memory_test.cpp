@@ -240,6 +240,31 @@ TEST(PairMemory, WhatTouchesAtRestIsNotApartByALastBit) {
   EXPECT_GT(known, 1000u);
 }
 
+/// To turn it on costs what some steps with it save. Here every trial is a success, and every step after that shows it
+/// to be none: the worst that a stream can do.
+TEST(PairMemory, WhatIsGivenUpSoonRestsLongerEachTime) {
+  const Roll roll(32);
+  const Body body = bodyOf(roll.topology, "roll");
+  Detector detector(options(true));
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> noise(-0.01, 0.01);
+  const auto state = [&] { return detector.history().impl().carried.memory.state(); };
+  Positions before = roll.at(0, 2);
+  int turned_on = 0;
+  for (int k = 0; k < 500; ++k) {
+    const bool was_on = state() == PairMemory::State::ON;
+    Positions after = roll.at(0.1 * (k + 1), 2);
+    if (was_on) {
+      for (Vec3& p : after) p += Vec3(noise(random), noise(random), noise(random));
+    }
+    detector.run(stepOf(body, before, after));
+    turned_on += !was_on && state() == PairMemory::State::ON;
+    before = after;
+  }
+  EXPECT_GE(turned_on, 3) << "a trial came, and was a success";
+  EXPECT_LE(turned_on, 7) << "after 16, 32, 64, 128, 256 steps";
+}
+
 TEST(PairMemory, TakesNoMoreThanItMay) {
   const Roll roll(64);
   const Body body = bodyOf(roll.topology, "roll");
