@@ -90,8 +90,8 @@ def of_turns(ones, others):
     """Of runs in turns: median times of both, the median of the ratios of neighbours, and what these span."""
     ratios = sorted(one / other for one, other in zip(ones, others))
     middle = len(ratios) // 2
-    return ["%.2f" % sorted(ones)[middle], "%.2f" % sorted(others)[middle], "%.3f" % ratios[middle], "%.3f" % ratios[0],
-            "%.3f" % ratios[-1]]
+    times = [sorted(times)[middle] for times in (ones, others)]
+    return ["%.*f" % (2 if time >= 1 else 4, time) for time in times] + ["%.3f" % ratios[i] for i in (middle, 0, -1)]
 
 
 def write_rod(folder, rows):

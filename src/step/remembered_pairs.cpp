@@ -11,8 +11,9 @@ using Clock = Deadline::Clock;
 
 namespace {
 
-constexpr std::size_t GROUPS = 64;        // in a unit of work
-constexpr std::size_t FEWEST_GROUPS = 8;  // pairs of them that are worth a memory
+constexpr std::size_t GROUPS = 64;  // in a unit of work
+// Pairs of them that are worth a memory: of fewer, to turn it on takes as long as a dozen steps save.
+constexpr std::size_t FEWEST_GROUPS = 100;
 
 }  // namespace
 

@@ -83,16 +83,16 @@ TEST(PairMemory, ARollThatTurnsAndBendsIsLookedAtInPart) {
 
 TEST(PairMemory, WhatComesNearIsFoundInTime) {
   // A point of the outer layer is pushed through the next one, faster with each step.
-  const Roll roll(32);
+  const Roll roll(40);
   const Body body = bodyOf(roll.topology, "roll");
   Detector remembers(options(true)), forgets(options(false));
   std::uint64_t known = 0, contacts = 0;
   Positions before = roll.at(0, 0);
   for (int k = 0; k < 14; ++k) {
     Positions after = before;
-    for (std::size_t c = 24; c < 32; ++c) {
+    for (std::size_t c = roll.size - 8; c < roll.size; ++c) {
       for (std::size_t r = 10; r < 18; ++r) {
-        Vec3& p = after[r * 32 + c];
+        Vec3& p = after[r * roll.size + c];
         const Vec3 inward(-p.x(), -p.y(), 0);
         p += 0.0002 * std::pow(1.6, k) * inward.normalized();
       }
@@ -109,7 +109,7 @@ TEST(PairMemory, WhatComesNearIsFoundInTime) {
 }
 
 TEST(PairMemory, ASeamForgets) {
-  const Roll roll(32);
+  const Roll roll(40);
   const Body body = bodyOf(roll.topology, "roll");
   Detector detector(options(true));
   for (int k = 0; k < 4; ++k) detector.run(stepOf(body, roll.at(0.1 * k), roll.at(0.1 * (k + 1))));
@@ -141,7 +141,7 @@ TEST(PairMemory, RandomStreamsAreAnsweredAsWithoutMemory) {
     const auto any = [&](int low, int high) {
       return low + static_cast<int>(random() % static_cast<std::uint64_t>(high - low + 1));
     };
-    const Roll roll(static_cast<std::size_t>(any(14, 30))), other(static_cast<std::size_t>(any(8, 20)));
+    const Roll roll(static_cast<std::size_t>(any(36, 48))), other(static_cast<std::size_t>(any(8, 28)));
     Options with = options(true), without = options(false);
     with.num_threads = any(1, 2);
     Detector remembers(with), forgets(without);
@@ -243,7 +243,7 @@ TEST(PairMemory, WhatTouchesAtRestIsNotApartByALastBit) {
 /// To turn it on costs what some steps with it save. Here every trial is a success, and every step after that shows it
 /// to be none: the worst that a stream can do.
 TEST(PairMemory, WhatIsGivenUpSoonRestsLongerEachTime) {
-  const Roll roll(32);
+  const Roll roll(40);
   const Body body = bodyOf(roll.topology, "roll");
   Detector detector(options(true));
   std::mt19937 random(3);
