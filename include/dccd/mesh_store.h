@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <vector>
 
 #include "dccd/export.h"
 #include "dccd/outcome.h"
@@ -69,28 +70,12 @@ class DCCD_EXPORT MeshStore {
   /// Why the run that the newest frame is in began (FIRST_FRAME, GAP, ...).
   StepStatus runReason() const { return run_reason_; }
 
-  /// The frame at or next after a stamp for which lookup is READY: its topology is that of the whole run. (The newest
-  /// frame may be in a later one.)
-  const MeshFrame& frameAtOrAfter(StampNs stamp_ns) const { return *frames_[firstAtOrAfter(stamp_ns)].frame; }
-
-  /// Position at a stamp for which lookup is READY: a frame's own positions, bit for bit, or interpolated between two.
-  /// The rounded doubles are the truth from there on (doc/algorithm.md, "The question").
-  void positionsAt(StampNs stamp_ns, Positions& out) const;
-  /// Rigid bodies: the pose at a stamp for which lookup is READY.
-  Eigen::Isometry3d poseAt(StampNs stamp_ns) const;
-
-  /// The largest uncertainty radius of each vertex over the frames that stamps in [from, to] (lookup READY) lie
-  /// between; empty when none of them has any.
-  void radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const;
-
-  /// The most faces that any of these frames (lookup READY) has dropped.
-  std::uint64_t droppedFacesOver(StampNs from_ns, StampNs to_ns) const;
-
-  /// How many frames lie between two stamps, neither included.
-  std::size_t framesWithin(StampNs from_ns, StampNs to_ns) const;
-  /// How far these frames are from the path that a step between the stamps takes, straight from t0 to t1 or, of a rigid
-  /// body, along the shorter arc between the poses there [m]; both stamps READY, in one run.
-  double offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const;
+  /// Where the body is at a stamp for which lookup is READY: the frame itself, or one between two, with what either of
+  /// them lacks and the larger of their radii. The rounded doubles are the truth from there on (doc/algorithm.md, "The
+  /// question").
+  std::shared_ptr<const MeshFrame> frameAt(StampNs stamp_ns) const;
+  /// The frames between two stamps, neither included.
+  std::vector<std::shared_ptr<const MeshFrame>> framesWithin(StampNs from_ns, StampNs to_ns) const;
 
   /// Forgets what is not needed for stamps at or after this one.
   void forgetBefore(StampNs stamp_ns);
@@ -109,9 +94,10 @@ class DCCD_EXPORT MeshStore {
   StepStatus classify(const MeshFrame& frame) const;
   void forgetOldest();
   std::size_t firstAtOrAfter(StampNs stamp_ns) const;
-  /// The frames that stamps in [from, to] lie between: places of the first and the last one.
-  std::pair<std::size_t, std::size_t> framesOver(StampNs from_ns, StampNs to_ns) const;
 };
+
+/// Of two lists of radii, of which either may be empty (none), the larger ones.
+DCCD_EXPORT std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b);
 
 /// Positions between two arrays of equal size, u in [0,1]; the ends are reproduced bit for bit.
 DCCD_EXPORT void interpolate(const Positions& a, const Positions& b, double u, Positions& out);

@@ -127,8 +127,10 @@ class DCCD_EXPORT Monitor {
   /// Null: none. Must outlive the monitor or be taken away. Steps of checkNow() and predict() are not told.
   void setListener(StepListener* listener);
 
- private:
   struct DCCD_HIDDEN Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 

@@ -42,15 +42,11 @@ struct MeshError : std::runtime_error {
   StepStatus status;
 };
 
-struct DecodedMesh {
-  StampNs stamp_ns = 0;  ///< 0: the message has none
+/// A frame in the coordinates of the message's own frame; stamp_ns is 0 where the message has none.
+struct DecodedMesh : MeshFrame {
   std::string frame_id;
-  std::shared_ptr<const Topology> topology;
-  Positions positions;
-  std::vector<double> radius_m;     ///< uncertainty per vertex; empty: none
-  std::size_t weld_changes = 0;     ///< welded vertices whose corners came apart
-  std::uint64_t dropped_faces = 0;  ///< that are in no part of the topology
-  std::size_t unread_lists = 0;     ///< triangle lists beside the one that was taken
+  std::size_t weld_changes = 0;  ///< welded vertices whose corners came apart
+  std::size_t unread_lists = 0;  ///< triangle lists beside the one that was taken
 };
 
 /// Keeps the topology from message to message, so that an unchanged one is one object. Not thread-safe.

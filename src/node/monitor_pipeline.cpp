@@ -89,8 +89,11 @@ void MonitorPipeline::loadFiles() {
                                  [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     addGroups(mesh, body.mesh_file, setsNamed(b), body);
     hints_[b] = rigidHint(body.mesh_file, mesh.positions, body.mesh_scale);
-    rigid_[b] = RigidMesh{mesh.topology, std::move(mesh.positions), {}};
-    if (body.input.noise_radius_m > 0) rigid_[b]->radius_m.assign(rigid_[b]->rest.size(), body.input.noise_radius_m);
+    MeshFrame& frame = rigid_[b].emplace();
+    frame.topology = mesh.topology;
+    frame.positions = std::move(mesh.positions);
+    frame.rigid = true;
+    if (body.input.noise_radius_m > 0) frame.radius_m.assign(frame.positions.size(), body.input.noise_radius_m);
   }
 }
 
@@ -209,7 +212,6 @@ DecodedMesh MonitorPipeline::decode(std::size_t body, const MeshMessage& message
 void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
-  waiting.arrival_ns = message.arrival_ns;
   const auto refuse = [&](StepStatus status, const std::string& reason) {
     monitor_->countReceived(body);
     skip(body, status, message.receipt_ns, message.arrival_ns, reason);
@@ -225,6 +227,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   if (message.no_memory > 0) return noMemory(message.no_memory);
   try {
     waiting.mesh = decode(body, message);
+    waiting.mesh.arrival_ns = message.arrival_ns;
     if (topology_filter_) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);
     }
@@ -305,7 +308,7 @@ void MonitorPipeline::giveUp() {
     if (!waiting_[b]) continue;
     const Waiting done = std::move(*waiting_[b]);
     waiting_[b].reset();
-    skip(b, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.arrival_ns, done.reason);
+    skip(b, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.mesh.arrival_ns, done.reason);
   }
   monitor_->finish();
 }

@@ -98,16 +98,10 @@ class MonitorPipeline {
  private:
   struct Waiting {
     DecodedMesh mesh;
-    std::int64_t arrival_ns = 0;
     bool overdue = false;  // past transform_timeout_s
     bool kept = false;     // that, or one before it was: a static body sends its only frame once, and steps do not wait
     bool told = false;     // the complaint about it has been set
     std::string reason;    // why it has no place yet
-  };
-  struct RigidMesh {
-    std::shared_ptr<const Topology> topology;
-    Positions rest;
-    std::vector<double> radius_m;
   };
   MonitorConfig config_;
   EffectTracker effects_;
@@ -116,8 +110,8 @@ class MonitorPipeline {
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
-  std::vector<bool> placed_;  // a static body of which the monitor has a frame
-  std::vector<std::optional<RigidMesh>> rigid_;
+  std::vector<bool> placed_;                     // a static body of which the monitor has a frame
+  std::vector<std::optional<MeshFrame>> rigid_;  // as the mesh file has them
   std::vector<std::string> complaints_, hints_;
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   std::optional<LoadedMap> unplaced_map_;

@@ -26,12 +26,8 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    MeshFrame frame;
+    MeshFrame frame = *rigid_[b];
     frame.stamp_ns = stamp_ns;
-    frame.topology = rigid_[b]->topology;
-    frame.positions = rigid_[b]->rest;
-    frame.rigid = true;
-    frame.radius_m = rigid_[b]->radius_m;
     const std::string& carrier = config_.bodies[b].tf_frame;
     if (!lookupTransform(transforms_, fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
       reason =
@@ -96,7 +92,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   if (!placed) {
     if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
     waiting.reason = reason;
-    waiting.overdue = finishing_ || secondsBetween(waiting.arrival_ns, now_ns) >= config_.transform_timeout_s;
+    waiting.overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
     // There is no use in waiting for a static body that has waited in vain itself.
     const bool timed_out =
         waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept);
@@ -110,19 +106,12 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   waiting_[body].reset();
   if (!placed) {
     if (is_clock && !has_place && !frame_answered_) learnAnew(StepStatus::NO_TRANSFORM);
-    skip(body, problem, done.mesh.stamp_ns, done.arrival_ns, reason);
+    skip(body, problem, done.mesh.stamp_ns, done.mesh.arrival_ns, reason);
     return true;
   }
   if (isStatic(body) && config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
-  MeshFrame frame;
-  frame.stamp_ns = done.mesh.stamp_ns;
-  frame.topology = std::move(done.mesh.topology);
-  frame.positions = std::move(done.mesh.positions);
-  frame.radius_m = std::move(done.mesh.radius_m);
-  frame.arrival_ns = done.arrival_ns;
-  frame.dropped_faces = done.mesh.dropped_faces;
-  transform(fixed_from_mesh, frame.positions);
-  monitor_->push(body, std::move(frame), now_ns);
+  transform(fixed_from_mesh, done.mesh.positions);
+  monitor_->push(body, std::move(done.mesh), now_ns);
   placed_[body] = isStatic(body);
   return true;
 }

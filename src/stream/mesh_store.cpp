@@ -149,76 +149,40 @@ Lookup MeshStore::lookup(StampNs stamp_ns, std::uint64_t* run) const {
   return Lookup::READY;
 }
 
-void MeshStore::positionsAt(StampNs stamp_ns, Positions& out) const {
+std::shared_ptr<const MeshFrame> MeshStore::frameAt(StampNs stamp_ns) const {
   const std::size_t i = firstAtOrAfter(stamp_ns);
   const MeshFrame& b = *frames_[i].frame;
-  if (b.stamp_ns == stamp_ns) {
-    out.assign(b.positions.begin(), b.positions.end());
-    return;
-  }
+  if (b.stamp_ns == stamp_ns) return frames_[i].frame;
   const MeshFrame& a = *frames_[i - 1].frame;
+  MeshFrame at;
+  at.stamp_ns = stamp_ns;
+  at.topology = b.topology;
+  at.rigid = b.rigid;
+  at.radius_m = largerRadii(a.radius_m, b.radius_m);
+  at.dropped_faces = std::max(a.dropped_faces, b.dropped_faces);
+  const double u = fraction(a.stamp_ns, b.stamp_ns, stamp_ns);
   if (b.rigid) {
-    const Eigen::Isometry3d moved = poseAt(stamp_ns) * b.pose.inverse();
-    out.resize(b.positions.size());
-    for (std::size_t v = 0; v < out.size(); ++v) out[v] = moved * b.positions[v];
-    return;
+    at.pose = interpolate(a.pose, b.pose, u);
+    const Eigen::Isometry3d moved = at.pose * b.pose.inverse();
+    for (const Vec3& p : b.positions) at.positions.push_back(moved * p);
+  } else {
+    interpolate(a.positions, b.positions, u, at.positions);
   }
-  interpolate(a.positions, b.positions, fraction(a.stamp_ns, b.stamp_ns, stamp_ns), out);
+  return std::make_shared<const MeshFrame>(std::move(at));
 }
 
-Eigen::Isometry3d MeshStore::poseAt(StampNs stamp_ns) const {
-  const std::size_t i = firstAtOrAfter(stamp_ns);
-  const MeshFrame& b = *frames_[i].frame;
-  if (b.stamp_ns == stamp_ns) return b.pose;
-  const MeshFrame& a = *frames_[i - 1].frame;
-  return interpolate(a.pose, b.pose, fraction(a.stamp_ns, b.stamp_ns, stamp_ns));
-}
-
-std::pair<std::size_t, std::size_t> MeshStore::framesOver(StampNs from_ns, StampNs to_ns) const {
-  std::size_t first = firstAtOrAfter(from_ns);
-  if (first > 0 && frames_[first].frame->stamp_ns != from_ns) --first;
-  return {first, std::min(firstAtOrAfter(to_ns), frames_.size() - 1)};
-}
-
-std::uint64_t MeshStore::droppedFacesOver(StampNs from_ns, StampNs to_ns) const {
-  const auto [first, last] = framesOver(from_ns, to_ns);
-  std::uint64_t most = 0;
-  for (std::size_t i = first; i <= last; ++i) most = std::max(most, frames_[i].frame->dropped_faces);
-  return most;
-}
-
-void MeshStore::radiiOver(StampNs from_ns, StampNs to_ns, std::vector<double>& out) const {
-  out.clear();
-  const auto [first, last] = framesOver(from_ns, to_ns);
-  for (std::size_t i = first; i <= last; ++i) {
-    const std::vector<double>& radius = frames_[i].frame->radius_m;
-    if (out.empty()) {
-      out.assign(radius.begin(), radius.end());
-    } else {
-      for (std::size_t v = 0; v < radius.size(); ++v) out[v] = std::max(out[v], radius[v]);
-    }
-  }
-}
-
-std::size_t MeshStore::framesWithin(StampNs from_ns, StampNs to_ns) const {
-  const std::size_t first = firstAtOrAfter(from_ns + 1), end = firstAtOrAfter(to_ns);
-  return end > first ? end - first : 0;
-}
-
-double MeshStore::offPath(StampNs from_ns, StampNs to_ns, const Positions& t0, const Positions& t1) const {
-  const Eigen::Isometry3d pose_t0 = poseAt(from_ns), pose_t1 = poseAt(to_ns);
+std::vector<std::shared_ptr<const MeshFrame>> MeshStore::framesWithin(StampNs from_ns, StampNs to_ns) const {
+  std::vector<std::shared_ptr<const MeshFrame>> within;
   const std::size_t end = firstAtOrAfter(to_ns);
-  double off = 0;
-  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < end; ++i) {
-    const MeshFrame& frame = *frames_[i].frame;
-    const double u = fraction(from_ns, to_ns, frame.stamp_ns);
-    const Eigen::Isometry3d moved = interpolate(pose_t0, pose_t1, u) * pose_t0.inverse();
-    for (std::size_t v = 0; v < t0.size(); ++v) {
-      const Vec3 on_path = frame.rigid ? Vec3(moved * t0[v]) : Vec3(t0[v] + u * (t1[v] - t0[v]));
-      off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared
-    }
-  }
-  return off;
+  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < end; ++i) within.push_back(frames_[i].frame);
+  return within;
+}
+
+std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  std::vector<double> larger(a.size());
+  for (std::size_t v = 0; v < a.size(); ++v) larger[v] = std::max(a[v], b[v]);
+  return larger;
 }
 
 void MeshStore::forgetBefore(StampNs stamp_ns) {

@@ -15,22 +15,8 @@
 
 namespace dccd {
 
-/// Positions of a frame, shared with it.
-inline std::shared_ptr<const Positions> positionsOf(const std::shared_ptr<const MeshFrame>& frame) {
-  return {frame, &frame->positions};
-}
-
-inline std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
-  return radius_m.empty() ? nullptr : share(std::move(radius_m));
-}
-
-/// The body where the frame has it, during the whole step.
-inline void hold(const std::shared_ptr<const MeshFrame>& frame, Body& body) {
-  body.topology = frame->topology;
-  body.t0 = body.t1 = positionsOf(frame);
-  body.radius_m = radii(frame->radius_m);
-  body.dropped_faces = frame->dropped_faces;
-}
+/// The body's mesh, and its way from where the one frame has it to where the other one does; they may be the same.
+void move(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body);
 
 struct Monitor::Impl {
   /// A frame of the clock body on its way to an outcome: a step from `from` to `to`, or a status without one.
@@ -86,7 +72,6 @@ struct Monitor::Impl {
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
   Step place(const Pending& pending);
-  void placeStream(std::size_t body, const Pending& pending, Body& out);
   void lookBetween(std::size_t body, Step& step) const;
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();

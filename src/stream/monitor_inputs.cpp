@@ -9,18 +9,42 @@
 namespace dccd {
 namespace {
 
-std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  std::vector<double> larger(a.size());
-  for (std::size_t v = 0; v < a.size(); ++v) larger[v] = std::max(a[v], b[v]);
-  return larger;
+std::shared_ptr<const std::vector<double>> radii(std::vector<double> radius_m) {
+  return radius_m.empty() ? nullptr : share(std::move(radius_m));
 }
 
 double largest(const std::vector<double>& values) {
   return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
 }
 
+/// How far the frame is from the path that the body takes, at this time of the step: straight or, of one that turns,
+/// along the shorter arc [m].
+double offPath(const MeshFrame& frame, const Body& body, double u) {
+  const Eigen::Isometry3d moved = interpolate(body.pose_t0, body.pose_t1, u) * body.pose_t0.inverse();
+  double off = 0;
+  for (std::size_t v = 0; v < frame.positions.size(); ++v) {
+    const Vec3 &t0 = (*body.t0)[v], &t1 = (*body.t1)[v];
+    const Vec3 on_path = body.turns ? Vec3(moved * t0) : Vec3(t0 + u * (t1 - t0));
+    off = std::max(off, (frame.positions[v] - on_path).norm());  // a vertex that is not finite is not compared
+  }
+  return off;
+}
+
 }  // namespace
+
+void move(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body) {
+  const auto positionsOf = [](const std::shared_ptr<const MeshFrame>& frame) {
+    return std::shared_ptr<const Positions>(frame, &frame->positions);
+  };
+  body.topology = to->topology;
+  body.t0 = positionsOf(from);
+  body.t1 = positionsOf(to);
+  body.turns = to->rigid && from != to;
+  body.pose_t0 = from->pose;
+  body.pose_t1 = to->pose;
+  body.radius_m = radii(largerRadii(from->radius_m, to->radius_m));
+  body.dropped_faces = std::max(from->dropped_faces, to->dropped_faces);
+}
 
 Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, bool timed_out) {
   const MeshStore& store = stores[body];
@@ -58,33 +82,25 @@ Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
 }
 
 /// A body that is seen more often than the clock body goes straight from where it is at the step's one end to the
-/// other. What was seen of it in between must not be contradicted in silence.
+/// other. What was seen of it in between must not be contradicted in silence: where it was, how uncertain, and what was
+/// missing of it.
 void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
-  const std::size_t frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
-  if (frames == 0) return;
-  const Body& body = step.bodies[b];
-  const double off_m = stores[b].offPath(step.start_ns, step.stamp_ns, *body.t0, *body.t1);
+  Body& body = step.bodies[b];
+  const auto frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
+  double off_m = 0;
+  for (const std::shared_ptr<const MeshFrame>& frame : frames) {
+    const double step_ns = static_cast<double>(step.stamp_ns - step.start_ns);
+    off_m = std::max(off_m, offPath(*frame, body, static_cast<double>(frame->stamp_ns - step.start_ns) / step_ns));
+    if (!frame->radius_m.empty()) {
+      body.radius_m = radii(largerRadii(body.radius_m ? *body.radius_m : std::vector<double>(), frame->radius_m));
+    }
+    body.dropped_faces = std::max(body.dropped_faces, frame->dropped_faces);
+  }
   if (off_m <= options.detector.rigid_tolerance_m) return;
   std::ostringstream text;
-  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in " << frames
+  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in " << frames.size()
        << " frames between its ends; make it the clock_body";
   step.off_path = text.str();
-}
-
-void Monitor::Impl::placeStream(std::size_t b, const Pending& pending, Body& out) {
-  const StampNs from_ns = pending.from->stamp_ns, to_ns = pending.to->stamp_ns;
-  Positions t0, t1;
-  stores[b].positionsAt(from_ns, t0);
-  stores[b].positionsAt(to_ns, t1);
-  out.t0 = share(std::move(t0));
-  out.t1 = share(std::move(t1));
-  if (out.turns) {
-    out.pose_t0 = stores[b].poseAt(from_ns);
-    out.pose_t1 = stores[b].poseAt(to_ns);
-  }
-  std::vector<double> radius_m;
-  stores[b].radiiOver(from_ns, to_ns, radius_m);
-  out.radius_m = radii(std::move(radius_m));
 }
 
 Step Monitor::Impl::place(const Pending& pending) {
@@ -96,26 +112,15 @@ Step Monitor::Impl::place(const Pending& pending) {
   step.map = usableMap(step.stamp_ns);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
-    if (b == options.clock_body) {
-      body.topology = pending.to->topology;
-      body.t0 = positionsOf(pending.from);
-      body.t1 = positionsOf(pending.to);
-      body.turns = pending.to->rigid;
-      body.pose_t0 = pending.from->pose;
-      body.pose_t1 = pending.to->pose;
-      body.radius_m = radii(largerRadii(pending.from->radius_m, pending.to->radius_m));
-      body.dropped_faces = std::max(pending.from->dropped_faces, pending.to->dropped_faces);
-    } else if (isStream(b)) {
-      // Not the newest frame, which may have begun another run with another topology while the step waited.
-      const MeshFrame& frame = stores[b].frameAtOrAfter(step.stamp_ns);
-      body.topology = frame.topology;
-      body.turns = frame.rigid;
-      body.dropped_faces = stores[b].droppedFacesOver(step.start_ns, step.stamp_ns);
-      placeStream(b, pending, body);
-      lookBetween(b, step);
-    } else {
-      hold(stores[b].newestShared(), body);
+    if (!isStream(b)) {
+      move(stores[b].newestShared(), stores[b].newestShared(), body);
       continue;
+    }
+    if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
+      move(pending.from, pending.to, body);
+    } else {
+      move(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
+      lookBetween(b, step);
     }
     stores[b].forgetBefore(step.stamp_ns);
   }

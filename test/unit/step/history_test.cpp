@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
 #include "dccd/stream.h"
 #include "step/history.h"
+#include "stream/monitor_impl.h"
 #include "support/closed_meshes.h"
 
 namespace dccd {
@@ -25,15 +27,24 @@ void expectFresh(History& history) {
   EXPECT_TRUE(then.inside.isClear());
   EXPECT_TRUE(now.inside.isClear());
   EXPECT_FALSE(now.inside.knowsEnd());
+  EXPECT_TRUE(now.memory.isClear());
+  EXPECT_EQ(now.memory.bytes(), then.memory.bytes());
+  EXPECT_TRUE(now.map.empty());
+  EXPECT_EQ(history.impl().begins_at, nullptr);
   EXPECT_TRUE(history.isClear());
 }
 
-/// Everything about an answer but its times.
-void expectSame(const Outcome& a, const Outcome& b) {
+void expectSameAnswer(const Outcome& a, const Outcome& b) {
+  EXPECT_EQ(a.status, b.status);
   EXPECT_EQ(difference(a.contacts, b.contacts), "");
   EXPECT_EQ(a.start_state, b.start_state);
   EXPECT_TRUE(std::equal(a.intersections.begin(), a.intersections.end(), b.intersections.begin(), b.intersections.end(),
                          [](const auto& x, const auto& y) { return x == y; }));
+}
+
+/// Everything about an answer but its times.
+void expectSame(const Outcome& a, const Outcome& b) {
+  expectSameAnswer(a, b);
   for (std::size_t e = 0; e < a.stats.effects.size(); ++e) {
     EXPECT_EQ(a.stats.effects[e].in, b.stats.effects[e].in) << toString(static_cast<Effect>(e));
     EXPECT_EQ(a.stats.effects[e].out, b.stats.effects[e].out) << toString(static_cast<Effect>(e));
@@ -110,6 +121,134 @@ TEST(History, AMapThatIsGoneIsNotKeptByOtherOptions) {
   EXPECT_EQ(without.status, StepStatus::NO_MAP);
   EXPECT_EQ(without.counts.obstacle, 0u);
   EXPECT_EQ(without.obstacle, nullptr);
+}
+
+/// The cloths and the box as streams: one cloth is the clock, the box holds still.
+struct ClothStream {
+  explicit ClothStream(const Step& step, const ClothStream* like = nullptr) : scene(step) {
+    if (like) {
+      stamp_ns = like->stamp_ns;
+      frames = like->frames;
+      away_m = like->away_m;
+      radius_m = like->radius_m;
+      fewer = like->fewer;
+    }
+    pushBox();
+  }
+  static MonitorOptions options() {
+    MonitorOptions o;
+    o.store.max_vertex_step_m = 1000;
+    o.look_ahead_s = 0.1;
+    return o;
+  }
+  static std::vector<Body> bodies() {
+    std::vector<Body> bodies(3);
+    bodies[0].name = "cloth";
+    bodies[1].name = "other";
+    bodies[2].name = "box";
+    bodies[2].motion = BodyMotionKind::STATIC;
+    return bodies;
+  }
+  void push(std::size_t b) {
+    const Body& body = scene.bodies[b];
+    MeshFrame frame{stamp_ns, body.topology, frames % 2 ? *body.t1 : *body.t0, false, Eigen::Isometry3d::Identity()};
+    for (Vec3& p : frame.positions) p += Vec3::Constant(b == 0 ? away_m[0] : b == 1 ? away_m[1] : 0);
+    if (b == 0 && radius_m > 0) frame.radius_m.assign(frame.positions.size(), radius_m);
+    if (b == 0 && fewer) {
+      std::vector<Face> faces = body.topology->faces();
+      faces.pop_back();
+      frame.topology = share(Topology::fromTriangles(frame.positions.size(), faces));
+    }
+    monitor.countReceived(b);
+    monitor.push(b, std::move(frame), 0);
+  }
+  void pushBox() { push(2); }
+  Outcome feed() {
+    push(1);
+    push(0);
+    Outcome outcome;
+    EXPECT_TRUE(monitor.next(0, outcome));
+    stamp_ns += 30000000;
+    ++frames;
+    return outcome;
+  }
+  History& history() { return monitor.impl().history; }
+
+  const Step scene;
+  Monitor monitor{options(), bodies()};
+  StampNs stamp_ns = 1000000000;
+  int frames = 0;
+  std::array<double, 2> away_m{0, 0};
+  double radius_m = 0;
+  bool fewer = false;
+};
+
+/// What a stream knows of as a seam, each in the middle of it. After the first frame that follows, or at once, the
+/// history holds nothing; and what a new monitor answers from that frame on is what this one answers. (It may look at
+/// others: the order of features in the arrays is that of the first frame.)
+TEST(History, EverySeamOfAStreamLeavesNothingBehind) {
+  enum class Clears { AT_ONCE, WITH_THE_NEXT_FRAME, NEVER };
+  struct Seam {
+    const char* name;
+    std::function<void(ClothStream&)> come;
+    StepStatus status;  // of the next frame
+    Clears clears;
+  };
+  const std::vector<Seam> seams = {
+      {"gap", [](ClothStream& s) { s.stamp_ns += 10000000000; }, StepStatus::GAP, Clears::WITH_THE_NEXT_FRAME},
+      {"time jump", [](ClothStream& s) { s.stamp_ns = 5000000; }, StepStatus::TIME_JUMP, Clears::WITH_THE_NEXT_FRAME},
+      {"topology", [](ClothStream& s) { s.fewer = true; }, StepStatus::TOPOLOGY_CHANGED, Clears::WITH_THE_NEXT_FRAME},
+      {"teleport", [](ClothStream& s) { s.away_m[0] = 5000; }, StepStatus::TELEPORT, Clears::WITH_THE_NEXT_FRAME},
+      {"reset", [](ClothStream& s) { s.monitor.reset(StepStatus::RESET); }, StepStatus::FIRST_FRAME, Clears::AT_ONCE},
+      {"reset of the frame", [](ClothStream& s) { s.monitor.reset(StepStatus::NO_TRANSFORM); }, StepStatus::FIRST_FRAME,
+       Clears::AT_ONCE},
+      {"another static body", [](ClothStream& s) { s.pushBox(); }, StepStatus::OK, Clears::AT_ONCE},
+      {"a static body that is gone",
+       [](ClothStream& s) {
+         s.monitor.withdraw(2);
+         expectFresh(s.history());
+         s.pushBox();
+       },
+       StepStatus::OK, Clears::AT_ONCE},
+      {"a step that fails", [](ClothStream& s) { s.radius_m = 0.01; }, StepStatus::INTERNAL_ERROR,
+       Clears::WITH_THE_NEXT_FRAME},
+      {"another body's teleport", [](ClothStream& s) { s.away_m[1] = 5000; }, StepStatus::TELEPORT,
+       Clears::WITH_THE_NEXT_FRAME},
+      {"a frame of the clock that is refused",
+       [](ClothStream& s) {
+         s.monitor.skip(0, StepStatus::BAD_MESSAGE, s.stamp_ns - 1, "", 0);
+         Outcome refused;
+         EXPECT_TRUE(s.monitor.next(0, refused));
+       },
+       StepStatus::OK, Clears::NEVER},
+  };
+  const Step scene = clothsInABox().motion();
+  for (const Seam& seam : seams) {
+    SCOPED_TRACE(seam.name);
+    ClothStream stream(scene);
+    for (int k = 0; k < 3; ++k) stream.feed();
+    EXPECT_FALSE(stream.history().isClear());
+    EXPECT_EQ(stream.monitor.predict().status, StepStatus::OK);
+    seam.come(stream);
+    if (seam.clears == Clears::AT_ONCE) expectFresh(stream.history());
+    ClothStream fresh(scene, &stream);
+    EXPECT_EQ(stream.feed().status, seam.status);
+    fresh.feed();
+    if (seam.clears == Clears::WITH_THE_NEXT_FRAME) expectFresh(stream.history());
+    EXPECT_TRUE(seam.clears != Clears::NEVER || !stream.history().isClear());
+    stream.radius_m = fresh.radius_m = 0;
+    int answered = 0;
+    for (int k = 0; k < 4; ++k) {
+      const Outcome now = stream.feed(), then = fresh.feed();
+      ASSERT_EQ(now.answered, then.answered) << k;
+      if (!now.answered) continue;
+      ++answered;
+      expectSameAnswer(now, then);
+      expectSameAnswer(stream.monitor.predict(), fresh.monitor.predict());
+      expectSameAnswer(stream.monitor.checkNow(), fresh.monitor.checkNow());
+    }
+    EXPECT_GE(answered, 3);
+  }
 }
 
 TEST(History, AStepAsideBeginsWhereItIsToldOnce) {

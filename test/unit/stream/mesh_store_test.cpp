@@ -68,12 +68,9 @@ TEST_F(MeshStoreTest, InterpolatesWithinARunOnly) {
   store.push(frame(0, 0));
   store.push(frame(100 * MS, 0.4));
   store.push(frame(250 * MS, 0.4));  // gap
-  Positions at;
   ASSERT_EQ(store.lookup(25 * MS), Lookup::READY);
-  store.positionsAt(25 * MS, at);
-  EXPECT_DOUBLE_EQ(at[0].z(), 0.1);
-  store.positionsAt(100 * MS, at);
-  EXPECT_EQ(at[0].z(), 0.4) << "a frame's own positions, bit for bit";
+  EXPECT_DOUBLE_EQ(store.frameAt(25 * MS)->positions[0].z(), 0.1);
+  EXPECT_EQ(store.frameAt(100 * MS)->positions[0].z(), 0.4) << "a frame's own positions, bit for bit";
   EXPECT_EQ(store.lookup(180 * MS), Lookup::TOO_OLD) << "across the gap";
   EXPECT_EQ(store.lookup(250 * MS), Lookup::READY);
   EXPECT_EQ(store.lookup(251 * MS), Lookup::NOT_YET);
@@ -88,8 +85,7 @@ TEST_F(MeshStoreTest, RigidFramesFollowTheArc) {
   MeshStore loose(MeshStoreOptions{0.1, 0, 4});
   loose.push(a);
   loose.push(b);
-  Positions at;
-  loose.positionsAt(50 * MS, at);
+  const Positions at = loose.frameAt(50 * MS)->positions;
   EXPECT_NEAR(at[1].norm(), 1, 1e-12) << "the chord would be at 0.707";
   EXPECT_NEAR(at[1].x(), std::sqrt(0.5), 1e-12);
 }
