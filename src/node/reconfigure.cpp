@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -17,34 +18,33 @@ namespace dccd {
 
 namespace {
 
+/// Calls set(live value, setting) for each of them.
+template <class Live, class Options, class Markers, class Set>
+void forEachLive(Live& live, Options& options, Markers& markers, const Set& set) {
+  set(live.accuracy, options.detector.accuracy.rung);
+  set(live.step_budget_ms, options.detector.step_budget_ms);
+  set(live.max_step_s, options.store.max_step_s);
+  set(live.max_vertex_step_m, options.store.max_vertex_step_m);
+  set(live.max_contacts, options.detector.max_contacts);
+  set(live.suppress_initial, options.detector.suppress_initial);
+  set(live.marker_point_size_m, markers.point_size_m);
+  set(live.marker_normal_length_m, markers.normal_length_m);
+  set(live.marker_mesh, markers.mesh);
+  set(live.marker_obstacle_m, markers.obstacle_m);
+}
+
 deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {
-  const MonitorOptions& options = config.monitor;
-  const MarkerConfig& markers = config.markers;
-  deformable_ccd::CollisionMonitorConfig live = deformable_ccd::CollisionMonitorConfig::__getDefault__();
-  live.accuracy = static_cast<int>(options.detector.accuracy.rung);
-  live.step_budget_ms = options.detector.step_budget_ms;
-  live.max_step_s = options.store.max_step_s;
-  live.max_vertex_step_m = options.store.max_vertex_step_m;
-  live.max_contacts = static_cast<int>(options.detector.max_contacts);
-  live.suppress_initial = options.detector.suppress_initial;
-  live.marker_point_size_m = markers.point_size_m;
-  live.marker_normal_length_m = markers.normal_length_m;
-  live.marker_mesh = markers.mesh;
-  live.marker_obstacle_m = markers.obstacle_m;
+  auto live = deformable_ccd::CollisionMonitorConfig::__getDefault__();
+  forEachLive(live, config.monitor, config.markers, [](auto& value, const auto& setting) {
+    value = static_cast<std::remove_reference_t<decltype(value)>>(setting);
+  });
   return live;
 }
 
 void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions& options, MarkerConfig& markers) {
-  options.detector.accuracy.rung = static_cast<Accuracy>(live.accuracy);
-  options.detector.step_budget_ms = live.step_budget_ms;
-  options.store.max_step_s = live.max_step_s;
-  options.store.max_vertex_step_m = live.max_vertex_step_m;
-  options.detector.max_contacts = static_cast<std::size_t>(live.max_contacts);
-  options.detector.suppress_initial = live.suppress_initial;
-  markers.point_size_m = live.marker_point_size_m;
-  markers.normal_length_m = live.marker_normal_length_m;
-  markers.mesh = live.marker_mesh;
-  markers.obstacle_m = live.marker_obstacle_m;
+  forEachLive(live, options, markers, [](const auto& value, auto& setting) {
+    setting = static_cast<std::remove_reference_t<decltype(setting)>>(value);
+  });
 }
 
 /// The one value of the message, in words.

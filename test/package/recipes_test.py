@@ -73,14 +73,19 @@ int main() {
   options.accuracy.rung = accuracyFromString("toy");
   History history;
   const Outcome outcome = detect(step, options, history);
+  Step back = step;  // begins where the first one ended
+  for (std::size_t b = 0; b < 2; ++b) std::swap(back.bodies[b].t0, back.bodies[b].t1);
+  History fresh;
+  const Outcome second = detect(back, options, history), alone = detect(back, options, fresh);
   options.off.add(Effect::TOY);
   const Outcome without = detect(step, options, history);
   EffectScene scene;
   scene.bodies = step.bodies;
   const EffectPlan plan(scene, {});
-  std::printf("%s %zu undecided %d %s, %d of them, %d when it is off\n", toString(allRungs().back()), outcome.counts.undecided,
+  std::printf("%s %zu undecided %d %s, %d of them, %d when it is off; back %zu, alone %zu\n", toString(allRungs().back()), outcome.counts.undecided,
               plan.running(Effect::TOY), plan.lines()[static_cast<std::size_t>(Effect::TOY)].c_str(),
-              static_cast<int>(outcome.stats[Effect::TOY].in), static_cast<int>(without.stats[Effect::TOY].in));
+              static_cast<int>(outcome.stats[Effect::TOY].in), static_cast<int>(without.stats[Effect::TOY].in),
+              second.counts.undecided, alone.counts.undecided);
 }
 '''
 
@@ -136,7 +141,7 @@ class RecipesTest(unittest.TestCase):
             ran = subprocess.run([str(tree / 'user')], capture_output=True, text=True, check=False)
             self.assertEqual(ran.returncode, 0, ran.stderr)
             said = ran.stdout
-            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company, 2 of them, 0 when it is off$')
+            self.assertRegex(said, r'^toy [1-9]\d* undecided 1 toy: on, toys like company, 2 of them, 0 when it is off; back ([1-9]\d*), alone \1$')
             self.publish_toy(tree)
 
     def publish_toy(self, tree):
