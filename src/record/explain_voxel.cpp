@@ -1,6 +1,7 @@
 #include "record/explain.h"
 
 #include <algorithm>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -8,7 +9,7 @@
 #include "obstacle/excluded_leaves.h"
 #include "record/explain_parts.h"
 #include "step/history.h"
-#include "step/map_frame.h"
+#include "step/observer.h"
 #include "step/parts.h"
 
 namespace dccd {
@@ -28,6 +29,27 @@ const OccupiedLeaf* leafOf(const std::vector<OccupiedLeaf>& leaves, const VoxelK
   });
   return found == leaves.end() ? nullptr : &*found;
 }
+
+bool isFeature(const std::vector<Index>& vertices, const Index* first, std::size_t count) {
+  return std::is_permutation(vertices.begin(), vertices.end(), first, first + count);
+}
+
+/// In which parts of a step the bounds of one feature reached one leaf.
+class Watch : public StepObserver {
+ public:
+  Watch(const std::vector<Index>& vertices, const VoxelKey& leaf) : vertices_(vertices), leaf_(leaf) {}
+  bool reached(std::size_t part) const { return parts_.count(part) > 0; }
+  void onPart(std::size_t part, const SceneArrays&) override { part_ = part; }
+  void onLeaf(const Index* vertices, std::size_t count, const OccupiedLeaf& leaf) override {
+    if (leaf.min == leaf_ && isFeature(vertices_, vertices, count)) parts_.insert(part_);
+  }
+
+ private:
+  const std::vector<Index>& vertices_;
+  const VoxelKey leaf_;
+  std::size_t part_ = 0;
+  std::set<std::size_t> parts_;
+};
 
 class VoxelExplanation : Explanation {
  public:
@@ -50,7 +72,11 @@ class VoxelExplanation : Explanation {
     if (distance_m_ <= 0) removeDistances(feature);  // of other bodies; `exact` holds none
     Step single = feature;
     single.map.surface = VoxelSurface::build(step_.map.surface->resolution(), {*leaf});
-    for (part_ = 0; part_ < parts_; ++part_) tellBounds(*leaf);
+    Watch watch(question_.vertex, leaf->min);
+    Options bounded = plain(options_);
+    if (distance_m_ > 0) bounded.accuracy.rung = Accuracy::CONSERVATIVE;
+    contacts(feature, bounded, &watch);
+    for (part_ = 0; part_ < parts_; ++part_) tellBounds(*leaf, watch.reached(part_));
     for (const Accuracy rung : allRungs()) {
       if (distance_m_ > 0 && !holdsDistance(rung)) continue;
       Options options = plain(options_);
@@ -92,10 +118,11 @@ class VoxelExplanation : Explanation {
     if (distance_m_ > 0) saySeparation(distance_m_, radius_m);
   }
 
-  /// The box of the feature's way and the leaf's.
-  void tellBounds(const OccupiedLeaf& leaf) {
+  /// Whether the flow tested the pair; and for the reader, the box of the feature's way and the leaf's.
+  void tellBounds(const OccupiedLeaf& leaf, bool reached) {
+    if (reached) return say("bounds", Says::KEPT, "the bounds of the way reach the leaf");
     const std::uint16_t key[3] = {leaf.min.x, leaf.min.y, leaf.min.z};
-    const double resolution = step_.map.surface->resolution(), reach_m = distance_m_;
+    const double resolution = step_.map.surface->resolution();
     Box way;
     for (const Index v : question_.vertex) {
       for (const std::size_t end : {part_, part_ + 1}) {
@@ -104,28 +131,30 @@ class VoxelExplanation : Explanation {
         way.max = way.max.cwiseMax(at);
       }
     }
+    std::ostringstream text;
     for (int axis = 0; axis < 3; ++axis) {
       const double begin = voxelPlane(key[axis], resolution);
       const double end = voxelPlane(static_cast<std::int64_t>(key[axis]) + leaf.size, resolution);
-      if (way.min[axis] - end <= reach_m && begin - way.max[axis] <= reach_m) continue;
-      std::ostringstream text;
+      if (way.min[axis] - end <= distance_m_ && begin - way.max[axis] <= distance_m_) continue;
       text << "apart along the map's "
            << "xyz"[axis] << ": the way spans " << way.min[axis] << " to " << way.max[axis] << " m, the leaf " << begin
            << " to " << end;
       return say("bounds", Says::REJECTED, text.str());
     }
-    say("bounds", Says::KEPT, "the box of the way reaches the leaf");
+    text << "the box of the way reaches the leaf, but nothing of it that this " << feature_.name()
+         << " could be the first to meet";
+    say("bounds", Says::REJECTED, text.str());
   }
 
-  static std::vector<Contact> contacts(const Step& step, const Options& options) {
+  static std::vector<Contact> contacts(const Step& step, const Options& options, StepObserver* observer = nullptr) {
     History history;
+    history.impl().observer = observer;
     return detect(step, options, history).contacts;
   }
 
   bool isQuestion(const Contact& c, const OccupiedLeaf& leaf) const {
     return c.kind == question_.kind && c.voxel == leaf.min &&
-           std::is_permutation(question_.vertex.begin(), question_.vertex.end(), c.vertex.begin(),
-                               c.vertex.begin() + static_cast<std::ptrdiff_t>(question_.vertex.size()));
+           isFeature(question_.vertex, c.vertex.data(), question_.vertex.size());
   }
 
   /// Contacts of the whole step: each is told in the part that it begins in.

@@ -2,9 +2,22 @@
 #include <algorithm>
 
 #include "step/history.h"
-#include "step/map_frame.h"
+#include "step/observer.h"
 
 namespace dccd {
+namespace {
+
+/// `fixed` itself where the frames are the same, else `moved`, filled with the positions in the map's frame [m].
+const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved) {
+  if (map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix()) return fixed;
+  moved.resize(fixed.size());
+  const Eigen::Matrix3d rotation = map_from_fixed.linear();
+  const Vec3 translation = map_from_fixed.translation();
+  for (std::size_t i = 0; i < fixed.size(); ++i) moved[i] = rotation * fixed[i] + translation;
+  return moved;
+}
+
+}  // namespace
 
 bool History::Impl::takeMapAnswer(std::size_t b, const Part& part, std::size_t room, ObstacleStats& total) {
   if (b >= carried.map.size() || !options->keep_bounds) return false;
@@ -42,6 +55,7 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
   ObstacleQuery query{*map_reduced, *body.setup.topology, inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0),
                       inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1)};
   query.body = static_cast<std::uint16_t>(b);
+  query.observer = observer;
   if (body.masked) {
     obstacle_active.assign(body.setup.topology->vertexCount(), 0);
     for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];

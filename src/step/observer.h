@@ -7,23 +7,24 @@
 #include "culling/scene_arrays.h"
 #include "dccd/elementary.h"
 #include "dccd/outcome.h"
+#include "obstacle/leaf_observer.h"
 #include "step/pair_separation.h"
 
 namespace dccd {
 
 /// Called on one thread: a step that is observed has one worker. Pairs are by internal vertices, features in any order.
-class StepObserver {
+class StepObserver : public LeafObserver {
  public:
-  virtual ~StepObserver() = default;
-  virtual void onPart(std::size_t part, const SceneArrays& scene) = 0;
+  virtual void onPart(std::size_t /*part*/, const SceneArrays& /*scene*/) {}
   /// The body's pairs with itself are left out as a whole: it certainly does not fold, or keeps its shape.
-  virtual void onSelfLeftOut(std::size_t body, const char* why) = 0;
+  virtual void onSelfLeftOut(std::size_t /*body*/, const char* /*why*/) {}
   /// Pairs that are left after a stage.
-  virtual void onPairs(Stage stage, PairKind kind, const Quad* pairs, std::size_t count) = 0;
+  virtual void onPairs(Stage, PairKind, const Quad* /*pairs*/, std::size_t /*count*/) {}
   /// The planar filter is not asked: the pairs carry distances.
-  virtual void onPlanarSkipped(PairKind kind, const Quad* pairs, std::size_t count) = 0;
-  virtual void onSeparation(PairKind kind, const Quad& pair, const PairSeparation& separation) = 0;
-  virtual void onResult(PairKind kind, const Quad& pair, const ElementaryResult& result) = 0;
+  virtual void onPlanarSkipped(PairKind, const Quad* /*pairs*/, std::size_t /*count*/) {}
+  virtual void onSeparation(PairKind, const Quad& /*pair*/, const PairSeparation&) {}
+  virtual void onResult(PairKind, const Quad& /*pair*/, const ElementaryResult&) {}
+  void onLeaf(const Index* /*vertices*/, std::size_t /*count*/, const OccupiedLeaf&) override {}
 };
 
 }  // namespace dccd
