@@ -96,9 +96,6 @@ class DCCD_EXPORT MeshStore {
   std::size_t firstAtOrAfter(StampNs stamp_ns) const;
 };
 
-/// Of two lists of radii, of which either may be empty (none), the larger ones.
-DCCD_EXPORT std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b);
-
 /// Positions between two arrays of equal size, u in [0,1]; the ends are reproduced bit for bit.
 DCCD_EXPORT void interpolate(const Positions& a, const Positions& b, double u, Positions& out);
 /// Pose between two: translation along the line, rotation along the shorter arc. u outside [0,1] extrapolates.

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "stream/radii.h"
+
 namespace dccd {
 
 namespace {
@@ -164,6 +166,7 @@ std::shared_ptr<const MeshFrame> MeshStore::frameAt(StampNs stamp_ns) const {
   if (b.rigid) {
     at.pose = interpolate(a.pose, b.pose, u);
     const Eigen::Isometry3d moved = at.pose * b.pose.inverse();
+    at.positions.reserve(b.positions.size());
     for (const Vec3& p : b.positions) at.positions.push_back(moved * p);
   } else {
     interpolate(a.positions, b.positions, u, at.positions);
@@ -176,13 +179,6 @@ std::vector<std::shared_ptr<const MeshFrame>> MeshStore::framesWithin(StampNs fr
   const std::size_t end = firstAtOrAfter(to_ns);
   for (std::size_t i = firstAtOrAfter(from_ns + 1); i < end; ++i) within.push_back(frames_[i].frame);
   return within;
-}
-
-std::vector<double> largerRadii(const std::vector<double>& a, const std::vector<double>& b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  std::vector<double> larger(a.size());
-  for (std::size_t v = 0; v < a.size(); ++v) larger[v] = std::max(a[v], b[v]);
-  return larger;
 }
 
 void MeshStore::forgetBefore(StampNs stamp_ns) {

@@ -16,7 +16,7 @@
 namespace dccd {
 
 /// The body's mesh, and its way from where the one frame has it to where the other one does; they may be the same.
-void move(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body);
+void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body);
 
 struct Monitor::Impl {
   /// A frame of the clock body on its way to an outcome: a step from `from` to `to`, or a status without one.

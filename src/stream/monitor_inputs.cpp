@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "stream/monitor_impl.h"
+#include "stream/radii.h"
 
 namespace dccd {
 namespace {
@@ -32,7 +33,8 @@ double offPath(const MeshFrame& frame, const Body& body, double u) {
 
 }  // namespace
 
-void move(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to, Body& body) {
+void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to,
+                  Body& body) {
   const auto positionsOf = [](const std::shared_ptr<const MeshFrame>& frame) {
     return std::shared_ptr<const Positions>(frame, &frame->positions);
   };
@@ -113,13 +115,13 @@ Step Monitor::Impl::place(const Pending& pending) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
     if (!isStream(b)) {
-      move(stores[b].newestShared(), stores[b].newestShared(), body);
+      placeBetween(stores[b].newestShared(), stores[b].newestShared(), body);
       continue;
     }
     if (b == options.clock_body) {  // of a step that has waited the store may have forgotten them
-      move(pending.from, pending.to, body);
+      placeBetween(pending.from, pending.to, body);
     } else {
-      move(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
+      placeBetween(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
       lookBetween(b, step);
     }
     stores[b].forgetBefore(step.stamp_ns);

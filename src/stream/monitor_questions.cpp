@@ -12,7 +12,7 @@ Outcome Monitor::checkNow() {
   step.bodies = m.bodies;
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     if (!m.stores[b].empty()) {
-      move(m.stores[b].newestShared(), m.stores[b].newestShared(), step.bodies[b]);
+      placeBetween(m.stores[b].newestShared(), m.stores[b].newestShared(), step.bodies[b]);
       continue;
     }
     Outcome outcome;
