@@ -18,4 +18,13 @@ inline std::string shortText(std::string_view text, std::size_t limit = MAX_TEXT
   return kept;
 }
 
+/// Empty when tf2 takes it as a frame's name; else what is wrong with it, in a few words. tf2 itself writes a line to
+/// the console for each name that it does not take.
+inline std::string frameNameProblem(const std::string& name) {
+  if (name.empty()) return "it is empty";
+  if (name[0] == '/') return "it begins with a slash";
+  if (name.size() > MAX_NAME) return "it has " + std::to_string(name.size()) + " characters";
+  return {};
+}
+
 }  // namespace dccd

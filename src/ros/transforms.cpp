@@ -28,13 +28,6 @@ bool isUsable(const geometry_msgs::TransformStamped& transform) {
 
 }  // namespace
 
-std::string frameNameProblem(const std::string& name) {
-  if (name.empty()) return "it is empty";
-  if (name[0] == '/') return "it begins with a slash";
-  if (name.size() > MAX_NAME) return "it has " + std::to_string(name.size()) + " characters";
-  return {};
-}
-
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
   const auto known = kept_.find(transform.child_frame_id);
   return known != kept_.end() &&

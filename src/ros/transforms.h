@@ -46,10 +46,6 @@ class TransformFeed {
   void clear();
 };
 
-/// Empty when tf2 takes the name; else what is wrong with it, in a few words. tf2 itself writes a line to the console
-/// for each name that it does not take.
-std::string frameNameProblem(const std::string& name);
-
 /// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no transform.
 bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source,
                      StampNs stamp_ns, Eigen::Isometry3d& transform, std::string& reason);
