@@ -50,33 +50,33 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
   for (const PairWorker& w : workers) {
     for (const PairKind kind : KINDS) all += w.hits(kind).size();
   }
-  std::array<const std::vector<HitOrder::Entry>*, 2> in_order{};
   parallel(2, all < HITS_TO_SHARE ? 2 : 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       std::vector<const std::vector<Hit>*> parts;
       for (const PairWorker& w : workers) parts.push_back(&w.hits(KINDS[k]));
-      in_order[k] = &order[k].sort(parts);
+      order[k].sort(std::move(parts));
       if (KINDS[k] == PairKind::VERTEX_FACE) result.contacts.assign(all, Contact());  // there are fewer of these
     }
   });
   std::size_t base = 0;
   for (std::size_t k = 0; k < KINDS.size(); ++k) {
     const PairKind kind = KINDS[k];
-    const std::vector<HitOrder::Entry>& sorted = *in_order[k];
+    const HitOrder& sorted = order[k];
     parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
       bool late = false;
       for (std::size_t i = first; i < last; ++i) {
         if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
         if (i + HITS_AHEAD < last) {
-          __builtin_prefetch(sorted[i + HITS_AHEAD].hit);
-          __builtin_prefetch(&sorted[i + HITS_AHEAD].hit->certainty);  // half of them lie across two cache lines
+          const Hit& next = sorted[i + HITS_AHEAD];
+          __builtin_prefetch(&next);
+          __builtin_prefetch(&next.certainty);  // half of them lie across two cache lines
         }
         if (i + FEATURES_AHEAD < last) {
-          const Hit& later = *sorted[i + FEATURES_AHEAD].hit;
+          const Hit& later = sorted[i + FEATURES_AHEAD];
           scene.prefetchFeature(secondKind(kind), later.bodies & 0xffff, static_cast<Index>(later.key));
         }
-        writeContact(kind, *sorted[i].hit, step, late, result.contacts[base + i]);
+        writeContact(kind, sorted[i], step, late, result.contacts[base + i]);
       }
     });
     base += sorted.size();

@@ -39,7 +39,8 @@ TEST(HitOrder, SortsByBodiesThenKeyAndKeepsEveryHit) {
       std::sort(expected.begin(), expected.end(),
                 [](const Hit* x, const Hit* y) { return std::tie(x->bodies, x->key) < std::tie(y->bodies, y->key); });
       std::vector<const Hit*> sorted;
-      for (const HitOrder::Entry& entry : order.sort(pointers)) sorted.push_back(entry.hit);
+      order.sort(pointers);
+      for (std::size_t i = 0; i < order.size(); ++i) sorted.push_back(&order[i]);
       ASSERT_EQ(sorted.size(), count);
       EXPECT_TRUE(std::equal(sorted.begin(), sorted.end(), expected.begin(), same_keys))
           << hits << " hits, " << bits << " bits, " << bodies << " bodies";
@@ -51,11 +52,16 @@ TEST(HitOrder, SortsByBodiesThenKeyAndKeepsEveryHit) {
 
 TEST(HitOrder, NothingAndOne) {
   HitOrder order;
-  EXPECT_TRUE(order.sort({}).empty());
   const std::vector<Hit> none, one(1);
-  EXPECT_TRUE(order.sort({&none}).empty());
-  ASSERT_EQ(order.sort({&none, &one}).size(), 1u);
-  EXPECT_EQ(order.sort({&one})[0].hit, &one[0]);
+  for (const auto& parts : {std::vector<const std::vector<Hit>*>{}, {&none}}) {
+    order.sort(parts);
+    EXPECT_EQ(order.size(), 0u);
+  }
+  for (const auto& parts : {std::vector<const std::vector<Hit>*>{&none, &one}, {&one}, {&one, &none}}) {
+    order.sort(parts);
+    ASSERT_EQ(order.size(), 1u);
+    EXPECT_EQ(&order[0], &one[0]);
+  }
 }
 
 }  // namespace
