@@ -1,7 +1,6 @@
 // One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for
 // each face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -23,26 +22,6 @@ std::unique_ptr<Rung> elementaryTestFor(const ObstacleOptions& options) {
                                 toString(rung) + "; use conservative");
   }
   return makeRung(options.accuracy);
-}
-
-bool ObstacleCheck::Impl::reachesSurface(const Run& run) const {
-  Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
-  const std::size_t count = run.query.topology.vertexCount();
-  for (const Positions* positions : {&run.query.map_t0, &run.query.map_t1}) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const double* p = (*positions)[i].data();
-      for (int axis = 0; axis < 3; ++axis) {  // a NaN fails both comparisons and changes nothing
-        lo[axis] = p[axis] < lo[axis] ? p[axis] : lo[axis];
-        hi[axis] = p[axis] > hi[axis] ? p[axis] : hi[axis];
-      }
-    }
-  }
-  const Box& bounds = run.surface->bounds;
-  const double reach = *std::max_element(reaches.begin(), reaches.end());
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(lo[axis] - reach <= bounds.max[axis] && hi[axis] + reach >= bounds.min[axis])) return false;
-  }
-  return true;
 }
 
 /// A face reaches as far as its most uncertain vertex asks for, and is found by the keys of all its vertices: each
@@ -190,7 +169,7 @@ bool ObstacleCheck::run(const ObstacleQuery& query, std::vector<Contact>& contac
   const Impl::Run run{query, &query.surface.impl(), &stats};
   impl.begin(query.deadline);
   impl.prepareReaches(run);
-  if (query.surface.leafCount() > 0 && impl.reachesSurface(run) && !impl.isLate(run)) {
+  if (query.surface.leafCount() > 0 && !impl.isLate(run)) {
     impl.prepareVertices(run);
     if (topology.hasFaces()) {
       impl.markNearFaces(run);

@@ -75,7 +75,6 @@ struct ObstacleCheck::Impl {
   bool foundTooMuch(const Run& run);
 
   void begin(const Deadline& deadline);
-  bool reachesSurface(const Run& run) const;
   void prepareReaches(const Run& run);
   void prepareVertices(const Run& run);
   /// What the keys of a face or an edge reach, as NEAR bits for its vertices; corner: also a corner.

@@ -119,6 +119,8 @@ struct History::Impl {
   bool meetAtStart(const Step& step, const Contact& contact) const;
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runMap(const Part& part);
+  /// False: its bounds show that it does not come near what is occupied in the part.
+  bool reachesMap(std::size_t body, const Part& part) const;
   bool runMapOf(std::size_t body, const Part& part, ObstacleStats& total);
   /// The body's contacts with the map where they are known to be those of the step before; false: they are not.
   bool takeMapAnswer(std::size_t body, const Part& part, std::size_t room, ObstacleStats& total);

@@ -1,6 +1,8 @@
 // A part of a step against the map.
 #include <algorithm>
+#include <cmath>
 
+#include "dccd/tolerances.h"
 #include "step/history.h"
 #include "step/observer.h"
 
@@ -15,6 +17,24 @@ const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Posit
   const Vec3 translation = map_from_fixed.translation();
   for (std::size_t i = 0; i < fixed.size(); ++i) moved[i] = rotation * fixed[i] + translation;
   return moved;
+}
+
+/// Whether the body comes so near to what is occupied that their bounds, in the map's frame, tell nothing. Those of its
+/// records, over the whole step, are placed as a vertex is; the slack is more than what rounding does to either.
+bool boundsReach(const SceneBody& body, const ObstacleMap& map, const Box& occupied, double distance_m) {
+  for (int axis = 0; axis < 3; ++axis) {
+    double lo = map.map_from_fixed.translation()[axis], hi = lo, size = std::abs(lo) + distance_m;
+    for (int from = 0; from < 3; ++from) {
+      const double factor = map.map_from_fixed.linear()(axis, from);
+      const double a = factor * body.bounds_min[from], b = factor * body.bounds_max[from];
+      lo += std::min(a, b);
+      hi += std::max(a, b);
+      size += std::max(std::abs(a), std::abs(b));
+    }
+    const double reach = distance_m + tolerance::LENGTH * size;
+    if (lo - reach > occupied.max[axis] || hi + reach < occupied.min[axis]) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -42,9 +62,23 @@ void History::Impl::keepMapAnswer(std::size_t b, const Part& part, std::size_t f
                     pairs};
 }
 
+bool History::Impl::reachesMap(std::size_t b, const Part& part) const {
+  const SceneBody& body = scene.bodies()[b];
+  double distance_m = scene.separation(b, OBSTACLE_BODY);
+  if (body.uncertain) {
+    const std::vector<double>& radii = *part.step.bodies[b].radius_m;
+    distance_m += *std::max_element(radii.begin(), radii.end());
+  }
+  return boundsReach(body, part.step.map, map_reduced->bounds(), distance_m);
+}
+
 /// False where the deadline cut it.
 bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& total) {
   const SceneBody& body = scene.bodies()[b];
+  if (!reachesMap(b, part)) {
+    if (b < carried.map.size()) carried.map[b] = MapAnswer();  // of a map that it did reach
+    return true;
+  }
   if (!obstacle_checks[b]) {
     ObstacleOptions o;
     o.accuracy = options->accuracy;

@@ -27,6 +27,8 @@ struct OnAMap : testing::Test {
         leaves.push_back(leaf);
       }
     }
+    // A post beside the cloth, higher than it is lifted, so that the map's bounds reach it.
+    leaves.push_back({{32768 + 8, 32768 + 8, 32772}, 1});
     return VoxelSurface::build(0.25, leaves);
   }
   /// The step's answer, which is that of a history of its own.
