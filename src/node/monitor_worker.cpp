@@ -122,18 +122,21 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   const std::string& frame = pipeline.fixedFrame();
   log.tell(outcome);
   newest_ns = outcome.stamp_ns;
-  state.tell(outcome, outcome.arrival_ns, frame);
+  // First: each message after the first one waits for roscpp's thread, which is awake by then and holds its locks.
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
+  state.tell(outcome, outcome.arrival_ns, frame);
   outputs.publishMarkers(outcome, bodies, config.markers, frame);
   publishEffects(toRosTime(outcome.stamp_ns));
   if (pipeline.effects().takeNewLeftOut(pipeline.monitor())) {
     outputs.publishLeftOut(toLeftOutPairs(pipeline.monitor().leftOut(), bodies, outcome.stamp_ns, frame));
   }
   predict(outcome);
-  StatsContext context = statsContext();
-  context.latency_s = latency_s;
-  outputs.publishStats(outcome, context, frame);
+  if (outputs.wantsStats()) {
+    StatsContext context = statsContext();
+    context.latency_s = latency_s;
+    outputs.publishStats(outcome, context, frame);
+  }
   diagnostics.add(outcome, latency_s);
 }
 

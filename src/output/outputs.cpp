@@ -46,10 +46,11 @@ void Outputs::publishMarkers(const Outcome& outcome, const std::vector<Body>& bo
 }
 
 void Outputs::publishStats(const Outcome& outcome, StatsContext context, const std::string& frame) {
-  if (stats_.getNumSubscribers() == 0) return;
   context.markers_built = markers_built_;
   stats_.publish(toStepStats(outcome, context, frame));
 }
+
+bool Outputs::wantsStats() const { return stats_.getNumSubscribers() > 0; }
 
 bool Outputs::wantsPrediction() const {
   return (predicted_ && predicted_.getNumSubscribers() > 0) ||
