@@ -75,8 +75,17 @@ bool History::Impl::reachesMap(std::size_t b, const Part& part) const {
 /// False where the deadline cut it.
 bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& total) {
   const SceneBody& body = scene.bodies()[b];
+  const Deadline::Clock::time_point start = Deadline::Clock::now();
+  const std::uint64_t in_before = total.pairs_in, out_before = result.contacts.size();
+  const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
+                        : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
+                                                                 : Effect::OCTOMAP;
+  const auto count = [&] {
+    result.stats[effect] += StageStats{total.pairs_in - in_before, result.contacts.size() - out_before, msSince(start)};
+  };
   if (!reachesMap(b, part)) {
     if (b < carried.map.size()) carried.map[b] = MapAnswer();  // of a map that it did reach
+    count();
     return true;
   }
   if (!obstacle_checks[b]) {
@@ -97,14 +106,6 @@ bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& tot
   }
   if (body.uncertain) query.vertex_radius_m = moving.radius_m->data();
   if (found_limit != FoundLimit::NONE) query.most_found = found_limit - std::min(found_limit, result.contacts.size());
-  const Deadline::Clock::time_point start = Deadline::Clock::now();
-  const std::uint64_t in_before = total.pairs_in, out_before = result.contacts.size();
-  const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
-                        : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
-                                                                 : Effect::OCTOMAP;
-  const auto count = [&] {
-    result.stats[effect] += StageStats{total.pairs_in - in_before, result.contacts.size() - out_before, msSince(start)};
-  };
   if (takeMapAnswer(b, part, query.most_found, total)) {
     count();
     return true;
