@@ -26,6 +26,7 @@ class Outputs {
                       const std::string& frame);
   /// After the step's prediction, which it tells of.
   void publishStats(const Outcome& outcome, StatsContext context, const std::string& frame);
+  /// Whether anybody listens to statistics.
   bool wantsStats() const;
   /// Whether anybody listens to predictions.
   bool wantsPrediction() const;

@@ -23,7 +23,8 @@ struct AtAVoxel : testing::Test {
 
   Eigen::Isometry3d anyPose(double offset_m) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = Eigen::Quaterniond::UnitRandom().toRotationMatrix();
+    const Eigen::Quaterniond turn(draw(-1, 1), draw(-1, 1), draw(-1, 1), draw(-1, 1));
+    pose.linear() = turn.normalized().toRotationMatrix();
     pose.translation() = Vec3(draw(-1, 1), draw(-1, 1), draw(-1, 1)) * offset_m;
     return pose;
   }
