@@ -1,20 +1,13 @@
+// The fields of a recording in the order of the file, for both directions.
 #include "record/step_recording.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <tuple>
 #include <type_traits>
 
 #include "dccd/accuracy.h"
-#include "dccd/regular_file.h"
 #include "record/recording_archive.h"
 #include "step/option_rows.h"
 
@@ -24,8 +17,6 @@ namespace {
 
 constexpr char MAGIC[8] = {'D', 'C', 'C', 'D', 'S', 'T', 'E', 'P'};
 // What hostile options could cost: parts of a step, and buffers for so many workers.
-constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{4} << 30;
-constexpr int MAX_COPIES = 1000;
 constexpr std::size_t MAX_SUBSTEPS = 100000;
 constexpr std::size_t MAX_BODIES = 65534;
 
@@ -343,8 +334,6 @@ void visit(Archive& a, Recording& r) {
   visitAnswer(a, r.answer);
 }
 
-std::string systemText(const std::string& path) { return path + ": cannot be written: " + std::strerror(errno); }
-
 }  // namespace
 
 void RecordingImage::build(const StepRecording& recording) {
@@ -359,69 +348,6 @@ void RecordingImage::build(const StepRecording& recording) {
   visitExpected(writer, recording);
   visitPatches(writer, recording);
   visitOptions<6>(writer, recording.options);  // effects that are off
-}
-
-bool RecordingImage::write(int descriptor) const noexcept {
-  for (const Piece& piece : pieces_) {
-    const char* data = static_cast<const char*>(piece.data ? piece.data : heads_.data() + piece.offset);
-    std::size_t left = piece.size;
-    while (left > 0) {
-      const ssize_t written = ::write(descriptor, data, left);
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) return false;
-      data += written;
-      left -= static_cast<std::size_t>(written);
-    }
-  }
-  return true;
-}
-
-std::size_t RecordingImage::bytes() const {
-  std::size_t sum = 0;
-  for (const Piece& piece : pieces_) sum += piece.size;
-  return sum;
-}
-
-std::string writeNewRecording(const std::string& stem, const StepRecording& recording) {
-  for (int copy = 1; copy <= MAX_COPIES; ++copy) {
-    const std::string path = stem + (copy == 1 ? "" : "_" + std::to_string(copy)) + ".step";
-    // Whoever makes the file has its name; it is written in its place when it is whole.
-    const int reserved = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    if (reserved < 0 && errno == EEXIST) continue;
-    if (reserved < 0) throw std::runtime_error(systemText(path));
-    ::close(reserved);
-    try {
-      writeRecording(path, recording);
-    } catch (const std::runtime_error&) {
-      ::unlink(path.c_str());
-      throw;
-    }
-    return path;
-  }
-  throw std::runtime_error(stem + ".step: " + std::to_string(MAX_COPIES) + " files of this name are there already");
-}
-
-void writeRecording(const std::string& path, const StepRecording& recording) {
-  RecordingImage image;
-  image.build(recording);
-  const std::string part = path + ".part";
-  const int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (descriptor < 0) throw std::runtime_error(systemText(path));
-  bool good = image.write(descriptor);
-  int why = errno;
-  // A full disk may show up only here.
-  if (::close(descriptor) != 0 && good) {
-    good = false;
-    why = errno;
-  }
-  if (good && std::rename(part.c_str(), path.c_str()) != 0) {
-    good = false;
-    why = errno;
-  }
-  if (good) return;
-  ::unlink(part.c_str());
-  errno = why;
-  throw std::runtime_error(systemText(path));
 }
 
 StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {
@@ -446,15 +372,6 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;
-}
-
-StepRecording readRecordingFile(const std::string& path) {
-  const std::string problem = regularFileProblem(path, MAX_FILE_BYTES);
-  if (!problem.empty()) throw RecordingError(path + ": " + problem);
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw RecordingError(path + ": cannot be read");
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  return readRecording(bytes.data(), bytes.size(), path);
 }
 
 }  // namespace dccd

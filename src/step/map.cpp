@@ -20,7 +20,8 @@ const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Posit
 }
 
 /// Whether the body comes so near to what is occupied that their bounds, in the map's frame, tell nothing. Those of its
-/// records, over the whole step, are placed as a vertex is; the slack is more than what rounding does to either.
+/// records along x, y and z, over the whole step, are placed as inMapFrame() places a vertex. Either is off by some ten
+/// half ulps of the size of its terms, of which the slack is thousands.
 bool boundsReach(const SceneBody& body, const ObstacleMap& map, const Box& occupied, double distance_m) {
   for (int axis = 0; axis < 3; ++axis) {
     double lo = map.map_from_fixed.translation()[axis], hi = lo, size = std::abs(lo) + distance_m;
