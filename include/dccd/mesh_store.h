@@ -16,14 +16,22 @@
 
 namespace dccd {
 
+/// Where something rigid was seen to be, in the fixed frame.
+struct SeenPose {
+  StampNs stamp_ns = 0;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< not finite: was not to be had
+};
+
 /// One frame, already in the fixed frame.
 struct MeshFrame {
   StampNs stamp_ns = 0;
   std::shared_ptr<const Topology> topology;
   Positions positions;  ///< [m]; non-finite ones are unchecked, not refused
   /// Rigid bodies: fixed_from_body at the stamp. Between two frames they then move along the rotation, not the chord.
+  /// Static ones: where their frame of reference was.
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<SeenPose> seen = {};    ///< of a rigid body: fixed_from_body since the frame before, ascending
   std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
   std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
   std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
@@ -76,6 +84,9 @@ class DCCD_EXPORT MeshStore {
   std::shared_ptr<const MeshFrame> frameAt(StampNs stamp_ns) const;
   /// The frames between two stamps, neither included.
   std::vector<std::shared_ptr<const MeshFrame>> framesWithin(StampNs from_ns, StampNs to_ns) const;
+
+  /// The poses seen between two stamps, neither included.
+  std::vector<SeenPose> seenWithin(StampNs from_ns, StampNs to_ns) const;
 
   /// Forgets what is not needed for stamps at or after this one.
   void forgetBefore(StampNs stamp_ns);

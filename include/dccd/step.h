@@ -15,6 +15,7 @@ struct ObstacleMap {
   std::shared_ptr<const VoxelSurface> surface;
   StampNs stamp_ns = 0;
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< at the map's stamp, held for the whole step
+  std::string frame_id;                                              ///< the name of its frame, for sentences
   std::string problem;                                               ///< why there is none, for the reason of NO_MAP
 };
 

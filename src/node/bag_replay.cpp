@@ -121,7 +121,7 @@ struct BagReplay::Run {
         predictions(predictions_to),
         variation(r.options_.variation),
         bag(r.path_),
-        pipeline(r.config_, transforms) {
+        pipeline(r.config_, feed) {
     pipeline.setTopologyFilter(variation.topology);
     if (r.options_.log) pipeline.monitor().computeOnly(*(log = r.options_.log));
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
@@ -182,6 +182,8 @@ struct BagReplay::Run {
       const std::string complaint = pipeline.takeComplaint(b);
       if (!complaint.empty()) complain(summary.mesh_topics[b] + ": " + complaint);
     }
+    const std::string note = pipeline.takeMapNote();
+    if (!note.empty()) complain(note);
   }
 
   void mesh(std::size_t body, const rosbag::MessageInstance& message, std::vector<std::uint8_t> bytes) {

@@ -41,7 +41,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
                              MonitorConfig given)
     : node(node_handle),
       private_node(private_handle),
-      pipeline(given, transforms, mapSourceOf(node, given)),
+      pipeline(given, feed, mapSourceOf(node, given)),
       config(pipeline.config()),
       recorder(config, pipeline.monitor(), private_node.getNamespace()),
       outputs(private_node, config),
@@ -51,7 +51,12 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),
       log(node, private_node.getNamespace(), config),
       look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
-      disabled_frames(config.bodies.size()) {}
+      disabled_frames(config.bodies.size()) {
+  // Of a static body the newest frame alone counts.
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (pipeline.isStatic(b)) queue.keepNewest(b);
+  }
+}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
@@ -71,13 +76,15 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
+  const std::int64_t now_ns = steadyNs();
+  state.mapCame(now_ns);
   const std::string problem = mapMessageProblem(message->getDataType(), message->getMD5Sum(), message->size(), config);
-  if (!problem.empty()) return maps->refuse(problem);  // before its bytes are copied
+  if (!problem.empty()) return maps->refuse(problem, now_ns);  // before its bytes are copied
   if (!hasMemoryFor(message->size())) {
-    return maps->refuse("there is not enough memory for a map of " + std::to_string(message->size()) + " bytes");
+    return maps->refuse("there is not enough memory for a map of " + std::to_string(message->size()) + " bytes",
+                        now_ns);
   }
-  maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()));
-  state.mapCame();  // after it: the worker, which may take the map before, says again and again that none is on its way
+  maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns);
 }
 
 /// Nothing may get out of a callback: the thread would end, and the process with it.
@@ -110,7 +117,7 @@ void CollisionMonitor::Impl::subscribe() {
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
   if (!config.octomap_file.empty()) {
-    maps->submitFile(config.octomap_file);
+    maps->submitFile(config.octomap_file, steadyNs());
   } else {
     map_subscriber = input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) {
       guarded(config.octomap_topic, [&] { onMap(m); });

@@ -87,6 +87,8 @@ struct CollisionMonitor::Impl {
   bool workOn(const std::vector<std::function<void()>>& commands);
   void carryOut(const std::function<void()>& command);
   void takeMaps();
+  bool waitsForMap();
+  bool mayTake(std::size_t body);
   void takeMessages();
   void tellComplaints();
   void publishOutcome(Outcome& outcome);

@@ -39,8 +39,12 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
   map_age_s_ = map_age_s;
 }
 
-void Liveness::mapCame(std::int64_t now_ns) {
-  if (map_since_ns_ == NEVER) map_since_ns_ = now_ns;
+void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
+  if (maps_.size() < MAX_OPEN) maps_.push_back({name, now_ns});
+}
+
+void Liveness::mapSettled(std::int64_t name) {
+  while (!maps_.empty() && maps_.front().name <= name) maps_.pop_front();
 }
 
 void Liveness::forget() {
@@ -63,7 +67,9 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (newest_.came_ns != NEVER && secondsBetween(newest_.came_ns, now_ns) > limits_.max_step_s) {
     add(Fault::Kind::SILENCE, "no frame has come for more than " + seconds(limits_.max_step_s));
   }
-  if (map_since_ns_ != NEVER && secondsBetween(map_since_ns_, now_ns) > limits_.answer_timeout_s) {
+  if (!maps_.empty() && maps_.front().name < answered_) {
+    add(Fault::Kind::NEWER_MAP, "a newer map came before the last frame that was answered, and is not in use yet");
+  } else if (!maps_.empty() && secondsBetween(maps_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
     add(Fault::Kind::NEWER_MAP,
         "a newer map came and has not been in use for more than " + seconds(limits_.answer_timeout_s));
   }

@@ -33,9 +33,9 @@ class Liveness {
   /// It has its outcome, whatever that says, and so do those before it. `map_age_s`: of the map in use at the frame's
   /// stamp; negative: none was used.
   void outcome(std::int64_t name, double map_age_s, std::int64_t now_ns);
-  /// A map came that is not in use yet; it is, or was refused.
-  void mapCame(std::int64_t now_ns);
-  void mapSettled() { map_since_ns_ = NEVER; }
+  /// A map came, under a name as frames have. It and all before it are in use, gave way to it or were refused.
+  void mapCame(std::int64_t name, std::int64_t now_ns);
+  void mapSettled(std::int64_t name);
 
   /// Something is asked for that makes what was said void, until forget().
   void ask(const std::string& what) { asked_ = what; }
@@ -55,7 +55,8 @@ class Liveness {
   LivenessLimits limits_;
   std::deque<Frame> open_;  // without an outcome; at most a few thousand, of which the oldest counts
   Frame newest_{0, NEVER};
-  std::int64_t map_since_ns_ = NEVER, answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
+  std::deque<Frame> maps_;                               // not in use; at most as many
+  std::int64_t answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
   std::string asked_;
   bool disabled_ = false, stopped_ = false;

@@ -20,18 +20,19 @@ void MapLoader::put(Job job) {
   ++received_;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (!job_ && !decoding_ && !done_) busy_since_ns_ = job.arrival_ns;
     job_ = std::move(job);
   }
   changed_.notify_one();
 }
 
-void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns) {
-  put({std::move(bytes), {}, receipt_ns, {}});
+void MapLoader::submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns, std::int64_t arrival_ns) {
+  put({std::move(bytes), {}, receipt_ns, arrival_ns, {}});
 }
 
-void MapLoader::submitFile(const std::string& file) { put({{}, file, 0, {}}); }
+void MapLoader::submitFile(const std::string& file, std::int64_t arrival_ns) { put({{}, file, 0, arrival_ns, {}}); }
 
-void MapLoader::refuse(const std::string& problem) { put({{}, {}, 0, problem}); }
+void MapLoader::refuse(const std::string& problem, std::int64_t arrival_ns) { put({{}, {}, 0, arrival_ns, problem}); }
 
 LoadedMap MapLoader::load(const Job& job) const {
   if (!job.file.empty()) return loadMapFile(job.file, config_, &memory_);
@@ -49,9 +50,10 @@ bool MapLoader::take(LoadedMap& map) {
   return true;
 }
 
-bool MapLoader::busy() {
+std::optional<std::int64_t> MapLoader::busySince() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return job_ || decoding_ || done_;
+  if (!job_ && !decoding_ && !done_) return std::nullopt;
+  return busy_since_ns_;
 }
 
 void MapLoader::loop() {
@@ -66,6 +68,7 @@ void MapLoader::loop() {
       decoding_ = true;
     }
     LoadedMap map = load(job);
+    map.arrival_ns = job.arrival_ns;
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
     if (!map.surface) ++refused_;
     {

@@ -35,17 +35,19 @@ class MapLoader {
   MapLoader(const MapLoader&) = delete;
   MapLoader& operator=(const MapLoader&) = delete;
 
-  /// A serialised octomap_msgs/Octomap; replaces one that still waits. From any thread.
-  void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns);
-  void submitFile(const std::string& file);
+  /// A serialised octomap_msgs/Octomap that came at `arrival_ns` of the steady clock; replaces one that still waits.
+  /// From any thread.
+  void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns, std::int64_t arrival_ns);
+  void submitFile(const std::string& file, std::int64_t arrival_ns);
   /// A message that is refused undecoded takes its turn all the same: it is newer than the map in use, which is void
   /// with it. From any thread.
-  void refuse(const std::string& problem);
+  void refuse(const std::string& problem, std::int64_t arrival_ns);
   /// The newest finished map, once.
   bool take(LoadedMap& map);
 
-  /// A map is on its way: it waits to be decoded, is being decoded, or can be taken.
-  bool busy();
+  /// When the first of the maps came that are on their way, that wait to be decoded, are being decoded or can be taken;
+  /// none is: no value.
+  std::optional<std::int64_t> busySince();
 
   std::uint64_t received() const { return received_; }
   std::uint64_t refused() const { return refused_; }
@@ -55,6 +57,7 @@ class MapLoader {
     std::vector<std::uint8_t> bytes;
     std::string file;
     StampNs receipt_ns = 0;
+    std::int64_t arrival_ns = 0;
     std::string problem;  // not empty: refused
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
@@ -65,6 +68,7 @@ class MapLoader {
   std::optional<Job> job_;
   std::optional<LoadedMap> done_;
   bool stopping_ = false, decoding_ = false;
+  std::int64_t busy_since_ns_ = 0;
   std::atomic<std::uint64_t> received_{0}, refused_{0};
   std::thread thread_;
 

@@ -55,7 +55,7 @@ void checkGrid(const BodyConfig& body) {
 
 }  // namespace
 
-MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transforms, const std::string& map_source)
+MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& transforms, const std::string& map_source)
     : config_(std::move(config)),
       effects_(config_, map_source),
       transforms_(transforms),
@@ -69,6 +69,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, tf2::BufferCore& transfor
   waiting_.resize(config_.bodies.size());
   placed_.resize(config_.bodies.size());
   complaints_.resize(config_.bodies.size());
+  refused_.resize(config_.bodies.size());
   checked_.resize(config_.bodies.size());
   static_meshes_.resize(config_.bodies.size());
 }
@@ -215,6 +216,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   const auto refuse = [&](StepStatus status, const std::string& reason) {
     monitor_->countReceived(body);
     skip(body, status, message.receipt_ns, message.arrival_ns, reason);
+    if (isStatic(body)) refused_[body] = shortText(reason);
   };
   if (message.too_large > 0) {
     return refuse(StepStatus::BAD_MESSAGE, "a message of " + std::to_string(message.too_large) +
@@ -239,9 +241,9 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   // Of a mesh that is the last one's, all is known.
   const bool is_new = checked_[body] != waiting.mesh.topology;
   if (const std::string problem = is_new ? indexProblem(body, *waiting.mesh.topology) : ""; !problem.empty()) {
-    monitor_->countReceived(body);
-    return skip(body, StepStatus::VERTEX_COUNT, message.receipt_ns, message.arrival_ns, problem);
+    return refuse(StepStatus::VERTEX_COUNT, problem);
   }
+  refused_[body].clear();
   checked_[body] = waiting.mesh.topology;
   if (is_new) {
     hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
@@ -271,8 +273,8 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   expectMap();
+  if (!unplaced_map_) unplaced_since_ns_ = now_ns;
   unplaced_map_ = std::move(map);
-  unplaced_since_ns_ = now_ns;
 }
 
 bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {

@@ -9,14 +9,13 @@
 #include <string>
 #include <vector>
 
-#include <tf2/buffer_core.h>
-
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
 #include "node/effects.h"
+#include "ros/transforms.h"
 
 namespace dccd {
 
@@ -26,6 +25,7 @@ struct LoadedMap {
   std::shared_ptr<const KnownSpace> known;      ///< when unknown_space is not free
   std::string frame_id;                         ///< empty: the fixed frame
   StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
+  std::int64_t arrival_ns = 0;                  ///< by the clock that frames' are of
   std::string problem;
 };
 
@@ -38,7 +38,7 @@ class MonitorPipeline {
  public:
   /// Loads topology and mesh files. Throws ParameterError or std::invalid_argument naming the parameter or file, or the
   /// effect that is asked for and that the scene cannot have. `map_source`: as EffectTracker's.
-  MonitorPipeline(MonitorConfig config, tf2::BufferCore& transforms, const std::string& map_source = {});
+  MonitorPipeline(MonitorConfig config, const TransformFeed& transforms, const std::string& map_source = {});
 
   /// Whether the body can take a message: none of its frames waits for tf, or one of a static body has waited in vain
   /// and gives way to the next. Each waits its own time: where tf lags behind a camera by more than the time between
@@ -50,8 +50,8 @@ class MonitorPipeline {
   /// From the next message on. Null: meshes are taken as they come. Rigid bodies' files always are.
   void setTopologyFilter(TopologyFilter filter) { topology_filter_ = std::move(filter); }
   void setMap(LoadedMap map, std::int64_t now_ns);
-  /// A map that was set has no place yet: its transform has not come.
-  bool mapWaits() const { return unplaced_map_.has_value(); }
+  /// When the newest map that is in use or was refused came; one that was set and has no place yet is neither.
+  std::int64_t settledMapNs() const { return settled_map_ns_; }
   /// Somebody is there who publishes maps: from now on a step without one lacks it.
   void expectMap() { effects_.expectMap(); }
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
@@ -91,6 +91,8 @@ class MonitorPipeline {
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
+  /// What was taken for granted to place the map, since the last call; for the log. Empty: nothing was.
+  std::string takeMapNote() { return std::exchange(map_note_, {}); }
   /// What looks like a mistake in the body's messages or mesh file, though they are valid (advice.h); empty: nothing
   /// does.
   const std::string& hint(std::size_t body) const { return hints_[body]; }
@@ -105,7 +107,7 @@ class MonitorPipeline {
   };
   MonitorConfig config_;
   EffectTracker effects_;
-  tf2::BufferCore& transforms_;
+  const TransformFeed& transforms_;
   std::unique_ptr<Monitor> monitor_;
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
@@ -113,10 +115,13 @@ class MonitorPipeline {
   std::vector<bool> placed_;                     // a static body of which the monitor has a frame
   std::vector<std::optional<MeshFrame>> rigid_;  // as the mesh file has them
   std::vector<std::string> complaints_, hints_;
+  std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   std::optional<LoadedMap> unplaced_map_;
   std::shared_ptr<const KnownSpace> known_;  // of the map in use
-  std::int64_t unplaced_since_ns_ = 0;
+  std::int64_t unplaced_since_ns_ = 0, settled_map_ns_ = 0;
+  std::string map_note_;
+  StampNs clock_ns_ = 0;  // of the clock body's last frame that was placed; 0: none
   std::string fixed_frame_;
   // Where the fixed frame is learnt: what is placed in it, as it came, to be placed in another one.
   std::vector<std::optional<DecodedMesh>> static_meshes_;
@@ -144,9 +149,10 @@ class MonitorPipeline {
   void keep(std::size_t body);
   /// The end has come for what still waits.
   void giveUp();
-  /// The static body that the monitor has where it is no more, since its newer frame waits; none: bodies' number.
+  /// The static body that the monitor has where it is no more, since its newer frame waits or was refused; none:
+  /// bodies' number.
   std::size_t misplaced() const;
-  /// Why the body, whose frame waits, has no place.
+  /// Why the body, whose frame waits or was refused, has no place.
   std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
@@ -156,6 +162,14 @@ class MonitorPipeline {
   bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
   void placeMap(std::int64_t now_ns);
+  /// Poses that were seen, of a body by its number, or of the map.
+  using SeenPoses = std::vector<std::pair<std::size_t, std::vector<SeenPose>>>;
+  /// Where the frames were of what is held, the map and static bodies, since the clock body's last frame, up to the
+  /// stamp of the one that waits. False: it is not known of all.
+  bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
+  std::vector<StampNs> stampsSince(StampNs from_ns, StampNs to_ns, const std::string& frame) const;
+  /// A map came before the clock body's frame and has no place yet, but may find one soon.
+  bool mapMayCome(std::int64_t now_ns) const;
 };
 
 }  // namespace dccd

@@ -1,5 +1,8 @@
 // Where things are: frames, rigid bodies and the map wait for their transforms and are moved into the fixed frame,
 // which may be learnt, and learnt anew.
+#include <limits>
+#include <optional>
+#include <sstream>
 #include <utility>
 
 #include "node/monitor_pipeline.h"
@@ -29,12 +32,17 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
     MeshFrame frame = *rigid_[b];
     frame.stamp_ns = stamp_ns;
     const std::string& carrier = config_.bodies[b].tf_frame;
-    if (!lookupTransform(transforms_, fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
+    if (!transforms_.lookup(fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
       reason =
           noTransform(carrier, fixed_frame_, reason) + "; body '" + config_.bodies[b].body.name + "' is carried by it";
       return false;
     }
     transform(frame.pose, frame.positions);
+    for (const StampNs seen_ns : stampsSince(clock_ns_, stamp_ns, carrier)) {
+      SeenPose seen{seen_ns, {}};
+      std::string unused;
+      if (transforms_.lookup(fixed_frame_, carrier, seen_ns, seen.pose, unused)) frame.seen.push_back(seen);
+    }
     frames.emplace_back(b, std::move(frame));
   }
   for (auto& frame : frames) {
@@ -54,13 +62,15 @@ void MonitorPipeline::keep(std::size_t body) {
 }
 
 std::string MonitorPipeline::missing(std::size_t body) const {
-  return waiting_[body]->reason + "; body '" + config_.bodies[body].body.name + "' waits for it";
+  const std::string name = "body '" + config_.bodies[body].body.name + "'";
+  if (!refused_[body].empty()) return "the newest frame of " + name + " was refused: " + refused_[body];
+  return waiting_[body]->reason + "; " + name + " waits for it";
 }
 
 void MonitorPipeline::nameMissing(Outcome& outcome) const {
   if (outcome.status != StepStatus::NO_BODY) return;
   for (std::size_t b = 0; b < waiting_.size(); ++b) {
-    if (!waiting_[b] || !waiting_[b]->kept) continue;
+    if (refused_[b].empty() && !(waiting_[b] && waiting_[b]->kept)) continue;
     outcome.reason = missing(b);
     return;
   }
@@ -68,7 +78,7 @@ void MonitorPipeline::nameMissing(Outcome& outcome) const {
 
 std::size_t MonitorPipeline::misplaced() const {
   std::size_t b = 0;
-  while (b < waiting_.size() && !(waiting_[b] && placed_[b])) ++b;
+  while (b < waiting_.size() && !(waiting_[b] && placed_[b]) && refused_[b].empty()) ++b;
   return b;
 }
 
@@ -82,20 +92,28 @@ bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std:
 
 bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
+  const bool overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
   std::string reason = fixed_frame_.empty() ? "the fixed frame is not known before the clock body's first message" : "";
   StepStatus problem = StepStatus::NO_TRANSFORM;
   Eigen::Isometry3d fixed_from_mesh;
   const bool is_clock = body == config_.monitor.clock_body;
-  const bool has_place = !fixed_frame_.empty() && lookupTransform(transforms_, fixed_frame_, waiting.mesh.frame_id,
-                                                                  waiting.mesh.stamp_ns, fixed_from_mesh, reason);
+  const bool has_place = !fixed_frame_.empty() && transforms_.lookup(fixed_frame_, waiting.mesh.frame_id,
+                                                                     waiting.mesh.stamp_ns, fixed_from_mesh, reason);
+  SeenPoses held;
+  if (is_clock && has_place) {
+    if (mapMayCome(now_ns)) return false;
+    // In time for a step that says so, if it does not come.
+    if (!findHeld(waiting.mesh.stamp_ns, held) && !overdue) return false;
+  }
   const bool placed = has_place && (!is_clock || placeOthers(now_ns, problem, reason));
   if (!placed) {
     if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
     waiting.reason = reason;
-    waiting.overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
+    waiting.overdue = overdue;
     // There is no use in waiting for a static body that has waited in vain itself.
+    const auto isHopeless = [this](std::size_t b) { return !refused_[b].empty() || waiting_[b]->kept; };
     const bool timed_out =
-        waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && waiting_[misplaced()]->kept);
+        waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && isHopeless(misplaced()));
     if (!timed_out) return false;
     if (isStatic(body)) {
       keep(body);
@@ -109,8 +127,13 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     skip(body, problem, done.mesh.stamp_ns, done.mesh.arrival_ns, reason);
     return true;
   }
+  if (isStatic(body)) done.mesh.pose = fixed_from_mesh;
   if (isStatic(body) && config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
   transform(fixed_from_mesh, done.mesh.positions);
+  if (is_clock) {
+    clock_ns_ = done.mesh.stamp_ns;
+    for (const auto& one : held) monitor_->seen(one.first, one.second);
+  }
   monitor_->push(body, std::move(done.mesh), now_ns);
   placed_[body] = isStatic(body);
   return true;
@@ -121,6 +144,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   if (!unplaced_map_->surface) {
     // Refused: what was there before is out of date, and no map is better than a wrong one.
     monitor_->setMap(noMap(unplaced_map_->problem));
+    settled_map_ns_ = unplaced_map_->arrival_ns;
     unplaced_map_.reset();
     placed_map_.reset();
     known_.reset();
@@ -131,10 +155,24 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   ObstacleMap map;
   map.surface = unplaced_map_->surface;
   map.stamp_ns = unplaced_map_->stamp_ns;
-  std::string reason;
-  if (lookupTransform(transforms_, frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) {
+  map.frame_id = frame;
+  std::string reason, unused;
+  bool placed = transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason);
+  // A latched map is older than all of tf that a monitor hears that starts later.
+  const std::optional<StampNs> first_ns = placed ? std::nullopt : transforms_.firstStamp(frame, fixed_frame_);
+  if (first_ns && *first_ns > map.stamp_ns) {
+    placed = transforms_.lookup(frame, fixed_frame_, *first_ns, map.map_from_fixed, unused);
+    if (placed) {
+      std::ostringstream text;
+      text << "the octomap is older than all transforms of its frame '" << frame << "': it is placed by the first, "
+           << secondsBetween(map.stamp_ns, *first_ns) << " s after its stamp";
+      map_note_ = text.str();
+    }
+  }
+  if (placed) {
     monitor_->setMap(std::move(map));
     known_ = unplaced_map_->known;
+    settled_map_ns_ = unplaced_map_->arrival_ns;
     if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
     unplaced_map_.reset();
   } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
@@ -144,6 +182,42 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
           noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason));
     }
   }
+}
+
+bool MonitorPipeline::mapMayCome(std::int64_t now_ns) const {
+  return unplaced_map_ && !finishing_ && secondsBetween(unplaced_since_ns_, now_ns) < config_.transform_timeout_s;
+}
+
+bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
+  bool all_known = true;
+  const auto find = [&](std::size_t body, const std::string& target, const std::string& source) {
+    if (target == source) return;
+    std::vector<SeenPose> seen;
+    std::string unused;
+    for (const StampNs seen_ns : stampsSince(clock_ns_, stamp_ns, target == fixed_frame_ ? source : target)) {
+      SeenPose one{seen_ns, {}};
+      if (transforms_.lookup(target, source, seen_ns, one.pose, unused)) seen.push_back(one);
+    }
+    SeenPose last{stamp_ns, {}};
+    const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
+    if (!known) last.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
+    seen.push_back(last);
+    held.emplace_back(body, std::move(seen));
+    all_known = all_known && known;
+  };
+  const ObstacleMap& map = monitor_->map();
+  if (map.surface) find(OBSTACLE_BODY, map.frame_id, fixed_frame_);
+  // A fixed frame that was named is at rest: somebody says so. One that was learnt may be a camera's that moves.
+  for (std::size_t b = 0; b < static_meshes_.size(); ++b) {
+    if (static_meshes_[b]) find(b, fixed_frame_, static_meshes_[b]->frame_id);
+  }
+  return all_known;
+}
+
+/// Of transforms between the frame and the fixed one, as far back as a step may reach.
+std::vector<StampNs> MonitorPipeline::stampsSince(StampNs from_ns, StampNs to_ns, const std::string& frame) const {
+  if (from_ns == 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s) return {};
+  return transforms_.stampsBetween(fixed_frame_, frame, from_ns, to_ns);
 }
 
 void MonitorPipeline::learnAnew(StepStatus status) {

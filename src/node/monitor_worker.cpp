@@ -64,11 +64,22 @@ void CollisionMonitor::Impl::takeMaps() {
   pipeline.setMap(std::move(map), steadyNs());
 }
 
+/// A frame is answered with the map that came before it, as far as that is ready in time and the queue has room.
+bool CollisionMonitor::Impl::waitsForMap() {
+  const std::optional<std::int64_t> since_ns = maps ? maps->busySince() : std::nullopt;
+  return since_ns && secondsBetween(*since_ns, steadyNs()) < config.transform_timeout_s &&
+         queue.size(config.monitor.clock_body) < config.queue_size;
+}
+
 void CollisionMonitor::Impl::takeMessages() {
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     MeshMessage message;
-    if (pipeline.idle(b) && queue.pop(b, message)) pipeline.take(b, message);
+    if (mayTake(b) && queue.pop(b, message)) pipeline.take(b, message);
   }
+}
+
+bool CollisionMonitor::Impl::mayTake(std::size_t body) {
+  return pipeline.idle(body) && queue.size(body) > 0 && !(body == config.monitor.clock_body && waitsForMap());
 }
 
 void CollisionMonitor::Impl::tellComplaints() {
@@ -77,6 +88,8 @@ void CollisionMonitor::Impl::tellComplaints() {
     // The clock body's come as outcomes, which are logged when they are published.
     if (!complaint.empty() && b != config.monitor.clock_body) log.complain(b, "message", complaint);
   }
+  const std::string note = pipeline.takeMapNote();
+  if (!note.empty()) log.complain(config.bodies.size(), "map", note);
 }
 
 void CollisionMonitor::Impl::lookIntoSilence() {
@@ -120,6 +133,7 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) {
 void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
+  state.mapSettled(pipeline.settledMapNs());
   log.tell(outcome);
   newest_ns = outcome.stamp_ns;
   // Before the contacts, though these then wait some 50 us longer for roscpp: a long list is not to keep a clear state
@@ -188,7 +202,8 @@ void CollisionMonitor::Impl::carryOut(const std::function<void()>& command) {
 void CollisionMonitor::Impl::work() {
   bool more = false;
   while (!stopping) {
-    const auto commands = queue.wait(more ? microseconds(0) : pipeline.waiting() ? POLL : SLEEP);
+    const bool waits = pipeline.waiting() || waitsForMap();
+    const auto commands = queue.wait(more ? microseconds(0) : waits ? POLL : SLEEP);
     if (stopping) return;
     try {
       more = workOn(commands);
@@ -207,16 +222,16 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
-  if (!maps || (!maps->busy() && !pipeline.mapWaits())) state.mapSettled();
   takeMessages();
   accountDropped();
   Outcome outcome;
   while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
+  state.mapSettled(pipeline.settledMapNs());
   tellComplaints();
   const std::string surprise = recorder.takeSurprise();
   if (!surprise.empty()) log.alarm("surprise", surprise);
   bool more = false;
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= pipeline.idle(b) && queue.size(b) > 0;
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) more |= mayTake(b);
   lookIntoSilence();
   const std::int64_t now_ns = steadyNs();
   if (diagnostics.isDue(now_ns)) {

@@ -50,14 +50,14 @@ void StateReporter::frameCame(std::int64_t arrival_ns) {
   liveness_.frame(arrival_ns, clock_.now());
 }
 
-void StateReporter::mapCame() {
+void StateReporter::mapCame(std::int64_t arrival_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  liveness_.mapCame(clock_.now());
+  liveness_.mapCame(arrival_ns, clock_.now());
 }
 
-void StateReporter::mapSettled() {
+void StateReporter::mapSettled(std::int64_t arrival_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  liveness_.mapSettled();
+  liveness_.mapSettled(arrival_ns);
 }
 
 void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame) {

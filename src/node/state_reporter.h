@@ -40,8 +40,9 @@ class StateReporter {
 
   /// A frame of the clock body came, whose outcome will bring the same `arrival_ns`.
   void frameCame(std::int64_t arrival_ns);
-  void mapCame();
-  void mapSettled();
+  /// A map came; the node uses or has refused those that came up to then.
+  void mapCame(std::int64_t arrival_ns);
+  void mapSettled(std::int64_t arrival_ns);
   /// A step's answer, or why there is none.
   void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.

@@ -5,6 +5,7 @@
 
 #include <geometry_msgs/TransformStamped.h>
 #include <tf2/exceptions.h>
+#include <Eigen/Geometry>
 
 #include "ros/short_text.h"
 
@@ -12,14 +13,23 @@ namespace dccd {
 
 namespace {
 
+// tf2 follows no longer chain.
+constexpr std::size_t MAX_CHAIN = 1000;
+
+ros::Time toTime(StampNs stamp_ns) {
+  ros::Time time;
+  time.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
+  return time;
+}
+
+/// As tf2 takes a name.
+std::string unslashed(const std::string& name) { return !name.empty() && name[0] == '/' ? name.substr(1) : name; }
+
 /// What tf2 would refuse with a line on the console, each time that it comes.
 bool isUsable(const geometry_msgs::TransformStamped& transform) {
   const auto& p = transform.transform.translation;
   const auto& q = transform.transform.rotation;
   const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-  const auto unslashed = [](const std::string& name) {
-    return !name.empty() && name[0] == '/' ? name.substr(1) : name;
-  };
   const std::string child = unslashed(transform.child_frame_id), parent = unslashed(transform.header.frame_id);
   // Written so that a NaN is refused.
   return frameNameProblem(child).empty() && frameNameProblem(parent).empty() && child != parent && std::isfinite(p.x) &&
@@ -29,9 +39,9 @@ bool isUsable(const geometry_msgs::TransformStamped& transform) {
 }  // namespace
 
 bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
-  const auto known = kept_.find(transform.child_frame_id);
+  const auto known = kept_.find(unslashed(transform.child_frame_id));
   return known != kept_.end() &&
-         static_cast<StampNs>(transform.header.stamp.toNSec()) < *known->second.rbegin() - JUMP_BACK_NS;
+         static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second.rbegin()->first - JUMP_BACK_NS;
 }
 
 bool TransformFeed::hasRoomFor(const geometry_msgs::TransformStamped& transform) {
@@ -43,12 +53,14 @@ bool TransformFeed::hasRoomFor(const geometry_msgs::TransformStamped& transform)
   return true;
 }
 
-/// Else its stamp is noted, and those are forgotten that the buffer forgets with it.
+/// Else it is kept, and those are forgotten that the buffer forgets with it.
 bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform) {
-  const StampNs stamp_ns = static_cast<StampNs>(transform.header.stamp.toNSec());
-  std::set<StampNs>& kept = kept_[transform.child_frame_id];
-  if (!kept.insert(stamp_ns).second) return true;
-  const auto old = kept.lower_bound(*kept.rbegin() - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
+  const auto& p = transform.transform.translation;
+  const auto& q = transform.transform.rotation;
+  std::map<StampNs, Pose>& kept = kept_[unslashed(transform.child_frame_id)];
+  const Pose pose{Eigen::Quaterniond(q.w, q.x, q.y, q.z), Vec3(p.x, p.y, p.z)};
+  if (!kept.emplace(static_cast<StampNs>(transform.header.stamp.toNSec()), pose).second) return true;
+  const auto old = kept.lower_bound(kept.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
   const std::size_t before = kept.size();
   kept.erase(kept.begin(), old);
   kept_count_ += 1 + kept.size() - before;
@@ -63,11 +75,13 @@ void TransformFeed::clear() {
 }
 
 bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
   return !is_static && std::any_of(message.transforms.begin(), message.transforms.end(),
                                    [&](const auto& transform) { return goesBack(transform); });
 }
 
 bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   bool cleared = false;
   for (const auto& transform : message.transforms) {
     if (!isUsable(transform) || !hasRoomFor(transform)) continue;
@@ -83,8 +97,47 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
   return cleared;
 }
 
-bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source,
-                     StampNs stamp_ns, Eigen::Isometry3d& transform, std::string& reason) {
+std::pair<TransformFeed::Chain, TransformFeed::Chain> TransformFeed::chains(const std::string& target,
+                                                                            const std::string& source,
+                                                                            StampNs stamp_ns) const {
+  const ros::Time time = toTime(stamp_ns);
+  const auto upFrom = [&](const std::string& frame) {
+    Chain chain{frame};
+    std::string parent;
+    while (chain.size() <= MAX_CHAIN && buffer_._getParent(chain.back(), time, parent)) chain.push_back(parent);
+    return chain;
+  };
+  Chain from_target = upFrom(target), from_source = upFrom(source);
+  const auto meeting =
+      std::find_first_of(from_source.begin(), from_source.end(), from_target.begin(), from_target.end());
+  if (meeting == from_source.end()) return {};
+  from_target.erase(std::find(from_target.begin(), from_target.end(), *meeting) + 1, from_target.end());
+  from_source.erase(meeting + 1, from_source.end());
+  return {std::move(from_target), std::move(from_source)};
+}
+
+TransformFeed::Pose TransformFeed::poseAlong(const Chain& chain, StampNs stamp_ns) const {
+  Pose sum;
+  for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+    const auto sent = kept_.find(chain[i]);
+    const auto at = sent == kept_.end() ? std::map<StampNs, Pose>::const_iterator() : sent->second.find(stamp_ns);
+    Pose one;
+    if (sent != kept_.end() && at != sent->second.end()) {
+      one = at->second;
+    } else {
+      const auto found = buffer_.lookupTransform(chain[i + 1], chain[i], toTime(stamp_ns)).transform;
+      one.rotation = Eigen::Quaterniond(found.rotation.w, found.rotation.x, found.rotation.y, found.rotation.z);
+      one.translation = Vec3(found.translation.x, found.translation.y, found.translation.z);
+    }
+    one.rotation.normalize();
+    sum.translation = one.translation + one.rotation * sum.translation;
+    sum.rotation = one.rotation * sum.rotation;
+  }
+  return sum;
+}
+
+bool TransformFeed::lookup(const std::string& target, const std::string& source, StampNs stamp_ns,
+                           Eigen::Isometry3d& transform, std::string& reason) const {
   transform = Eigen::Isometry3d::Identity();
   if (target == source) return true;
   for (const std::string* name : {&target, &source}) {
@@ -93,20 +146,56 @@ bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, c
     reason = "'" + shortText(*name, MAX_NAME) + "' is no frame's name: " + reason;
     return false;
   }
-  ros::Time stamp;
-  stamp.fromNSec(static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0)));
+  const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    if (!buffer.canTransform(target, source, stamp, &reason)) return false;
-    const auto found = buffer.lookupTransform(target, source, stamp).transform;
-    transform.linear() = Eigen::Quaterniond(found.rotation.w, found.rotation.x, found.rotation.y, found.rotation.z)
-                             .normalized()
-                             .toRotationMatrix();
-    transform.translation() = Vec3(found.translation.x, found.translation.y, found.translation.z);
+    if (!buffer_.canTransform(target, source, toTime(stamp_ns), &reason)) return false;
+    // The newest common transform is tf2's to find.
+    const auto [from_target, from_source] =
+        stamp_ns > 0 ? chains(target, source, stamp_ns) : std::pair<Chain, Chain>({target}, {source, target});
+    const Pose of_target = poseAlong(from_target, stamp_ns), of_source = poseAlong(from_source, stamp_ns);
+    const Eigen::Quaterniond back = of_target.rotation.conjugate();
+    transform.linear() = (back * of_source.rotation).normalized().toRotationMatrix();
+    transform.translation() = back * (of_source.translation - of_target.translation);
     return transform.matrix().allFinite();
   } catch (const tf2::TransformException& error) {
     reason = error.what();
     return false;
   }
+}
+
+/// With those that are kept of each frame on the way.
+template <class Take>
+void TransformFeed::forEachKept(const std::string& target, const std::string& source, Take take) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    const auto [from_target, from_source] = chains(target, source, 0);
+    for (const Chain* chain : {&from_target, &from_source}) {
+      for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
+        const auto kept = kept_.find((*chain)[i]);
+        if (kept != kept_.end() && !kept->second.empty()) take(kept->second);
+      }
+    }
+  } catch (const tf2::TransformException&) {  // a frame that nobody has named yet
+  }
+}
+
+std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
+                                                  StampNs to_ns) const {
+  std::vector<StampNs> stamps;
+  forEachKept(target, source, [&](const std::map<StampNs, Pose>& kept) {
+    for (auto it = kept.upper_bound(from_ns); it != kept.end() && it->first < to_ns; ++it) stamps.push_back(it->first);
+  });
+  std::sort(stamps.begin(), stamps.end());
+  stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
+  return stamps;
+}
+
+std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, const std::string& source) const {
+  std::optional<StampNs> first;
+  forEachKept(target, source, [&](const std::map<StampNs, Pose>& kept) {
+    first = std::max(first.value_or(kept.begin()->first), kept.begin()->first);
+  });
+  return first;
 }
 
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions) {

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstddef>
-#include <set>
+#include <map>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
+#include <vector>
 
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
@@ -19,7 +22,7 @@ constexpr StampNs JUMP_BACK_NS = tolerance::TF_JUMP_BACK_NS;
 
 /// Feeds a tf2 buffer and clears it when tf's own stamps jump back, as a looping replay makes them: kept transforms of
 /// the end would otherwise be taken for ones of the beginning. Leaves out what tf2 would write a line to the console
-/// for, each time: repeated stamps above all. Not thread-safe; tf2::BufferCore itself is.
+/// for, each time: repeated stamps above all. Any thread may call it.
 class TransformFeed {
  public:
   /// tf2 forgets no name; further frames are left out.
@@ -33,9 +36,28 @@ class TransformFeed {
   /// Returns true when the buffer was cleared.
   bool add(const tf2_msgs::TFMessage& message, bool is_static);
 
+  /// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no
+  /// transform. A transform of this very stamp is taken as it was sent; tf2 alone would interpolate from it to the next
+  /// one once that is there, and give other last bits.
+  bool lookup(const std::string& target, const std::string& source, StampNs stamp_ns, Eigen::Isometry3d& transform,
+              std::string& reason) const;
+  /// Ascending: between the two, neither included, each stamp of a transform that target_from_source is made of.
+  std::vector<StampNs> stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
+                                     StampNs to_ns) const;
+  /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
+  std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
+
  private:
+  struct Pose {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+    Vec3 translation = Vec3::Zero();
+  };
+  /// From a frame up to an ancestor, the frame first and the ancestor last.
+  using Chain = std::vector<std::string>;
+
   tf2::BufferCore& buffer_;
-  std::unordered_map<std::string, std::set<StampNs>> kept_;  // stamps that the buffer holds, per child frame
+  mutable std::mutex mutex_;
+  std::unordered_map<std::string, std::map<StampNs, Pose>> kept_;  // what the buffer holds, per child frame
   std::size_t kept_count_ = 0;
   std::unordered_set<std::string> names_;
   std::unordered_map<std::string, bool> static_;  // per child frame: as tf2 takes it, for good, from what came first
@@ -44,11 +66,12 @@ class TransformFeed {
   bool hasRoomFor(const geometry_msgs::TransformStamped& transform);
   bool isRepeated(const geometry_msgs::TransformStamped& transform);
   void clear();
+  /// To where the two meet.
+  std::pair<Chain, Chain> chains(const std::string& target, const std::string& source, StampNs stamp_ns) const;
+  Pose poseAlong(const Chain& chain, StampNs stamp_ns) const;
+  template <class Take>
+  void forEachKept(const std::string& target, const std::string& source, Take take) const;
 };
-
-/// target_from_source at the stamp. False, with the reason, when it is not known (yet). Equal frames need no transform.
-bool lookupTransform(const tf2::BufferCore& buffer, const std::string& target, const std::string& source,
-                     StampNs stamp_ns, Eigen::Isometry3d& transform, std::string& reason);
 
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions);
 

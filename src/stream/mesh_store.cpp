@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -178,6 +179,17 @@ std::vector<std::shared_ptr<const MeshFrame>> MeshStore::framesWithin(StampNs fr
   std::vector<std::shared_ptr<const MeshFrame>> within;
   const std::size_t end = firstAtOrAfter(to_ns);
   for (std::size_t i = firstAtOrAfter(from_ns + 1); i < end; ++i) within.push_back(frames_[i].frame);
+  return within;
+}
+
+std::vector<SeenPose> MeshStore::seenWithin(StampNs from_ns, StampNs to_ns) const {
+  std::vector<SeenPose> within;
+  for (std::size_t i = firstAtOrAfter(from_ns + 1); i < frames_.size(); ++i) {
+    const MeshFrame& frame = *frames_[i].frame;
+    std::copy_if(frame.seen.begin(), frame.seen.end(), std::back_inserter(within),
+                 [&](const SeenPose& seen) { return seen.stamp_ns > from_ns && seen.stamp_ns < to_ns; });
+    if (frame.stamp_ns >= to_ns) break;
+  }
   return within;
 }
 

@@ -122,6 +122,7 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
     m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
     if (isSeam(status)) {
       m.stores[body] = std::move(store);
+      m.held_seen[body].clear();
       m.forgetLast();
     }
     return status;
@@ -162,6 +163,7 @@ void Monitor::Impl::onClockFrame(Pending step) {
     for (Pending& waiting : pending) {
       if (waiting.status == StepStatus::OK) drop(waiting, StepStatus::NO_BODY, "time jumped back while waiting");
     }
+    forgetHeldSeen();
     for (std::size_t b = 0; b < stores.size(); ++b) {
       const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
                          secondsBetween(step.stamp_ns, stores[b].newest().stamp_ns) > options.store.max_step_s;
@@ -218,6 +220,8 @@ void Monitor::reset(StepStatus status) {
     if (m.isStream(b)) m.stores[b].clear();
   }
   if (status == StepStatus::RESET) m.forgetReferences();
+  m.forgetHeldSeen();
+  m.told_runs.assign(m.bodies.size(), 0);
   m.forgetLast();
   m.tracker.seam();
 }
@@ -319,7 +323,10 @@ bool Monitor::next(std::int64_t now_ns, Outcome& outcome) {
     without(step.status, step.reason);
     if (isSeam(step.status)) {
       m.forgetLast();
-      if (!step.to) m.tracker.seam();  // else it is another body's, which runStep() sees
+      if (!step.to) {  // else it is another body's, which runStep() sees
+        m.tracker.seam();
+        m.told_runs.assign(m.bodies.size(), 0);
+      }
     }
     m.tracker.tell(outcome);
   }

@@ -41,11 +41,13 @@ struct Monitor::Impl {
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
   ObstacleMap map;
-  History history, side_history;  // of steps; of predictions and checks
+  std::vector<std::deque<SeenPose>> held_seen;  // per body, and last of the map; for the steps to come, ascending
+  History history, side_history;                // of steps; of predictions and checks
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
   References references;
   std::vector<std::uint64_t> runs, last_runs;  // per body, the run without a seam that this step, the last one is in
+  std::vector<std::uint64_t> told_runs;        // per body, the run that outcomes have told of so far; 0: none
   bool finishing = false;
   std::atomic<bool> cancelled{false};
   StepListener* listener = nullptr;
@@ -57,6 +59,8 @@ struct Monitor::Impl {
     stores.assign(bodies.size(), MeshStore(options.store));
     counters.resize(bodies.size());
     runs.resize(bodies.size());
+    told_runs.resize(bodies.size());
+    forgetHeldSeen();
     forgetReferences();
   }
 
@@ -71,8 +75,12 @@ struct Monitor::Impl {
   void onClockFrame(Pending step);
   Ready ready(Pending& step, bool timed_out);
   Ready placeable(std::size_t body, Pending& step, bool timed_out);
+  /// The body's run is another one than outcomes have told of: the step is one of seam, once.
+  bool isSeamOf(std::size_t body, Pending& step);
   Step place(const Pending& pending);
   void lookBetween(std::size_t body, Step& step) const;
+  void lookAtHeld(Step& step) const;
+  void forgetHeldSeen() { held_seen.assign(bodies.size() + 1, {}); }
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();
   /// Nothing is carried over a seam.

@@ -31,6 +31,38 @@ double offPath(const MeshFrame& frame, const Body& body, double u) {
   return off;
 }
 
+/// The same of poses that were seen, `moved` from where the body is at the step's start: by the corners of what it
+/// occupies there, off which none of its vertices is farther.
+double offPath(const Eigen::Isometry3d& seen, const Eigen::Isometry3d& expected, const Eigen::AlignedBox3d& bounds) {
+  double off = 0;
+  if (bounds.isEmpty()) return off;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 p = bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));
+    off = std::max(off, (seen * p - expected * p).norm());
+  }
+  return off;
+}
+
+Eigen::AlignedBox3d boundsOf(const Body& body) {
+  Eigen::AlignedBox3d bounds;
+  for (const Positions* positions : {body.t0.get(), body.t1.get()}) {
+    for (const Vec3& p : *positions) {
+      if (p.allFinite()) bounds.extend(p);
+    }
+  }
+  return bounds;
+}
+
+Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
+  Eigen::AlignedBox3d bounds;
+  for (const Body& body : step.bodies) {
+    if (meetsMap(body)) bounds.extend(boundsOf(body));
+  }
+  return bounds;
+}
+
+void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
+
 }  // namespace
 
 void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::shared_ptr<const MeshFrame>& to,
@@ -66,10 +98,24 @@ Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, b
     return Ready::NEVER;
   }
   const Lookup at_t0 = store.lookup(step.from->stamp_ns, &run_t0);
-  if (at_t1 == Lookup::READY && at_t0 == Lookup::READY && run_t0 == runs[body]) return Ready::YES;
+  if (at_t1 == Lookup::READY && at_t0 == Lookup::READY && run_t0 == runs[body]) {
+    return isSeamOf(body, step) ? Ready::NEVER : Ready::YES;
+  }
+  if (at_t1 == Lookup::READY) told_runs[body] = runs[body];
   drop(step, store.runReason() == StepStatus::FIRST_FRAME ? StepStatus::NO_BODY : store.runReason(),
        name + "has no unbroken frames around the step (" + toString(store.runReason()) + ")");
   return Ready::NEVER;
+}
+
+/// A run that began by a jump back may reach over the whole of a step that follows one of the run before: both alone
+/// are whole, and what happened between the two nobody saw.
+bool Monitor::Impl::isSeamOf(std::size_t body, Pending& step) {
+  const bool was_told = told_runs[body] == 0 || told_runs[body] == runs[body];
+  told_runs[body] = runs[body];
+  if (was_told) return false;
+  const StepStatus reason = stores[body].runReason();
+  drop(step, reason, "body '" + bodies[body].name + "' began anew since the last step (" + toString(reason) + ")");
+  return true;
 }
 
 Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
@@ -89,20 +135,63 @@ Monitor::Impl::Ready Monitor::Impl::ready(Pending& step, bool timed_out) {
 void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   Body& body = step.bodies[b];
   const auto frames = stores[b].framesWithin(step.start_ns, step.stamp_ns);
+  const std::vector<SeenPose> seen = stores[b].seenWithin(step.start_ns, step.stamp_ns);
+  const auto fractionAt = [&](StampNs stamp_ns) {
+    return static_cast<double>(stamp_ns - step.start_ns) / static_cast<double>(step.stamp_ns - step.start_ns);
+  };
   double off_m = 0;
   for (const std::shared_ptr<const MeshFrame>& frame : frames) {
-    const double step_ns = static_cast<double>(step.stamp_ns - step.start_ns);
-    off_m = std::max(off_m, offPath(*frame, body, static_cast<double>(frame->stamp_ns - step.start_ns) / step_ns));
+    off_m = std::max(off_m, offPath(*frame, body, fractionAt(frame->stamp_ns)));
     if (!frame->radius_m.empty()) {
       body.radius_m = radii(largerRadii(body.radius_m ? *body.radius_m : std::vector<double>(), frame->radius_m));
     }
     body.dropped_faces = std::max(body.dropped_faces, frame->dropped_faces);
   }
+  const Eigen::AlignedBox3d bounds = seen.empty() ? Eigen::AlignedBox3d() : boundsOf(body);
+  const Eigen::Isometry3d from_t0 = body.pose_t0.inverse();
+  for (const SeenPose& one : seen) {
+    const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionAt(one.stamp_ns));
+    off_m = std::max(off_m, offPath(one.pose * from_t0, on_path * from_t0, bounds));
+  }
   if (off_m <= options.detector.rigid_tolerance_m) return;
   std::ostringstream text;
-  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in " << frames.size()
-       << " frames between its ends; make it the clock_body";
-  step.off_path = text.str();
+  text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in ";
+  if (body.rigid) {
+    text << seen.size() << " transforms between its ends; send the mesh of '" << bodies[options.clock_body].name
+         << "' more often";
+  } else {
+    text << frames.size() << " frames between its ends; make it the clock_body";
+  }
+  addSentence(step.off_path, text.str());
+}
+
+/// A static body and the map are held where they were. What tf said since must not be contradicted in silence.
+void Monitor::Impl::lookAtHeld(Step& step) const {
+  for (std::size_t b = 0; b < held_seen.size(); ++b) {
+    const bool is_map = b == bodies.size();
+    if (held_seen[b].empty() || (is_map ? !step.map.surface : stores[b].empty())) continue;
+    const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
+    double off_m = 0;
+    bool known = true;
+    Eigen::AlignedBox3d bounds;
+    for (const SeenPose& one : held_seen[b]) {
+      // The end of a step alone where it has no length, as that of a question has.
+      if (one.stamp_ns > step.stamp_ns || (one.stamp_ns <= step.start_ns && one.stamp_ns != step.stamp_ns)) continue;
+      known = known && one.pose.matrix().allFinite();
+      if (!known || one.pose.matrix() == held.matrix()) continue;
+      if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
+      off_m = std::max(off_m, is_map ? offPath(one.pose, held, bounds)
+                                     : offPath(one.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
+    }
+    const std::string name = is_map ? "the octomap's frame '" + step.map.frame_id + "'"
+                                    : "the frame of the static body '" + bodies[b].name + "'";
+    if (!known) addSentence(step.off_path, "there is no transform that tells where " + name + " was in this step");
+    if (off_m <= options.detector.rigid_tolerance_m) continue;
+    std::ostringstream text;
+    text << name << " was seen up to " << off_m << " m from where it was at its stamp; set fixed_frame to "
+         << (is_map ? "it" : "what is at rest");
+    addSentence(step.off_path, text.str());
+  }
 }
 
 Step Monitor::Impl::place(const Pending& pending) {
@@ -126,6 +215,10 @@ Step Monitor::Impl::place(const Pending& pending) {
     }
     stores[b].forgetBefore(step.stamp_ns);
   }
+  for (std::deque<SeenPose>& seen : held_seen) {
+    while (!seen.empty() && seen.front().stamp_ns <= step.start_ns) seen.pop_front();
+  }
+  lookAtHeld(step);
   keepReferences(step, references);
   return step;
 }
@@ -165,7 +258,15 @@ bool Monitor::Impl::separates(const Body& body) const {
          std::any_of(body.separations.begin(), body.separations.end(), named);
 }
 
-void Monitor::setMap(ObstacleMap map) { impl_->map = std::move(map); }
+void Monitor::setMap(ObstacleMap map) {
+  if (map.frame_id != impl_->map.frame_id) impl_->held_seen.back().clear();
+  impl_->map = std::move(map);
+}
+
+void Monitor::seen(std::size_t body, const std::vector<SeenPose>& poses) {
+  auto& all = impl_->held_seen.at(body == OBSTACLE_BODY ? impl_->bodies.size() : body);
+  all.insert(all.end(), poses.begin(), poses.end());
+}
 
 ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
   ObstacleMap used = map;

@@ -25,6 +25,7 @@ Outcome Monitor::checkNow() {
   m.keepReferences(step, references);
   step.start_ns = step.stamp_ns = m.stores[m.options.clock_body].newest().stamp_ns;
   step.map = m.usableMap(step.stamp_ns);
+  m.lookAtHeld(step);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
   Outcome outcome = detect(step, m.options.detector, m.side_history, Deadline().orWhen(m.cancelled));

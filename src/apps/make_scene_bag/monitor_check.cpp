@@ -14,7 +14,8 @@ void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_pa
   const MonitorConfig config = readConfig(spec.monitor, "monitor/");
   try {
     tf2::BufferCore transforms;
-    const MonitorPipeline pipeline(config, transforms);  // effects that are not to be had, files
+    const TransformFeed feed(transforms);
+    const MonitorPipeline pipeline(config, feed);  // effects that are not to be had, files
   } catch (const std::exception& error) {
     throw std::runtime_error(scene_path + ": monitor: " + error.what());
   }

@@ -74,13 +74,29 @@ TEST(Liveness, AMapThatGrowsOldAndOneThatIsOnItsWay) {
   liveness.outcome(1, 0.7, 50 * MS);
   EXPECT_EQ(kinds(liveness, 300 * MS), Kinds{}) << "0.7 s old at the frame, which came 0.3 s ago";
   EXPECT_EQ(kinds(liveness, 301 * MS), Kinds{Fault::Kind::OLD_MAP});
-  liveness.mapCame(310 * MS);
-  liveness.mapCame(400 * MS);
+  liveness.mapCame(2, 310 * MS);
+  liveness.mapCame(3, 400 * MS);
   EXPECT_EQ(kinds(liveness, 411 * MS), (Kinds{Fault::Kind::NEWER_MAP, Fault::Kind::OLD_MAP}));
-  liveness.mapSettled();
-  liveness.frame(2, 420 * MS);
-  liveness.outcome(2, -1, 430 * MS);
+  liveness.mapSettled(2);
+  EXPECT_EQ(kinds(liveness, 411 * MS), Kinds{Fault::Kind::OLD_MAP}) << "the second has waited for 11 ms";
+  liveness.mapSettled(3);
+  liveness.frame(4, 420 * MS);
+  liveness.outcome(4, -1, 430 * MS);
   EXPECT_EQ(kinds(liveness, 5000 * MS), Kinds{}) << "without a map none is old";
+}
+
+TEST(Liveness, AFrameAnsweredWithoutTheMapThatCameBeforeItProvesNothing) {
+  Liveness liveness({0.5, 10, 0});
+  liveness.frame(1, 0);
+  liveness.mapCame(2, 10 * MS);
+  liveness.outcome(1, -1, 20 * MS);
+  EXPECT_EQ(kinds(liveness, 20 * MS), Kinds{}) << "the frame came before the map";
+  liveness.frame(3, 30 * MS);
+  EXPECT_EQ(kinds(liveness, 30 * MS), Kinds{}) << "and waits for it";
+  liveness.outcome(3, -1, 40 * MS);
+  EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_MAP});
+  liveness.mapSettled(2);
+  EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{});
 }
 
 TEST(Liveness, WhatIsAskedForHoldsUntilItIsDone) {

@@ -54,6 +54,31 @@ TEST_F(TwoBodies, FramesBetweenTheEndsThatLeaveThePathAreNoClearStep) {
   EXPECT_NE(through.reason.find("body 'tip' was seen up to 2 m off the path"), std::string::npos) << through.reason;
 }
 
+// From below to above by a stamp that goes back by a nanosecond: the step before and the one after are whole, each in a
+// run of its own, and nobody saw what lies between.
+TEST_F(TwoBodies, AJumpOfAnotherBodyBetweenTwoStepsIsASeam) {
+  constexpr StampNs START = 1700000000000 * MS;
+  for (const StampNs back_ns : {StampNs{1}, StampNs{10 * MS}, StampNs{100 * MS}, StampNs{5000 * MS}}) {
+    Monitor two(loose(), {named("floor"), named("tip")});
+    const auto step = [&](int k, double tip_z) {
+      two.push(1, tip(START + 100 * k * MS, tip_z), NOW);
+      two.push(0, floor(START + 100 * k * MS, 0), NOW);
+      return only(two);
+    };
+    step(0, -1.5);
+    EXPECT_TRUE(assuranceOf(step(1, -1.5)).clear()) << "the tip, 1 high, is below";
+    two.push(1, tip(START + 100 * MS - back_ns, 1), NOW);
+    std::vector<Outcome> outcomes;
+    for (int k = 2; k < 6; ++k) outcomes.push_back(step(k, 1));
+    EXPECT_EQ(outcomes[0].status, StepStatus::TIME_JUMP) << back_ns << " ns";
+    EXPECT_FALSE(outcomes[0].answered);
+    EXPECT_NE(outcomes[0].reason.find("body 'tip'"), std::string::npos) << outcomes[0].reason;
+    EXPECT_EQ(outcomes[1].status, StepStatus::OK) << "said once";
+    EXPECT_TRUE(assuranceOf(outcomes[3]).clear());
+    expectAddsUp(two);
+  }
+}
+
 // Of the frames that a step lies between one had a face that could not be used: then not all was looked at. It was also
 // more uncertain: so was the step.
 TEST_F(TwoBodies, WhatAnyFrameOfTheStepLacksIsMissing) {

@@ -78,15 +78,17 @@ TEST(DepthImage, TheNewestCloudHoldsWhateverItsTriangles) {
   EXPECT_EQ(scene.pipeline.monitor().counters(1).of(StepStatus::TOPOLOGY_CHANGED), 0u);
 }
 
-TEST(DepthImage, ACameraThatSeesNothingLeavesTheSurfaceBefore) {
+TEST(DepthImage, ACameraThatSeesNothingIsNoSurfaceAndNoAnswer) {
   Seen scene;
   scene.see(1, {0, 0, 0, 0, 0, 0, 0, 0});
   scene.see(1.05, {LOST, LOST, LOST, LOST, LOST, LOST, LOST, LOST});
   EXPECT_EQ(scene.pipeline.monitor().counters(1).of(StepStatus::BAD_MESSAGE), 1u);
   const std::string complaint = scene.pipeline.takeComplaint(1);
   EXPECT_NE(complaint.find("no three of the 64 kept pixels"), std::string::npos) << complaint;
-  scene.feed(1.1, 0.3f);
-  EXPECT_NEAR(scene.feed(1.2, -0.1f).earliest_toc, 0.75, 1e-6);
+  EXPECT_EQ(scene.feed(1.1, 0.3f).status, StepStatus::NO_BODY);
+  scene.see(1.15, {0, 0, 0, 0, 0, 0, 0, 0});
+  scene.feed(1.2, 0.3f);
+  EXPECT_NEAR(scene.feed(1.3, -0.1f).earliest_toc, 0.75, 1e-6);
 }
 
 }  // namespace

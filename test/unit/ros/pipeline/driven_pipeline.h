@@ -54,6 +54,14 @@ inline std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vecto
   return bytesOf(out);
 }
 
+/// The same with a stamp of which no double has all nanoseconds.
+inline std::vector<std::uint8_t> cloudAt(const ros::Time& stamp, float z, const std::string& frame = "world") {
+  std::vector<std::uint8_t> bytes = cloud(0, z, {}, frame);
+  const std::uint32_t parts[] = {stamp.sec, stamp.nsec};  // after the sequence number
+  std::memcpy(bytes.data() + 4, parts, sizeof parts);
+  return bytes;
+}
+
 /// Occupied below 0, free up to 0.2, unknown from there on; 0.1 m voxels over 0.5 m x 0.5 m.
 inline std::vector<std::uint8_t> map(double stamp_s) {
   octomap_msgs::Octomap out;
@@ -77,11 +85,12 @@ inline std::vector<std::uint8_t> map(double stamp_s) {
 
 struct Driven {
   tf2::BufferCore transforms;
+  TransformFeed feed_tf{transforms};
   MonitorConfig config;
   MonitorPipeline pipeline;
   Outcome outcome;
 
-  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, transforms) {}
+  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, feed_tf) {}
 
   void giveMap(double stamp_s) {
     LoadedMap loaded = decodeMapMessage(map(stamp_s), config);

@@ -73,8 +73,9 @@ TEST(Inside, AMeshFileInMillimetresIsHintedAt) {
 
 std::string errorOf(const XmlRpcValue& tree) {
   tf2::BufferCore transforms;
+  const TransformFeed feed(transforms);
   try {
-    MonitorPipeline pipeline(readConfig(tree), transforms);
+    MonitorPipeline pipeline(readConfig(tree), feed);
   } catch (const ParameterError& error) {
     return error.what();
   }

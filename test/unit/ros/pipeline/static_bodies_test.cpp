@@ -1,6 +1,7 @@
 // A static body whose frames are sent once: how they wait for their transform, and what the steps say meanwhile.
 #include <gtest/gtest.h>
 
+#include "dccd/assurance.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -126,6 +127,37 @@ TEST(StaticBodies, AnOldPlaceIsNoAnswerWhileTheNewOneHasNoTransform) {
   EXPECT_EQ(total.of(StepStatus::NO_BODY), 2u);
   EXPECT_EQ(total.of(StepStatus::NO_TRANSFORM), 1u) << "the table's second frame gave way to the third";
   EXPECT_EQ(total.waiting(), 0u);
+}
+
+// As with a map: what was refused is newer than what is known, which is void with it.
+TEST(StaticBodies, ARefusedFrameMakesTheOneBeforeVoid) {
+  Tabled scene;
+  scene.raise("table", 0.1);
+  scene.take(Tabled::TABLE, 1, 0, 0);
+  double stamp_s = 1.7e9;
+  const auto feed = [&] {
+    scene.take(Tabled::CLOTH, stamp_s += 0.1, 0.3f, 0);
+    return scene.pipeline.nextOutcome(0, scene.outcome);
+  };
+  ASSERT_TRUE(feed());
+  for (const bool cut : {true, false}) {
+    ASSERT_TRUE(feed());
+    ASSERT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    MeshMessage bad{"sensor_msgs/PointCloud2", cloud(2, 0, {}, "table"), 0, 0};
+    cut ? bad.bytes.resize(50) : void(bad.too_large = std::size_t{1} << 30);
+    scene.pipeline.take(Tabled::TABLE, bad);
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_TRUE(feed()) << "there is nothing to wait for";
+      EXPECT_EQ(scene.outcome.status, StepStatus::NO_BODY);
+      EXPECT_EQ(scene.outcome.reason.rfind("the newest frame of body 'table' was refused: ", 0), 0u)
+          << scene.outcome.reason;
+    }
+    EXPECT_EQ(scene.pipeline.checkNow().status, StepStatus::NO_BODY);
+    scene.take(Tabled::TABLE, 3, 0, 0);
+    ASSERT_TRUE(feed());
+  }
+  EXPECT_EQ(scene.tables().of(StepStatus::BAD_MESSAGE), 2u);
+  EXPECT_EQ(scene.pipeline.monitor().total().waiting(), 0u);
 }
 
 TEST(StaticBodies, CloudsThatComeFasterThanTfFindTheirPlace) {

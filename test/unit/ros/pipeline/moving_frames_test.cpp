@@ -1,0 +1,232 @@
+// What moves by tf between the frames of the cloth, at stamps of today: rigid bodies, and the map.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "dccd/assurance.h"
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr double START_S = 1.7e9;
+
+XmlRpcValue clothAndTip() {
+  const std::string file = ::testing::TempDir() + "tip.obj";
+  std::ofstream(file) << "v 0.2 0.2 0\nv 0.21 0.2 0.05\nv 0.2 0.21 0.05\nf 1 2 3\n";
+  XmlRpcValue tree = scene();
+  tree["effects"]["octomap"] = "off";
+  tree["bodies"]["cloth"]["topic"] = "cloth";
+  tree["bodies"]["tip"]["rigid"]["mesh"] = file;
+  tree["bodies"]["tip"]["rigid"]["frame"] = "tip";
+  return tree;
+}
+
+struct Moving : Driven {
+  explicit Moving(const XmlRpcValue& tree) : Driven(tree) {}
+  void move(const std::string& child, double after_s, double z, double turn = 0) {
+    geometry_msgs::TransformStamped transform;
+    transform.header.stamp = ros::Time(START_S) + ros::Duration(after_s);
+    transform.header.frame_id = "world";
+    transform.child_frame_id = child;
+    transform.transform.translation.z = z;
+    transform.transform.rotation.w = std::cos(turn / 2);
+    transform.transform.rotation.z = std::sin(turn / 2);
+    tf2_msgs::TFMessage message;
+    message.transforms.push_back(transform);
+    feed_tf.add(message, false);
+  }
+  /// Whether the frame has its outcome at once.
+  bool offer(double after_s, float z, std::int64_t now_ns = 0) {
+    pipeline.take(0, {"sensor_msgs/PointCloud2", cloudAt(ros::Time(START_S) + ros::Duration(after_s), z), 0, now_ns});
+    return pipeline.nextOutcome(now_ns, outcome);
+  }
+};
+
+// The tip is at z 0.5 at both ends, the cloth at 0.
+TEST(RigidBodies, ThatLeaveTheirPathBetweenTheEndsAreNoClearStep) {
+  const auto lastOf = [](const std::vector<double>& between) {
+    Moving scene(clothAndTip());
+    for (int i = 0; i <= 2; ++i) scene.move("tip", 0.05 * i, 0.5);
+    EXPECT_TRUE(scene.offer(0, 0));
+    EXPECT_TRUE(scene.offer(0.05, 0));
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    for (std::size_t i = 0; i < between.size(); ++i) {
+      scene.move("tip", 0.05 + 0.05 * static_cast<double>(i + 1) / static_cast<double>(between.size() + 1), between[i]);
+    }
+    EXPECT_TRUE(scene.offer(0.1, 0));
+    const Outcome through = scene.outcome;
+    scene.move("tip", 0.15, 0.5);
+    EXPECT_TRUE(scene.offer(0.15, 0));
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "the step after is as it was seen";
+    return through;
+  };
+  for (const auto& dip : {std::vector<double>{-0.5}, {0.2, -0.5, -0.5, 0.2}, {0.5, 0.4985, 0.5}}) {
+    const Outcome outcome = lastOf(dip);
+    EXPECT_EQ(outcome.status, StepStatus::PARTIAL);
+    EXPECT_TRUE(outcome.answered);
+    EXPECT_FALSE(assuranceOf(outcome).proved);
+    EXPECT_NE(outcome.reason.find("body 'tip' was seen up to"), std::string::npos) << outcome.reason;
+    EXPECT_NE(outcome.reason.find("transforms between its ends"), std::string::npos) << outcome.reason;
+  }
+  EXPECT_TRUE(assuranceOf(lastOf({0.5, 0.4995, 0.5005})).clear()) << "within rigid_tolerance_m of 1 mm";
+}
+
+TEST(RigidBodies, ThatTurnEvenlyAreOnTheirPath) {
+  for (const double off : {0.0, 0.1}) {
+    Moving scene(clothAndTip());
+    for (int i = 0; i <= 10; ++i) scene.move("tip", 0.01 * i, 0.5, 0.1 * i + (i == 7 ? off : 0));
+    scene.offer(0, 0);
+    scene.offer(0.05, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    scene.offer(0.1, 0);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), off == 0) << scene.outcome.reason;
+  }
+}
+
+// A frame that is refused in between: the step is longer, and what was seen in all of it counts.
+TEST(RigidBodies, AreLookedAtOverALongerStepToo) {
+  Moving scene(clothAndTip());
+  for (const double at : {0.0, 0.05, 0.1, 0.15}) scene.move("tip", at, 0.5);
+  scene.move("tip", 0.06, -0.5);
+  scene.offer(0, 0);
+  scene.offer(0.05, 0);
+  scene.pipeline.take(0, {"sensor_msgs/PointCloud2", {}, 0, 0});
+  EXPECT_TRUE(scene.pipeline.nextOutcome(0, scene.outcome));
+  EXPECT_EQ(scene.outcome.status, StepStatus::BAD_MESSAGE);
+  scene.offer(0.15, 0);
+  EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL) << scene.outcome.reason;
+}
+
+struct Mapped : Moving {
+  explicit Mapped(const XmlRpcValue& tree = scene()) : Moving(tree) {}
+  void giveMapIn(const std::string& frame, double after_s, std::int64_t now_ns = 0) {
+    LoadedMap loaded = decodeMapMessage(map(1), config);
+    loaded.frame_id = frame;
+    loaded.stamp_ns = static_cast<StampNs>((ros::Time(START_S) + ros::Duration(after_s)).toNSec());
+    pipeline.setMap(std::move(loaded), now_ns);
+  }
+};
+
+// The map's top is at 0 in its frame, the cloth hangs at 0.05.
+TEST(Map, ThatMovesAgainstTheFixedFrameIsNoClearStep) {
+  Mapped scene;
+  for (const double at : {0.0, 0.05, 0.1}) scene.move("odom", at, -0.5);
+  scene.giveMapIn("odom", 0);
+  scene.offer(0, 0.05f);
+  scene.offer(0.05, 0.05f);
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  scene.offer(0.1, 0.05f);
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+  scene.move("odom", 0.12, 0.2);  // up through the cloth and back
+  scene.move("odom", 0.15, -0.5);
+  scene.offer(0.15, 0.05f);
+  EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL);
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved);
+  EXPECT_NE(scene.outcome.reason.find("the octomap's frame 'odom' was seen up to 0.7 m"), std::string::npos)
+      << scene.outcome.reason;
+  scene.move("odom", 0.2, -0.5);
+  scene.offer(0.2, 0.05f);
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "it is back: " << scene.outcome.reason;
+  scene.move("odom", 0.25, -0.3);
+  scene.offer(0.25, 0.05f);
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved);
+  EXPECT_FALSE(assuranceOf(scene.pipeline.checkNow()).proved) << "nor by a question";
+  scene.move("odom", 0.3, -0.3);
+  scene.offer(0.3, 0.05f);
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved) << "it stays where the map is not held";
+  scene.giveMapIn("odom", 0.3);
+  scene.move("odom", 0.35, -0.3);
+  scene.offer(0.35, 0.05f);
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "a map of now: " << scene.outcome.reason;
+}
+
+TEST(Map, WhoseFrameNobodyTellsOfIsNoClearStep) {
+  Mapped scene;
+  scene.move("odom", 0, -0.5);
+  scene.move("odom", 0.05, -0.5);
+  scene.giveMapIn("odom", 0);
+  scene.offer(0, 0.05f);
+  scene.offer(0.05, 0.05f);
+  EXPECT_TRUE(assuranceOf(scene.outcome).clear());
+  EXPECT_FALSE(scene.offer(0.1, 0.05f)) << "waits for the transform";
+  EXPECT_TRUE(scene.pipeline.nextOutcome(1000000000, scene.outcome));
+  EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL);
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved);
+  EXPECT_NE(scene.outcome.reason.find("no transform that tells where the octomap's frame 'odom' was"),
+            std::string::npos)
+      << scene.outcome.reason;
+}
+
+// The cloth's frame is a camera's, from which the fixed frame is learnt; the table's is at rest.
+TEST(StaticBodies, InAFixedFrameThatMovesAreNoClearStep) {
+  for (const bool named : {false, true}) {
+    XmlRpcValue tree;
+    if (named) tree = scene();
+    tree["max_vertex_step_m"] = 0.0;
+    tree["effects"]["octomap"] = "off";
+    tree["bodies"]["cloth"]["topic"] = "cloth";
+    tree["bodies"]["table"]["topic"] = "table";
+    tree["bodies"]["table"]["motion"] = "static";
+    Moving scene(tree);
+    for (int i = 0; i < 6; ++i) scene.move("table", 0.05 * i, i < 3 ? -0.5 : 0.5);
+    const std::size_t table = 1;
+    scene.pipeline.take(table, {"sensor_msgs/PointCloud2", cloud(START_S, 0, {}, "table"), 0, 0});
+    for (int i = 0; i < 3; ++i) scene.offer(0.05 * i, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
+    scene.offer(0.15, 0);
+    EXPECT_EQ(assuranceOf(scene.outcome).clear(), named) << "the table was where it was seen; whose frame moved?";
+    if (named) continue;
+    EXPECT_EQ(scene.outcome.status, StepStatus::PARTIAL);
+    EXPECT_NE(scene.outcome.reason.find("the frame of the static body 'table' was seen up to 1 m"), std::string::npos)
+        << scene.outcome.reason;
+    scene.pipeline.take(
+        table, {"sensor_msgs/PointCloud2", cloudAt(ros::Time(START_S) + ros::Duration(0.15), 0, "table"), 0, 0});
+    scene.offer(0.2, 0);
+    EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << "a frame of now: " << scene.outcome.reason;
+  }
+}
+
+// octomap_server sends its map once, before the monitor hears of tf.
+TEST(Map, ThatIsOlderThanAllOfTfIsPlacedByTheFirstTransform) {
+  Mapped scene;
+  scene.giveMapIn("odom", -60);
+  scene.offer(0, 0.05f);
+  scene.pipeline.nextOutcome(1000000000, scene.outcome);
+  EXPECT_FALSE(scene.offer(0.05, 0.05f, 1000000000) && scene.outcome.status != StepStatus::NO_MAP);
+  for (const double at : {0.1, 0.15, 0.2}) scene.move("odom", at, -0.5);
+  scene.offer(0.1, 0.05f, 2000000000);
+  scene.offer(0.15, 0.05f, 2000000000);
+  EXPECT_EQ(scene.outcome.status, StepStatus::OK) << scene.outcome.reason;
+  EXPECT_TRUE(scene.outcome.obstacle);
+  const std::string note = scene.pipeline.takeMapNote();
+  EXPECT_NE(note.find("it is placed by the first, 60.1 s after its stamp"), std::string::npos) << note;
+  EXPECT_EQ(scene.pipeline.takeMapNote(), "");
+  scene.offer(0.2, -0.6f, 2000000000);
+  EXPECT_FALSE(scene.outcome.contacts.empty()) << "its top is at -0.5";
+}
+
+// One that came before a frame, but has no place yet, is waited for.
+TEST(Map, AFrameWaitsForTheMapThatCameBeforeIt) {
+  Mapped scene;
+  for (const double at : {0.0, 0.05, 0.1}) scene.move("odom", at, -0.5);
+  scene.giveMapIn("odom", 0);
+  scene.offer(0, 0.05f);
+  scene.offer(0.05, 0.05f);
+  scene.giveMapIn("odom", 0.11, 100000000);
+  EXPECT_FALSE(scene.offer(0.1, 0.05f, 100000000)) << "the newer map may have its place soon";
+  scene.move("odom", 0.12, 0);
+  EXPECT_TRUE(scene.pipeline.nextOutcome(150000000, scene.outcome));
+  EXPECT_NEAR(scene.pipeline.monitor().map().map_from_fixed.translation().z(), -5. / 120, 0.5)
+      << "placed between -0.5 and 0";
+  scene.giveMapIn("nowhere", 0.2, 200000000);
+  scene.move("odom", 0.15, 0);
+  EXPECT_FALSE(scene.offer(0.15, 0.2f, 200000000));
+  EXPECT_TRUE(scene.pipeline.nextOutcome(500000000, scene.outcome)) << "but not for ever";
+  EXPECT_FALSE(assuranceOf(scene.outcome).proved);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,122 @@
+// Where tf says that things are: at exactly the stamp asked for, whatever else has come by then.
+#include "ros/transforms.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr StampNs MS = 1000000, START = 1700000000000 * MS;
+
+geometry_msgs::TransformStamped sent(const std::string& parent, const std::string& child, StampNs stamp_ns,
+                                     const Eigen::Quaterniond& q, const Vec3& p) {
+  geometry_msgs::TransformStamped out;
+  out.header.stamp.fromNSec(static_cast<std::uint64_t>(stamp_ns));
+  out.header.frame_id = parent;
+  out.child_frame_id = child;
+  out.transform.translation.x = p.x(), out.transform.translation.y = p.y(), out.transform.translation.z = p.z();
+  out.transform.rotation.w = q.w(), out.transform.rotation.x = q.x();
+  out.transform.rotation.y = q.y(), out.transform.rotation.z = q.z();
+  return out;
+}
+
+class Transforms : public ::testing::Test {
+ protected:
+  tf2::BufferCore buffer;
+  TransformFeed feed{buffer};
+  std::mt19937_64 random{7};
+  std::string reason;
+
+  void add(const geometry_msgs::TransformStamped& transform, bool is_static = false) {
+    tf2_msgs::TFMessage message;
+    message.transforms.push_back(transform);
+    feed.add(message, is_static);
+  }
+  Vec3 place() {
+    std::normal_distribution<double> normal;
+    return {normal(random), normal(random), normal(random)};
+  }
+  Eigen::Quaterniond turn() {
+    std::normal_distribution<double> normal;
+    return Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
+  }
+  Eigen::Isometry3d pose(const std::string& target, const std::string& source, StampNs stamp_ns) {
+    Eigen::Isometry3d found;
+    EXPECT_TRUE(feed.lookup(target, source, stamp_ns, found, reason)) << reason;
+    return found;
+  }
+};
+
+// world <- base <- hand <- tool, base static, the others moving; and world <- camera.
+TEST_F(Transforms, OfAStampThatWasSentKeepItsBitsWhateverComesLater) {
+  int by_tf2_alone = 0;
+  for (int i = 0; i < 200; ++i) {
+    const StampNs stamp_ns = START + 10 * i * MS;
+    add(sent("world", "/base", 0, turn(), place()), true);
+    add(sent("base", "hand", stamp_ns, turn(), place()));
+    add(sent("/hand", "tool", stamp_ns, turn(), place()));
+    add(sent("world", "camera", stamp_ns, turn(), place()));
+    const ros::Time time = ros::Time().fromNSec(static_cast<std::uint64_t>(stamp_ns));
+    const auto before_tf2 = buffer.lookupTransform("camera", "tool", time).transform.rotation;
+    const Eigen::Isometry3d before = pose("camera", "tool", stamp_ns);
+    for (const char* names : {"base hand", "hand tool", "world camera"}) {
+      const std::string both(names), parent = both.substr(0, both.find(' '));
+      add(sent(parent, both.substr(parent.size() + 1), stamp_ns + 3 * MS, turn(), place()));
+      EXPECT_EQ(pose("camera", "tool", stamp_ns).matrix(), before.matrix()) << i << " after " << names;
+    }
+    const auto after_tf2 = buffer.lookupTransform("camera", "tool", time).transform.rotation;
+    by_tf2_alone += before_tf2.w != after_tf2.w || before_tf2.x != after_tf2.x || before_tf2.y != after_tf2.y ||
+                    before_tf2.z != after_tf2.z;
+    EXPECT_NEAR((before.linear() * before.linear().transpose() - Eigen::Matrix3d::Identity()).norm(), 0, 1e-14);
+  }
+  EXPECT_GT(by_tf2_alone, 20) << "else this test shows nothing";
+}
+
+TEST_F(Transforms, BetweenTwoStampsAreWhatTf2Says) {
+  for (int i = 0; i < 50; ++i) {
+    add(sent("world", "hand", START + 10 * i * MS, turn(), place()));
+    add(sent("hand", "tool", START + 10 * i * MS + 5 * MS, turn(), place()));
+  }
+  for (StampNs stamp_ns = START + 5 * MS; stamp_ns < START + 480 * MS; stamp_ns += 7 * MS + 13) {
+    const auto found =
+        buffer.lookupTransform("world", "tool", ros::Time().fromNSec(static_cast<std::uint64_t>(stamp_ns)));
+    const Eigen::Isometry3d ours = pose("world", "tool", stamp_ns), back = pose("tool", "world", stamp_ns);
+    const auto& p = found.transform.translation;
+    const auto& q = found.transform.rotation;
+    EXPECT_LT((ours.translation() - Vec3(p.x, p.y, p.z)).norm(), 1e-14);
+    EXPECT_LT((ours.linear() - Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix()).norm(), 1e-14);
+    EXPECT_LT((ours * back).matrix().isIdentity(1e-14) ? 0 : 1, 1);
+  }
+  Eigen::Isometry3d none;
+  EXPECT_FALSE(feed.lookup("world", "tool", START + 491 * MS, none, reason)) << "nothing is extrapolated";
+  EXPECT_NE(reason, "");
+  EXPECT_FALSE(feed.lookup("world", "nobody", START, none, reason));
+}
+
+TEST_F(Transforms, StampsAndTheFirstOneAreThoseOfTheWayBetweenTheTwoFrames) {
+  add(sent("world", "base", 0, turn(), place()), true);
+  for (int i = 0; i < 5; ++i) {
+    add(sent("base", "hand", START + 10 * i * MS, turn(), place()));
+    add(sent("hand", "tool", START + 20 * i * MS + 4 * MS, turn(), place()));
+    add(sent("world", "camera", START + i * MS, turn(), place()));
+  }
+  const auto after = [](std::vector<int> ms) {
+    std::vector<StampNs> stamps;
+    for (const int one : ms) stamps.push_back(START + one * MS);
+    return stamps;
+  };
+  EXPECT_EQ(feed.stampsBetween("base", "tool", START, START + 30 * MS), after({4, 10, 20, 24}));
+  EXPECT_EQ(feed.stampsBetween("tool", "world", START, START + 20 * MS), after({4, 10}));
+  EXPECT_EQ(feed.stampsBetween("world", "base", START, START + 30 * MS), after({})) << "static";
+  EXPECT_EQ(feed.stampsBetween("world", "camera", START + 30 * MS, START), after({})) << "the wrong way round";
+  EXPECT_EQ(feed.firstStamp("world", "tool"), START + 4 * MS);
+  EXPECT_FALSE(feed.firstStamp("world", "base").has_value());
+  EXPECT_FALSE(feed.firstStamp("world", "nobody").has_value());
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
