@@ -31,10 +31,10 @@ struct MeshFrame {
   /// Static ones: where their frame of reference was.
   bool rigid = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  std::vector<SeenPose> seen = {};    ///< of a rigid body: fixed_from_body since the frame before, ascending
   std::vector<double> radius_m = {};  ///< uncertainty per vertex, finite and 0 or more; empty: none
   std::uint64_t dropped_faces = 0;    ///< that were sent and are in no part of the topology: unchecked
   std::int64_t arrival_ns = 0;        ///< of its message, by any clock: goes on to the outcome
+  std::vector<SeenPose> seen = {};    ///< of a rigid body: fixed_from_body since the frame before, ascending
 };
 
 struct MeshStoreOptions {

@@ -102,6 +102,8 @@ class DCCD_EXPORT Monitor {
   /// The step that is computed, and all after it, are not wanted any more: they end at once, as with a step budget that
   /// is over. From any thread.
   void cancel();
+  /// Steps that wait for other bodies' frames are answered with this status instead.
+  void dropSteps(StepStatus status, const std::string& reason);
   /// Whether a step waits for other bodies' frames, so that next() is worth calling again later.
   bool waiting() const;
   /// End of input: steps that still wait are not waited for any longer.

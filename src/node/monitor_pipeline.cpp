@@ -287,6 +287,11 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
     }
   }
   if (finishing_) giveUp();
+  // Nor do steps that wait for other bodies find a static one where it is no more.
+  if (const std::size_t body = misplaced(); body < waiting_.size()) {
+    if (!isHopeless(body)) return false;
+    monitor_->dropSteps(StepStatus::NO_BODY, missing(body));
+  }
   if (!monitor_->next(now_ns, outcome)) return false;
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
@@ -310,6 +315,7 @@ void MonitorPipeline::giveUp() {
     if (!waiting_[b]) continue;
     const Waiting done = std::move(*waiting_[b]);
     waiting_[b].reset();
+    if (placed_[b]) refused_[b] = done.reason;
     skip(b, StepStatus::NO_TRANSFORM, done.mesh.stamp_ns, done.mesh.arrival_ns, done.reason);
   }
   monitor_->finish();

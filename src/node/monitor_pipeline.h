@@ -152,6 +152,8 @@ class MonitorPipeline {
   /// The static body that the monitor has where it is no more, since its newer frame waits or was refused; none:
   /// bodies' number.
   std::size_t misplaced() const;
+  /// There is no use in waiting for such a body's place: its frame was refused or has waited in vain itself.
+  bool isHopeless(std::size_t body) const { return !refused_[body].empty() || waiting_[body]->kept; }
   /// Why the body, whose frame waits or was refused, has no place.
   std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.

@@ -110,8 +110,6 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
     waiting.reason = reason;
     waiting.overdue = overdue;
-    // There is no use in waiting for a static body that has waited in vain itself.
-    const auto isHopeless = [this](std::size_t b) { return !refused_[b].empty() || waiting_[b]->kept; };
     const bool timed_out =
         waiting.overdue || waiting.kept || (problem == StepStatus::NO_BODY && isHopeless(misplaced()));
     if (!timed_out) return false;

@@ -160,9 +160,7 @@ void Monitor::Impl::onClockFrame(Pending step) {
   } else if (step.status == StepStatus::TIME_JUMP) {
     // Steps that wait for other bodies will not get them any more, and those bodies' frames from before the jump, whose
     // stamps lie after its new time, are of no use.
-    for (Pending& waiting : pending) {
-      if (waiting.status == StepStatus::OK) drop(waiting, StepStatus::NO_BODY, "time jumped back while waiting");
-    }
+    dropWaiting(StepStatus::NO_BODY, "time jumped back while waiting");
     forgetHeldSeen();
     for (std::size_t b = 0; b < stores.size(); ++b) {
       const bool stale = b != options.clock_body && isStream(b) && !stores[b].empty() &&
@@ -205,6 +203,8 @@ Deadline Monitor::restOf(const Outcome& outcome) const {
 }
 
 void Monitor::cancel() { impl_->cancelled = true; }
+
+void Monitor::dropSteps(StepStatus status, const std::string& reason) { impl_->dropWaiting(status, reason); }
 
 bool Monitor::waiting() const { return !impl_->pending.empty(); }
 

@@ -70,6 +70,11 @@ struct Monitor::Impl {
     step.status = status;
     step.reason = reason;
   }
+  void dropWaiting(StepStatus status, const std::string& reason) {
+    for (Pending& step : pending) {
+      if (step.status == StepStatus::OK) drop(step, status, reason);
+    }
+  }
   /// With the next sequence number.
   Pending newPending(StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   void onClockFrame(Pending step);

@@ -96,7 +96,7 @@ void RecordedScene::push() {
   std::vector<double> radius_m;
   for (std::size_t i = 0; with_distances_ && i < grid.size(); ++i)
     radius_m.push_back(1e-3 * static_cast<double>(i % 4));
-  monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity(), {}, radius_m}, 0);
+  monitor_.push(0, {stamp_ns, grid_, grid, false, Eigen::Isometry3d::Identity(), radius_m}, 0);
 }
 
 Outcome RecordedScene::nextFrames() {
