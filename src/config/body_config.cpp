@@ -77,7 +77,7 @@ void readRigid(ParameterReader section, BodyConfig& body) {
 
 void readUncertainty(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
-  input.noise_radius_m = section.number("radius_m", 0.0, 0, LARGE);
+  input.noise_radius_m = section.number("radius_m", 0.0, 0, MAX_NOISE_M);
   input.noise_field = section.get("field", std::string());
   const bool scaled = section.has("scale");
   input.noise_scale = section.number("scale", 1.0, 0, 1e6);
