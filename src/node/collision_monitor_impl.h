@@ -88,6 +88,7 @@ struct CollisionMonitor::Impl {
   void carryOut(const std::function<void()>& command);
   void takeMaps();
   void takeMessages();
+  bool holdsStaticFrames() const;
   void tellComplaints();
   void publishOutcome(Outcome& outcome);
   void publishTopics(Outcome& outcome);

@@ -37,10 +37,16 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
   // MAX_OPEN frames had no answer, and the newest one was not kept: now it is the one that counts.
   if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
+  static_answered_ = static_in_use_;
 }
 
 void Liveness::mapCame(std::int64_t now_ns) {
   if (map_since_ns_ == NEVER) map_since_ns_ = now_ns;
+}
+
+void Liveness::staticFrame(const std::string& body) {
+  static_newest_ = body;
+  ++static_came_;
 }
 
 void Liveness::forget() {
@@ -70,6 +76,9 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (limits_.octomap_timeout_s > 0 && map_age_s_ >= 0 && answered_ns_ != NEVER &&
       map_age_s_ + secondsBetween(answered_ns_, now_ns) > limits_.octomap_timeout_s) {
     add(Fault::Kind::OLD_MAP, "the map is older than " + seconds(limits_.octomap_timeout_s));
+  }
+  if (static_answered_ != static_came_) {
+    add(Fault::Kind::NEWER_BODY, "a newer frame of body '" + static_newest_ + "' came, which no step has used yet");
   }
   return faults;
 }

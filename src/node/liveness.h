@@ -17,7 +17,7 @@ struct LivenessLimits {
 
 /// What stands in the way of a proof apart from the step itself. One of a kind at a time.
 struct Fault {
-  enum class Kind : std::uint8_t { ASKED, DISABLED, STOPPED, NO_ANSWER, SILENCE, NEWER_MAP, OLD_MAP };
+  enum class Kind : std::uint8_t { ASKED, DISABLED, STOPPED, NO_ANSWER, SILENCE, NEWER_MAP, OLD_MAP, NEWER_BODY };
   Kind kind = Kind::ASKED;
   std::string sentence;
 };
@@ -36,6 +36,12 @@ class Liveness {
   /// A map came that is not in use yet; it is, or was refused.
   void mapCame(std::int64_t now_ns);
   void mapSettled() { map_since_ns_ = NEVER; }
+
+  /// A frame of a static body came: what was said is void until a step that used it is answered.
+  void staticFrame(const std::string& body);
+  std::uint64_t staticFrames() const { return static_came_; }  ///< that came
+  /// So many of them are in use, or were refused, from the next step on.
+  void staticInUse(std::uint64_t frames) { static_in_use_ = frames; }
 
   /// Something is asked for that makes what was said void, until forget().
   void ask(const std::string& what) { asked_ = what; }
@@ -57,6 +63,8 @@ class Liveness {
   Frame newest_{0, NEVER};
   std::int64_t map_since_ns_ = NEVER, answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
+  std::uint64_t static_came_ = 0, static_in_use_ = 0, static_answered_ = 0;  // frames: in all, in use, in an answer
+  std::string static_newest_;                                                // the body of the last one
   std::string asked_;
   bool disabled_ = false, stopped_ = false;
 };
