@@ -17,11 +17,16 @@ struct NewContact {
   Contact contact;
 };
 
+/// The first touch of a new patch that is not expected is not before this, [1] of the step: 0 where surfaces cross.
+inline double newsTocLower(const Patch& patch) { return patch.crossings > 0 ? 0 : patch.earliest.toc_lower; }
+
 /// One for each pair of partners, the earliest first; of one time in canonical order. Of patches that are new
-/// (Patch::is_new) or, where none are tracked, of all contacts that are not expected.
+/// (Patch::is_new) or, where none are tracked, of all contacts that are not expected. Of a patch that is new by edges
+/// that cross faces when the step begins alone there is none.
 DCCD_EXPORT std::vector<NewContact> newContacts(const Outcome& outcome);
 
-/// Not after the first of them, nor after what was left unchecked: [1] of the step; infinity: neither is there.
+/// Not after the first of them, nor after what was left unchecked: [1] of the step; infinity: neither is there. 0 where
+/// surfaces cross that is new, or not expected where patches are not tracked.
 DCCD_EXPORT double earliestNewToc(const Outcome& outcome);
 
 }  // namespace dccd

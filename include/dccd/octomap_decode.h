@@ -54,7 +54,8 @@ struct OctomapLimits {
 /// Throws OctomapError for an unknown id, a resolution out of range, a stream that ends early, goes deeper than 16
 /// levels, holds a log-odds value that is not a number, or has bytes left over, a header that contradicts the fields,
 /// and for limits exceeded. Time and memory are linear in the size of the data. A log-odds of 0 or more is occupied, as
-/// in liboctomap by default. A stream whose root has no children says nothing of any voxel: an empty map.
+/// in liboctomap by default. A root without children is a leaf, all of the octree's space: in a full stream what its
+/// log-odds say; in a binary one, which does not tell, it is refused.
 DCCD_EXPORT DecodedOctomap decodeOctomap(const OctomapFields& fields, const OctomapLimits& limits = {});
 
 /// Reads a .bt or .ot file by its header. Throws OctomapError naming the file.

@@ -50,8 +50,8 @@ struct Patch {
   PatchBeginning beginning = PatchBeginning::NEW;
   /// It began between these. from UNKNOWN_NS: before `to`, nobody knows when.
   StampNs began_from_ns = UNKNOWN_NS, began_to_ns = UNKNOWN_NS;
-  /// Its first contact that is not expected is one of this step, or of this prediction, and did not touch when that
-  /// began.
+  /// It is an alarm. Something of it that is not expected touches in this step, or in this prediction, and nothing such
+  /// did before: it began in it, or what touches was expected until now.
   bool is_new = false;
 
   bool isExpected() const { return expected == contacts + crossings; }
@@ -62,7 +62,7 @@ enum class PatchEventKind : std::uint8_t {
   ENDED = 1,       ///< told when patch_gap_s is over
   SPLIT = 2,       ///< its parts have been apart for patch_gap_s; the largest keeps the identity
   MERGED = 3,      ///< the oldest identity stays
-  UNEXPECTED = 4,  ///< all of it was expected, and now something is not
+  UNEXPECTED = 4,  ///< all of it was expected, and now something is not; also where another phase expects less
 };
 DCCD_EXPORT const char* toString(PatchEventKind kind);
 

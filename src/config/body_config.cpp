@@ -77,7 +77,7 @@ void readRigid(ParameterReader section, BodyConfig& body) {
 
 void readUncertainty(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
-  input.noise_radius_m = section.number("radius_m", 0.0, 0, LARGE);
+  input.noise_radius_m = section.number("radius_m", 0.0, 0, MAX_NOISE_M);
   input.noise_field = section.get("field", std::string());
   const bool scaled = section.has("scale");
   input.noise_scale = section.number("scale", 1.0, 0, 1e6);
@@ -171,12 +171,12 @@ std::array<std::uint16_t, 2> readPartners(ParameterReader& entry, const MonitorC
   for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
   std::vector<std::uint16_t> pair;
   for (const ParameterTree& name : entry.list("between")) {
-    const auto at = std::find(known.rbegin(), known.rend(), name.text);  // a body may be called self
-    if (at == known.rend()) {
+    const auto at = std::find(known.begin(), known.end(), name.text);
+    if (at == known.end()) {
       entry.fail("between", "names '" + name.text + "', which is no body and not octomap; nearest is '" +
                                 nearestName(name.text, known) + "'");
     }
-    const std::ptrdiff_t place = known.rend() - at - 1;
+    const std::ptrdiff_t place = at - known.begin();
     pair.push_back(place == 0 ? OBSTACLE_BODY : place == 1 ? SELF : static_cast<std::uint16_t>(place - 2));
   }
   if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
@@ -207,6 +207,11 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
   } else {
     ParameterReader section = reader.section("bodies");
     for (const std::string& name : section.names()) {
+      if (name == "octomap" || name == "self") {
+        section.fail(name,
+                     "is no name for a body: where pairs are named (between), octomap is the map, and self is "
+                     "the body itself; give it another one");
+      }
       ParameterReader one = section.section(name);
       BodyConfig body = readBody(one, name, name);
       readBodyEffects(one, config, body);

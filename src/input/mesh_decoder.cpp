@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "ros/short_text.h"
 #include "ros/transforms.h"
@@ -132,11 +133,13 @@ void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std:
     if (!mesh.positions[i].allFinite()) continue;  // unchecked anyway, and trackers leave everything of it open
     const std::size_t point = pixel ? (*pixel)[i] : i;
     const double value = cloud->extraValue(point);
-    if (!(value >= 0) || !std::isfinite(config_.noise_scale * value)) {
-      refuse("field '" + config_.noise_field + "' of point " + std::to_string(point) + " is " + std::to_string(value) +
-             "; an uncertainty is finite and not negative");
-    }
     mesh.radius_m[i] += config_.noise_scale * value;
+    if (!(value >= 0) || !(mesh.radius_m[i] <= MAX_NOISE_M)) {
+      std::ostringstream text;
+      text << "field '" << config_.noise_field << "' of point " << point << " is " << value
+           << "; an uncertainty is not negative, and at most " << MAX_NOISE_M << " m with its scale and radius_m";
+      refuse(text.str());
+    }
   }
 }
 

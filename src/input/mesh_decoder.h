@@ -15,6 +15,8 @@
 
 namespace dccd {
 
+constexpr double MAX_NOISE_M = 1e9;  ///< of a vertex' uncertainty radius
+
 enum class TopologySource : std::uint8_t { AUTO, MESSAGE, GRID, POLYLINE, FILE, FIRST_FRAME_WELD, DEPTH_IMAGE };
 
 /// How a body's messages are to be read.

@@ -72,6 +72,7 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   message.receipt_ns = static_cast<StampNs>(ros::Time::now().toNSec());
   message.arrival_ns = now_ns;
   queue.push(body, std::move(message));
+  if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {

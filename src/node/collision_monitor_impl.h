@@ -90,6 +90,7 @@ struct CollisionMonitor::Impl {
   bool waitsForMap();
   bool mayTake(std::size_t body);
   void takeMessages();
+  bool holdsStaticFrames() const;
   void tellComplaints();
   void publishOutcome(Outcome& outcome);
   void publishTopics(Outcome& outcome);

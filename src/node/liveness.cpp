@@ -37,6 +37,7 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
   // MAX_OPEN frames had no answer, and the newest one was not kept: now it is the one that counts.
   if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
+  static_answered_ = static_in_use_;
 }
 
 void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
@@ -45,6 +46,15 @@ void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
 
 void Liveness::mapSettled(std::int64_t name) {
   while (!maps_.empty() && maps_.front().name <= name) maps_.pop_front();
+}
+
+void Liveness::staticFrame(const std::string& body, std::int64_t now_ns) {
+  if (static_answered_ == static_came_) static_since_ns_ = now_ns, static_alone_ = false;
+  const auto [last, is_first] = static_ns_.try_emplace(body, now_ns);
+  static_alone_ = static_alone_ || is_first || secondsBetween(last->second, now_ns) > limits_.max_step_s;
+  last->second = now_ns;
+  static_newest_ = body;
+  ++static_came_;
 }
 
 void Liveness::forget() {
@@ -76,6 +86,10 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (limits_.octomap_timeout_s > 0 && map_age_s_ >= 0 && answered_ns_ != NEVER &&
       map_age_s_ + secondsBetween(answered_ns_, now_ns) > limits_.octomap_timeout_s) {
     add(Fault::Kind::OLD_MAP, "the map is older than " + seconds(limits_.octomap_timeout_s));
+  }
+  if (static_answered_ != static_came_ &&
+      (static_alone_ || secondsBetween(static_since_ns_, now_ns) > limits_.answer_timeout_s)) {
+    add(Fault::Kind::NEWER_BODY, "a newer frame of body '" + static_newest_ + "' came, which no step has used yet");
   }
   return faults;
 }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,7 @@ struct LivenessLimits {
 
 /// What stands in the way of a proof apart from the step itself. One of a kind at a time.
 struct Fault {
-  enum class Kind : std::uint8_t { ASKED, DISABLED, STOPPED, NO_ANSWER, SILENCE, NEWER_MAP, OLD_MAP };
+  enum class Kind : std::uint8_t { ASKED, DISABLED, STOPPED, NO_ANSWER, SILENCE, NEWER_MAP, OLD_MAP, NEWER_BODY };
   Kind kind = Kind::ASKED;
   std::string sentence;
 };
@@ -36,6 +37,13 @@ class Liveness {
   /// A map came, under a name as frames have. It and all before it are in use, gave way to it or were refused.
   void mapCame(std::int64_t name, std::int64_t now_ns);
   void mapSettled(std::int64_t name);
+
+  /// A frame of a static body came: what was said is void until a step that used it is answered. One that follows the
+  /// last one within max_step_s, as a depth camera's do all the time, has answer_timeout_s for that.
+  void staticFrame(const std::string& body, std::int64_t now_ns);
+  std::uint64_t staticFrames() const { return static_came_; }  ///< that came
+  /// So many of them are in use, or were refused, from the next step on.
+  void staticInUse(std::uint64_t frames) { static_in_use_ = frames; }
 
   /// Something is asked for that makes what was said void, until forget().
   void ask(const std::string& what) { asked_ = what; }
@@ -58,6 +66,11 @@ class Liveness {
   std::deque<Frame> maps_;                               // not in use; at most as many
   std::int64_t answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
+  std::uint64_t static_came_ = 0, static_in_use_ = 0, static_answered_ = 0;  // frames: in all, in use, in an answer
+  std::string static_newest_;                                                // the body of the last one
+  std::map<std::string, std::int64_t> static_ns_;                            // when the last one of each came
+  std::int64_t static_since_ns_ = NEVER;                                     // the first that is in no answer
+  bool static_alone_ = false;                                                // one of these follows none
   std::string asked_;
   bool disabled_ = false, stopped_ = false;
 };

@@ -82,6 +82,14 @@ bool CollisionMonitor::Impl::mayTake(std::size_t body) {
   return pipeline.idle(body) && queue.size(body) > 0 && !(body == config.monitor.clock_body && waitsForMap());
 }
 
+/// Whether each static body's newest frame has been taken, and is not waiting for its place.
+bool CollisionMonitor::Impl::holdsStaticFrames() const {
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (pipeline.isStatic(b) && (queue.size(b) > 0 || !pipeline.idle(b))) return false;
+  }
+  return true;
+}
+
 void CollisionMonitor::Impl::tellComplaints() {
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     const std::string complaint = pipeline.takeComplaint(b);
@@ -222,8 +230,10 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
+  const std::uint64_t static_frames = state.staticFrames();  // before it: what comes from here on may not be taken
   takeMessages();
   accountDropped();
+  if (holdsStaticFrames()) state.staticInUse(static_frames);
   Outcome outcome;
   while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
   state.mapSettled(pipeline.settledMapNs());

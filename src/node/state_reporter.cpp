@@ -1,5 +1,6 @@
 #include "node/state_reporter.h"
 
+#include <algorithm>
 #include <chrono>
 #include <new>
 #include <utility>
@@ -22,8 +23,11 @@ std::int64_t WatchClock::now() {
   const std::int64_t now_ns = simulated ? static_cast<std::int64_t>(ros::Time::now().toNSec()) : steadyNs();
   // Before the first /clock the time is 0, and from there to the first one nothing passes.
   const bool begins = simulated != std::exchange(simulated_, simulated) || last_ns_ == 0;
-  if (!begins && now_ns > last_ns_) elapsed_ns_ += now_ns - last_ns_;
-  last_ns_ = now_ns;
+  if (begins || now_ns != last_ns_) {
+    const std::int64_t steady_ns = steadyNs(), true_ns = steady_ns - std::exchange(changed_ns_, steady_ns);
+    if (!begins) elapsed_ns_ += now_ns > last_ns_ ? now_ns - last_ns_ : std::min(last_ns_ - now_ns, true_ns);
+    last_ns_ = now_ns;
+  }
   return elapsed_ns_;
 }
 
@@ -58,6 +62,22 @@ void StateReporter::mapCame(std::int64_t arrival_ns) {
 void StateReporter::mapSettled(std::int64_t arrival_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   liveness_.mapSettled(arrival_ns);
+}
+
+void StateReporter::staticCame(const std::string& body) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.staticFrame(body, clock_.now());
+  say(false);
+}
+
+std::uint64_t StateReporter::staticFrames() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return liveness_.staticFrames();
+}
+
+void StateReporter::staticInUse(std::uint64_t frames) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  liveness_.staticInUse(frames);
 }
 
 void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame) {

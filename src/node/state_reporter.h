@@ -17,15 +17,16 @@
 
 namespace dccd {
 
-/// Runs with the steady clock; with /use_sim_time with /clock, at its rate, and stands while that stands. A clock that
-/// jumps back, as a bag in a loop does, takes nothing away.
+/// Runs with the steady clock; with /use_sim_time with /clock, at its rate, and stands while that stands. While /clock
+/// goes back true time passes, as much as it goes back at the most: a clock that runs backwards hides no silence, and
+/// one that jumps back, as of a bag in a loop, takes nothing away.
 class WatchClock {
  public:
   std::int64_t now();
 
  private:
   bool simulated_ = false;
-  std::int64_t last_ns_ = 0, elapsed_ns_ = 0;
+  std::int64_t last_ns_ = 0, changed_ns_ = 0, elapsed_ns_ = 0;  // changed: on the steady clock
 };
 
 /// Safe to call from any thread.
@@ -43,6 +44,11 @@ class StateReporter {
   /// A map came; the node uses or has refused those that came up to then.
   void mapCame(std::int64_t arrival_ns);
   void mapSettled(std::int64_t arrival_ns);
+  /// A static body's frame came.
+  void staticCame(const std::string& body);
+  std::uint64_t staticFrames();
+  /// So many of them are in use from the next step on.
+  void staticInUse(std::uint64_t frames);
   /// A step's answer, or why there is none.
   void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.

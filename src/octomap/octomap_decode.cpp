@@ -83,7 +83,13 @@ template <class Leaf>
 void walkBinary(Bytes& bytes, const Cube& cube, Leaf& leaf) {
   const unsigned char* bits = bytes.take(2);
   const unsigned children = bits[0] | static_cast<unsigned>(bits[1]) << 8;
-  if (children == 0 && cube.depth > 0) {
+  if (children == 0) {
+    // A tree that is pruned to its root is written like this whatever it holds.
+    if (cube.depth == 0) {
+      throw OctomapError(
+          "octomap data are a root without children, which in a binary map is all occupied, all free and all unknown "
+          "alike; send the full map (binary: false), or no data where nothing is known");
+    }
     leaf(cube, false);  // an inner node without children: liboctomap takes it for free
     return;
   }
@@ -111,7 +117,7 @@ void walkFull(Bytes& bytes, const Cube& cube, std::size_t extra, Leaf& leaf) {
   }
   const unsigned children = node[sizeof(float) + extra];
   if (children == 0) {
-    if (cube.depth > 0) leaf(cube, log_odds >= 0);
+    leaf(cube, log_odds >= 0);
     return;
   }
   checkDepth(cube, bytes);

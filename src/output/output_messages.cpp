@@ -69,7 +69,14 @@ std::string noContact(const Outcome& outcome) {
   return text + besides(outcome) + start;
 }
 
-/// A line for people; `first` is null where nothing known touches.
+/// Is the alarm about edges through faces, of which no contact tells?
+bool crossesAsNews(const Outcome& outcome) {
+  const auto crosses = [](const Patch& patch) { return patch.is_new && patch.crossings > 0; };
+  return outcome.tracked ? std::any_of(outcome.patches.begin(), outcome.patches.end(), crosses)
+                         : outcome.unchecked_toc_lower > 0;
+}
+
+/// A line for people; `first` is null where no contact is known.
 std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, const std::vector<Body>& bodies) {
   if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
   if (!std::isfinite(toc)) return noContact(outcome);
@@ -77,6 +84,7 @@ std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, 
   const std::string rest = besides(outcome).empty() ? std::string(", starts ") + toString(outcome.start_state) : start;
   char when[64];
   std::snprintf(when, sizeof when, "%.6f s into the step", toc * outcome.duration_s());
+  if (!first && toc == 0 && crossesAsNews(outcome)) return "surfaces cross since before the step began" + rest;
   if (!first) return std::string("not all was checked in time; what was not cannot touch before ") + when + rest;
   if (first->certainty != Certainty::CERTAIN) {
     return "perhaps a contact, not before " + std::string(when) + ": " + nameOf(*first, bodies) + rest;

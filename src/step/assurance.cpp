@@ -11,11 +11,13 @@ std::string joined(const std::vector<std::string>& sentences) {
   return text;
 }
 
-/// Beside what lasts, a contact that is of the same patch is not new.
+/// Beside what lasts, a contact that is of the same patch is not new; what lasts and was expected until now is.
 Touching touchingOf(const Outcome& outcome) {
+  if (!outcome.tracked) return outcome.touching;
   const bool any_new =
       std::any_of(outcome.patches.begin(), outcome.patches.end(), [](const Patch& p) { return p.is_new; });
-  return outcome.touching == Touching::NEW && outcome.tracked && !any_new ? Touching::LASTING : outcome.touching;
+  if (any_new) return Touching::NEW;
+  return outcome.touching == Touching::NEW ? Touching::LASTING : outcome.touching;
 }
 
 }  // namespace

@@ -68,6 +68,15 @@ std::uint64_t looseVertices(const Body& body) {
   return static_cast<std::uint64_t>(std::count(accounted.begin(), accounted.end(), false));
 }
 
+/// Is every vertex on an edge or a face left out? Then nothing of the body was looked at.
+bool isMaskedWhole(const Body& body) {
+  const std::vector<Index>& used = body.topology->usedVertices();
+  if (body.vertex_mask.empty() || body.vertex_mask.size() < used.size()) return false;
+  std::vector<bool> masked(body.topology->vertexCount());
+  for (const Index v : body.vertex_mask) masked.at(v) = true;
+  return std::all_of(used.begin(), used.end(), [&](Index v) { return masked[v]; });
+}
+
 /// What of the bodies was not looked at, counted; in words, or empty.
 std::string takeUnchecked(const Step& step, StepStats& stats) {
   std::uint64_t dropped = 0, loose = 0;
@@ -133,7 +142,12 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
   if (options.obstacle_expected && !step.map.surface) {
     say(StepStatus::NO_MAP, step.map.problem + "; checked without it");
   }
-  // Neither changes the status: the step was computed as it was asked for.
+  // None of these changes the status: the step was computed as it was asked for.
+  for (const Body& body : step.bodies) {
+    if (!isMaskedWhole(body)) continue;
+    outcome.unproved.push_back("vertex_mask names every vertex of body '" + body.name +
+                               "', so nothing of it was checked");
+  }
   if (!provesAnswers(options.accuracy.rung)) {
     outcome.unproved.push_back(std::string("accuracy ") + toString(options.accuracy.rung) +
                                " misses contacts and proves nothing");

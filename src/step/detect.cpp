@@ -141,6 +141,7 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   const std::size_t hits = outcome.contacts.size();
   expected.mark(outcome);
   if (options->patches) findPatches(outcome);
+  sayLeftOutForNoise(step, outcome.unproved);
   conclude(*options, step, needed, outcome);
   if (options->patches) patches.list(outcome);
   outcome.stats.total_ms = msSince(begun);

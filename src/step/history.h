@@ -109,6 +109,8 @@ struct History::Impl {
   bool mayRemember(const Part& part);
   void useMemory(StepContext& context);
   void rememberPairs(const StepContext& context, const Part& part);
+  /// Of a pair that only uncertainty leaves out it is not known whether it comes as near as that. A sentence a body.
+  void sayLeftOutForNoise(const Step& step, std::vector<std::string>& unproved) const;
   void cutHits(const Span& span);
   /// What may be found in a whole step with these options and bodies; FoundLimit::NONE: no limit.
   std::size_t foundLimit() const;
@@ -149,6 +151,7 @@ struct History::Impl {
   std::vector<UnfoldedProof> unfolded;  // per body
   std::vector<LeftOutOfBody> left_out;  // per body
   std::vector<LeftOutPair> left_out_list;
+  std::vector<double> left_out_m;  // of each one, how far apart it is in the reference frame
   std::shared_ptr<const VoxelSurface> map_given, map_reduced;  // the step's, and what exclude_boxes leave of it
   Eigen::Isometry3d map_pose = Eigen::Isometry3d::Identity();  // with which
   std::uint64_t excluded_voxels = 0;

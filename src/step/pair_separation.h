@@ -14,6 +14,8 @@ struct PairSeparation {
   double total_m = 0;     ///< a contact from this distance on
   double noise_m = 0;     ///< of it, the uncertainty of the vertices
   bool left_out = false;  ///< a neighbour on the mesh: only a touch counts
+  /// Farther apart in the reference frame than its bodies' separation: without uncertainty it would not be left out.
+  bool for_noise = false;
 };
 
 /// The rule for the features of two bodies, or of one with itself.
@@ -53,6 +55,7 @@ struct SeparationRule {
     // The list is made for the largest radii so far; what counts is what the vertices are known to now.
     const bool listed = apart_m < std::numeric_limits<double>::infinity();
     s.left_out = listed && (!wide_list || apart_m <= s.total_m + tolerance_m);
+    s.for_noise = s.left_out && wide_list && s.noise_m > 0 && apart_m > bodies_m;
     if (s.left_out) s.total_m = s.noise_m = 0;
     return s;
   }

@@ -1,9 +1,12 @@
 // Which pairs of features a step tests: the tasks of each body and pair of bodies, and what is left out of them.
 #include <algorithm>
+#include <sstream>
 
+#include "dccd/accuracy.h"
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 #include "step/history.h"
+#include "step/pair_separation.h"
 
 namespace dccd {
 
@@ -178,6 +181,7 @@ void History::Impl::findLeftOut(const Step& step) {
   const std::size_t n = scene.bodies().size();
   left_out.assign(n, {});
   left_out_list.clear();
+  left_out_m.clear();
   Step rest = step;
   bool any = false;
   for (std::size_t b = 0; b < n; ++b) {
@@ -237,9 +241,34 @@ void History::Impl::listLeftOut(std::size_t b, PairKind kind) {
     one.distance_m =
         restDistance(kind, {at[pair.vertex[0]], at[pair.vertex[1]], at[pair.vertex[2]], at[pair.vertex[3]]});
     left_out_list.push_back(pair);
+    left_out_m.push_back(one.distance_m);
   }
   left_out[b].set(kind, keys, vertices ? body.vertex_begin : body.edge_begin,
                   vertices ? topology.vertexCount() : topology.edges().size());
+}
+
+void History::Impl::sayLeftOutForNoise(const Step& step, std::vector<std::string>& unproved) const {
+  if (left_out_list.empty() || !scene.uncertain()) return;
+  std::vector<std::size_t> counts(step.bodies.size(), 0);
+  std::vector<SeparationRule> rules;
+  for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+    rules.emplace_back(scene, b, b, holdsDistance(options->accuracy.rung) ? options->accuracy.tolerance_m : 0);
+    if (step.bodies[b].radius_m) rules.back().radii = step.bodies[b].radius_m->data();  // the list names its vertices
+  }
+  for (std::size_t i = 0; i < left_out_list.size(); ++i) {
+    const LeftOutPair& pair = left_out_list[i];
+    counts[pair.body] += rules[pair.body].of(pair.kind, pair.vertex, left_out_m[i]).for_noise;
+  }
+  for (std::size_t b = 0; b < counts.size(); ++b) {
+    if (counts[b] == 0) continue;
+    const Body& body = step.bodies[b];
+    std::ostringstream text;
+    text << "body '" << body.name << "': " << counts[b]
+         << " pairs of its own features are closer in its reference frame than its uncertainty (radii of up to "
+         << *std::max_element(body.radius_m->begin(), body.radius_m->end())
+         << " m) reaches, and were only checked for touching";
+    unproved.push_back(text.str());
+  }
 }
 
 std::size_t History::Impl::foundLimit() const {

@@ -285,6 +285,7 @@ void Monitor::Impl::follow(Outcome& outcome) {
   if (!options.detector.patches) return tracker.seam();
   const auto start = Deadline::Clock::now();
   try {
+    tracker.expect(options.detector.expected);
     tracker.follow(history.impl().patches, options.patch_gap_s, outcome);
   } catch (...) {
     tracker.forget(outcome);

@@ -27,7 +27,8 @@ std::vector<NewContact> newContacts(const Outcome& outcome) {
   std::vector<NewContact> earliest;
   if (outcome.tracked) {
     for (const Patch& patch : outcome.patches) {
-      if (patch.is_new) take({patch.body, patch.id, patch.earliest}, earliest);
+      const bool by_contact = patch.contacts > 0 && !patch.earliest.expected;
+      if (patch.is_new && by_contact) take({patch.body, patch.id, patch.earliest}, earliest);
     }
   } else {
     for (const Contact& contact : outcome.contacts) {
@@ -40,10 +41,14 @@ std::vector<NewContact> newContacts(const Outcome& outcome) {
 }
 
 double earliestNewToc(const Outcome& outcome) {
-  if (!outcome.tracked) return outcome.earliest_unexpected_toc;
+  if (!outcome.tracked) {
+    const bool crosses = std::any_of(outcome.intersections.begin(), outcome.intersections.end(),
+                                     [](const StartIntersection& start) { return !start.expected; });
+    return crosses ? 0 : outcome.earliest_unexpected_toc;
+  }
   double toc = outcome.unchecked_toc_lower;
   for (const Patch& patch : outcome.patches) {
-    if (patch.is_new) toc = std::min(toc, patch.earliest.toc_lower);
+    if (patch.is_new) toc = std::min(toc, newsTocLower(patch));
   }
   return toc;
 }

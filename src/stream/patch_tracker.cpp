@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 #include <type_traits>
 #include <utility>
 
+#include "dccd/new_contacts.h"
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
 
@@ -43,6 +45,7 @@ void PatchTracker::seam(std::size_t body) {
       ++at;
       continue;
     }
+    if (!at->second.unexpected) cut_off_expected_[at->second.body] = followed_expectations_;
     waiting_.push_back(eventOf(PatchEventKind::ENDED, at->first));
     waiting_.back().from_ns = at->second.touched_ns;
     waiting_.back().to_ns = at->second.released_ns;  // known only where it had been let go before the seam
@@ -58,6 +61,12 @@ void PatchTracker::seam(std::size_t body) {
   for (std::size_t i = 0; i < all_.spots.size(); ++i) {
     if (!isOf(all_.spots[i].body, body)) trace_.push(all_.spots[i], all_.known[i]);
   }
+}
+
+void PatchTracker::expect(const std::vector<Expectation>& expected) {
+  if (expected == expected_) return;
+  expected_ = expected;
+  ++expectations_;
 }
 
 void PatchTracker::forget(Outcome& outcome) noexcept {
@@ -116,6 +125,11 @@ void PatchTracker::follow(const std::vector<PatchSpot>& spots, const std::vector
     if (patch != outcome.patches.end()) event.patch = static_cast<std::uint32_t>(patch - outcome.patches.begin());
   }
   has_last_ = true;
+  for (auto at = cut_off_expected_.begin(); at != cut_off_expected_.end();) {
+    const bool seen = at->first[1] == OBSTACLE_BODY ? map_seen_ : mesh_seen_;
+    at = seen ? cut_off_expected_.erase(at) : std::next(at);
+  }
+  followed_expectations_ = expectations_;
 }
 
 void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
@@ -147,13 +161,27 @@ void PatchTracker::name(Outcome& outcome) const {
   outcome.tracked = true;
 }
 
-/// A living patch is news once: in the step in which something unexpected of it begins to touch. What touched already
-/// when the step began is no news.
+/// Of a part that is none of a living patch: a seam cut it off, or it was forgotten after a burst, while all of it was
+/// expected, and now other things are.
+bool PatchTracker::wasCutOffAsExpected(const Part& part) const {
+  const auto is_expected = [&](const auto& one) { return !one.second.unexpected && one.second.body == part.body; };
+  if (forgot_burst_ && expectsOtherwise() && std::any_of(living_.begin(), living_.end(), is_expected)) return true;
+  const auto cut_off = cut_off_expected_.find(part.body);
+  return cut_off != cut_off_expected_.end() && cut_off->second != expectations_;
+}
+
+/// A patch is news once: in the step in which something unexpected of it touches for the first time. What touched
+/// already when it was first looked at is no news; what was expected until now is.
 void PatchTracker::findNews() {
   for (Part& part : parts_) {
-    const bool known = std::any_of(part.before.begin(), part.before.end(),
-                                   [&](std::uint64_t id) { return living_.at(id).unexpected; });
-    part.is_new = part.unexpected_new && !part.unexpected_initial && !known;
+    const auto is_unexpected = [&](std::uint64_t id) { return living_.at(id).unexpected; };
+    if (part.before.empty()) {
+      part.is_new = part.isUnexpected() && (!part.unexpected_initial || wasCutOffAsExpected(part));
+    } else if (expectsOtherwise()) {  // what was expected may be what no longer is, also beside what never was
+      part.is_new = part.isUnexpected() && !std::all_of(part.before.begin(), part.before.end(), is_unexpected);
+    } else {
+      part.is_new = part.isUnexpected() && std::none_of(part.before.begin(), part.before.end(), is_unexpected);
+    }
   }
 }
 
@@ -165,10 +193,10 @@ void PatchTracker::tellNews(Outcome& outcome) const {
     PatchEvent& event = outcome.patch_events.back();
     for (const Patch& patch : outcome.patches) {
       if (patch.id != part.id || !patch.is_new) continue;
-      const StampNs from_ns = outcome.stampBefore(patch.earliest.toc_lower);
+      const StampNs from_ns = outcome.stampBefore(newsTocLower(patch));
       if (event.from_ns != UNKNOWN_NS && event.from_ns <= from_ns) continue;
       event.from_ns = from_ns;
-      event.to_ns = outcome.stampAfter(patch.earliest.toc_upper);
+      event.to_ns = outcome.stampAfter(patch.crossings > 0 ? 0 : patch.earliest.toc_upper);
     }
   }
 }
@@ -198,8 +226,8 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
   };
   // After a burst of contacts the trace would cost every later step as much, so it is forgotten early.
   const std::size_t kept = std::max(tolerance::TRACE_PER_SPOT * spots.size(), tolerance::TRACE_ALWAYS);
-  const bool burst = trace_.spots.size() > kept;
-  for (std::size_t i = 0; !burst && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
+  forgot_burst_ = trace_.spots.size() > kept;
+  for (std::size_t i = 0; !forgot_burst_ && i < trace_.spots.size(); ++i) add(trace_.spots[i], trace_.known[i]);
   releaseBurst(current_);
   current_.assign(all_.spots.size(), NO_PATCH);
   for (const PatchSpot& spot : spots) {
@@ -355,7 +383,7 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
   alive_.clear();
   for (auto& [id, living] : living_) living.unexpected = false;
   for (std::size_t i = 0; i < current_.size(); ++i) {
-    const Touch& spot = all_.spots[i];
+    Touch& spot = all_.spots[i];
     Known known = all_.known[i];
     const std::int64_t clock_ns = spot.onMap() ? map_clock_ns_ : mesh_clock_ns_;
     if (current_[i] != NO_PATCH) known.last_ns = clock_ns;
@@ -363,6 +391,8 @@ void PatchTracker::remember(double gap_s, const Outcome& outcome) {
     Part& part = parts_[(*part_of_)[i]];
     if (part.touches) {
       known.id = part.id;
+      // All of it is expected now: what was not, when other things were expected, is over.
+      if (expectsOtherwise() && !part.isUnexpected()) spot.expected = true;
       part.lasts_unexpected = part.lasts_unexpected || !spot.expected;
     } else {
       if (alive_.empty() || alive_.back() != known.id) alive_.push_back(known.id);

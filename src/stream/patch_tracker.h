@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "dccd/expectation.h"
 #include "dccd/outcome.h"
 #include "dccd/range_log.h"
 #include "step/patches.h"
@@ -21,6 +22,8 @@ class PatchTracker {
 
   /// Frames begin anew, of one body or of all: what lives there ends, nobody knows when. Told with the next outcome.
   void seam(std::size_t body = ALL);
+  /// What is expected in the steps that are followed from here on.
+  void expect(const std::vector<Expectation>& expected);
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:
   /// what detect() found in it.
   void follow(const PatchMaker& found, double gap_s, Outcome& outcome);
@@ -76,6 +79,7 @@ class PatchTracker {
     bool unexpected_new = false, unexpected_initial = false;  // something not expected: came in this step, was there
     bool is_new = false;
     std::array<std::uint16_t, 2> body{0, 0};
+    bool isUnexpected() const { return unexpected_new || unexpected_initial; }
   };
 
   void merge(const std::vector<PatchSpot>& spots, const Outcome& outcome);
@@ -86,6 +90,8 @@ class PatchTracker {
   void keepIdentities(Outcome& outcome);
   void name(Outcome& outcome) const;
   void begin(Outcome& outcome);
+  bool expectsOtherwise() const { return expectations_ != followed_expectations_; }
+  bool wasCutOffAsExpected(const Part& part) const;
   void findNews();
   void tellNews(Outcome& outcome) const;
   void goOn(const Outcome& outcome);
@@ -99,6 +105,11 @@ class PatchTracker {
   // Time that was seen whole, with the map and without: nothing ends in what was not.
   std::int64_t mesh_clock_ns_ = 0, map_clock_ns_ = 0;
   bool mesh_seen_ = false, map_seen_ = false;  // in this step
+  std::vector<Expectation> expected_;
+  std::uint64_t expectations_ = 0, followed_expectations_ = 0;  // how often they changed: now, in the last step
+  /// Partners of which a patch was all expected until a seam cut it off, and how often expectations had changed then.
+  /// Kept until it is seen what touches now.
+  std::map<std::array<std::uint16_t, 2>, std::uint64_t> cut_off_expected_;
   std::vector<PatchEvent> waiting_;
   bool has_last_ = false;
   std::shared_ptr<const VoxelSurface> last_map_;
@@ -108,6 +119,7 @@ class PatchTracker {
   // Buffers of a step.
   TouchGraph graph_;
   Trace all_;                                            // the trace, then what is new in the step
+  bool forgot_burst_ = false;                            // the trace is not in all_
   std::vector<std::uint32_t> current_;                   // per one of these its patch in the step; NO_PATCH: none
   const std::vector<std::uint32_t>* part_of_ = nullptr;  // per one of these
   std::vector<std::uint32_t> last_at_;                   // per vertex: the last one of these there; NO_INDEX

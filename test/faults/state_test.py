@@ -15,6 +15,7 @@ import rosbag
 import rospy
 from deformable_ccd.msg import ContactArray, MeshStamped, State
 from geometry_msgs.msg import Point
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import MeshTriangle
 from std_msgs.msg import Bool
@@ -194,6 +195,57 @@ class StateTest(LiveNodeTest):
         self.wait_proved()
         stream.end()
         self.assert_consistent()
+
+    def test_a_newer_frame_of_a_static_body(self):
+        """It voids what was said as soon as it comes, not with the next step."""
+        bodies = {'bodies/cloth/topic': '/held/mesh', 'bodies/table/topic': '/held/table', 'bodies/table/motion': 'static',
+                  'clock_body': 'cloth'}
+        self.start_node('held', max_step_s=30.0, **bodies)
+        table = rospy.Publisher('/held/table', PointCloud2, queue_size=None)
+        self.addCleanup(table.unregister)
+        wait_for(lambda: table.get_num_connections() == 1, 20, 'the node to listen')
+        cloth, below, through = Sheet(), Sheet(), Sheet()
+        below.variants = [b''.join(struct.pack('<3d', 0.01 * c, 0.01 * r, -1.0) for r in range(ROWS) for c in range(COLS))]
+        through.variants = [b''.join(struct.pack('<3d', 0.1 * c, 0.003 * r, 0.01 * (c % 2) - 0.004) for r in range(ROWS) for c in range(COLS))]
+        table.publish(below.message(100))
+        time.sleep(0.5)
+        for k in range(3):
+            self.step(cloth.message(100 + 0.1 * k))
+        self.wait_proved()
+        wait_for(lambda: self.clear[-1].data, 5, '~clear')
+        said = len(self.contacts)
+        table.publish(through.message(100.2))
+        self.wait_missing("a newer frame of body 'table' came, which no step has used yet")
+        self.assertEqual(len(self.contacts), said, 'there was no step')
+        outcome = self.step(cloth.message(100.3))
+        self.assertGreater(outcome.total_contacts + len(outcome.intersections), 0)
+        self.wait_proved()
+        self.assertFalse(self.states[-1].clear)
+        self.assert_consistent()
+
+    def test_a_clock_that_runs_backwards(self):
+        rospy.set_param('/use_sim_time', True)
+        try:
+            self.start_node('backwards')
+        finally:
+            rospy.delete_param('/use_sim_time')
+        clock = rospy.Publisher('/clock', Clock, queue_size=10)
+        self.addCleanup(clock.unregister)
+        wait_for(lambda: clock.get_num_connections() == 1, 20, 'the node to listen to the clock')
+        cloth, now_s = Sheet(), 1000.0
+        for k in range(4):
+            now_s += 0.05
+            clock.publish(Clock(rospy.Time.from_sec(now_s)))
+            time.sleep(0.05)
+            self.step(cloth.message(now_s))
+        self.wait_proved()
+        end = time.monotonic() + 20
+        while self.states[-1].proved and time.monotonic() < end:  # from now on there are no frames
+            now_s -= 0.05
+            clock.publish(Clock(rospy.Time.from_sec(now_s)))
+            time.sleep(0.05)
+        self.wait_missing('no frame has come')
+        self.assertGreater(now_s, 1000.2 - 10, 'within seconds, not for want of a clock')
 
     def test_the_last_word_of_a_node_that_ends(self):
         for number in (signal.SIGINT, signal.SIGTERM):

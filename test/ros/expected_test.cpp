@@ -1,6 +1,7 @@
 // Expected contacts through the live node: no alarm in their phase, but found, listed, counted, marked and said.
 #include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/PatchEvent.h>
 #include <deformable_ccd/SetPhase.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/TimeToContact.h>
@@ -91,7 +92,7 @@ TEST_F(Pressing, AnUnknownPhaseIsRefusedWithTheKnownOnes) {
   EXPECT_TRUE(setPhase("press").success);
   const auto reply = setPhase("prss");
   EXPECT_FALSE(reply.success);
-  EXPECT_NE(reply.message.find("known phases are 'press'"), std::string::npos) << reply.message;
+  EXPECT_NE(reply.message.find("known phases are 'carry', 'press'"), std::string::npos) << reply.message;
   EXPECT_NE(reply.message.find("in force is phase 'press'"), std::string::npos) << reply.message;
 }
 
@@ -117,6 +118,34 @@ TEST_F(Pressing, InItsPhaseItIsFoundListedCountedMarkedAndNoAlarm) {
   EXPECT_EQ(said.touching, State::NONE);
   EXPECT_EQ(said.expected, std::vector<std::string>{words}) << "said also where nothing touches";
   EXPECT_TRUE(said.clear);
+}
+
+TEST_F(Pressing, APhaseThatEndsIsAnAlarmForWhatGoesOnTouching) {
+  Probe<deformable_ccd::PatchEvent> events(node, "/pressing/events");
+  Probe<deformable_ccd::TimeToContact> prediction(node, "/pressing/time_to_contact");
+  EXPECT_TRUE(setPhase("carry").success);
+  move(0.1, -0.01, 220);
+  EXPECT_EQ(said.touching, State::EXPECTED) << said.reason;
+  const auto stay = [&](double stamp_s) {  // the tip stays below the table: edges cross, and there is no contact
+    EXPECT_EQ(send(mesh, meshStamped(tipAbove(-0.01), stamp_s)).contacts.size(), 0u);
+    EXPECT_TRUE(waitUntil([&] { return saidAt(ros::Time(stamp_s)); }));
+    EXPECT_TRUE(waitUntil([&] { return first.last().header.stamp == ros::Time(stamp_s); }));
+    return first.last();
+  };
+  EXPECT_FALSE(stay(220.2).contact);
+  EXPECT_TRUE(setPhase("").success);
+  const auto alarm = stay(220.3);
+  EXPECT_TRUE(alarm.contact);
+  EXPECT_EQ(alarm.seconds_from_start, 0);
+  EXPECT_EQ(alarm.time_of_contact, ros::Time(220.2));
+  EXPECT_NE(alarm.summary.find("surfaces cross since before the step began"), std::string::npos) << alarm.summary;
+  EXPECT_EQ(said.touching, State::NEW) << said.reason;
+  EXPECT_TRUE(said.proved) << said.reason;
+  EXPECT_FALSE(stay(220.4).contact) << "one alarm";
+  EXPECT_EQ(said.touching, State::LASTING);
+  std::size_t unexpected = 0;
+  for (const auto& event : events.all()) unexpected += event.kind == deformable_ccd::PatchEvent::UNEXPECTED;
+  EXPECT_EQ(unexpected, 1u);
 }
 
 TEST_F(Pressing, APredictionIsAboutWhatIsNotExpected) {

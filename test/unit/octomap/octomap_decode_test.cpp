@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -15,6 +16,10 @@
 #include <set>
 #include <sstream>
 #include <tuple>
+
+#include "dccd/assurance.h"
+#include "dccd/detect.h"
+#include "dccd/known_space.h"
 
 namespace dccd {
 namespace {
@@ -31,7 +36,7 @@ Leaves sorted(const std::vector<OccupiedLeaf>& leaves) {
 template <class Tree>
 Leaves leavesOf(const Tree& tree, bool occupied) {
   Leaves list;
-  if (tree.size() <= 1) return list;
+  if (tree.size() == 0) return list;
   for (auto it = tree.begin_leafs(), end = tree.end_leafs(); it != end; ++it) {
     if (tree.isNodeOccupied(*it) != occupied) continue;
     const octomap::OcTreeKey key = it.getIndexKey();
@@ -83,6 +88,15 @@ struct Stream {
 
 DecodedOctomap decode(const Stream& stream, const OctomapLimits& limits = {}) {
   return decodeOctomap({stream.id, stream.resolution, stream.binary, stream.data.data(), stream.data.size()}, limits);
+}
+
+std::string errorOf(const Stream& stream, const OctomapLimits& limits = {}) {
+  try {
+    decode(stream, limits);
+  } catch (const OctomapError& error) {
+    return error.what();
+  }
+  return "";
 }
 
 template <class Tree>
@@ -203,15 +217,6 @@ TEST(OctomapDecode, WhatItReadsOfDamagedStreamsIsWhatLiboctomapReads) {
   EXPECT_GT(compared, 100);
 }
 
-std::string errorOf(const Stream& stream, const OctomapLimits& limits = {}) {
-  try {
-    decode(stream, limits);
-  } catch (const OctomapError& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(OctomapDecode, ErrorsNameTheFieldAndTheValue) {
   EXPECT_NE(errorOf({"PointCloud", 0.1, true, ""}).find("PointCloud"), std::string::npos);
   EXPECT_EQ(errorOf({"OcTree", 0, true, ""}), "octomap resolution is 0, which is not a length from 1e-290 to 1e290 m");
@@ -266,9 +271,92 @@ TEST(OctomapDecode, CountsAreThoseOfTheTrees) {
   EXPECT_TRUE(decodeOctomap({"OcTree", 0.05, true, bytes.data(), bytes.size()}, limits).free.empty());
 }
 
-TEST(OctomapDecode, ARootWithoutChildrenSaysNothing) {
-  EXPECT_TRUE(decode({"OcTree", 0.1, true, std::string(2, '\0')}).occupied.empty());
-  EXPECT_TRUE(decode({"OcTree", 0.1, false, std::string(5, '\0')}).occupied.empty());
+/// The full stream of a tree that is its root alone, and the same with the header of a file.
+template <class Tree>
+std::vector<Stream> rootAlone(const Tree& tree, float log_odds) {
+  std::string bytes(sizeof log_odds, '\0');
+  std::memcpy(bytes.data(), &log_odds, sizeof log_odds);
+  if (tree.getTreeType() == "ColorOcTree") bytes += "rgb";
+  bytes += '\0';  // no children
+  const std::string id = tree.getTreeType();
+  const std::string header = "# Octomap OcTree file\nid " + id + "\nsize 1\nres 0.1\ndata\n";
+  return {{id, 0.1, false, bytes}, {id, 0.1, false, header + bytes}};
+}
+
+TYPED_TEST(OctomapRoundTrip, ARootThatIsALeafIsAllOfTheSpace) {
+  for (const float log_odds : {3.5f, 0.0f, -0.5f, std::numeric_limits<float>::infinity()}) {
+    TypeParam tree(0.1);
+    for (const Stream& stream : rootAlone(tree, log_odds)) {
+      const DecodedOctomap map = decode(stream);
+      const Leaves all{{0, 0, 0, 65536}}, none;
+      EXPECT_EQ(sorted(map.occupied), log_odds >= 0 ? all : none) << log_odds;
+      EXPECT_EQ(sorted(map.free), log_odds >= 0 ? none : all) << log_odds;
+      if (stream.data[0] == '#') continue;
+      std::istringstream in(stream.data);
+      tree.readData(in);
+      EXPECT_EQ(sorted(map.occupied), leavesOf(tree, true)) << log_odds;
+      EXPECT_EQ(sorted(map.free), leavesOf(tree, false)) << log_odds;
+    }
+  }
+}
+
+// All occupied, all free and all unknown are written alike: two bytes that name no child.
+TYPED_TEST(OctomapRoundTrip, ABinaryRootWithoutChildrenIsRefused) {
+  TypeParam tree(0.1);
+  std::istringstream in(rootAlone(tree, 3.5f)[0].data);
+  tree.readData(in);
+  ASSERT_EQ(tree.size(), 1u);
+  for (const Stream& stream : streamsOf(tree)) {
+    if (!stream.binary) {
+      EXPECT_EQ(decode(stream).occupied.size(), 1u) << "liboctomap's own stream";
+      continue;
+    }
+    const std::string error = errorOf(stream);
+    EXPECT_NE(error.find("a root without children"), std::string::npos) << error;
+    EXPECT_NE(error.find("binary: false"), std::string::npos) << "the remedy: " << error;
+  }
+}
+
+TYPED_TEST(OctomapRoundTrip, ARootWithoutDataIsRefused) {
+  for (const bool binary : {true, false}) {
+    const TypeParam tree(0.1);
+    const std::string id = tree.getTreeType();
+    const std::string kind = binary ? "binary file" : "file";
+    EXPECT_NE(errorOf({id, 0.1, binary, "# Octomap OcTree " + kind + "\nid " + id + "\nsize 1\nres 0.1\ndata\n"}), "");
+    EXPECT_NE(errorOf({id, 0.1, binary, std::string(1, '\0')}), "");
+  }
+}
+
+// Wherever a mesh is, and wherever it goes within the octree's space, it is in what is occupied.
+TEST(OctomapDecode, InASolidMapNothingIsClear) {
+  const DecodedOctomap map = decode(rootAlone(octomap::OcTree(0.1), 3.5f)[0]);
+  const auto surface = VoxelSurface::build(map.resolution_m, map.occupied);
+  for (const double at : {-3000.0, -0.05, 0.0, 0.05, 1.0, 3000.0}) {
+    Step step;
+    step.stamp_ns = 1;
+    step.bodies.resize(1);
+    step.bodies[0].topology = share(Topology::fromTriangles(3, {{0, 1, 2}}));
+    const Positions x{{at, at, 0}, {at + 0.1, at, 0}, {at, at + 0.1, 0}};
+    Positions moved = x;
+    for (Vec3& p : moved) p.z() += 0.02;
+    step.bodies[0].t0 = std::make_shared<const Positions>(x);
+    step.bodies[0].t1 = std::make_shared<const Positions>(moved);
+    step.map.surface = surface;
+    History history;
+    const Outcome outcome = detect(step, Options(), history);
+    EXPECT_FALSE(assuranceOf(outcome).clear()) << at;
+    EXPECT_EQ(outcome.start_state, StartState::INTERSECTING) << at;
+    EXPECT_GT(outcome.counts.initial, 0u) << at;
+  }
+}
+
+TEST(OctomapDecode, InAFreeMapNothingIsUnknown) {
+  const DecodedOctomap map = decode(rootAlone(octomap::OcTree(0.1), -1.0f)[0]);
+  const auto known = KnownSpace::build(map.resolution_m, map.free);
+  Box box;
+  box.min = Vec3(-1, -1, -1);
+  box.max = Vec3(1, 1, 1);
+  EXPECT_TRUE(known->unknownLeaves(box, 1000).empty());
 }
 
 TEST(OctomapDecode, FilesAreReadByTheirHeader) {

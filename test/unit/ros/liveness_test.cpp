@@ -2,9 +2,14 @@
 #include "node/liveness.h"
 
 #include <gtest/gtest.h>
+#include <ros/time.h>
 
 #include <algorithm>
+#include <chrono>
 #include <random>
+#include <thread>
+
+#include "node/state_reporter.h"
 
 namespace dccd {
 namespace {
@@ -97,6 +102,68 @@ TEST(Liveness, AFrameAnsweredWithoutTheMapThatCameBeforeItProvesNothing) {
   EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_MAP});
   liveness.mapSettled(2);
   EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{});
+}
+
+TEST(Liveness, AStaticBodysNewerFrameVoidsWhatWasSaid) {
+  Liveness liveness({0.1, 10, 0});
+  liveness.frame(1, 0);
+  liveness.outcome(1, -1, 10 * MS);
+  EXPECT_EQ(kinds(liveness, 20 * MS), Kinds{});
+  liveness.staticFrame("table", 20 * MS);
+  EXPECT_EQ(kinds(liveness, 20 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "at once";
+  EXPECT_EQ(liveness.faults(20 * MS)[0].sentence, "a newer frame of body 'table' came, which no step has used yet");
+  liveness.frame(2, 30 * MS);
+  liveness.outcome(2, -1, 40 * MS);
+  EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "that step was made without it";
+  liveness.staticInUse(liveness.staticFrames());
+  EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "no step has used it";
+  liveness.staticFrame("table", 45 * MS);
+  liveness.outcome(3, -1, 50 * MS);
+  EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "the second came meanwhile";
+  liveness.staticInUse(liveness.staticFrames());
+  liveness.outcome(4, -1, 60 * MS);
+  EXPECT_EQ(kinds(liveness, 60 * MS), Kinds{});
+}
+
+// A depth camera's surfaces come as often as the cloth's frames; each is in the next answer.
+TEST(Liveness, AStreamOfStaticFramesHasItsTime) {
+  Liveness liveness({0.1, 0.5, 0});
+  liveness.staticFrame("surface", 0);
+  for (int k = 1; k <= 20; ++k) {
+    liveness.staticInUse(liveness.staticFrames());
+    liveness.frame(k, 30 * k * MS);
+    liveness.outcome(k, -1, (30 * k + 5) * MS);
+    EXPECT_EQ(kinds(liveness, (30 * k + 5) * MS), Kinds{});
+    liveness.staticFrame("surface", (30 * k + 10) * MS);
+    EXPECT_EQ(kinds(liveness, (30 * k + 29) * MS), Kinds{}) << k;
+  }
+  EXPECT_EQ(kinds(liveness, 720 * MS), Kinds{Fault::Kind::NEWER_BODY}) << "0.1 s after the last one came";
+}
+
+/// /clock goes by `simulated`, a step of it each 5 ms of true time; how far the watch went [s].
+double watchedOver(int steps, double step_s) {
+  ros::Time::init();
+  ros::Time::setNow(ros::Time(10000));
+  WatchClock watch;
+  const std::int64_t begin_ns = watch.now();
+  for (int k = 1; k <= steps; ++k) {
+    ros::Time::setNow(ros::Time(10000 + k * step_s));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    for (int look = 0; look < 3; ++look) watch.now();  // more often than the clock ticks
+  }
+  const std::int64_t end_ns = watch.now();
+  ros::Time::useSystemTime();
+  return 1e-9 * static_cast<double>(end_ns - begin_ns);
+}
+
+TEST(WatchClockTest, TimeThatRunsBackwardsPasses) {
+  EXPECT_NEAR(watchedOver(20, 1), 20, 1e-6) << "forwards, at the clock's rate";
+  EXPECT_NEAR(watchedOver(20, 0), 0, 1e-6) << "it stands";
+  const double slowly_s = watchedOver(20, -0.001);
+  EXPECT_NEAR(slowly_s, 0.02, 1e-6) << "no more than the clock went back";
+  const double backwards_s = watchedOver(20, -1);
+  EXPECT_GE(backwards_s, 0.1) << "true time has passed";
+  EXPECT_LT(backwards_s, 20) << "a jump back is no long silence";
 }
 
 TEST(Liveness, WhatIsAskedForHoldsUntilItIsDone) {

@@ -21,6 +21,16 @@ TEST(Parameters, UnknownNamesAreRefusedWithTheNearest) {
   EXPECT_TRUE(mentions(errorOf(nested), "~topology/rows")) << errorOf(nested);
 }
 
+TEST(Parameters, WordsForTheMapAndTheBodyItselfAreNoNames) {
+  for (const std::string name : {"octomap", "self"}) {
+    XmlRpcValue tree;
+    tree["bodies"]["cloth"]["topic"] = "/cloth";
+    tree["bodies"][name]["topic"] = "/other";
+    EXPECT_TRUE(mentions(errorOf(tree), "~bodies/" + name + " is no name for a body")) << errorOf(tree);
+    EXPECT_TRUE(mentions(errorOf(tree), "octomap is the map, and self is the body itself; give it another one"));
+  }
+}
+
 TEST(Parameters, WrongTypesAreRefused) {
   XmlRpcValue text;
   text["tolerance_m"] = "1e-6";

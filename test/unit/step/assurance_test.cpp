@@ -134,6 +134,21 @@ TEST(Assurance, WhatIsSaidFromOutsideTakesItAwayToo) {
   EXPECT_EQ(describe(assuranceOf(gap)), "not proved: no answer, GAP: 0.7 s");
 }
 
+TEST(Assurance, ABodyOfWhichEveryVertexIsMaskedIsNotProved) {
+  Asked asked;
+  for (Index v = 0; v < 16; ++v) asked.upper().vertex_mask.push_back(v);
+  const Assurance none = assuranceOf(asked.answer());
+  EXPECT_FALSE(none.proved);
+  EXPECT_FALSE(none.clear());
+  EXPECT_EQ(none.missing,
+            std::vector<std::string>{"vertex_mask names every vertex of body 'upper', so nothing of it was checked"});
+  asked.upper().vertex_mask.back() = 0;  // twice, and one of them is looked at
+  EXPECT_TRUE(assuranceOf(asked.answer()).proved);
+  // A vertex of no face makes no difference: there is nothing to look at.
+  asked.upper().topology = share(Topology::fromTriangles(16, {{0, 1, 2}}));
+  EXPECT_TRUE(mentions(assuranceOf(asked.answer()).missing, "nothing of it was checked"));
+}
+
 TEST(Assurance, WhatIsLeftOutByChoiceIsNamedAndTakesNothingAway) {
   Asked asked;
   asked.upper().vertex_mask = {0, 1};

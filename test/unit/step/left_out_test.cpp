@@ -4,8 +4,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <set>
+#include <string>
+#include <vector>
 
+#include "dccd/assurance.h"
 #include "dccd/stream.h"
 #include "oracle/exact_distance.h"
 #include "support/step_support.h"
@@ -313,6 +317,79 @@ TEST(LeftOut, RadiiMayComeAfterTheFirstFrame) {
   EXPECT_TRUE(felt.feed(0.03, radius_m).contacts.empty()) << "neighbours are no contacts";
   EXPECT_GT(felt.monitor.leftOut().size(), 100u);
   EXPECT_FALSE(felt.feed(0.01, radius_m).contacts.empty());
+}
+
+/// A crumpled sheet of random heights and then each vertex somewhere else, all vertices known to this radius [m].
+/// Whether each of the steps is clear: proved, and nothing touches.
+std::vector<bool> clearWith(double radius_m, unsigned seed, double separation_m) {
+  MonitorOptions options;
+  options.detector = conservative();
+  options.store.max_vertex_step_m = 0;
+  Body sheet;
+  sheet.name = "sheet";
+  sheet.minimum_separation_m = separation_m;
+  Monitor monitor(options, {sheet});
+  const auto topology = share(Topology::grid(4, 5));
+  std::mt19937 random(seed);
+  const auto uniform = [&](double most) { return most * (2 * static_cast<double>(random() >> 8) / (1 << 24) - 1); };
+  const double fold = 0.2 * static_cast<double>(seed % 5), shake = std::pow(10, -1 - static_cast<double>(seed % 4));
+  std::vector<bool> clear;
+  for (int k = 0; k < 4; ++k) {
+    Positions x;
+    for (std::size_t v = 0; v < topology->vertexCount(); ++v) {
+      // A sheet of cells of 1 m, of which one side is folded over the other one, more in every step.
+      const double along = static_cast<double>(v % 5), across = static_cast<double>(v / 5), turned = fold * k;
+      const double out = std::max(0.0, along - 2);
+      x.emplace_back(std::min(along, 2.0) + out * std::cos(turned), across, out * std::sin(turned));
+      x.back() += Vec3(uniform(shake), uniform(shake), uniform(shake));
+    }
+    const StampNs stamp_ns = 10000000 * (k + 1);
+    monitor.push(0,
+                 {stamp_ns, topology, x, false, Eigen::Isometry3d::Identity(),
+                  std::vector<double>(radius_m > 0 ? x.size() : 0, radius_m)},
+                 0);
+    Outcome outcome;
+    EXPECT_TRUE(monitor.next(0, outcome));
+    if (k > 0) clear.push_back(assuranceOf(outcome).clear());
+  }
+  return clear;
+}
+
+TEST(LeftOut, MoreNoiseMakesNothingClearThatLessNoiseDidNot) {
+  std::size_t cleared = 0, not_cleared = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const double separation_m = seed % 2 ? 0.05 : 0;
+    std::vector<bool> before(3, true);
+    double radius_m = 0;
+    for (int i = 0; i < 42; ++i) {
+      const std::vector<bool> clear = clearWith(radius_m, seed, separation_m);
+      for (std::size_t k = 0; k < clear.size(); ++k) {
+        EXPECT_LE(clear[k], before[k]) << "seed " << seed << ", step " << k << ", radius " << radius_m << " m";
+        ++(clear[k] ? cleared : not_cleared);
+      }
+      before = clear;
+      radius_m = i == 0 ? 1e-4 : radius_m * (radius_m < 10 ? 1.4 : 1e6);
+    }
+    EXPECT_GT(radius_m, 1e30);
+    EXPECT_EQ(before, std::vector<bool>(3, false)) << "of a sheet of 4 m that is known to 1e30 m nothing is known";
+  }
+  EXPECT_GT(cleared, 1000u);
+  EXPECT_GT(not_cleared, 1000u);
+}
+
+TEST(LeftOut, WhatOnlyNoiseLeavesOutIsSaid) {
+  MonitoredFelt near(0), far(SEPARATION_M);
+  const auto unproved = [](MonitoredFelt& felt, double radius_m) {
+    felt.feed(0.03, MonitoredFelt::radii(radius_m));
+    return felt.feed(0.03, MonitoredFelt::radii(radius_m)).unproved;
+  };
+  const auto said = unproved(near, 0.006);  // two of them reach over an edge of 10 mm
+  ASSERT_EQ(said.size(), 1u);
+  const std::string count = std::to_string(near.monitor.leftOut().size());
+  EXPECT_EQ(said[0], "body 'felt': " + count +
+                         " pairs of its own features are closer in its reference frame than its uncertainty (radii of "
+                         "up to 0.006 m) reaches, and were only checked for touching");
+  EXPECT_TRUE(unproved(far, 1e-6).empty()) << "what is left out is closer than the separation";
 }
 
 }  // namespace

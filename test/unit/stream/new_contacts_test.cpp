@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dccd/assurance.h"
 #include "dccd/new_contacts.h"
+#include "unit/stream/monitor_support.h"
 #include "unit/stream/patch_stream.h"
 
 namespace dccd {
@@ -102,7 +104,7 @@ TEST(NewContacts, WhatIsNotExpectedIsRememberedWhereExpectedThingsTouchAsWell) {
   EXPECT_EQ(stream.text(), "BEGAN 1");
 }
 
-TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsNone) {
+TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsOneOnce) {
   MonitorOptions options;
   Expectation anywhere;
   anywhere.partners[1].body = OBSTACLE_BODY;
@@ -116,10 +118,246 @@ TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsNone) {
   stream.options().detector.expected.clear();  // the next phase of the task
   stream.monitor().setOptions(stream.options());
   const Outcome outcome = stream.feed({resting});
-  EXPECT_TRUE(newContacts(outcome).empty());
-  EXPECT_EQ(assuranceOf(outcome).touching, Touching::LASTING);
+  EXPECT_EQ(newContacts(outcome).size(), 1u);
+  EXPECT_EQ(earliestNewToc(outcome), 0) << "it touched when the step began";
+  EXPECT_EQ(assuranceOf(outcome).touching, Touching::NEW);
+  EXPECT_EQ(stream.text(), "BEGAN 1, UNEXPECTED 1");
+  const Outcome after = stream.feed({resting});
+  EXPECT_TRUE(newContacts(after).empty());
+  EXPECT_EQ(assuranceOf(after).touching, Touching::LASTING);
   for (int k = 0; k < 12; ++k) stream.feed({above});
   EXPECT_EQ(newContacts(stream.feed({resting})).size(), 1u) << "it comes back";
+}
+
+/// Two triangles that cross as long as the second one's tip is below the first one, and what is expected of them.
+struct PhasesOfCrossing : ::testing::Test {
+  static Positions sheet() { return {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}; }
+  static Positions tipAt(double z) { return {{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}; }
+  static MonitorOptions carrying() {
+    MonitorOptions options = expecting(true);
+    options.patch_gap_s = 0.25;
+    return options;
+  }
+  static MonitorOptions expecting(bool they_meet) {
+    MonitorOptions options;
+    options.store.max_vertex_step_m = 0;
+    if (!they_meet) return options;
+    Expectation meeting;
+    meeting.partners[1].body = 1;
+    options.detector.expected = {meeting};
+    return options;
+  }
+  Stream stream{{oneTriangle(), oneTriangle()}, carrying()};
+
+  void expectMeeting(bool they_meet) {
+    stream.options().detector.expected = expecting(they_meet).detector.expected;
+    stream.monitor().setOptions(stream.options());
+  }
+  /// The step that ends with the tip at this height; whether it is an alarm.
+  bool isAlarm(double z) {
+    const Outcome outcome = stream.feed({sheet(), tipAt(z)});
+    const bool alarm = assuranceOf(outcome).touching == Touching::NEW;
+    EXPECT_EQ(std::isfinite(earliestNewToc(outcome)), alarm) << stream.text();
+    return alarm;
+  }
+  std::size_t unexpected() const {
+    return static_cast<std::size_t>(
+        std::count_if(stream.events().begin(), stream.events().end(),
+                      [](const PatchEvent& event) { return event.kind == PatchEventKind::UNEXPECTED; }));
+  }
+};
+
+TEST_F(PhasesOfCrossing, ACrossingWithoutAContactIsAnAlarmOnceItIsNoLongerExpected) {
+  isAlarm(0.2);
+  EXPECT_FALSE(isAlarm(-0.2));
+  EXPECT_FALSE(isAlarm(-0.2));
+  expectMeeting(false);
+  const Outcome outcome = stream.feed({sheet(), tipAt(-0.2)});
+  ASSERT_EQ(outcome.total_contacts, 0u) << "edges cross a face, and nothing moves";
+  ASSERT_FALSE(outcome.intersections.empty());
+  EXPECT_EQ(assuranceOf(outcome).touching, Touching::NEW);
+  EXPECT_EQ(earliestNewToc(outcome), 0);
+  EXPECT_TRUE(newContacts(outcome).empty()) << "no contact can be told";
+  ASSERT_EQ(unexpected(), 1u) << stream.text();
+  EXPECT_EQ(stream.events().back().from_ns, outcome.start_ns);
+  EXPECT_FALSE(isAlarm(-0.2)) << "one alarm";
+  EXPECT_FALSE(isAlarm(0.2)) << "it leaves";
+  EXPECT_FALSE(isAlarm(-0.2)) << "within the gap it is the same";
+  EXPECT_EQ(unexpected(), 1u);
+}
+
+TEST_F(PhasesOfCrossing, InEachStepThatFollowsTheSwitch) {
+  // What becomes of the tip in the step after the switch, from below the sheet: it stays, moves on, leaves.
+  for (const double z : {-0.2, -0.3, 0.2}) {
+    Stream fresh{{oneTriangle(), oneTriangle()}, carrying()};
+    std::swap(stream, fresh);
+    isAlarm(0.2);
+    EXPECT_FALSE(isAlarm(-0.2)) << z;
+    expectMeeting(false);
+    EXPECT_TRUE(isAlarm(z)) << z;
+    EXPECT_EQ(unexpected(), 1u) << z;
+  }
+}
+
+TEST_F(PhasesOfCrossing, WhatReturnsWithinTheGapAfterTheSwitch) {
+  isAlarm(0.2);
+  isAlarm(-0.2);
+  isAlarm(0.2);
+  expectMeeting(false);
+  EXPECT_FALSE(isAlarm(0.3)) << "nothing touches";
+  EXPECT_TRUE(isAlarm(-0.2));
+  EXPECT_EQ(stream.text(), "BEGAN 1, UNEXPECTED 1");
+}
+
+TEST_F(PhasesOfCrossing, APhaseThatComesAndGoesBetweenTwoStepsIsNone) {
+  isAlarm(0.2);
+  isAlarm(-0.2);
+  expectMeeting(false);
+  expectMeeting(true);
+  EXPECT_FALSE(isAlarm(-0.2));
+  EXPECT_EQ(unexpected(), 0u);
+}
+
+TEST_F(PhasesOfCrossing, EachPhaseThatEndsIsAnAlarm) {
+  isAlarm(0.2);
+  isAlarm(-0.2);
+  for (int k = 0; k < 3; ++k) {
+    expectMeeting(false);
+    EXPECT_TRUE(isAlarm(-0.2 - 0.01 * k)) << k;
+    expectMeeting(true);
+    EXPECT_FALSE(isAlarm(-0.2)) << k;
+  }
+  EXPECT_EQ(unexpected(), 3u);
+}
+
+TEST_F(PhasesOfCrossing, WhatTouchedFirstWithoutAnExpectationIsToldWhenAPhaseOfItEnds) {
+  expectMeeting(false);
+  isAlarm(0.2);
+  EXPECT_TRUE(isAlarm(-0.2));
+  // Within the gap something else touched that no phase has looked at.
+  expectMeeting(true);
+  EXPECT_FALSE(isAlarm(-0.2));
+  expectMeeting(false);
+  EXPECT_TRUE(isAlarm(-0.2));
+}
+
+TEST_F(PhasesOfCrossing, WhatWasInitialIsToldToo) {
+  isAlarm(-0.2);
+  EXPECT_FALSE(isAlarm(-0.2));
+  expectMeeting(false);
+  EXPECT_TRUE(isAlarm(-0.2));
+  EXPECT_FALSE(isAlarm(-0.2));
+  EXPECT_EQ(stream.text(), "BEGAN 1 INITIAL, UNEXPECTED 1");
+}
+
+TEST_F(PhasesOfCrossing, ASeamAtTheSwitchHidesNothing) {
+  for (const bool seam_first : {true, false}) {
+    Stream fresh{{oneTriangle(), oneTriangle()}, carrying()};
+    std::swap(stream, fresh);
+    isAlarm(0.2);
+    isAlarm(-0.2);
+    if (!seam_first) expectMeeting(false);
+    stream.monitor().reset();
+    isAlarm(-0.2);
+    if (seam_first) expectMeeting(false);
+    EXPECT_TRUE(isAlarm(-0.2)) << seam_first << ": " << stream.text();
+    EXPECT_FALSE(isAlarm(-0.2));
+    stream.monitor().reset();
+    isAlarm(-0.2);
+    EXPECT_FALSE(isAlarm(-0.2)) << "a seam alone is no alarm";
+  }
+}
+
+TEST_F(PhasesOfCrossing, AGapAtTheSwitchHidesNothingEither) {
+  isAlarm(0.2);
+  isAlarm(-0.2);
+  stream.wait(1000000000);
+  expectMeeting(false);
+  isAlarm(-0.2);
+  EXPECT_TRUE(isAlarm(-0.2)) << stream.text();
+}
+
+TEST_F(PhasesOfCrossing, WithoutASwitchASeamIsNoAlarm) {
+  isAlarm(0.2);
+  isAlarm(-0.2);
+  stream.monitor().reset();
+  isAlarm(-0.2);
+  EXPECT_FALSE(isAlarm(-0.2));
+}
+
+TEST_F(PhasesOfCrossing, WithoutPatchesEveryStepIsAnAlarm) {
+  isAlarm(0.2);
+  isAlarm(-0.2);
+  stream.options().detector.patches = false;
+  expectMeeting(false);
+  for (int k = 0; k < 2; ++k) {
+    const Outcome outcome = stream.feed({sheet(), tipAt(-0.2)});
+    EXPECT_EQ(earliestNewToc(outcome), 0) << "a crossing, which is no contact";
+  }
+  expectMeeting(true);
+  EXPECT_TRUE(std::isinf(earliestNewToc(stream.feed({sheet(), tipAt(-0.2)}))));
+}
+
+TEST(NewContacts, WhatSplitsOrMergesAtTheSwitchIsTold) {
+  MonitorOptions options;
+  Expectation left;  // of a strip of 21 columns the first ones may lie on the table
+  for (Index v = 0; v < 5 * 21; ++v) {
+    if (v % 21 < 8) left.partners[0].vertices.push_back(v);
+  }
+  left.partners[1].body = OBSTACLE_BODY;
+  options.detector.expected = {left};
+  Stream stream({grid(5, 21)}, options);
+  stream.setMap(table(0.05));
+  const auto down = [&](const std::vector<std::pair<std::size_t, std::size_t>>& columns) {
+    return stream.feed({strip(5, 21, 0.02, [&](std::size_t c) {
+      const auto holds = [&](const auto& range) { return range.first <= c && c <= range.second; };
+      return std::any_of(columns.begin(), columns.end(), holds) ? 0.0 : 0.01;
+    })});
+  };
+  const auto expectNothing = [&] {
+    stream.options().detector.expected.clear();
+    stream.monitor().setOptions(stream.options());
+  };
+  down({});
+  EXPECT_TRUE(newContacts(down({{0, 5}})).empty());
+  EXPECT_EQ(newContacts(down({{0, 5}, {12, 20}})).size(), 1u) << "that side is not expected";
+  expectNothing();
+  EXPECT_EQ(newContacts(down({{0, 20}})).size(), 1u) << "both are one now: " << stream.text();
+  EXPECT_NE(stream.text().find("MERGED 1+2"), std::string::npos) << stream.text();
+  EXPECT_NE(stream.text().find("UNEXPECTED 1"), std::string::npos) << stream.text();
+
+  Stream other({grid(5, 21)}, options);
+  std::swap(stream, other);
+  stream.options().patch_gap_s = 0;
+  stream.options().detector.expected[0].partners[0].vertices.clear();
+  stream.monitor().setOptions(stream.options());
+  stream.setMap(table(0.05));
+  down({});
+  EXPECT_TRUE(newContacts(down({{0, 20}})).empty());
+  for (int k = 0; k < 2; ++k) EXPECT_TRUE(newContacts(down({{0, 5}, {12, 20}})).empty());
+  expectNothing();
+  const Outcome outcome = down({{0, 5}, {12, 20}});
+  EXPECT_NE(stream.text().find("SPLIT"), std::string::npos) << stream.text();
+  EXPECT_EQ(std::count_if(outcome.patches.begin(), outcome.patches.end(), [](const Patch& p) { return p.is_new; }), 2);
+}
+
+TEST(NewContacts, WhatABurstLeavesAtTheSwitchIsTold) {
+  MonitorOptions options;
+  Expectation anywhere;
+  anywhere.partners[1].body = OBSTACLE_BODY;
+  options.detector.expected = {anywhere};
+  options.detector.max_contacts = 1;
+  Stream stream({grid(300, 300)}, options);  // more vertices than are remembered in any case
+  stream.setMap(table(0.05));
+  const auto resting = [&](std::size_t columns) {
+    return stream.feed({strip(300, 300, 0.001, [&](std::size_t c) { return c < columns ? 0.0 : 0.01; })});
+  };
+  resting(0);
+  resting(300);
+  EXPECT_TRUE(newContacts(resting(4)).empty());
+  stream.options().detector.expected.clear();
+  stream.monitor().setOptions(stream.options());
+  EXPECT_EQ(newContacts(resting(4)).size(), 1u) << stream.text();
 }
 
 TEST(NewContacts, OfAPredictionWhatDoesNotLastYet) {

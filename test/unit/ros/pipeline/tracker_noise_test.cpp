@@ -46,6 +46,9 @@ TEST(TrackerNoise, BadFieldsAreRefusedByNameAndValue) {
   EXPECT_EQ(noisy.feed(1.1, 0.2f, {0, -1, 0, 0}).status, StepStatus::BAD_MESSAGE);
   EXPECT_NE(noisy.outcome.reason.find("of point 1 is -1"), std::string::npos) << noisy.outcome.reason;
   EXPECT_EQ(noisy.feed(1.2, 0.2f, {0, 0, NAN, 0}).status, StepStatus::BAD_MESSAGE);
+  EXPECT_EQ(noisy.feed(1.25, 0.2f, {0, 0, 0, 1.001e9f}).status, StepStatus::BAD_MESSAGE) << "as the parameters";
+  EXPECT_NE(noisy.outcome.reason.find("of point 3 is 1.001e+09; "), std::string::npos) << noisy.outcome.reason;
+  EXPECT_NE(noisy.outcome.reason.find("at most 1e+09 m"), std::string::npos) << noisy.outcome.reason;
   EXPECT_EQ(noisy.feed(1.3, 0.2f, {0, 0, 0, 0}).status, StepStatus::FIRST_FRAME) << "and nothing is lost";
 }
 
