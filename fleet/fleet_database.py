@@ -56,7 +56,7 @@ def fill(database, fleet, folder, snakemake_version):
             (name, recording['bag'], result['bag_bytes'], STATES[result['exit']], result['headline'], result['said'],
              tables.get('frames'), tables.get('answered'), tables.get('unanswered_share'), tables.get('duration_s'),
              tables.get('first_new_contact_s'), result['seconds'], result['max_memory_kb'],
-             tables.get('digests', {}).get('contacts.csv')))
+             tables.get('contacts_sha256')))
         for table in ('partners', 'patches', 'events', 'timings', 'slowest'):
             columns = {column[1] for column in database.execute('PRAGMA table_info(%s)' % table)}
             insert(database, table, name, [{k: v for k, v in row.items() if k in columns} for row in tables.get(table, [])])
