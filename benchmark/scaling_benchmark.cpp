@@ -6,8 +6,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "scene/generated_scene.h"
 #include "support/detector.h"
+#include "support/generated_scene.h"
 #include "support/timing.h"
 
 namespace dccd {
@@ -15,20 +15,20 @@ namespace benchmarks {
 namespace {
 
 struct Frames {
-  std::vector<scene::GeneratedBody> bodies;
+  std::vector<test::GeneratedBody> bodies;
   std::vector<Positions> t0, t1;  // one a body
   std::size_t triangles = 0;
 };
 
 Frames generate(const std::string& kind, std::size_t triangles, std::size_t frame) {
-  scene::GeneratedOptions options;
+  test::GeneratedOptions options;
   options.triangles = triangles;
-  const auto sequence = scene::generateSequence(scene::generatedKindFromString(kind), options);
+  const auto sequence = test::generateSequence(test::generatedKindFromString(kind), options);
   Frames frames;
   frames.bodies = sequence->bodies();
   frames.triangles = sequence->triangleCount();
   const auto split = [&](std::vector<Positions>& out) {
-    for (const scene::GeneratedBody& b : frames.bodies) {
+    for (const test::GeneratedBody& b : frames.bodies) {
       const auto first = sequence->positions().begin() + b.vertex_offset;
       out.emplace_back(first, first + static_cast<std::ptrdiff_t>(b.topology.vertexCount()));
     }

@@ -1,12 +1,4 @@
-# Scenes with known contacts (src/scene/*.cpp: no dependency but the core's headers), and the physics that records moving ones
-# (src/scene/physics: Bullet soft bodies in double precision, never part of the node).
-file(GLOB SCENE_SOURCES CONFIGURE_DEPENDS src/scene/*.cpp)
-if(SCENE_SOURCES)
-  add_library(deformable_ccd_scene STATIC ${SCENE_SOURCES})
-  target_include_directories(deformable_ccd_scene PUBLIC src)
-  target_link_libraries(deformable_ccd_scene PUBLIC deformable_ccd_headers)
-endif()
-
+# The physics that records scenes (src/scene/physics: Bullet soft bodies in double precision, never part of the node).
 # The one strict reader of configuration: of scene files here, of the node's parameters in ros.cmake.
 file(GLOB PARAMETERS_SOURCES CONFIGURE_DEPENDS src/parameters/*.cpp)
 file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)

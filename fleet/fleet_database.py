@@ -8,11 +8,11 @@ SCHEMA = '''
 CREATE TABLE recordings (
   name TEXT PRIMARY KEY,
   bag TEXT, bag_bytes INTEGER,
-  state TEXT,                   -- proved, not proved, failed (it cannot be answered), partial (ranges are missing), missing
-  headline TEXT, said TEXT,     -- the report's first sentence; what analyze_bag said of what is not proved
+  state TEXT,                   -- proved, not proved, failed (it cannot be answered), missing
+  headline TEXT, said TEXT,     -- the report's first sentence; what analyze_bag said of what is not proved, or failed
   frames INTEGER, answered INTEGER, unanswered_share REAL,
   duration_s REAL, first_new_contact_s REAL,
-  compute_s REAL, max_memory_kb INTEGER, ranges INTEGER,
+  compute_s REAL, max_memory_kb INTEGER,
   contacts_sha256 TEXT);
 CREATE TABLE partners (recording TEXT, body_0 TEXT, body_1 TEXT, first_s REAL, in_contact_s REAL, contacts INTEGER,
   patches INTEGER);
@@ -23,15 +23,10 @@ CREATE TABLE events (recording TEXT, step INTEGER, event TEXT, patch INTEGER, ot
 CREATE TABLE statuses (recording TEXT, status TEXT, frames INTEGER);
 CREATE TABLE timings (recording TEXT, stage TEXT, median_ms REAL, p95_ms REAL);
 CREATE TABLE slowest (recording TEXT, step INTEGER, time_s REAL, ms REAL);
-CREATE TABLE failures (recording TEXT, range TEXT, what TEXT);
 CREATE TABLE parameters (name TEXT, value TEXT);
 CREATE TABLE versions (component TEXT, version TEXT);
 '''
 STATES = {0: 'proved', 3: 'not proved', 1: 'failed'}
-
-
-def state_of(result):
-    return 'partial' if result['failures'] and result['exit'] != 1 else STATES[result['exit']]
 
 
 def results_of(fleet, folder):
@@ -54,20 +49,18 @@ def fill(database, fleet, folder, snakemake_version):
         name = recording['name']
         if not result:
             database.execute('INSERT INTO recordings (name, bag, state) VALUES (?, ?, ?)', (name, recording['bag'], 'missing'))
-            insert(database, 'failures', name, [{'range': 'all', 'what': 'is missing'}])
             continue
         tables = result.get('tables', {})
         database.execute(
-            'INSERT INTO recordings VALUES (%s)' % ', '.join('?' * 15),
-            (name, recording['bag'], result['bag_bytes'], state_of(result), result['headline'], result['said'],
+            'INSERT INTO recordings VALUES (%s)' % ', '.join('?' * 14),
+            (name, recording['bag'], result['bag_bytes'], STATES[result['exit']], result['headline'], result['said'],
              tables.get('frames'), tables.get('answered'), tables.get('unanswered_share'), tables.get('duration_s'),
-             tables.get('first_new_contact_s'), result['seconds'], result['max_memory_kb'], result['ranges'],
-             tables.get('digests', {}).get('contacts.csv')))
+             tables.get('first_new_contact_s'), result['seconds'], result['max_memory_kb'],
+             tables.get('contacts_sha256')))
         for table in ('partners', 'patches', 'events', 'timings', 'slowest'):
             columns = {column[1] for column in database.execute('PRAGMA table_info(%s)' % table)}
             insert(database, table, name, [{k: v for k, v in row.items() if k in columns} for row in tables.get(table, [])])
         insert(database, 'statuses', name, [{'status': s, 'frames': n} for s, n in tables.get('statuses', {}).items()])
-        insert(database, 'failures', name, result['failures'])
     database.executemany('INSERT INTO parameters VALUES (?, ?)',
                          [('params', fleet['params'] or ''), ('text', fleet['params_text']), ('options', ' '.join(fleet['options']))])
     database.executemany('INSERT INTO versions VALUES (?, ?)', [('deformable_ccd', fleet['version']),
@@ -76,7 +69,7 @@ def fill(database, fleet, folder, snakemake_version):
 
 PAGE = pathlib.Path(__file__).resolve().parent / 'page.html'
 COLUMNS = (('recording', ''), ('state', ''), ('first new contact', 's'), ('in contact, by pair', 's'), ('unanswered', '%'),
-           ('slowest step', 'ms'), ('duration', 's'), ('computed in', 's'), ('failures', ''))
+           ('slowest step', 'ms'), ('duration', 's'), ('computed in', 's'), ('said', ''))
 
 
 def cell(text, key=None):
@@ -91,7 +84,6 @@ def page_row(database, one):
         text = '<a href="%s">%s</a>' % (html.escape(link, quote=True), text)
     pairs = database.execute('SELECT * FROM partners WHERE recording = ? ORDER BY in_contact_s DESC', (name,)).fetchall()
     slow = database.execute('SELECT * FROM slowest WHERE recording = ? ORDER BY ms DESC', (name,)).fetchone()
-    failures = database.execute('SELECT * FROM failures WHERE recording = ?', (name,)).fetchall()
 
     def value(x, form):
         return cell('–', 'inf') if x is None else cell(form % x, repr(x))
@@ -102,7 +94,7 @@ def page_row(database, one):
         value(None if one['unanswered_share'] is None else 100 * one['unanswered_share'], '%.2f'),
         cell('–', 0) if slow is None else cell('%.2f at %.3f s' % (slow['ms'], slow['time_s']), slow['ms']),
         value(one['duration_s'], '%.1f'), value(one['compute_s'], '%.1f'),
-        cell('<br>'.join(html.escape('%s: %s' % (f['range'], f['what'])) for f in failures), len(failures))]))
+        cell('<br>'.join(map(html.escape, (one['said'] or '').split('\n'))))]))
 
 
 def page(database, title, lead, head, body):

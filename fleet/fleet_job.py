@@ -1,4 +1,4 @@
-"""One job of a fleet: a range of a recording, a recording, or the database and page of all. Snakemake calls it.
+"""One job of a fleet: a recording, or the database and page of all. Snakemake calls it.
 
 A job that ends without an error has written its result, also where that is a failure: a bag that cannot be read stays so. A job
 that was killed, or found no room to write, leaves no result and ends with 1, and so is computed again by the next run.
@@ -29,14 +29,14 @@ def write(path, data):
     unfinished.replace(path)
 
 
-def analyze(fleet, recording, folder, extra):
+def analyze(fleet, recording, folder):
     """Runs analyze_bag with its report in the folder, which is there afterwards only where it was answered. What it said and
     cost."""
     unfinished = folder.with_name(folder.name + '.part')
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.parent.mkdir(parents=True, exist_ok=True)
-    command = [fleet['tool'], recording['bag'], '--report', str(unfinished), '--quiet', '--threads', str(fleet['threads']),
-               *fleet['options'], *extra]
+    command = [fleet['tool'], recording['bag'], '--report', str(unfinished), '--quiet', '--no-accuracy-table',
+               '--threads', str(fleet['threads']), *fleet['options']]
     start = time.time()
     ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
     said = ran.stderr.decode(errors='replace').strip()
@@ -57,46 +57,11 @@ def analyze(fleet, recording, folder, extra):
             'max_memory_kb': resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss}
 
 
-def compute_range(fleet, name, range_name):
-    recording = next(r for r in fleet['recordings'] if r['name'] == name)
-    span = next(s for s in recording['ranges'] if s['name'] == range_name)
-    extra = ['--from', repr(span['from_s'])]
-    if span['to_s'] is not None:
-        extra += ['--to', repr(span['to_s'])]
-    folder = pathlib.Path('recordings', name, 'ranges', range_name)
-    write_to = folder / 'record.json'
-    record = analyze(fleet, recording, folder / 'data', ['--no-accuracy-table', *extra])
-    write(write_to, {**record, **span})
-
-
 def compute_recording(fleet, name):
     recording = next(r for r in fleet['recordings'] if r['name'] == name)
     folder = pathlib.Path('recordings', name)
-    failures, records, extra = [], [], ['--no-accuracy-table']
-    for span in recording['ranges']:
-        there = folder / 'ranges' / span['name'] / 'record.json'
-        what = 'from %s s to %s' % (span['from_s'], 'the end' if span['to_s'] is None else '%s s' % span['to_s'])
-        if not there.exists():
-            failures.append({'range': what, 'what': 'is missing'})
-            continue
-        record = json.loads(there.read_text())
-        records.append(record)
-        if record['exit'] in ANSWERED:
-            extra += ['--merge', str(there.parent / 'data')] if '--merge' not in extra else [str(there.parent / 'data')]
-        else:
-            failures.append({'range': what, 'what': record['said']})
-    if recording['ranges'] and '--merge' not in extra:  # nothing to merge
-        result = {**records[0], 'seconds': 0}
-    else:
-        result = analyze(fleet, recording, folder / 'report', extra)
-    if result['exit'] == ERROR and not failures:
-        failures.append({'range': 'all', 'what': result['said']})
-    for left in (folder / 'ranges').glob('*'):  # of another cut
-        if left.name not in {span['name'] for span in recording['ranges']}:
-            shutil.rmtree(left, ignore_errors=True)
-    result['seconds'] = round(result['seconds'] + sum(r['seconds'] for r in records), 3)
-    result['max_memory_kb'] = max([result['max_memory_kb'], *(r['max_memory_kb'] for r in records)])
-    result.update({'name': name, 'bag': recording['bag'], 'ranges': len(recording['ranges']), 'failures': failures})
+    result = analyze(fleet, recording, folder / 'report')
+    result.update({'name': name, 'bag': recording['bag']})
     if result['exit'] in ANSWERED:
         result['tables'] = fleet_tables.of_report(folder / 'report')
     write(folder / 'result.json', result)
@@ -106,9 +71,7 @@ def main():
     verb, config, *names = sys.argv[1:]
     fleet = json.loads(pathlib.Path(config).read_text())
     try:
-        if verb == 'range':
-            compute_range(fleet, *names)
-        elif verb == 'recording':
+        if verb == 'recording':
             compute_recording(fleet, *names)
         else:
             fleet_database.write(fleet, pathlib.Path('.'), *names)

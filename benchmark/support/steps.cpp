@@ -70,9 +70,9 @@ void forRealStep(const SceneRequest& request, const std::function<void(const Sce
 
 void forGeneratedSteps(const SceneRequest& request, const std::function<void(const SceneBodies&, const Step&)>& set_up,
                        const std::function<void(const Step&)>& visit) {
-  const auto sequence = scene::generateSequence(scene::generatedKindFromString(request.name), request.options);
+  const auto sequence = test::generateSequence(test::generatedKindFromString(request.name), request.options);
   SceneBodies bodies;
-  for (const scene::GeneratedBody& b : sequence->bodies()) {
+  for (const test::GeneratedBody& b : sequence->bodies()) {
     addBody(bodies, b.topology, b.vertex_offset, request.self && b.deforms);
   }
   finish(bodies);

@@ -8,7 +8,7 @@
 
 #include "dccd/elementary.h"
 #include "paper/triangle_candidates.h"
-#include "scene/generated_scene.h"
+#include "support/generated_scene.h"
 
 namespace dccd {
 namespace benchmarks {
@@ -34,7 +34,7 @@ struct SceneRequest {
   bool self = true;             ///< pairs within a body, too; where false, the parts of a real scene are bodies
   std::size_t steps = 16;       ///< of a generated sequence, spread over it evenly; 0 means all
   std::size_t first_frame = 0;  ///< of a generated sequence
-  scene::GeneratedOptions options;
+  test::GeneratedOptions options;
 };
 
 /// Calls setUp once with the bodies and a step that guides them, then visit for each step.

@@ -40,28 +40,13 @@ class DCCD_EXPORT LookAheadScore {
   void predict(const Outcome& prediction);
   LookAheadSummary summary() const;
 
+ private:
   /// Body, what it touches (body or OBSTACLE_BODY), vertex.
   using Key = std::uint64_t;
   struct Prediction {
-    Key key = 0;
     StampNs made_ns = 0;
     double after_ns = 0;
   };
-  /// What a part of a stream came to, and what it leaves to the part that comes next.
-  struct Part {
-    std::vector<double> errors_s;
-    std::size_t not_observed = 0, not_predicted = 0;
-    std::vector<Key> touching;
-    std::vector<Prediction> pending;
-  };
-  /// A part begins: what was counted is forgotten, what is predicted is not.
-  void beginPart();
-  Part part() const;
-  /// Of what comes next in the stream, from where nothing that was predicted here is waited for any more.
-  void add(const Part& next);
-  double horizon_s() const { return horizon_s_; }
-
- private:
   using Times = std::map<Key, double>;
 
   /// The earliest certain contact of each vertex [0,1]; `touching`: all that is in contact, initial or not certain too.

@@ -49,8 +49,6 @@ struct DCCD_EXPORT FrameCounters {
   FrameCounters& operator+=(const FrameCounters& other);
 };
 
-class RangeLog;
-
 /// Told of every step that is computed, on the thread that calls next().
 class DCCD_EXPORT StepListener {
  public:
@@ -124,11 +122,6 @@ class DCCD_EXPORT Monitor {
 
   const FrameCounters& counters(std::size_t body) const;
   FrameCounters total() const;
-
-  /// Before the first frame: of all steps only those of the log's range, and the one before them, are computed. What
-  /// comes before is answered OK without a contact, which is no answer; patches get no identities (dccd/range_log.h).
-  /// The log must outlive the monitor.
-  void computeOnly(RangeLog& log);
 
   /// Null: none. Must outlive the monitor or be taken away. Steps of checkNow() and predict() are not told.
   void setListener(StepListener* listener);

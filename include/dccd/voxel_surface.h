@@ -36,9 +36,6 @@ class DCCD_EXPORT VoxelSurface {
   double resolution() const;  ///< [m]
   std::size_t leafCount() const;
   // These three are counted at each call.
-  std::size_t faceCount() const;  ///< exposed faces, each leaf's own
-  std::size_t edgeCount() const;  ///< convex edges, each leaf's own
-  std::size_t cornerCount() const;
   std::size_t memoryBytes() const;
   const Box& bounds() const;  ///< [m], map frame; empty when nothing is occupied
   /// Leaves in the order of the surface's index: fixed by the set of leaves, not sorted by key.

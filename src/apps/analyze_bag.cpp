@@ -2,18 +2,14 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
-#include <future>
 #include <iomanip>
 #include <iostream>
-#include <limits>
 #include <memory>
 #include <sstream>
 
-#include "apps/analyze_bag/range_result.h"
 #include "apps/analyze_bag/result_bag.h"
 #include "apps/analyze_bag/study_runner.h"
 #include "dccd/accuracy.h"
-#include "dccd/range_log.h"
 #include "dccd/simd_target.h"
 #include "node/bag_replay.h"
 #include "report/report.h"
@@ -31,11 +27,9 @@ constexpr int ERROR = 1, NOT_PROVED = 3;
 
 struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh, command;
-  std::vector<std::string> ranges;
   double look_ahead_s = 0;
-  double from_s = 0, to_s = std::numeric_limits<double>::infinity();
   int threads = 0;
-  bool without_map = false, no_rungs = false, study = false, is_range = false, quiet = false, forget = false;
+  bool without_map = false, no_rungs = false, study = false, quiet = false, forget = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -122,9 +116,8 @@ std::string commandLine(int argc, char** argv) {
 }
 
 /// What the page's head says of the run.
-void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary,
-              const std::vector<EffectDecision>& effects, std::size_t ranges, Report& report) {
-  report.setEffects(effects);
+void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary, Report& report) {
+  report.setEffects(summary.effects.decisions());
   report.setLeftOut(summary.left_out, config.monitorBodies());
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
   report.setCounters(summary.frames);
@@ -144,7 +137,6 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
       {"accuracy", toString(config.monitor.detector.accuracy.rung)},
       {"threads", std::to_string(config.monitor.detector.num_threads)},
       {"SIMD target", simdTarget()}};
-  if (ranges > 0) facts.push_back({"joined from", std::to_string(ranges) + " ranges"});
   for (const std::string& c : summary.complaints) facts.push_back({"complaint", c});
   report.setFacts(std::move(facts));
 }
@@ -156,29 +148,12 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
             << lookAheadLine(summary) << of_study << "octomap: " << summary.map_source << '\n'
-            << (a.is_range ? "range: " + a.report : "report: " + a.report + "/report.html") << '\n';
+            << "report: " << a.report << "/report.html\n";
   for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: " << c << '\n';
   const std::string unproved = report.unproved();
   if (unproved.empty()) return 0;
   std::cerr << "analyze_bag: " << (answered ? "not proved: " : "no frame was answered: ") << unproved << '\n';
   return NOT_PROVED;
-}
-
-/// What a join needs of this run, which computed a part of the bag.
-RangeResult rangeOf(const Arguments& a, const MonitorConfig& config, const RangeLog& log,
-                    const BagReplaySummary& summary, const Report& report) {
-  RangeResult range;
-  range.folder = a.report;
-  range.bag_name = std::filesystem::path(a.bag).filename();
-  range.bag_bytes = std::filesystem::file_size(a.bag);
-  range.parameters = config.hash();
-  range.frames = log.range();
-  range.from_s = a.from_s;
-  range.to_s = a.to_s;
-  range.summary = summary;
-  range.effects = summary.effects.decisions();
-  range.report = report.state();
-  return range;
 }
 
 int analyze(const Arguments& a) {
@@ -188,20 +163,12 @@ int analyze(const Arguments& a) {
   options.octomap_file = a.octomap;
   options.show_progress = !a.quiet;
   std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
-  std::optional<RangeLog> log;
-  if (a.is_range) {
-    const StepRange frames = BagReplay(a.bag, config, options).rangeOf(a.from_s, a.to_s);
-    std::filesystem::create_directories(a.report);
-    log.emplace(a.report + "/" + RANGE_LOG, frames, config.monitor.look_ahead_s);
-    options.log = &*log;
-  }
   BagReplay replay(a.bag, config, options);
   Report report(a.report);
   report.setAccuracy(config.monitor.detector.accuracy);
   bool answered = false;
-  BagReplaySummary summary = replay.run(
+  const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
-        report.setOrigin(so_far.origin_ns);
         report.add(outcome, pipeline.monitor().bodies());
         answered = answered || outcome.answered;
         if (out) out->add(outcome, pipeline, so_far, at);
@@ -212,14 +179,7 @@ int analyze(const Arguments& a) {
       [&](const Outcome& prediction, MonitorPipeline& pipeline, const BagReplaySummary&, const ros::Time& at) {
         if (out) out->addPrediction(prediction, pipeline, at);
       });
-  if (log) {
-    report.close();
-    log->close();
-    summary.look_ahead.reset();  // the join's
-    writeRange(rangeOf(a, config, *log, summary, report));
-    return conclude(a, summary, report, answered);
-  }
-  describe(a, config, summary, summary.effects.decisions(), 0, report);
+  describe(a, config, summary, report);
   report.finish();
   if (!a.no_rungs) {  // takes long, and what there is should not be lost with it
     out.reset();
@@ -238,50 +198,13 @@ int analyze(const Arguments& a) {
   return conclude(a, summary, report, answered, study_line);
 }
 
-/// The ranges of a bag as one run would have answered it.
-int merge(const Arguments& a) {
-  const MonitorConfig config = configure(a);
-  setSimdTarget(config.simd_target);
-  const std::vector<RangeResult> ranges = readRanges(a.ranges, a.bag, config.hash());
-  Report report(a.report);
-  RangeJoin join(config.monitor.patch_gap_s, config.monitor.look_ahead_s);
-  const std::vector<Body> bodies = config.monitorBodies();
-  report.setOrigin(ranges.back().summary.origin_ns);
-  std::uint64_t next = 1;
-  double reached_s = 0;
-  const auto missing = [&](const std::string& to) {
-    report.addMissing("the range from " + seconds(reached_s) + " to " + to + " is missing");
-  };
-  // Most of a join is to copy tables, and nothing else needs what is in them.
-  std::future<void> tables = std::async(std::launch::async, [&] {
-    for (const RangeResult& range : ranges) report.appendTables(range.folder);
-  });
-  for (const RangeResult& range : ranges) {
-    if (range.frames.first > next) {
-      missing(seconds(range.from_s));
-      join.gap();
-    }
-    report.append(range.report);
-    join.add(range.folder + "/" + RANGE_LOG, [&](const Outcome& outcome) { report.addPatches(outcome, bodies); });
-    if (!range.isEmpty()) next = range.frames.last + 1;
-    reached_s = range.to_s;
-  }
-  if (!ranges.back().reachesEnd()) missing("the end");
-  BagReplaySummary summary = joined(ranges);
-  summary.look_ahead = join.lookAhead();
-  describe(a, config, summary, ranges.back().effects, ranges.size(), report);
-  tables.get();
-  report.finish();
-  return conclude(a, summary, report, report.anyAnswered());
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"Contacts of a recorded run, with a report"};
   Arguments a;
   app.add_option("BAG", a.bag, "bag to analyse")->required()->check(CLI::ExistingFile);
-  auto* output = app.add_option("-o,--output", a.out, "write a bag with the input and the results");
+  app.add_option("-o,--output", a.out, "write a bag with the input and the results");
   app.add_option("--report", a.report, "folder for the report")->required();
   app.add_option("--params", a.params, "YAML file with the node's parameters")->check(CLI::ExistingFile);
   app.add_option("--mesh", a.mesh, "mesh topic; without parameters the first one of the bag is taken");
@@ -295,20 +218,10 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_flag("--forget", a.forget, "each step without what the ones before have shown; no answer changes");
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
-  auto* study = app.add_flag(
-      "--accuracy-study", a.study,
-      "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
-      "does to first contacts; what was stopped goes on");
+  app.add_flag("--accuracy-study", a.study,
+               "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
+               "does to first contacts; what was stopped goes on");
   app.add_flag("--quiet", a.quiet, "no progress");
-  auto* from = app.add_option("--from", a.from_s, "a range: from this long after the bag's first message [s]")
-                   ->check(CLI::NonNegativeNumber);
-  auto* to = app.add_option("--to", a.to_s, "a range: until this long after it, itself not included [s]")
-                 ->check(CLI::PositiveNumber);
-  auto* merged = app.add_option("--merge", a.ranges, "folders that --from and --to left: their ranges as one run")
-                     ->check(CLI::ExistingDirectory)
-                     ->excludes(from)
-                     ->excludes(to);
-  for (auto* of_ranges : {from, to, merged}) of_ranges->excludes(output)->excludes(study);
   app.footer(
       "Exit status:\n"
       "  0  every step is proved: what does not touch is known not to\n"
@@ -317,9 +230,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     a.command = commandLine(argc, argv);
-    a.is_range = from->count() + to->count() > 0;
-    if (!(a.from_s < a.to_s)) throw std::runtime_error("--from " + seconds(a.from_s) + " is not before --to");
-    return a.ranges.empty() ? analyze(a) : merge(a);
+    return analyze(a);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : ERROR;
   } catch (const std::exception& e) {

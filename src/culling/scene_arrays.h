@@ -145,12 +145,6 @@ class SceneArrays {
   /// After a refit() that left pieces out: nothing is kept of it.
   void forgetBounds() { bounds_valid_ = false; }
 
-  /// In the place of refit(), for a step that is not computed: the next one keeps what it would have kept after it.
-  void putOffRefit() {
-    for (SceneBody& body : bodies_) body.stale = body.stale || !body.kept;
-    bounds_valid_ = true;
-  }
-
   const std::vector<SceneBody>& bodies() const { return bodies_; }
   const VertexMotion* vertices() const { return vertices_.get(); }
   /// The RECORD values of an internal vertex, after refit().

@@ -118,8 +118,6 @@ class QuadraticRoots {
     if (degree_ == 2) discriminant_ = g_.c[1] * g_.c[1] - ((g_.c[0] * g_.c[2]) << 2);
   }
 
-  const Quadratic<Z>& polynomial() const { return g_; }
-
   /// Distinct real roots.
   int count() const { return degree_ == 1 ? 1 : discriminant_.sign() + 1; }
 

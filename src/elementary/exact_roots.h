@@ -182,7 +182,6 @@ class PolynomialRoots {
   int degree_;
   int count_ = 0;
   RootLabel labels_[3] = {};
-  int octaves_[3] = {};  ///< 0: not known yet
   std::int64_t cells_[3] = {};
 };
 

@@ -2,10 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
-
-#include "simd/exact_batch.h"
 
 namespace dccd {
 namespace exact {
@@ -50,28 +46,6 @@ ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int 
   return coincident ? contactInCell(0, toc_bits, Tier::COINCIDENCE) : undecided(Tier::COINCIDENCE);
 }
 
-ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bits) {
-  VertexMotion vertices[4] = {};
-  for (int i = 0; i < 4; ++i) {
-    std::copy(pair.x[0][i], pair.x[0][i] + 3, vertices[i].t0);
-    std::copy(pair.x[1][i], pair.x[1][i] + 3, vertices[i].t1);
-  }
-  const std::uint32_t quads[1][4] = {{0, 1, 2, 3}};
-  simd::BatchInput input;
-  input.vertices = vertices[0].t0;
-  input.quads = quads;
-  input.count = 1;
-  input.kind = kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
-  input.toc_bits = toc_bits;
-  std::uint8_t verdict;
-  std::uint64_t cell;
-  double lo, hi;
-  simd::exactBatch(input, {&verdict, &cell, &lo, &hi});
-  if (verdict == simd::BATCH_NO) return noContact(Tier::DOUBLE_BATCH);
-  if (verdict != simd::BATCH_YES) return undecided(Tier::DOUBLE_BATCH);
-  return contactInCell(static_cast<std::int64_t>(cell), toc_bits, Tier::DOUBLE_BATCH);
-}
-
 ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
   ElementaryResult result = decideByCoincidence(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideAtSimpleTime(kind, pair, toc_bits);
@@ -79,29 +53,6 @@ ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_
   if (result.verdict == Verdict::UNDECIDED) result = decideByDoubleDouble(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideByFixedIntegers(kind, pair, toc_bits);
   return result.verdict == Verdict::UNDECIDED ? decideByBigIntegers(kind, pair, toc_bits) : result;
-}
-
-ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair, int toc_bits) {
-  if (kind != PairKind::VERTEX_FACE && kind != PairKind::EDGE_EDGE) {
-    throw std::invalid_argument(std::string("exact test: kind ") + toString(kind) + " is not vertex-face or edge-edge");
-  }
-  switch (tier) {
-    case Tier::COINCIDENCE:
-      return decideByCoincidence(kind, pair, toc_bits);
-    case Tier::DOUBLE_BATCH:
-      return decideByBatch(kind, pair, toc_bits);
-    case Tier::BERNSTEIN:
-      return decideBySubdivision(kind, pair);
-    case Tier::DOUBLE_DOUBLE:
-      return decideByDoubleDouble(kind, pair, toc_bits);
-    case Tier::FIXED_INTEGER:
-      return decideByFixedIntegers(kind, pair, toc_bits);
-    case Tier::BIG_INTEGER:
-      return decideByBigIntegers(kind, pair, toc_bits);
-    case Tier::COUNT:
-      break;
-  }
-  throw std::invalid_argument(std::string("exact test: there is no tier ") + toString(tier));
 }
 
 }  // namespace exact

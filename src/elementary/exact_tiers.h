@@ -23,8 +23,6 @@ ElementaryResult undecided(Tier tier);
 
 /// COINCIDENCE: a vertex of one feature where one of the other is, at t = 0.
 ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int toc_bits);
-/// DOUBLE_BATCH: the batched kernel on one pair; a contact whose cell it cannot tell is undecided.
-ElementaryResult decideByBatch(PairKind kind, const PairMotion& pair, int toc_bits);
 /// BERNSTEIN: only ever says NO_CONTACT.
 ElementaryResult decideBySubdivision(PairKind kind, const PairMotion& pair);
 /// DOUBLE_DOUBLE: roots bracketed within 2^-52; undecided where f is zero, or nearly, at an end of the step or an
@@ -43,10 +41,6 @@ ElementaryResult decideByBigIntegers(PairKind kind, const PairMotion& pair, int 
 
 /// What DOUBLE_BATCH left, by the tiers after it; always decides.
 ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits);
-
-/// One tier alone, for tests and for measuring what each is worth. Throws std::invalid_argument for a tier that does
-/// not exist or a kind that is not VERTEX_FACE or EDGE_EDGE.
-ElementaryResult decideWithTier(Tier tier, PairKind kind, const PairMotion& pair, int toc_bits);
 
 }  // namespace exact
 }  // namespace dccd

@@ -113,8 +113,6 @@ struct BagReplay::Run {
   std::map<std::string, std::size_t> frames_of_topic;
   BagReplaySummary summary;
   std::set<std::string> complained;
-  RangeLog* log = nullptr;
-  bool any = false, past_range = false;
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
       : sink(to),
@@ -123,7 +121,6 @@ struct BagReplay::Run {
         bag(r.path_),
         pipeline(r.config_, feed) {
     pipeline.setTopologyFilter(variation.topology);
-    if (r.options_.log) pipeline.monitor().computeOnly(*(log = r.options_.log));
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
     for (std::size_t b = 0; b < r.config_.bodies.size(); ++b) {
@@ -140,10 +137,10 @@ struct BagReplay::Run {
   /// The prediction that follows from an answered outcome, whose statistics get its cost.
   std::optional<Outcome> predict(Outcome& outcome) {
     if (!look_ahead) return std::nullopt;
-    log ? log->observe(outcome) : look_ahead->observe(outcome);
+    look_ahead->observe(outcome);
     if (!outcome.answered) return std::nullopt;
     std::optional<Outcome> prediction = pipeline.monitor().predict();
-    log ? log->predict(*prediction) : look_ahead->predict(*prediction);
+    look_ahead->predict(*prediction);
     outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(*prediction);
     return prediction;
   }
@@ -165,15 +162,7 @@ struct BagReplay::Run {
 
   void drain(const ros::Time& at) {
     Outcome outcome;
-    while (!past_range && pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
-      if (!any) summary.origin_ns = outcome.start_ns > 0 ? outcome.start_ns : outcome.stamp_ns;
-      any = true;
-      past_range = log && outcome.sequence >= log->range().last;
-      if (log && !log->range().holds(outcome.sequence)) {
-        summary.passed.count(outcome.status);
-        continue;
-      }
-      summary.told.count(outcome.status);
+    while (pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       const std::optional<Outcome> prediction = predict(outcome);
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
@@ -273,23 +262,6 @@ std::string BagReplay::firstMeshTopic(const std::string& bag) {
   return "";
 }
 
-StepRange BagReplay::rangeOf(double from_s, double to_s) const {
-  rosbag::Bag bag(path_);
-  rosbag::View all(bag);
-  const BodyConfig& clock = config_.bodies[config_.monitor.clock_body];
-  // Each message of the clock body makes one outcome.
-  const auto framesBefore = [&](double s) -> std::uint64_t {
-    if (!(s > 0)) return 0;
-    const ros::Time end = all.getBeginTime() + ros::Duration(s) - ros::Duration(0, 1);
-    return rosbag::View(bag, rosbag::TopicQuery(absolute(clock.topic)), all.getBeginTime(), end).size();
-  };
-  StepRange range;
-  if (all.size() == 0) return range;
-  range.first = framesBefore(from_s) + 1;
-  if (to_s <= (all.getEndTime() - all.getBeginTime()).toSec()) range.last = framesBefore(to_s);
-  return range;
-}
-
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
   Run run(*this, sink, predictions);
   const std::string& map_topic = config_.octomap_topic;
@@ -335,7 +307,6 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
       run.setMap(readMap(m, config_, memory), static_cast<std::int64_t>(at.toNSec()));
     }
     progress.advance();
-    if (run.past_range) break;
   }
   run.pipeline.finish();
   run.drain(at);

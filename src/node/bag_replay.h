@@ -11,7 +11,6 @@
 #include <rosbag/bag.h>
 
 #include "dccd/look_ahead_score.h"
-#include "dccd/range_log.h"
 #include "node/map_loader.h"
 #include "node/monitor_pipeline.h"
 
@@ -28,7 +27,6 @@ struct BagReplayOptions {
   std::string octomap_file;  ///< instead of the bag's maps; empty: none
   bool show_progress = false;
   Variation variation;
-  RangeLog* log = nullptr;  ///< only outcomes of its range are told, and nothing is read past it
 };
 
 /// What a replay met besides outcomes.
@@ -39,8 +37,6 @@ struct BagReplaySummary {
   std::string map_source;               ///< its topic or file, and who named it, in words
   std::vector<std::string> complaints;  ///< refused messages, each kind once; maps that are missing or not listened to
   FrameCounters frames;
-  FrameCounters told, passed;                  ///< of outcomes by status: those that were told, those before the range
-  StampNs origin_ns = 0;                       ///< where the first outcome of the bag begins, told or not
   EffectPlan effects;                          ///< at the end
   std::vector<LeftOutPair> left_out;           ///< at the end
   std::optional<LookAheadSummary> look_ahead;  ///< where look_ahead_s is above 0
@@ -65,10 +61,6 @@ class BagReplay {
   /// The first topic of the bag that carries meshes and is no monitor's own, for configurations that name none. Empty:
   /// none.
   static std::string firstMeshTopic(const std::string& bag);
-
-  /// Frames of the clock body that were recorded from `from_s` to before `to_s`, seconds after the bag's first message,
-  /// by Outcome::sequence.
-  StepRange rangeOf(double from_s, double to_s) const;
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that

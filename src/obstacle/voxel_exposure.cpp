@@ -175,8 +175,6 @@ void markFeatureCells(VoxelTree& tree, int level, std::uint32_t index, const std
 
 }  // namespace
 
-FeatureMask featuresOfFaces(unsigned exposed_faces) { return FEATURES_OF_FACES[exposed_faces & 63]; }
-
 std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
   std::vector<FeatureMask> masks(tree.leaves().size(), 0);
   for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node) smallLeaves(tree, node, masks);

@@ -21,10 +21,6 @@ constexpr int edgeBit(int axis, int side_b, int side_c) { return 6 + 4 * axis + 
 /// Corner at the lower (0) or upper (1) side of x, y and z.
 constexpr int cornerBit(int side_x, int side_y, int side_z) { return 18 + side_x + 2 * side_y + 4 * side_z; }
 
-/// The features that six exposed (bit set) or covered faces of a cube make: an edge counts when both its faces are
-/// exposed, a corner when all three are.
-FeatureMask featuresOfFaces(unsigned exposed_faces);
-
 /// One mask for each leaf, in the tree's order. Where the neighbours are smaller than the leaf, a face that is exposed
 /// anywhere counts whole, and so does an edge or a corner that counts somewhere: a superset, never less.
 /// Also tells the tree which cells hold edges and corners.

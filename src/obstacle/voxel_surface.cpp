@@ -39,12 +39,6 @@ VoxelSurface::Impl::Impl(double resolution, const std::vector<OccupiedLeaf>& lea
   }
 }
 
-std::size_t VoxelSurface::Impl::countFeatures(FeatureMask kind) const {
-  std::size_t count = 0;
-  for (const FeatureMask mask : features) count += bitCount(mask & kind);
-  return count;
-}
-
 KeyBox VoxelSurface::Impl::keysOf(const double* lo, const double* hi) const {
   KeyBox box;
   for (int axis = 0; axis < 3; ++axis) {
@@ -63,9 +57,6 @@ VoxelSurface::~VoxelSurface() = default;
 
 double VoxelSurface::resolution() const { return impl_->resolution_m; }
 std::size_t VoxelSurface::leafCount() const { return impl_->features.size(); }
-std::size_t VoxelSurface::faceCount() const { return impl_->countFeatures(FACE_MASK); }
-std::size_t VoxelSurface::edgeCount() const { return impl_->countFeatures(EDGE_MASK); }
-std::size_t VoxelSurface::cornerCount() const { return impl_->countFeatures(CORNER_MASK); }
 std::size_t VoxelSurface::memoryBytes() const {
   return sizeof(Impl) + impl_->tree.memoryBytes() + impl_->features.capacity() * sizeof(FeatureMask);
 }

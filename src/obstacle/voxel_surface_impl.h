@@ -16,8 +16,6 @@ struct VoxelSurface::Impl {
   /// Keys of all voxels that a closed range of coordinates [m] may touch, closed voxels: at least these.
   KeyBox keysOf(const double* lo, const double* hi) const;
 
-  std::size_t countFeatures(FeatureMask kind) const;
-
   double resolution_m;
   double inverse_resolution;
   VoxelTree tree;

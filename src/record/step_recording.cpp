@@ -23,8 +23,8 @@ constexpr std::size_t MAX_BODIES = 65534;
 enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1 };
 
 // The least bytes that one item of a list takes.
-constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 50, INTERSECTION_BYTES = 24,
-                      EXPECTATION_BYTES = 32;
+constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 51, INTERSECTION_BYTES = 25,
+                      EXPECTATION_BYTES = 32, PATCH_BYTES = 200, TEXT_BYTES = 4;
 
 template <typename Archive, typename Pose>
 void visitPose(Archive& a, Pose& pose) {
@@ -64,9 +64,7 @@ template <typename Archive, typename Rung>
 void visitRung(Archive& a, Rung& rung) {
   a.choice(rung, allRungs().back());
   if constexpr (Archive::READS) {
-    if (rung < allRungs().front()) {
-      a.fail("it was made with accuracy screen, which decided nothing and is no rung any more");
-    }
+    if (rung < allRungs().front()) a.fail("rung " + std::to_string(static_cast<int>(rung)) + " does not exist");
   }
 }
 
@@ -93,16 +91,18 @@ void visitOption(Archive& a, Value& value) {
   }
 }
 
-template <std::uint32_t VERSION, typename Archive, std::uint32_t SINCE, typename Value>
-void visitOptionOf(Archive& a, OptionRow<SINCE, Value>& row) {
-  if constexpr (SINCE == VERSION) visitOption(a, row.value);
+template <typename Archive, bool RECORDED, typename Value>
+void visitOptionOf(Archive& a, OptionRow<RECORDED, Value>& row) {
+  if constexpr (RECORDED) visitOption(a, row.value);
 }
 
-/// Those that this version of the file added.
-template <std::uint32_t VERSION, typename Archive, typename Options>
+template <typename Archive, typename Options>
 void visitOptions(Archive& a, Options& options) {
   auto rows = optionRows(options);
-  std::apply([&](auto&... row) { (visitOptionOf<VERSION>(a, row), ...); }, rows);
+  std::apply([&](auto&... row) { (visitOptionOf(a, row), ...); }, rows);
+  if constexpr (Archive::READS) {
+    if (options.max_substeps > MAX_SUBSTEPS) a.fail("max_substeps is " + std::to_string(options.max_substeps));
+  }
 }
 
 template <typename Archive, typename Body>
@@ -120,6 +120,8 @@ void visitBody(Archive& a, Body& body) {
   a.flag(body.turns);
   visitPose(a, body.pose_t0);
   visitPose(a, body.pose_t1);
+  a.flag(body.shell);
+  a.number(body.dropped_faces);
 }
 
 void visitTopology(RecordingWriter& a, const Body& body) {
@@ -172,6 +174,29 @@ void visitContact(Archive& a, Contact& c) {
   a.choice(c.certainty, Certainty::UNDECIDED);
   a.flag(c.initial);
   a.flag(c.leaving);
+  a.flag(c.expected);
+}
+
+template <typename Archive, typename Vector>
+void visitVector(Archive& a, Vector& v) {
+  for (int i = 0; i < 3; ++i) a.number(v[i]);
+}
+
+/// Which patches last is a matter of the stream, not of a step.
+template <typename Archive, typename Answer>
+void visitPatches(Archive& a, Answer& answer) {
+  a.count(answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
+  for (auto& patch : answer.patches) {
+    for (auto& body : patch.body) a.number(body);
+    for (auto* count : {&patch.contacts, &patch.certain, &patch.initial, &patch.crossings, &patch.expected})
+      a.size(*count);
+    a.number(patch.toc_lower);
+    a.number(patch.toc_upper);
+    visitContact(a, patch.earliest);
+    a.number(patch.area_m2);
+    for (auto* vector : {&patch.centroid, &patch.normal, &patch.box.min, &patch.box.max}) visitVector(a, *vector);
+  }
+  a.array(answer.patch_of);
 }
 
 template <typename Archive, typename Answer>
@@ -180,22 +205,29 @@ void visitAnswer(Archive& a, Answer& answer) {
   a.text(answer.reason);
   a.flag(answer.answered);
   a.flag(answer.complete);
-  bool clear = false;  // until version 2; since then what it follows from is there
-  a.flag(clear);
+  a.flag(answer.cut);
   a.choice(answer.start_state, StartState::NOT_CHECKED);
+  a.choice(answer.touching, Touching::EXPECTED);
   a.size(answer.total_contacts);
   a.size(answer.suppressed);
   a.number(answer.excluded_voxels);
   a.size(answer.substeps);
   a.number(answer.unchecked_toc_lower);
   a.number(answer.earliest_toc);
+  a.number(answer.earliest_unexpected_toc);
   a.count(answer.contacts, CONTACT_BYTES, std::numeric_limits<std::size_t>::max());
   for (auto& contact : answer.contacts) visitContact(a, contact);
   a.count(answer.intersections, INTERSECTION_BYTES, std::numeric_limits<std::size_t>::max());
   for (auto& crossing : answer.intersections) {
     for (auto& body : crossing.body) a.number(body);
     for (auto& vertex : crossing.vertex) a.number(vertex);
+    a.flag(crossing.expected);
   }
+  for (auto* sentences : {&answer.unproved, &answer.excluded, &answer.expected}) {
+    a.count(*sentences, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
+    for (auto& sentence : *sentences) a.text(sentence);
+  }
+  visitPatches(a, answer);
 }
 
 template <typename Archive, typename Body>
@@ -236,70 +268,6 @@ void visitReference(RecordingReader& a, Body& body) {
   body.reference = share(std::move(reference));
 }
 
-/// What version 2 added.
-template <typename Archive, typename Recording>
-void visitDistances(Archive& a, Recording& r) {
-  for (auto& body : r.step.bodies) {
-    visitSeparations(a, body);
-    visitReference(a, body);
-  }
-}
-
-constexpr std::size_t TEXT_BYTES = 4;
-
-/// What version 3 added: what an assurance follows from, and where the work was cut.
-template <typename Archive, typename Recording>
-void visitVerdict(Archive& a, Recording& r) {
-  visitOptions<3>(a, r.options);
-  a.flag(r.answer.cut);
-  a.text(r.step.off_path);
-  for (auto& body : r.step.bodies) {
-    a.flag(body.shell);
-    a.number(body.dropped_faces);
-  }
-  a.choice(r.answer.touching, Touching::EXPECTED);
-  for (auto* sentences : {&r.answer.unproved, &r.answer.excluded}) {
-    a.count(*sentences, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
-    for (auto& sentence : *sentences) a.text(sentence);
-  }
-}
-
-/// What version 4 added: which contacts are expected.
-template <typename Archive, typename Recording>
-void visitExpected(Archive& a, Recording& r) {
-  visitOptions<4>(a, r.options);
-  for (auto& contact : r.answer.contacts) a.flag(contact.expected);
-  for (auto& crossing : r.answer.intersections) a.flag(crossing.expected);
-  a.number(r.answer.earliest_unexpected_toc);
-  a.count(r.answer.expected, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
-  for (auto& sentence : r.answer.expected) a.text(sentence);
-}
-
-constexpr std::size_t PATCH_BYTES = 200;
-
-template <typename Archive, typename Vector>
-void visitVector(Archive& a, Vector& v) {
-  for (int i = 0; i < 3; ++i) a.number(v[i]);
-}
-
-/// What version 5 added: patches. Which of them last is a matter of the stream, not of a step.
-template <typename Archive, typename Recording>
-void visitPatches(Archive& a, Recording& r) {
-  visitOptions<5>(a, r.options);
-  a.count(r.answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
-  for (auto& patch : r.answer.patches) {
-    for (auto& body : patch.body) a.number(body);
-    for (auto* count : {&patch.contacts, &patch.certain, &patch.initial, &patch.crossings, &patch.expected})
-      a.size(*count);
-    a.number(patch.toc_lower);
-    a.number(patch.toc_upper);
-    visitContact(a, patch.earliest);
-    a.number(patch.area_m2);
-    for (auto* vector : {&patch.centroid, &patch.normal, &patch.box.min, &patch.box.max}) visitVector(a, *vector);
-  }
-  a.array(r.answer.patch_of);
-}
-
 /// The file's fields in their order, for both directions.
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
@@ -307,24 +275,20 @@ void visit(Archive& a, Recording& r) {
   a.number(r.step.sequence);
   a.number(r.step.start_ns);
   a.number(r.step.stamp_ns);
+  a.text(r.step.off_path);
   if constexpr (Archive::READS) {
     if (r.step.start_ns < 0 || r.step.stamp_ns <= r.step.start_ns) {
       a.fail("the step lasts from " + std::to_string(r.step.start_ns) + " ns to " + std::to_string(r.step.stamp_ns) +
              " ns");
     }
   }
-  visitOptions<1>(a, r.options);
-  std::size_t reserved = 0;  // was the clock body, when a replay took frames
-  a.size(reserved);
-  if constexpr (Archive::READS) {
-    if (r.options.max_substeps > MAX_SUBSTEPS) {
-      a.fail("max_substeps is " + std::to_string(r.options.max_substeps));
-    }
-  }
+  visitOptions(a, r.options);
   a.count(r.step.bodies, BODY_BYTES, MAX_BODIES);
   for (auto& body : r.step.bodies) {
     visitBody(a, body);
     visitTopology(a, body);
+    visitSeparations(a, body);
+    visitReference(a, body);
   }
   visitMap(a, r.step.map);
   a.number(r.step.map.stamp_ns);
@@ -343,11 +307,6 @@ void RecordingImage::build(const StepRecording& recording) {
   for (const char c : MAGIC) writer.number(c);
   writer.number(RECORDING_VERSION);
   visit(writer, recording);
-  visitDistances(writer, recording);
-  visitVerdict(writer, recording);
-  visitExpected(writer, recording);
-  visitPatches(writer, recording);
-  visitOptions<6>(writer, recording.options);  // effects that are off
 }
 
 StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {
@@ -358,18 +317,13 @@ StepRecording readRecording(const void* data, std::size_t size, const std::strin
   if (std::memcmp(magic, MAGIC, sizeof magic) != 0) reader.fail("not a recording of a step");
   std::uint32_t version = 0;
   reader.number(version);
-  if (version < 1 || version > RECORDING_VERSION) {
-    reader.fail("version " + std::to_string(version) + " of the format; this program reads versions 1 to " +
-                std::to_string(RECORDING_VERSION));
+  if (version != RECORDING_VERSION) {
+    reader.fail("version " + std::to_string(version) + " of the format, and this program reads version " +
+                std::to_string(RECORDING_VERSION) +
+                " alone; record the step again, or replay it by the program that recorded it");
   }
   StepRecording recording;
   visit(reader, recording);
-  if (version >= 2) visitDistances(reader, recording);
-  if (version >= 3) visitVerdict(reader, recording);
-  if (version >= 4) visitExpected(reader, recording);
-  if (version >= 5) visitPatches(reader, recording);
-  if (version >= 6) visitOptions<6>(reader, recording.options);
-  recording.version = version;
   if (reader.left() > 0) reader.fail(std::to_string(reader.left()) + " bytes are left over");
   return recording;
 }

@@ -16,10 +16,8 @@
 
 namespace dccd {
 
-/// 1, without distances beyond the bodies' own, 2, without what an assurance follows from, 3, without expected
-/// contacts, 4, without patches, and 5, without effects that are off, can be read, too; of 1 not the first files,
-/// without Options::unfolded_test.
-constexpr std::uint32_t RECORDING_VERSION = 6;
+/// Counts up with every change of the fields or their order. A file of another version is refused.
+constexpr std::uint32_t RECORDING_VERSION = 7;
 
 /// A recording that cannot be read; the text names the input, the byte and the value.
 struct DCCD_EXPORT RecordingError : std::runtime_error {
@@ -27,8 +25,7 @@ struct DCCD_EXPORT RecordingError : std::runtime_error {
 };
 
 struct StepRecording {
-  std::uint32_t version = RECORDING_VERSION;  ///< of the file that it was read from
-  std::string note;                           ///< why it was written, by what
+  std::string note;  ///< why it was written, by what
   Step step;
   Options options;
   bool has_answer = false;  ///< false: the program ended in the step

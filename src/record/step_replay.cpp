@@ -17,13 +17,9 @@ bool samePair(const Contact& a, const Contact& b) {
          a.voxel_size == b.voxel_size;
 }
 
-/// Until version 2 contacts between meshes were never called initial.
-bool knowsInitial(const Contact& c, std::uint32_t version) { return version >= 3 || c.body[1] == OBSTACLE_BODY; }
-
-bool sameContact(const Contact& a, const Contact& b, std::uint32_t version) {
+bool sameContact(const Contact& a, const Contact& b) {
   return samePair(a, b) && sameBits(a.toc_lower, b.toc_lower) && sameBits(a.toc_upper, b.toc_upper) &&
-         a.certainty == b.certainty && (a.initial == b.initial || !knowsInitial(a, version)) &&
-         a.leaving == b.leaving && (a.expected == b.expected || version < 4);
+         a.certainty == b.certainty && a.initial == b.initial && a.leaving == b.leaving && a.expected == b.expected;
 }
 
 std::string pairText(const Contact& c) {
@@ -38,7 +34,7 @@ std::string pairText(const Contact& c) {
   return text.str();
 }
 
-bool samePatch(const Patch& a, const Patch& b, std::uint32_t version) {
+bool samePatch(const Patch& a, const Patch& b) {
   const auto places = [](const Patch& p) {
     return std::array<double, 13>{p.area_m2,    p.centroid[0], p.centroid[1], p.centroid[2], p.normal[0],
                                   p.normal[1],  p.normal[2],   p.box.min[0],  p.box.min[1],  p.box.min[2],
@@ -48,11 +44,8 @@ bool samePatch(const Patch& a, const Patch& b, std::uint32_t version) {
     return std::tie(p.body, p.contacts, p.certain, p.initial, p.crossings, p.expected);
   };
   const std::array<double, 13> x = places(a), y = places(b);
-  // A file does not say of a patch's earliest contact whether it is expected; the contacts and the counts do.
-  Contact earliest = a.earliest;
-  earliest.expected = b.earliest.expected;
   return counts(a) == counts(b) && sameBits(a.toc_lower, b.toc_lower) && sameBits(a.toc_upper, b.toc_upper) &&
-         sameContact(earliest, b.earliest, version) && std::equal(x.begin(), x.end(), y.begin(), sameBits);
+         sameContact(a.earliest, b.earliest) && std::equal(x.begin(), x.end(), y.begin(), sameBits);
 }
 
 class Differences {
@@ -80,32 +73,32 @@ class Differences {
   std::vector<std::string> found_;
 };
 
-void compareContacts(const Outcome& recorded, const Outcome& replayed, std::uint32_t version, Differences& out) {
+void compareContacts(const Outcome& recorded, const Outcome& replayed, Differences& out) {
   out.field("number of contacts", recorded.contacts.size(), replayed.contacts.size());
   const std::size_t n = std::min(recorded.contacts.size(), replayed.contacts.size());
   for (std::size_t i = 0; i < n; ++i) {
-    if (sameContact(recorded.contacts[i], replayed.contacts[i], version)) continue;
+    if (sameContact(recorded.contacts[i], replayed.contacts[i])) continue;
     out.add("contact " + std::to_string(i) + ": recorded " + pairText(recorded.contacts[i]) + "; replayed " +
             pairText(replayed.contacts[i]));
   }
 }
 
 /// The recorded step ended early: what it called certain must be among the replayed contacts.
-void compareCertain(const Outcome& recorded, const Outcome& replayed, std::uint32_t version, Differences& out) {
+void compareCertain(const Outcome& recorded, const Outcome& replayed, Differences& out) {
   for (const Contact& c : recorded.contacts) {
     if (c.certainty != Certainty::CERTAIN) continue;
     const bool found = std::any_of(replayed.contacts.begin(), replayed.contacts.end(),
-                                   [&](const Contact& other) { return sameContact(c, other, version); });
+                                   [&](const Contact& other) { return sameContact(c, other); });
     if (!found) out.add("recorded as certain, not replayed: " + pairText(c));
   }
 }
 
 }  // namespace
 
-std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed, std::uint32_t version) {
+std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed) {
   Differences out;
   if (!recorded.answered || !recorded.complete) {
-    if (recorded.answered) compareCertain(recorded, replayed, version, out);
+    if (recorded.answered) compareCertain(recorded, replayed, out);
     return out.take();
   }
   out.field("status", std::string(toString(recorded.status)), std::string(toString(replayed.status)));
@@ -115,24 +108,17 @@ std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& 
   out.field("excluded voxels", recorded.excluded_voxels, replayed.excluded_voxels);
   out.field("parts of the step", recorded.substeps, replayed.substeps);
   out.field("earliest toc", recorded.earliest_toc, replayed.earliest_toc);
-  compareContacts(recorded, replayed, version, out);
-  if (version >= 3) {
-    out.field("touching", std::string(toString(recorded.touching)), std::string(toString(replayed.touching)));
-    if (recorded.unproved != replayed.unproved) out.add("what was not shown differs");
-  }
-  if (version >= 4) {
-    out.field("earliest unexpected toc", recorded.earliest_unexpected_toc, replayed.earliest_unexpected_toc);
-  }
-  if (version >= 5) {
-    const auto same_patch = [&](const Patch& a, const Patch& b) { return samePatch(a, b, version); };
-    const bool same = std::equal(recorded.patches.begin(), recorded.patches.end(), replayed.patches.begin(),
-                                 replayed.patches.end(), same_patch);
-    if (!same || recorded.patch_of != replayed.patch_of) out.add("the patches differ");
-  }
+  compareContacts(recorded, replayed, out);
+  out.field("touching", std::string(toString(recorded.touching)), std::string(toString(replayed.touching)));
+  if (recorded.unproved != replayed.unproved) out.add("what was not shown differs");
+  out.field("earliest unexpected toc", recorded.earliest_unexpected_toc, replayed.earliest_unexpected_toc);
+  const bool same_patches = std::equal(recorded.patches.begin(), recorded.patches.end(), replayed.patches.begin(),
+                                       replayed.patches.end(), samePatch);
+  if (!same_patches || recorded.patch_of != replayed.patch_of) out.add("the patches differ");
   const bool same =
       std::equal(recorded.intersections.begin(), recorded.intersections.end(), replayed.intersections.begin(),
-                 replayed.intersections.end(), [&](const StartIntersection& a, const StartIntersection& b) {
-                   return a.body == b.body && a.vertex == b.vertex && (a.expected == b.expected || version < 4);
+                 replayed.intersections.end(), [](const StartIntersection& a, const StartIntersection& b) {
+                   return a.body == b.body && a.vertex == b.vertex && a.expected == b.expected;
                  });
   if (!same) out.add("the intersections at t=0 differ");
   return out.take();
@@ -153,7 +139,7 @@ StepReplay replayStep(const StepRecording& recording, int threads) {
     result.answer.status = StepStatus::INTERNAL_ERROR;
     result.answer.reason = error.what();
   }
-  if (recording.has_answer) result.differences = compareAnswers(recording.answer, result.answer, recording.version);
+  if (recording.has_answer) result.differences = compareAnswers(recording.answer, result.answer);
   return result;
 }
 

@@ -22,8 +22,7 @@ struct StepReplay {
 DCCD_EXPORT StepReplay replayStep(const StepRecording& recording, int threads = 1);
 
 /// Bits that differ between two answers, one sentence each, ten at most.
-DCCD_EXPORT std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed,
-                                                    std::uint32_t version = RECORDING_VERSION);
+DCCD_EXPORT std::vector<std::string> compareAnswers(const Outcome& recorded, const Outcome& replayed);
 
 /// "VF cloth 3 | table 0 1 2", with the voxel where there is one.
 DCCD_EXPORT std::string describeContact(const Contact& contact, const std::vector<Body>& bodies);

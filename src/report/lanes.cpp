@@ -97,30 +97,6 @@ void ContactLanes::add(const Outcome& o, const std::vector<Body>& bodies, StampN
   addFirst(o, bodies, origin_ns);
 }
 
-nlohmann::json ContactLanes::state() const {
-  nlohmann::json lanes = nlohmann::json::array();
-  for (const auto& [partners, lane] : lanes_) {
-    nlohmann::json bars = nlohmann::json::array();
-    for (const auto& [id, bar] : lane.bars) {
-      if (id == 0 && !lane.of_patches) bars.push_back({bar.from_s, bar.to_s, bar.expected});
-    }
-    lanes.push_back({{"partners", partners}, {"names", lane.names}, {"first", lane.first}, {"bars", std::move(bars)}});
-  }
-  return lanes;
-}
-
-void ContactLanes::append(const nlohmann::json& state) {
-  for (const nlohmann::json& from : state) {
-    Lane& of = lanes_[from.at("partners").get<Partners>()];
-    from.at("names").get_to(of.names);
-    if (of.first.is_null()) of.first = from.at("first");
-    for (const nlohmann::json& bar : from.at("bars")) {
-      const Bar more{bar.at(0).get<double>(), bar.at(1).get<double>(), bar.at(2).get<bool>()};
-      extend(of, 0, more, more.from_s);
-    }
-  }
-}
-
 nlohmann::json ContactLanes::json() const {
   nlohmann::json lanes = nlohmann::json::array();
   for (const auto& [partners, lane] : lanes_) {

@@ -23,9 +23,6 @@ class ContactLanes {
   /// A list: names, bars [id, from, to, expected], events [kind, time, id, expected], first new contact or null, left
   /// out. Times in seconds from the origin.
   nlohmann::json json() const;
-  /// Of a range of a recording: what add() does not learn from its patches alone. append() takes it in, range by range.
-  nlohmann::json state() const;
-  void append(const nlohmann::json& state);
   /// Whether the outcome holds a pair's first new contact.
   bool addedFirst() const { return added_first_; }
 

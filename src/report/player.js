@@ -6,7 +6,7 @@ const player = (() => {
     return null;
   }
   const D = JSON.parse(get('player_data').textContent);
-  if (!D.frames.length) { note.textContent = 'There is nothing to play: no step was answered, or the report was joined from ranges, which keep no frames.'; return null; }
+  if (!D.frames.length) { note.textContent = 'There is nothing to play: no step was answered.'; return null; }
   // Positions of all frames, whole quanta, decoded once.
   const frames = (() => {
     const binary = atob(D.bytes), out = [];

@@ -31,8 +31,6 @@ class PlayerData {
   void add(const Outcome& outcome, const std::vector<Body>& bodies, StampNs origin_ns, bool keep);
   /// JSON of all of it; at most about the budget, except for what may never be left out.
   std::string json();
-  std::size_t framesSeen() const { return seen_; }
-  std::size_t framesKept() const { return frames_.size(); }
 
   /// Coordinates in whole quanta, x y z a vertex.
   using Quanta = std::vector<std::int32_t>;

@@ -122,7 +122,6 @@ void Report::addHeat(const Outcome& outcome, const std::vector<Body>& bodies) {
     const auto& topology = outcome.step->bodies[b].topology;
     if (!topology || (!heat.mesh.is_null() && heat.contacts.size() == topology->vertexCount())) continue;
     // A body whose topology changed begins anew: its vertices are other ones.
-    heat.begun_anew = !heat.mesh.is_null();
     heat.mesh = {{"name", bodies[b].name}, {"flat", flatLayout(*outcome.step->bodies[b].t0)}};
     heat.mesh["faces"] = topology->faces();
     if (!topology->hasFaces()) heat.mesh["edges"] = topology->edges();
@@ -164,7 +163,8 @@ void Report::addTimes(const Outcome& o) {
 }
 
 void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
-  if (!any_) setOrigin(o.start_ns > 0 ? o.start_ns : o.stamp_ns);
+  if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
+  any_ = true;
   writeStep(o);
   addRow(o);
   addProof(o);
@@ -179,16 +179,6 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   addHeat(o, bodies);
   addFirstContact(o, bodies);
   addTimes(o);
-}
-
-void Report::addPatches(const Outcome& o, const std::vector<Body>& bodies) {
-  writePatches(o, bodies);
-  lanes_.add(o, bodies, origin_ns_);
-}
-
-void Report::setOrigin(StampNs origin_ns) {
-  origin_ns_ = origin_ns;
-  any_ = true;
 }
 
 void Report::addProof(const Outcome& o) {
@@ -221,13 +211,6 @@ void Report::setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector
   }
   file.close();
   if (!file) throw std::runtime_error(folder_ + "/left_out.csv: cannot be written");
-}
-
-void Report::close() {
-  for (std::ofstream* file : {&contacts_, &steps_, &patches_, &events_, &timing_}) {
-    if (file->is_open()) file->close();
-    if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
-  }
 }
 
 }  // namespace dccd

@@ -30,18 +30,6 @@ class Report {
   explicit Report(const std::string& folder);
 
   void add(const Outcome& outcome, const std::vector<Body>& bodies);
-  /// Times are counted from here, and not from the first outcome that is added.
-  void setOrigin(StampNs origin_ns);
-  /// Of a range of a recording: all that append() needs beside the tables.
-  nlohmann::json state() const;
-  /// state() of the range that comes next. Its patches and events are added by addPatches(), an outcome each.
-  void append(const nlohmann::json& state);
-  /// The tables that a Report of the range that comes next left in the folder: contacts, steps and times. May run while
-  /// another thread calls append() and addPatches(). Throws std::runtime_error naming the file.
-  void appendTables(const std::string& folder);
-  void addPatches(const Outcome& outcome, const std::vector<Body>& bodies);
-  /// What has no answer because its range is missing, in words.
-  void addMissing(const std::string& what) { missing_.push_back(what); }
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
   /// Before the first outcome: what they are answered with.
   void setAccuracy(const AccuracyOptions& accuracy) { player_.setAccuracy(accuracy); }
@@ -58,9 +46,6 @@ class Report {
   /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
   /// naming the file.
   void finish();
-  /// Of a range, instead of the page: closes the tables. Throws std::runtime_error naming the folder.
-  void close();
-  bool anyAnswered() const { return answered_ > 0; }
   /// One sentence: the first contact, or that there was none, or that there was no answer; and what is not proved of
   /// it.
   std::string headline() const;
@@ -73,12 +58,10 @@ class Report {
     nlohmann::json mesh;                  // name, layout of the first answered step, faces or edges
     std::vector<std::uint32_t> contacts;  // per vertex
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
-    bool begun_anew = false;              // with another topology
   };
   void addProof(const Outcome& outcome);
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
   void addRow(const Outcome& outcome);
-  void addRows(const std::string& rows);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
   void addTimes(const Outcome& outcome);
   void writeStep(const Outcome& outcome);
@@ -119,7 +102,6 @@ class Report {
   std::vector<RungCost> rungs_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
-  std::vector<std::string> missing_;
   FrameCounters counters_;
 };
 

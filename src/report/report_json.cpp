@@ -39,12 +39,8 @@ void Report::addRow(const Outcome& o) {
                               {"toc", o.answered ? finiteOrNull(o.earliest_toc) : nlohmann::json()},
                               {"toc_new", finiteOrNull(earliest_new)},
                               {"ms", o.stats.total_ms}};
-  addRows(toText(row, -1));
-}
-
-void Report::addRows(const std::string& rows) {
-  if (!rows_.empty() && !rows.empty()) rows_ += ",\n";
-  rows_ += rows;
+  if (!rows_.empty()) rows_ += ",\n";
+  rows_ += toText(row, -1);
 }
 
 std::string Report::unproved() const {
@@ -55,7 +51,6 @@ std::string Report::unproved() const {
     reasons += (reasons.empty() ? "" : ", ") + found.first + " (" + std::to_string(found.second) + ")";
   }
   if (frames > 0) reasons = std::to_string(frames) + " of " + std::to_string(frames_) + " frames: " + reasons;
-  for (const std::string& what : missing_) reasons += (reasons.empty() ? "" : "; ") + what;
   if (!reasons.empty()) return reasons;
   return answered_ > 0 ? "" : frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
 }
@@ -191,9 +186,8 @@ void Report::finish() {
   std::ofstream json_file(folder_ + "/report.json"), page(folder_ + "/report.html");
   json_file << dumped(data, 1) << '\n';
   page << reportPage(dumped(data, -1), player_.json());
-  close();
-  for (std::ofstream* file : {&json_file, &page}) {
-    file->close();
+  for (std::ofstream* file : {&json_file, &page, &contacts_, &steps_, &patches_, &events_, &timing_}) {
+    if (file->is_open()) file->close();
     if (!*file) throw std::runtime_error(folder_ + ": the report could not be written completely");
   }
 }

@@ -155,25 +155,6 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   return outcome;
 }
 
-void History::Impl::passOver(const Step& step, const Options& wanted) {
-  const ScopedFloatMode mode;  // what is made here, is made once for the steps that follow
-  carried.clear();
-  setOptions(wanted);
-  setBodies(step);
-  useMap(step.map);
-  StepStats stats;
-  const std::size_t parts = std::min(neededParts(step, stats), options->max_substeps);
-  Step part = step;
-  if (parts > 1) {
-    for (Body& body : part.bodies) body.t1 = body.t0;
-  }
-  for (std::size_t i = 0; i < parts; ++i) {
-    if (parts > 1) advance(step, i + 1, parts, part);
-    scene.record(part, stats);
-    scene.putOffRefit();
-  }
-}
-
 void History::Impl::findPatches(Outcome& outcome) {
   const Clock::time_point start = Clock::now();
   patches.run([&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, outcome);

@@ -66,9 +66,6 @@ struct Carried {
 
 struct History::Impl {
   Outcome run(const Step& step, const Options& wanted, Deadline deadline);
-  /// What the step leaves to all later ones, without its answer: the arrays that are made once, the order of features
-  /// in them, the range of the records. Nothing is carried over from it. Throws what run() throws.
-  void passOver(const Step& step, const Options& wanted);
 
   /// What throws may leave half of it made: what follows from options and map is made anew, and from bodies, where
   /// these were not done. Nothing is carried over.

@@ -99,31 +99,8 @@ void LookAheadScore::predict(const Outcome& prediction) {
   for (const auto& [key, toc] : first) {
     if (touching_.count(key)) continue;
     pending_[key].push_back(
-        {key, prediction.start_ns, toc * static_cast<double>(prediction.stamp_ns - prediction.start_ns)});
+        {prediction.start_ns, toc * static_cast<double>(prediction.stamp_ns - prediction.start_ns)});
   }
-}
-
-void LookAheadScore::beginPart() {
-  errors_s_.clear();
-  next_sample_ = not_observed_ = not_predicted_ = 0;
-}
-
-LookAheadScore::Part LookAheadScore::part() const {
-  Part part{errors_s_, not_observed_, not_predicted_, {touching_.begin(), touching_.end()}, {}};
-  for (const auto& [key, predictions] : pending_) {
-    part.pending.insert(part.pending.end(), predictions.begin(), predictions.end());
-  }
-  return part;
-}
-
-void LookAheadScore::add(const Part& next) {
-  for (const double error_s : next.errors_s) addSample(error_s);
-  not_observed_ += next.not_observed;
-  not_predicted_ += next.not_predicted;
-  any_ = true;
-  touching_ = {next.touching.begin(), next.touching.end()};
-  pending_.clear();
-  for (const Prediction& p : next.pending) pending_[p.key].push_back(p);
 }
 
 LookAheadSummary LookAheadScore::summary() const {

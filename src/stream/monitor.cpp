@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "dccd/range_log.h"
 #include "step/history.h"
 #include "stream/monitor_impl.h"
 #include "stream/seam_reason.h"
@@ -94,11 +93,6 @@ void Monitor::countReceived(std::size_t body, std::uint64_t count, std::uint64_t
 
 void Monitor::countDropped(std::size_t body, StepStatus status, std::uint64_t count) {
   impl_->counters.at(body).by_status.at(static_cast<std::size_t>(status)) += count;
-}
-
-void Monitor::computeOnly(RangeLog& log) {
-  impl_->log = &log;
-  impl_->tracker.leaveTo(log);
 }
 
 void Monitor::setListener(StepListener* listener) { impl_->listener = listener; }
@@ -233,8 +227,6 @@ void Monitor::Impl::forgetLast() {
 
 Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline) {
   const Step step = place(pending);
-  const bool passes = log && pending.sequence < log->range().first;
-  if (held && !passes) computeHeld();
   // A step continues the last one if it begins at that one's end and no body has begun a new run in between (ready()
   // has set the runs): only then are interpolated positions at the stamp in common the same bits.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
@@ -242,42 +234,12 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
     if (last_runs[b] != runs[b]) tracker.seam(b);
   }
   last = nullptr;  // until this one is done
-  if (passes) return passOver(step);
   if (listener) listener->onStep(step, options.detector);
   Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;
   follow(outcome);
   return outcome;
-}
-
-/// The step is held back until it is known whether the next one is computed, which begins with what this one leaves.
-Outcome Monitor::Impl::passOver(const Step& step) {
-  try {
-    if (held) history.impl().passOver(*held, options.detector);
-  } catch (const std::exception&) {
-    history.impl().forgetMade();  // as after a step that failed: the range that computes it says so
-  }
-  Outcome outcome;
-  outcome.status = StepStatus::OK;
-  outcome.answered = true;
-  outcome.start_ns = step.start_ns;
-  outcome.stamp_ns = step.stamp_ns;
-  outcome.sequence = step.sequence;
-  outcome.step = last = held = std::make_shared<const Step>(step);
-  last_runs = runs;
-  return outcome;
-}
-
-/// In a whole run this step would carry over what is known of the one before it. That changes no answer, and what the
-/// step leaves to the next one is the same without it.
-void Monitor::Impl::computeHeld() {
-  const std::shared_ptr<const Step> step = std::exchange(held, nullptr);
-  try {
-    tracker.knowMap(detect(*step, options.detector, history, Deadline().orWhen(cancelled)));
-  } catch (const std::exception&) {
-    forgetLast();
-  }
 }
 
 /// Which of its patches are those of the step before.

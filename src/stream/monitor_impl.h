@@ -51,8 +51,6 @@ struct Monitor::Impl {
   bool finishing = false;
   std::atomic<bool> cancelled{false};
   StepListener* listener = nullptr;
-  RangeLog* log = nullptr;           // of the steps outside of its range there is no answer
-  std::shared_ptr<const Step> held;  // the last one before the range: it is computed when the next one is in it
   std::uint64_t sequence = 0;
 
   Impl(const MonitorOptions& o, std::vector<Body> b) : options(o), bodies(std::move(b)) {
@@ -94,8 +92,6 @@ struct Monitor::Impl {
   ObstacleMap usableMap(StampNs stamp_ns) const;
   Outcome runStep(const Pending& pending, const Deadline& deadline);
   void follow(Outcome& outcome);
-  Outcome passOver(const Step& step);
-  void computeHeld();
 };
 
 }  // namespace dccd

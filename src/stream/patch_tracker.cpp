@@ -39,7 +39,6 @@ PatchEvent PatchTracker::eventOf(PatchEventKind kind, std::uint64_t id) const {
 }
 
 void PatchTracker::seam(std::size_t body) {
-  if (log_) return log_->seam(body);
   for (auto at = living_.begin(); at != living_.end();) {
     if (!isOf(at->second.body, body)) {
       ++at;
@@ -85,32 +84,19 @@ void PatchTracker::forget(Outcome& outcome) noexcept {
 }
 
 void PatchTracker::tell(Outcome& outcome) {
-  if (log_) return log_->tell(outcome);
   outcome.patch_events.insert(outcome.patch_events.begin(), waiting_.begin(), waiting_.end());
   waiting_.clear();
 }
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
-  findNewVoxels(found, outcome);
-  knowMap(outcome);
-  if (log_) return log_->follow(found.spots(), found.unexpected(), on_new_voxel_, outcome);
-  follow(found.spots(), found.unexpected(), on_new_voxel_, gap_s, outcome);
-}
-
-void PatchTracker::knowMap(const Outcome& before) {
-  last_map_ = before.obstacle;
-  last_map_pose_ = before.step->map.map_from_fixed;
-}
-
-void PatchTracker::follow(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
-                          const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome) {
   const std::vector<Body>& bodies = outcome.step->bodies;
   bool same = graph_.bodyCount() == bodies.size();
   for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
   if (!same) seam();
   graph_.setBodies(bodies);
-  merge(spots, outcome);
-  findParts(spots, unexpected, on_new_voxel, outcome);
+  merge(found.spots(), outcome);
+  findParts(found, outcome);
+  findNewVoxels(found, outcome);
   findNews();
   keepIdentities(outcome);
   begin(outcome);
@@ -139,7 +125,7 @@ void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {
     if (!graph_.sameMesh(b, bodies[b])) return;
   }
   merge(found.spots(), outcome);
-  findParts(found.spots(), found.unexpected(), {}, outcome);
+  findParts(found, outcome);
   findNews();
   for (Part& part : parts_) part.id = part.before.empty() ? 0 : part.before.front();
   name(outcome);
@@ -250,17 +236,19 @@ void PatchTracker::merge(const std::vector<PatchSpot>& spots, const Outcome& out
   half_merged_ = false;
 }
 
-/// Which patches touch, when the step begins, a voxel that the map before did not have. Asked only where the map is
-/// another one than in the step before.
+/// Which parts that were none of a living patch touch, when the step begins, a voxel that the map before did not have.
+/// Asked only where the map is another one than in the step before.
 void PatchTracker::findNewVoxels(const PatchMaker& found, const Outcome& outcome) {
-  on_new_voxel_.clear();
-  if (last_map_ == outcome.obstacle) return;
-  on_new_voxel_.assign(outcome.patches.size(), 0);
-  for (std::size_t t = 0; t < found.touches().size(); ++t) {
-    const Touch& touch = found.touches()[t];
-    std::uint8_t& is_new = on_new_voxel_[found.patchOf()[t]];
-    if (!is_new && touch.initial && touch.onMap()) is_new = isNewOnMap(touch, outcome);
+  if (last_map_ != outcome.obstacle && has_last_) {
+    for (std::size_t t = 0; t < found.touches().size(); ++t) {
+      const Touch& touch = found.touches()[t];
+      Part& part = parts_[part_of_patch_[found.patchOf()[t]]];
+      if (part.map_changed || !part.before.empty() || !touch.initial || !touch.onMap()) continue;
+      part.map_changed = isNewOnMap(touch, outcome);
+    }
   }
+  last_map_ = outcome.obstacle;
+  last_map_pose_ = outcome.step->map.map_from_fixed;
 }
 
 bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const {
@@ -272,10 +260,9 @@ bool PatchTracker::isNewOnMap(const Touch& touch, const Outcome& outcome) const 
   return last_map_->leafAt(last_map_pose_ * (outcome.step->map.map_from_fixed.inverse() * center)) == nullptr;
 }
 
-void PatchTracker::findParts(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
-                             const std::vector<std::uint8_t>& on_new_voxel, const Outcome& outcome) {
+void PatchTracker::findParts(const PatchMaker& found, const Outcome& outcome) {
   // Where all that touched still does, the patches of the step are the parts.
-  const bool same = all_.spots.size() == spots.size();
+  const bool same = all_.spots.size() == found.spots().size();
   part_of_ = same ? &current_ : &graph_.components(all_.spots);
   releaseBurst(parts_);
   parts_.assign(same ? outcome.patches.size() : graph_.componentCount(), Part());
@@ -296,17 +283,12 @@ void PatchTracker::findParts(const std::vector<PatchSpot>& spots, const std::vec
     part.toc_lower = std::min(part.toc_lower, patch.toc_lower);
     part.toc_upper = std::min(part.toc_upper, patch.toc_upper);
     part.initial = part.initial || patch.initial + patch.crossings > 0;
-    part.unexpected_new = part.unexpected_new || unexpected[p].is_new;
-    part.unexpected_initial = part.unexpected_initial || unexpected[p].is_initial;
+    part.unexpected_new = part.unexpected_new || found.unexpected()[p].is_new;
+    part.unexpected_initial = part.unexpected_initial || found.unexpected()[p].is_initial;
   }
   for (Part& part : parts_) {
     std::sort(part.before.begin(), part.before.end());
     part.before.erase(std::unique(part.before.begin(), part.before.end()), part.before.end());
-  }
-  if (!has_last_ || on_new_voxel.empty()) return;
-  for (std::size_t p = 0; p < outcome.patches.size(); ++p) {
-    Part& part = parts_[part_of_patch_[p]];
-    if (part.before.empty() && on_new_voxel[p]) part.map_changed = true;
   }
 }
 

@@ -9,7 +9,6 @@
 
 #include "dccd/expectation.h"
 #include "dccd/outcome.h"
-#include "dccd/range_log.h"
 #include "step/patches.h"
 
 namespace dccd {
@@ -27,10 +26,6 @@ class PatchTracker {
   /// Of an answered step that comes after the last one: its patches get identities, and the outcome its events. found:
   /// what detect() found in it.
   void follow(const PatchMaker& found, double gap_s, Outcome& outcome);
-  /// The same of what a range has logged. on_new_voxel: per patch, whether it touched at its start a voxel that the map
-  /// before did not have; empty: none did.
-  void follow(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
-              const std::vector<std::uint8_t>& on_new_voxel, double gap_s, Outcome& outcome);
   /// Identities for the patches of an outcome aside from the stream, 0 for those that would be new. Changes nothing.
   void recognise(const PatchMaker& found, Outcome& outcome);
   /// After an exception from follow(): nothing half done is left, and what lives ends, as at a seam. What the outcome
@@ -38,10 +33,6 @@ class PatchTracker {
   void forget(Outcome& outcome) noexcept;
   /// What has happened since the last outcome goes into this one.
   void tell(Outcome& outcome);
-  /// From now on patches get no identities: what they follow from goes into the log.
-  void leaveTo(RangeLog& log) { log_ = &log; }
-  /// The map of the step before the first one that is followed.
-  void knowMap(const Outcome& before);
 
  private:
   struct Living {
@@ -83,8 +74,7 @@ class PatchTracker {
   };
 
   void merge(const std::vector<PatchSpot>& spots, const Outcome& outcome);
-  void findParts(const std::vector<PatchSpot>& spots, const std::vector<PatchUnexpected>& unexpected,
-                 const std::vector<std::uint8_t>& on_new_voxel, const Outcome& outcome);
+  void findParts(const PatchMaker& found, const Outcome& outcome);
   void findNewVoxels(const PatchMaker& found, const Outcome& outcome);
   bool isNewOnMap(const Touch& touch, const Outcome& outcome) const;
   void keepIdentities(Outcome& outcome);
@@ -114,7 +104,6 @@ class PatchTracker {
   bool has_last_ = false;
   std::shared_ptr<const VoxelSurface> last_map_;
   Eigen::Isometry3d last_map_pose_ = Eigen::Isometry3d::Identity();
-  RangeLog* log_ = nullptr;
 
   // Buffers of a step.
   TouchGraph graph_;
@@ -127,8 +116,7 @@ class PatchTracker {
   bool half_merged_ = false;                             // a merge has not come to its end, and last_at_ is not as new
   std::vector<std::uint32_t> part_of_patch_;
   std::vector<Part> parts_;
-  std::vector<std::uint64_t> alive_;        // ascending
-  std::vector<std::uint8_t> on_new_voxel_;  // per patch; empty: none is
+  std::vector<std::uint64_t> alive_;  // ascending
 };
 
 }  // namespace dccd

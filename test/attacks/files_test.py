@@ -70,10 +70,6 @@ class FilesTest(AttackTest):
             with self.subTest(truth=path.name):
                 self.refused([self.tool('check_step'), frame, frame, '--contacts', self.folder + '/contacts.csv', '--stats',
                               self.folder + '/stats.json', '--accuracy', 'all', '--truth', path], words)
-        for path in self.special_files('.cbor'):
-            with self.subTest(range=path.name):
-                path.rename(path.with_name('range.cbor'))
-                self.refused([self.tool('analyze_bag'), bag, '--report', self.folder + '/report', '--merge', path.parent], words)
 
     def test_two_monitors_in_one_folder(self):
         folder = pathlib.Path(self.folder) / 'shared'

@@ -107,7 +107,7 @@ class SlurmTest(FolderTestCase):
         bags = [bag for bag, _ in made] + [corrupt]
         out = self.folder / 'results'
         words = [str(w) for w in ('/usr/bin/python3', TOOLS / 'analyze_fleet', *bags, '--params', params, '--out', out, '--slurm',
-                                  '--jobs', 4, '--chunk', '0.5')]
+                                  '--jobs', 4)]
         with open(self.folder / 'fleet.err', 'w+') as said:
             process = subprocess.Popen(words, env=self.environment, stdout=subprocess.DEVNULL, stderr=said)
             killed = self.kill_a_worker(process)
@@ -115,13 +115,13 @@ class SlurmTest(FolderTestCase):
             said.seek(0)
             text = said.read()
         self.assertTrue(killed)
-        self.assertIn('corrupt: all: ', text)
+        self.assertIn('analyze_fleet: corrupt: ', text)
         states = collections.Counter(state for state, in rows_of(out, 'SELECT state FROM recordings'))
         self.assertEqual(sum(states.values()), 12)
-        self.assertEqual((states['failed'], states['partial'] + states['missing']), (1, 1), (states, text))
+        self.assertEqual((states['failed'], states['missing']), (1, 1), (states, text))
         again = run(*words, environment=self.environment)
         states = collections.Counter(state for state, in rows_of(out, 'SELECT state FROM recordings'))
-        self.assertEqual((states['failed'], states['partial'] + states['missing']), (1, 0), (states, again.stderr))
+        self.assertEqual((states['failed'], states['missing']), (1, 0), (states, again.stderr))
         whole = self.folder / 'whole'
         for bag, _ in made[:3]:
             run(TOOLS / 'analyze_bag', bag, '--report', whole, '--no-accuracy-table', '--quiet', '--params', params)
@@ -131,7 +131,7 @@ class SlurmTest(FolderTestCase):
     def kill_a_worker(self, process):
         """An analyze_bag that Slurm has started, once some are done."""
         while process.poll() is None:
-            if len(list((self.folder / 'results').glob('recordings/*/ranges/*/record.json'))) > 3:
+            if len(list((self.folder / 'results').glob('recordings/*/result.json'))) > 3:
                 for pid in filter(str.isdigit, os.listdir('/proc')):
                     try:
                         command = pathlib.Path('/proc', pid, 'cmdline').read_bytes().split(b'\0')

@@ -1,4 +1,4 @@
-"""Scenes, bags and commands for the tests of bags: analysed, cut, and of fleets."""
+"""Scenes, bags and commands for the tests of bags and of fleets."""
 import sqlite3
 import subprocess
 

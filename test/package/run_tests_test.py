@@ -148,12 +148,13 @@ class RunTestsTest(unittest.TestCase):
             (checkout / folder).mkdir(parents=True, exist_ok=True)
         for name in ('common.sh', 'newcomer.sh'):
             shutil.copy(CHECKOUT / 'scripts/lib' / name, checkout / 'scripts/lib')
-        (checkout / 'scripts/demo').write_text('#!/bin/sh\nmkdir -p build; echo the demo; %s\n' % demo)
-        (checkout / 'scripts/demo').chmod(0o755)
+        for script, words in (('demo', 'mkdir -p build; echo the demo; ' + demo), ('build', 'mkdir build/tools')):
+            (checkout / 'scripts' / script).write_text('#!/bin/sh\n%s\n' % words)
+            (checkout / 'scripts' / script).chmod(0o755)
         (checkout / 'test/package/commands_test.py').write_text(textwrap.dedent('''
             import os, unittest
             class T(unittest.TestCase):
-                def test_the_demo_was_before(self): assert os.path.isdir('../../build')
+                def test_demo_and_build_were_before(self): assert os.path.isdir('../../build/tools')
                 def test_verdict(self): %s
             ''') % verdict)
         return checkout

@@ -9,6 +9,7 @@
 #include "elementary/exact_tiers.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
+#include "support/exact_tier.h"
 #include "support/query_property.h"
 #include "support/structured_pairs.h"
 
@@ -58,7 +59,7 @@ TEST(ElementaryStructured, FewWordsAreEnough) {
     std::size_t settled = 0, left = 0;
     for (std::size_t i = 0; i < set.pairs.size(); ++i) {
       const PairMotion pair = motionOf(set, i);
-      const bool batch = exact::decideByBatch(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
+      const bool batch = test::decideByBatch(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED;
       const bool known = batch || exact::decideByCoincidence(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||
                          exact::decideBySubdivision(set.kind, pair).verdict != Verdict::UNDECIDED ||
                          exact::decideAtSimpleTime(set.kind, pair, TOC_BITS).verdict != Verdict::UNDECIDED ||

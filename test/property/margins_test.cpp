@@ -16,6 +16,7 @@
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
 #include "simd/float_mode.h"
+#include "support/exact_tier.h"
 #include "support/generators.h"
 #include "support/margin_checks.h"
 #include "support/margin_witnesses.h"
@@ -160,7 +161,7 @@ void holdTier(Tier tier, int pairs, const std::function<Query(RandomSource&)>& n
   int settled = 0;
   for (int n = 0; n < pairs; ++n) {
     const Query query = next(random);
-    const ElementaryResult result = exact::decideWithTier(tier, query.kind, query.motion, options.toc_bits);
+    const ElementaryResult result = test::decideWithTier(tier, query.kind, query.motion, options.toc_bits);
     if (result.verdict == Verdict::UNDECIDED) continue;
     ++settled;
     std::optional<Root> toc = firstContact(query.kind, query.motion);

@@ -7,6 +7,7 @@
 #include "elementary/exact_double_double.h"
 #include "elementary/exact_tiers.h"
 #include "oracle/algebraic.h"
+#include "support/exact_tier.h"
 #include "support/generators.h"
 
 namespace dccd {
@@ -108,7 +109,7 @@ TEST(ExactDoubleDouble, CellsFromTheWholeStepAreThoseOfTheIntegers) {
       const std::int64_t cell = exact::cellOfRoot(exact::CoplanarityCubic(PairKind::VERTEX_FACE, pair), 0, 1, bits);
       if (cell < 0) continue;  // exactly on a grid point
       ++found;
-      const ElementaryResult truth = exact::decideWithTier(Tier::FIXED_INTEGER, PairKind::VERTEX_FACE, pair, bits);
+      const ElementaryResult truth = test::decideWithTier(Tier::FIXED_INTEGER, PairKind::VERTEX_FACE, pair, bits);
       ASSERT_EQ(truth.verdict, Verdict::CONTACT);
       ASSERT_EQ(std::ldexp(static_cast<double>(cell), -bits), truth.toc_lower) << t << " " << bits;
     }

@@ -21,9 +21,9 @@ void change(std::vector<Box>& value) { value.push_back({Vec3(1, 2, 3), Vec3(4, 5
 void change(std::vector<Expectation>& value) { value.push_back({{{{0, {1, 2}, "hem"}, {1, {}, ""}}}, "carry"}); }
 void change(std::vector<std::string>& value) { value.push_back("a body"); }
 
-template <std::uint32_t SINCE, class Value>
-constexpr bool isRecorded(const OptionRow<SINCE, Value>&) {
-  return SINCE != NOT_RECORDED;
+template <bool RECORDED, class Value>
+constexpr bool isRecorded(const OptionRow<RECORDED, Value>&) {
+  return RECORDED;
 }
 
 template <std::size_t I>

@@ -52,12 +52,9 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
   const Case cases[] = {
       {"~accuracy is 'fast', which proves nothing and is no setting of a monitor; write exact",
        [](XmlRpcValue& t) { t["accuracy"] = "fast"; }},
-      {"~accuracy is 'screen', which proves nothing and is no setting of a monitor; write exact",
-       [](XmlRpcValue& t) { t["accuracy"] = "screen"; }},
       {"~accuracy is 'exactly', it must be one of conservative, exact; nearest is 'exact'",
        [](XmlRpcValue& t) { t["accuracy"] = "exactly"; }},
-      // Names that were once taken.
-      {"~record_ring is not known; nearest is ~record_steps", [](XmlRpcValue& t) { t["record_ring"] = 3; }},
+      {"~record_stesp is not known; nearest is ~record_steps", [](XmlRpcValue& t) { t["record_stesp"] = 3; }},
       {"~record_directory is not known; nearest is ~record_folder",
        [](XmlRpcValue& t) { t["record_directory"] = "steps"; }},
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},

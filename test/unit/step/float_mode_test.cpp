@@ -88,9 +88,8 @@ TEST(FloatMode, OfTheCallerChangesNoCounter) {
   }
 }
 
-/// What is made once for all later steps may be made by a step that is passed over: which pairs are left out of the
-/// separation, and how far apart these are.
-TEST(FloatMode, OfWhoPassesAStepOverChangesNoLaterAnswer) {
+/// What is made once for all later steps: which pairs are left out of the separation, and how far apart these are.
+TEST(FloatMode, OfTheCallerChangesNoLaterAnswer) {
   Step cloth = crumpled(5, 2, 40).motion();
   Body& body = cloth.bodies[0];
   const Edge& edge = body.topology->edges().front();
@@ -98,10 +97,10 @@ TEST(FloatMode, OfWhoPassesAStepOverChangesNoLaterAnswer) {
   body.reference = std::make_shared<const ReferenceFrame>(ReferenceFrame{*body.t0, {}});
   Options options;
   options.accuracy.rung = Accuracy::CONSERVATIVE;  // whose minimum separation may be above 0
-  const auto distancesAfterPassingOver = [&](int mode) {
+  const auto distancesAfter = [&](int mode) {
     History history;
     const RoundingMode rounding(mode);
-    history.impl().passOver(cloth, options);
+    detect(cloth, options, history);
     EXPECT_EQ(std::fegetround(), mode);
     const LeftOutOfBody& left_out = history.impl().left_out[0];
     const SceneBody& ranks = history.impl().scene.bodies()[0];
@@ -122,10 +121,10 @@ TEST(FloatMode, OfWhoPassesAStepOverChangesNoLaterAnswer) {
     EXPECT_EQ(distances.size(), history.leftOut().size());
     return distances;
   };
-  const std::vector<double> usual = distancesAfterPassingOver(FE_TONEAREST);
+  const std::vector<double> usual = distancesAfter(FE_TONEAREST);
   ASSERT_GT(usual.size(), 100u);
   for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
-    EXPECT_EQ(distancesAfterPassingOver(mode), usual) << "mode " << mode;
+    EXPECT_EQ(distancesAfter(mode), usual) << "mode " << mode;
   }
 }
 

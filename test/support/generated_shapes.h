@@ -7,7 +7,7 @@
 #include "dccd/types.h"
 
 namespace dccd {
-namespace scene {
+namespace test {
 
 struct TriangleShape {
   Positions vertices;
@@ -25,5 +25,5 @@ TriangleShape cubeSphere(std::size_t cells);
 TriangleShape revolution(std::size_t rings, std::size_t segments, double half_length_m,
                          const std::function<double(double)>& radius_m);
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

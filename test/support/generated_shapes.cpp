@@ -1,10 +1,10 @@
-#include "scene/generated_shapes.h"
+#include "support/generated_shapes.h"
 
 #include <cmath>
 #include <map>
 
 namespace dccd {
-namespace scene {
+namespace test {
 
 TriangleShape sheet(std::size_t cells, double side_m) {
   TriangleShape s;
@@ -103,5 +103,5 @@ TriangleShape revolution(std::size_t rings, std::size_t segments, double half_le
   return s;
 }
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

@@ -6,11 +6,11 @@
 #include <functional>
 #include <random>
 
-#include "scene/generated_scene.h"
-#include "scene/generated_shapes.h"
+#include "support/generated_scene.h"
+#include "support/generated_shapes.h"
 
 namespace dccd {
-namespace scene {
+namespace test {
 namespace {
 
 /// What the cloth falls onto.
@@ -273,5 +273,5 @@ std::unique_ptr<GeneratedSequence> generateClothBone(const GeneratedOptions& opt
   return std::make_unique<ClothBone>(options, static_cast<std::size_t>(total * 108 / 155), rings, segments);
 }
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

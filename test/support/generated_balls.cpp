@@ -2,11 +2,11 @@
 #include <cmath>
 #include <random>
 
-#include "scene/generated_scene.h"
-#include "scene/generated_shapes.h"
+#include "support/generated_scene.h"
+#include "support/generated_shapes.h"
 
 namespace dccd {
-namespace scene {
+namespace test {
 namespace {
 
 constexpr double FRAME_S = 1.0 / 24;
@@ -134,5 +134,5 @@ std::unique_ptr<GeneratedSequence> generateNBody(const GeneratedOptions& options
   return std::make_unique<NBody>(options, std::max<std::size_t>(2, rest / per_ball));
 }
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

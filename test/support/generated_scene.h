@@ -13,7 +13,7 @@
 #include "dccd/types.h"
 
 namespace dccd {
-namespace scene {
+namespace test {
 
 enum class GeneratedKind : std::uint8_t {
   CLOTH_BALL = 0,  ///< 92K triangles, 94 frames: a sheet drops onto a ball that starts to rotate
@@ -81,5 +81,5 @@ std::unique_ptr<GeneratedSequence> generateNBody(const GeneratedOptions& options
 std::unique_ptr<GeneratedSequence> generateDragon(const GeneratedOptions& options);
 std::unique_ptr<GeneratedSequence> generateLion(const GeneratedOptions& options);
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

@@ -1,9 +1,9 @@
-#include "scene/generated_scene.h"
+#include "support/generated_scene.h"
 
 #include <stdexcept>
 
 namespace dccd {
-namespace scene {
+namespace test {
 
 const char* toString(GeneratedKind kind) {
   switch (kind) {
@@ -79,5 +79,5 @@ std::unique_ptr<GeneratedSequence> generateSequence(GeneratedKind kind, const Ge
   throw std::invalid_argument("not a kind of generated scene");
 }
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

@@ -1,13 +1,13 @@
-#include "scene/generated_scene.h"
+#include "support/generated_scene.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
-#include "scene/generated_shapes.h"
+#include "support/generated_shapes.h"
 
 namespace dccd {
-namespace scene {
+namespace test {
 namespace {
 
 class GeneratedScenes : public ::testing::TestWithParam<GeneratedKind> {};
@@ -95,5 +95,5 @@ TEST(GeneratedShapes, AreWhatTheySay) {
 }
 
 }  // namespace
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <random>
 
-#include "scene/generated_scene.h"
-#include "scene/generated_shapes.h"
+#include "support/generated_scene.h"
+#include "support/generated_shapes.h"
 
 namespace dccd {
-namespace scene {
+namespace test {
 namespace {
 
 /// The radius of a lumpy body in a direction, between 0.6 and 1.4.
@@ -222,5 +222,5 @@ std::unique_ptr<GeneratedSequence> generateLion(const GeneratedOptions& options)
   return std::make_unique<Lion>(options, triangleGoal(options, 1.6e6));
 }
 
-}  // namespace scene
+}  // namespace test
 }  // namespace dccd
