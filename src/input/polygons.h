@@ -21,14 +21,26 @@ struct Polygons {
   friend bool operator==(const Polygons& a, const Polygons& b) { return a.corners == b.corners && a.ends == b.ends; }
 };
 
+/// Of a polygon that is not convex: beyond this it is unchecked. The time of one is quadratic in its corners.
+constexpr std::size_t MAX_CONCAVE_CORNERS = 256;
+
 /// What became of polygons.
 struct PolygonFaces {
   std::vector<Face> faces;             ///< of all polygons, in their order; none repeats a vertex
   std::vector<std::size_t> ends;       ///< of each polygon among the faces
   std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face, ascending
+  bool unseen = false;                 ///< one of them had a corner that was not finite
 };
 
-/// Triangulates. Every corner is below positions.size().
+/// Every corner is below positions.size(). Corners that repeat the one before count once. Then
+///  - fewer than three corners are an edge or a vertex: unchecked unless a face has that, too;
+///  - three are their triangle;
+///  - more are judged in the coordinate plane where their area is largest (of Newell's normal), by exact signs. A
+///  convex
+///    polygon is the fan of its first corner; another one that does not touch itself is cut by ears: the triangles lie
+///    side by side and fill its outline. Of a polygon that is not plane the same triangles are taken.
+/// What else there is (a corner named twice, an outline that touches itself or has no area, a corner that is not
+/// finite, too many corners) is unchecked.
 PolygonFaces facesOf(const Polygons& polygons, const Positions& positions);
 
 }  // namespace dccd
