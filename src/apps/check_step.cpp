@@ -200,15 +200,17 @@ std::vector<Step> stepsOf(const Arguments& a) {
   step.bodies.resize(1);
   step.bodies[0].name = a.frames[0];
   step.bodies[0].topology = share(Topology::fromTriangles(first.positions.size(), first.faces));
+  step.bodies[0].dropped_faces = first.unchecked.size();
   step.bodies[0].t1 = share(first.positions);
   std::vector<Step> steps;
   for (std::size_t i = 1; i < a.frames.size(); ++i) {
     const MeshFile next = loadMeshFile(a.frames[i]);
-    if (first.positions.size() != next.positions.size() || first.faces != next.faces) {
-      throw std::runtime_error(
-          a.frames[i] + ": not the topology of " + a.frames[0] + " (" + std::to_string(next.positions.size()) +
-          " vertices and " + std::to_string(next.faces.size()) + " faces, expected " +
-          std::to_string(first.positions.size()) + " and " + std::to_string(first.faces.size()) + ", the same ones)");
+    if (first.positions.size() != next.positions.size() || !(first.polygons == next.polygons)) {
+      throw std::runtime_error(a.frames[i] + ": not the topology of " + a.frames[0] + " (" +
+                               std::to_string(next.positions.size()) + " vertices and " +
+                               std::to_string(next.polygons.size()) + " faces, expected " +
+                               std::to_string(first.positions.size()) + " and " +
+                               std::to_string(first.polygons.size()) + ", the same ones)");
     }
     step.bodies[0].t0 = step.bodies[0].t1;
     step.bodies[0].t1 = share(next.positions);

@@ -148,6 +148,7 @@ class PlyReader {
       throw MeshFileError(path_ + ": the vertices have no property '" + AXES[axis] + "' of float or double");
     }
     if (vertices_ == 0) throw MeshFileError(path_ + ": no vertices");
+    setPolygons(std::move(polygons_), mesh_);
     return std::move(mesh_);
   }
 
@@ -185,21 +186,17 @@ class PlyReader {
 
   void addCorner(std::int64_t v) {
     if (v < 0 || v >= static_cast<std::int64_t>(vertices_)) {
-      throw MeshFileError(path_ + ": polygon " + std::to_string(polygons_) + " names vertex " + std::to_string(v) +
-                          " of " + std::to_string(vertices_));
+      throw MeshFileError(path_ + ": polygon " + std::to_string(polygons_.size()) + " names vertex " +
+                          std::to_string(v) + " of " + std::to_string(vertices_));
     }
     polygon_.push_back(static_cast<Index>(v));
   }
-  void endPolygon() {
-    for (std::size_t k = 2; k < polygon_.size(); ++k) {
-      mesh_.faces.push_back({polygon_[0], polygon_[k - 1], polygon_[k]});
-    }
-    ++polygons_;
-  }
+  void endPolygon() { polygons_.add(polygon_); }
 
   const std::string& path_;
   MeshFile mesh_;
-  std::size_t vertices_ = 0, polygons_ = 0;  // as the header says; as read so far
+  Polygons polygons_;
+  std::size_t vertices_ = 0;  // as the header says
   bool has_axis_[3] = {false, false, false};
   std::vector<Index> polygon_;
 };
@@ -225,21 +222,33 @@ std::string readWholeFile(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
+std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh) {
+  PolygonFaces made = facesOf(polygons, mesh.positions);
+  mesh.polygons = std::move(polygons);
+  mesh.faces = std::move(made.faces);
+  mesh.unchecked = std::move(made.unchecked);
+  return std::move(made.ends);
+}
+
 MeshFile weldTriangles(const Positions& corners, const std::string& path) {
   if (corners.empty() || corners.size() % 3 != 0) throw MeshFileError(path + ": no whole triangles");
+  std::vector<std::size_t> ends;
+  for (std::size_t end = 3; end <= corners.size(); end += 3) ends.push_back(end);
+  return weldPolygons(corners, std::move(ends), path);
+}
+
+MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path) {
   MeshFile mesh;
+  Polygons polygons;
+  polygons.ends = std::move(ends);
   std::map<std::array<double, 3>, Index> known;
-  for (std::size_t c = 0; c < corners.size(); c += 3) {
-    Face face;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3& p = corners[c + static_cast<std::size_t>(k)];
-      if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
-      const auto [it, fresh] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<Index>(mesh.positions.size()));
-      if (fresh) mesh.positions.push_back(p);
-      face[static_cast<std::size_t>(k)] = it->second;
-    }
-    if (face[0] != face[1] && face[1] != face[2] && face[0] != face[2]) mesh.faces.push_back(face);
+  for (const Vec3& p : corners) {
+    if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
+    const auto [it, fresh] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<Index>(mesh.positions.size()));
+    if (fresh) mesh.positions.push_back(p);
+    polygons.corners.push_back(it->second);
   }
+  setPolygons(std::move(polygons), mesh);
   return mesh;
 }
 

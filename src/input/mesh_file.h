@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dccd/types.h"
+#include "input/polygons.h"
 
 namespace dccd {
 
@@ -19,9 +20,11 @@ struct MeshFileError : std::runtime_error {
 using FaceGroups = std::map<std::string, std::vector<std::pair<std::size_t, std::size_t>>>;
 
 struct MeshFile {
-  Positions positions;      ///< [m], in the file's frame; float or double coordinates are taken exactly
-  std::vector<Face> faces;  ///< polygons with more than three corners as fans
-  FaceGroups groups;        ///< of an OBJ
+  Positions positions;                 ///< [m], in the file's frame; float or double coordinates are taken exactly
+  std::vector<Face> faces;             ///< as facesOf() makes them of the file's polygons
+  FaceGroups groups;                   ///< of an OBJ
+  Polygons polygons;                   ///< as the file has them
+  std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face
 };
 
 /// PLY or OBJ: vertices keep their numbers, their order and every bit of their coordinates, as frames and topologies
@@ -35,8 +38,12 @@ std::string fileEnding(const std::string& path);
 void requireReadable(const std::string& path);
 /// The bytes of such a file. Throws MeshFileError.
 std::string readWholeFile(const std::string& path);
+/// Makes the mesh's faces of the polygons. Returns where each polygon ends among the faces.
+std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh);
 /// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first
-/// corners; triangles without area are left out. Throws MeshFileError for a coordinate that is not finite.
+/// corners. Throws MeshFileError for a coordinate that is not finite.
 MeshFile weldTriangles(const Positions& corners, const std::string& path);
+/// The same of polygons, each of the corners up to its end.
+MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path);
 
 }  // namespace dccd

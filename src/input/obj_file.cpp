@@ -25,15 +25,14 @@ class ObjReader {
     }
     endGroups();
     // Faces may name vertices that come after them.
-    for (const Face& face : mesh_.faces) {
-      for (const Index v : face) {
-        if (v >= mesh_.positions.size()) {
-          throw MeshFileError(path_ + ": a face names vertex " + std::to_string(std::size_t{v} + 1) + " of " +
-                              std::to_string(mesh_.positions.size()));
-        }
+    for (const Index v : polygons_.corners) {
+      if (v >= mesh_.positions.size()) {
+        throw MeshFileError(path_ + ": a face names vertex " + std::to_string(std::size_t{v} + 1) + " of " +
+                            std::to_string(mesh_.positions.size()));
       }
     }
     if (mesh_.positions.empty()) throw MeshFileError(path_ + ": no vertices");
+    nameGroups(setPolygons(std::move(polygons_), mesh_));
     return std::move(mesh_);
   }
 
@@ -61,19 +60,29 @@ class ObjReader {
     for (std::string name; words >> name;) groups_.insert(name);
   }
 
-  /// The faces since the last `g` are what its groups get.
+  /// The polygons since the last `g` are what its groups get.
   void endGroups() {
     for (const std::string& name : groups_) {
       auto& ranges = mesh_.groups[name];
-      if (mesh_.faces.size() > begin_) ranges.emplace_back(begin_, mesh_.faces.size());
+      if (polygons_.size() > begin_) ranges.emplace_back(begin_, polygons_.size());
     }
     groups_.clear();
-    begin_ = mesh_.faces.size();
+    begin_ = polygons_.size();
+  }
+
+  /// From ranges of polygons to ranges of faces.
+  void nameGroups(const std::vector<std::size_t>& ends) {
+    const auto face = [&](std::size_t polygon) { return polygon == 0 ? 0 : ends[polygon - 1]; };
+    for (auto& [name, ranges] : mesh_.groups) {
+      for (auto& [first, last] : ranges) {
+        first = face(first);
+        last = face(last);
+      }
+    }
   }
 
   void readFace(const std::string& line) {
-    Index first = 0, previous = 0;
-    std::size_t corners = 0;
+    std::vector<Index> corners;
     const char* at = line.c_str() + 1;
     while (true) {
       while (isBlank(*at)) ++at;
@@ -81,16 +90,13 @@ class ObjReader {
       char* end = nullptr;
       const long long number = std::strtoll(at, &end, 10);
       if (end == at || number == 0) fail("a corner of a face is no vertex's number");
-      const Index v = index(number);
+      corners.push_back(index(number));
       // Texture and normal of the corner.
       for (at = end; *at != '\0' && !isBlank(*at); ++at) {
       }
-      if (corners == 0) first = v;
-      if (corners >= 2) mesh_.faces.push_back({first, previous, v});
-      previous = v;
-      ++corners;
     }
-    if (corners < 3) fail("a face needs three corners");
+    if (corners.size() < 3) fail("a face needs three corners");
+    polygons_.add(corners);
   }
 
   Index index(long long number) const {
@@ -103,6 +109,7 @@ class ObjReader {
   const std::string& path_;
   std::size_t line_ = 0;
   MeshFile mesh_;
+  Polygons polygons_;
   std::set<std::string> groups_;  // of the faces since begin_
   std::size_t begin_ = 0;
 };

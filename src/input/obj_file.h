@@ -10,7 +10,7 @@
 namespace dccd {
 
 /// `v` and `f` lines, faces with indices from 1 or backwards from the newest vertex, and `g` lines: the groups that the
-/// faces after them belong to. All else is skipped. Polygons become fans. Throws MeshFileError naming the file, the
+/// faces after them belong to. All else is skipped. Throws MeshFileError naming the file, the
 /// line and what is wrong with it.
 MeshFile loadObjFile(const std::string& path);
 
