@@ -55,18 +55,23 @@ bool isPadding(std::string_view bytes) {
 
 MeshFile weldTriangles(const Positions& corners, const std::string& path) {
   if (corners.empty() || corners.size() % 3 != 0) throw MeshFileError(path + ": no whole triangles");
+  std::vector<std::size_t> ends;
+  for (std::size_t end = 3; end <= corners.size(); end += 3) ends.push_back(end);
+  return weldPolygons(corners, std::move(ends), path);
+}
+
+MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path) {
   MeshFile mesh;
-  Polygons triangles;
+  Polygons polygons;
+  polygons.ends = std::move(ends);
   std::map<std::array<double, 3>, Index> known;
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const Vec3& p = corners[c];
+  for (const Vec3& p : corners) {
     if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
     const auto [it, fresh] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<Index>(mesh.positions.size()));
     if (fresh) mesh.positions.push_back(p);
-    triangles.corners.push_back(it->second);
-    if (c % 3 == 2) triangles.ends.push_back(triangles.corners.size());
+    polygons.corners.push_back(it->second);
   }
-  setPolygons(std::move(triangles), mesh);
+  setPolygons(std::move(polygons), mesh);
   return mesh;
 }
 

@@ -48,5 +48,7 @@ bool isPadding(std::string_view bytes);
 /// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first
 /// corners. Throws MeshFileError for a coordinate that is not finite.
 MeshFile weldTriangles(const Positions& corners, const std::string& path);
+/// The same of polygons, each of the corners up to its end.
+MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path);
 
 }  // namespace dccd

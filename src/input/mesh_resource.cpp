@@ -1,7 +1,6 @@
 #include "input/mesh_resource.h"
 
 #include <algorithm>
-#include <iterator>
 #include <stdexcept>
 
 #include <ros/package.h>
@@ -41,12 +40,10 @@ MeshResource resourceOf(const std::string& path, double scale) {
       p *= scale;
       if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
     }
-    std::vector<Face> faces;
-    std::copy_if(mesh.faces.begin(), mesh.faces.end(), std::back_inserter(faces),
-                 [](const Face& f) { return f[0] != f[1] && f[1] != f[2] && f[0] != f[2]; });
     resource.topology =
-        std::make_shared<const Topology>(mesh.edges.empty() ? Topology::fromTriangles(mesh.positions.size(), faces)
+        std::make_shared<const Topology>(mesh.edges.empty() ? Topology::fromTriangles(mesh.positions.size(), mesh.faces)
                                                             : Topology::fromEdges(mesh.positions.size(), mesh.edges));
+    resource.dropped_faces = mesh.unchecked.size();
     resource.positions = std::move(mesh.positions);
     resource.file_faces = std::move(mesh.faces);
     resource.groups = std::move(mesh.groups);

@@ -12,8 +12,9 @@ namespace dccd {
 struct MeshResource {
   std::shared_ptr<const Topology> topology;
   Positions positions;           ///< [m], after scaling
-  std::vector<Face> file_faces;  ///< as the file has them, which the groups count
+  std::vector<Face> file_faces;  ///< which the groups count; the topology has equal ones once
   FaceGroups groups;
+  std::uint64_t dropped_faces = 0;   ///< polygons that cannot be used: unchecked
   std::vector<std::string> remarks;  ///< about what of the file was skipped
 
   /// The vertices of a group's faces, each once, in order; empty where there is no such group.

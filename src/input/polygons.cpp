@@ -194,7 +194,11 @@ std::vector<Edge> edgesAndVertices(const std::vector<Face>& faces) {
 
 }  // namespace
 
-PolygonFaces facesOf(const Polygons& polygons, const Positions& positions) {
+PolygonFaces facesOf(const Polygons& polygons, const Positions& positions, const PolygonFaces* before) {
+  const auto contains = [](const std::vector<std::size_t>& sorted, std::size_t p) {
+    return std::binary_search(sorted.begin(), sorted.end(), p);
+  };
+  const auto finite = [&](Index v) { return positions[v].allFinite(); };
   PolygonFaces out;
   out.ends.reserve(polygons.size());
   std::vector<std::size_t> slight;  // polygons that are no more than an edge or a vertex,
@@ -202,14 +206,21 @@ PolygonFaces facesOf(const Polygons& polygons, const Positions& positions) {
   for (std::size_t p = 0; p < polygons.size(); ++p) {
     const Index* all = polygons.corners.data();
     const std::vector<Index> corners = withoutRepeats(all + polygons.begin(p), all + polygons.ends[p]);
-    const auto finite = [&](Index v) { return positions[v].allFinite(); };
-    if (!corners.empty() && corners.size() < 3) {
+    if (corners.empty()) {
+      // nothing is missing
+    } else if (corners.size() < 3) {
       slight.push_back(p);
       slight_edges.push_back(edgeOf(corners.front(), corners.back()));
-    } else if (corners.size() > 3 && !std::all_of(corners.begin(), corners.end(), finite)) {
-      out.unseen = true;
+    } else if (before && !contains(before->unseen, p)) {
+      const auto face = [&](std::size_t end) { return before->faces.begin() + static_cast<std::ptrdiff_t>(end); };
+      out.faces.insert(out.faces.end(), face(p == 0 ? 0 : before->ends[p - 1]), face(before->ends[p]));
+      if (contains(before->unchecked, p)) out.unchecked.push_back(p);
+    } else if (namesOneTwice(corners)) {
       out.unchecked.push_back(p);
-    } else if (corners.empty() || namesOneTwice(corners) || !addFaces(corners, positions, out.faces)) {
+    } else if (corners.size() > 3 && !std::all_of(corners.begin(), corners.end(), finite)) {
+      out.unseen.push_back(p);
+      out.unchecked.push_back(p);
+    } else if (!addFaces(corners, positions, out.faces)) {
       out.unchecked.push_back(p);
     }
     out.ends.push_back(out.faces.size());

@@ -29,11 +29,11 @@ struct PolygonFaces {
   std::vector<Face> faces;             ///< of all polygons, in their order; none repeats a vertex
   std::vector<std::size_t> ends;       ///< of each polygon among the faces
   std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face, ascending
-  bool unseen = false;                 ///< one of them had a corner that was not finite
+  std::vector<std::size_t> unseen;     ///< of these, the ones with a corner that was not finite
 };
 
 /// Every corner is below positions.size(). Corners that repeat the one before count once. Then
-///  - fewer than three corners are an edge or a vertex: unchecked unless a face has that, too;
+///  - one or two corners are a vertex or an edge: unchecked unless a face has that, too; none is nothing;
 ///  - three are their triangle;
 ///  - more are judged in the coordinate plane where their area is largest (of Newell's normal), by exact signs. A
 ///  convex
@@ -41,6 +41,9 @@ struct PolygonFaces {
 ///    side by side and fill its outline. Of a polygon that is not plane the same triangles are taken.
 /// What else there is (a corner named twice, an outline that touches itself or has no area, a corner that is not
 /// finite, too many corners) is unchecked.
-PolygonFaces facesOf(const Polygons& polygons, const Positions& positions);
+///
+/// before: what became of the same polygons earlier. It is kept, so that a mesh that deforms stays one mesh; only its
+/// `unseen` ones are looked at again.
+PolygonFaces facesOf(const Polygons& polygons, const Positions& positions, const PolygonFaces* before = nullptr);
 
 }  // namespace dccd

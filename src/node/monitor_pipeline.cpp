@@ -91,6 +91,7 @@ void MonitorPipeline::loadFiles() {
       const MeshResource file =
           loadFile(body, "topology/file", "an STL, OBJ or PLY", [&] { return loadTopologyFile(body.topology_file); });
       body.input.file_topology = file.topology;
+      body.input.file_dropped_faces = file.dropped_faces;
       remarks_[b] = remarksOf(body.topology_file, file);
       addGroups(file, body.topology_file, setsNamed(b), body);
       checkGrid(body);
@@ -104,6 +105,7 @@ void MonitorPipeline::loadFiles() {
     MeshFrame& frame = rigid_[b].emplace();
     frame.topology = mesh.topology;
     frame.positions = std::move(mesh.positions);
+    frame.dropped_faces = mesh.dropped_faces;
     frame.rigid = true;
     if (body.input.noise_radius_m > 0) frame.radius_m.assign(frame.positions.size(), body.input.noise_radius_m);
   }

@@ -299,12 +299,34 @@ TEST(Polygons, WhatCannotBeTriangulatedIsUnchecked) {
   EXPECT_FALSE(unchecked({0, 0, 1, 2, 2, 0})) << "the same one again is no other corner";
   EXPECT_FALSE(unchecked({0, 1, 4})) << "a triangle is itself";
   EXPECT_FALSE(unchecked({0, 1, 6})) << "be it where it may";
-  for (const std::vector<Index>& few : {std::vector<Index>{}, {0}, {0, 1}, {0, 1, 1}, {1, 1, 1}}) {
+  for (const std::vector<Index>& few : {std::vector<Index>{0}, {0, 1}, {0, 1, 1}, {1, 1, 1}}) {
     EXPECT_TRUE(unchecked(few));
   }
   EXPECT_TRUE(unchecked({0, 1, 2, 6}));
-  EXPECT_TRUE(facesOf(polygonsOf({{0, 1, 2, 6}}), points).unseen);
-  EXPECT_FALSE(facesOf(polygonsOf({{0, 2, 1, 3}}), points).unseen);
+  EXPECT_TRUE(facesOf(polygonsOf({{}}), points).unchecked.empty());
+}
+
+TEST(Polygons, WhatTheyBecameIsKeptAndWhatWasNotFiniteIsLookedAtAgain) {
+  // A dart, a bow tie and an L, whose last corner is missing at first; and an edge that only the L has.
+  Positions points = DART;
+  points.insert(points.end(), {{5, 0, 0}, {6, 1, 0}, {6, 0, 0}, {5, 1, 0}});
+  points.insert(points.end(), L.begin(), L.end());
+  const Polygons polygons = polygonsOf({{0, 1, 2, 3}, {4, 5, 6, 7}, {8, 9, 10, 11, 12, 13}, {8, 9}});
+  Positions gap = points;
+  gap.back().x() = std::nan("");
+  const PolygonFaces first = facesOf(polygons, gap);
+  EXPECT_EQ(first.unchecked, (std::vector<std::size_t>{1, 2, 3}));
+  EXPECT_EQ(first.unseen, (std::vector<std::size_t>{2}));
+  // By then the dart is convex, and the bow tie a square.
+  points[3] = {-1, 1, 0};
+  std::swap(points[5], points[6]);
+  const PolygonFaces second = facesOf(polygons, points, &first);
+  EXPECT_EQ(second.unchecked, (std::vector<std::size_t>{1}));
+  EXPECT_TRUE(second.unseen.empty());
+  EXPECT_EQ(second.faces.size(), 6u);
+  EXPECT_TRUE(std::equal(first.faces.begin(), first.faces.end(), second.faces.begin()));
+  EXPECT_EQ(second.ends, (std::vector<std::size_t>{2, 2, 6, 6}));
+  EXPECT_NE(facesOf(polygons, points).faces, second.faces) << "as if they had not come before";
 }
 
 TEST(Polygons, AnEdgeOrAVertexThatAFaceHasIsChecked) {
