@@ -159,7 +159,7 @@ TEST_F(OddFiles, ADaeIsNoTopologyOfATracker) {
   EXPECT_EQ(load(ours("pyramid.obj")), "");
 }
 
-TEST_F(OddFiles, PclPrintsNothingOfThem) {
+TEST_F(OddFiles, NothingIsPrintedOfThem) {
   const std::string head =
       "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nproperty uchar red\nend_header\n";
   ::testing::internal::CaptureStdout();
