@@ -41,9 +41,8 @@ find_package(yaml-cpp REQUIRED)
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
   src/input/depth_surface.cpp src/input/known_types.cpp src/input/mesh_decoder.cpp src/input/mesh_file.cpp
-  src/input/mesh_views.cpp src/input/polygons.cpp
-  src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp src/input/soup_weld.cpp src/input/stl_file.cpp
-  src/input/text_lines.cpp
+  src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp
+  src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
   src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
   src/parameters/parameter_reader.cpp src/parameters/parameter_yaml.cpp src/scene/physics/expectations.cpp
   src/scene/physics/scene_file.cpp)
