@@ -49,6 +49,12 @@ std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh) {
   return std::move(made.ends);
 }
 
+void remarkUnchecked(const std::function<std::string(std::size_t)>& name, MeshFile& mesh) {
+  if (mesh.unchecked.empty()) return;
+  mesh.remarks.push_back(std::to_string(mesh.unchecked.size()) +
+                         " polygons cannot be used and are unchecked, the first is " + name(mesh.unchecked[0]));
+}
+
 bool isPadding(std::string_view bytes) {
   return bytes.find_first_not_of(std::string_view("\0 \t\r\n", 5)) == std::string_view::npos;
 }

@@ -1,6 +1,7 @@
 // Mesh files: what a reader makes of one, and what the readers share. doc/mesh_files.md has the grammar of each format.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -43,6 +44,8 @@ void requireReadable(const std::string& path);
 std::string readWholeFile(const std::string& path);
 /// Makes the mesh's faces of the polygons. Returns where each polygon ends among the faces.
 std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh);
+/// A remark where polygons are unchecked. `name` says of the first one where it stands in the file.
+void remarkUnchecked(const std::function<std::string(std::size_t)>& name, MeshFile& mesh);
 /// What stands behind the end of a binary file can hold no geometry: zeros, blanks and ends of lines.
 bool isPadding(std::string_view bytes);
 /// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first

@@ -48,6 +48,7 @@ class ObjReader {
                           "), and a mesh is of the ones or the others; write them to two files");
     }
     nameGroups(setPolygons(std::move(polygons_), mesh_));
+    remarkUnchecked([&](std::size_t p) { return "in line " + std::to_string(face_lines_[p]); }, mesh_);
     if (unknown_lines_ > 0) {
       mesh_.remarks.push_back(std::to_string(unknown_lines_) +
                               " lines with unknown keywords are skipped, the first is " + first_unknown_);
@@ -129,6 +130,7 @@ class ObjReader {
     corners_.clear();
     for (std::size_t w = 1; w < words_.size(); ++w) corners_.push_back(cornerOf(words_[w], 3));
     polygons_.add(corners_);
+    face_lines_.push_back(words_[0].line);
   }
 
   void readLine() {
@@ -204,6 +206,7 @@ class ObjReader {
   std::vector<TextWord> words_;  // of the statement
   MeshFile mesh_;
   Polygons polygons_;
+  std::vector<std::size_t> face_lines_;  // of the polygons
   std::vector<Index> corners_;
   Index furthest_ = 0;  // of the vertices that were named before they came
   TextWord furthest_word_{{}, 0};

@@ -287,6 +287,11 @@ class PlyReader {
     }
     if (std::string remark = body->finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
     setPolygons(std::move(polygons_), mesh_);
+    const auto name = [&](std::size_t p) {
+      return p >= faces_begin_ && p < faces_end_ ? "polygon " + std::to_string(p - faces_begin_)
+                                                 : std::string("a triangle of a strip");
+    };
+    remarkUnchecked(name, mesh_);
     return std::move(mesh_);
   }
 
@@ -402,6 +407,7 @@ class PlyReader {
   void readPolygons(const Element& element, PlyBody& body) {
     const std::size_t list = propertyOf(element, {"vertex_indices", "vertex_index"}, true);
     const bool strips = element.name == "tristrips";
+    if (!strips) faces_begin_ = polygons_.size();
     forRows(element, body, [&](std::size_t i) {
       const Property& property = element.properties[i];
       if (i != list) return skipValue(property, body);
@@ -420,6 +426,7 @@ class PlyReader {
         polygons_.add(corners_);
       }
     });
+    if (!strips) faces_end_ = polygons_.size();
   }
 
   const std::string& bytes_;
@@ -428,6 +435,7 @@ class PlyReader {
   PlyHeader header_;
   MeshFile mesh_;
   Polygons polygons_;
+  std::size_t faces_begin_ = 0, faces_end_ = 0;  // of the element `face` among the polygons
   std::vector<Index> corners_;
 };
 

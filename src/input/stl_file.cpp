@@ -80,6 +80,12 @@ class AsciiReader {
   Positions corners_;
 };
 
+MeshFile meshOf(const Positions& corners, const std::string& path) {
+  MeshFile mesh = weldTriangles(corners, path);
+  remarkUnchecked([](std::size_t t) { return "triangle " + std::to_string(t); }, mesh);
+  return mesh;
+}
+
 bool isText(const std::string& bytes, const std::string& path) {
   TextLines lines(bytes, path);
   return lines.nextWithWords() && inSmallLetters(lines.words()[0].text) == "solid" &&
@@ -96,7 +102,7 @@ MeshFile loadStlFile(const std::string& path) {
   // count are more than any file has that is read.
   const std::size_t end = BEGIN_BYTES + std::size_t{triangles} * TRIANGLE_BYTES;
   if (bytes.size() < BEGIN_BYTES || bytes.size() < end) {
-    if (isText(bytes, path)) return weldTriangles(AsciiReader(bytes, path).read(), path);
+    if (isText(bytes, path)) return meshOf(AsciiReader(bytes, path).read(), path);
     throw MeshFileError(
         path + ": neither an ASCII STL nor a binary one of the size that it states: " + std::to_string(triangles) +
         " triangles take " + std::to_string(end) + " bytes, and it has " + std::to_string(bytes.size()));
@@ -106,7 +112,7 @@ MeshFile loadStlFile(const std::string& path) {
     throw MeshFileError(path + ": states " + std::to_string(triangles) + " triangles, and " + rest +
                         " that are not empty follow them; correct the count (byte 80), or cut them off");
   }
-  MeshFile mesh = weldTriangles(binaryCorners(bytes, triangles), path);
+  MeshFile mesh = meshOf(binaryCorners(bytes, triangles), path);
   if (bytes.size() > end) mesh.remarks.push_back(rest + " of padding after the last triangle are skipped");
   return mesh;
 }

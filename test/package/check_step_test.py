@@ -154,6 +154,7 @@ class FilesTest(unittest.TestCase):
 
     def test_a_face_that_repeats_a_corner_is_unchecked(self):
         self.assertEqual(self.obj('f 1 2 3\nf 4 5 6\nf 2 4 4\n'), NOT_PROVED, self.said)
+        self.assertIn('0.obj: 1 polygons cannot be used and are unchecked, the first is in line 9', self.remarks)
 
     def test_ropes(self):
         text = 'v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0.3 -0.2 %(z)s\nv 0.3 0.2 %(z)s\nl 1 2 3\nl 4 5\n'

@@ -47,7 +47,6 @@ Triangles trianglesOf(const Positions& p, const std::vector<Face>& faces) {
 }
 
 // --- the other readers, each in a child process: they crash, and some print
-// ----------------------------------------------
 
 using Answer = std::optional<Triangles>;  // nothing: refused, or the child did not come to an end
 
@@ -137,7 +136,6 @@ Answer byPcl(const std::string& path) {
 }
 
 // --- what is written
-// -----------------------------------------------------------------------------------------------------
 
 struct Mesh {
   Positions positions;  // all different, of few bits, so that readers that round to float do not round them

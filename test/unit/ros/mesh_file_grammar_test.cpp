@@ -53,8 +53,14 @@ void expectTwo(const MeshFile& mesh, const std::string& what) {
   EXPECT_TRUE(mesh.unchecked.empty()) << what;
 }
 
+void expectUnchecked(const MeshFile& mesh, const std::vector<std::size_t>& polygons, const std::string& first) {
+  EXPECT_EQ(mesh.unchecked, polygons);
+  ASSERT_EQ(mesh.remarks.size(), 1u);
+  EXPECT_TRUE(mentions(mesh.remarks[0], "are unchecked, the first is ")) << mesh.remarks[0];
+  EXPECT_TRUE(mentions(mesh.remarks[0], first)) << mesh.remarks[0];
+}
+
 // --- OBJ
-// ---------------------------------------------------------------------------------------------------------------
 
 class ObjGrammar : public Grammar {
  protected:
@@ -185,7 +191,7 @@ TEST_F(ObjGrammar, RepeatedCorners) {
   EXPECT_EQ(mesh.polygons.size(), 3u);
   EXPECT_EQ(mesh.faces, TWO) << "2 4 4 is an edge of the last face";
   EXPECT_TRUE(mesh.unchecked.empty());
-  EXPECT_EQ(faces("f 1 2 3\nf 2 4 4\n").unchecked, std::vector<std::size_t>{1});
+  expectUnchecked(faces("f 1 2 3\nf 2 4 4\n"), {1}, "in line 6");
 }
 
 TEST_F(ObjGrammar, Lines) {
@@ -254,7 +260,6 @@ TEST_F(ObjGrammar, UnknownKeywords) {
 }
 
 // --- STL
-// ---------------------------------------------------------------------------------------------------------------
 
 class StlGrammar : public Grammar {
  protected:
@@ -376,11 +381,10 @@ TEST_F(StlGrammar, NotFinite) {
 TEST_F(StlGrammar, RepeatedCorners) {
   const std::string thin = facet({"0 0 0", "1 0 0", "1 0 0"}), apart = facet({"5 0 0", "6 0 0", "6 0 0"});
   expectTwo(read("a.stl", solid(two() + thin)), "an edge of a face");
-  EXPECT_EQ(read("a.stl", solid(two() + apart)).unchecked, std::vector<std::size_t>{2});
+  expectUnchecked(read("a.stl", solid(two() + apart)), {2}, "triangle 2");
 }
 
 // --- PLY
-// ---------------------------------------------------------------------------------------------------------------
 
 class PlyGrammar : public Grammar {
  protected:
@@ -540,10 +544,9 @@ TEST_F(PlyGrammar, VerticesThatAreNotThere) {
 }
 
 TEST_F(PlyGrammar, RepeatedCorners) {
-  EXPECT_EQ(read("a.ply", head(xyz() + faceElement()) + points() + "3 0 1 2\n3 3 1 3\n").unchecked,
-            std::vector<std::size_t>{1});
-  EXPECT_EQ(read("a.ply", head(xyz() + faceElement(3)) + points() + "3 0 1 2\n2 0 3\n3 2 1 3\n").unchecked,
-            std::vector<std::size_t>{1});
+  expectUnchecked(read("a.ply", head(xyz() + faceElement()) + points() + "3 0 1 2\n3 3 1 3\n"), {1}, "polygon 1");
+  expectUnchecked(read("a.ply", head(xyz() + faceElement(3)) + points() + "3 0 1 2\n2 0 3\n3 2 1 3\n"), {1},
+                  "polygon 1");
 }
 
 TEST_F(PlyGrammar, Strips) {
@@ -557,7 +560,7 @@ TEST_F(PlyGrammar, Strips) {
   expectTwo(read("a.ply", strips("3 0 1 2\n3 2 1 3\n", "2")), "two of them");
   EXPECT_EQ(read("a.ply", strips("6 3 0 1 2 -1 0\n")).faces, (std::vector<Face>{{3, 0, 1}, {1, 0, 2}}));
   expectRefused("a.ply", strips("4 0 1 2 -2\n"), "a.ply:14: ", "strip 0 names vertex -2 of 4");
-  EXPECT_EQ(read("a.ply", strips("6 0 1 2 -1 1 3\n")).unchecked, std::vector<std::size_t>{1}) << "an edge of no face";
+  expectUnchecked(read("a.ply", strips("6 0 1 2 -1 1 3\n")), {1}, "of a strip");
 }
 
 TEST_F(PlyGrammar, OtherElements) {
@@ -592,7 +595,6 @@ TEST_F(PlyGrammar, EndOfBytes) {
 }
 
 // --- the page
-// ----------------------------------------------------------------------------------------------------------
 
 TEST(MeshFilesPage, EachRowIsATestAndEachTestARow) {
   std::ifstream page(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/doc/mesh_files.md");
