@@ -63,19 +63,19 @@ class ObjReader {
     words_.clear();
     bool comment = takeWords(0);
     while (goesOn()) {
-      const std::size_t known = lines_.words().size();
+      const std::size_t before = lines_.words().size();
       // What stands before the mark and what follows it are two words: they never are one, whoever reads them.
       const TextWord mark = lines_.words().back();
       if (!lines_.append()) lines_.fail("ends in '\\', and no line follows");
       const bool skipped = comment || (!words_.empty() && !isOneOf(READ, words_[0].text));
-      if (skipped && lines_.words().size() > known && isKnown(lines_.words()[known].text)) {
+      if (skipped && lines_.words().size() > before && isKnown(lines_.words()[before].text)) {
         lines_.fail(mark,
                     "ends a line that is skipped, and it is not certain that the next line belongs to it; remove '\\'");
       }
       if (mark.text != "\\" && !lines_.text().empty() && !isBlank(lines_.text()[0])) {
         lines_.fail(mark, "ends in '\\', and the next line begins without a blank: write one before the '\\'");
       }
-      if (!comment) comment = takeWords(known);
+      if (!comment) comment = takeWords(before);
     }
     return true;
   }

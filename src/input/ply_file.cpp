@@ -275,6 +275,7 @@ class PlyReader {
 
   MeshFile read() {
     requireMesh();
+    vertices_ = elementNamed("vertex")->count;
     const std::unique_ptr<PlyBody> body = openBody();
     for (const Element& element : header_.elements) {
       if (element.name == "vertex") {
@@ -387,9 +388,8 @@ class PlyReader {
   }
 
   Index vertexOf(std::int64_t v, const PlyBody& body) const {
-    const std::uint64_t vertices = elementNamed("vertex")->count;
-    if (v < 0 || static_cast<std::uint64_t>(v) >= vertices || v >= std::int64_t{NO_INDEX}) {
-      body.fail("names vertex " + std::to_string(v) + " of " + std::to_string(vertices));
+    if (v < 0 || static_cast<std::uint64_t>(v) >= vertices_ || v >= std::int64_t{NO_INDEX}) {
+      body.fail("names vertex " + std::to_string(v) + " of " + std::to_string(vertices_));
     }
     return static_cast<Index>(v);
   }
@@ -435,6 +435,7 @@ class PlyReader {
   PlyHeader header_;
   MeshFile mesh_;
   Polygons polygons_;
+  std::uint64_t vertices_ = 0;
   std::size_t faces_begin_ = 0, faces_end_ = 0;  // of the element `face` among the polygons
   std::vector<Index> corners_;
 };
