@@ -29,7 +29,6 @@ find_path(OWN_MESSAGES deformable_ccd/ContactArray.h REQUIRED)
 find_path(ROS_MESSAGES std_msgs/Header.h REQUIRED)
 #catkin_lint: ignore_once duplicate_find
 find_package(PCL REQUIRED COMPONENTS common)
-find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 find_library(LZ4_LIBRARY lz4 REQUIRED)  # flann's headers call it, where nothing is optimised away
 foreach(library rosconsole roscpp_serialization rostime)
   find_library(${library}_LIBRARY ${library} REQUIRED)
@@ -42,15 +41,15 @@ find_package(yaml-cpp REQUIRED)
 file(GLOB MESSAGE_TYPES CONFIGURE_DEPENDS src/input/message_types/*.cpp)
 add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
   src/input/depth_surface.cpp src/input/known_types.cpp src/input/mesh_decoder.cpp src/input/mesh_file.cpp
-  src/input/mesh_views.cpp
-  src/input/message_type.cpp src/input/obj_file.cpp src/input/soup_weld.cpp src/input/stl_file.cpp
+  src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp
+  src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
   src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
   src/parameters/parameter_reader.cpp src/parameters/parameter_yaml.cpp src/scene/physics/expectations.cpp
   src/scene/physics/scene_file.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC
-  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${PCL_IO_PLY_LIBRARY} ${LZ4_LIBRARY})
+  deformable_ccd_archive yaml-cpp ${HEADER_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${LZ4_LIBRARY})
 
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/fuzz_targets.txt "")
 add_custom_target(fuzzers)

@@ -90,7 +90,12 @@ if(DEFORMABLE_CCD_CORE_ONLY)
   return()
 endif()
 add_gtest_suite(octomap_tests SOURCES ${octomap_SOURCES} LIBRARIES deformable_ccd_octomap)
-add_gtest_suite(ros_tests SOURCES ${ros_SOURCES} LIBRARIES deformable_ccd_ros)
+# One test holds our readers of mesh files beside those of assimp and PCL.
+find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
+set_source_files_properties(test/unit/ros/mesh_file_differential_test.cpp PROPERTIES
+  INCLUDE_DIRECTORIES "${PCL_INCLUDE_DIRS}")
+add_gtest_suite(ros_tests SOURCES ${ros_SOURCES}
+  LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY})
 if(TARGET deformable_ccd_physics)
   add_gtest_suite(physics_tests SOURCES ${physics_SOURCES} LIBRARIES deformable_ccd_physics deformable_ccd)
 endif()

@@ -31,6 +31,10 @@ class DCCD_EXPORT Topology {
   /// Rope: edges between consecutive points, no faces. Throws when vertex_count < 2.
   static Topology polyline(std::size_t vertex_count);
 
+  /// Ropes: the edges as they are given, no faces. An edge given twice is kept once. Throws TopologyError on an index
+  /// >= vertex_count or an edge that repeats a vertex.
+  static Topology fromEdges(std::size_t vertex_count, const std::vector<Edge>& edges);
+
   std::size_t vertexCount() const { return vertex_count_; }
   const std::vector<Face>& faces() const { return faces_; }
   const std::vector<Edge>& edges() const { return edges_; }

@@ -9,6 +9,7 @@
 
 #include "apps/analyze_bag/result_bag.h"
 #include "apps/analyze_bag/study_runner.h"
+#include "apps/decimal_options.h"
 #include "dccd/accuracy.h"
 #include "dccd/simd_target.h"
 #include "node/bag_replay.h"
@@ -228,6 +229,7 @@ int main(int argc, char** argv) {
       "  1  an error, and a line that says which\n"
       "  3  answered, but not all of it is proved, or no frame was answered; a line says why");
   try {
+    requireDecimalNumbers(app);
     app.parse(argc, argv);
     a.command = commandLine(argc, argv);
     return analyze(a);

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "apps/decimal_options.h"
 #include "dccd/detect.h"
 #include "dccd/simd_target.h"
 #include "input/mesh_file.h"
@@ -67,6 +68,7 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_flag("--earliest-only", a.earliest_only, "only the first contacts");
   app.add_flag("--forget", a.forget,
                "of several steps: each without what the ones before have shown; no answer changes");
+  requireDecimalNumbers(app);
   app.parse(argc, argv);
   if (a.accuracy == "all" && a.isSequence()) throw std::runtime_error("--accuracy all takes two frames");
   if (a.accuracy == "all" && app.count("--repeat") == 0) a.repeat = MOST_ROUNDS;
@@ -194,21 +196,33 @@ void print(const Run& run) {
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
 
+MeshFile frameOf(const std::string& path) {
+  MeshFile frame = loadMeshFile(path);
+  for (const std::string& remark : frame.remarks) std::cerr << "check_step: " << path << ": " << remark << '\n';
+  return frame;
+}
+
+std::string sizesOf(const MeshFile& frame) {
+  return std::to_string(frame.positions.size()) + " vertices, " + std::to_string(frame.polygons.size()) +
+         " faces and " + std::to_string(frame.edges.size()) + " edges of lines";
+}
+
 std::vector<Step> stepsOf(const Arguments& a) {
-  const MeshFile first = loadMeshFile(a.frames[0]);
+  const MeshFile first = frameOf(a.frames[0]);
   Step step;
   step.bodies.resize(1);
   step.bodies[0].name = a.frames[0];
-  step.bodies[0].topology = share(Topology::fromTriangles(first.positions.size(), first.faces));
+  step.bodies[0].topology = share(first.edges.empty() ? Topology::fromTriangles(first.positions.size(), first.faces)
+                                                      : Topology::fromEdges(first.positions.size(), first.edges));
+  step.bodies[0].dropped_faces = first.unchecked.size();
   step.bodies[0].t1 = share(first.positions);
   std::vector<Step> steps;
   for (std::size_t i = 1; i < a.frames.size(); ++i) {
-    const MeshFile next = loadMeshFile(a.frames[i]);
-    if (first.positions.size() != next.positions.size() || first.faces != next.faces) {
-      throw std::runtime_error(
-          a.frames[i] + ": not the topology of " + a.frames[0] + " (" + std::to_string(next.positions.size()) +
-          " vertices and " + std::to_string(next.faces.size()) + " faces, expected " +
-          std::to_string(first.positions.size()) + " and " + std::to_string(first.faces.size()) + ", the same ones)");
+    const MeshFile next = frameOf(a.frames[i]);
+    if (first.positions.size() != next.positions.size() || !(first.polygons == next.polygons) ||
+        first.edges != next.edges) {
+      throw std::runtime_error(a.frames[i] + ": not the topology of " + a.frames[0] + " (" + sizesOf(next) +
+                               ", expected " + sizesOf(first) + ", the same ones)");
     }
     step.bodies[0].t0 = step.bodies[0].t1;
     step.bodies[0].t1 = share(next.positions);

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "apps/decimal_options.h"
 #include "apps/make_scene_bag/monitor_check.h"
 #include "apps/make_scene_bag/recorder.h"
 #include "scene/physics/scene_file.h"
@@ -28,6 +29,7 @@ int main(int argc, char** argv) {
   app.add_option("--monitor-config", options.monitor_config_path,
                  "Also write the scene's parameters for the monitor here");
   app.add_flag("--quiet", options.quiet, "No progress bar");
+  dccd::requireDecimalNumbers(app);
   CLI11_PARSE(app, argc, argv);
   try {
     const dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);

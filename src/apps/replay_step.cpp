@@ -5,6 +5,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "apps/decimal_options.h"
 #include "dccd/simd_target.h"
 #include "record/explain.h"
 #include "record/step_replay.h"
@@ -35,6 +36,7 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto; the answer does not depend on it")->capture_default_str();
   app.add_option("--show", a.show, "contacts to list")->capture_default_str();
+  requireDecimalNumbers(app);
   app.parse(argc, argv);
   return a;
 }
@@ -43,17 +45,17 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
 std::vector<std::uint32_t> numbersOf(const std::string& text, std::size_t count) {
   std::istringstream in(text.substr(3));
   std::vector<std::uint32_t> numbers;
-  while (numbers.size() < count) {
-    std::int64_t number = -1;
-    char comma = ',';
-    if ((!numbers.empty() && !(in >> comma)) || comma != ',' || !(in >> number) || number < 0 || number >= NO_INDEX) {
-      throw std::invalid_argument("--pair " + text + ": " + std::to_string(count) +
-                                  " numbers are needed, separated by commas");
+  for (std::string word; std::getline(in, word, ',');) {
+    const auto number = decimalInteger(word);
+    if (!number || *number < 0 || *number >= NO_INDEX) {
+      throw std::invalid_argument("--pair " + text + ": '" + word + "' is no number of a vertex or a voxel");
     }
-    numbers.push_back(static_cast<std::uint32_t>(number));
+    numbers.push_back(static_cast<std::uint32_t>(*number));
   }
-  std::string rest;
-  if (in >> rest) throw std::invalid_argument("--pair " + text + ": '" + rest + "' is too much");
+  if (numbers.size() != count || text.back() == ',') {
+    throw std::invalid_argument("--pair " + text + ": " + std::to_string(count) +
+                                " numbers are needed, separated by commas");
+  }
   return numbers;
 }
 

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/decimal_options.h"
 #include "dccd/accuracy.h"
 #include "dccd/elementary.h"
 #include "oracle/oracle.h"
@@ -257,6 +258,7 @@ int main(int argc, char** argv) {
   app.add_option("--toc-bits", options.toc_bits, "exact: bits of the TOC's cell, 10 to 52")->capture_default_str();
   app.add_option("--max-subdivisions", options.max_subdivisions, "conservative: cap per pair")->capture_default_str();
   try {
+    dccd::requireDecimalNumbers(app);
     app.parse(argc, argv);
     return dccd::runQueries(dirs, accuracy, options, format == "csv");
   } catch (const CLI::ParseError& error) {

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -27,7 +28,7 @@ namespace {
 constexpr rlim_t CHILD_BYTES = rlim_t{1} << 30;  // on top of what this process has
 constexpr rlim_t CHILD_CPU_S = 20;
 constexpr std::chrono::seconds CHILD_WALL{60};
-constexpr char GOOD = 'm', BAD = 'e';  // the first byte of an answer: corners follow, or words
+constexpr char GOOD = 'm', BAD = 'e';  // the first byte of an answer: polygons follow, or words
 
 Eigen::Affine3d affine(const aiMatrix4x4& m) {
   Eigen::Affine3d out;
@@ -35,7 +36,7 @@ Eigen::Affine3d affine(const aiMatrix4x4& m) {
   return out;
 }
 
-void addTriangles(const aiScene& scene, const aiNode& root, Positions& corners) {
+void addPolygons(const aiScene& scene, const aiNode& root, Positions& corners, std::vector<std::uint64_t>& ends) {
   struct Placed {
     const aiNode* node;
     Eigen::Affine3d parent;
@@ -49,28 +50,36 @@ void addTriangles(const aiScene& scene, const aiNode& root, Positions& corners) 
       const aiMesh& mesh = *scene.mMeshes[at.node->mMeshes[i]];
       for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
         const aiFace& face = mesh.mFaces[f];
-        for (unsigned k = 0; face.mNumIndices == 3 && k < 3; ++k) {
+        for (unsigned k = 0; k < face.mNumIndices; ++k) {
           const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
           corners.push_back(transform * Vec3(p.x, p.y, p.z));
         }
+        ends.push_back(corners.size());
       }
     }
     for (unsigned c = at.node->mNumChildren; c-- > 0;) open.push_back({at.node->mChildren[c], transform});
   }
 }
 
-/// In the child: a byte, then the corners' coordinates or words.
+/// In the child: a byte, then words; or the number of polygons, their ends and the coordinates of their corners.
 std::string answerOf(const std::string& bytes) {
   try {
     Assimp::Importer importer;
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-    const aiScene* scene = importer.ReadFileFromMemory(bytes.data(), bytes.size(),
-                                                       aiProcess_ValidateDataStructure | aiProcess_Triangulate, "dae");
+    const aiScene* scene =
+        importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_ValidateDataStructure, "dae");
     if (!scene || !scene->mRootNode) return BAD + std::string(importer.GetErrorString());
     Positions corners;
-    addTriangles(*scene, *scene->mRootNode, corners);
-    std::string answer(1 + corners.size() * sizeof(Vec3), GOOD);
-    if (!corners.empty()) std::memcpy(answer.data() + 1, corners.data()->data(), answer.size() - 1);
+    std::vector<std::uint64_t> ends;
+    addPolygons(*scene, *scene->mRootNode, corners, ends);
+    std::string answer(1, GOOD);
+    const auto append = [&](const void* data, std::size_t size) {
+      answer.append(static_cast<const char*>(data), size);
+    };
+    const std::uint64_t count = ends.size();
+    append(&count, sizeof count);
+    append(ends.data(), ends.size() * sizeof ends[0]);
+    append(corners.data(), corners.size() * sizeof corners[0]);
     return answer;
   } catch (const std::exception& error) {
     return BAD + std::string(error.what());
@@ -144,20 +153,37 @@ std::string askChild(const std::string& path, const std::string& bytes) {
   return answer;
 }
 
+/// What a child says that came to its end. False: this one did not.
+bool readPolygons(const std::string& answer, Positions& corners, std::vector<std::size_t>& ends) {
+  constexpr std::size_t HEAD = 1 + sizeof(std::uint64_t);
+  std::uint64_t count = 0;
+  if (answer.size() < HEAD) return false;
+  std::memcpy(&count, answer.data() + 1, sizeof count);
+  if (count > (answer.size() - HEAD) / sizeof count) return false;
+  const std::size_t begin = HEAD + count * sizeof count, bytes = answer.size() - begin;
+  if (bytes % sizeof(Vec3) != 0) return false;
+  ends.resize(count);
+  corners.resize(bytes / sizeof(Vec3));
+  if (count > 0) std::memcpy(ends.data(), answer.data() + HEAD, begin - HEAD);
+  if (bytes > 0) std::memcpy(corners.data()->data(), answer.data() + begin, bytes);
+  return std::is_sorted(ends.begin(), ends.end()) && (ends.empty() ? 0 : ends.back()) == corners.size();
+}
+
 }  // namespace
 
 MeshFile loadDaeFile(const std::string& path) {
   const std::string answer = askChild(path, readWholeFile(path));
-  const std::size_t bytes = answer.empty() ? 0 : answer.size() - 1;
-  if (answer.empty() || (answer[0] == GOOD && bytes % (3 * sizeof(Vec3)) != 0)) {
+  Positions corners;
+  std::vector<std::size_t> ends;
+  if (!answer.empty() && answer[0] == BAD) {
+    throw MeshFileError(path + ": not a readable .dae mesh: " + answer.substr(1));
+  }
+  if (!readPolygons(answer, corners, ends)) {
     throw MeshFileError(path + ": assimp did not come to an end of it within " + std::to_string(CHILD_CPU_S) +
                         " s and 1 GiB, or crashed; the file is damaged");
   }
-  if (answer[0] == BAD) throw MeshFileError(path + ": not a readable .dae mesh: " + answer.substr(1));
-  Positions corners(bytes / sizeof(Vec3));
-  if (bytes > 0) std::memcpy(corners.data()->data(), answer.data() + 1, bytes);
   if (corners.empty()) throw MeshFileError(path + ": there are no triangles");
-  return weldTriangles(corners, path);
+  return weldPolygons(corners, std::move(ends), path);
 }
 
 }  // namespace dccd

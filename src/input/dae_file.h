@@ -13,8 +13,8 @@
 
 namespace dccd {
 
-/// Every triangle of the scene, in metres by the file's unit, with the transforms of its nodes; the axes are the file's
-/// own whatever its up_axis is, as in RViz. Coordinates are of single precision in assimp. Welded by weldTriangles().
+/// Every polygon of the scene, in metres by the file's unit, with the transforms of its nodes; the axes are the file's
+/// own whatever its up_axis is, as in RViz. Coordinates are of single precision in assimp. Welded by weldPolygons().
 /// Throws MeshFileError naming the file and what is wrong with it.
 MeshFile loadDaeFile(const std::string& path);
 

@@ -13,33 +13,12 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& text) { throw MeshError(StepStatus::BAD_MESSAGE, text); }
 
-/// Faces as they were sent: those that span a surface, and those that repeat a vertex.
-struct SentFaces {
-  std::vector<Face> proper, repeating;
-
-  void add(const Face& face) {
-    const bool repeats = face[0] == face[1] || face[1] == face[2] || face[0] == face[2];
-    (repeats ? repeating : proper).push_back(face);
-  }
-};
-
-/// A face that repeats a vertex is no more than an edge or a vertex. Where a proper face has that, too, it is looked
-/// at; else it is dropped.
-std::uint64_t countDropped(const std::vector<Face>& repeating, const Topology& topology) {
-  return static_cast<std::uint64_t>(std::count_if(repeating.begin(), repeating.end(), [&](const Face& face) {
-    const auto ends = std::minmax({face[0], face[1], face[2]});
-    if (ends.first == ends.second) {
-      return !std::binary_search(topology.usedVertices().begin(), topology.usedVertices().end(), ends.first);
-    }
-    return !std::binary_search(topology.edges().begin(), topology.edges().end(), Edge{ends.first, ends.second});
-  }));
-}
-
-void requireSomething(const Topology& topology, std::size_t faces) {
-  if (!topology.usedVertices().empty()) return;
+void requireSomething(const PolygonFaces& faces) {
+  if (!faces.faces.empty()) return;
   refuse("there is nothing to check: " +
-         (faces == 0 ? "the message has no triangle"
-                     : "all of its " + std::to_string(faces) + " triangles name a vertex twice"));
+         (faces.ends.empty() ? "the message has no triangle"
+                             : "none of its " + std::to_string(faces.ends.size()) +
+                                   " faces can be used; they name a vertex twice, or are no polygons with an area"));
 }
 
 std::size_t faceCount(const IndexedView& mesh) {
@@ -48,26 +27,29 @@ std::size_t faceCount(const IndexedView& mesh) {
   return count;
 }
 
-SentFaces triangulated(const IndexedView& mesh, std::size_t points) {
-  SentFaces faces;
-  const auto add = [&](Index a, Index b, Index c) {
-    for (const Index v : {a, b, c}) {
-      if (v >= points) {
-        refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
-      }
-    }
-    faces.add({a, b, c});
-  };
-  faces.proper.reserve(mesh.triangles.size);
+/// All that it has, as polygons.
+Polygons polygonsOf(const IndexedView& mesh) {
+  Polygons polygons;
+  polygons.corners.reserve(3 * mesh.triangles.size);
+  polygons.ends.reserve(mesh.triangles.size + mesh.polygons.size());
+  const auto end = [&] { polygons.ends.push_back(polygons.corners.size()); };
   for (std::size_t i = 0; i < mesh.triangles.size; ++i) {
     const auto t = mesh.triangles[i];
-    add(t[0], t[1], t[2]);
+    polygons.corners.insert(polygons.corners.end(), t.begin(), t.end());
+    end();
   }
   for (const auto& polygon : mesh.polygons) {
-    if (polygon.size == 1 || polygon.size == 2) add(polygon[0], polygon[0], polygon[polygon.size - 1]);
-    for (std::size_t k = 2; k < polygon.size; ++k) add(polygon[0], polygon[k - 1], polygon[k]);
+    for (std::size_t k = 0; k < polygon.size; ++k) polygons.corners.push_back(polygon[k]);
+    end();
   }
-  return faces;
+  return polygons;
+}
+
+void requireVertices(const Polygons& polygons, std::size_t points) {
+  for (const Index v : polygons.corners) {
+    if (v < points) continue;
+    refuse("triangle index " + std::to_string(v) + ", but there are " + std::to_string(points) + " vertices");
+  }
 }
 
 Eigen::Affine3d markerTransform(const MarkerView& marker) {
@@ -81,7 +63,14 @@ Eigen::Affine3d markerTransform(const MarkerView& marker) {
   transform.translation() = Vec3(marker.pose[0], marker.pose[1], marker.pose[2]);
   const Vec3 scale(marker.scale[0], marker.scale[1], marker.scale[2]);
   if (!scale.allFinite()) refuse("scale is not finite");
-  if ((scale.array() != 0).all()) transform.linear() = transform.linear() * scale.asDiagonal();
+  if (scale.isZero(0)) return transform;  // it was never set
+  if ((scale.array() == 0).any()) {
+    std::ostringstream text;
+    text << "scale is (" << scale.x() << ", " << scale.y() << ", " << scale.z()
+         << "), which leaves the mesh no depth; set no component to 0, or all three for no scale";
+    refuse(text.str());
+  }
+  transform.linear() = transform.linear() * scale.asDiagonal();
   return transform;
 }
 
@@ -167,8 +156,7 @@ void MeshDecoder::start(const HeaderView& header, DecodedMesh& mesh) const {
   }
 }
 
-std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, std::size_t grid_rows,
-                                                           std::size_t grid_cols) {
+void MeshDecoder::takeFixed(std::size_t points, std::size_t grid_rows, std::size_t grid_cols, DecodedMesh& mesh) {
   const auto mismatch = [&](const std::string& what) {
     throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(points) + " points, but " + what);
   };
@@ -176,14 +164,17 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
     if (config_.file_topology->vertexCount() != points) {
       mismatch("the topology file has " + std::to_string(config_.file_topology->vertexCount()) + " vertices");
     }
-    return config_.file_topology;
+    mesh.topology = config_.file_topology;
+    mesh.dropped_faces = config_.file_dropped_faces;
+    return;
   }
   if (config_.source == TopologySource::POLYLINE) {
     if (points < 2) mismatch("a polyline needs 2");
     if (!known_.topology || known_.topology->vertexCount() != points) {
-      known_ = {std::make_shared<const Topology>(Topology::polyline(points)), {}, 0};
+      known_ = {std::make_shared<const Topology>(Topology::polyline(points)), {}, {}};
     }
-    return known_.topology;
+    mesh.topology = known_.topology;
+    return;
   }
   const std::size_t rows = config_.rows ? config_.rows : grid_rows, cols = config_.cols ? config_.cols : grid_cols;
   if (rows * cols != points) {
@@ -191,24 +182,30 @@ std::shared_ptr<const Topology> MeshDecoder::fixedTopology(std::size_t points, s
              std::to_string(rows * cols));
   }
   if (rows >= 2 && cols >= 2) checkFaces(2 * (rows - 1) * (cols - 1));
-  // One face stands for the grid's shape. It repeats a vertex, as no proper one does that a message brings.
-  const Face shape{static_cast<Index>(rows), static_cast<Index>(rows), static_cast<Index>(cols)};
-  if (!known_.topology || known_.faces.size() != 1 || known_.faces[0] != shape) {
-    known_ = {std::make_shared<const Topology>(Topology::grid(rows, cols)), {shape}, 0};
+  // Two corners of no polygon stand for the grid's shape.
+  const Polygons shape{{static_cast<Index>(rows), static_cast<Index>(cols)}, {}};
+  if (!known_.topology || !(known_.sent == shape)) {
+    known_ = {std::make_shared<const Topology>(Topology::grid(rows, cols)), shape, {}};
   }
-  return known_.topology;
+  mesh.topology = known_.topology;
 }
 
-void MeshDecoder::takeFaces(std::size_t points, std::vector<Face> proper, const std::vector<Face>& repeating,
-                            DecodedMesh& mesh) {
-  if (!known_.topology || known_.topology->vertexCount() != points || known_.faces != proper) {
-    auto topology = std::make_shared<const Topology>(Topology::fromTriangles(points, proper));
-    requireSomething(*topology, proper.size() + repeating.size());
-    known_ = {std::move(topology), std::move(proper), 0};
+void MeshDecoder::takeFaces(Polygons sent, DecodedMesh& mesh) {
+  const std::size_t points = mesh.positions.size();
+  const bool fits = known_.topology && known_.topology->vertexCount() == points;
+  const bool same = fits && known_.sent == sent;
+  if (!same || !known_.faces.unseen.empty()) {
+    requireVertices(sent, points);
+    PolygonFaces faces = facesOf(sent, mesh.positions, same ? &known_.faces : nullptr);
+    requireSomething(faces);
+    std::shared_ptr<const Topology> topology = known_.topology;
+    if (!fits || faces.faces != known_.faces.faces) {
+      topology = std::make_shared<const Topology>(Topology::fromTriangles(points, faces.faces));
+    }
+    known_ = {std::move(topology), std::move(sent), std::move(faces)};
   }
-  known_.dropped_faces = countDropped(repeating, *known_.topology);
   mesh.topology = known_.topology;
-  mesh.dropped_faces = known_.dropped_faces;
+  mesh.dropped_faces = known_.faces.unchecked.size();
 }
 
 DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
@@ -247,7 +244,7 @@ DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
         "an unorganised point cloud has no topology; set topology/rows and topology/cols for a grid, or "
         "topology/source to polyline or file");
   }
-  mesh.topology = fixedTopology(cloud.size(), cloud.height, cloud.width);
+  takeFixed(cloud.size(), cloud.height, cloud.width, mesh);
   mesh.positions.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
   addRadii(&cloud, mesh);
@@ -263,11 +260,19 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
   if (config_.source == TopologySource::FIRST_FRAME_WELD) {
     refuse("topology/source first_frame_weld is for triangle lists; this message has indices");
   }
+  mesh.positions.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (view.cloud) {
+      mesh.positions[i] = view.cloud->point(i);
+    } else {
+      const auto p = view.points[i];
+      mesh.positions[i] = Vec3(p[0], p[1], p[2]);
+    }
+  }
   if (config_.source == TopologySource::MESSAGE || (config_.source == TopologySource::AUTO && carries_faces)) {
     if (!carries_faces) refuse("the message has no triangles; set topology/source to grid, polyline or file");
     checkFaces(faceCount(view));
-    SentFaces sent = triangulated(view, count);
-    takeFaces(count, std::move(sent.proper), sent.repeating, mesh);
+    takeFaces(polygonsOf(view), mesh);
   } else if (config_.source == TopologySource::AUTO && !config_.rows && !config_.cols) {
     // A publisher may send the triangles once and vertices ever after. What of them could not be used is missing as
     // long.
@@ -278,18 +283,10 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
                                                     std::to_string(known_.topology->vertexCount()));
     }
     mesh.topology = known_.topology;
-    mesh.dropped_faces = known_.dropped_faces;
+    mesh.dropped_faces = known_.faces.unchecked.size();
+    if (!known_.faces.unseen.empty()) takeFaces(known_.sent, mesh);
   } else {
-    mesh.topology = fixedTopology(count, 0, 0);
-  }
-  mesh.positions.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (view.cloud) {
-      mesh.positions[i] = view.cloud->point(i);
-    } else {
-      const auto p = view.points[i];
-      mesh.positions[i] = Vec3(p[0], p[1], p[2]);
-    }
+    takeFixed(count, 0, 0, mesh);
   }
   addRadii(view.cloud ? &*view.cloud : nullptr, mesh);
   return mesh;
@@ -343,22 +340,21 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   } else {
     weld_.keepApart(count);
   }
+  mesh.positions.reserve(weld_.cornerOfVertex().size());
+  for (const Index corner : weld_.cornerOfVertex()) mesh.positions.push_back(transform * corners[corner]);
   if (config_.source == TopologySource::FILE) {
-    mesh.topology = fixedTopology(count, 0, 0);
+    takeFixed(count, 0, 0, mesh);
   } else {
     try {
-      SentFaces sent;
-      sent.proper.reserve(count / 3);
-      const std::vector<Index>& vertex = weld_.vertexOfCorner();
-      for (std::size_t c = 0; c < count; c += 3) sent.add({vertex[c], vertex[c + 1], vertex[c + 2]});
-      takeFaces(weld_.cornerOfVertex().size(), std::move(sent.proper), sent.repeating, mesh);
+      Polygons sent{weld_.vertexOfCorner(), {}};
+      sent.ends.reserve(count / 3);
+      for (std::size_t end = 3; end <= count; end += 3) sent.ends.push_back(end);
+      takeFaces(std::move(sent), mesh);
     } catch (...) {
       if (welds_anew) weld_.forget();  // a soup that is refused does not say which corners of the next one are one
       throw;
     }
   }
-  mesh.positions.reserve(weld_.cornerOfVertex().size());
-  for (const Index corner : weld_.cornerOfVertex()) mesh.positions.push_back(transform * corners[corner]);
   addRadii(nullptr, mesh);
   return mesh;
 }

@@ -11,6 +11,7 @@
 #include "dccd/mesh_store.h"
 #include "input/depth_surface.h"
 #include "input/message_type.h"
+#include "input/polygons.h"
 #include "input/soup_weld.h"
 
 namespace dccd {
@@ -26,8 +27,9 @@ struct MeshInputConfig {
   TopologySource source = TopologySource::AUTO;
   std::size_t rows = 0, cols = 0;  ///< grid; both 0: not given
   std::shared_ptr<const Topology> file_topology;
-  DepthSurfaceOptions depth;  ///< of a depth image
-  bool weld = true;           ///< triangle soup: corners with equal coordinates are one vertex
+  std::uint64_t file_dropped_faces = 0;  ///< of the file that cannot be used
+  DepthSurfaceOptions depth;             ///< of a depth image
+  bool weld = true;                      ///< triangle soup: corners with equal coordinates are one vertex
   std::optional<std::string> marker_namespace;
   std::optional<int> marker_id;
   std::size_t max_vertices = 1000000;
@@ -70,8 +72,8 @@ class MeshDecoder {
   /// without triangles mean these.
   struct Known {
     std::shared_ptr<const Topology> topology;
-    std::vector<Face> faces;          // of which it was made
-    std::uint64_t dropped_faces = 0;  // that came with them
+    Polygons sent;       // as they came,
+    PolygonFaces faces;  // and what they became then: of that the topology is made
   };
   Known known_;
   SoupWeld weld_;
@@ -88,9 +90,10 @@ class MeshDecoder {
   void start(const HeaderView& header, DecodedMesh& mesh) const;
   /// `pixel` has the number in the cloud of each vertex; null: they are the same.
   void addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel = nullptr) const;
-  std::shared_ptr<const Topology> fixedTopology(std::size_t points, std::size_t grid_rows, std::size_t grid_cols);
-  /// Faces that a message brings: those that span a surface, and those that repeat a vertex.
-  void takeFaces(std::size_t points, std::vector<Face> proper, const std::vector<Face>& repeating, DecodedMesh& mesh);
+  /// The topology that the configuration says.
+  void takeFixed(std::size_t points, std::size_t grid_rows, std::size_t grid_cols, DecodedMesh& mesh);
+  /// Faces that a message brings, over mesh.positions.
+  void takeFaces(Polygons sent, DecodedMesh& mesh);
 };
 
 }  // namespace dccd

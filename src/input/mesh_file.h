@@ -1,13 +1,16 @@
-// Mesh files: PLY by PCL's parser (ASCII, binary of either byte order), OBJ by our own (obj_file.h).
+// Mesh files: what a reader makes of one, and what the readers share. doc/mesh_files.md has the grammar of each format.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "dccd/types.h"
+#include "input/polygons.h"
 
 namespace dccd {
 
@@ -19,9 +22,13 @@ struct MeshFileError : std::runtime_error {
 using FaceGroups = std::map<std::string, std::vector<std::pair<std::size_t, std::size_t>>>;
 
 struct MeshFile {
-  Positions positions;      ///< [m], in the file's frame; float or double coordinates are taken exactly
-  std::vector<Face> faces;  ///< polygons with more than three corners as fans
-  FaceGroups groups;        ///< of an OBJ
+  Positions positions;                 ///< [m], in the file's frame; float or double coordinates are taken exactly
+  std::vector<Face> faces;             ///< as facesOf() makes them of the file's polygons
+  FaceGroups groups;                   ///< of an OBJ
+  Polygons polygons;                   ///< as the file has them
+  std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face
+  std::vector<Edge> edges;             ///< of the lines of an OBJ, which then has no faces
+  std::vector<std::string> remarks;    ///< sentences about what was skipped, for the user to see
 };
 
 /// PLY or OBJ: vertices keep their numbers, their order and every bit of their coordinates, as frames and topologies
@@ -35,8 +42,16 @@ std::string fileEnding(const std::string& path);
 void requireReadable(const std::string& path);
 /// The bytes of such a file. Throws MeshFileError.
 std::string readWholeFile(const std::string& path);
+/// Makes the mesh's faces of the polygons. Returns where each polygon ends among the faces.
+std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh);
+/// A remark where polygons are unchecked. `name` says of the first one where it stands in the file.
+void remarkUnchecked(const std::function<std::string(std::size_t)>& name, MeshFile& mesh);
+/// What stands behind the end of a binary file can hold no geometry: zeros, blanks and ends of lines.
+bool isPadding(std::string_view bytes);
 /// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first
-/// corners; triangles without area are left out. Throws MeshFileError for a coordinate that is not finite.
+/// corners. Throws MeshFileError for a coordinate that is not finite.
 MeshFile weldTriangles(const Positions& corners, const std::string& path);
+/// The same of polygons, each of the corners up to its end.
+MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path);
 
 }  // namespace dccd

@@ -1,7 +1,6 @@
 #include "input/mesh_resource.h"
 
 #include <algorithm>
-#include <iterator>
 #include <stdexcept>
 
 #include <ros/package.h>
@@ -33,10 +32,7 @@ MeshFile load(const std::string& path) {
   throw MeshFileError(path + ": unknown mesh format '" + ending + "'; STL, OBJ, PLY and DAE can be read");
 }
 
-}  // namespace
-
-MeshResource loadMeshResource(const std::string& address, double scale) {
-  const std::string path = pathOf(address);
+MeshResource resourceOf(const std::string& path, double scale) {
   MeshResource resource;
   try {
     MeshFile mesh = load(path);
@@ -44,18 +40,27 @@ MeshResource loadMeshResource(const std::string& address, double scale) {
       p *= scale;
       if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");
     }
-    std::vector<Face> faces;
-    std::copy_if(mesh.faces.begin(), mesh.faces.end(), std::back_inserter(faces),
-                 [](const Face& f) { return f[0] != f[1] && f[1] != f[2] && f[0] != f[2]; });
-    resource.topology = std::make_shared<const Topology>(Topology::fromTriangles(mesh.positions.size(), faces));
+    resource.topology =
+        std::make_shared<const Topology>(mesh.edges.empty() ? Topology::fromTriangles(mesh.positions.size(), mesh.faces)
+                                                            : Topology::fromEdges(mesh.positions.size(), mesh.edges));
+    resource.dropped_faces = mesh.unchecked.size();
     resource.positions = std::move(mesh.positions);
     resource.file_faces = std::move(mesh.faces);
     resource.groups = std::move(mesh.groups);
+    resource.remarks = std::move(mesh.remarks);
   } catch (const MeshFileError& error) {
     throw std::invalid_argument(error.what());
   } catch (const TopologyError& error) {
     throw std::invalid_argument(path + ": " + error.what());
   }
+  return resource;
+}
+
+}  // namespace
+
+MeshResource loadMeshResource(const std::string& address, double scale) {
+  const std::string path = pathOf(address);
+  MeshResource resource = resourceOf(path, scale);
   if (!resource.topology->hasFaces()) throw std::invalid_argument(path + ": there are no triangles");
   return resource;
 }
@@ -78,7 +83,10 @@ MeshResource loadTopologyFile(const std::string& address) {
   if (fileEnding(address) == "dae") {
     throw std::invalid_argument(address + ": a DAE does not number its vertices as a tracker does");
   }
-  return loadMeshResource(address, 1);
+  const std::string path = pathOf(address);
+  MeshResource resource = resourceOf(path, 1);
+  if (resource.topology->edges().empty()) throw std::invalid_argument(path + ": there are no triangles and no lines");
+  return resource;
 }
 
 }  // namespace dccd

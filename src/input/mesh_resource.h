@@ -12,8 +12,10 @@ namespace dccd {
 struct MeshResource {
   std::shared_ptr<const Topology> topology;
   Positions positions;           ///< [m], after scaling
-  std::vector<Face> file_faces;  ///< as the file has them, which the groups count
+  std::vector<Face> file_faces;  ///< which the groups count; the topology has equal ones once
   FaceGroups groups;
+  std::uint64_t dropped_faces = 0;   ///< polygons that cannot be used: unchecked
+  std::vector<std::string> remarks;  ///< about what of the file was skipped
 
   /// The vertices of a group's faces, each once, in order; empty where there is no such group.
   std::vector<Index> verticesOf(const std::string& group) const;
@@ -23,8 +25,8 @@ struct MeshResource {
 /// Throws std::invalid_argument naming the file and what is wrong with it, or the package that is not found.
 MeshResource loadMeshResource(const std::string& address, double scale);
 
-/// The faces over the points that a tracker sends: PLY, OBJ or STL. A DAE is refused, for its vertices are numbered by
-/// the library that reads it. Throws as above.
+/// The faces over the points that a tracker sends, or of an OBJ the lines between them: PLY, OBJ or STL. A DAE is
+/// refused, for its vertices are numbered by the library that reads it. Throws as above.
 MeshResource loadTopologyFile(const std::string& address);
 
 }  // namespace dccd

@@ -68,7 +68,7 @@ struct IndexedView {
   std::optional<CloudView> cloud;                 ///< the vertices, where they come as a cloud
   WireSpan<PointOnWire> points;                   ///< otherwise
   WireSpan<TriangleOnWire> triangles;             ///< triangles,
-  std::vector<WireSpan<std::uint32_t>> polygons;  ///< or polygons, which become fans
+  std::vector<WireSpan<std::uint32_t>> polygons;  ///< or polygons
   std::size_t size() const { return cloud ? cloud->size() : points.size; }
 };
 

@@ -1,108 +1,217 @@
 #include "input/obj_file.h"
 
-#include <cstdlib>
-#include <fstream>
+#include <algorithm>
 #include <set>
-#include <sstream>
+#include <string_view>
+
+#include "dccd/decimal.h"
+#include "input/polygons.h"
+#include "input/text_lines.h"
 
 namespace dccd {
 
 namespace {
 
-bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+constexpr std::string_view READ[] = {"v", "f", "l", "g"};
+constexpr std::string_view NO_GEOMETRY[] = {
+    "vt",       "vn",    "vp",       "o",        "s",   "mg",         "mtllib",    "usemtl", "maplib", "usemap",
+    "material", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech",  "stech"};
+/// Points, the old outline of a face, free-form curves and surfaces with all that belongs to them, other files,
+/// commands.
+constexpr std::string_view OTHER_GEOMETRY[] = {"p",    "fo",   "curv", "curv2", "surf", "cstype", "deg", "bmat",
+                                               "step", "parm", "trim", "hole",  "scrv", "sp",     "end", "con",
+                                               "bzp",  "bsp",  "cdc",  "cdp",   "res",  "call",   "csh"};
+
+template <std::size_t N>
+bool isOneOf(const std::string_view (&keywords)[N], std::string_view word) {
+  return std::find(std::begin(keywords), std::end(keywords), word) != std::end(keywords);
+}
+
+bool isKnown(std::string_view word) {
+  return isOneOf(READ, word) || isOneOf(NO_GEOMETRY, word) || isOneOf(OTHER_GEOMETRY, word);
+}
 
 class ObjReader {
  public:
-  explicit ObjReader(const std::string& path) : path_(path) {}
+  ObjReader(const std::string& text, const std::string& path) : path_(path), lines_(text, path) {}
 
-  MeshFile read(std::istream& in) {
-    for (std::string line; std::getline(in, line);) {
-      ++line_;
-      if (line[0] == 'g' && (line.size() == 1 || isBlank(line[1]))) readGroups(line);
-      if (line.size() < 2 || !isBlank(line[1])) continue;
-      if (line[0] == 'v') readVertex(line);
-      if (line[0] == 'f') readFace(line);
+  MeshFile read() {
+    while (nextStatement()) {
+      if (!words_.empty()) take(words_[0]);
     }
     endGroups();
-    // Faces may name vertices that come after them.
-    for (const Face& face : mesh_.faces) {
-      for (const Index v : face) {
-        if (v >= mesh_.positions.size()) {
-          throw MeshFileError(path_ + ": a face names vertex " + std::to_string(std::size_t{v} + 1) + " of " +
-                              std::to_string(mesh_.positions.size()));
-        }
-      }
-    }
     if (mesh_.positions.empty()) throw MeshFileError(path_ + ": no vertices");
+    // Faces and lines may name vertices that come after them.
+    if (furthest_ >= mesh_.positions.size()) lines_.fail(furthest_word_, missing());
+    if (polygons_.size() > 0 && !mesh_.edges.empty()) {
+      throw MeshFileError(path_ + ": has faces and lines ('l', first in line " + std::to_string(first_line_element_) +
+                          "), and a mesh is of the ones or the others; write them to two files");
+    }
+    nameGroups(setPolygons(std::move(polygons_), mesh_));
+    remarkUnchecked([&](std::size_t p) { return "in line " + std::to_string(face_lines_[p]); }, mesh_);
+    if (unknown_lines_ > 0) {
+      mesh_.remarks.push_back(std::to_string(unknown_lines_) +
+                              " lines with unknown keywords are skipped, the first is " + first_unknown_);
+    }
     return std::move(mesh_);
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw MeshFileError(path_ + ":" + std::to_string(line_) + ": " + what);
+  /// A line without its comment, and the lines on which it goes on. False at the end.
+  bool nextStatement() {
+    if (!lines_.next()) return false;
+    words_.clear();
+    bool comment = takeWords(0);
+    while (goesOn()) {
+      const std::size_t before = lines_.words().size();
+      // What stands before the mark and what follows it are two words: they never are one, whoever reads them.
+      const TextWord mark = lines_.words().back();
+      if (!lines_.append()) lines_.fail("ends in '\\', and no line follows");
+      const bool skipped = comment || (!words_.empty() && !isOneOf(READ, words_[0].text));
+      if (skipped && lines_.words().size() > before && isKnown(lines_.words()[before].text)) {
+        lines_.fail(mark,
+                    "ends a line that is skipped, and it is not certain that the next line belongs to it; remove '\\'");
+      }
+      if (mark.text != "\\" && !lines_.text().empty() && !isBlank(lines_.text()[0])) {
+        lines_.fail(mark, "ends in '\\', and the next line begins without a blank: write one before the '\\'");
+      }
+      if (!comment) comment = takeWords(before);
+    }
+    return true;
   }
 
-  void readVertex(const std::string& line) {
-    Vec3 p;
-    const char* at = line.c_str() + 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      char* end = nullptr;
-      p[axis] = std::strtod(at, &end);
-      if (end == at) fail("a vertex needs three numbers");
-      at = end;
+  /// From the line's words, from the one of this number on; true where a comment ends them.
+  bool takeWords(std::size_t first) {
+    for (std::size_t w = first; w < lines_.words().size(); ++w) {
+      TextWord word = lines_.words()[w];
+      if (word.text[0] == '#') return true;
+      if (w + 1 == lines_.words().size() && word.text.back() == '\\') word.text.remove_suffix(1);
+      if (!word.text.empty()) words_.push_back(word);
     }
-    mesh_.positions.push_back(p);
+    return false;
+  }
+  bool goesOn() const { return !lines_.words().empty() && !lines_.text().empty() && lines_.text().back() == '\\'; }
+  static bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\f' || c == '\v'; }
+
+  void take(const TextWord& keyword) {
+    if (keyword.text == "v") return readVertex();
+    if (keyword.text == "f") return readFace();
+    if (keyword.text == "l") return readLine();
+    if (keyword.text == "g") return readGroups();
+    if (isOneOf(NO_GEOMETRY, keyword.text)) return;
+    if (isOneOf(OTHER_GEOMETRY, keyword.text)) {
+      lines_.fail(keyword, "carries geometry that is not read; write it as 'v' and 'f' or 'l' lines");
+    }
+    const std::string small = inSmallLetters(keyword.text);
+    if (isOneOf(READ, small) || isOneOf(OTHER_GEOMETRY, small)) lines_.fail(keyword, "must be in small letters");
+    if (decimalNumber(keyword.text)) lines_.fail(keyword, "begins a line, and no line goes on with '\\' before it");
+    if (unknown_lines_++ == 0) first_unknown_ = quoted(keyword.text) + " in line " + std::to_string(keyword.line);
+  }
+
+  /// x y z; then perhaps a weight, which must be 1, and a colour.
+  void readVertex() {
+    const std::size_t numbers = words_.size() - 1;
+    if (numbers != 3 && numbers != 4 && numbers != 6 && numbers != 7) {
+      lines_.fail(words_[0], "has " + std::to_string(numbers) +
+                                 " numbers; a vertex has x y z, then perhaps a weight of 1, "
+                                 "then perhaps a colour of three");
+    }
+    double value[7] = {};
+    for (std::size_t i = 0; i < numbers; ++i) value[i] = lines_.number(words_[i + 1]);
+    if ((numbers == 4 || numbers == 7) && value[3] != 1) {
+      lines_.fail(words_[4], "is the weight of a vertex: only 1 is read, for programs differ on what others mean");
+    }
+    if (mesh_.positions.size() + 1 >= NO_INDEX) lines_.fail("too many vertices");
+    mesh_.positions.emplace_back(value[0], value[1], value[2]);
+  }
+
+  void readFace() {
+    if (words_.size() < 4) lines_.fail(words_[0], "has fewer than three corners");
+    corners_.clear();
+    for (std::size_t w = 1; w < words_.size(); ++w) corners_.push_back(cornerOf(words_[w], 3));
+    polygons_.add(corners_);
+    face_lines_.push_back(words_[0].line);
+  }
+
+  void readLine() {
+    if (words_.size() < 3) lines_.fail(words_[0], "has fewer than two vertices");
+    if (mesh_.edges.empty()) first_line_element_ = words_[0].line;
+    Index before = cornerOf(words_[1], 2);
+    for (std::size_t w = 2; w < words_.size(); ++w) {
+      const Index v = cornerOf(words_[w], 2);
+      if (v == before) lines_.fail(words_[w], "is the vertex before it, too");
+      mesh_.edges.push_back({std::min(before, v), std::max(before, v)});
+      before = v;
+    }
+  }
+
+  /// `v`, `v/vt` or `v/vt/vn`, of which all but the first may be empty.
+  Index cornerOf(const TextWord& word, std::size_t most_parts) {
+    std::string_view rest = word.text;
+    std::int64_t number = 0;
+    std::size_t parts = 0;
+    for (bool more = true; more; ++parts) {
+      const std::size_t slash = rest.find('/');
+      more = slash != std::string_view::npos;
+      const std::string_view part = rest.substr(0, slash);
+      rest.remove_prefix(more ? slash + 1 : rest.size());
+      const auto integer = decimalInteger(part);
+      if (parts == most_parts || (!integer && (parts == 0 || !part.empty())) || (integer && *integer == 0)) {
+        lines_.fail(word, "is no corner: vertex, texture and normal are integers from 1, or from -1 backwards");
+      }
+      if (parts == 0) number = *integer;
+    }
+    const auto count = static_cast<std::int64_t>(mesh_.positions.size());
+    const std::int64_t v = number > 0 ? number - 1 : count + number;
+    if (v < 0 || v >= std::int64_t{NO_INDEX}) lines_.fail(word, missing());
+    if (v >= count && (furthest_word_.line == 0 || v > std::int64_t{furthest_})) {
+      furthest_ = static_cast<Index>(v);
+      furthest_word_ = word;
+    }
+    return static_cast<Index>(v);
+  }
+  std::string missing() const {
+    return "names a vertex that is not there; " + std::to_string(mesh_.positions.size()) + " are";
   }
 
   /// Each name of the line is a group; none: the faces that follow belong to no group.
-  void readGroups(const std::string& line) {
+  void readGroups() {
     endGroups();
-    std::istringstream words(line.substr(1));
-    for (std::string name; words >> name;) groups_.insert(name);
+    for (std::size_t w = 1; w < words_.size(); ++w) groups_.insert(std::string(words_[w].text));
   }
 
-  /// The faces since the last `g` are what its groups get.
+  /// The polygons since the last `g` are what its groups get.
   void endGroups() {
     for (const std::string& name : groups_) {
       auto& ranges = mesh_.groups[name];
-      if (mesh_.faces.size() > begin_) ranges.emplace_back(begin_, mesh_.faces.size());
+      if (polygons_.size() > begin_) ranges.emplace_back(begin_, polygons_.size());
     }
     groups_.clear();
-    begin_ = mesh_.faces.size();
+    begin_ = polygons_.size();
   }
 
-  void readFace(const std::string& line) {
-    Index first = 0, previous = 0;
-    std::size_t corners = 0;
-    const char* at = line.c_str() + 1;
-    while (true) {
-      while (isBlank(*at)) ++at;
-      if (*at == '\0') break;
-      char* end = nullptr;
-      const long long number = std::strtoll(at, &end, 10);
-      if (end == at || number == 0) fail("a corner of a face is no vertex's number");
-      const Index v = index(number);
-      // Texture and normal of the corner.
-      for (at = end; *at != '\0' && !isBlank(*at); ++at) {
+  /// From ranges of polygons to ranges of faces.
+  void nameGroups(const std::vector<std::size_t>& ends) {
+    const auto face = [&](std::size_t polygon) { return polygon == 0 ? 0 : ends[polygon - 1]; };
+    for (auto& [name, ranges] : mesh_.groups) {
+      for (auto& [first, last] : ranges) {
+        first = face(first);
+        last = face(last);
       }
-      if (corners == 0) first = v;
-      if (corners >= 2) mesh_.faces.push_back({first, previous, v});
-      previous = v;
-      ++corners;
     }
-    if (corners < 3) fail("a face needs three corners");
-  }
-
-  Index index(long long number) const {
-    const long long count = static_cast<long long>(mesh_.positions.size());
-    const long long v = number > 0 ? number - 1 : count + number;
-    if (v < 0 || v >= NO_INDEX) fail("a face names vertex " + std::to_string(number));
-    return static_cast<Index>(v);
   }
 
   const std::string& path_;
-  std::size_t line_ = 0;
+  TextLines lines_;
+  std::vector<TextWord> words_;  // of the statement
   MeshFile mesh_;
+  Polygons polygons_;
+  std::vector<std::size_t> face_lines_;  // of the polygons
+  std::vector<Index> corners_;
+  Index furthest_ = 0;  // of the vertices that were named before they came
+  TextWord furthest_word_{{}, 0};
+  std::size_t first_line_element_ = 0, unknown_lines_ = 0;
+  std::string first_unknown_;
   std::set<std::string> groups_;  // of the faces since begin_
   std::size_t begin_ = 0;
 };
@@ -110,9 +219,8 @@ class ObjReader {
 }  // namespace
 
 MeshFile loadObjFile(const std::string& path) {
-  requireReadable(path);
-  std::ifstream file(path, std::ios::binary);
-  return ObjReader(path).read(file);
+  const std::string text = readWholeFile(path);
+  return ObjReader(text, path).read();
 }
 
 }  // namespace dccd

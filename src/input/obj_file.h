@@ -1,6 +1,7 @@
-// OBJ: vertices and faces, as doubles and in their order. PCL's reader ends the program on lines that end early or hold
-// other bytes; assimp's (5.2.5, of Debian 12) rounds to float, opens the files that an OBJ names as its materials, and
-// writes to a wild address when such a file sets a value before it names a material: two minutes of fuzzing found that.
+// OBJ: vertices, faces and lines, as doubles and in their order. PCL's reader ends the program on lines that end early
+// or hold other bytes; assimp's (5.2.5, of Debian 12) rounds to float, opens the files that an OBJ names as its
+// materials, and writes to a wild address when such a file sets a value before it names a material: two minutes of
+// fuzzing found that.
 #pragma once
 
 #include <string>
@@ -9,9 +10,9 @@
 
 namespace dccd {
 
-/// `v` and `f` lines, faces with indices from 1 or backwards from the newest vertex, and `g` lines: the groups that the
-/// faces after them belong to. All else is skipped. Polygons become fans. Throws MeshFileError naming the file, the
-/// line and what is wrong with it.
+/// By the table in doc/mesh_files.md: `v`, `f` or `l`, and `g`, whose groups the faces after it belong to; what is
+/// known to carry no geometry is skipped, a keyword that is not known is remarked, one that carries other geometry is
+/// refused. Throws MeshFileError naming the file, the line and the word.
 MeshFile loadObjFile(const std::string& path);
 
 }  // namespace dccd

@@ -9,7 +9,8 @@
 
 namespace dccd {
 
-/// Welded by weldTriangles(). Throws MeshFileError naming the file and what is wrong with it.
+/// By the table in doc/mesh_files.md, welded by weldTriangles(). Throws MeshFileError naming the file, and of text the
+/// line and the word.
 MeshFile loadStlFile(const std::string& path);
 
 }  // namespace dccd

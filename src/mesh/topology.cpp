@@ -95,6 +95,25 @@ Topology Topology::polyline(std::size_t vertex_count) {
   return t;
 }
 
+Topology Topology::fromEdges(std::size_t vertex_count, const std::vector<Edge>& edges) {
+  requireIndexable(vertex_count);
+  Topology t;
+  t.vertex_count_ = vertex_count;
+  t.edges_.reserve(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const auto [first, second] = std::minmax(edges[i][0], edges[i][1]);
+    if (first == second || second >= vertex_count) {
+      throw TopologyError(
+          "edge " + std::to_string(i) + " (" + std::to_string(edges[i][0]) + ", " + std::to_string(edges[i][1]) + ") " +
+          (first == second ? "repeats a vertex"
+                           : "names a vertex that is not below the vertex count " + std::to_string(vertex_count)));
+    }
+    t.edges_.push_back({first, second});
+  }
+  t.finish();
+  return t;
+}
+
 void Topology::finish() {
   std::sort(edges_.begin(), edges_.end());
   closed_ = hasFaces();  // an edge is still listed once for each of its faces

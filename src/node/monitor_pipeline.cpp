@@ -39,6 +39,15 @@ void addGroups(const MeshResource& mesh, const std::string& file, const std::set
   }
 }
 
+std::string joined(const std::string& a, const std::string& b) { return a + (a.empty() || b.empty() ? "" : "; ") + b; }
+
+/// What of a file was skipped.
+std::string remarksOf(const std::string& file, const MeshResource& mesh) {
+  std::string text;
+  for (const std::string& remark : mesh.remarks) text = joined(text, file + ": " + remark);
+  return text;
+}
+
 std::string setsOf(const BodyConfig& body) {
   std::string text;
   for (const auto& set : body.sets) text += (text.empty() ? "'" : ", '") + set.first + "'";
@@ -61,6 +70,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
       transforms_(transforms),
       fixed_frame_(config_.fixed_frame) {
   hints_.resize(config_.bodies.size());
+  remarks_.resize(config_.bodies.size());
   loadFiles();
   findSets();
   config_.monitor.detector.expected = config_.expectedIn(config_.phase);
@@ -82,6 +92,8 @@ void MonitorPipeline::loadFiles() {
       const MeshResource file =
           loadFile(body, "topology/file", "an STL, OBJ or PLY", [&] { return loadTopologyFile(body.topology_file); });
       body.input.file_topology = file.topology;
+      body.input.file_dropped_faces = file.dropped_faces;
+      remarks_[b] = remarksOf(body.topology_file, file);
       addGroups(file, body.topology_file, setsNamed(b), body);
       checkGrid(body);
     }
@@ -89,10 +101,12 @@ void MonitorPipeline::loadFiles() {
     MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
                                  [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     addGroups(mesh, body.mesh_file, setsNamed(b), body);
-    hints_[b] = rigidHint(body.mesh_file, mesh.positions, body.mesh_scale);
+    remarks_[b] = remarksOf(body.mesh_file, mesh);
+    hints_[b] = joined(remarks_[b], rigidHint(body.mesh_file, mesh.positions, body.mesh_scale));
     MeshFrame& frame = rigid_[b].emplace();
     frame.topology = mesh.topology;
     frame.positions = std::move(mesh.positions);
+    frame.dropped_faces = mesh.dropped_faces;
     frame.rigid = true;
     if (body.input.noise_radius_m > 0) frame.radius_m.assign(frame.positions.size(), body.input.noise_radius_m);
   }
@@ -246,7 +260,7 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   refused_[body].clear();
   checked_[body] = waiting.mesh.topology;
   if (is_new) {
-    hints_[body] = meshHint(waiting.mesh, config_.bodies[body].input);
+    hints_[body] = joined(remarks_[body], meshHint(waiting.mesh, config_.bodies[body].input));
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;
   if (unstamped) waiting.mesh.stamp_ns = message.receipt_ns;

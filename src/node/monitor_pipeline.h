@@ -114,7 +114,7 @@ class MonitorPipeline {
   std::vector<std::optional<Waiting>> waiting_;
   std::vector<bool> placed_;                     // a static body of which the monitor has a frame
   std::vector<std::optional<MeshFrame>> rigid_;  // as the mesh file has them
-  std::vector<std::string> complaints_, hints_;
+  std::vector<std::string> complaints_, hints_, remarks_;
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   std::optional<LoadedMap> unplaced_map_;

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 
+#include "dccd/export.h"
 #include "dccd/tolerances.h"
 
 namespace dccd {
 
-/// Sign of (p1 - p0) x (q - p0) in the plane of two coordinates, exact: +1 where q lies left of p0 p1.
-int orientation2d(double p0x, double p0y, double p1x, double p1y, double qx, double qy);
+/// Sign of (p1 - p0) x (q - p0) in the plane of two coordinates, exact: +1 where q lies left of p0 p1. Also
+/// for the polygons of the input, in another library.
+DCCD_EXPORT int orientation2d(double p0x, double p0y, double p1x, double p1y, double qx, double qy);
 
 /// Sign of the volume (b - a) x (c - a) . (q - a), exact.
 int orientation3d(const double* a, const double* b, const double* c, const double* q);

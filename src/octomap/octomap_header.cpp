@@ -1,8 +1,8 @@
 #include "octomap/octomap_header.h"
 
-#include <cstdlib>
 #include <cstring>
 
+#include "dccd/decimal.h"
 #include "dccd/octomap_decode.h"
 
 namespace dccd {
@@ -19,10 +19,9 @@ bool beginsWith(const char* data, std::size_t size, const char* text) {
 }
 
 double parseNumber(const std::string& text, const std::string& field) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0') throw OctomapError("octomap header: " + field + " is '" + text + "', not a number");
-  return value;
+  const auto value = decimalNumber(text);
+  if (!value) throw OctomapError("octomap header: " + field + " is '" + text + "', not a number");
+  return *value;
 }
 
 /// One line "key value"; false at the line "data".

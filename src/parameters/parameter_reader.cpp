@@ -36,6 +36,11 @@ std::string shown(double value) {
 std::string range(double min, double max) { return "from " + shown(min) + " to " + shown(max); }
 std::string range(int min, int max) { return "from " + std::to_string(min) + " to " + std::to_string(max); }
 
+/// The text that stands where a number should.
+std::string notThis(const ParameterTree& value) {
+  return value.kind == Kind::TEXT ? ", not '" + value.text.substr(0, 60) + "'" : "";
+}
+
 }  // namespace
 
 const char* kindName(const ParameterTree& value) {
@@ -109,7 +114,7 @@ double ParameterReader::numberOf(const ParameterTree& value, const std::string& 
   if (value.kind != Kind::NUMBER && value.kind != Kind::INTEGER) {
     // YAML takes 1e-6 for text; only 1.0e-6 is a number there.
     const char* hint = value.kind == Kind::TEXT ? " (in YAML write 1.0e-6, not 1e-6)" : "";
-    fail(name, std::string("is ") + kindName(value) + ", a number is needed" + hint);
+    fail(name, std::string("is ") + kindName(value) + ", a number is needed" + notThis(value) + hint);
   }
   const double result = value.kind == Kind::NUMBER ? value.number : value.integer;
   if (!(result >= min && result <= max)) fail(name, "is " + shown(result) + ", it must be " + range(min, max));
@@ -126,7 +131,8 @@ double ParameterReader::number(const std::string& name, double fallback, double 
 }
 
 int ParameterReader::integerOf(const ParameterTree& value, const std::string& name, int min, int max) const {
-  if (value.kind != Kind::INTEGER) failKind(name, value, "an integer");
+  if (value.kind != Kind::INTEGER)
+    fail(name, std::string("is ") + kindName(value) + ", an integer is needed" + notThis(value));
   if (value.integer < min || value.integer > max) {
     fail(name, "is " + std::to_string(value.integer) + ", it must be " + range(min, max));
   }

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "dccd/decimal.h"
 #include "dccd/regular_file.h"
 #include "parameters/parameter_tree.h"
 
@@ -44,12 +45,18 @@ class YamlTree {
   static ParameterTree scalar(const YAML::Node& node) {
     const std::string text = node.Scalar();
     if (node.Tag() == "!") return text;  // quoted
-    int integer = 0;
-    double number = 0;
+    if (const auto integer = decimalInteger(text);
+        integer && !looksOctal(text) && static_cast<int>(*integer) == *integer) {
+      return static_cast<int>(*integer);
+    }
+    // YAML 1.1, which rosparam reads, has no number without a point; one without digits is .inf or .nan.
+    if (text.find('.') != std::string::npos) {
+      if (const auto number = decimalNumber(text)) return *number;
+      double number = 0;
+      const bool digits = text.find_first_of("0123456789") != std::string::npos;
+      if (!digits && YAML::convert<double>::decode(node, number)) return number;
+    }
     bool truth = false;
-    if (YAML::convert<int>::decode(node, integer)) return integer;
-    // YAML 1.1, which rosparam reads, has no number without a point.
-    if (text.find('.') != std::string::npos && YAML::convert<double>::decode(node, number)) return number;
     if (YAML::convert<bool>::decode(node, truth)) return truth;
     return text;
   }

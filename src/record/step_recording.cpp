@@ -20,7 +20,7 @@ constexpr char MAGIC[8] = {'D', 'C', 'C', 'D', 'S', 'T', 'E', 'P'};
 constexpr std::size_t MAX_SUBSTEPS = 100000;
 constexpr std::size_t MAX_BODIES = 65534;
 
-enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1 };
+enum class Connectivity : std::uint8_t { TRIANGLES = 0, POLYLINE = 1, EDGES = 2 };
 
 // The least bytes that one item of a list takes.
 constexpr std::size_t SEPARATION_BYTES = 10, BODY_BYTES = 64, CONTACT_BYTES = 51, INTERSECTION_BYTES = 25,
@@ -124,11 +124,23 @@ void visitBody(Archive& a, Body& body) {
   a.number(body.dropped_faces);
 }
 
+/// As Topology::polyline() makes it.
+bool isPolyline(const Topology& topology) {
+  const std::vector<Edge>& edges = topology.edges();
+  for (Index i = 0; i < edges.size(); ++i) {
+    if (edges[i] != Edge{i, i + 1}) return false;
+  }
+  return edges.size() + 1 == topology.vertexCount();
+}
+
 void visitTopology(RecordingWriter& a, const Body& body) {
   static const std::vector<Face> NONE;
-  const bool line = body.topology && !body.topology->hasFaces() && !body.topology->edges().empty();
-  a.choice(line ? Connectivity::POLYLINE : Connectivity::TRIANGLES, Connectivity::POLYLINE);
-  a.array(body.topology ? body.topology->faces() : NONE);
+  const Topology* const t = body.topology.get();
+  const bool line = t && !t->hasFaces() && !t->edges().empty();
+  const bool chain = line && isPolyline(*t);
+  a.choice(chain ? Connectivity::POLYLINE : line ? Connectivity::EDGES : Connectivity::TRIANGLES, Connectivity::EDGES);
+  a.array(t ? t->faces() : NONE);
+  if (line && !chain) a.array(t->edges());
 }
 
 void visitTopology(RecordingReader& a, Body& body) {
@@ -139,11 +151,15 @@ void visitTopology(RecordingReader& a, Body& body) {
   }
   Connectivity kind = Connectivity::TRIANGLES;
   std::vector<Face> faces;
-  a.choice(kind, Connectivity::POLYLINE);
+  a.choice(kind, Connectivity::EDGES);
   a.array(faces);
+  std::vector<Edge> edges;
+  if (kind == Connectivity::EDGES) a.array(edges);
   try {
-    body.topology = std::make_shared<const Topology>(
-        kind == Connectivity::POLYLINE ? Topology::polyline(vertices) : Topology::fromTriangles(vertices, faces));
+    body.topology =
+        std::make_shared<const Topology>(kind == Connectivity::POLYLINE ? Topology::polyline(vertices)
+                                         : kind == Connectivity::EDGES  ? Topology::fromEdges(vertices, edges)
+                                                                        : Topology::fromTriangles(vertices, faces));
   } catch (const TopologyError& error) {
     a.fail("body '" + body.name + "': " + error.what());
   }

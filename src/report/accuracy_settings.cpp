@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "dccd/decimal.h"
 #include "dccd/regular_file.h"
 
 namespace dccd {
@@ -19,6 +20,13 @@ struct Line {
   std::optional<TimeCell> cell;
 };
 
+double timeOf(const std::string& word) {
+  const auto time = decimalNumber(word);
+  if (!time) throw std::runtime_error("a time of contact must be a number, not '" + word + "'");
+  return *time;
+}
+
+/// What follows the times, as the certainty that check_step writes, is skipped.
 std::optional<Line> parse(std::string text) {
   std::replace(text.begin(), text.end(), ',', ' ');
   std::istringstream in(text);
@@ -26,18 +34,19 @@ std::optional<Line> parse(std::string text) {
   if (!(in >> kind) || kind.front() == '#' || kind == "kind") return std::nullopt;
   if (kind != "VF" && kind != "EE") throw std::runtime_error("'" + kind + "' is neither VF nor EE");
   std::array<Index, 4> vertices{};
+  std::string word;
   for (Index& vertex : vertices) {
-    long long number = -1;
-    if (!(in >> number) || number < 0 || number >= NO_INDEX) {
+    const auto number = in >> word ? decimalInteger(word) : std::nullopt;
+    if (!number || *number < 0 || *number >= NO_INDEX) {
       throw std::runtime_error("four vertices are needed, numbered from 0");
     }
-    vertex = static_cast<Index>(number);
+    vertex = static_cast<Index>(*number);
   }
   Line line{KnownContacts::pairOf(kind == "VF" ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE, vertices), std::nullopt};
-  TimeCell cell{};
-  if (!(in >> std::ws).eof()) {
-    if (!(in >> cell.lower)) throw std::runtime_error("a time of contact must be a number");
-    if (!(in >> cell.upper)) cell.upper = cell.lower;
+  if (in >> word) {
+    TimeCell cell{};
+    cell.lower = timeOf(word);
+    cell.upper = in >> word ? timeOf(word) : cell.lower;
     if (!(cell.lower >= 0 && cell.lower <= cell.upper && cell.upper <= 1)) {
       throw std::runtime_error("a time of contact lies between 0 and 1, the earlier end first");
     }

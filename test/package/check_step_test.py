@@ -103,6 +103,90 @@ class CheckStepTest(unittest.TestCase):
         self.assertEqual(subprocess.run([tool(), '--no-such-flag'], capture_output=True).returncode, 1)
 
 
+OBJ_TRIANGLES = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 %(z)s\nv 0.3 0.2 %(z)s\nv 0.2 0.3 %(z)s\n%(faces)s'
+PLY_HEAD = 'ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n'
+
+
+class FilesTest(unittest.TestCase):
+    """Small files of odd but legal form, of which the contacts are known."""
+
+    def check(self, ending, first, second):
+        with tempfile.TemporaryDirectory() as folder:
+            frames = [pathlib.Path(folder) / (name + ending) for name in '01']
+            for frame, text in zip(frames, (first, second)):
+                frame.write_text(text)
+            csv = pathlib.Path(folder) / 'contacts.csv'
+            done = subprocess.run([tool(), *map(str, frames), '--contacts', str(csv)], capture_output=True, text=True)
+            self.said, self.remarks = done.stdout, done.stderr.replace(folder + '/', '')
+            rows = csv.read_text().splitlines()[1:] if csv.exists() else []
+        self.contacts = []
+        for row in rows:
+            kind, *vertices, lower, upper, certainty = row.split(',')
+            self.assertEqual(certainty, 'certain')
+            self.assertLessEqual(float(lower), 0.5)
+            self.assertLess(0.5, float(upper))
+            self.contacts.append((kind, *map(int, vertices)))
+        return done.returncode
+
+    THROUGH = [('VF', v, 0, 1, 2) for v in (3, 4, 5)]
+
+    def obj(self, faces):
+        return self.check('.obj', *(OBJ_TRIANGLES % {'z': z, 'faces': faces} for z in ('0.5', '-0.5')))
+
+    def test_obj_lines_that_go_on_and_blanks_before_words(self):
+        for faces in ('f 1 2 3\nf 4 5 6\n', 'f 1 2 \\\n3\nf 4 5 6\n', '  f 1 2 3\n\tf 4 5 6\n', '\ff 1 2 3\n\vf 4 5 6\n'):
+            self.assertEqual(self.obj(faces), 0, self.remarks)
+            self.assertEqual(self.contacts, self.THROUGH, faces)
+            self.assertEqual(self.remarks, '')
+
+    def test_what_is_not_known_is_said(self):
+        self.assertEqual(self.obj('face 1 2 3\nf 1 2 3\nf 4 5 6\n'), 0)
+        self.assertEqual(self.contacts, self.THROUGH)
+        for frame in '01':
+            self.assertIn("check_step: %s.obj: 1 lines with unknown keywords are skipped, the first is 'face' in line 7" % frame,
+                          self.remarks)
+
+    def test_geometry_that_is_not_read_is_an_error(self):
+        for faces, word in (('fo 1 2 3\nf 4 5 6\n', "0.obj:7: 'fo'"), ('f 1 2 3\nF 4 5 6\n', "0.obj:8: 'F'"),
+                            ('f 1 2 3.0\n', "0.obj:7: '3.0'")):
+            self.assertEqual(self.obj(faces), 1)
+            self.assertIn(word, self.remarks)
+
+    def test_a_face_that_repeats_a_corner_is_unchecked(self):
+        self.assertEqual(self.obj('f 1 2 3\nf 4 5 6\nf 2 4 4\n'), NOT_PROVED, self.said)
+        self.assertIn('0.obj: 1 polygons cannot be used and are unchecked, the first is in line 9', self.remarks)
+
+    def test_ropes(self):
+        text = 'v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0.3 -0.2 %(z)s\nv 0.3 0.2 %(z)s\nl 1 2 3\nl 4 5\n'
+        self.assertEqual(self.check('.obj', text % {'z': '0.4'}, text % {'z': '-0.4'}), 0, self.said)
+        self.assertEqual(self.contacts, [('EE', 0, 1, 3, 4)])
+        apart = self.check('.obj', text % {'z': '0.4'}, text.replace('l 4 5', 'l 5 4 3') % {'z': '0.4'})
+        self.assertEqual(apart, 1)
+        self.assertIn('not the topology of', self.remarks)
+
+    def test_ply_elements_of_other_names(self):
+        head = PLY_HEAD % 6 + ('element material 1\nproperty list uchar float weights\nelement face 2\nproperty list uchar int '
+                               'vertex_indices\nelement edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n')
+        frames = [head + '0 0 0\n1 0 0\n0 1 0\n0.2 0.2 {0}\n0.3 0.2 {0}\n0.2 0.3 {0}\n2 0.5 0.5\n3 0 1 2\n3 3 4 5\n0 1\n'.format(z)
+                  for z in ('0.5', '-0.5')]
+        self.assertEqual(self.check('.ply', *frames), 0, self.remarks)
+        self.assertEqual(self.contacts, self.THROUGH)
+        self.assertIn("check_step: 1.ply: element 'edge' (1) is skipped", self.remarks)
+
+    def test_ply_strips(self):
+        head = PLY_HEAD % 7 + 'element tristrips 1\nproperty list int int vertex_indices\nend_header\n'
+        frames = [head + '0 0 0\n1 0 0\n0 1 0\n1 1 0\n0.75 0.75 %s\n0.8 0.75 %s\n0.75 0.8 %s\n8 0 1 2 3 -1 4 5 6\n' % (z, z, z)
+                  for z in ('0.5', '-0.5')]
+        self.assertEqual(self.check('.ply', *frames), 0, self.remarks)
+        self.assertEqual(self.contacts, [('VF', v, 2, 1, 3) for v in (4, 5, 6)])
+
+    def test_a_range_grid_is_named(self):
+        text = PLY_HEAD % 3 + ('element range_grid 2\nproperty list uchar int vertex_indices\nend_header\n'
+                               '0 0 0\n1 0 0\n0 1 0\n1 0\n0\n')
+        self.assertEqual(self.check('.ply', text, text), 1)
+        self.assertIn('range grid', self.remarks)
+
+
 class SequenceTest(unittest.TestCase):
     """A sheet that is rolled up, turns and is rolled tighter, slowly, then until its layers meet: more than two frames are steps."""
 

@@ -36,7 +36,7 @@ def player(name):
 
 
 def fleet(option):
-    return constant('fleet/analyze_fleet', option, r"'--%s', type=int, default=(\d+)")
+    return constant('fleet/analyze_fleet', option, r"'--%s', type=whole, default=(\d+)")
 
 
 # Of each page: what it says, with the number in brackets, and what the code has.

@@ -50,6 +50,10 @@ void mesh_file(const std::uint8_t* data, std::size_t size) {
         if (v >= mesh.positions.size()) throw std::logic_error("a face names a vertex that is not there");
       }
     }
+    for (const Edge& edge : mesh.edges) {
+      if (edge[0] >= edge[1] || edge[1] >= mesh.positions.size()) throw std::logic_error("an edge that is none");
+    }
+    if (mesh.polygons.size() > 0 && !mesh.edges.empty()) throw std::logic_error("faces and lines");
   } catch (const MeshFileError& error) {
     if (std::string(error.what()).find(file.path()) == std::string::npos)
       throw std::logic_error("an error without the file");

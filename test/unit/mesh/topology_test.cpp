@@ -66,5 +66,16 @@ TEST(Topology, PolylineHasNoFaces) {
   EXPECT_EQ(t.edges(), (std::vector<Edge>{{0, 1}, {1, 2}}));
 }
 
+TEST(Topology, RopesAreTheEdgesThatAreGiven) {
+  const Topology t = Topology::fromEdges(6, {{4, 2}, {0, 1}, {2, 4}, {1, 2}});
+  EXPECT_FALSE(t.hasFaces());
+  EXPECT_FALSE(t.isClosed());
+  EXPECT_EQ(t.edges(), (std::vector<Edge>{{0, 1}, {1, 2}, {2, 4}}));
+  EXPECT_EQ(t.usedVertices(), (std::vector<Index>{0, 1, 2, 4}));
+  EXPECT_EQ(Topology::fromEdges(3, {{1, 2}, {0, 1}}), Topology::polyline(3));
+  EXPECT_THROW(Topology::fromEdges(3, {{0, 1}, {2, 2}}), TopologyError);
+  EXPECT_THROW(Topology::fromEdges(3, {{0, 3}}), TopologyError);
+}
+
 }  // namespace
 }  // namespace dccd

@@ -35,6 +35,17 @@ TEST(StepRecording, WhatIsReadIsWhatWasWritten) {
   EXPECT_TRUE(compareAnswers(r.answer, again.answer).empty());
 }
 
+TEST(Recording, SeveralRopesInOneBodyStaySeveral) {
+  StepRecording r = recordScene();
+  Body& rope = r.step.bodies[2];
+  ASSERT_FALSE(rope.topology->hasFaces());
+  rope.topology = share(Topology::fromEdges(rope.t0->size(), {{0, 1}, {2, 3}}));
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
+  const StepRecording again = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(*again.step.bodies[2].topology, *rope.topology);
+  EXPECT_EQ(recordingBytes(again), bytes);
+}
+
 TEST(Recording, OfARungThatIsNoneSaysSo) {
   StepRecording r = recordScene();
   r.options.accuracy.rung = static_cast<Accuracy>(0);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <random>
+#include <sstream>
 
 namespace dccd {
 namespace {
@@ -42,10 +43,10 @@ Bytes mesh(const Positions& points, const std::vector<Face>& faces) {
   return out;
 }
 
-Bytes marker(const Positions& corners, double x = 0, double qw = 1) {
+Bytes marker(const Positions& corners, double x = 0, double qw = 1, const Vec3& scale = {1, 1, 1}) {
   Bytes out;
   out.header().text("cloth").put<std::int32_t>(2).put(MARKER_TRIANGLE_LIST).put(MARKER_ADD);
-  out.put(x).put(0.0).put(0.0).put(0.0).put(0.0).put(0.0).put(qw).put(1.0).put(1.0).put(1.0);
+  out.put(x).put(0.0).put(0.0).put(0.0).put(0.0).put(0.0).put(qw).put(scale.x()).put(scale.y()).put(scale.z());
   for (int i = 0; i < 4; ++i) out.put(1.0f);
   out.put<std::uint64_t>(0)
       .put<std::uint8_t>(0)
@@ -125,6 +126,107 @@ TEST(MeshDecoder, WhatTrianglesLackIsMissingAsLongAsTheyHold) {
   for (int k = 0; k < 3; ++k) EXPECT_EQ(decode(decoder, MESH, mesh(five, {})).dropped_faces, 1u) << "vertices alone";
   EXPECT_EQ(decode(decoder, MESH, mesh(five, HALVES)).dropped_faces, 0u);
   EXPECT_EQ(decode(decoder, MESH, mesh(five, {})).dropped_faces, 0u);
+}
+
+/// pcl_msgs/PolygonMesh with vertices of double precision.
+Bytes polygonMesh(const Positions& points, const std::vector<std::vector<Index>>& polygons) {
+  const auto count = static_cast<std::uint32_t>(points.size());
+  Bytes out;
+  out.header().header().put<std::uint32_t>(1).put(count).put<std::uint32_t>(3);
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    out.text(std::string(1, static_cast<char>('x' + axis))).put(8 * axis).put<std::uint8_t>(8).put<std::uint32_t>(1);
+  }
+  out.put<std::uint8_t>(0).put<std::uint32_t>(24).put(24 * count).put(24 * count);
+  for (const Vec3& p : points) out.put(p.x()).put(p.y()).put(p.z());
+  out.put<std::uint8_t>(1).put(static_cast<std::uint32_t>(polygons.size()));
+  for (const std::vector<Index>& polygon : polygons) {
+    out.put(static_cast<std::uint32_t>(polygon.size()));
+    for (const Index v : polygon) out.put(v);
+  }
+  return out;
+}
+constexpr const char* POLYGONS = "pcl_msgs/PolygonMesh";
+const Positions DART = {{0, 0, 0}, {2, 1, 0}, {0, 2, 0}, {1.5, 1, 0}};
+const std::vector<Face> DART_FACES = {{3, 0, 1}, {1, 2, 3}};
+
+TEST(MeshDecoder, AConcavePolygonStaysInItsOutlineAndItsTrianglesHold) {
+  MeshDecoder decoder({});
+  const DecodedMesh dart = decode(decoder, POLYGONS, polygonMesh(DART, {{0, 1, 2, 3}}));
+  EXPECT_EQ(dart.topology->faces(), DART_FACES) << "none lies over the notch";
+  EXPECT_EQ(dart.dropped_faces, 0u);
+  // As a convex one it would be cut by its other diagonal, and this one is at first not there.
+  Positions later = DART;
+  later[3] = {-1, 1, 0};
+  EXPECT_EQ(decode(decoder, POLYGONS, polygonMesh(later, {{0, 1, 2, 3}})).topology, dart.topology);
+  EXPECT_EQ(decode(decoder, POLYGONS, polygonMesh(later, {})).topology, dart.topology);
+  MeshDecoder other({});
+  EXPECT_EQ(decode(other, POLYGONS, polygonMesh(later, {{0, 1, 2, 3}})).topology->faces(),
+            (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST(MeshDecoder, APolygonIsChosenWhenAllOfItIsSeenAndUntilThenUnchecked) {
+  Positions points = DART;
+  points.push_back({5, 5, 5});
+  Positions gap = points;
+  gap[2].y() = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::vector<Index>> polygons = {{0, 1, 4}, {0, 1, 2, 3}};
+  for (const bool polygons_again : {true, false}) {
+    MeshDecoder decoder({});
+    const DecodedMesh first = decode(decoder, POLYGONS, polygonMesh(gap, polygons));
+    EXPECT_EQ(first.topology->faces(), (std::vector<Face>{{0, 1, 4}}));
+    EXPECT_EQ(first.dropped_faces, 1u);
+    const auto next = [&](const Positions& p) {
+      return decode(decoder, POLYGONS, polygons_again ? polygonMesh(p, polygons) : polygonMesh(p, {}));
+    };
+    EXPECT_EQ(next(gap).topology, first.topology);
+    EXPECT_EQ(next(gap).dropped_faces, 1u);
+    const DecodedMesh whole = next(points);
+    EXPECT_EQ(whole.topology->faces(), (std::vector<Face>{{0, 1, 4}, DART_FACES[0], DART_FACES[1]}));
+    EXPECT_EQ(whole.dropped_faces, 0u);
+    EXPECT_EQ(next(gap).topology, whole.topology) << "what it is, is known now";
+    EXPECT_EQ(next(gap).dropped_faces, 0u);
+  }
+}
+
+TEST(MeshDecoder, APolygonThatCannotBeTriangulatedIsMissing) {
+  MeshDecoder decoder({});
+  const std::vector<std::vector<Index>> polygons = {{0, 1, 2}, {0, 2, 1, 3}, {0, 1, 3, 0, 2}, {1, 3}, {2, 1}, {}};
+  EXPECT_EQ(decode(decoder, POLYGONS, polygonMesh(SQUARE, polygons)).dropped_faces, 3u)
+      << "a bow tie, a corner twice and a diagonal, but not the edge of a face";
+  EXPECT_EQ(decode(decoder, POLYGONS, polygonMesh(SQUARE, {})).dropped_faces, 3u);
+  MeshDecoder fresh({});
+  EXPECT_THROW(decode(fresh, POLYGONS, polygonMesh(SQUARE, {{0, 2, 1, 3}})), MeshError) << "nothing is left to check";
+  EXPECT_THROW(decode(fresh, POLYGONS, polygonMesh(SQUARE, {{0, 1, 2}, {0, 1, 2, 9}})), MeshError);
+}
+
+TEST(MeshDecoder, FacesOfAFileThatCannotBeUsedAreMissingInEachFrameThatUsesIt) {
+  MeshInputConfig config;
+  config.source = TopologySource::FILE;
+  config.file_topology = std::make_shared<const Topology>(Topology::fromTriangles(4, HALVES));
+  config.file_dropped_faces = 7;
+  MeshDecoder decoder(config);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(decode(decoder, CLOUD, cloud({})).dropped_faces, 7u);
+    EXPECT_EQ(decode(decoder, MESH, mesh(SQUARE, {})).dropped_faces, 7u);
+    EXPECT_EQ(decode(decoder, POLYGONS, polygonMesh(SQUARE, {})).dropped_faces, 7u);
+  }
+}
+
+TEST(MeshDecoder, AScaleIsWholeOrNotThere) {
+  const Positions corners = {{1, 2, 3}, {2, 2, 3}, {1, 3, 5}};
+  const auto first = [&](const Vec3& scale) {
+    MeshDecoder decoder({});
+    return Vec3(decode(decoder, MARKER, marker(corners, 0, 1, scale)).positions[0]);
+  };
+  EXPECT_EQ(first({0, 0, 0}), Vec3(1, 2, 3)) << "was never set";
+  EXPECT_EQ(first({0, -0.0, 0}), Vec3(1, 2, 3));
+  EXPECT_EQ(first({2, 3, 0.5}), Vec3(2, 6, 1.5));
+  EXPECT_EQ(first({-1, 1, 1}), Vec3(-1, 2, 3)) << "mirrored";
+  for (const Vec3& scale : {Vec3(2, 2, 0), Vec3(0, 2, 2), Vec3(2, 0, 0), Vec3(0, 0, -1)}) {
+    std::ostringstream values;
+    values << "scale is (" << scale.x() << ", " << scale.y() << ", " << scale.z() << ")";
+    EXPECT_TRUE(mentions(errorOf({}, MARKER, marker(corners, 0, 1, scale)), values.str())) << values.str();
+  }
 }
 
 TEST(MeshDecoder, WhatIsRefusedLeavesItAsItWas) {

@@ -175,6 +175,28 @@ TEST(Parameters, OfAFileTheLineIsNamed) {
   EXPECT_NE(errorIn("fixed_frame: &a [*a]\n").find("p.yaml:1: nests too deeply"), std::string::npos);
 }
 
+TEST(Parameters, ANumberOfAFileIsAWholeOne) {
+  const auto kindOf = [](const std::string& word) { return parseYaml("a: " + word + "\n", "p.yaml").members["a"]; };
+  for (const char* word : {"1.0-1", "1.0D-2", "0,5", "0x10", "0x1.8p3", "010", "-010", "1_000", "1.5f", "1:30",
+                           "3000000000", "1.0e999", "."}) {
+    EXPECT_EQ(kindOf(word).kind, ParameterTree::Kind::TEXT) << word;
+    try {
+      readConfig(parseYaml(std::string("\nmax_step_s: ") + word + "\n", "p.yaml"), "");
+      ADD_FAILURE() << word << " was accepted";
+    } catch (const ParameterError& error) {
+      EXPECT_TRUE(mentions(error.what(),
+                           std::string("p.yaml:2: max_step_s is a string, a number is needed, not '") + word + "'"))
+          << error.what();
+    }
+  }
+  EXPECT_EQ(kindOf("-12").integer, -12);
+  EXPECT_EQ(kindOf("0").integer, 0);
+  EXPECT_EQ(kindOf("00.5").number, 0.5);
+  EXPECT_EQ(kindOf("-1.5e-3").number, -1.5e-3);
+  EXPECT_EQ(kindOf("-.inf").number, -std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::isnan(kindOf(".nan").number));
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd

@@ -1,0 +1,450 @@
+#include "input/ply_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "dccd/decimal.h"
+#include "input/text_lines.h"
+
+namespace dccd {
+
+namespace {
+
+enum class Number : std::uint8_t { INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT, DOUBLE };
+
+std::optional<Number> numberNamed(std::string_view name) {
+  static constexpr std::string_view NAMES[][2] = {{"char", "int8"},     {"uchar", "uint8"},   {"short", "int16"},
+                                                  {"ushort", "uint16"}, {"int", "int32"},     {"uint", "uint32"},
+                                                  {"float", "float32"}, {"double", "float64"}};
+  for (std::size_t n = 0; n < std::size(NAMES); ++n) {
+    if (name == NAMES[n][0] || name == NAMES[n][1]) return static_cast<Number>(n);
+  }
+  return std::nullopt;
+}
+bool isInteger(Number type) { return type < Number::FLOAT; }
+std::size_t bytesOf(Number type) {
+  static constexpr std::size_t BYTES[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return BYTES[static_cast<std::size_t>(type)];
+}
+
+struct Property {
+  std::string name;
+  Number type;                       // of the value, or of a list's items
+  std::optional<Number> count_type;  // of a list
+};
+
+struct Element {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+enum class Encoding : std::uint8_t { ASCII, LITTLE_ENDIAN_BYTES, BIG_ENDIAN_BYTES };
+
+/// Known words and types only, no element without properties or given twice, and no more elements than the file has
+/// bytes: what a header claims is not believed.
+class PlyHeader {
+ public:
+  PlyHeader(TextLines& lines, std::size_t file_bytes) : lines_(lines), file_bytes_(file_bytes) {
+    if (!lines.next() || lines.words().size() != 1 || lines.words()[0].text != "ply") fail("is no PLY file");
+    while (lines.next()) {
+      if (take()) continue;
+      finish();
+      return;
+    }
+    lines.fail("the header has no end");
+  }
+
+  std::optional<Encoding> encoding;
+  std::vector<Element> elements;
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    lines_.fail("header line " + quoted(lines_.text()) + " " + what);
+  }
+  std::string_view word(std::size_t w) const {
+    return w < lines_.words().size() ? lines_.words()[w].text : std::string_view();
+  }
+
+  /// False at the end of the header.
+  bool take() {
+    if (word(0) == "comment" || word(0) == "obj_info") return true;
+    std::size_t used = 1;
+    if (word(0) == "format") {
+      used = takeFormat();
+    } else if (word(0) == "element") {
+      used = takeElement();
+    } else if (word(0) == "property") {
+      used = takeProperty();
+    } else if (word(0) != "end_header") {
+      fail("cannot be understood");
+    }
+    if (lines_.words().size() > used) fail("holds too many words");
+    return word(0) != "end_header";
+  }
+
+  std::size_t takeFormat() {
+    static constexpr std::string_view NAMES[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+    const auto* const name = std::find(std::begin(NAMES), std::end(NAMES), word(1));
+    if (name == std::end(NAMES) || word(2) != "1.0") fail("names no format of version 1.0");
+    if (encoding) fail("names the format once more");
+    encoding = static_cast<Encoding>(name - std::begin(NAMES));
+    return 3;
+  }
+
+  std::size_t takeElement() {
+    requireProperties();
+    const auto count = decimalInteger(word(2));
+    if (!count || *count < 0) fail("needs a name and a count");
+    Element element;
+    element.name = word(1);
+    element.count = static_cast<std::uint64_t>(*count);
+    if (element.count > file_bytes_) fail("claims more than the file holds");
+    for (const Element& other : elements) {
+      if (other.name == element.name) fail("names an element once more");
+    }
+    elements.push_back(std::move(element));
+    return 3;
+  }
+
+  std::size_t takeProperty() {
+    if (elements.empty()) fail("belongs to no element");
+    const bool list = word(1) == "list";
+    const std::size_t at = list ? 3 : 1;
+    const std::optional<Number> type = numberNamed(word(at)), count = numberNamed(word(2));
+    if (!type || (list && !count)) fail("names no type");
+    if (list && !isInteger(*count)) fail("counts a list by a type that is no integer");
+    if (word(at + 1).empty()) fail("has no name");
+    elements.back().properties.push_back({std::string(word(at + 1)), *type, list ? count : std::nullopt});
+    return at + 2;
+  }
+
+  void requireProperties() const {
+    if (!elements.empty() && elements.back().properties.empty()) fail("ends an element without properties");
+  }
+  void finish() const {
+    requireProperties();
+    if (!encoding) fail("ends a header that names no format");
+  }
+
+  TextLines& lines_;
+  std::size_t file_bytes_;
+};
+
+/// The rows of the elements, value by value.
+class PlyBody {
+ public:
+  virtual ~PlyBody() = default;
+  /// `what` outlives the row.
+  virtual void beginRow(std::string_view what, std::uint64_t number) {
+    what_ = what;
+    number_ = number;
+  }
+  virtual void endRow() = 0;
+  virtual double number(Number type) = 0;
+  /// Of a type that is an integer.
+  virtual std::int64_t integer(Number type) = 0;
+  virtual void skip(Number type, std::uint64_t count) = 0;
+  virtual bool holds(Number type, std::uint64_t count) const = 0;
+  [[noreturn]] virtual void fail(const std::string& what) const = 0;
+  /// After the last row. A remark, or nothing.
+  virtual std::string finish() = 0;
+
+ protected:
+  /// "polygon 3", for messages.
+  std::string row() const { return std::string(what_) + " " + std::to_string(number_); }
+
+ private:
+  std::string_view what_;
+  std::uint64_t number_ = 0;
+};
+
+/// A row is a line.
+class PlyText : public PlyBody {
+ public:
+  explicit PlyText(TextLines& lines) : lines_(lines) {}
+
+  void beginRow(std::string_view what, std::uint64_t number) override {
+    PlyBody::beginRow(what, number);
+    if (!lines_.nextWithWords()) lines_.fail("the file ends before " + row());
+    next_ = 0;
+  }
+  void endRow() override {
+    if (next_ < lines_.words().size()) lines_.fail(lines_.words()[next_], "is more than " + row() + " has");
+  }
+  double number(Number type) override {
+    const TextWord& word = take();
+    if (isInteger(type)) return static_cast<double>(lines_.integer(word));
+    const double value = lines_.number(word);
+    if (type == Number::DOUBLE || !std::isfinite(value)) return value;
+    if (std::abs(value) > double{std::numeric_limits<float>::max()}) lines_.fail(word, "is too large for a float");
+    return double{static_cast<float>(value)};
+  }
+  std::int64_t integer(Number) override { return lines_.integer(take()); }
+  void skip(Number, std::uint64_t count) override {
+    for (; count > 0; --count) take();
+  }
+  bool holds(Number, std::uint64_t count) const override { return count <= lines_.words().size() - next_; }
+  [[noreturn]] void fail(const std::string& what) const override { lines_.fail(row() + " " + what); }
+  std::string finish() override {
+    if (lines_.nextWithWords()) {
+      lines_.fail(lines_.words()[0], "stands after all that the header counts: its counts are too low");
+    }
+    return {};
+  }
+
+ private:
+  const TextWord& take() {
+    if (next_ == lines_.words().size()) lines_.fail(row() + " has too few values in its line");
+    return lines_.words()[next_++];
+  }
+  TextLines& lines_;
+  std::size_t next_ = 0;
+};
+
+class PlyBytes : public PlyBody {
+ public:
+  PlyBytes(std::string_view rest, bool big_endian, const std::string& path)
+      : rest_(rest), swap_(big_endian), path_(path) {}
+
+  void endRow() override {}
+  double number(Number type) override {
+    if (type == Number::FLOAT) return double{take<float>()};
+    if (type == Number::DOUBLE) return take<double>();
+    return static_cast<double>(integer(type));
+  }
+  std::int64_t integer(Number type) override {
+    switch (type) {
+      case Number::INT8:
+        return take<std::int8_t>();
+      case Number::UINT8:
+        return take<std::uint8_t>();
+      case Number::INT16:
+        return take<std::int16_t>();
+      case Number::UINT16:
+        return take<std::uint16_t>();
+      case Number::INT32:
+        return take<std::int32_t>();
+      default:
+        return take<std::uint32_t>();
+    }
+  }
+  void skip(Number type, std::uint64_t count) override {
+    if (!holds(type, count)) end();
+    rest_.remove_prefix(static_cast<std::size_t>(count) * bytesOf(type));
+  }
+  bool holds(Number type, std::uint64_t count) const override { return count <= rest_.size() / bytesOf(type); }
+  [[noreturn]] void fail(const std::string& what) const override {
+    throw MeshFileError(path_ + ": " + row() + " " + what);
+  }
+  std::string finish() override {
+    if (rest_.empty()) return {};
+    const std::string count = std::to_string(rest_.size());
+    if (isPadding(rest_)) return count + " bytes of padding after the last element are skipped";
+    throw MeshFileError(path_ + ": " + count + " bytes stand after all that the header counts: its counts are too low");
+  }
+
+ private:
+  [[noreturn]] void end() const { throw MeshFileError(path_ + ": the file ends in " + row()); }
+
+  template <typename T>
+  T take() {
+    char bytes[sizeof(T)];
+    if (rest_.size() < sizeof(T)) end();
+    std::memcpy(bytes, rest_.data(), sizeof(T));
+    rest_.remove_prefix(sizeof(T));
+    if (swap_) std::reverse(bytes, bytes + sizeof(T));
+    T value;
+    std::memcpy(&value, bytes, sizeof(T));
+    return value;
+  }
+
+  std::string_view rest_;
+  bool swap_;
+  const std::string& path_;
+};
+
+class PlyReader {
+ public:
+  PlyReader(const std::string& bytes, const std::string& path)
+      : bytes_(bytes), path_(path), lines_(bytes, path), header_(lines_, bytes.size()) {}
+
+  MeshFile read() {
+    requireMesh();
+    vertices_ = elementNamed("vertex")->count;
+    const std::unique_ptr<PlyBody> body = openBody();
+    for (const Element& element : header_.elements) {
+      if (element.name == "vertex") {
+        readVertices(element, *body);
+      } else if (element.name == "face" || element.name == "tristrips") {
+        readPolygons(element, *body);
+      } else {
+        skip(element, *body);
+      }
+    }
+    if (std::string remark = body->finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
+    setPolygons(std::move(polygons_), mesh_);
+    const auto name = [&](std::size_t p) {
+      return p >= faces_begin_ && p < faces_end_ ? "polygon " + std::to_string(p - faces_begin_)
+                                                 : std::string("a triangle of a strip");
+    };
+    remarkUnchecked(name, mesh_);
+    return std::move(mesh_);
+  }
+
+ private:
+  const Element* elementNamed(std::string_view name) const {
+    for (const Element& element : header_.elements) {
+      if (element.name == name) return &element;
+    }
+    return nullptr;
+  }
+
+  void requireMesh() const {
+    const auto holds = [&](std::string_view name) { return elementNamed(name) && elementNamed(name)->count > 0; };
+    if (!holds("vertex")) throw MeshFileError(path_ + ": no vertices");
+    if (holds("range_grid") && !holds("face") && !holds("tristrips")) {
+      throw MeshFileError(path_ +
+                          ": has no faces, but a scanner's range grid (element 'range_grid'); convert it to faces");
+    }
+  }
+
+  std::unique_ptr<PlyBody> openBody() {
+    if (header_.encoding == Encoding::ASCII) return std::make_unique<PlyText>(lines_);
+    std::string_view rest = lines_.rest();
+    // Where lines end with CR alone, a line feed after the header's last one is a byte of the body.
+    const std::size_t first_end = bytes_.find('\r'), at = bytes_.size() - rest.size();
+    const bool by_cr = first_end < bytes_.find('\n') && bytes_[first_end + 1] != '\n';
+    if (by_cr && at >= 2 && bytes_[at - 2] == '\r' && bytes_[at - 1] == '\n') {
+      rest = std::string_view(bytes_).substr(at - 1);
+    }
+    return std::make_unique<PlyBytes>(rest, header_.encoding == Encoding::BIG_ENDIAN_BYTES, path_);
+  }
+
+  static std::string_view rowName(const Element& element) {
+    return element.name == "face" ? "polygon" : element.name == "tristrips" ? "strip" : std::string_view(element.name);
+  }
+
+  static void skipValue(const Property& property, PlyBody& body) {
+    body.skip(property.type, property.count_type ? countOf(property, body) : 1);
+  }
+  static std::uint64_t countOf(const Property& list, PlyBody& body) {
+    const std::int64_t count = body.integer(*list.count_type);
+    if (count < 0 || !body.holds(list.type, static_cast<std::uint64_t>(count))) {
+      body.fail("has a list '" + list.name + "' of " + std::to_string(count) + ", which is not there");
+    }
+    return static_cast<std::uint64_t>(count);
+  }
+
+  template <typename Take>
+  void forRows(const Element& element, PlyBody& body, Take take) {
+    for (std::uint64_t row = 0; row < element.count; ++row) {
+      body.beginRow(rowName(element), row);
+      for (std::size_t p = 0; p < element.properties.size(); ++p) take(p);
+      body.endRow();
+    }
+  }
+
+  void skip(const Element& element, PlyBody& body) {
+    forRows(element, body, [&](std::size_t p) { skipValue(element.properties[p], body); });
+    if (element.count == 0) return;
+    mesh_.remarks.push_back("element " + quoted(element.name) + " (" + std::to_string(element.count) + ") is skipped");
+  }
+
+  /// The place of the one property of one of these names.
+  std::size_t propertyOf(const Element& element, std::initializer_list<std::string_view> names, bool list) const {
+    const auto named = [&](const Property& p) { return std::find(names.begin(), names.end(), p.name) != names.end(); };
+    const auto& all = element.properties;
+    const auto found = std::find_if(all.begin(), all.end(), named);
+    if (std::count_if(all.begin(), all.end(), named) == 1 && found->count_type.has_value() == list &&
+        (!list || isInteger(found->type))) {
+      return static_cast<std::size_t>(found - all.begin());
+    }
+    throw MeshFileError(path_ + ": element " + quoted(element.name) + " needs just one property '" +
+                        std::string(*names.begin()) + (list ? "', a list of integers" : "', a number"));
+  }
+
+  void readVertices(const Element& element, PlyBody& body) {
+    std::vector<int> axis_of(element.properties.size(), -1);
+    int axis = 0;
+    for (const std::string_view name : {"x", "y", "z"}) axis_of[propertyOf(element, {name}, false)] = axis++;
+    for (std::uint64_t row = 0; row < element.count; ++row) {
+      Vec3 p = Vec3::Zero();
+      body.beginRow(rowName(element), row);
+      for (std::size_t i = 0; i < element.properties.size(); ++i) {
+        if (axis_of[i] < 0) {
+          skipValue(element.properties[i], body);
+        } else {
+          p[axis_of[i]] = body.number(element.properties[i].type);
+        }
+      }
+      body.endRow();
+      mesh_.positions.push_back(p);
+    }
+  }
+
+  Index vertexOf(std::int64_t v, const PlyBody& body) const {
+    if (v < 0 || static_cast<std::uint64_t>(v) >= vertices_ || v >= std::int64_t{NO_INDEX}) {
+      body.fail("names vertex " + std::to_string(v) + " of " + std::to_string(vertices_));
+    }
+    return static_cast<Index>(v);
+  }
+
+  /// Every second triangle of a strip goes round the other way. Fewer than three corners stay one polygon.
+  void addStrip() {
+    if (corners_.size() < 3 && !corners_.empty()) polygons_.add(corners_);
+    for (std::size_t k = 2; k < corners_.size(); ++k) {
+      const std::size_t odd = k % 2;
+      polygons_.add({corners_[k - 2 + odd], corners_[k - 1 - odd], corners_[k]});
+    }
+    corners_.clear();
+  }
+
+  void readPolygons(const Element& element, PlyBody& body) {
+    const std::size_t list = propertyOf(element, {"vertex_indices", "vertex_index"}, true);
+    const bool strips = element.name == "tristrips";
+    if (!strips) faces_begin_ = polygons_.size();
+    forRows(element, body, [&](std::size_t i) {
+      const Property& property = element.properties[i];
+      if (i != list) return skipValue(property, body);
+      corners_.clear();
+      for (std::uint64_t left = countOf(property, body); left > 0; --left) {
+        const std::int64_t v = body.integer(property.type);
+        if (strips && v == -1) {
+          addStrip();
+        } else {
+          corners_.push_back(vertexOf(v, body));
+        }
+      }
+      if (strips) {
+        addStrip();
+      } else {
+        polygons_.add(corners_);
+      }
+    });
+    if (!strips) faces_end_ = polygons_.size();
+  }
+
+  const std::string& bytes_;
+  const std::string& path_;
+  TextLines lines_;
+  PlyHeader header_;
+  MeshFile mesh_;
+  Polygons polygons_;
+  std::uint64_t vertices_ = 0;
+  std::size_t faces_begin_ = 0, faces_end_ = 0;  // of the element `face` among the polygons
+  std::vector<Index> corners_;
+};
+
+}  // namespace
+
+MeshFile loadPlyFile(const std::string& path) {
+  const std::string bytes = readWholeFile(path);
+  return PlyReader(bytes, path).read();
+}
+
+}  // namespace dccd

@@ -1,0 +1,48 @@
+"""A number on a command line is a whole decimal one, or an error that names the option and the word."""
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from checkout import CHECKOUT, TOOLS
+
+WHOLE = ('0x10', '010', '1.5', '1_0', '1e1', '3x', '')
+DECIMAL = ('0x1p-3', '0,5', '1.0d-3', 'nan', 'inf', '1_0.5', '0.1-1', '1e999', '')
+OPTIONS = {
+    'check_step': (['a.obj', 'a.obj'], ['--threads', '--toc-bits', '--repeat'], ['--tolerance', '--budget']),
+    'analyze_bag': (['a.obj', '--report', 'report'], ['--threads'], ['--look-ahead']),
+    'replay_step': (['a.obj'], ['--threads', '--show'], []),
+    'run_queries': (['.'], ['--toc-bits', '--max-subdivisions'], ['--tolerance']),
+    'make_scene_bag': (['a.yaml', 'a.bag'], ['--frames', '--seed'], ['--rate']),
+    'analyze_fleet': (['--out', 'out'], ['--threads', '--jobs'], []),
+}
+
+
+class CommandLineNumbersTest(unittest.TestCase):
+    def test_no_other_word_is_a_number(self):
+        for name, (arguments, whole, decimal) in OPTIONS.items():
+            path = TOOLS / name if (TOOLS / name).exists() else CHECKOUT / 'fleet' / name
+            for options, words in ((whole, WHOLE), (decimal, DECIMAL)):
+                for option in options:
+                    for word in words:
+                        self.refused(path, arguments, option, word)
+
+    def refused(self, path, arguments, option, word):
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / 'a.obj').write_text('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')
+            done = subprocess.run([str(path), *arguments, option, word], cwd=folder, capture_output=True, text=True)
+        what = '%s %s %r: %s' % (path.name, option, word, done.stdout + done.stderr)
+        self.assertNotEqual(done.returncode, 0, what)
+        self.assertIn(option, done.stdout + done.stderr, what)
+        self.assertIn(word, done.stdout + done.stderr, what)
+
+    def test_whole_numbers_are_taken(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / 'a.obj').write_text('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')
+            done = subprocess.run([str(TOOLS / 'check_step'), 'a.obj', 'a.obj', '--threads', '+1', '--toc-bits', '20', '--tolerance',
+                                   '.5e-3', '--budget', '1e3'], cwd=folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,619 @@
+// The grammar of mesh files: each row of the tables in doc/mesh_files.md is a test of its name here.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+
+#include "input/mesh_file.h"
+#include "input/stl_file.h"
+#include "support/folder_test.h"
+
+namespace dccd {
+namespace {
+
+bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+class Grammar : public test::FolderTest {
+ protected:
+  MeshFile read(const std::string& name, const std::string& bytes) {
+    const std::string path = (folder_ / name).string();
+    std::ofstream(path, std::ios::binary) << bytes;
+    return fileEnding(path) == "stl" ? loadStlFile(path) : loadMeshFile(path);
+  }
+  /// Behind the folder: "a.obj:3: ..."; empty where it is read.
+  std::string error(const std::string& name, const std::string& bytes) {
+    try {
+      read(name, bytes);
+    } catch (const MeshFileError& e) {
+      return std::string(e.what()).substr(folder_.string().size() + 1);
+    }
+    return "";
+  }
+  void expectRefused(const std::string& name, const std::string& bytes, const std::string& where,
+                     const std::string& word) {
+    const std::string said = error(name, bytes);
+    EXPECT_EQ(said.substr(0, where.size()), where) << said << "\n" << bytes;
+    EXPECT_TRUE(mentions(said, word)) << said << "\n" << bytes;
+  }
+};
+
+const Positions SQUARE{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0.25}};
+const std::vector<Face> TWO{{0, 1, 2}, {2, 1, 3}};
+
+/// Two triangles on four vertices.
+void expectTwo(const MeshFile& mesh, const std::string& what) {
+  EXPECT_EQ(mesh.positions, SQUARE) << what;
+  EXPECT_EQ(mesh.faces, TWO) << what;
+  EXPECT_TRUE(mesh.unchecked.empty()) << what;
+}
+
+void expectUnchecked(const MeshFile& mesh, const std::vector<std::size_t>& polygons, const std::string& first) {
+  EXPECT_EQ(mesh.unchecked, polygons);
+  ASSERT_EQ(mesh.remarks.size(), 1u);
+  EXPECT_TRUE(mentions(mesh.remarks[0], "are unchecked, the first is ")) << mesh.remarks[0];
+  EXPECT_TRUE(mentions(mesh.remarks[0], first)) << mesh.remarks[0];
+}
+
+// --- OBJ
+
+class ObjGrammar : public Grammar {
+ protected:
+  static std::string vertices() { return "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.25\n"; }
+  /// Of the two faces behind the vertices.
+  MeshFile faces(const std::string& text) { return read("a.obj", vertices() + text); }
+  void expectFaces(const std::string& text) {
+    const MeshFile mesh = faces(text);
+    expectTwo(mesh, text);
+    EXPECT_TRUE(mesh.remarks.empty()) << text;
+  }
+  void expectLine5(const std::string& text, const std::string& word) {
+    expectRefused("a.obj", vertices() + text, "a.obj:5: ", word);
+  }
+};
+
+TEST_F(ObjGrammar, Blanks) {
+  for (const std::string blank : {" ", "\t", "\f", "\v", " \t\f\v "}) {
+    expectFaces(blank + "f" + blank + "1" + blank + "2" + blank + "3" + blank + "\n" + blank + "f 3 2 4\n");
+    expectTwo(read("a.obj",
+                   blank + "v 0 0 0\n" + blank + "v" + blank + "1 0 0\n" + "v 0 1 0\nv 1 1 0.25\nf 1 2 3\nf 3 2 4\n"),
+              "v");
+  }
+}
+
+TEST_F(ObjGrammar, EndsOfLines) {
+  const std::string text = vertices() + "f 1 2 3\n\nf 3 2 4\n";
+  for (const std::string end : {"\r", "\r\n"}) {
+    expectTwo(read("a.obj", std::regex_replace(text, std::regex("\n"), end)), end);
+    const std::string wrong = std::regex_replace(vertices() + "f 1 2 3\nf 3 2 x\n", std::regex("\n"), end);
+    expectRefused("a.obj", wrong, "a.obj:6: ", "'x'");
+  }
+  expectFaces("f 1 2 3\nf 3 2 4");
+}
+
+TEST_F(ObjGrammar, ByteOrderMark) {
+  expectTwo(read("a.obj", "\xef\xbb\xbf" + vertices() + "f 1 2 3\nf 3 2 4\n"), "UTF-8");
+  expectRefused("a.obj", std::string("\xff\xfev\0 \0", 6), "a.obj", "UTF-16");
+}
+
+TEST_F(ObjGrammar, Comments) {
+  expectFaces("# a square\nf 1 2 3 # one\n  #\nf 3 2 4 #4\n#");
+  expectLine5("f 1 2 3# one\n", "'3#'");
+}
+
+TEST_F(ObjGrammar, ContinuedLines) {
+  expectFaces("f 1 2 \\\n3\nf 3 \\\r\n\\\n  2 4\n");
+  expectTwo(read("a.obj", "v 0 0 0\nv 1\\\n 0 0\nv 0 1 \\\n0\nv 1 1 0.25\nf 1 2 3\nf 3 2 4\n"), "vertices");
+  expectRefused("a.obj", vertices() + "f 1 2 \\\n  x\n", "a.obj:6: ", "'x'");
+  expectLine5("f 1 2 3\\\n4\n", "without a blank");
+  expectLine5("f 1 2 3 \\", "no line follows");
+  // Programs differ on whether the next line belongs to it.
+  expectLine5("# C:\\meshes\\\nf 1 2 3\n", "not certain");
+  expectRefused("a.obj", vertices() + "f 1 2 \\\n3 # C:\\meshes\\\nf 3 2 4\n", "a.obj:6: ", "not certain");
+  expectFaces("\\\nf 1 2 3\nf 3 2 4\n");
+  expectLine5("usemtl C:\\meshes\\\n f 1 2 3\n", "not certain");
+  expectFaces("usemtl a \\\n b\nf 1 2 3\nf 3 2 4\n");
+}
+
+TEST_F(ObjGrammar, Vertices) {
+  const std::string rest = "f 1 2 3\nf 3 2 4\n";
+  for (const std::string more : {" 1", " 1.0", " 0.5 0.5 1", " 1 0.5 0.5 1"}) {
+    expectTwo(read("a.obj", "v 0 0 0" + more + "\nv +1 0. .0" + more + "\nv 0e5 1E0 -0\nv 10e-1 1 0.25\n" + rest),
+              more);
+  }
+  for (const std::string numbers : {"", "0", "0 0", "0 0 0 0 0", "0 0 0 0 0 0 0 0"}) {
+    expectRefused("a.obj", "v " + numbers + "\n", "a.obj:1: ", "'v'");
+  }
+}
+
+TEST_F(ObjGrammar, Weights) {
+  expectRefused("a.obj", "v 1 1 1 2\n", "a.obj:1: ", "'2'");
+  expectRefused("a.obj", "v 1 1 1 0.5 1 0 0\n", "a.obj:1: ", "'0.5'");
+}
+
+const char* const NO_NUMBERS[] = {"1.0-1", "1.0D-2", "1d0", "0,5", "0x10",  "0x1p3", "1.0.0", "1e",       "e1",    ".",
+                                  "+",     "--1",    "1f",  "1_0", "1e999", "1'0",   "1#IND", "\xd9\xa1", "nan(1)"};
+
+TEST_F(ObjGrammar, Numbers) {
+  for (const std::string word : NO_NUMBERS) {
+    for (int axis = 0; axis < 3; ++axis) {
+      std::string line = "v";
+      for (int k = 0; k < 3; ++k) line += " " + (k == axis ? word : "0");
+      expectRefused("a.obj", "v 0 0 0\n" + line + "\n", "a.obj:2: ", "is no decimal number");
+    }
+  }
+  EXPECT_EQ(read("a.obj", "v 0.1 1e-320 123456789012345678901234567890\n").positions[0],
+            Vec3(0.1, 1e-320, 123456789012345678901234567890.0));
+}
+
+TEST_F(ObjGrammar, NotFinite) {
+  const MeshFile mesh = read("a.obj", "v nan 0 0\nv inf 0 0\nv -Infinity 0 NaN\n");
+  EXPECT_TRUE(std::isnan(mesh.positions[0].x()));
+  EXPECT_EQ(mesh.positions[1].x(), INFINITY);
+  EXPECT_EQ(mesh.positions[2].x(), -INFINITY);
+}
+
+TEST_F(ObjGrammar, Corners) {
+  for (const std::string tail : {"", "/7", "//7", "/7/7", "/-1/-1", "/", "//"}) {
+    const auto corner = [&](const std::string& v) { return " " + v + tail; };
+    expectFaces("f" + corner("1") + corner("2") + corner("3") + "\nf" + corner("-2") + corner("-3") + corner("+4") +
+                "\n");
+  }
+  for (const std::string word :
+       {"0", "x", "1.0", "1.5", "1,2", "1/x", "1/0", "1//0", "1//x", "1/1/1/1", "/1", "1e0", "0x1", "1-"}) {
+    expectLine5("f 2 3 " + word + "\n", "'" + word + "'");
+    expectLine5("f " + word + " 2 3\n", "'" + word + "'");
+  }
+}
+
+TEST_F(ObjGrammar, VerticesThatAreNotThere) {
+  expectTwo(read("a.obj", "f 1 2 3\nf 3 2 4\n" + vertices()), "vertices may come later");
+  expectRefused("a.obj", vertices() + "f 1 2 3\nf 3 2 9\nf 3 2 5\n", "a.obj:6: ", "'9'");
+  expectLine5("f 1 2 5/1\n", "'5/1'");
+  expectLine5("f 1 2 -5\n", "'-5'");
+  expectLine5("f 1 2 4000000000\n", "'4000000000'");
+  expectLine5("f 1 2 99999999999999999999\n", "'99999999999999999999'");
+  expectRefused("a.obj", "f 1 2 3\n", "a.obj: ", "no vertices");
+}
+
+TEST_F(ObjGrammar, FewCorners) {
+  expectLine5("f 1 2\n", "fewer than three corners");
+  expectLine5("f\n", "fewer than three corners");
+}
+
+TEST_F(ObjGrammar, RepeatedCorners) {
+  const MeshFile mesh = faces("f 1 2 3\nf 2 4 4\nf 3 2 4\n");
+  EXPECT_EQ(mesh.polygons.size(), 3u);
+  EXPECT_EQ(mesh.faces, TWO) << "2 4 4 is an edge of the last face";
+  EXPECT_TRUE(mesh.unchecked.empty());
+  expectUnchecked(faces("f 1 2 3\nf 2 4 4\n"), {1}, "in line 6");
+}
+
+TEST_F(ObjGrammar, Lines) {
+  const MeshFile mesh = read("a.obj", vertices() + "v 2 2 2\nl 1 2 3\nl 5/1 -2/7\n");
+  EXPECT_EQ(mesh.edges, (std::vector<Edge>{{0, 1}, {1, 2}, {3, 4}}));
+  EXPECT_TRUE(mesh.faces.empty());
+  expectLine5("l 1\n", "fewer than two");
+  expectLine5("l 1 2 2\n", "'2'");
+  expectLine5("l 1 2//3\n", "'2//3'");
+  expectLine5("l 1 9\n", "'9'");
+  EXPECT_TRUE(mentions(error("a.obj", vertices() + "f 1 2 3\nl 3 4\n"), "line 6"));
+}
+
+TEST_F(ObjGrammar, Groups) {
+  const MeshFile mesh = faces("g one both\nf 1 2 3\ng two both\nf 3 2 4\ng\n");
+  EXPECT_EQ(mesh.groups.at("one"), (FaceGroups::mapped_type{{0, 1}}));
+  EXPECT_EQ(mesh.groups.at("two"), (FaceGroups::mapped_type{{1, 2}}));
+  EXPECT_EQ(mesh.groups.at("both"), (FaceGroups::mapped_type{{0, 1}, {1, 2}}));
+}
+
+TEST_F(ObjGrammar, SkippedKeywords) {
+  expectFaces(
+      "vt 0 0\nvn 0 0 1\nvp 1\no name\ns off\nmg 1 0.5\nmtllib a.mtl\nusemtl b\nmaplib m\nusemap m\nbevel on\n"
+      "c_interp on\nd_interp on\nlod 1\nshadow_obj a\ntrace_obj a\nctech a\nstech a\nf 1 2 3\nf 3 2 4\n");
+}
+
+TEST_F(ObjGrammar, OtherGeometry) {
+  for (const std::string word : {"p 1",
+                                 "fo 1 2 3",
+                                 "curv 0 1 1 2",
+                                 "curv2 1 2",
+                                 "surf 0 1 0 1 1 2 3 4",
+                                 "cstype bspline",
+                                 "deg 3",
+                                 "bmat u 1",
+                                 "step 1",
+                                 "parm u 0 1",
+                                 "trim 0 1 1",
+                                 "hole 0 1 1",
+                                 "scrv 0 1 1",
+                                 "sp 1",
+                                 "end",
+                                 "con 1 0 1 1 2 0 1 1",
+                                 "bzp 1",
+                                 "bsp 1",
+                                 "cdc 1",
+                                 "cdp 1",
+                                 "res 1",
+                                 "call other.obj",
+                                 "csh rm"}) {
+    expectLine5(word + "\nf 1 2 3\nf 3 2 4\n", "'" + word.substr(0, word.find(' ')) + "'");
+  }
+}
+
+TEST_F(ObjGrammar, Capitals) {
+  for (const std::string word : {"F", "V", "L", "G", "FO", "Curv"}) expectLine5(word + " 1 2 3\n", "small letters");
+}
+
+TEST_F(ObjGrammar, LinesOfNumbers) { expectLine5("3 2 4\nf 1 2 3\nf 3 2 4\n", "'3'"); }
+
+TEST_F(ObjGrammar, UnknownKeywords) {
+  const MeshFile mesh = faces("face 1 2 3\nf 1 2 3\nf1 2 3\nf 3 2 4\n");
+  expectTwo(mesh, "unknown");
+  ASSERT_EQ(mesh.remarks.size(), 1u);
+  EXPECT_TRUE(mentions(mesh.remarks[0], "2 lines") && mentions(mesh.remarks[0], "'face' in line 5")) << mesh.remarks[0];
+}
+
+// --- STL
+
+class StlGrammar : public Grammar {
+ protected:
+  static std::string facet(const std::vector<std::string>& corners, const std::string& normal = "0 0 1") {
+    std::string text = "facet normal " + normal + "\nouter loop\n";
+    for (const std::string& corner : corners) text += "vertex " + corner + "\n";
+    return text + "endloop\nendfacet\n";
+  }
+  static std::string two() { return facet({"0 0 0", "1 0 0", "0 1 0"}) + facet({"0 1 0", "1 0 0", "1 1 0.25"}); }
+  static std::string solid(const std::string& facets, const std::string& name = "a") {
+    return "solid " + name + "\n" + facets + "endsolid " + name + "\n";
+  }
+  static std::string binary(std::uint32_t count, const std::string& header = "binary") {
+    std::string out = header;
+    out.resize(80);
+    out.append(reinterpret_cast<const char*>(&count), 4);
+    for (const Face& face : TWO) {
+      float values[12] = {0, 0, 1};
+      for (int k = 0; k < 3; ++k) {
+        for (int axis = 0; axis < 3; ++axis) values[3 * k + 3 + axis] = static_cast<float>(SQUARE[face[k]][axis]);
+      }
+      out.append(reinterpret_cast<const char*>(values), sizeof values).append(2, '\0');
+    }
+    return out;
+  }
+};
+
+TEST_F(StlGrammar, Ascii) {
+  expectTwo(read("a.stl", solid(two())), "plain");
+  expectTwo(
+      read("a.stl", solid(facet({"0 0 0", "1 0 0", "0 1 0"})) + "\n" + solid(facet({"0 1 0", "1 0 0", "1 1 0.25"}))),
+      "two solids");
+  expectTwo(read("a.stl", std::regex_replace(solid(two()), std::regex("\n"), "\r")), "CR");
+  expectTwo(read("a.stl", std::regex_replace(solid(two()), std::regex("\n"), "\r\n\t")),
+            "CR LF, blanks before the words");
+  expectTwo(read("a.stl", "\xef\xbb\xbf \n" + solid(two())), "mark of UTF-8");
+  const std::string one_line = std::regex_replace(two(), std::regex("\n"), " ");
+  expectTwo(read("a.stl", "solid\n" + one_line + "endsolid"), "facets in one line");
+}
+
+TEST_F(StlGrammar, Capitals) {
+  std::string text = solid(two());
+  for (char& c : text) c = static_cast<char>(std::toupper(c));
+  expectTwo(read("a.stl", text), text);
+}
+
+TEST_F(StlGrammar, Names) {
+  for (const std::string name : {"", "vertex", "a vertex 1 2 3", "facet normal 0 0 1", "endsolid", "solid", "1.0-1"}) {
+    expectTwo(read("a.stl", solid(two(), name)), name);
+  }
+}
+
+TEST_F(StlGrammar, Normals) {
+  for (const std::string normal : {"nan nan nan", "-nan(ind) 0 0", "0 0 0", "5 -3 1e9"}) {
+    expectTwo(read("a.stl", solid(facet({"0 0 0", "1 0 0", "0 1 0"}, normal) + facet({"0 1 0", "1 0 0", "1 1 0.25"}))),
+              normal);
+  }
+  EXPECT_NE(error("a.stl", solid(facet({"0 0 0", "1 0 0", "0 1 0"}, "0 0"))), "");
+}
+
+TEST_F(StlGrammar, Numbers) {
+  for (const std::string word : NO_NUMBERS) {
+    expectRefused("a.stl", solid(facet({"0 0 0", "1 " + word + " 0", "0 1 0"})), "a.stl:5: ", "is no decimal number");
+  }
+  EXPECT_EQ(read("a.stl", solid(facet({"0.1 0 0", "1 0 0", "0 1 0"}))).positions[0].x(), 0.1) << "no float";
+}
+
+TEST_F(StlGrammar, OtherWords) {
+  expectRefused("a.stl", solid(facet({"0 0 0", "1 0 0"})), "a.stl:6: ", "'endloop'");
+  expectRefused("a.stl", solid(facet({"0 0 0", "1 0 0", "0 1 0", "1 1 0"})), "a.stl:7: ", "'vertex'");
+  expectRefused("a.stl", solid(facet({"0 0 0 0", "1 0 0", "0 1 0"})), "a.stl:4: ", "'0'");
+  expectRefused("a.stl", solid("color 1 0 0\n" + two()), "a.stl:2: ", "'color'");
+  expectRefused("a.stl", solid(two()) + two(), "a.stl:17: ", "'facet'");
+  expectRefused("a.stl", "solidify\n" + two(), "a.stl: ", "neither");
+}
+
+TEST_F(StlGrammar, CutText) {
+  const std::string whole = solid(two());
+  for (const std::size_t left : {whole.size() - 12, whole.size() / 2, std::size_t{9}}) {
+    EXPECT_NE(error("a.stl", whole.substr(0, left)), "") << left;
+  }
+  expectRefused("a.stl", solid(""), "a.stl: ", "no whole triangles");
+}
+
+TEST_F(StlGrammar, Binary) {
+  for (const std::string header : {"", "binary", "solid", "SOLID vertex 1 2 3"}) {
+    const MeshFile mesh = read("a.stl", binary(2, header));
+    expectTwo(mesh, header);
+    EXPECT_TRUE(mesh.remarks.empty());
+  }
+}
+
+TEST_F(StlGrammar, Padding) {
+  for (const std::string& more :
+       {std::string(1, '\0'), std::string(50, '\0'), std::string("\r\n"), std::string(1000, ' ')}) {
+    for (const std::string header : {"binary", "solid"}) {
+      const MeshFile mesh = read("a.stl", binary(2, header) + more);
+      expectTwo(mesh, header);
+      ASSERT_EQ(mesh.remarks.size(), 1u);
+      EXPECT_TRUE(mentions(mesh.remarks[0], std::to_string(more.size()) + " bytes")) << mesh.remarks[0];
+    }
+  }
+}
+
+TEST_F(StlGrammar, WrongCounts) {
+  for (const std::uint32_t count : {0u, 1u}) {
+    expectRefused("a.stl", binary(count), "a.stl: ", "states " + std::to_string(count) + " triangles");
+    expectRefused("a.stl", binary(count, "solid"), "a.stl: ", "states " + std::to_string(count) + " triangles");
+  }
+  expectRefused("a.stl", binary(3), "a.stl: ", "of the size that it states");
+  expectRefused("a.stl", binary(3, "solid"), "a.stl: ", "of the size that it states");
+  expectRefused("a.stl", binary(2).substr(0, 150), "a.stl: ", "of the size that it states");
+}
+
+TEST_F(StlGrammar, NotFinite) {
+  expectRefused("a.stl", solid(facet({"nan 0 0", "1 0 0", "0 1 0"})), "a.stl: ", "is not finite");
+}
+
+TEST_F(StlGrammar, RepeatedCorners) {
+  const std::string thin = facet({"0 0 0", "1 0 0", "1 0 0"}), apart = facet({"5 0 0", "6 0 0", "6 0 0"});
+  expectTwo(read("a.stl", solid(two() + thin)), "an edge of a face");
+  expectUnchecked(read("a.stl", solid(two() + apart)), {2}, "triangle 2");
+}
+
+// --- PLY
+
+class PlyGrammar : public Grammar {
+ protected:
+  static std::string head(const std::string& more, const std::string& format = "ascii") {
+    return "ply\nformat " + format + " 1.0\n" + more + "end_header\n";
+  }
+  static std::string xyz(std::size_t count = 4, const std::string& type = "double") {
+    std::string text = "element vertex " + std::to_string(count) + "\n";
+    for (const char* axis : {"x", "y", "z"}) text += "property " + type + " " + axis + "\n";
+    return text;
+  }
+  static std::string points() { return "0 0 0\n1 0 0\n0 1 0\n1 1 0.25\n"; }
+  static std::string faceElement(std::size_t count = 2) {
+    return "element face " + std::to_string(count) + "\nproperty list uchar int vertex_indices\n";
+  }
+  static std::string faces() { return "3 0 1 2\n3 2 1 3\n"; }
+  static std::string whole() { return head(xyz() + faceElement()) + points() + faces(); }
+
+  template <typename T>
+  static void put(std::string& out, T value, bool big) {
+    char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    if (big) std::reverse(bytes, bytes + sizeof value);
+    out.append(bytes, sizeof value);
+  }
+  /// With an element with a list before the faces, and lists and scalars beside their corners.
+  static std::string binary(bool big, const std::string& end = "\n") {
+    std::string text =
+        head("element material 1\nproperty list ushort double weights\nproperty short id\n" + xyz(4, "float") +
+                 "property list uchar uchar tags\nelement face 2\nproperty uchar flags\nproperty list uchar int "
+                 "vertex_indices\n"
+                 "property list uchar float texcoord\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n",
+             big ? "binary_big_endian" : "binary_little_endian");
+    text = std::regex_replace(text, std::regex("\n"), end);
+    put(text, std::uint16_t{2}, big);
+    for (const double weight : {0.5, 2.0}) put(text, weight, big);
+    put(text, std::int16_t{-7}, big);
+    for (const Vec3& p : SQUARE) {
+      for (const double x : p) put(text, static_cast<float>(x), big);
+      text += std::string("\3abc");
+    }
+    for (const Face& face : TWO) {
+      text += std::string("\xff\3");
+      for (const Index v : face) put(text, static_cast<std::int32_t>(v), big);
+      text += '\6';
+      for (int k = 0; k < 6; ++k) put(text, 0.5f, big);
+    }
+    put(text, std::int32_t{0}, big);
+    put(text, std::int32_t{1}, big);
+    return text;
+  }
+};
+
+TEST_F(PlyGrammar, Encodings) {
+  expectTwo(read("a.ply", whole()), "ascii");
+  for (const bool big : {false, true}) expectTwo(read("a.ply", binary(big)), big ? "big" : "little");
+}
+
+TEST_F(PlyGrammar, EndsOfLines) {
+  for (const std::string end : {"\r", "\r\n"}) {
+    expectTwo(read("a.ply", std::regex_replace(whole(), std::regex("\n"), end)), end);
+    expectTwo(read("a.ply", binary(false, end)), end);
+    // The body begins with the byte of a line feed.
+    std::string text = head("element other 1\nproperty uchar a\n" + xyz(4, "uchar"), "binary_little_endian");
+    text = std::regex_replace(text, std::regex("\n"), end) + "\n" + std::string(11, '\2') + '\3';
+    EXPECT_EQ(read("a.ply", text).positions.back(), Vec3(2, 2, 3)) << end;
+  }
+  expectTwo(read("a.ply", "\xef\xbb\xbf" + whole()), "mark of UTF-8");
+  expectTwo(read("a.ply", head(xyz() + faceElement()) + "\n" + points() + "\n\n" + faces() + "\n"), "empty lines");
+}
+
+TEST_F(PlyGrammar, Header) {
+  const auto refused = [&](const std::string& more, const std::string& word) {
+    expectRefused("a.ply", head(more) + points() + faces(), "a.ply:", word);
+  };
+  refused("elements vertex 4\n", "cannot be understood");
+  refused("\n" + xyz(), "cannot be understood");
+  refused("element vertex four\n", "'element vertex four'");
+  refused("element vertex -1\n", "needs a name and a count");
+  refused("element vertex 0x4\n", "needs a name and a count");
+  refused("element vertex 4 4\n", "too many words");
+  refused("element vertex 4000000000\n", "claims more than the file holds");
+  refused("element vertex 4\nelement face 2\n", "without properties");
+  refused("property double x\n", "belongs to no element");
+  refused("element vertex 4\nproperty long x\n", "names no type");
+  refused("element vertex 4\nproperty list float int x\n", "counts a list");
+  refused("element vertex 4\nproperty double\n", "has no name");
+  refused(xyz() + xyz(), "once more");
+  refused("format ascii 1.0\n" + xyz(), "once more");
+  expectRefused("a.ply", "ply\nformat ascii 2.0\nend_header\n", "a.ply:2: ", "names no format");
+  expectRefused("a.ply", "ply\n" + xyz() + "end_header\n" + points(), "a.ply:6: ", "names no format");
+  expectRefused("a.ply", "plyx\n", "a.ply:1: ", "is no PLY file");
+  expectRefused("a.ply", "ply\nformat ascii 1.0\n", "a.ply:2: ", "has no end");
+  expectTwo(read("a.ply", head("comment a\nobj_info b\ncomment\n" + xyz() + faceElement()) + points() + faces()),
+            "comments");
+}
+
+TEST_F(PlyGrammar, Vertices) {
+  const std::string properties =
+      "element vertex 4\nproperty uchar red\nproperty float64 z\nproperty list int8 uint16 rings\n"
+      "property float y\nproperty int32 x\nproperty float32 quality\n";
+  expectTwo(read("a.ply", head(properties + faceElement()) +
+                              "255 0 0 0 0 nan\n7 0 2 5 6 0 1 0.5\n0.5 0 1 9 1 0 1\n0 0.25 0 1 1 0\n" + faces()),
+            "in another order, with others between them");
+  for (const char* type :
+       {"char", "int8", "short", "int16", "int", "int32", "uchar", "uint8", "ushort", "uint16", "uint", "uint32"}) {
+    EXPECT_EQ(read("a.ply", head(xyz(1, type)) + "1 2 3\n").positions[0], Vec3(1, 2, 3)) << type;
+  }
+  expectRefused("a.ply", head("element vertex 1\nproperty float x\nproperty float y\n") + "0 0\n", "a.ply: ", "'z'");
+  expectRefused("a.ply", head(xyz(1) + "property float x\n") + "0 0 0 0\n", "a.ply: ", "'x'");
+  expectRefused("a.ply", head(faceElement()) + faces(), "a.ply: ", "no vertices");
+}
+
+TEST_F(PlyGrammar, Numbers) {
+  for (const std::string word : NO_NUMBERS) {
+    expectRefused("a.ply", head(xyz(1)) + "0 " + word + " 0\n", "a.ply:8: ", "is no decimal number");
+    expectRefused("a.ply", head(xyz(1, "float")) + "0 " + word + " 0\n", "a.ply:8: ", "is no decimal number");
+    expectRefused("a.ply", head(xyz(1, "int")) + "0 " + word + " 0\n", "a.ply:8: ", "is no integer");
+    expectRefused("a.ply", head(xyz() + faceElement()) + points() + "3 0 1 2\n3 2 " + word + " 3\n",
+                  "a.ply:15: ", "is no integer");
+  }
+  EXPECT_EQ(read("a.ply", head(xyz(1)) + "0.1 1e-320 1e300\n").positions[0], Vec3(0.1, 1e-320, 1e300));
+  EXPECT_EQ(read("a.ply", head(xyz(1, "float")) + "0.1 0 0\n").positions[0].x(), double{0.1f});
+  expectRefused("a.ply", head(xyz(1, "float")) + "0 1e39 0\n", "a.ply:8: ", "too large for a float");
+  EXPECT_TRUE(std::isnan(read("a.ply", head(xyz(1)) + "nan 0 inf\n").positions[0].x()));
+}
+
+TEST_F(PlyGrammar, LinesOfText) {
+  const std::string top = head(xyz() + faceElement());
+  expectRefused("a.ply", top + "0 0 0\n1 0\n0 1 0\n1 1 0.25\n" + faces(), "a.ply:11: ", "vertex 1 has too few");
+  expectRefused("a.ply", top + "0 0 0\n1 0 0 0\n0 1 0\n1 1 0.25\n" + faces(), "a.ply:11: ", "more than vertex 1 has");
+  expectRefused("a.ply", top + points() + "3 0 1 2\n4 2 1 3\n", "a.ply:15: ", "polygon 1");
+  expectRefused("a.ply", top + points() + "3 0 1 2\n2 2 1 3\n", "a.ply:15: ", "'3'");
+  expectRefused("a.ply", top + points() + "3 0 1 2\n", "a.ply:14: ", "ends before polygon 1");
+  expectRefused("a.ply", top + points() + faces() + "3 0 1 3\n", "a.ply:16: ", "counts are too low");
+  expectRefused("a.ply", top + points() + "-3 0 1 2\n3 2 1 3\n", "a.ply:14: ", "-3");
+}
+
+TEST_F(PlyGrammar, FacesBesideTheirCorners) {
+  expectTwo(read("a.ply", head(xyz() + "element face 2\nproperty list uchar float texcoord\nproperty uchar red\n"
+                                       "property list uint8 uint32 vertex_index\nproperty int texnumber\n") +
+                              points() + "6 0 0 1 0 0 1 255 3 0 1 2 0\n0 9 3 2 1 3 1\n"),
+            "texcoord");
+  for (const std::string properties :
+       {"property list uchar int vertices\n", "property int vertex_indices\n",
+        "property list uchar float vertex_indices\n",
+        "property list uchar int vertex_indices\nproperty list uchar int vertex_index\n"}) {
+    expectRefused("a.ply", head(xyz() + "element face 1\n" + properties) + points() + "3 0 1 2\n",
+                  "a.ply: ", "'vertex_indices'");
+  }
+}
+
+TEST_F(PlyGrammar, VerticesThatAreNotThere) {
+  const std::string top = head(xyz() + faceElement());
+  expectRefused("a.ply", top + points() + "3 0 1 2\n3 2 1 4\n", "a.ply:15: ", "polygon 1 names vertex 4 of 4");
+  expectRefused("a.ply", top + points() + "3 0 1 -1\n3 2 1 3\n", "a.ply:14: ", "polygon 0 names vertex -1 of 4");
+}
+
+TEST_F(PlyGrammar, RepeatedCorners) {
+  expectUnchecked(read("a.ply", head(xyz() + faceElement()) + points() + "3 0 1 2\n3 3 1 3\n"), {1}, "polygon 1");
+  expectUnchecked(read("a.ply", head(xyz() + faceElement(3)) + points() + "3 0 1 2\n2 0 3\n3 2 1 3\n"), {1},
+                  "polygon 1");
+}
+
+TEST_F(PlyGrammar, Strips) {
+  const auto strips = [](const std::string& lines, const std::string& count = "1", const std::string& item = "int") {
+    return head(xyz() + "element tristrips " + count + "\nproperty list int " + item + " vertex_indices\n") + points() +
+           lines;
+  };
+  expectTwo(read("a.ply", strips("4 0 1 2 3\n")), "alternate");
+  expectTwo(read("a.ply", strips("4 0 1 2 3\n", "1", "uint")), "without a sign");
+  expectTwo(read("a.ply", strips("9 0 1 2 -1 -1 2 1 3 -1\n")), "-1 begins anew");
+  expectTwo(read("a.ply", strips("3 0 1 2\n3 2 1 3\n", "2")), "two of them");
+  EXPECT_EQ(read("a.ply", strips("6 3 0 1 2 -1 0\n")).faces, (std::vector<Face>{{3, 0, 1}, {1, 0, 2}}));
+  expectRefused("a.ply", strips("4 0 1 2 -2\n"), "a.ply:14: ", "strip 0 names vertex -2 of 4");
+  expectUnchecked(read("a.ply", strips("6 0 1 2 -1 1 3\n")), {1}, "of a strip");
+}
+
+TEST_F(PlyGrammar, OtherElements) {
+  const MeshFile mesh = read(
+      "a.ply", head("element camera 1\nproperty float view_px\n" + xyz() +
+                    "element material 2\nproperty list uchar float weights\n" + faceElement() +
+                    "element edge 1\nproperty int vertex1\nproperty int vertex2\nelement none 0\nproperty int a\n") +
+                   "0.5\n" + points() + "2 0.5 0.5\n0\n" + faces() + "0 3\n");
+  expectTwo(mesh, "skipped");
+  ASSERT_EQ(mesh.remarks.size(), 3u);
+  EXPECT_TRUE(mentions(mesh.remarks[1], "'material' (2)")) << mesh.remarks[1];
+}
+
+TEST_F(PlyGrammar, RangeGrid) {
+  const std::string grid = "element range_grid 2\nproperty list uchar int vertex_indices\n";
+  EXPECT_TRUE(mentions(error("a.ply", head(xyz() + grid) + points() + "1 0\n0\n"), "range grid"));
+  expectTwo(read("a.ply", head(xyz() + grid + faceElement()) + points() + "1 0\n0\n" + faces()), "with faces");
+}
+
+TEST_F(PlyGrammar, PointsAlone) { EXPECT_EQ(read("a.ply", head(xyz()) + points()).positions, SQUARE); }
+
+TEST_F(PlyGrammar, EndOfBytes) {
+  const std::string bytes = binary(false);
+  for (std::size_t cut = 1; cut < 60; ++cut) EXPECT_NE(error("a.ply", bytes.substr(0, bytes.size() - cut)), "") << cut;
+  for (const std::string& more : {std::string(12, '\0'), std::string("\n")}) {
+    const MeshFile mesh = read("a.ply", bytes + more);
+    expectTwo(mesh, "padding");
+    EXPECT_TRUE(mentions(mesh.remarks.back(), std::to_string(more.size()) + " bytes of padding"))
+        << mesh.remarks.back();
+  }
+  expectRefused("a.ply", bytes + "\1", "a.ply: ", "counts are too low");
+}
+
+// --- the page
+
+TEST(MeshFilesPage, EachRowIsATestAndEachTestARow) {
+  std::ifstream page(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/doc/mesh_files.md");
+  std::set<std::string> rows, tests;
+  for (std::string line; std::getline(page, line);) {
+    std::smatch name;
+    if (std::regex_search(line, name, std::regex("`((?:Obj|Ply|Stl)Grammar\\.\\w+)` \\|$"))) rows.insert(name[1]);
+  }
+  const ::testing::UnitTest& all = *::testing::UnitTest::GetInstance();
+  for (int s = 0; s < all.total_test_suite_count(); ++s) {
+    const ::testing::TestSuite& suite = *all.GetTestSuite(s);
+    if (!mentions(suite.name(), "Grammar")) continue;
+    for (int t = 0; t < suite.total_test_count(); ++t) {
+      tests.insert(std::string(suite.name()) + "." + suite.GetTestInfo(t)->name());
+    }
+  }
+  EXPECT_GT(tests.size(), 30u);
+  EXPECT_EQ(rows, tests);
+}
+
+}  // namespace
+}  // namespace dccd
