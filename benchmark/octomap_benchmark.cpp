@@ -116,7 +116,7 @@ Body bodyOf(const Case& c) {
   return cloth;
 }
 
-/// Steps to and fro between the two ends, with what the steps before have shown and without, in turns.
+/// Steps to and fro between the two ends, with what is kept of a body at rest and without, in turns.
 nlohmann::json timeStream(const Case& c, const std::shared_ptr<const VoxelSurface>& surface, int repeat) {
   Options options, forgetting;
   forgetting.keep_bounds = false;
@@ -124,7 +124,7 @@ nlohmann::json timeStream(const Case& c, const std::shared_ptr<const VoxelSurfac
   const Body cloth = bodyOf(c);
   Step there = test::stepOf(cloth, c.t0, c.t1), back = test::stepOf(cloth, c.t1, c.t0);
   there.map.surface = back.map.surface = surface;
-  std::vector<double> with_memory, without, ratio;
+  std::vector<double> kept, without, ratio;
   std::size_t contacts = 0;
   for (int r = -2; r < repeat; ++r) {  // what is made once for the mesh and the map is in neither
     const Step& step = (r & 1) == 0 ? there : back;
@@ -140,10 +140,10 @@ nlohmann::json timeStream(const Case& c, const std::shared_ptr<const VoxelSurfac
                                  forgot.contacts.end(), [](const Contact& x, const Contact& y) {
                                    return !canonicalLess(x, y) && !canonicalLess(y, x) && x.toc_upper == y.toc_upper;
                                  });
-    if (!same) throw std::runtime_error(c.name + ": memory changes the contacts");
+    if (!same) throw std::runtime_error(c.name + ": what is kept changes the contacts");
     if (r < 0) continue;
     contacts = with.contacts.size();
-    with_memory.push_back(ms[0]);
+    kept.push_back(ms[0]);
     without.push_back(ms[1]);
     ratio.push_back(ms[0] / ms[1]);
   }
@@ -152,7 +152,7 @@ nlohmann::json timeStream(const Case& c, const std::shared_ptr<const VoxelSurfac
           {"voxels", surface->leafCount()},
           {"contacts", contacts},
           {"required_ms", c.required_ms},
-          {"ms", spread(with_memory)},
+          {"ms", spread(kept)},
           {"forget_ms", spread(without)},
           {"forget_ratio", quartiles(ratio)}};
 }

@@ -165,17 +165,6 @@ def write_first(folder, rows):
     return save(folder, "first", "# The first contact only\n\n" + table(header, lines))
 
 
-def write_stream(folder, rows):
-    header = ["sequence", "steps", "threads", "contacts", "pairs of clusters known apart, a step", "mean ms a step",
-              "the same with --forget", "ratio", "from", "to"]
-    lines = []
-    for r in rows:
-        lines.append([r["sequence"], str(r["steps"]), str(r["threads"]), str(r["contacts"]), "%.0f" % r["known_apart"]] +
-                     of_turns(r["ms"], r["forget_ms"]))
-    write_rows(os.path.join(folder, "stream.csv"), header, lines)
-    return save(folder, "stream", "# Streams with memory and without\n\n" + table(header, lines))
-
-
 def write_budget(folder, result):
     header = ["input", "without, ms", "budget ms", "cut", "p50", "p95", "p99", "max", "allowed"]
     rows = []

@@ -29,9 +29,8 @@ struct Options {
   double max_compute_ms = 0;      ///< ends a step that has no budget as if it were one; 0: none
   bool earliest_only = false;     ///< only contacts that may be the first; with `exact` those in the earliest TOC cell
   bool check_start_state = true;  ///< run the static tests when the step needs them
-  /// What the steps before have shown is not done again: bodies that move bit for bit as in the step before keep their
-  /// bounds, and clusters that are known to stay apart are not paired (no answer changes). Off: to time a step again
-  /// and again.
+  /// What the steps before have shown is not done again: bodies at rest keep their bounds and their contacts with the
+  /// map (no answer changes). Off: to time a step again and again.
   bool keep_bounds = true;
   /// Leave out the self-collision of surfaces that certainly do not fold (no answer changes).
   bool unfolded_test = true;

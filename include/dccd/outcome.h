@@ -114,11 +114,9 @@ struct StepStats {
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
   std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
-  std::uint64_t pairs_known_apart = 0;  ///< pairs of clusters that the steps before had shown to stay apart in this one
-  std::uint64_t pairs_shown_apart = 0;  ///< pairs of clusters found to be apart when the step ends, and by how much
-  std::uint64_t map_answers_kept = 0;   ///< bodies at rest whose contacts with the map are those of the step before
-  std::uint64_t left_out_listed = 0;    ///< pairs closer than the separation in the reference frame
-  std::uint64_t left_out_met = 0;       ///< of those, the ones that came to the elementary test, without a separation
+  std::uint64_t map_answers_kept = 0;  ///< bodies at rest whose contacts with the map are those of the step before
+  std::uint64_t left_out_listed = 0;   ///< pairs closer than the separation in the reference frame
+  std::uint64_t left_out_met = 0;      ///< of those, the ones that came to the elementary test, without a separation
   const StageStats& operator[](Stage s) const { return stages[static_cast<std::size_t>(s)]; }
   StageStats& operator[](Stage s) { return stages[static_cast<std::size_t>(s)]; }
   const StageStats& operator[](Effect e) const { return effects[static_cast<std::size_t>(e)]; }
@@ -141,8 +139,6 @@ struct StepStats {
   COUNTER(bodies_refitted, false)   \
   COUNTER(bodies_kept, false)       \
   COUNTER(body_pairs, false)        \
-  COUNTER(pairs_known_apart, false) \
-  COUNTER(pairs_shown_apart, false) \
   COUNTER(map_answers_kept, false)  \
   COUNTER(left_out_listed, true)    \
   COUNTER(left_out_met, false)

@@ -58,26 +58,12 @@ constexpr double RECORD_PADDING = 0.5;
 constexpr double RECORD_SHARE = 0.125;
 /// [1] Slack of a margin in records, of the largest coordinate: the roundings of both its sums.
 constexpr double RECORD_MARGIN = 4 * HALF_ULP;
-/// [1] Slack of the length that a record's unit stands for: within the guard it is off by less than 2^-12.
-constexpr double RECORD_UNIT = 0x1p-11;
 constexpr double RECORD_SMALLEST_RANGE = 0x1p-20;  ///< [1] guard on the records' range, of the largest coordinate
 /// [1] Margin of a separation that is a sum of several, which must not come out too small.
 DCCD_MARGIN double SEPARATION_SUM = 0x1p-50;
-/// [1] Slack of a length that is a root of a sum of a few products, of a product of a few factors, and of a cosine;
-/// these are off by less than 2^-46.
+/// [1] Slack of bounds that are placed in the frame of the map, of the size of their terms: these are off by less than
+/// 2^-46 of it.
 constexpr double LENGTH = 0x1p-40;
-/// [1] Slack of a residual and of a distance between two points, of the scene's size: these are off by 2^-46 of it.
-constexpr double RESIDUAL = 0x1p-44;
-/// [1] What is added to a sum of squares so that points on one line have a rotation, too. No bound depends on it, for
-/// residuals are measured. Larger: the rotation fits less well. Smaller: on a line it is mostly rounding.
-constexpr double ROTATION_FIT = 1e-9;
-/// [m, m^2] Guard: along a shorter direction no gap is measured, so that a longer one's squares and products do not
-/// vanish. Larger: more pairs are not known to stay apart, and are tested in each step. Smaller: its length is mostly
-/// rounding, and a gap may come out too large.
-constexpr double SHORTEST_DIRECTION = 1e-150;
-/// [m] Guard on the size of a scene whose pairs are remembered: squares and products neither vanish nor overflow.
-/// Narrower: more scenes are tested as if nothing were known. Wider: a certificate may not hold.
-constexpr double REMEMBERED_SMALLEST_M = 1e-100, REMEMBERED_LARGEST_M = 1e100;
 
 // --- filters ---------------------------------------------------------------------------------------------------------
 // Planar filter (simd/fused_filter.cpp), in float on differences.

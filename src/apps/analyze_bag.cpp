@@ -217,7 +217,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
-  app.add_flag("--forget", a.forget, "each step without what the ones before have shown; no answer changes");
+  app.add_flag("--forget", a.forget, "nothing is kept of bodies at rest; no answer changes");
   app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
   app.add_flag("--accuracy-study", a.study,
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "

@@ -66,8 +66,7 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
   app.add_flag("--no-start-state", a.no_start_state, "leave out whether surfaces cross at t=0: then nothing is proved");
   app.add_flag("--earliest-only", a.earliest_only, "only the first contacts");
-  app.add_flag("--forget", a.forget,
-               "of several steps: each without what the ones before have shown; no answer changes");
+  app.add_flag("--forget", a.forget, "of several steps: nothing is kept of bodies at rest; no answer changes");
   requireDecimalNumbers(app);
   app.parse(argc, argv);
   if (a.accuracy == "all" && a.isSequence()) throw std::runtime_error("--accuracy all takes two frames");

@@ -113,12 +113,6 @@ void ClusterTree::refitLeaves(const std::int16_t* records, const std::int16_t* m
                     levels_[0].soa.data() + first_group * SOA_SIZE, levels_[0].aos.data() + first_group * AOS_SIZE);
 }
 
-void ClusterTree::boundLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
-                              std::size_t last_group) {
-  simd::boundLeaves(records, boundedGroup(first_group), arity_, (last_group - first_group) * GROUP, margin16,
-                    levels_[0].aos.data() + first_group * AOS_SIZE);
-}
-
 void ClusterTree::refitUpper() {
   for (std::size_t l = 1; l < levels_.size(); ++l) {
     simd::buildUpper(levels_[l - 1].aos.data(), levels_[l - 1].groups, levels_[l].soa.data(), levels_[l].aos.data());

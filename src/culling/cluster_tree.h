@@ -62,9 +62,6 @@ class ClusterTree {
   /// Recomputes all bounds from the vertices' records. margin16: see simd::buildLeaves.
   void refitLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
                    std::size_t last_group);
-  /// The groups' bounds alone; what their members are is then of another step.
-  void boundLeaves(const std::int16_t* records, const std::int16_t* margin16, std::size_t first_group,
-                   std::size_t last_group);
   void refitUpper();
   /// simd::shortenBounds() of the groups of a level.
   void shorten(std::size_t level, std::int32_t end, bool swept, std::size_t first_group, std::size_t last_group);

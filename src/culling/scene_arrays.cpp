@@ -5,6 +5,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "dccd/tolerances.h"
+
 namespace dccd {
 namespace {
 
@@ -188,10 +190,14 @@ double SceneArrays::separation(std::size_t a, std::size_t b) const {
   return separationBetween(bodies_[a].setup, a, bodies_[b].setup, b);
 }
 
-/// Of a direction in which the scene is small beside its coordinates, a record's roundings are no small part of a unit.
+/// Of a direction in which the scene is small beside its coordinates, a record's roundings are no small part of a unit:
+/// those of a sum, a difference and a product, each below 2^-53 of twice the size in that direction, of two numbers.
+/// Together they are below 2^-49 of it, against a unit of at least 2^-17 of the range.
 std::int32_t SceneArrays::endOf(double until) const {
   for (int d = 0; d < 8; ++d) {
-    if (scale_[d] > 0 && unit(d) == 0) return simd::WHOLE_STEP;
+    const double range = range_max_[d] - range_min_[d];
+    const double size = std::max(std::abs(range_min_[d]), std::abs(range_max_[d]));
+    if (scale_[d] > 0 && !(range > tolerance::RECORD_SMALLEST_RANGE * size)) return simd::WHOLE_STEP;
   }
   const bool widened =
       std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& body) { return body.reach_m > 0; });

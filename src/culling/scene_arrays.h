@@ -36,14 +36,12 @@ struct SceneBody {
   std::vector<std::uint8_t> asked;   ///< per vertex; 0: in the body's vertex_mask. Empty: no mask
   std::vector<std::uint8_t> active;  ///< per used vertex; what the trees are masked with
   bool masked = false;
-  bool uncertain = false;     ///< some vertex has an uncertainty radius above 0 in this step
-  bool unchanged = false;     ///< every vertex is at both ends where it was in the step before, bit for bit
-  bool kept = false;          ///< nothing of it changed since the last step, nor did the range of the records
-  bool stale = false;         ///< its records and bounds are not those of its vertices
-  bool recorded = false;      ///< it has been through a step since it was set
-  bool mask_changed = false;  ///< other vertices are left out than in the step before
-  bool whole = false;         ///< the bounds of its leaves' members are those of its leaves
-  double reach_m = 0;         ///< how far its bounds are widened: half of the scene's largest separation of meshes
+  bool uncertain = false;  ///< some vertex has an uncertainty radius above 0 in this step
+  bool unchanged = false;  ///< every vertex is at both ends where it was in the step before, bit for bit
+  bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
+  bool stale = false;      ///< its records and bounds are not those of its vertices
+  bool recorded = false;   ///< it has been through a step since it was set
+  double reach_m = 0;      ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
   std::int16_t margin[16] = {};                   ///< reach_m in record units
   bool translates = false;  ///< all vertices have exactly the same displacement in this step (at rest included)
@@ -96,20 +94,19 @@ class SceneArrays {
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
 
   /// Records and bounds of every body that is not kept. pieces(n, f): calls f(first, last) over [0, n), in parallel or
-  /// not. members: also those of the features in the leaves; else refitMembers() is to follow where they are asked for.
+  /// not.
   template <class Pieces>
-  void refit(const Pieces& pieces, StepStats& stats, bool members = true) {
+  void refit(const Pieces& pieces, StepStats& stats) {
     for (SceneBody& body : bodies_) {
       ++(body.kept ? stats.bodies_kept : stats.bodies_refitted);
-      if (body.kept && !body.stale && (body.whole || !members)) continue;
+      if (body.kept && !body.stale) continue;
       body.stale = false;
-      body.whole = members;
       pieces(body.usedCount(), [&](std::size_t first, std::size_t last) {
         quantize(body.internal_begin + first, body.internal_begin + last);
       });
       for (ClusterTree& tree : body.trees) {
         pieces(tree.level(0).groups,
-               [&](std::size_t first, std::size_t last) { refitLeaves(body, tree, members, first, last); });
+               [&](std::size_t first, std::size_t last) { refitLeaves(body, tree, first, last); });
         tree.refitUpper();
       }
     }
@@ -117,12 +114,7 @@ class SceneArrays {
     bounds_valid_ = true;
   }
 
-  /// The members of one group of leaves, after a refit() without them.
-  void refitMembers(std::size_t b, FeatureKind kind, std::size_t group) {
-    refitLeaves(bodies_[b], bodies_[b].trees[static_cast<int>(kind)], true, group, group + 1);
-  }
-
-  /// After a refit() with members: its bounds reach from t0 to `until` or a little later. The next refit() makes them
+  /// After a refit(): its bounds reach from t0 to `until` or a little later. The next refit() makes them
   /// anew. Does nothing to a scene with separations or radii.
   template <class Pieces>
   Span shorten(const Pieces& pieces, double until) {
@@ -150,13 +142,6 @@ class SceneArrays {
   /// The RECORD values of an internal vertex, after refit().
   const std::int16_t* record(Index internal) const { return records_.data() + internal * simd::RECORD; }
   std::size_t vertexCount() const { return vertex_count_; }
-  /// What a record unit of direction d is at least [m], with all that was rounded on the way; 0: the records say
-  /// nothing of that direction.
-  double unit(int d) const;
-  /// No coordinate of a vertex is larger [m].
-  double size() const;
-  /// A ball around all that a group of leaves holds at t=0 [m], after refit().
-  void ballAtStart(const std::int16_t* aos, double* centre, double& radius) const;
   /// Pairs of different bodies, flattened, the smaller index first, whose bounds overlap (t0_only: at t=0).
   void overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pairs, std::vector<std::uint32_t>& scratch) const;
   std::size_t height() const { return height_; }
@@ -226,7 +211,7 @@ class SceneArrays {
   std::int32_t endOf(double until) const;
   bool isStill(const SceneBody& body) const;
   void quantize(std::size_t first, std::size_t last);
-  void refitLeaves(const SceneBody& body, ClusterTree& tree, bool members, std::size_t first, std::size_t last) const;
+  void refitLeaves(const SceneBody& body, ClusterTree& tree, std::size_t first, std::size_t last) const;
   void refitBodies();
 
   std::vector<SceneBody> bodies_;

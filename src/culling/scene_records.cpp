@@ -176,8 +176,7 @@ void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::arra
   if (!body.kept) body.translates = !masked && sameDisplacement(out, body.usedCount());
   body.recorded = !body.uncertain;  // radii widen the bounds, and may be others in the next step
   stats.unchecked_vertices += unchecked;
-  body.mask_changed = changed || masked != body.masked;
-  if (body.mask_changed) {
+  if (changed || masked != body.masked) {
     // The mask is indexed by internal vertex number.
     const std::uint8_t* flags = masked ? body.active.data() - body.internal_begin : nullptr;
     for (ClusterTree& tree : body.trees) tree.mask(flags);
@@ -280,16 +279,8 @@ void SceneArrays::quantize(std::size_t first, std::size_t last) {
   simd::quantize(vertices_[first].t0, last - first, low_, scale_, records_.data() + first * simd::RECORD);
 }
 
-void SceneArrays::refitLeaves(const SceneBody& body, ClusterTree& tree, bool members, std::size_t first,
-                              std::size_t last) const {
-  const auto refit = [&](const std::int16_t* margin16, std::size_t from, std::size_t to) {
-    if (members) {
-      tree.refitLeaves(records_.data(), margin16, from, to);
-    } else {
-      tree.boundLeaves(records_.data(), margin16, from, to);
-    }
-  };
-  if (!body.uncertain) return refit(body.reach_m > 0 ? body.margin : nullptr, first, last);
+void SceneArrays::refitLeaves(const SceneBody& body, ClusterTree& tree, std::size_t first, std::size_t last) const {
+  if (!body.uncertain) return tree.refitLeaves(records_.data(), body.reach_m > 0 ? body.margin : nullptr, first, last);
   // Only groups with an uncertain vertex are widened further, by the largest radius in them.
   std::int16_t margin[16];
   for (std::size_t group = first; group < last; ++group) {
@@ -299,41 +290,8 @@ void SceneArrays::refitLeaves(const SceneBody& body, ClusterTree& tree, bool mem
       radius = std::max(radius, radii_[tree.feature(0)[i]]);
     }
     setMargin(body, body.reach_m + radius, margin);
-    refit(margin, group, group + 1);
+    tree.refitLeaves(records_.data(), margin, group, group + 1);
   }
-}
-
-double SceneArrays::size() const {
-  double size = 0;
-  for (int d = 0; d < 3; ++d) size = std::max({size, std::abs(range_min_[d]), std::abs(range_max_[d])});
-  return size;
-}
-
-double SceneArrays::unit(int d) const {
-  // The scaled number is off by the roundings of a sum, a difference and a product, each below 2^-53 of twice the size
-  // in that direction: of two numbers, together below 2^-49 of it, against a unit of at least 2^-17 of the range.
-  const double range = range_max_[d] - range_min_[d], size = std::max(std::abs(range_min_[d]), std::abs(range_max_[d]));
-  if (!(scale_[d] > 0) || !(range > tolerance::RECORD_SMALLEST_RANGE * size)) return 0;
-  return (1 - tolerance::RECORD_UNIT) / scale_[d];
-}
-
-void SceneArrays::ballAtStart(const std::int16_t* aos, double* centre, double& radius) const {
-  double squared = 0;
-  for (int d = 0; d < 3; ++d) {
-    // Between the value before the truncation and the one after it lies a unit; the rest of the second one is for all
-    // that is rounded.
-    const bool level = range_min_[d] == range_max_[d];
-    const double unit = scale_[d] > 0 ? 1 / scale_[d] : level ? 0 : std::numeric_limits<double>::infinity();
-    if (level) {
-      centre[d] = range_min_[d];
-      continue;
-    }
-    const double low = low_[d] + (aos[d] + 32763) * unit, high = low_[d] + (aos[simd::RECORD + d] + 32766) * unit;
-    centre[d] = 0.5 * (low + high);
-    const double half = 0.5 * (high - low);
-    squared += half * half;
-  }
-  radius = std::sqrt(squared) * (1 + tolerance::LENGTH);
 }
 
 }  // namespace dccd

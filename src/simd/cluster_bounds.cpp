@@ -139,25 +139,6 @@ void BuildLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRI
   }
 }
 
-void BoundLeaves(const int16_t* HWY_RESTRICT records, const uint32_t* HWY_RESTRICT indices, size_t arity, size_t count,
-                 const int16_t* HWY_RESTRICT margin16, int16_t* HWY_RESTRICT aos) {
-  const D16 d;
-  for (size_t g = 0; g < count / GROUP; ++g) {
-    for (size_t k = 0; k < RECORD; k += hn::Lanes(d)) {
-      auto lowest = hn::Set(d, EMPTY_LO);
-      auto highest = hn::Set(d, EMPTY_HI);
-      for (size_t i = 0; i < GROUP; ++i) {
-        hn::Vec<D16> small, large;
-        boundFeature(d, records, indices + (g * GROUP + i) * arity, arity, margin16, k, small, large);
-        lowest = hn::Min(lowest, small);
-        highest = hn::Max(highest, large);
-      }
-      hn::StoreU(lowest, d, aos + g * AOS_SIZE + k);
-      hn::StoreU(highest, d, aos + g * AOS_SIZE + RECORD + k);
-    }
-  }
-}
-
 void BuildUpper(const int16_t* HWY_RESTRICT child_aos, size_t child_count, int16_t* HWY_RESTRICT soa,
                 int16_t* HWY_RESTRICT aos) {
   HWY_ALIGN int16_t lo[GROUP * RECORD];
@@ -215,7 +196,6 @@ namespace simd {
 HWY_EXPORT(ProjectionBounds);
 HWY_EXPORT(Quantize);
 HWY_EXPORT(BuildLeaves);
-HWY_EXPORT(BoundLeaves);
 HWY_EXPORT(BuildUpper);
 HWY_EXPORT(ShortenBounds);
 
@@ -228,10 +208,6 @@ void quantize(const double* vertices, std::size_t n, const double* low8, const d
 void buildLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
                  const std::int16_t* margin16, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildLeaves)(records, indices, arity, count, margin16, soa, aos);
-}
-void boundLeaves(const std::int16_t* records, const std::uint32_t* indices, std::size_t arity, std::size_t count,
-                 const std::int16_t* margin16, std::int16_t* aos) {
-  HWY_DYNAMIC_DISPATCH(BoundLeaves)(records, indices, arity, count, margin16, aos);
 }
 void buildUpper(const std::int16_t* child_aos, std::size_t child_count, std::int16_t* soa, std::int16_t* aos) {
   HWY_DYNAMIC_DISPATCH(BuildUpper)(child_aos, child_count, soa, aos);

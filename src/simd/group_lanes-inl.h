@@ -11,7 +11,6 @@
 #include <cstring>
 
 #include "simd/group_pairs.h"
-#include "simd/lane_bits-inl.h"
 #include "simd/targets.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -19,6 +18,17 @@ namespace dccd {
 namespace simd {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+// Bit i of the result: lane i of the mask. D has fewer than 32 lanes.
+template <class D, class M>
+HWY_INLINE uint32_t bitsOf(D d, M mask) {
+  static_assert(hn::MaxLanes(D()) < 32, "the bits of a word");
+  uint8_t packed[8] = {0};
+  hn::StoreMaskBits(d, mask, packed);
+  uint32_t word;
+  std::memcpy(&word, packed, sizeof word);
+  return word & ((1u << hn::Lanes(d)) - 1);
+}
 
 // Bit per lane: 1 where the node may meet the lane's node. It does not where both nodes' values are strictly in order
 // in a direction, the same way round at t0 and t1. lo and hi point at the 16 values of one node, of which each two

@@ -74,27 +74,10 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 }
 #endif
 
-// Which pairs of nodes are not reported. Both functions take a mask of the lanes of the group opposite node i and
-// return those that stay: before() ahead of the test of bounds, where it costs little, after() of what has passed it.
-// by_rows: i is in the first group.
+// Which pairs of nodes are not reported, of those whose bounds meet: from() takes a mask of the lanes of the group
+// opposite node i and returns those that stay. by_rows: i is in the first group.
 struct LeaveNoneOut {
-  HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
-  HWY_INLINE uint32_t after(bool, uint32_t, uint32_t mask) const { return mask; }
-};
-
-// By a mask for each node of the first group.
-struct LeaveMasksOut {
-  const uint16_t* HWY_RESTRICT masks;
-  HWY_INLINE uint32_t before(bool by_rows, uint32_t i, uint32_t mask) const {
-    return by_rows ? mask & ~uint32_t{masks[i]} : mask;
-  }
-  HWY_INLINE uint32_t after(bool by_rows, uint32_t i, uint32_t mask) const {
-    for (uint32_t rest = by_rows ? 0 : mask; rest; rest &= rest - 1) {
-      const auto j = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-      mask &= ~(static_cast<uint32_t>(masks[j] >> i & 1) << j);
-    }
-    return mask;
-  }
+  HWY_INLINE uint32_t from(bool, uint32_t, uint32_t mask) const { return mask; }
 };
 
 // Features of A and B vertices that share one: their vertices lane by lane.
@@ -102,8 +85,7 @@ template <size_t A, size_t B>
 struct LeaveAdjacentOut {
   const uint32_t* HWY_RESTRICT a;
   const uint32_t* HWY_RESTRICT b;
-  HWY_INLINE uint32_t before(bool, uint32_t, uint32_t mask) const { return mask; }
-  HWY_INLINE uint32_t after(bool by_rows, uint32_t i, uint32_t mask) const {
+  HWY_INLINE uint32_t from(bool by_rows, uint32_t i, uint32_t mask) const {
     return mask & ~(by_rows ? sharing<A, B>(a, i, b) : sharing<B, A>(b, i, a));
   }
 };
@@ -132,7 +114,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   const PairWriter writer(by_rows, (by_rows ? h : g) * GROUP);
   const uint32_t base = (by_rows ? g : h) * GROUP;
   const auto write = [&](uint32_t i, uint32_t mask)
-                         HWY_ATTR { o = writer.write(base + i, leave_out.after(by_rows, i, mask), o); };
+                         HWY_ATTR { o = writer.write(base + i, leave_out.from(by_rows, i, mask), o); };
   uint32_t met[GROUP], to_write = 0;
   for (uint32_t left = by_rows ? rows : cols; left; left &= left - 1) {
     const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
@@ -140,7 +122,6 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
-    mask = leave_out.before(by_rows, i, mask);
     if (mask == 0) continue;
     mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
     if (WRITES_LATER) {
@@ -208,28 +189,6 @@ size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_
   return testUnsharedPairsOf<2, 2>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
 }
 
-template <size_t A, size_t B>
-HWY_INLINE void shareMasks(const uint32_t* HWY_RESTRICT a, const uint32_t* HWY_RESTRICT b,
-                           uint16_t* HWY_RESTRICT masks) {
-  for (uint32_t i = 0; i < GROUP; ++i) {
-    masks[i] = static_cast<uint16_t>(a[i] == UINT32_MAX ? 0 : sharing<A, B>(a, i, b));
-  }
-}
-
-void SharedVertices(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, uint16_t* shared) {
-  const uint32_t* of_a = a.vertices + size_t{g} * a.arity * GROUP;
-  const uint32_t* of_b = b.vertices + size_t{h} * b.arity * GROUP;
-  if (a.arity == 1) return shareMasks<1, 3>(of_a, of_b, shared);
-  if (b.arity == 3) return shareMasks<2, 3>(of_a, of_b, shared);
-  shareMasks<2, 2>(of_a, of_b, shared);
-}
-
-size_t TestLeafPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool self, const uint16_t* shared,
-                    uint32_t* out) {
-  const uint32_t* end = testPair<false>(a, b, g, h, self && g == h, Diagonal::STRICT_UPPER, LeaveMasksOut{shared}, out);
-  return static_cast<size_t>(end - out) / 2;
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
 }  // namespace dccd
@@ -240,8 +199,6 @@ namespace dccd {
 namespace simd {
 HWY_EXPORT(TestGroupPairs);
 HWY_EXPORT(TestUnsharedPairs);
-HWY_EXPORT(SharedVertices);
-HWY_EXPORT(TestLeafPair);
 
 std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                            std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
@@ -254,14 +211,6 @@ std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const st
                               std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
                               std::size_t* consumed) {
   return HWY_DYNAMIC_DISPATCH(TestUnsharedPairs)(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
-}
-
-void sharedVertices(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, std::uint16_t* shared) {
-  HWY_DYNAMIC_DISPATCH(SharedVertices)(a, b, g, h, shared);
-}
-std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
-                         const std::uint16_t* shared, std::uint32_t* out) {
-  return HWY_DYNAMIC_DISPATCH(TestLeafPair)(a, b, g, h, self, shared, out);
 }
 
 }  // namespace simd

@@ -32,14 +32,5 @@ std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const st
                               std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
                               std::size_t* consumed);
 
-/// Which lanes of two groups of such leaves share a vertex: bit j of shared[i] says that feature i of g and feature j
-/// of h do. Empty lanes share none.
-void sharedVertices(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, std::uint16_t* shared);
-
-/// testGroupPairs() for one pair of leaf groups (g, h), STRICT_UPPER, both times, without the lanes in `shared`:
-/// what it writes is what that would write, in that order, less those. out has room for 256 pairs.
-std::size_t testLeafPair(const GroupsView& a, const GroupsView& b, std::uint32_t g, std::uint32_t h, bool self,
-                         const std::uint16_t* shared, std::uint32_t* out);
-
 }  // namespace simd
 }  // namespace dccd

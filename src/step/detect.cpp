@@ -72,7 +72,6 @@ void Carried::clear() {
   apart.clear();
   start_state.clear();
   inside.clear();
-  memory.clear();
   map = std::vector<MapAnswer>();
 }
 
@@ -285,10 +284,8 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
     runUntilFirst(context);
   } else {
     findPairs(context, Share::ALL);
-    if (carried.memory.isOn()) useMemory(context);
     runPairs(context);
   }
-  if (remembers) rememberPairs(context, part);
   hits_done = Clock::now();
   collect(part.step, part.deadline);
   const bool all_pairs = result.complete;
@@ -333,15 +330,7 @@ bool History::Impl::fill(const Part& part) {
       }
     });
   };
-  remembers = mayRemember(part) && needsTrees(part);
-  if (!remembers) carried.memory.clear();
-  if (needsTrees(part)) {
-    const bool searches = checksStartState(part) && !isStartKnown() && carried.start_state.needsTrees(part.continues);
-    scene.refit(inPieces, stats, searches || !carried.memory.isOn());
-    if (remembers && !late && carried.memory.state() != PairMemory::State::OFF) {
-      carried.memory.beginStep(scene, inPieces);
-    }
-  }
+  if (needsTrees(part)) scene.refit(inPieces, stats);
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;
 }

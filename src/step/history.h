@@ -23,7 +23,6 @@
 #include "step/hit_order.h"
 #include "step/inside.h"
 #include "step/left_out.h"
-#include "step/pair_memory.h"
 #include "step/pair_worker.h"
 #include "step/patches.h"
 #include "step/start_state.h"
@@ -53,12 +52,11 @@ struct Carried {
   std::vector<std::uint8_t> apart;  ///< per body: it certainly did not touch itself
   StartStateSearch start_state;     ///< what may meet there
   InsideSearch inside;              ///< and what may be inside of something
-  PairMemory memory;                ///< and by how much what is apart is so
   std::vector<MapAnswer> map;       ///< per body that has not moved since; empty: none
 
   void clear();
   bool isClear() const {
-    return end.empty() && apart.empty() && start_state.isClear() && inside.isClear() && memory.isClear() && map.empty();
+    return end.empty() && apart.empty() && start_state.isClear() && inside.isClear() && map.empty();
   }
   /// Does the step begin where the last one ended? Every body bit for bit. The one place that decides it.
   bool isContinuedBy(const Step& step) const;
@@ -102,10 +100,6 @@ struct History::Impl {
     return options->earliest_only && options->accuracy.rung == Accuracy::EXACT &&
            options->broad_phase == BroadPhase::CLUSTERED && !observer;
   }
-  /// Whether certificates may be used or made in this part; what cannot be used is forgotten.
-  bool mayRemember(const Part& part);
-  void useMemory(StepContext& context);
-  void rememberPairs(const StepContext& context, const Part& part);
   /// Of a pair that only uncertainty leaves out it is not known whether it comes as near as that. A sentence a body.
   void sayLeftOutForNoise(const Step& step, std::vector<std::string>& unproved) const;
   void cutHits(const Span& span);
@@ -134,7 +128,6 @@ struct History::Impl {
   void parallel(std::size_t n, std::size_t piece, const Function& function);
 
   Carried carried;
-  bool remembers = false;  // in this part
   StepObserver* observer = nullptr;
   Impl* begins_at = nullptr;  // the next step begins where this one's ended
   bool aside = false;         // so did the step that is being run

@@ -21,16 +21,10 @@ int sideOf(const double* p, const double* q, const double* point) {
 }
 
 /// Calls visit(slot) for the features whose bounds at `at` the half-line from the record along +z meets. Bounds hold
-/// their features, and records keep the order of coordinates, so no feature that the half-line meets is missed. Where
-/// the bounds of the leaves' members were not made (members), all of a leaf are visited.
+/// their features, and records keep the order of coordinates, so no feature that the half-line meets is missed.
 template <class Visit>
-void visitAbove(const ClusterTree& tree, bool members, const std::int16_t* record, int at, std::size_t level,
-                std::size_t group, const Visit& visit) {
-  if (level == 0 && !members) {
-    const std::size_t end = std::min((group + 1) * simd::GROUP, tree.featureCount());
-    for (std::size_t slot = group * simd::GROUP; slot < end; ++slot) visit(slot);
-    return;
-  }
+void visitAbove(const ClusterTree& tree, const std::int16_t* record, int at, std::size_t level, std::size_t group,
+                const Visit& visit) {
   const std::int16_t* from = record + at * simd::DIRECTIONS;
   const std::int16_t* low =
       tree.level(level).soa.data() + group * simd::SOA_SIZE + simd::soaIndex(at * simd::DIRECTIONS, 0);
@@ -42,7 +36,7 @@ void visitAbove(const ClusterTree& tree, bool members, const std::int16_t* recor
     if (highest(2) < from[2]) continue;
     const std::size_t node = group * simd::GROUP + lane;
     if (level > 0) {
-      if (node < tree.level(level - 1).groups) visitAbove(tree, members, record, at, level - 1, node, visit);
+      if (node < tree.level(level - 1).groups) visitAbove(tree, record, at, level - 1, node, visit);
     } else if (node < tree.featureCount()) {
       visit(node);
     }
@@ -69,8 +63,7 @@ bool InsideSearch::isInside(const SceneArrays& scene, const Question& question, 
   const ClusterTree& faces = scene.bodies()[question.closed].tree(FeatureKind::FACE);
   const double* point = x(question.internal);
   bool touched = false, enclosed = false;
-  const bool members = scene.bodies()[question.closed].whole;
-  visitAbove(faces, members, scene.record(question.internal), at, faces.height() - 1, 0, [&](std::size_t slot) {
+  visitAbove(faces, scene.record(question.internal), at, faces.height() - 1, 0, [&](std::size_t slot) {
     if (touched) return;
     const Index* f = faces.feature(slot);
     const Sight sight = sightOf(point, x(f[0]), x(f[1]), x(f[2]));

@@ -30,8 +30,7 @@ PairWorker::PairWorker()
       keys_(CAPACITY),
       kept_(CAPACITY),
       results_(CAPACITY),
-      separations_(CAPACITY),
-      remembered_slots_(2 * ClusterPairStream::CHUNK) {}
+      separations_(CAPACITY) {}
 
 void PairWorker::beginStep() {
   for (auto& h : hits_) {
@@ -113,15 +112,12 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   begin(context, task, index);
   const TreePair trees{&a_->tree(firstKind(task.kind)), &b_->tree(secondKind(task.kind)),
                        task.self && task.kind == PairKind::EDGE_EDGE, context.span, task.self};
-  const double contact_m = context.contactDistance(task.body_a, task.body_b);
   for (std::size_t p = task.first; p < task.last; ++p) {
     const bool whole_pair =
-        !goesOn()        ? false
-        : context.memory ? testRemembered(context.memory->group(p), contact_m)
-                         : stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
-                             take(slots, n);
-                             return goesOn();
-                           });
+        goesOn() && stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {
+          take(slots, n);
+          return goesOn();
+        });
     if (whole_pair) continue;
     leaveOut(trees, pairs, p);
     break;
@@ -129,27 +125,6 @@ void PairWorker::run(StepContext& context, const PairTask& task, std::size_t ind
   end();
   stats_[Stage::BROAD_PHASE].in += stream_.clusterPairsTested() * simd::GROUP * simd::GROUP;
   stream_.clearCounters();
-}
-
-/// What the memory says of a group is to be tested. False: it was not gone through.
-bool PairWorker::testRemembered(PairMemory::Group& group, double contact_m) {
-  constexpr std::size_t MOST = simd::GROUP * simd::GROUP;
-  std::size_t n = 0;
-  const auto pass = [&] {
-    take(remembered_slots_.data(), n);
-    n = 0;
-    return goesOn();
-  };
-  for (PairMemory::Pair& pair : group.pairs) {
-    if (!pair.to_test) {
-      ++stats_.pairs_known_apart;
-      continue;
-    }
-    n += context_->memory->test(*context_->scene, group, pair, contact_m, remembered_slots_.data() + 2 * n, stats_);
-    stats_[Stage::BROAD_PHASE].in += MOST;
-    if (n + MOST > ClusterPairStream::CHUNK && !pass()) return false;
-  }
-  return n == 0 || pass();
 }
 
 /// Of what was not looked at here all that is known is when the groups can meet.

@@ -9,11 +9,9 @@
 
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
-#include "dccd/tolerances.h"
 #include "step/found_limit.h"
 #include "step/left_out.h"
 #include "step/observer.h"
-#include "step/pair_memory.h"
 #include "step/pair_separation.h"
 
 namespace dccd {
@@ -54,12 +52,6 @@ struct TaskHits {
 
 /// What all workers share during a step.
 struct StepContext {
-  /// What is as near as this may be a contact of the two bodies, whatever the rung calls one. In proof: the
-  /// conservative rung calls what is within its tolerance of the separation one, and the separation itself may be
-  /// rounded up.
-  double contactDistance(std::size_t a, std::size_t b) const {
-    return scene->separation(a, b) * (1 + tolerance::SEPARATION_SUM) + 2 * tolerance_m;
-  }
   const SceneArrays* scene = nullptr;
   const Rung* elementary = nullptr;
   Deadline deadline;
@@ -73,7 +65,6 @@ struct StepContext {
   double not_after = 2;                   ///< earliest_only: and contacts that begin later are not listed
   bool bounds_late = false;               ///< earliest_only: pairs are bounded before they are tested
   Span span;                              ///< of the bounds
-  PairMemory* memory = nullptr;           ///< what its groups say is to be tested; null: all of it
   /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
   std::chrono::nanoseconds per_hit{0};
   std::atomic<std::size_t> hits{0};
@@ -107,7 +98,6 @@ class PairWorker {
   void begin(StepContext& context, const PairTask& task, std::size_t index);
   void end();
   bool goesOn() const { return !enough_ && !context_->timeIsUp(); }
-  bool testRemembered(PairMemory::Group& group, double contact_m);
   bool shareVertex(std::size_t i, std::size_t j) const;
   /// Pairs of slots whose features share no vertex.
   void take(const std::uint32_t* slots, std::size_t count);
@@ -142,7 +132,6 @@ class PairWorker {
   std::vector<std::uint32_t> kept_;
   std::vector<ElementaryResult> results_;
   std::vector<double> separations_;
-  std::vector<std::uint32_t> remembered_slots_;
   SeparationRule rule_;     // of the task's bodies
   bool separated_ = false;  // the rule applies: separations_ holds a value for each pair
   const LeftOutOfBody* left_out_ = nullptr;

@@ -188,10 +188,11 @@ class FilesTest(unittest.TestCase):
 
 
 class SequenceTest(unittest.TestCase):
-    """A sheet that is rolled up, turns and is rolled tighter, slowly, then until its layers meet: more than two frames are steps."""
+    """A sheet that is rolled up, turns, rests and is rolled tighter until its layers meet: more than two frames are steps."""
 
     N = 40
-    TIGHTER = (0, 1e-6, 2e-6, 3e-6, 4e-6, 5e-6, 2.4e-3)
+    TIGHTER = (0, 1e-6, 2e-6, 2.4e-3)
+    ORDER = (0, 1, 1, 1, 1, 2, 3)
 
     def frame(self, k):
         points = []
@@ -201,14 +202,15 @@ class SequenceTest(unittest.TestCase):
                 radius = 0.2 + (0.002 - self.TIGHTER[k]) * angle + 0.0001 * math.sin(5 * r + 3 * c)
                 turned = angle + 0.01 * k
                 points.append((radius * math.cos(turned), radius * math.sin(turned), r / self.N))
+        points[25] = points[0]  # a turn further out: what touches is looked at where it rests, too
         return points
 
     def test_each_step_has_the_answer_that_it_has_alone(self):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
-            frames = [str(folder / ('%d.ply' % k)) for k in range(7)]
-            for k, path in enumerate(frames):
-                write(pathlib.Path(path), self.frame(k), faces_of(self.N))
+            for k in range(4):
+                write(folder / ('%d.ply' % k), self.frame(k), faces_of(self.N))
+            frames = [str(folder / ('%d.ply' % k)) for k in self.ORDER]
 
             def run(frames, *flags):
                 done = subprocess.run([tool(), *frames, '--contacts', str(folder / 'out.csv'), '--stats', str(folder / 'out.json'),
@@ -220,8 +222,8 @@ class SequenceTest(unittest.TestCase):
             forgot, without = run(frames, '--forget')
             self.assertEqual(kept, forgot)
             self.assertEqual(kept, run(frames, '--threads', '2')[0])
-            self.assertGreater(stats['pairs_known_apart'], 0)
-            self.assertEqual(without['pairs_known_apart'], 0)
+            self.assertGreater(stats['bodies_kept'], 0)
+            self.assertEqual(without['bodies_kept'], 0)
             counters = re.findall(r'  COUNTER\((\w+), ', (CHECKOUT / 'include/dccd/outcome.h').read_text())
             self.assertGreater(len(counters), 10)
             self.assertLessEqual(set(counters), set(stats))

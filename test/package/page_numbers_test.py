@@ -27,10 +27,6 @@ def tolerance(name):
     return constant('include/dccd/tolerances.h', name)
 
 
-def memory(name):
-    return constant('src/step/pair_memory.cpp', name)
-
-
 def player(name):
     return constant('src/report/player_data.h', name)
 
@@ -77,10 +73,6 @@ NUMBERS = {
     'doc/development.md': [
         (r'`sync_timeout_s` and (\d+) steps', lambda: constant('include/dccd/stream.h', 'max_waiting')),
         (r'1 s or (\d+) messages', lambda: constant('src/input/mesh_subscription.cpp', 'SUBSCRIBER_QUEUE')),
-    ],
-    'doc/algorithm.md': [
-        (r'less than (\d+) % of it would hold', lambda: round(100 * memory('WORTH_TURNING_ON'))),
-        (r'holds less than (\d+) %', lambda: round(100 * memory('WORTH_STAYING_ON'))),
     ],
     'doc/fleet.md': [
         (r'job may take ([\d,]+) MB', lambda: fleet('mem-mb')),

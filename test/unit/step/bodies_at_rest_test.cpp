@@ -1,7 +1,10 @@
 // Bodies at rest are not refitted, bodies that are apart are not paired, and neither changes any answer.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <string>
 
 #include "support/step_support.h"
 
@@ -108,6 +111,55 @@ TEST(BodiesAtRest, ChangesOfAnyKindAreSeen) {
   wrong.bodies = {test::moving(scene.setups[0], rest, rest), test::moving(scene.setups[1], few, few)};
   EXPECT_THROW(detector.run(wrong), std::invalid_argument);
   EXPECT_EQ(run(rest, rest).stats.bodies_kept, 0u) << "after a refused step nothing is known to be in order";
+}
+
+/// Everything that can happen to a stream, at random.
+TEST(BodiesAtRest, RandomStreamsAreAnsweredAsIfNothingWereKept) {
+  const Waved scene;
+  std::uint64_t kept = 0, contacts = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    std::mt19937 random(seed);
+    const auto oneIn = [&](unsigned n) { return random() % n == 0; };
+    Options with, without;
+    with.num_threads = 1 + static_cast<int>(seed % 2);
+    without.keep_bounds = false;
+    const bool distant = oneIn(3);
+    if (distant) with.accuracy.rung = without.accuracy.rung = Accuracy::CONSERVATIVE;
+    Detector keeps(with), forgets(without);
+    Positions at[2] = {scene.rest, scene.moving};
+    bool both = true;
+    for (int k = 0; k < 40; ++k) {
+      if (oneIn(15)) both = !both;
+      if (oneIn(15)) {  // a seam
+        keeps.history().clear();
+        forgets.history().clear();
+      }
+      if (oneIn(15)) {  // a teleport
+        for (Vec3& p : at[1]) p.x() += 0.2;
+      }
+      Step step;
+      for (int b = 0; b < (both ? 2 : 1); ++b) {
+        Positions t1 = oneIn(6) ? scene.at(k + 7 * b) : at[b];
+        if (oneIn(15)) t1[random() % 81].x() = std::nan("");
+        step.bodies.push_back(moving(scene.setups[static_cast<std::size_t>(b)], at[b], t1));
+        if (distant) step.bodies.back().minimum_separation_m = 0.002;
+        if (std::all_of(t1.begin(), t1.end(), [](const Vec3& p) { return p.allFinite(); })) at[b] = t1;
+      }
+      const Outcome a = keeps.run(step), b = forgets.run(step);
+      const std::string where = "seed " + std::to_string(seed) + ", step " + std::to_string(k);
+      ASSERT_EQ(difference(a.contacts, b.contacts), "") << where;
+      ASSERT_EQ(a.status, b.status) << where;
+      ASSERT_EQ(a.start_state, b.start_state) << where;
+      ASSERT_TRUE(std::equal(a.intersections.begin(), a.intersections.end(), b.intersections.begin(),
+                             b.intersections.end(), [](const auto& x, const auto& y) { return x == y; }))
+          << where;
+      EXPECT_EQ(b.stats.bodies_kept, 0u);
+      kept += a.stats.bodies_kept;
+      contacts += a.contacts.size();
+    }
+  }
+  EXPECT_GT(kept, 300u);
+  EXPECT_GT(contacts, 1000u);
 }
 
 TEST(BodiesApart, AreNotPaired) {
