@@ -105,7 +105,7 @@ class ObjReader {
     const std::string small = inSmallLetters(keyword.text);
     if (isOneOf(READ, small) || isOneOf(OTHER_GEOMETRY, small)) lines_.fail(keyword, "must be in small letters");
     if (decimalNumber(keyword.text)) lines_.fail(keyword, "begins a line, and no line goes on with '\\' before it");
-    if (unknown_lines_++ == 0) first_unknown_ = quoted(keyword.text) + " in line " + std::to_string(keyword.line);
+    if (unknown_lines_++ == 0) first_unknown_ = inQuotes(keyword.text) + " in line " + std::to_string(keyword.line);
   }
 
   /// x y z; then perhaps a weight, which must be 1, and a colour.

@@ -64,7 +64,7 @@ class PlyHeader {
 
  private:
   [[noreturn]] void fail(const std::string& what) const {
-    lines_.fail("header line " + quoted(lines_.text()) + " " + what);
+    lines_.fail("header line " + inQuotes(lines_.text()) + " " + what);
   }
   std::string_view word(std::size_t w) const {
     return w < lines_.words().size() ? lines_.words()[w].text : std::string_view();
@@ -352,7 +352,8 @@ class PlyReader {
   void skip(const Element& element, PlyBody& body) {
     forRows(element, body, [&](std::size_t p) { skipValue(element.properties[p], body); });
     if (element.count == 0) return;
-    mesh_.remarks.push_back("element " + quoted(element.name) + " (" + std::to_string(element.count) + ") is skipped");
+    mesh_.remarks.push_back("element " + inQuotes(element.name) + " (" + std::to_string(element.count) +
+                            ") is skipped");
   }
 
   /// The place of the one property of one of these names.
@@ -364,7 +365,7 @@ class PlyReader {
         (!list || isInteger(found->type))) {
       return static_cast<std::size_t>(found - all.begin());
     }
-    throw MeshFileError(path_ + ": element " + quoted(element.name) + " needs just one property '" +
+    throw MeshFileError(path_ + ": element " + inQuotes(element.name) + " needs just one property '" +
                         std::string(*names.begin()) + (list ? "', a list of integers" : "', a number"));
   }
 

@@ -24,7 +24,7 @@ std::string inSmallLetters(std::string_view word) {
   return small;
 }
 
-std::string quoted(std::string_view word) {
+std::string inQuotes(std::string_view word) {
   constexpr std::size_t SHOWN = 40;
   std::string text(word.substr(0, SHOWN));
   std::replace_if(
@@ -80,7 +80,7 @@ void TextLines::fail(const std::string& what) const {
 }
 
 void TextLines::fail(const TextWord& word, const std::string& what) const {
-  throw MeshFileError(path_ + ":" + std::to_string(word.line) + ": " + quoted(word.text) + " " + what);
+  throw MeshFileError(path_ + ":" + std::to_string(word.line) + ": " + inQuotes(word.text) + " " + what);
 }
 
 double TextLines::number(const TextWord& word) const {

@@ -52,6 +52,6 @@ class TextLines {
 /// In small letters, of ASCII alone.
 std::string inSmallLetters(std::string_view word);
 /// In quotes, cut where it is long; what cannot be printed as '?'.
-std::string quoted(std::string_view word);
+std::string inQuotes(std::string_view word);
 
 }  // namespace dccd
