@@ -176,13 +176,8 @@ void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::arra
   if (!body.kept) body.translates = !masked && sameDisplacement(out, body.usedCount());
   body.recorded = !body.uncertain;  // radii widen the bounds, and may be others in the next step
   stats.unchecked_vertices += unchecked;
-<<<<<<< ours
-  if (changed || masked != body.masked) {
-=======
   sew(body, motion, unchecked == 0);
-  body.mask_changed = changed || masked != body.masked;
-  if (body.mask_changed) {
->>>>>>> theirs
+  if (changed || masked != body.masked) {
     // The mask is indexed by internal vertex number.
     const std::uint8_t* flags = masked ? body.active.data() - body.internal_begin : nullptr;
     for (ClusterTree& tree : body.trees) tree.mask(flags);

@@ -64,14 +64,8 @@ bool InsideSearch::isInside(const SceneArrays& scene, const Question& question, 
   const ClusterTree& faces = scene.bodies()[question.closed].tree(FeatureKind::FACE);
   const double* point = x(question.internal);
   bool touched = false, enclosed = false;
-<<<<<<< ours
   visitAbove(faces, scene.record(question.internal), at, faces.height() - 1, 0, [&](std::size_t slot) {
-    if (touched) return;
-=======
-  const bool members = scene.bodies()[question.closed].whole;
-  visitAbove(faces, members, scene.record(question.internal), at, faces.height() - 1, 0, [&](std::size_t slot) {
     if (touched || scene.bodies()[question.closed].isRepeated(slot)) return;
->>>>>>> theirs
     const Index* f = faces.feature(slot);
     const Sight sight = sightOf(point, x(f[0]), x(f[1]), x(f[2]));
     touched = sight == Sight::TOUCHED;
