@@ -51,7 +51,9 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),
       log(node, private_node.getNamespace(), config),
       look_ahead(config.monitor.look_ahead_s, LOOK_AHEAD_SAMPLES),
-      disabled_frames(config.bodies.size()) {}
+      disabled_frames(config.bodies.size()) {
+  pipeline.explainTransforms([this] { return feed.onlyUnusable(); });
+}
 
 // --- input thread ----------------------------------------------------------------------------------------------------
 
@@ -68,6 +70,11 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   message.arrival_ns = now_ns;
   queue.push(body, std::move(message));
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
+}
+
+void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) {
+  feed.add(message, is_static);
+  for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
 }
 
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
@@ -102,11 +109,11 @@ void CollisionMonitor::Impl::subscribe() {
   }
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { feed.add(*m, false); }); },
+      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { onTransforms(*m, false); }); },
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf_static", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { feed.add(*m, true); }); });
+      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { onTransforms(*m, true); }); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });

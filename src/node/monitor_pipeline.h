@@ -49,6 +49,8 @@ class MonitorPipeline {
   void take(std::size_t body, const MeshMessage& message);
   /// From the next message on. Null: meshes are taken as they come. Rigid bodies' files always are.
   void setTopologyFilter(TopologyFilter filter) { topology_filter_ = std::move(filter); }
+  /// Says which transforms could not be used, for the reason of a frame that has no place; empty: none.
+  void explainTransforms(std::function<std::string()> unusable) { unusable_transforms_ = std::move(unusable); }
   void setMap(LoadedMap map, std::int64_t now_ns);
   /// A map that was set has no place yet: its transform has not come.
   bool mapWaits() const { return unplaced_map_.has_value(); }
@@ -109,6 +111,7 @@ class MonitorPipeline {
   std::unique_ptr<Monitor> monitor_;
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
+  std::function<std::string()> unusable_transforms_;
   std::vector<std::optional<Waiting>> waiting_;
   std::vector<bool> placed_;                     // a static body of which the monitor has a frame
   std::vector<std::optional<MeshFrame>> rigid_;  // as the mesh file has them
@@ -156,6 +159,8 @@ class MonitorPipeline {
   bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
   void placeMap(std::int64_t now_ns);
+  /// What explainTransforms() brought says, to go after another reason.
+  std::string unusableTransforms() const;
 };
 
 }  // namespace dccd

@@ -22,6 +22,11 @@ ObstacleMap noMap(std::string why) {
 
 }  // namespace
 
+std::string MonitorPipeline::unusableTransforms() const {
+  const std::string unusable = unusable_transforms_ ? unusable_transforms_() : "";
+  return unusable.empty() ? "" : "; " + shortText(unusable);
+}
+
 bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
@@ -30,8 +35,8 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
     frame.stamp_ns = stamp_ns;
     const std::string& carrier = config_.bodies[b].tf_frame;
     if (!lookupTransform(transforms_, fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
-      reason =
-          noTransform(carrier, fixed_frame_, reason) + "; body '" + config_.bodies[b].body.name + "' is carried by it";
+      reason = noTransform(carrier, fixed_frame_, reason) + unusableTransforms() + "; body '" +
+               config_.bodies[b].body.name + "' is carried by it";
       return false;
     }
     transform(frame.pose, frame.positions);
@@ -90,7 +95,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
                                                                   waiting.mesh.stamp_ns, fixed_from_mesh, reason);
   const bool placed = has_place && (!is_clock || placeOthers(now_ns, problem, reason));
   if (!placed) {
-    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
+    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason) + unusableTransforms();
     waiting.reason = reason;
     waiting.overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
     // There is no use in waiting for a static body that has waited in vain itself.
@@ -140,8 +145,8 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
     if (monitor_->map().problem.empty()) {
-      monitor_->setMap(
-          noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason));
+      monitor_->setMap(noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame +
+                             "': " + reason + unusableTransforms()));
     }
   }
 }
