@@ -3,6 +3,7 @@
 #include "node/bag_replay.h"
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -15,6 +16,7 @@
 #include "octomap/coarser.h"
 #include "report/progress_bar.h"
 #include "ros/message_bytes.h"
+#include "ros/short_text.h"
 #include "ros/transforms.h"
 
 namespace dccd {
@@ -23,7 +25,26 @@ namespace {
 /// rosbag reads a device for its first line until memory is gone.
 void requireFile(const std::string& bag) {
   const std::string problem = regularFileProblem(bag);
-  if (!problem.empty()) throw rosbag::BagIOException(bag + ": " + problem);
+  if (!problem.empty()) throw std::runtime_error(bag + ": " + problem);
+}
+
+/// Throws std::runtime_error naming the file and what to do.
+void openBag(const std::string& path, rosbag::Bag& bag) {
+  requireFile(path);
+  const std::string remedy = "; run: rosbag reindex " + path;
+  try {
+    bag.open(path, rosbag::bagmode::Read);
+  } catch (const rosbag::BagUnindexedException&) {
+    throw std::runtime_error(path + ": the bag has no index, as its recording was not ended" + remedy);
+  } catch (const rosbag::BagException& error) {
+    const std::string mark = "#ROSBAG V";
+    std::string begin(mark.size(), '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+    if (file.gcount() == 0) throw std::runtime_error(path + ": the file is empty: nothing was recorded");
+    if (begin != mark) throw std::runtime_error(path + ": the file is no bag: it does not begin with '" + mark + "'");
+    throw std::runtime_error(path + ": the bag is cut or damaged (" + shortText(error.what()) + ")" + remedy);
+  }
 }
 
 // Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
@@ -115,11 +136,8 @@ struct BagReplay::Run {
   std::set<std::string> complained;
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
-      : sink(to),
-        predictions(predictions_to),
-        variation(r.options_.variation),
-        bag(r.path_),
-        pipeline(r.config_, feed) {
+      : sink(to), predictions(predictions_to), variation(r.options_.variation), pipeline(r.config_, feed) {
+    openBag(r.path_, bag);
     pipeline.setTopologyFilter(variation.topology);
     if (r.config_.monitor.look_ahead_s > 0) look_ahead.emplace(r.config_.monitor.look_ahead_s);
     pipeline.effects().hearPredictions(look_ahead.has_value());
@@ -191,8 +209,8 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
   config_.transform_timeout_s = 0;
   if (!options_.octomap_file.empty()) config_.octomap_file = options_.octomap_file;
-  requireFile(path_);
-  rosbag::Bag file(path_);
+  rosbag::Bag file;
+  openBag(path_, file);
   rosbag::View view(file);
   std::set<std::string> topics;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
@@ -251,8 +269,8 @@ std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
 BagReplay::~BagReplay() = default;
 
 std::string BagReplay::firstMeshTopic(const std::string& bag) {
-  requireFile(bag);
-  rosbag::Bag file(bag);
+  rosbag::Bag file;
+  openBag(bag, file);
   rosbag::View view(file);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
@@ -301,6 +319,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
       for (const std::size_t body : bodies->second) transforms.meshComes(body, stampOf(m.getDataType(), bytes), at);
     }
     transforms.feedUntil(at);
+    for (const std::string& line : run.feed.takeComplaints()) run.complain("tf: " + line);
     if (is_mesh) {
       for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
     } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {

@@ -75,6 +75,11 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
+void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) {
+  feed.add(message, is_static);
+  for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
+}
+
 void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
   map_publisher_seen = true;
   const std::int64_t now_ns = steadyNs();
@@ -109,11 +114,11 @@ void CollisionMonitor::Impl::subscribe() {
   }
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { feed.add(*m, false); }); },
+      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { onTransforms(*m, false); }); },
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
       "/tf_static", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { feed.add(*m, true); }); });
+      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { onTransforms(*m, true); }); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });

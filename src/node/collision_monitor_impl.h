@@ -76,6 +76,7 @@ struct CollisionMonitor::Impl {
   void subscribe();
   void guarded(const std::string& topic, const std::function<void()>& take);
   void onMesh(std::size_t body, MeshMessage message);
+  void onTransforms(const tf2_msgs::TFMessage& message, bool is_static);
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);
 
   // Service thread.

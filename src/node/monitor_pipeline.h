@@ -172,6 +172,8 @@ class MonitorPipeline {
   std::vector<StampNs> stampsSince(StampNs from_ns, StampNs to_ns, const std::string& frame) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.
   bool mapMayCome(std::int64_t now_ns) const;
+  /// Which transforms could not be used, to go after another reason.
+  std::string unusableTransforms() const;
 };
 
 }  // namespace dccd

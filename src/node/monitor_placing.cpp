@@ -25,6 +25,11 @@ ObstacleMap noMap(std::string why) {
 
 }  // namespace
 
+std::string MonitorPipeline::unusableTransforms() const {
+  const std::string unusable = transforms_.onlyUnusable();
+  return unusable.empty() ? "" : "; " + shortText(unusable);
+}
+
 bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
@@ -33,8 +38,8 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
     frame.stamp_ns = stamp_ns;
     const std::string& carrier = config_.bodies[b].tf_frame;
     if (!transforms_.lookup(fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
-      reason =
-          noTransform(carrier, fixed_frame_, reason) + "; body '" + config_.bodies[b].body.name + "' is carried by it";
+      reason = noTransform(carrier, fixed_frame_, reason) + unusableTransforms() + "; body '" +
+               config_.bodies[b].body.name + "' is carried by it";
       return false;
     }
     transform(frame.pose, frame.positions);
@@ -107,7 +112,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   }
   const bool placed = has_place && (!is_clock || placeOthers(now_ns, problem, reason));
   if (!placed) {
-    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason);
+    if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason) + unusableTransforms();
     waiting.reason = reason;
     waiting.overdue = overdue;
     const bool timed_out =
@@ -176,8 +181,8 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
     // It is tried again at every call: a map comes rarely, and its transform may come late.
     if (monitor_->map().problem.empty()) {
-      monitor_->setMap(
-          noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame + "': " + reason));
+      monitor_->setMap(noMap("no transform from '" + fixed_frame_ + "' to the octomap's frame '" + frame +
+                             "': " + reason + unusableTransforms()));
     }
   }
 }

@@ -32,7 +32,8 @@ struct StatsContext {
   std::uint64_t weld_changes = 0;
   double latency_s = 0;
   std::uint64_t maps_received = 0, maps_refused = 0;
-  std::uint64_t steps_unpublished = 0;   ///< of which not everything was published
+  std::uint64_t steps_unpublished = 0;  ///< of which not everything was published
+  std::uint64_t transforms_unusable = 0;
   std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
   LookAheadSummary look_ahead;
   std::uint64_t markers_built = 0;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
+#include <utility>
 
 #include <geometry_msgs/TransformStamped.h>
 #include <tf2/exceptions.h>
@@ -25,15 +27,24 @@ ros::Time toTime(StampNs stamp_ns) {
 /// As tf2 takes a name.
 std::string unslashed(const std::string& name) { return !name.empty() && name[0] == '/' ? name.substr(1) : name; }
 
-/// What tf2 would refuse with a line on the console, each time that it comes.
-bool isUsable(const geometry_msgs::TransformStamped& transform) {
+/// Of what tf2 would refuse with a line on the console, each time that it comes; empty: it can be used.
+std::string problemOf(const geometry_msgs::TransformStamped& transform) {
   const auto& p = transform.transform.translation;
   const auto& q = transform.transform.rotation;
-  const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
   const std::string child = unslashed(transform.child_frame_id), parent = unslashed(transform.header.frame_id);
-  // Written so that a NaN is refused.
-  return frameNameProblem(child).empty() && frameNameProblem(parent).empty() && child != parent && std::isfinite(p.x) &&
-         std::isfinite(p.y) && std::isfinite(p.z) && std::abs(norm2 - 1) < tolerance::TF_QUATERNION_NORM;
+  if (const std::string problem = frameNameProblem(child); !problem.empty()) return "child_frame_id: " + problem;
+  if (const std::string problem = frameNameProblem(parent); !problem.empty()) return "frame_id: " + problem;
+  if (child == parent) return "it is its own parent";
+  std::ostringstream text;
+  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+    text << "its translation (" << p.x << ' ' << p.y << ' ' << p.z << ") is not finite";
+    return text.str();
+  }
+  const double norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+  if (std::abs(norm2 - 1) < tolerance::TF_QUATERNION_NORM) return {};  // false with a NaN
+  text << "its rotation x y z w (" << q.x << ' ' << q.y << ' ' << q.z << ' ' << q.w << ") has the length "
+       << std::sqrt(norm2) << "; publish a quaternion of length 1";
+  return text.str();
 }
 
 }  // namespace
@@ -80,11 +91,39 @@ bool TransformFeed::clears(const tf2_msgs::TFMessage& message, bool is_static) c
                                    [&](const auto& transform) { return goesBack(transform); });
 }
 
+void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem) {
+  ++unusable_;
+  const std::string child = shortText(unslashed(transform.child_frame_id), MAX_NAME);
+  const bool known = told_.count(child) > 0;
+  if (!known && told_.size() >= MAX_TOLD) return;
+  const std::string text = "transforms of '" + child + "' are left out: " + problem;
+  // A frame that has had usable ones is not in want of a place.
+  if (!known && static_.count(transform.child_frame_id) == 0) only_unusable_[child] = text;
+  if (told_.insert(child).second) complaints_.push_back(text);
+}
+
+std::string TransformFeed::onlyUnusable() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::string text;
+  for (const auto& [child, problem] : only_unusable_) text += (text.empty() ? "" : "; ") + problem;
+  return text;
+}
+
+std::vector<std::string> TransformFeed::takeComplaints() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(complaints_, {});
+}
+
 bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
   const std::lock_guard<std::mutex> lock(mutex_);
   bool cleared = false;
   for (const auto& transform : message.transforms) {
-    if (!isUsable(transform) || !hasRoomFor(transform)) continue;
+    if (const std::string problem = problemOf(transform); !problem.empty()) {
+      leaveOut(transform, problem);
+      continue;
+    }
+    if (!only_unusable_.empty()) only_unusable_.erase(unslashed(transform.child_frame_id));
+    if (!hasRoomFor(transform)) continue;
     if (!static_.emplace(transform.child_frame_id, is_static).first->second) {
       if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
         clear();

@@ -1,10 +1,13 @@
 // Transforms: what arrives on /tf goes into one buffer; what is asked for comes out at exactly the stamp asked.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -30,6 +33,9 @@ class TransformFeed {
   /// In the 10 s that tf2 keeps, of all frames together: 26,000 a second. Where more come all are forgotten.
   static constexpr std::size_t MAX_KEPT = std::size_t{1} << 18;
 
+  /// Child frames with unusable transforms that are told of.
+  static constexpr std::size_t MAX_TOLD = 16;
+
   explicit TransformFeed(tf2::BufferCore& buffer) : buffer_(buffer) {}
   /// Whether add() would clear the buffer.
   bool clears(const tf2_msgs::TFMessage& message, bool is_static) const;
@@ -47,6 +53,13 @@ class TransformFeed {
   /// From when on target_from_source is known, where tf has more than static transforms of it; else none.
   std::optional<StampNs> firstStamp(const std::string& target, const std::string& source) const;
 
+  /// How many transforms could not be used.
+  std::uint64_t unusable() const { return unusable_; }
+  /// Which frames have had no others, and why, in words; empty: none.
+  std::string onlyUnusable() const;
+  /// A line for each child frame that has had an unusable one, once.
+  std::vector<std::string> takeComplaints();
+
  private:
   struct Pose {
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
@@ -60,12 +73,17 @@ class TransformFeed {
   std::unordered_map<std::string, std::map<StampNs, Pose>> kept_;  // what the buffer holds, per child frame
   std::size_t kept_count_ = 0;
   std::unordered_set<std::string> names_;
+  std::atomic<std::uint64_t> unusable_{0};
+  std::map<std::string, std::string> only_unusable_;  // per child frame that has had no usable one: what was wrong
+  std::set<std::string> told_;
+  std::vector<std::string> complaints_;
   std::unordered_map<std::string, bool> static_;  // per child frame: as tf2 takes it, for good, from what came first
 
   bool goesBack(const geometry_msgs::TransformStamped& transform) const;
   bool hasRoomFor(const geometry_msgs::TransformStamped& transform);
   bool isRepeated(const geometry_msgs::TransformStamped& transform);
   void clear();
+  void leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem);
   /// To where the two meet.
   std::pair<Chain, Chain> chains(const std::string& target, const std::string& source, StampNs stamp_ns) const;
   Pose poseAlong(const Chain& chain, StampNs stamp_ns) const;

@@ -1,0 +1,101 @@
+"""Bags that analyze_bag cannot open: one line with the file's name and the remedy, exit status 1; and the remedy helps."""
+import shutil
+import struct
+import subprocess
+import unittest
+
+import rosbag
+import rospy
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import PointCloud2, PointField
+from tf2_msgs.msg import TFMessage
+
+from checkout import TOOLS, FolderTestCase
+
+
+def cloud(stamp_s, frame='world'):
+    """Four points, flat."""
+    message = PointCloud2(height=2, width=2, point_step=12, row_step=24)
+    message.header.frame_id, message.header.stamp = frame, rospy.Time.from_sec(stamp_s)
+    message.fields = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate('xyz')]
+    message.data = b''.join(struct.pack('<3f', 0.1 * (i % 2), 0.1 * (i // 2), 0.0) for i in range(4))
+    return message
+
+
+class DamagedBagTest(FolderTestCase):
+    def setUp(self):
+        self.whole, self.unindexed = self.folder / 'whole.bag', self.folder / 'unindexed.bag'
+        bag = rosbag.Bag(str(self.whole), 'w', chunk_threshold=4096)  # what of it is whole can be saved
+        for k in range(200):
+            bag.write('/cloth', cloud(100 + 0.1 * k), rospy.Time.from_sec(100 + 0.1 * k))
+        bag.flush()
+        shutil.copy(self.whole, self.unindexed)
+        bag.close()
+
+    def analyze(self, bag):
+        command = [str(TOOLS / 'analyze_bag'), str(bag), '--mesh', '/cloth', '--report', str(self.folder / 'report'),
+                   '--no-accuracy-table', '--quiet']
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+    def refused(self, bag):
+        """The one line that is said, with --mesh or without."""
+        ran = self.analyze(bag)
+        self.assertEqual(ran.returncode, 1, ran.stderr)
+        self.assertEqual(ran.stderr.count('\n'), 1, ran.stderr)
+        self.assertIn(str(bag) + ': ', ran.stderr)
+        plain = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--report', str(self.folder / 'report')],
+                               capture_output=True, text=True, check=False, timeout=60)
+        self.assertEqual((plain.returncode, plain.stderr), (1, ran.stderr))
+        return ran.stderr
+
+    def cut(self, size):
+        path = self.folder / 'cut.bag'
+        path.write_bytes(self.whole.read_bytes()[:size])
+        return path
+
+    def test_a_whole_one(self):
+        self.assertEqual(self.analyze(self.whole).returncode, 0)
+
+    def test_a_recording_that_was_not_ended(self):
+        said = self.refused(self.unindexed)
+        self.assertIn('the bag has no index, as its recording was not ended; run: rosbag reindex %s\n' % self.unindexed, said)
+        subprocess.run(['rosbag', 'reindex', str(self.unindexed)], check=True, capture_output=True)
+        self.assertEqual(self.analyze(self.unindexed).returncode, 0, 'the remedy')
+
+    def test_one_that_is_cut(self):
+        size = self.whole.stat().st_size
+        for keep in (size - 1, size - 100, size // 2, 4096 + 13, 4096, 100, 13, 9):
+            with self.subTest(kept=keep):
+                path = self.cut(keep)
+                self.assertRegex(self.refused(path), r'the bag is cut or damaged \(.*\); run: rosbag reindex %s\n' % path)
+        half = self.cut(size // 2)
+        subprocess.run(['rosbag', 'reindex', str(half)], check=True, capture_output=True)
+        self.assertEqual(self.analyze(half).returncode, 0, 'the remedy')
+
+    def test_what_is_no_bag(self):
+        self.assertIn('the file is empty: nothing was recorded', self.refused(self.cut(0)))
+        other = self.folder / 'other.bag'
+        other.write_text('v 0 0 0\n' * 1000)
+        self.assertIn("the file is no bag: it does not begin with '#ROSBAG V'", self.refused(other))
+
+    def test_a_quaternion_that_is_none(self):
+        """The reason of the frame without a place, and the complaint, name it."""
+        path, turned = self.folder / 'turned.bag', TransformStamped(child_frame_id='camera')
+        turned.header.frame_id, turned.header.stamp, turned.transform.rotation.w = 'world', rospy.Time.from_sec(100), 1.2
+        with rosbag.Bag(str(path), 'w') as bag:
+            bag.write('/tf_static', TFMessage([turned]), rospy.Time.from_sec(100))
+            for k in range(2):
+                bag.write('/cloth', cloud(100 + 0.1 * k, 'camera'), rospy.Time.from_sec(100 + 0.1 * k))
+        params = self.folder / 'world.yaml'
+        params.write_text('fixed_frame: world\n')
+        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(path), '--mesh', '/cloth', '--params', str(params), '--report',
+                              str(self.folder / 'report'), '--no-accuracy-table', '--quiet'],
+                             capture_output=True, text=True, check=False, timeout=60)
+        self.assertEqual(ran.returncode, 3, ran.stderr)
+        words = "transforms of 'camera' are left out: its rotation x y z w (0 0 0 1.2) has the length 1.2; publish a quaternion"
+        self.assertIn('tf: ' + words, ran.stderr)
+        self.assertRegex(ran.stderr, r'NO_TRANSFORM: no transform from .camera. to .world.: .*; transforms of .camera. are left out')
+
+
+if __name__ == '__main__':
+    unittest.main()
