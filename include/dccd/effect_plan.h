@@ -20,7 +20,7 @@ using EffectSettings = std::map<Effect, EffectSetting>;  ///< what is missing is
 
 /// What the plan is derived from: the bodies that the flow is given, and what it is not told.
 struct EffectScene {
-  std::vector<Body> bodies;        ///< topology null: not known yet
+  std::vector<Body> bodies;        ///< topology null: not known yet; t0 of rigid ones: wherever they were once
   std::vector<std::string> noise;  ///< per body, where its uncertainty radii come from, in words; empty: it has none
   std::string map_source;          ///< a topic or file, for the sentence
   bool map_named = false;          ///< by the user, as a topic: it is missed until it comes

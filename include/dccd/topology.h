@@ -38,6 +38,8 @@ class DCCD_EXPORT Topology {
   /// There are faces and every edge lies on an even number of them: no border, so that each point of space that is not
   /// on the surface is inside of it or outside, however it is bent.
   bool isClosed() const { return closed_; }
+  /// An edge that keeps it from being closed; of a closed surface, any edge. There must be faces.
+  const Edge& borderEdge() const { return border_edge_; }
 
   /// Vertices that belong to at least one edge, ascending. Others are not features and never in contact.
   const std::vector<Index>& usedVertices() const { return used_vertices_; }
@@ -53,6 +55,7 @@ class DCCD_EXPORT Topology {
   std::vector<Edge> edges_;
   std::vector<Index> used_vertices_;
   bool closed_ = false;
+  Edge border_edge_{};
   void finish();
 };
 

@@ -11,6 +11,7 @@
 
 #include "culling/cluster_tree.h"
 #include "dccd/outcome.h"
+#include "mesh/seams.h"
 
 namespace dccd {
 
@@ -46,6 +47,10 @@ struct SceneBody {
   double reach_m = 0;         ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
   std::int16_t margin[16] = {};                   ///< reach_m in record units
+  bool sewn = false;                              ///< it has a border by its numbers alone: its seams hold in this step
+  bool sewn_known = false;                        ///< for the vertices as they are
+  Seams seams;                                    ///< by which it is sewn, or was
+  std::vector<std::uint8_t> repeated_slot;        ///< Seams::repeated, by slot
   bool translates = false;  ///< all vertices have exactly the same displacement in this step (at rest included)
 
   const ClusterTree& tree(FeatureKind k) const { return trees[static_cast<int>(k)]; }
@@ -61,7 +66,9 @@ struct SceneBody {
   }
   std::size_t usedCount() const { return slot_vertex.size(); }
   /// In this step others can be inside of it, and must not: closed, nothing of its surface is left out, no container.
-  bool hasInside() const { return setup.topology->isClosed() && !setup.shell && !masked; }
+  bool hasInside() const { return (setup.topology->isClosed() || sewn) && !setup.shell && !masked; }
+  /// The face in the slot does not count for what is inside.
+  bool isRepeated(std::size_t slot) const { return sewn && repeated_slot[slot] != 0; }
 };
 
 class SceneArrays {
@@ -222,6 +229,7 @@ class SceneArrays {
   std::size_t piecesInAUnit() const;
   void copyPiece(const Step& step, Piece& piece);
   bool closeCopies(const Step& step, bool bounds_valid, StepStats& stats);
+  void sew(SceneBody& body, const Body& motion, bool all_finite) const;
   void closeCopy(SceneBody& body, const Body& motion, const std::array<Piece*, 2>& pieces, bool bounds_valid,
                  StepStats& stats);
   void spanPiece(Piece& piece) const;

@@ -176,6 +176,7 @@ void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::arra
   if (!body.kept) body.translates = !masked && sameDisplacement(out, body.usedCount());
   body.recorded = !body.uncertain;  // radii widen the bounds, and may be others in the next step
   stats.unchecked_vertices += unchecked;
+  sew(body, motion, unchecked == 0);
   body.mask_changed = changed || masked != body.masked;
   if (body.mask_changed) {
     // The mask is indexed by internal vertex number.
@@ -189,6 +190,22 @@ void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::arra
       stats.unchecked_faces += bad(f[0]) || bad(f[1]) || bad(f[2]);
     }
   }
+}
+
+/// Seams that hold are kept.
+void SceneArrays::sew(SceneBody& body, const Body& motion, bool all_finite) const {
+  if (body.unchanged && body.sewn_known) return;
+  body.sewn_known = all_finite;
+  body.sewn = false;
+  if (!all_finite || body.setup.topology->isClosed() || body.setup.shell || bodies_.size() < 2) return;
+  if (body.seams.vertices.empty() || !hold(body.seams, *motion.t0, *motion.t1)) {
+    body.seams = seamsOf(*body.setup.topology, *motion.t0, *motion.t1, body.seams);
+    body.repeated_slot.clear();
+    for (const Index rank : body.rank(FeatureKind::FACE)) {
+      if (!body.seams.vertices.empty()) body.repeated_slot.push_back(body.seams.repeated[face_order_[rank]]);
+    }
+  }
+  body.sewn = !body.seams.vertices.empty();
 }
 
 void SceneArrays::spanPiece(Piece& piece) const {

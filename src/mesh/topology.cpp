@@ -100,6 +100,7 @@ void Topology::finish() {
   closed_ = hasFaces();  // an edge is still listed once for each of its faces
   for (auto first = edges_.begin(); closed_ && first != edges_.end();) {
     const auto last = std::find_if(first, edges_.end(), [&](const Edge& e) { return e != *first; });
+    border_edge_ = *first;
     closed_ = (last - first) % 2 == 0;
     first = last;
   }

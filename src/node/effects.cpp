@@ -63,7 +63,9 @@ void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {
   for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
     const auto& topology = outcome.step->bodies[b].topology;
     std::shared_ptr<const Topology>& known = scene_.bodies[b].topology;
-    changed = changed || !known || known->hasFaces() != topology->hasFaces();
+    const bool other = !known || known->hasFaces() != topology->hasFaces();
+    if (other && scene_.bodies[b].rigid) scene_.bodies[b].t0 = outcome.step->bodies[b].t0;
+    changed = changed || other;
     known = topology;
   }
   if (changed) plan_ = EffectPlan(scene_, settings_);

@@ -7,6 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "mesh/seams.h"
+
 namespace dccd {
 
 namespace {
@@ -92,7 +94,8 @@ std::string notSolid(const EffectScene& scene) {
   std::string border, mask;
   for (const Body& body : scene.bodies) {
     if (!body.rigid || !body.topology || !body.topology->hasFaces() || body.shell || !meet(body, body)) continue;
-    if (!body.topology->isClosed()) {
+    const bool sewn = body.t0 && !seamsOf(*body.topology, *body.t0, *body.t0).vertices.empty();
+    if (!body.topology->isClosed() && !sewn) {
       append(border, ", ", body.name);
     } else if (!body.vertex_mask.empty()) {
       append(mask, ", ", body.name);

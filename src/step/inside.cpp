@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "obstacle/axis_predicates.h"
 #include "step/start_state.h"
@@ -71,7 +72,7 @@ bool InsideSearch::isInside(const SceneArrays& scene, const Question& question, 
   bool touched = false, enclosed = false;
   const bool members = scene.bodies()[question.closed].whole;
   visitAbove(faces, members, scene.record(question.internal), at, faces.height() - 1, 0, [&](std::size_t slot) {
-    if (touched) return;
+    if (touched || scene.bodies()[question.closed].isRepeated(slot)) return;
     const Index* f = faces.feature(slot);
     const Sight sight = sightOf(point, x(f[0]), x(f[1]), x(f[2]));
     touched = sight == Sight::TOUCHED;
@@ -87,7 +88,8 @@ const std::vector<StartIntersection>& InsideSearch::run(const SceneArrays& scene
   const bool all_finite = stats.unchecked_vertices == 0;
   if (!(all_finite && pieces_of_all_)) forgetBodies();
   pieces_of_all_ = all_finite;
-  if (!(continues && known_ && all_finite)) clear();
+  const bool same_surfaces = takeSurfaces(scene);
+  if (!(continues && known_ && all_finite && same_surfaces)) clear();
   askOpen(scene, deadline);
   if (!searched_) search(scene, deadline);
   whole_ = searched_ && open_.empty();
@@ -100,6 +102,20 @@ const std::vector<StartIntersection>& InsideSearch::run(const SceneArrays& scene
     of->out += inside_.size();
   }
   return intersections_;
+}
+
+/// False: some surface is not what it was in the step before.
+bool InsideSearch::takeSurfaces(const SceneArrays& scene) {
+  const auto surfaceOf = [](const SceneBody& body) {
+    return static_cast<std::uint8_t>((body.hasInside() ? 2 : 0) + (body.sewn ? 1 : 0));
+  };
+  bool same = surfaces_.size() == scene.bodies().size();
+  surfaces_.resize(scene.bodies().size());
+  for (std::size_t b = 0; b < surfaces_.size(); ++b) {
+    const std::uint8_t before = std::exchange(surfaces_[b], surfaceOf(scene.bodies()[b]));
+    same = same && before == surfaces_[b];
+  }
+  return same;
 }
 
 bool InsideSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,

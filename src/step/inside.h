@@ -25,6 +25,9 @@ Sight sightOf(const double* point, const double* a, const double* b, const doubl
 /// the one with the smallest number: where it is only partly inside, one of its edges meets a face, which
 /// StartStateSearch lists. A body is not asked about itself. Pairs are those that meet() (body.h).
 ///
+/// A body whose corners are doubled is closed while these are at one place throughout the step (mesh/seams.h): it is
+/// the same cycle then. When its seams come apart or close, all is asked anew.
+///
 /// What is known at the start of one step is carried over to the next, so that only the first frame, frames after a
 /// reset and vertices that touched are asked about. Why that is complete: let a vertex v be on no face of B at any
 /// time of the step. B's faces, an even number at each edge, are a cycle modulo 2, and whether v is enclosed is that
@@ -79,6 +82,7 @@ class InsideSearch {
     Index vertex, internal;
   };
 
+  bool takeSurfaces(const SceneArrays& scene);
   static void list(const std::vector<Question>& inside, std::vector<StartIntersection>& out);
   static bool isInside(const SceneArrays& scene, const Question& question, int at);  ///< at: 0 or 1, of the step's ends
   void askOpen(const SceneArrays& scene, const Deadline& deadline);
@@ -87,6 +91,7 @@ class InsideSearch {
   void ask(const SceneArrays& scene, const Question& question);
   const std::vector<Piece>& piecesOf(const SceneArrays& scene, std::size_t body);
 
+  std::vector<std::uint8_t> surfaces_;  // per body: whether it has an inside, and whether by its seams
   bool whole_ = false;
   bool known_ = false;                        // all contacts since the last run(): what that found can be carried over
   bool searched_ = false;                     // the search has come to its end

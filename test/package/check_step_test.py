@@ -97,6 +97,45 @@ class CheckStepTest(unittest.TestCase):
         self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(0.05), '--accuracy', 'all'), 0, 'exact decides')
         self.assertIn('fast: not proved', self.said)
 
+    def obj(self, points, polygons, ends=None):
+        """The step of an OBJ from the points to the ends."""
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            for name, at in (('0.obj', points), ('1.obj', ends or points)):
+                (folder / name).write_text(''.join('v %r %r %r\n' % p for p in at) +
+                                           ''.join('f ' + ' '.join(str(v + 1) for v in polygon) + '\n' for polygon in polygons))
+            done = subprocess.run([tool(), str(folder / '0.obj'), str(folder / '1.obj'), '--stats', str(folder / 'stats.json')],
+                                  capture_output=True, text=True)
+            self.assertEqual(done.stderr, '')
+            self.stats = json.loads((folder / 'stats.json').read_text())
+        self.said = done.stdout
+        return done.returncode
+
+    def test_a_chip_falls_through_the_notch_of_an_l(self):
+        outline = [(3, 0), (3, 1), (1, 1), (1, 3), (0, 3), (0, 0)]
+        polygons = [(0, 1, 2, 3, 4, 5), (6, 7, 8)]
+
+        def falls(chip):
+            return [[(x, y, 0.0) for x, y in outline] + [(x, y, z) for x, y in chip] for z in (1.0, -1.0)]
+        start, end = falls([(1.2, 1.2), (1.6, 1.2), (1.2, 1.6)])
+        self.assertEqual(self.obj(start, polygons, end), 0)
+        self.assertIn('proved, nothing touches', self.said)
+        start, end = falls([(0.2, 0.2), (0.6, 0.2), (0.2, 0.6)])
+        self.obj(start, polygons, end)
+        self.assertIn('something touches anew', self.said)
+
+    def test_a_dart_at_rest_touches_nothing(self):
+        self.assertEqual(self.obj([(0, 0, 0), (2, 1, 0), (0, 2, 0), (1.5, 1, 0)], [(0, 1, 2, 3)]), 0)
+        self.assertIn('proved, nothing touches', self.said)
+
+    def test_faces_that_cannot_be_used(self):
+        square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+        self.assertEqual(self.obj(square, [(0, 1, 2), (0, 2, 3), (0, 1, 1)]), 0, 'the edge of a face')
+        for face in ((1, 3, 3), (0, 2, 1, 3)):
+            self.assertEqual(self.obj(square, [(0, 1, 2), (0, 2, 3), face]), NOT_PROVED)
+            self.assertIn('1 faces were sent that cannot be used', self.said)
+            self.assertNotIn('nothing touches', self.said)
+
     def test_errors_are_told_from_what_is_not_proved(self):
         done = subprocess.run([tool(), 'nowhere.ply', 'nowhere.ply'], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)

@@ -83,6 +83,22 @@ StepBody sheet(std::size_t rows, std::size_t cols, const Vec3& corner, double sp
 
 StepBody together(const StepBody& a, const StepBody& b) { return joined(a, b, 0); }
 
+StepBody withOwnCorners(const StepBody& body) {
+  StepBody out;
+  std::vector<Face> faces;
+  for (const Face& f : body.topology.faces()) {
+    const auto n = static_cast<Index>(out.t0.size());
+    faces.push_back({n, n + 1, n + 2});
+    for (const Index v : f) {
+      out.t0.push_back(body.t0[v]);
+      out.t1.push_back(body.t1[v]);
+    }
+  }
+  out.topology = Topology::fromTriangles(out.t0.size(), faces);
+  out.self_collision = false;  // its faces touch along their edges
+  return out;
+}
+
 StepBody randomClosed(const Draw& draw, Coordinates coordinates) {
   const auto part = [&]() -> StepBody {
     switch (draw(0, 4)) {

@@ -17,6 +17,9 @@ StepBody sheet(std::size_t rows, std::size_t cols, const Vec3& corner, double sp
 /// One body of two: their vertices and faces after one another.
 StepBody together(const StepBody& a, const StepBody& b);
 
+/// The same faces, each with corners of its own, as exporters write them; not tested against itself.
+StepBody withOwnCorners(const StepBody& body);
+
 /// Boxes, tetrahedra, octahedra with vertices anywhere, shells in one another and parts that share a vertex or an edge,
 /// with coordinates of the style given; every edge lies on an even number of faces.
 StepBody randomClosed(const Draw& draw, Coordinates coordinates);

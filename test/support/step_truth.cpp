@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "oracle/exact_inside.h"
 
@@ -88,15 +89,43 @@ bool arePaired(const TestStep& step, std::size_t a, std::size_t b) {
   return step.bodies[a].against_bodies && step.bodies[b].against_bodies;
 }
 
-/// Straight from the definition: no edge has an odd number of faces, and every vertex of a face counts.
-bool enclosesSpace(const StepBody& body) {
+/// Straight from the definition: no edge has an odd number of faces.
+bool isClosed(const std::vector<Face>& faces) {
   std::map<Edge, int> faces_at;
-  for (const Face& f : body.topology.faces()) {
-    if (!isActive(body, f.data(), 3)) return false;
+  for (const Face& f : faces) {
     for (int i = 0; i < 3; ++i) ++faces_at[{std::min(f[i], f[(i + 1) % 3]), std::max(f[i], f[(i + 1) % 3])}];
   }
   const auto odd = [](const auto& edge) { return edge.second % 2 != 0; };
-  return !body.shell && !faces_at.empty() && std::none_of(faces_at.begin(), faces_at.end(), odd);
+  return !faces_at.empty() && std::none_of(faces_at.begin(), faces_at.end(), odd);
+}
+
+/// The faces with one vertex for all that are at one place at both ends of the step; each of them once, none without
+/// three corners.
+std::vector<Face> mergedFaces(const StepBody& body) {
+  std::map<std::vector<double>, Index> vertex_at;
+  std::map<std::set<Index>, Face> faces;
+  for (Face f : body.topology.faces()) {
+    for (Index& v : f) {
+      const Vec3 &p = body.t0[v], &q = body.t1[v];
+      v = vertex_at.try_emplace({p[0], p[1], p[2], q[0], q[1], q[2]}, v).first->second;
+    }
+    const std::set<Index> corners(f.begin(), f.end());
+    if (corners.size() == 3) faces.try_emplace(corners, f);
+  }
+  std::vector<Face> merged;
+  for (const auto& one : faces) merged.push_back(one.second);
+  return merged;
+}
+
+/// The faces that enclose space; none where there is a border, though vertices are merged, or a vertex does not count.
+std::vector<Face> enclosingFaces(const StepBody& body) {
+  for (const Face& f : body.topology.faces()) {
+    if (!isActive(body, f.data(), 3)) return {};
+  }
+  if (body.shell) return {};
+  if (isClosed(body.topology.faces())) return body.topology.faces();
+  const std::vector<Face> merged = mergedFaces(body);
+  return isClosed(merged) ? merged : std::vector<Face>();
 }
 
 /// Of the vertices that edges join the one with the smallest number, for each piece; ascending.
@@ -170,13 +199,13 @@ std::vector<StartIntersection> trueInsides(const TestStep& step) {
   for (std::size_t a = 0; a < step.bodies.size(); ++a) {
     for (const Index v : firstOfPieces(step.bodies[a])) {
       for (std::size_t b = 0; b < step.bodies.size(); ++b) {
-        if (a == b || !arePaired(step, a, b) || !enclosesSpace(step.bodies[b])) continue;
+        if (a == b || !arePaired(step, a, b)) continue;
         std::vector<std::array<Vec3, 3>> faces;
-        for (const Face& f : step.bodies[b].topology.faces()) {
+        for (const Face& f : enclosingFaces(step.bodies[b])) {
           const Positions& x = step.bodies[b].t0;
           faces.push_back({x[f[0]], x[f[1]], x[f[2]]});
         }
-        if (!isInSolid(step.bodies[a].t0[v], faces)) continue;
+        if (faces.empty() || !isInSolid(step.bodies[a].t0[v], faces)) continue;
         found.push_back({{static_cast<std::uint16_t>(a), static_cast<std::uint16_t>(b)},
                          {v, NO_INDEX, NO_INDEX, NO_INDEX, NO_INDEX}});
       }

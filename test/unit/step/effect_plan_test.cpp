@@ -182,6 +182,21 @@ TEST(EffectPlan, ABodyWithABorderHasNoInside) {
   EXPECT_EQ(said(), plain + "; with masked vertices, no inside: finger");
   scene.bodies[1].topology = share(Topology::fromTriangles(4, {faces[0], faces[1]}));
   EXPECT_EQ(said(), plain + "; with a border, no inside: finger");
+  scene.bodies[1].vertex_mask.clear();
+  std::vector<Face> own;
+  Positions corners, apart;
+  for (const Face& f : faces) {
+    const auto n = static_cast<Index>(corners.size());
+    own.push_back({n, n + 1, n + 2});
+    for (const Index v : f) corners.push_back(v == 3 ? Vec3(0, 0, 0) : Vec3(Vec3::Unit(v)));
+  }
+  apart = corners;
+  apart[4][1] += 1e-9;
+  scene.bodies[1].topology = share(Topology::fromTriangles(corners.size(), own));
+  scene.bodies[1].t0 = share(corners);
+  EXPECT_EQ(said(), plain) << "doubled corners are no border";
+  scene.bodies[1].t0 = share(apart);
+  EXPECT_EQ(said(), plain + "; with a border, no inside: finger");
   scene.bodies[1].shell = true;
   EXPECT_EQ(said(), plain) << "a container is not asked";
   scene.bodies[1].shell = false;

@@ -85,6 +85,61 @@ TEST(Inside, WhatHasABorderHasNoInside) {
   EXPECT_FALSE(assuranceOf(partial).clear());
 }
 
+TEST(Inside, OneBoxHasOneAnswerHoweverItsCornersAreNumbered) {
+  TestStep step = clothInABox();
+  step.bodies[1] = withOwnCorners(step.bodies[1]);
+  ASSERT_FALSE(step.bodies[1].topology.isClosed());
+  EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 0, 1)}));
+  EXPECT_FALSE(assuranceOf(startOf(step)).clear());
+  EXPECT_TRUE(same(trueInsides(step), {insideOf(0, 0, 1)}));
+  step.bodies[1].t0[4] += 0.0 * step.bodies[1].t0[4];  // zeros of either sign are one place
+  for (double& x : step.bodies[1].t0[7]) x = x == 0 ? -0.0 : x;
+  EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 0, 1)}));
+  // As a soup of two layers, one for either side, and with a face that is a line in it.
+  TestStep layers = clothInABox();
+  StepBody two = together(withOwnCorners(layers.bodies[1]), withOwnCorners(layers.bodies[1]));
+  std::vector<Face> faces = two.topology.faces();
+  const Index last = static_cast<Index>(two.t0.size());
+  faces.push_back({last, last + 1, 0});
+  for (Positions* x : {&two.t0, &two.t1}) x->insert(x->end(), {(*x)[0], (*x)[1]});
+  two.topology = Topology::fromTriangles(two.t0.size(), faces);
+  two.self_collision = false;
+  layers.bodies[1] = two;
+  EXPECT_TRUE(same(startOf(layers).intersections, {insideOf(0, 0, 1)}));
+  for (Positions* x : {&layers.bodies[0].t0, &layers.bodies[0].t1}) {
+    for (Vec3& p : *x) p[2] -= 3;
+  }
+  EXPECT_EQ(startOf(layers).start_state, StartState::CLEAR) << "under it, with all layers above";
+}
+
+TEST(Inside, CornersThatAreNotAtOnePlaceThroughoutTheStepAreABorder) {
+  for (const bool at_end : {false, true}) {
+    TestStep step = clothInABox();
+    step.bodies[1] = withOwnCorners(step.bodies[1]);
+    Vec3& corner = (at_end ? step.bodies[1].t1 : step.bodies[1].t0)[5];
+    corner[0] = std::nextafter(corner[0], 9);
+    EXPECT_EQ(startOf(step).start_state, StartState::CLEAR);
+    EXPECT_TRUE(trueInsides(step).empty());
+  }
+  TestStep hole = clothInABox();
+  std::vector<Face> faces = hole.bodies[1].topology.faces();
+  faces.pop_back();
+  hole.bodies[1].topology = Topology::fromTriangles(8, faces);
+  hole.bodies[1] = withOwnCorners(hole.bodies[1]);
+  EXPECT_EQ(startOf(hole).start_state, StartState::CLEAR);
+}
+
+TEST(Inside, AMirroredBoxIsTheSameSolid) {
+  for (const bool own_corners : {false, true}) {
+    TestStep step = clothInABox();
+    if (own_corners) step.bodies[1] = withOwnCorners(step.bodies[1]);
+    for (Positions* x : {&step.bodies[1].t0, &step.bodies[1].t1}) {
+      for (Vec3& p : *x) p = -p;
+    }
+    EXPECT_TRUE(same(startOf(step).intersections, {insideOf(0, 0, 1)}));
+  }
+}
+
 TEST(Inside, ABodyIsNotAskedAboutItself) {
   TestStep step;
   step.bodies = {together(box({-2, -2, -2}, {2, 2, 2}), box({-1, -1, -1}, {1, 1, 1})), clothAt({0.2, 0.1, 1.5}),
@@ -172,6 +227,22 @@ TEST(Inside, WhatIsInsideStaysKnownWithoutAQuestion) {
     EXPECT_TRUE(same(outcome.intersections, {insideOf(0, 0, 1)}));
     EXPECT_EQ(outcome.stats[Stage::START_STATE].in, 0u);
   }
+}
+
+TEST(Inside, ABoxThatComesApartAndClosesAgainIsAskedAnew) {
+  TestStep step = clothInABox();
+  step.bodies[1] = withOwnCorners(step.bodies[1]);
+  const Positions closed = step.bodies[1].t0;
+  Positions apart = closed;
+  apart[5][0] += 0.25;
+  Detector detector;
+  for (const Positions& end : {closed, closed, apart, apart, closed, closed, closed}) {
+    step = step.continued({step.bodies[0].t1, end});
+    const Outcome outcome = detector.run(step.motion());
+    EXPECT_TRUE(same(outcome.intersections, startOf(step).intersections));
+    EXPECT_TRUE(same(outcome.intersections, trueInsides(step)));
+  }
+  EXPECT_EQ(detector.run(step.motion()).start_state, StartState::INTERSECTING);
 }
 
 TEST(Inside, WhatWentInThroughTheWallIsFoundOnceItIsThere) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <fstream>
+#include <sstream>
 
 #include "dccd/assurance.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
@@ -60,6 +61,77 @@ TEST(Inside, AClothInARigidBodyOfAnStlIsNoClearStart) {
   container.raise("finger", -20);
   container.feed(1, 0.3f);
   EXPECT_TRUE(assuranceOf(container.feed(1.1, 0.2f)).clear()) << "a container is meant to hold others";
+}
+
+/// The same box as an OBJ or a PLY, each of its faces with corners of its own.
+std::string boxWithOwnCorners(const std::string& ending) {
+  const std::string file = ::testing::TempDir() + "own_corners." + ending;
+  const int quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  const bool obj = ending == "obj";
+  std::ostringstream vertices, faces;
+  for (int q = 0; q < 6; ++q) {
+    faces << (obj ? "f" : "4");
+    for (int k = 0; k < 4; ++k) {
+      const int v = quads[q][k];
+      vertices << (obj ? "v " : "") << (v & 1 ? 10 : -10) << ' ' << (v & 2 ? 10 : -10) << ' ' << (v & 4 ? 40 : 0)
+               << '\n';
+      faces << ' ' << 4 * q + k + obj;
+    }
+    faces << '\n';
+  }
+  std::ofstream out(file);
+  if (!obj) {
+    out << "ply\nformat ascii 1.0\nelement vertex 24\nproperty float x\nproperty float y\nproperty float z\n"
+           "element face 6\nproperty list uchar int vertex_indices\nend_header\n";
+  }
+  out << vertices.str() << faces.str();
+  return file;
+}
+
+// One box has one answer, in whatever way its file numbers the corners, and mirrored as well.
+TEST(Inside, AClothInARigidBodyWithDoubledCornersIsNoClearStart) {
+  for (const std::string ending : {"stl", "obj", "ply"}) {
+    for (const double scale : {1.0, -1.0}) {
+      XmlRpcValue tree = clothAndFinger();
+      if (ending != "stl") tree["bodies"]["finger"]["rigid"]["mesh"] = boxWithOwnCorners(ending);
+      tree["bodies"]["finger"]["rigid"]["scale"] = scale;
+      Driven driven(tree);
+      driven.raise("finger", scale > 0 ? -20 : 20);
+      driven.feed(1, 0.3f);
+      const Outcome& inside = driven.feed(1.1, 0.2f);
+      ASSERT_EQ(inside.status, StepStatus::OK) << inside.reason;
+      EXPECT_EQ(inside.start_state, StartState::INTERSECTING) << ending << ' ' << scale;
+      EXPECT_EQ(inside.intersections.size(), 1u);
+      EXPECT_FALSE(assuranceOf(inside).clear());
+      driven.raise("finger", -500);
+      driven.feed(1.2, 0.3f);
+      EXPECT_TRUE(assuranceOf(driven.feed(1.3, 0.2f)).clear()) << ending << ' ' << scale;
+    }
+  }
+}
+
+// One rule for files and messages: what cannot be used is missing, and the step is PARTIAL.
+TEST(Files, FacesThatCannotBeUsedAreUnchecked) {
+  const std::string file = ::testing::TempDir() + "with_a_line.obj";
+  for (const std::string face : {"", "f 1 4 4\n", "f 1 4 2 3\nf 1 1 4\n", "f 1 2 2\n"}) {
+    const bool usable = face.empty() || face == "f 1 2 2\n";
+    std::ofstream(file) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n" << face;
+    XmlRpcValue rigid = clothAndFinger();
+    rigid["bodies"]["finger"]["rigid"]["mesh"] = file;
+    XmlRpcValue topology = scene();
+    topology["effects"]["octomap"] = "off";
+    topology["topology"]["file"] = file;
+    for (const XmlRpcValue& tree : {rigid, topology}) {
+      Driven driven(tree);
+      driven.raise("finger", -3);
+      driven.feed(1, 0.3f);
+      const Outcome& outcome = driven.feed(1.1, 0.2f);
+      EXPECT_EQ(outcome.status, usable ? StepStatus::OK : StepStatus::PARTIAL) << face << outcome.reason;
+      EXPECT_EQ(assuranceOf(outcome).clear(), usable) << face;
+      EXPECT_EQ(outcome.reason.find("faces were sent that cannot be used") != std::string::npos, !usable)
+          << outcome.reason;
+    }
+  }
 }
 
 TEST(Inside, AMeshFileInMillimetresIsHintedAt) {
