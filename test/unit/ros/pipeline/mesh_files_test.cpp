@@ -88,25 +88,23 @@ std::string boxWithOwnCorners(const std::string& ending) {
   return file;
 }
 
-// One box has one answer, in whatever way its file numbers the corners, and mirrored as well.
+// One box has one answer, in whatever way its file numbers the corners.
 TEST(Inside, AClothInARigidBodyWithDoubledCornersIsNoClearStart) {
   for (const std::string ending : {"stl", "obj", "ply"}) {
-    for (const double scale : {1.0, -1.0}) {
-      XmlRpcValue tree = clothAndFinger();
-      if (ending != "stl") tree["bodies"]["finger"]["rigid"]["mesh"] = boxWithOwnCorners(ending);
-      tree["bodies"]["finger"]["rigid"]["scale"] = scale;
-      Driven driven(tree);
-      driven.raise("finger", scale > 0 ? -20 : 20);
-      driven.feed(1, 0.3f);
-      const Outcome& inside = driven.feed(1.1, 0.2f);
-      ASSERT_EQ(inside.status, StepStatus::OK) << inside.reason;
-      EXPECT_EQ(inside.start_state, StartState::INTERSECTING) << ending << ' ' << scale;
-      EXPECT_EQ(inside.intersections.size(), 1u);
-      EXPECT_FALSE(assuranceOf(inside).clear());
-      driven.raise("finger", -500);
-      driven.feed(1.2, 0.3f);
-      EXPECT_TRUE(assuranceOf(driven.feed(1.3, 0.2f)).clear()) << ending << ' ' << scale;
-    }
+    XmlRpcValue tree = clothAndFinger();
+    if (ending != "stl") tree["bodies"]["finger"]["rigid"]["mesh"] = boxWithOwnCorners(ending);
+    Driven driven(tree);
+    driven.raise("finger", -20);
+    driven.feed(1, 0.3f);
+    const Outcome& inside = driven.feed(1.1, 0.2f);
+    ASSERT_EQ(inside.status, StepStatus::OK) << inside.reason;
+    EXPECT_EQ(inside.start_state, StartState::INTERSECTING) << ending;
+    EXPECT_EQ(inside.intersections.size(), 1u);
+    EXPECT_FALSE(assuranceOf(inside).clear());
+    Driven beside(tree);
+    beside.raise("finger", -500);
+    beside.feed(1, 0.3f);
+    EXPECT_TRUE(assuranceOf(beside.feed(1.1, 0.2f)).clear()) << ending;
   }
 }
 
