@@ -70,7 +70,8 @@ TEST_F(TwoBodies, AJumpOfAnotherBodyBetweenTwoStepsIsASeam) {
     two.push(1, tip(START + 100 * MS - back_ns, 1), NOW);
     std::vector<Outcome> outcomes;
     for (int k = 2; k < 6; ++k) outcomes.push_back(step(k, 1));
-    EXPECT_EQ(outcomes[0].status, StepStatus::TIME_JUMP) << back_ns << " ns";
+    // After a jump by more than max_step_s the frame that follows it comes after a gap, too.
+    EXPECT_EQ(outcomes[0].status, back_ns < 1000 * MS ? StepStatus::TIME_JUMP : StepStatus::GAP) << back_ns << " ns";
     EXPECT_FALSE(outcomes[0].answered);
     EXPECT_NE(outcomes[0].reason.find("body 'tip'"), std::string::npos) << outcomes[0].reason;
     EXPECT_EQ(outcomes[1].status, StepStatus::OK) << "said once";
