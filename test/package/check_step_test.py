@@ -54,7 +54,7 @@ class CheckStepTest(unittest.TestCase):
             write(folder / '1.ply', t1, self.FACES)
             done = subprocess.run([tool(), str(folder / '0.ply'), str(folder / '1.ply'), '--stats', str(folder / 'stats.json'),
                                    *flags], capture_output=True, text=True)
-            self.assertEqual(done.stderr, '')
+            self.remarked = done.stderr
             self.stats = json.loads((folder / 'stats.json').read_text())
         self.said = done.stdout
         return done.returncode
@@ -119,6 +119,7 @@ class CheckStepTest(unittest.TestCase):
             return [[(x, y, 0.0) for x, y in outline] + [(x, y, z) for x, y in chip] for z in (1.0, -1.0)]
         start, end = falls([(1.2, 1.2), (1.6, 1.2), (1.2, 1.6)])
         self.assertEqual(self.obj(start, polygons, end), 0)
+        self.assertEqual(self.remarked, '')
         self.assertIn('proved, nothing touches', self.said)
         start, end = falls([(0.2, 0.2), (0.6, 0.2), (0.2, 0.6)])
         self.obj(start, polygons, end)
@@ -134,6 +135,7 @@ class CheckStepTest(unittest.TestCase):
         for face in ((1, 3, 3), (0, 2, 1, 3)):
             self.assertEqual(self.obj(square, [(0, 1, 2), (0, 2, 3), face]), NOT_PROVED)
             self.assertIn('1 faces were sent that cannot be used', self.said)
+            self.assertIn('0.obj: 1 polygons cannot be used and are unchecked, the first is in line 7', self.remarked)
             self.assertNotIn('nothing touches', self.said)
 
     def test_errors_are_told_from_what_is_not_proved(self):
