@@ -54,7 +54,7 @@ class CheckStepTest(unittest.TestCase):
             write(folder / '1.ply', t1, self.FACES)
             done = subprocess.run([tool(), str(folder / '0.ply'), str(folder / '1.ply'), '--stats', str(folder / 'stats.json'),
                                    *flags], capture_output=True, text=True)
-            self.remarked = done.stderr
+            self.assertEqual(done.stderr, '')
             self.stats = json.loads((folder / 'stats.json').read_text())
         self.said = done.stdout
         return done.returncode
@@ -106,7 +106,7 @@ class CheckStepTest(unittest.TestCase):
                                            ''.join('f ' + ' '.join(str(v + 1) for v in polygon) + '\n' for polygon in polygons))
             done = subprocess.run([tool(), str(folder / '0.obj'), str(folder / '1.obj'), '--stats', str(folder / 'stats.json')],
                                   capture_output=True, text=True)
-            self.assertEqual(done.stderr, '')
+            self.remarked = done.stderr
             self.stats = json.loads((folder / 'stats.json').read_text())
         self.said = done.stdout
         return done.returncode
