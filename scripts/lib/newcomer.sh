@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What a newcomer types, before the tests' packages could hide that something is missing: the README's first command, what that
-# names as the next one, then every command of the pages. Ends where one of the first two fails. What the pages' tests print, their verdict too, goes to pages.log in
-# the build folder, which PagesRunner (scripts/lib/runners.py) counts.
+# What a newcomer types, before the tests' packages could hide that something is missing: the README's first command, the next
+# one that this names, then every command of the pages. Ends where one of the first two fails. What the pages' tests print, their
+# verdict too, goes to pages.log in the build folder, which PagesRunner (scripts/lib/runners.py) counts.
 set -euo pipefail
 . "$(dirname "$0")/common.sh"
 
