@@ -54,9 +54,8 @@ inline bool isNanOrInfinity(std::string_view word) {
 
 }  // namespace detail
 
-/// The double nearest to a decimal number such as `-0.5`, `.5`, `5.` or `+5e-3`; also `nan`, `inf` and `infinity`, in
-/// capitals or not. Nothing for all else: a blank, a comma, `1.0-1`, `1.0D-2`, hexadecimal digits, and what is too
-/// large for a double.
+/// The double nearest to a decimal number such as -0.5, .5, 5. or +5e-3; also nan, inf and infinity, in capitals or
+/// not. Nothing for all else: a blank, a comma, 1.0-1, 1.0D-2, hexadecimal digits, and what is too large for a double.
 inline std::optional<double> decimalNumber(std::string_view word) {
   if (!detail::isDecimal(word) && !detail::isNanOrInfinity(word)) return std::nullopt;
   // std::from_chars has no floating numbers in libstdc++ 10.

@@ -87,6 +87,7 @@ class MonitorPipeline {
   EffectTracker& effects() { return effects_; }
   const EffectTracker& effects() const { return effects_; }
   const std::string& fixedFrame() const { return fixed_frame_; }
+  std::uint64_t transformsUnusable() const { return transforms_.unusable(); }
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.

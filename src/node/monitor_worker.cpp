@@ -120,7 +120,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.steps_unpublished = steps_unpublished;
   context.maps_received = maps ? maps->received() : 0;
   context.frames_handed_over = frames_handed_over;
-  context.transforms_unusable = feed.unusable();
+  context.transforms_unusable = pipeline.transformsUnusable();
   context.maps_refused = maps ? maps->refused() : 0;
   context.parameter_hash = config.hash();
   return context;

@@ -105,7 +105,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   put(status, "gaps", context.frames.of(StepStatus::GAP));
   put(status, "steps not wholly published", context.steps_unpublished);
   put(status, "frames handed over in process", context.frames_handed_over);
-  if (context.transforms_unusable > 0) put(status, "unusable transforms", context.transforms_unusable);
+  put(status, "unusable transforms", context.transforms_unusable);
   put(status, "maps received", context.maps_received);
   put(status, "maps refused", context.maps_refused);
   if (map_present_) put(status, "map age [s]", map_age_s_);

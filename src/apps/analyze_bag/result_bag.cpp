@@ -29,6 +29,7 @@ static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplayS
   StatsContext context;
   context.frames = pipeline.monitor().total();
   context.weld_changes = pipeline.weldChanges();
+  context.transforms_unusable = pipeline.transformsUnusable();
   context.maps_received = so_far.maps;
   context.maps_refused = so_far.maps_refused;
   return context;
