@@ -170,7 +170,9 @@ class MonitorPipeline {
   /// Where the frames were of what is held, the map and static bodies, since the clock body's last frame, up to the
   /// stamp of the one that waits. False: it is not known of all.
   bool findHeld(StampNs stamp_ns, SeenPoses& held) const;
-  std::vector<StampNs> stampsSince(StampNs from_ns, StampNs to_ns, const std::string& frame) const;
+  void lookBack(std::size_t body, const std::string& target, const std::string& source);
+  std::vector<SeenPose> posesBetween(const std::string& target, const std::string& source, StampNs from_ns,
+                                     StampNs to_ns) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.
   bool mapMayCome(std::int64_t now_ns) const;
   /// Which transforms could not be used, to go after another reason.

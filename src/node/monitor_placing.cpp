@@ -43,11 +43,7 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::str
       return false;
     }
     transform(frame.pose, frame.positions);
-    for (const StampNs seen_ns : stampsSince(clock_ns_, stamp_ns, carrier)) {
-      SeenPose seen{seen_ns, {}};
-      std::string unused;
-      if (transforms_.lookup(fixed_frame_, carrier, seen_ns, seen.pose, unused)) frame.seen.push_back(seen);
-    }
+    frame.seen = posesBetween(fixed_frame_, carrier, clock_ns_, stamp_ns);
     frames.emplace_back(b, std::move(frame));
   }
   for (auto& frame : frames) {
@@ -131,7 +127,10 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     return true;
   }
   if (isStatic(body)) done.mesh.pose = fixed_from_mesh;
-  if (isStatic(body) && config_.fixed_frame.empty()) static_meshes_[body] = done.mesh;
+  if (isStatic(body) && config_.fixed_frame.empty()) {
+    static_meshes_[body] = done.mesh;
+    lookBack(body, fixed_frame_, done.mesh.frame_id);
+  }
   transform(fixed_from_mesh, done.mesh.positions);
   if (is_clock) {
     clock_ns_ = done.mesh.stamp_ns;
@@ -174,6 +173,7 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
   }
   if (placed) {
     monitor_->setMap(std::move(map));
+    lookBack(OBSTACLE_BODY, frame, fixed_frame_);
     known_ = unplaced_map_->known;
     settled_map_ns_ = unplaced_map_->arrival_ns;
     if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
@@ -195,12 +195,8 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   bool all_known = true;
   const auto find = [&](std::size_t body, const std::string& target, const std::string& source) {
     if (target == source) return;
-    std::vector<SeenPose> seen;
+    std::vector<SeenPose> seen = posesBetween(target, source, clock_ns_, stamp_ns);
     std::string unused;
-    for (const StampNs seen_ns : stampsSince(clock_ns_, stamp_ns, target == fixed_frame_ ? source : target)) {
-      SeenPose one{seen_ns, {}};
-      if (transforms_.lookup(target, source, seen_ns, one.pose, unused)) seen.push_back(one);
-    }
     SeenPose last{stamp_ns, {}};
     const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
     if (!known) last.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -217,10 +213,24 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
   return all_known;
 }
 
-/// Of transforms between the frame and the fixed one, as far back as a step may reach.
-std::vector<StampNs> MonitorPipeline::stampsSince(StampNs from_ns, StampNs to_ns, const std::string& frame) const {
-  if (from_ns == 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s) return {};
-  return transforms_.stampsBetween(fixed_frame_, frame, from_ns, to_ns);
+/// Steps that wait for other bodies will be answered with what is held only now.
+void MonitorPipeline::lookBack(std::size_t body, const std::string& target, const std::string& source) {
+  if (target == source || !monitor_->waiting()) return;
+  const auto longest_ns = static_cast<StampNs>(config_.monitor.store.max_step_s * 1e9);
+  monitor_->seen(body, posesBetween(target, source, clock_ns_ - longest_ns, clock_ns_ + 1));
+}
+
+/// Target_from_source at each stamp of tf between the two, as far back as a step may reach.
+std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, const std::string& source,
+                                                    StampNs from_ns, StampNs to_ns) const {
+  std::vector<SeenPose> seen;
+  if (from_ns <= 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s + 1e-6) return seen;
+  std::string unused;
+  for (const StampNs stamp_ns : transforms_.stampsBetween(target, source, from_ns, to_ns)) {
+    SeenPose one{stamp_ns, {}};
+    if (transforms_.lookup(target, source, stamp_ns, one.pose, unused)) seen.push_back(one);
+  }
+  return seen;
 }
 
 void MonitorPipeline::learnAnew(StepStatus status) {

@@ -116,7 +116,6 @@ StepStatus Monitor::push(std::size_t body, MeshFrame frame, std::int64_t now_ns)
     m.counters.at(body).count(isSeam(status) ? StepStatus::OK : status);
     if (isSeam(status)) {
       m.stores[body] = std::move(store);
-      m.held_seen[body].clear();
       m.forgetLast();
     }
     return status;

@@ -41,6 +41,7 @@ struct Monitor::Impl {
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
   ObstacleMap map;
+  std::string map_frame;                        // of the last map that there was
   std::vector<std::deque<SeenPose>> held_seen;  // per body, and last of the map; for the steps to come, ascending
   History history, side_history;                // of steps; of predictions and checks
   PatchTracker tracker;

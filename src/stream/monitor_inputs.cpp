@@ -259,7 +259,10 @@ bool Monitor::Impl::separates(const Body& body) const {
 }
 
 void Monitor::setMap(ObstacleMap map) {
-  if (map.frame_id != impl_->map.frame_id) impl_->held_seen.back().clear();
+  // Steps that wait may have another map, of the same frame, after none.
+  if (!map.frame_id.empty() && map.frame_id != std::exchange(impl_->map_frame, map.frame_id)) {
+    impl_->held_seen.back().clear();
+  }
   impl_->map = std::move(map);
 }
 

@@ -50,6 +50,11 @@ XmlRpcValue plates() {
   tree["bodies"]["finger"]["rigid"]["mesh"] = file;
   tree["bodies"]["finger"]["rigid"]["frame"] = "finger";
   tree["clock_body"] = "cloth";
+  for (int phase = 0; phase < 2; ++phase) {  // what is expected is no less a contact
+    tree["expected_contacts"][phase]["between"][0] = "cloth";
+    tree["expected_contacts"][phase]["between"][1] = phase == 0 ? "other" : "finger";
+    tree["expected_contacts"][phase]["phase"] = phase == 0 ? "carry" : "lay";
+  }
   return tree;
 }
 
@@ -105,9 +110,9 @@ class World {
     driven_.feed_tf.add(message, false);
     tracks_[frame].say(stamp_ns, z);
   }
-  void giveMap(StampNs stamp_ns) {
+  void giveMap(StampNs stamp_ns, const std::string& frame = "odom") {
     LoadedMap loaded = decodeMapMessage(map(1), driven_.config);
-    loaded.frame_id = "odom";
+    loaded.frame_id = frame;
     loaded.stamp_ns = stamp_ns;
     driven_.pipeline.setMap(std::move(loaded), 0);
     held_odom_ = odom_;
@@ -146,9 +151,13 @@ class World {
       refused.problem = "a test";
       driven_.pipeline.setMap(std::move(refused), 0);
       map_refused_ = true;
+    } else if (chance(40)) {  // it waits for a place that it never gets
+      giveMap(now, "nowhere");
+      map_refused_ = true;
     } else if (chance(10)) {
       giveMap(now);
     }
+    if (chance(10)) driven_.pipeline.setPhase(driven_.config.phases().at(random_() % 2));
     if (chance(25)) cloth_ = level() / 4;
     if (chance(25)) {
       send("cloth", now, 0, true);
@@ -169,7 +178,7 @@ class World {
     if (!assuranceOf(outcome).clear()) return;
     ++clear;
     EXPECT_FALSE(table_refused_) << "the table's newest frame was refused";
-    EXPECT_FALSE(map_refused_) << "the newest map was refused";
+    EXPECT_FALSE(map_refused_) << "the newest map was refused, or has no place";
     std::map<std::string, int> sides;
     for (const char* name : {"other", "finger", "odom", "table"}) {
       const int end = judge(name, outcome.start_ns, outcome.stamp_ns);
