@@ -19,7 +19,7 @@ namespace dccd {
 /// Where something rigid was seen to be, in the fixed frame.
 struct SeenPose {
   StampNs stamp_ns = 0;
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< not finite: was not to be had
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< not finite: nobody knows
 };
 
 /// One frame, already in the fixed frame.

@@ -90,9 +90,9 @@ class DCCD_EXPORT Monitor {
   /// The map from the next step on.
   void setMap(ObstacleMap map);
   const ObstacleMap& map() const;
-  /// Where the frame of what holds at all times was since, ascending, up to the stamps of the steps to come: of a
-  /// static body (fixed_from_frame, as MeshFrame::pose) or of the map (body OBSTACLE_BODY, map_from_fixed). A step in
-  /// which it is not where push() or setMap() had it is PARTIAL.
+  /// Where the frame of what holds at all times was, up to the stamps of the steps to come: of a static body
+  /// (fixed_from_frame, as MeshFrame::pose) or of the map (body OBSTACLE_BODY, map_from_fixed). A step in which it is
+  /// not where push() or setMap() had it is PARTIAL.
   void seen(std::size_t body, const std::vector<SeenPose>& poses);
 
   /// The next outcome, in the order of the clock body's frames. False: none, or the next waits for other bodies.

@@ -176,6 +176,9 @@ constexpr std::size_t FRAMES_ALWAYS_KEPT = 64;
 /// each spot that touches now: else a burst of contacts would cost every later step as much. Larger: steps after a
 /// burst take longer. Smaller: what touches again soon after a burst is told as new.
 constexpr std::size_t TRACE_PER_SPOT = 8, TRACE_ALWAYS = 1 << 16;
+/// [1] Transforms of one body within a step that are looked at; of a step with more nothing is known. Larger: a flood
+/// of them holds the worker up longer. Smaller: broadcasters that are faster than so many a step prove nothing.
+constexpr std::size_t MOST_POSES_A_STEP = 1024;
 /// [ns] tf stamps that go back further begin a recording anew: broadcasters of one tree are late by less.
 constexpr long long TF_JUMP_BACK_NS = 1000000000;
 /// [1] As tf2's own: a rotation whose squared norm is further from 1 is none, and is left out.

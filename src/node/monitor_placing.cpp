@@ -17,6 +17,12 @@ std::string noTransform(const std::string& from, const std::string& to, const st
   return "no transform from '" + from + "' to '" + to + "': " + shortText(why);
 }
 
+SeenPose unknownAt(StampNs stamp_ns) {
+  SeenPose seen{stamp_ns, {}};
+  seen.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
+  return seen;
+}
+
 ObstacleMap noMap(std::string why) {
   ObstacleMap none;
   none.problem = std::move(why);
@@ -199,8 +205,7 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
     std::string unused;
     SeenPose last{stamp_ns, {}};
     const bool known = transforms_.lookup(target, source, stamp_ns, last.pose, unused);
-    if (!known) last.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
-    seen.push_back(last);
+    seen.push_back(known ? last : unknownAt(stamp_ns));
     held.emplace_back(body, std::move(seen));
     all_known = all_known && known;
   };
@@ -215,18 +220,20 @@ bool MonitorPipeline::findHeld(StampNs stamp_ns, SeenPoses& held) const {
 
 /// Steps that wait for other bodies will be answered with what is held only now.
 void MonitorPipeline::lookBack(std::size_t body, const std::string& target, const std::string& source) {
-  if (target == source || !monitor_->waiting()) return;
+  if (target == source || clock_ns_ == 0 || !monitor_->waiting()) return;
   const auto longest_ns = static_cast<StampNs>(config_.monitor.store.max_step_s * 1e9);
   monitor_->seen(body, posesBetween(target, source, clock_ns_ - longest_ns, clock_ns_ + 1));
 }
 
-/// Target_from_source at each stamp of tf between the two, as far back as a step may reach.
+/// Target_from_source at each stamp of tf between the two, as far back as a step may reach (from 0: not at all).
 std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, const std::string& source,
                                                     StampNs from_ns, StampNs to_ns) const {
   std::vector<SeenPose> seen;
-  if (from_ns <= 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s + 1e-6) return seen;
+  if (from_ns == 0 || secondsBetween(from_ns, to_ns) > config_.monitor.store.max_step_s + 1e-6) return seen;
+  const std::vector<StampNs> stamps = transforms_.stampsBetween(target, source, from_ns, to_ns);
+  if (stamps.size() > tolerance::MOST_POSES_A_STEP) return {unknownAt(stamps.back())};
   std::string unused;
-  for (const StampNs stamp_ns : transforms_.stampsBetween(target, source, from_ns, to_ns)) {
+  for (const StampNs stamp_ns : stamps) {
     SeenPose one{stamp_ns, {}};
     if (transforms_.lookup(target, source, stamp_ns, one.pose, unused)) seen.push_back(one);
   }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -41,9 +42,10 @@ struct Monitor::Impl {
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
   ObstacleMap map;
-  std::string map_frame;                        // of the last map that there was
-  std::vector<std::deque<SeenPose>> held_seen;  // per body, and last of the map; for the steps to come, ascending
-  History history, side_history;                // of steps; of predictions and checks
+  std::string map_frame;  // of the last map that there was
+  /// Per body, and last of the map: for the steps to come, by stamp.
+  std::vector<std::map<StampNs, Eigen::Isometry3d>> held_seen;
+  History history, side_history;  // of steps; of predictions and checks
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
   References references;
@@ -84,6 +86,8 @@ struct Monitor::Impl {
   Step place(const Pending& pending);
   void lookBetween(std::size_t body, Step& step) const;
   void lookAtHeld(Step& step) const;
+  /// The earliest stamp at which a step to come may begin; where none is known of, the given one.
+  StampNs oldestStart(StampNs otherwise) const;
   void forgetHeldSeen() { held_seen.assign(bodies.size() + 1, {}); }
   void keepReferences(Step& step, References& kept) const;
   void forgetReferences();

@@ -31,9 +31,8 @@ double offPath(const MeshFrame& frame, const Body& body, double u) {
   return off;
 }
 
-/// The same of poses that were seen, `moved` from where the body is at the step's start: by the corners of what it
-/// occupies there, off which none of its vertices is farther.
-double offPath(const Eigen::Isometry3d& seen, const Eigen::Isometry3d& expected, const Eigen::AlignedBox3d& bounds) {
+/// How far the two poses bring points within the bounds from each other: the most that they do its corners [m].
+double apart(const Eigen::Isometry3d& seen, const Eigen::Isometry3d& expected, const Eigen::AlignedBox3d& bounds) {
   double off = 0;
   if (bounds.isEmpty()) return off;
   for (int corner = 0; corner < 8; ++corner) {
@@ -59,6 +58,11 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
     if (meetsMap(body)) bounds.extend(boundsOf(body));
   }
   return bounds;
+}
+
+std::string unknown(const std::string& name) {
+  return "where " + name + " was is not known for all of this step (no transform, or more than " +
+         std::to_string(tolerance::MOST_POSES_A_STEP) + ")";
 }
 
 void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
@@ -149,10 +153,14 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   }
   const Eigen::AlignedBox3d bounds = seen.empty() ? Eigen::AlignedBox3d() : boundsOf(body);
   const Eigen::Isometry3d from_t0 = body.pose_t0.inverse();
+  bool known = true;
   for (const SeenPose& one : seen) {
+    known = known && one.pose.matrix().allFinite();
+    if (!known) break;
     const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionAt(one.stamp_ns));
-    off_m = std::max(off_m, offPath(one.pose * from_t0, on_path * from_t0, bounds));
+    off_m = std::max(off_m, apart(one.pose * from_t0, on_path * from_t0, bounds));
   }
+  if (!known) addSentence(step.off_path, unknown("body '" + body.name + "'"));
   if (off_m <= options.detector.rigid_tolerance_m) return;
   std::ostringstream text;
   text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in ";
@@ -174,18 +182,19 @@ void Monitor::Impl::lookAtHeld(Step& step) const {
     double off_m = 0;
     bool known = true;
     Eigen::AlignedBox3d bounds;
-    for (const SeenPose& one : held_seen[b]) {
-      // The end of a step alone where it has no length, as that of a question has.
-      if (one.stamp_ns > step.stamp_ns || (one.stamp_ns <= step.start_ns && one.stamp_ns != step.stamp_ns)) continue;
-      known = known && one.pose.matrix().allFinite();
-      if (!known || one.pose.matrix() == held.matrix()) continue;
+    // The end of a step alone where it has no length, as that of a question has.
+    const StampNs first_ns = std::min(step.start_ns + 1, step.stamp_ns);
+    const auto end = held_seen[b].upper_bound(step.stamp_ns);
+    for (auto one = held_seen[b].lower_bound(first_ns); one != end; ++one) {
+      known = known && one->second.matrix().allFinite();
+      if (!known || one->second.matrix() == held.matrix()) continue;
       if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
-      off_m = std::max(off_m, is_map ? offPath(one.pose, held, bounds)
-                                     : offPath(one.pose * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
+      off_m = std::max(off_m, is_map ? apart(one->second, held, bounds)
+                                     : apart(one->second * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
     }
     const std::string name = is_map ? "the octomap's frame '" + step.map.frame_id + "'"
                                     : "the frame of the static body '" + bodies[b].name + "'";
-    if (!known) addSentence(step.off_path, "there is no transform that tells where " + name + " was in this step");
+    if (!known) addSentence(step.off_path, unknown(name));
     if (off_m <= options.detector.rigid_tolerance_m) continue;
     std::ostringstream text;
     text << name << " was seen up to " << off_m << " m from where it was at its stamp; set fixed_frame to "
@@ -214,9 +223,6 @@ Step Monitor::Impl::place(const Pending& pending) {
       lookBetween(b, step);
     }
     stores[b].forgetBefore(step.stamp_ns);
-  }
-  for (std::deque<SeenPose>& seen : held_seen) {
-    while (!seen.empty() && seen.front().stamp_ns <= step.start_ns) seen.pop_front();
   }
   lookAtHeld(step);
   keepReferences(step, references);
@@ -268,7 +274,18 @@ void Monitor::setMap(ObstacleMap map) {
 
 void Monitor::seen(std::size_t body, const std::vector<SeenPose>& poses) {
   auto& all = impl_->held_seen.at(body == OBSTACLE_BODY ? impl_->bodies.size() : body);
-  all.insert(all.end(), poses.begin(), poses.end());
+  for (const SeenPose& one : poses) all.insert_or_assign(one.stamp_ns, one.pose);
+  // Also where no step is ever made.
+  if (!all.empty()) all.erase(all.begin(), all.lower_bound(impl_->oldestStart(all.rbegin()->first)));
+}
+
+StampNs Monitor::Impl::oldestStart(StampNs otherwise) const {
+  const MeshStore& clock = stores[options.clock_body];
+  StampNs oldest = clock.empty() ? otherwise : clock.newest().stamp_ns;
+  for (const Pending& step : pending) {
+    if (step.from) oldest = std::min(oldest, step.from->stamp_ns);
+  }
+  return oldest;
 }
 
 ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {

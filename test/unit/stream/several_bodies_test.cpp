@@ -1,6 +1,7 @@
 // Several bodies in one stream: one is the clock, the others are interpolated, waited for, or static.
 #include <gtest/gtest.h>
 
+#include "stream/monitor_impl.h"
 #include "unit/stream/monitor_support.h"
 
 namespace dccd {
@@ -77,6 +78,25 @@ TEST_F(TwoBodies, AJumpOfAnotherBodyBetweenTwoStepsIsASeam) {
     EXPECT_EQ(outcomes[1].status, StepStatus::OK) << "said once";
     EXPECT_TRUE(assuranceOf(outcomes[3]).clear());
     expectAddsUp(two);
+  }
+}
+
+// What is said of the map's frame with each frame is kept for steps that may come; where the other body never comes, or
+// each frame is a seam, none does.
+TEST_F(TwoBodies, PosesOfWhatIsHeldAreNotKeptForStepsThatNeverCome) {
+  MonitorOptions teleports = loose();
+  teleports.store.max_vertex_step_m = 0.1;
+  for (const MonitorOptions& options : {loose(), teleports}) {
+    Monitor two(options, {named("floor"), named("tip")});
+    for (int k = 0; k < 3000; ++k) {
+      std::vector<SeenPose> seen;
+      for (int i = 1; i <= 10; ++i) seen.push_back({(100 * k + 10 * i) * MS, Eigen::Isometry3d::Identity()});
+      two.seen(OBSTACLE_BODY, seen);
+      two.push(0, floor((100 * k + 100) * MS, k % 2), NOW);
+      Outcome outcome;
+      while (two.next(LATER, outcome)) EXPECT_FALSE(outcome.answered);
+      ASSERT_LT(two.impl().held_seen.back().size(), 100u) << "after " << k << " frames";
+    }
   }
 }
 
