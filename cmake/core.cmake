@@ -2,8 +2,8 @@
 # users the public headers' functions and hides the rest; tests, benchmarks and run_queries, which look at the rest, take
 # the same objects as an archive that nobody installs.
 file(GLOB CORE_SOURCES CONFIGURE_DEPENDS
-  src/mesh/*.cpp src/projection/*.cpp src/culling/*.cpp src/simd/*.cpp src/elementary/*.cpp src/obstacle/*.cpp
-  src/step/*.cpp src/stream/*.cpp src/record/*.cpp)
+  src/culling/*.cpp src/simd/*.cpp src/elementary/*.cpp src/obstacle/*.cpp src/step/*.cpp src/step/*/*.cpp
+  src/stream/*.cpp src/record/*.cpp)
 file(STRINGS include/dccd/export.h API_VERSION_LINE REGEX "define DCCD_API_VERSION [0-9]+")
 string(REGEX MATCH "[0-9]+" API_VERSION "${API_VERSION_LINE}")
 

@@ -44,8 +44,8 @@ add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
   src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp
   src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
   src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp
-  src/parameters/parameter_reader.cpp src/parameters/parameter_yaml.cpp src/scene/physics/expectations.cpp
-  src/scene/physics/scene_file.cpp)
+  src/config/parameter_reader.cpp src/config/parameter_yaml.cpp src/apps/make_scene_bag/physics/expectations.cpp
+  src/apps/make_scene_bag/physics/scene_file.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})
 target_link_libraries(deformable_ccd_decoders PUBLIC

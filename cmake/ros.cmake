@@ -12,8 +12,7 @@ endif()
 
 # --- the node: what comes in, its options, what goes out, and the class that holds them ---------------------------------
 file(GLOB ROS_SOURCES CONFIGURE_DEPENDS
-  src/ros/*.cpp src/parameters/*.cpp src/input/*.cpp src/input/message_types/*.cpp src/config/*.cpp
-  src/output/*.cpp src/node/*.cpp)
+  src/input/*.cpp src/input/message_types/*.cpp src/config/*.cpp src/output/*.cpp src/node/*.cpp)
 list(APPEND ROS_LINK_LIBRARIES deformable_ccd ${catkin_LIBRARIES} yaml-cpp)
 if(ROS_SOURCES)
   add_library(deformable_ccd_ros SHARED ${ROS_SOURCES})

@@ -1,7 +1,7 @@
-# The physics that records scenes (src/scene/physics: Bullet soft bodies in double precision, never part of the node).
+# The physics that records scenes (src/apps/make_scene_bag/physics: Bullet soft bodies in double precision, never part of the node).
 # The one strict reader of configuration: of scene files here, of the node's parameters in ros.cmake.
-file(GLOB PARAMETERS_SOURCES CONFIGURE_DEPENDS src/parameters/*.cpp)
-file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/scene/physics/*.cpp)
+file(GLOB PARAMETERS_SOURCES CONFIGURE_DEPENDS src/config/parameter_*.cpp)
+file(GLOB PHYSICS_SOURCES CONFIGURE_DEPENDS src/apps/make_scene_bag/physics/*.cpp)
 if((NOT DEFORMABLE_CCD_CORE_ONLY OR DEFORMABLE_CCD_BENCHMARKS) AND PHYSICS_SOURCES)
   # Two builds of Bullet can be installed side by side; single precision would make the recorded cloth jitter.
   #catkin_lint: ignore_once duplicate_find

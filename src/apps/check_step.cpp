@@ -12,7 +12,7 @@
 #include "apps/decimal_options.h"
 #include "dccd/detect.h"
 #include "dccd/simd_target.h"
-#include "input/mesh_file.h"
+#include "input/mesh_formats.h"
 #include "report/accuracy_settings.h"
 #include "report/progress_bar.h"
 

@@ -8,8 +8,8 @@
 
 #include "apps/decimal_options.h"
 #include "apps/make_scene_bag/monitor_check.h"
+#include "apps/make_scene_bag/physics/scene_file.h"
 #include "apps/make_scene_bag/recorder.h"
-#include "scene/physics/scene_file.h"
 
 int main(int argc, char** argv) {
   CLI::App app(

@@ -21,7 +21,7 @@
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
 #include "oracle/query_file.h"
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 namespace dccd {
 namespace {

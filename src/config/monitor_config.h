@@ -8,10 +8,10 @@
 
 #include <xmlrpcpp/XmlRpcValue.h>
 
+#include "config/parameter_reader.h"
 #include "dccd/effect_plan.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
-#include "parameters/parameter_reader.h"
 
 namespace dccd {
 

@@ -10,8 +10,8 @@
 #include <hwy/aligned_allocator.h>
 
 #include "culling/cluster_tree.h"
+#include "culling/seams.h"
 #include "dccd/outcome.h"
-#include "mesh/seams.h"
 
 namespace dccd {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "ros/short_text.h"
-#include "ros/transforms.h"
+#include "input/short_text.h"
+#include "input/transforms.h"
 
 namespace dccd {
 

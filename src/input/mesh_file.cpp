@@ -7,8 +7,6 @@
 #include <map>
 
 #include "dccd/regular_file.h"
-#include "input/obj_file.h"
-#include "input/ply_file.h"
 
 namespace dccd {
 namespace {
@@ -79,14 +77,6 @@ MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, c
   }
   setPolygons(std::move(polygons), mesh);
   return mesh;
-}
-
-MeshFile loadMeshFile(const std::string& path) {
-  const std::string type = fileEnding(path);
-  if (type == "obj") return loadObjFile(path);
-  if (type == "ply") return loadPlyFile(path);
-  requireReadable(path);
-  throw MeshFileError(path + ": unknown mesh format '" + type + "'; .ply and .obj can be read");
 }
 
 }  // namespace dccd

@@ -31,10 +31,6 @@ struct MeshFile {
   std::vector<std::string> remarks;    ///< sentences about what was skipped, for the user to see
 };
 
-/// PLY or OBJ: vertices keep their numbers, their order and every bit of their coordinates, as frames and topologies
-/// need it. Throws MeshFileError naming the file and what is wrong with it.
-MeshFile loadMeshFile(const std::string& path);
-
 /// The small letters behind a path's last dot; empty where there is none.
 std::string fileEnding(const std::string& path);
 /// Throws MeshFileError unless the path is a regular file of at most 512 MiB that can be read: a pipe or a device would

@@ -5,9 +5,8 @@
 
 #include <ros/package.h>
 
-#include "input/dae_file.h"
 #include "input/mesh_file.h"
-#include "input/stl_file.h"
+#include "input/mesh_formats.h"
 
 namespace dccd {
 
@@ -24,18 +23,10 @@ std::string pathOf(const std::string& address) {
   return slash == std::string::npos ? root : root + address.substr(slash);
 }
 
-MeshFile load(const std::string& path) {
-  const std::string ending = fileEnding(path);
-  if (ending == "stl") return loadStlFile(path);
-  if (ending == "dae") return loadDaeFile(path);
-  if (ending == "ply" || ending == "obj") return loadMeshFile(path);
-  throw MeshFileError(path + ": unknown mesh format '" + ending + "'; STL, OBJ, PLY and DAE can be read");
-}
-
 MeshResource resourceOf(const std::string& path, double scale) {
   MeshResource resource;
   try {
-    MeshFile mesh = load(path);
+    MeshFile mesh = loadMeshFile(path);
     for (Vec3& p : mesh.positions) {
       p *= scale;
       if (!p.allFinite()) throw MeshFileError(path + ": a coordinate is not finite");

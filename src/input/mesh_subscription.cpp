@@ -10,9 +10,9 @@
 #include <ros/subscribe_options.h>
 #include <ros/this_node.h>
 
-#include "ros/master_question.h"
-#include "ros/message_bytes.h"
-#include "ros/steady_clock.h"
+#include "input/master_question.h"
+#include "input/message_bytes.h"
+#include "input/steady_clock.h"
 
 namespace dccd {
 

@@ -13,11 +13,11 @@
 
 #include "dccd/regular_file.h"
 #include "input/known_types.h"
+#include "input/message_bytes.h"
+#include "input/short_text.h"
+#include "input/transforms.h"
 #include "octomap/coarser.h"
 #include "report/progress_bar.h"
-#include "ros/message_bytes.h"
-#include "ros/short_text.h"
-#include "ros/transforms.h"
 
 namespace dccd {
 namespace {

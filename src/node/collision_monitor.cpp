@@ -8,7 +8,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "dccd/simd_target.h"
-#include "ros/message_bytes.h"
+#include "input/message_bytes.h"
 
 namespace dccd {
 namespace {

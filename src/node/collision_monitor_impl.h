@@ -16,6 +16,8 @@
 #include <topic_tools/shape_shifter.h>
 
 #include "input/mesh_subscription.h"
+#include "input/steady_clock.h"
+#include "input/transforms.h"
 #include "node/collision_monitor.h"
 #include "node/input_queue.h"
 #include "node/map_loader.h"
@@ -26,8 +28,6 @@
 #include "node/state_reporter.h"
 #include "node/step_recorder.h"
 #include "output/diagnostics.h"
-#include "ros/steady_clock.h"
-#include "ros/transforms.h"
 
 namespace dccd {
 

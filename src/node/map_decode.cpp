@@ -9,10 +9,10 @@
 #include "dccd/tolerances.h"
 #include "input/known_types.h"
 #include "input/mesh_views.h"
+#include "input/short_text.h"
+#include "input/transforms.h"
 #include "input/wire.h"
 #include "node/map_loader.h"
-#include "ros/short_text.h"
-#include "ros/transforms.h"
 
 namespace dccd {
 

@@ -4,7 +4,7 @@
 #include <new>
 #include <utility>
 
-#include "ros/master_question.h"
+#include "input/master_question.h"
 
 namespace dccd {
 namespace {

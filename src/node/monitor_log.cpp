@@ -4,9 +4,9 @@
 
 #include <ros/console.h>
 
+#include "input/short_text.h"
+#include "input/steady_clock.h"
 #include "output/advice.h"
-#include "ros/short_text.h"
-#include "ros/steady_clock.h"
 
 namespace dccd {
 

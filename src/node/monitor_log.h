@@ -9,10 +9,10 @@
 
 #include "config/monitor_config.h"
 #include "dccd/stream.h"
+#include "input/log_throttle.h"
 #include "input/silence.h"
 #include "node/monitor_pipeline.h"
 #include "node/named_inputs.h"
-#include "ros/log_throttle.h"
 
 namespace dccd {
 

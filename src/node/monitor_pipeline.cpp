@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "input/mesh_resource.h"
+#include "input/short_text.h"
+#include "input/transforms.h"
 #include "output/advice.h"
-#include "ros/short_text.h"
-#include "ros/transforms.h"
 
 namespace dccd {
 

@@ -14,8 +14,8 @@
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
+#include "input/transforms.h"
 #include "node/effects.h"
-#include "ros/transforms.h"
 
 namespace dccd {
 

@@ -5,9 +5,9 @@
 #include <sstream>
 #include <utility>
 
+#include "input/short_text.h"
+#include "input/transforms.h"
 #include "node/monitor_pipeline.h"
-#include "ros/short_text.h"
-#include "ros/transforms.h"
 
 namespace dccd {
 

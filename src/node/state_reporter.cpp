@@ -8,8 +8,8 @@
 #include <ros/time.h>
 #include <std_msgs/Bool.h>
 
+#include "input/steady_clock.h"
 #include "output/output_messages.h"
-#include "ros/steady_clock.h"
 
 namespace dccd {
 namespace {

@@ -4,8 +4,8 @@
 #include <map>
 #include <sstream>
 
+#include "culling/toc_bound.h"
 #include "dccd/accuracy.h"
-#include "projection/toc_bound.h"
 #include "record/explain_parts.h"
 #include "step/history.h"
 #include "step/parts.h"

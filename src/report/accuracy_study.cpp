@@ -1,5 +1,5 @@
 #include "report/accuracy_study.h"
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 #include <algorithm>
 #include <fstream>

@@ -1,5 +1,5 @@
 #include "report/contact_log.h"
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 #include <algorithm>
 #include <tuple>

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "report/contact_vertices.h"
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 namespace dccd {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "dccd/assurance.h"
 #include "report/report.h"
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 namespace dccd {
 namespace {

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "mesh/seams.h"
+#include "culling/seams.h"
 
 namespace dccd {
 

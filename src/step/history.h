@@ -20,12 +20,12 @@
 #include "simd/float_mode.h"
 #include "step/expected_contacts.h"
 #include "step/fork_join.h"
-#include "step/hit_order.h"
-#include "step/inside.h"
-#include "step/left_out.h"
-#include "step/pair_worker.h"
-#include "step/patches.h"
-#include "step/start_state.h"
+#include "step/pairs/hit_order.h"
+#include "step/pairs/left_out.h"
+#include "step/pairs/pair_worker.h"
+#include "step/patches/patches.h"
+#include "step/start/inside.h"
+#include "step/start/start_state.h"
 
 namespace dccd {
 

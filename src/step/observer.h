@@ -8,7 +8,7 @@
 #include "dccd/elementary.h"
 #include "dccd/outcome.h"
 #include "obstacle/leaf_observer.h"
-#include "step/pair_separation.h"
+#include "step/pairs/pair_separation.h"
 
 namespace dccd {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 namespace dccd {
 

@@ -9,7 +9,7 @@
 
 #include "dccd/expectation.h"
 #include "dccd/outcome.h"
-#include "step/patches.h"
+#include "step/patches/patches.h"
 
 namespace dccd {
 

@@ -9,31 +9,25 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 # Folder of src/ -> the folders of src/ that it may include. The public headers (dccd/...) are open to all but simd,
 # which takes the tolerances alone. A folder may always include itself.
 CORE = {
-    'statistics': set(),
     'simd': set(),
-    'mesh': set(),
-    'projection': {'simd'},
-    'culling': {'mesh', 'projection', 'simd'},
+    'culling': {'simd'},
     'elementary': {'simd'},
     'obstacle': {'simd'},
-    'step': {'mesh', 'projection', 'culling', 'elementary', 'obstacle', 'simd'},
-    'stream': {'step', 'obstacle', 'statistics'},
-    'record': {'stream', 'step', 'culling', 'projection', 'obstacle', 'simd'},
+    'step': {'culling', 'elementary', 'obstacle', 'simd'},
+    'stream': {'step', 'obstacle'},
+    'record': {'stream', 'step', 'culling', 'obstacle', 'simd'},
 }
 MAY_INCLUDE = {
     **CORE,
-    'report': {'statistics'},
+    'report': {'stream'},
     'octomap': {'obstacle'},
-    'parameters': set(),
-    'scene': {'parameters'},
-    'ros': set(),
-    'input': {'ros', 'obstacle'},
-    'config': {'ros', 'input', 'parameters'},
-    'output': {'ros', 'input', 'config', 'report'},
-    'node': {'ros', 'input', 'config', 'output', 'octomap', 'record', 'report', 'parameters'},
+    'input': {'obstacle'},
+    'config': {'input'},
+    'output': {'input', 'config', 'report'},
+    'node': {'input', 'config', 'output', 'octomap', 'record', 'report'},
     'apps': None,  # everything
 }
-ROS_ROOMS = ('ros', 'input', 'config', 'output', 'node', 'apps')
+ROS_ROOMS = ('input', 'config', 'output', 'node', 'apps')
 # What tests and benchmarks hold the libraries against.
 OUTSIDE = ('paper/', 'oracle/', 'support/', 'test/', 'unit/')
 ROS_OR_PCL = re.compile(r'^(ros/|ros\.h|tf2|pcl|rosbag|roslib|nodelet|pluginlib|topic_tools|dynamic_reconfigure|'
@@ -42,7 +36,7 @@ OCTOMAP = re.compile(r'^octomap/(?!.*\.hh)')
 INTRINSICS = re.compile(r'\b_mm(?:256|512)?_[a-z]|\b__m(?:128|256|512)|immintrin\.h|arm_neon\.h|hwy/highway\.h|'
                         r'hwy/foreach_target\.h|HWY_NAMESPACE')
 # The rooms that compute with rounding, and what a tolerance looks like there: a small power, or a factor of nearly 1.
-ROUNDED = ('projection', 'culling', 'simd', 'elementary', 'obstacle', 'step')
+ROUNDED = ('culling', 'simd', 'elementary', 'obstacle', 'step')
 SMALL_NUMBER = re.compile(r"\b0x1p-(?!64\b)\d+|\b\d+e-\d+\b|\b(?:1\.0\d+|0\.99\d*)\b|epsilon\(\)")
 # A fraction with a name of its own. What is called WORTH_... says which work is worth its time, and decides no answer.
 FRACTION = re.compile(r'\bconstexpr (?:double|float) (?!WORTH_)(?:\w+ = [^,;]*, )*?\w+ = \d*\.0*[1-9]\d*f?\b')
@@ -156,8 +150,8 @@ class LayeringTest(unittest.TestCase):
                  if bracket == '<' and OCTOMAP.match(target)]
         self.assertEqual(wrong, [])
 
-    def test_bullet_only_under_scene_physics(self):
-        files = [p for p in code_under('src') if p.relative_to(CHECKOUT).parts[1:3] != ('scene', 'physics')]
+    def test_bullet_only_under_physics(self):
+        files = [p for p in code_under('src') if p.parent.name != 'physics']
         wrong = [name(p) for p in files if any(re.match(r'(bt[A-Z]|Bullet)', t) for _, t in includes(p))]
         self.assertEqual(wrong, [])
 

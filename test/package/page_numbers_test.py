@@ -63,8 +63,8 @@ NUMBERS = {
         (r'for `hold_s` \(([\d.]+)\)', lambda: constant('examples/stop_the_arm.py', 'hold_s', r'\b%s=([\d.]+)')),
     ],
     'doc/guarantees.md': [
-        (r'([\d,]+) names of frames', lambda: constant('src/ros/transforms.h', 'MAX_FRAMES')),
-        (r'([\d,]+) transforms in 10 s', lambda: constant('src/ros/transforms.h', 'MAX_KEPT')),
+        (r'([\d,]+) names of frames', lambda: constant('src/input/transforms.h', 'MAX_FRAMES')),
+        (r'([\d,]+) transforms in 10 s', lambda: constant('src/input/transforms.h', 'MAX_KEPT')),
         (r'own queue of (\d+) messages', lambda: constant('src/input/mesh_subscription.cpp', 'SUBSCRIBER_QUEUE')),
         (r'child process with (\d+) GiB', lambda: constant('src/input/dae_file.cpp', 'CHILD_BYTES') / 2**30),
         (r'GiB and (\d+) s of processor', lambda: constant('src/input/dae_file.cpp', 'CHILD_CPU_S')),

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "oracle/exact_inside.h"
-#include "step/inside.h"
+#include "step/start/inside.h"
 #include "support/closed_meshes.h"
 #include "support/query_property.h"
 #include "support/step_judge.h"

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "oracle/exact_distance.h"
-#include "step/start_state.h"
+#include "step/start/start_state.h"
 
 namespace dccd {
 namespace test {

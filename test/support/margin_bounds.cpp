@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
+#include "culling/toc_bound.h"
 #include "culling/unfolded.h"
 #include "obstacle/static_filters.h"
 #include "oracle/exact_distance.h"
 #include "oracle/oracle.h"
-#include "projection/toc_bound.h"
 #include "support/margin_numbers.h"
 #include "support/margin_pairs.h"
 

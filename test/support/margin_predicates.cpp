@@ -9,7 +9,7 @@
 #include "obstacle/static_filters.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "oracle/oracle.h"
-#include "step/start_state.h"
+#include "step/start/start_state.h"
 #include "support/margin_numbers.h"
 #include "support/margin_pairs.h"
 

@@ -10,9 +10,9 @@
 #include <set>
 #include <tuple>
 
+#include "culling/toc_bound.h"
 #include "oracle/algebraic.h"
 #include "oracle/query_file.h"
-#include "projection/toc_bound.h"
 #include "simd/fused_filter.h"
 #include "simd/group_pairs.h"
 #include "support/data.h"

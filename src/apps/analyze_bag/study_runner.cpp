@@ -18,7 +18,7 @@
 #include "dccd/accuracy.h"
 #include "dccd/regular_file.h"
 #include "report/accuracy_settings.h"
-#include "statistics/quantile.h"
+#include "stream/quantile.h"
 
 namespace dccd {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "apps/make_scene_bag/physics/shapes.h"
 #include "octomap/map_builder.h"
-#include "scene/physics/shapes.h"
 
 namespace dccd {
 namespace {

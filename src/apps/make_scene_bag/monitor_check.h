@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "scene/physics/scene_spec.h"
+#include "apps/make_scene_bag/physics/scene_spec.h"
 
 namespace dccd {
 

@@ -10,9 +10,9 @@
 #include <boost/make_shared.hpp>
 
 #include "apps/make_scene_bag/messages.h"
+#include "apps/make_scene_bag/physics/shapes.h"
+#include "apps/make_scene_bag/physics/simulation.h"
 #include "report/progress_bar.h"
-#include "scene/physics/shapes.h"
-#include "scene/physics/simulation.h"
 
 namespace dccd {
 namespace {

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "fuzz/fuzz_target.h"
-#include "input/mesh_file.h"
+#include "input/obj_file.h"
+#include "input/ply_file.h"
 #include "input/stl_file.h"
 
 namespace {
@@ -39,11 +40,12 @@ class NamedBytes {
 
 void mesh_file(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return;
-  static const char* const ENDINGS[] = {".stl", ".ply", ".obj"};
-  const int format = data[0] % 3;
-  const NamedBytes file(data + 1, size - 1, ENDINGS[format]);
+  static const std::pair<const char*, MeshFile (*)(const std::string&)> FORMATS[] = {
+      {".stl", loadStlFile}, {".ply", loadPlyFile}, {".obj", loadObjFile}};
+  const auto& [ending, load] = FORMATS[data[0] % 3];
+  const NamedBytes file(data + 1, size - 1, ending);
   try {
-    const MeshFile mesh = format == 0 ? loadStlFile(file.path()) : loadMeshFile(file.path());
+    const MeshFile mesh = load(file.path());
     if (mesh.positions.empty()) throw std::logic_error("a mesh without vertices");
     for (const Face& face : mesh.faces) {
       for (const Index v : face) {

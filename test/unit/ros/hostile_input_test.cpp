@@ -19,7 +19,7 @@
 
 #include "dccd/octomap_decode.h"
 #include "input/mesh_decoder.h"
-#include "input/mesh_file.h"
+#include "input/mesh_formats.h"
 #include "input/stl_file.h"
 #include "node/map_loader.h"
 #include "record/step_recording.h"

@@ -23,8 +23,7 @@
 #include <pcl/io/ply/ply_parser.h>
 #include <assimp/Importer.hpp>
 
-#include "input/mesh_file.h"
-#include "input/stl_file.h"
+#include "input/mesh_formats.h"
 #include "support/folder_test.h"
 
 namespace dccd {
@@ -400,7 +399,7 @@ class MeshFileDifferential : public test::FolderTest {
       std::ofstream(path, std::ios::binary) << w.bytes;
       const Triangles truth = trianglesOf(w.mesh.positions, w.mesh.faces);
       MeshFile ours;
-      ASSERT_NO_THROW(ours = ending == "stl" ? loadStlFile(path) : loadMeshFile(path)) << w.bytes;
+      ASSERT_NO_THROW(ours = loadMeshFile(path)) << w.bytes;
       ASSERT_EQ(trianglesOf(ours.positions, ours.faces), truth) << w.bytes;
       count(byAssimp(w.bytes, ending), truth, w, assimp_mistakes, assimp);
       if (ending == "ply") count(byPcl(path), truth, w, pcl_mistakes, pcl);

@@ -10,8 +10,7 @@
 #include <regex>
 #include <set>
 
-#include "input/mesh_file.h"
-#include "input/stl_file.h"
+#include "input/mesh_formats.h"
 #include "support/folder_test.h"
 
 namespace dccd {
@@ -24,7 +23,7 @@ class Grammar : public test::FolderTest {
   MeshFile read(const std::string& name, const std::string& bytes) {
     const std::string path = (folder_ / name).string();
     std::ofstream(path, std::ios::binary) << bytes;
-    return fileEnding(path) == "stl" ? loadStlFile(path) : loadMeshFile(path);
+    return loadMeshFile(path);
   }
   /// Behind the folder: "a.obj:3: ..."; empty where it is read.
   std::string error(const std::string& name, const std::string& bytes) {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "input/mesh_file.h"
+#include "input/mesh_formats.h"
 
 namespace dccd {
 namespace {

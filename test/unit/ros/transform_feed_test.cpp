@@ -1,5 +1,5 @@
 // Transforms that cannot be used: left out, counted, and said once a child frame, with values and remedy.
-#include "ros/transforms.h"
+#include "input/transforms.h"
 
 #include <gtest/gtest.h>
 

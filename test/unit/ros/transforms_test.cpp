@@ -1,5 +1,5 @@
 // Where tf says that things are: at exactly the stamp asked for, whatever else has come by then.
-#include "ros/transforms.h"
+#include "input/transforms.h"
 
 #include <gtest/gtest.h>
 

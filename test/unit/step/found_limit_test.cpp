@@ -1,6 +1,6 @@
 // What a step may find: input that coincides makes pairs by the square, and is cut at a count, which is the same for
 // any number of threads and SIMD target.
-#include "step/found_limit.h"
+#include "step/pairs/found_limit.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -1,4 +1,4 @@
-#include "step/hit_order.h"
+#include "step/pairs/hit_order.h"
 
 #include <gtest/gtest.h>
 

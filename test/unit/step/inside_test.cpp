@@ -1,5 +1,5 @@
 // What is inside of a closed body at the start of a step, though no edge meets a face.
-#include "step/inside.h"
+#include "step/start/inside.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "step/start_state.h"
+#include "step/start/start_state.h"
 
 #include <gtest/gtest.h>
 

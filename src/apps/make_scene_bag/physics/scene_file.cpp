@@ -1,0 +1,256 @@
+#include "apps/make_scene_bag/physics/scene_file.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "apps/make_scene_bag/physics/expectations.h"
+
+namespace dccd::scene {
+namespace {
+
+constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
+
+Shape readSheet(ParameterReader map) {
+  Shape shape;
+  shape.kind = Shape::Kind::SHEET;
+  shape.rows = map.integer("rows", 2, 1000);
+  shape.cols = map.integer("cols", 2, 1000);
+  shape.size_m = map.numbers("size_m", 2, 1e-3, 1e3);
+  shape.center_m = map.vector("center_m");
+  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+  map.finish();
+  return shape;
+}
+
+Shape readTube(ParameterReader map) {
+  Shape shape;
+  shape.kind = Shape::Kind::TUBE;
+  shape.rows = map.integer("rows", 2, 1000);
+  shape.cols = map.integer("cols", 3, 1000);
+  shape.size_m = Vec3(map.number("radius_m", 1e-3, 1e3), map.number("length_m", 1e-3, 1e3), 0.0);
+  shape.center_m = map.vector("center_m");
+  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+  map.finish();
+  return shape;
+}
+
+Shape readRope(ParameterReader map) {
+  Shape shape;
+  shape.kind = Shape::Kind::ROPE;
+  shape.cols = map.integer("points", 2, 10000);
+  shape.size_m = Vec3(map.number("length_m", 1e-3, 1e3), 0.0, 0.0);
+  shape.center_m = map.vector("center_m");
+  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+  map.finish();
+  return shape;
+}
+
+Motion readMotion(ParameterReader& parent) {
+  Motion motion;
+  for (ParameterReader& map : parent.sections("motion")) {
+    MotionKey key;
+    key.time_s = map.number("time_s", 0.0, LARGE);
+    key.offset_m = map.vector("offset_m", Vec3::Zero());
+    key.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
+    if (!motion.empty() && key.time_s <= motion.back().time_s)
+      map.fail("time_s", "must be later than that of the key before");
+    map.finish();
+    motion.push_back(key);
+  }
+  return motion;
+}
+
+Gripper readGripper(ParameterReader map, const Shape& shape) {
+  Gripper gripper;
+  const bool by_row = map.has("row"), by_col = map.has("col"), by_vertex = map.has("vertices");
+  if (by_row + by_col + by_vertex != 1) map.fail("", "needs just one of row, col, vertices: what the gripper holds");
+  if (by_row) {
+    const int row = map.integer("row", 0, shape.rows - 1);
+    gripper.vertices.resize(static_cast<std::size_t>(shape.cols));
+    std::iota(gripper.vertices.begin(), gripper.vertices.end(), row * shape.cols);
+  } else if (by_col) {
+    const int col = map.integer("col", 0, shape.cols - 1);
+    for (int row = 0; row < shape.rows; ++row) gripper.vertices.push_back(row * shape.cols + col);
+  } else {
+    gripper.vertices = map.integers("vertices", 0, shape.rows * shape.cols - 1);
+  }
+  gripper.motion = readMotion(map);
+  if (map.has("release_s")) gripper.release_s = map.number("release_s", 0.0, LARGE);
+  map.finish();
+  return gripper;
+}
+
+Body readBody(ParameterReader map, const std::string& fixed_frame) {
+  Body body;
+  body.name = map.text("name");
+  body.topic = map.text("topic", "/" + body.name);
+  body.frame = map.text("frame", fixed_frame);
+  const std::vector<std::string> outputs{"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"};
+  const std::string output = map.choice("output", outputs.front(), outputs);
+  body.output = static_cast<MeshOutput>(std::find(outputs.begin(), outputs.end(), output) - outputs.begin());
+  const bool sheet = map.has("sheet"), tube = map.has("tube"), rope = map.has("rope");
+  if (sheet + tube + rope != 1) map.fail("", "needs just one of sheet, tube, rope: the body's shape");
+  body.shape = sheet  ? readSheet(map.neededSection("sheet"))
+               : tube ? readTube(map.neededSection("tube"))
+                      : readRope(map.neededSection("rope"));
+  if (rope && body.output != MeshOutput::POINT_CLOUD_GRID)
+    map.fail("output", "must be point_cloud_grid: a rope has no faces");
+  body.mass_kg = map.number("mass_kg", 1e-6, LARGE);
+  body.thickness_m = map.number("thickness_m", body.thickness_m, 1e-5, 1.0);
+  body.stretch_stiffness = map.number("stretch_stiffness", body.stretch_stiffness, 0.0, 1.0);
+  body.damping = map.number("damping", 0.0, 0.0, 1.0);
+  body.start_noise_m = map.number("start_noise_m", 0.0, 0.0, 1.0);
+  body.tracker_noise_m = map.number("tracker_noise_m", 0.0, 0.0, 1.0);
+  if (map.has("bending")) {
+    ParameterReader bending = map.section("bending");
+    body.bending = Bending{bending.number("stiffness", 0.0, 1.0)};
+    bending.finish();
+  }
+  if (map.has("self_collision")) {
+    if (rope) map.fail("self_collision", "needs faces, and a rope has none; leave it out");
+    ParameterReader self_collision = map.section("self_collision");
+    body.self_collision = SelfCollision{self_collision.integer("clusters", SelfCollision{}.clusters, 2, 10000)};
+    self_collision.finish();
+  }
+  if (map.has("friction")) body.friction = map.number("friction", 0.0, 1.0);
+  for (ParameterReader& gripper : map.sections("grippers")) body.grippers.push_back(readGripper(gripper, body.shape));
+  map.finish();
+  return body;
+}
+
+Solid readSolid(ParameterReader map) {
+  Solid solid;
+  const bool box = map.has("box"), ring = map.has("ring");
+  if (box + ring != 1) map.fail("", "needs just one of box, ring");
+  if (box) {
+    ParameterReader inner = map.neededSection("box");
+    solid.box.min = inner.vector("min_m");
+    solid.box.max = inner.vector("max_m");
+    if (!(solid.box.min.array() < solid.box.max.array()).all())
+      inner.fail("max_m", "must be above min_m on every axis");
+    inner.finish();
+  } else {
+    solid.kind = Solid::Kind::RING;
+    ParameterReader inner = map.neededSection("ring");
+    solid.center_m = inner.vector("center_m");
+    solid.axis = inner.vector("axis", Vec3::UnitZ());
+    if (solid.axis.norm() < 1e-6) inner.fail("axis", "is zero; write a direction");
+    solid.axis.normalize();
+    solid.radius_m = inner.number("radius_m", 1e-3, 1e3);
+    solid.tube_radius_m = inner.number("tube_radius_m", 1e-4, solid.radius_m);
+    inner.finish();
+  }
+  map.finish();
+  return solid;
+}
+
+Obstacle readObstacle(ParameterReader map, const std::string& fixed_frame) {
+  Obstacle obstacle;
+  obstacle.topic = map.text("topic", "/octomap_binary");
+  obstacle.frame = map.text("frame", fixed_frame);
+  obstacle.resolution_m = map.number("resolution_m", 1e-3, 10.0);
+  obstacle.binary = map.get("binary", true);
+  obstacle.collides = map.get("collides", false);
+  obstacle.inset_m = map.number("inset_m", 0.0, 0.0, 1.0);
+  for (ParameterReader& solid : map.sections("solids")) obstacle.solids.push_back(readSolid(solid));
+  if (obstacle.solids.empty())
+    map.fail("solids", "must hold at least one solid (box or ring); or leave the obstacle out");
+  map.finish();
+  return obstacle;
+}
+
+RigidBody readRigidBody(ParameterReader map) {
+  RigidBody body;
+  if (map.has("self_collision"))
+    map.fail("self_collision", "has no meaning: the body is rigid and cannot meet itself; remove this line");
+  body.name = map.text("name");
+  body.frame = map.text("frame", body.name);
+  body.size_m = map.numbers("size_m", 3, 1e-4, 1e3);
+  body.start_m = map.vector("start_m");
+  body.motion = readMotion(map);
+  map.finish();
+  return body;
+}
+
+Wind readWind(ParameterReader map) {
+  Wind wind;
+  wind.velocity_m_s = map.vector("velocity_m_s");
+  wind.drag = map.number("drag", 0.0, LARGE);
+  wind.lift = map.number("lift", 0.0, 0.0, LARGE);
+  wind.gust = map.number("gust", 0.0, 0.0, 10.0);
+  wind.gust_period_s = map.number("gust_period_s", wind.gust_period_s, 0.01, LARGE);
+  map.finish();
+  return wind;
+}
+
+/// One body of the monitor's block, held against the body of the scene on its topic.
+void checkMonitorBody(ParameterReader map, const SceneSpec& spec) {
+  map.number("minimum_separation_m", 0.0, 0.0, LARGE);
+  if (map.has("rigid") && map.get("self_collision", false)) {
+    map.fail("self_collision", "has no meaning: the body is rigid and cannot meet itself; remove this line");
+  }
+  ParameterReader topology = map.section("topology");
+  if (!map.has("topic") || !topology.has("rows")) return;
+  const int rows = topology.integer("rows", 2, 100000), cols = topology.integer("cols", 2, 100000);
+  for (const Body& body : spec.bodies) {
+    const int points = body.shape.rows * body.shape.cols;
+    if (body.topic != map.text("topic") || rows * cols == points) continue;
+    topology.fail("rows", "and cols are " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
+                              std::to_string(rows * cols) + ", but " + body.name + " has " + std::to_string(points) +
+                              " points; write rows: " + std::to_string(body.shape.rows) +
+                              ", cols: " + std::to_string(body.shape.cols));
+  }
+}
+
+/// The monitor reads its block itself; what contradicts the scene is refused before anything is recorded.
+void checkMonitor(ParameterReader& scene, const SceneSpec& spec) {
+  ParameterReader monitor = scene.section("monitor");
+  monitor.number("minimum_separation_m", 0.0, 0.0, LARGE);
+  ParameterReader bodies = monitor.section("bodies");
+  for (const std::string& name : bodies.names()) checkMonitorBody(bodies.section(name), spec);
+}
+
+SceneSpec readScene(const ParameterTree& tree) {
+  ParameterReader map(tree, "");
+  SceneSpec spec;
+  spec.name = map.text("name");
+  spec.description = map.text("description");
+  spec.fixed_frame = map.text("fixed_frame", "world");
+  spec.frame_rate_hz = map.number("frame_rate_hz", spec.frame_rate_hz, 0.1, 1000.0);
+  spec.frames = map.integer("frames", 2, 1000000);
+  ParameterReader physics = map.neededSection("physics");
+  spec.substeps = physics.integer("substeps", spec.substeps, 1, 1000);
+  if (physics.has("gravity_m_s2")) spec.gravity_m_s2 = physics.vector("gravity_m_s2");
+  if (physics.has("wind")) spec.wind = readWind(physics.section("wind"));
+  physics.finish();
+  for (ParameterReader& body : map.sections("bodies")) {
+    spec.bodies.push_back(readBody(body, spec.fixed_frame));
+    for (std::size_t i = 0; i + 1 < spec.bodies.size(); ++i) {
+      if (spec.bodies[i].topic == spec.bodies.back().topic)
+        body.fail("topic", "is another body's, too; write a topic of its own");
+    }
+  }
+  if (spec.bodies.empty()) map.fail("bodies", "must hold at least one body: what moves in this scene");
+  if (map.has("obstacle")) spec.obstacle = readObstacle(map.section("obstacle"), spec.fixed_frame);
+  for (ParameterReader& body : map.sections("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
+  checkMonitor(map, spec);
+  if (map.has("expect")) checkExpectations(map.section("expect"), spec);
+  spec.monitor = map.raw("monitor");
+  spec.monitor.file = tree.file;
+  map.finish();
+  return spec;
+}
+
+}  // namespace
+
+SceneSpec parseScene(const std::string& text, const std::string& name) {
+  SceneSpec spec = readScene(parseYaml(text, name));
+  spec.monitor_yaml = yamlBelow(text, "monitor");
+  return spec;
+}
+
+SceneSpec readSceneFile(const std::string& path) {
+  return parseScene(yamlText(path, "a scene file, such as config/scenes/table_edge.yaml"), path);
+}
+
+}  // namespace dccd::scene

@@ -1,0 +1,18 @@
+// Scene files: YAML in, SceneSpec out.
+#pragma once
+
+#include <string>
+
+#include "apps/make_scene_bag/physics/scene_spec.h"
+#include "config/parameter_reader.h"
+
+namespace dccd::scene {
+
+/// Reads a scene file. Throws ParameterError ("FILE:LINE: key: what to write") on whatever it does not understand, and
+/// on contradictions: a gripper on a vertex that is not there, a solid without volume, two things on one topic.
+SceneSpec readSceneFile(const std::string& path);
+
+/// The same for a text; `name` leads messages in the place of the file.
+SceneSpec parseScene(const std::string& text, const std::string& name);
+
+}  // namespace dccd::scene

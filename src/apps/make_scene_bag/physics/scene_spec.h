@@ -1,0 +1,123 @@
+// What a scene file (config/scenes/*.yaml) says: bodies, obstacle, motion, and only the physical effects it names.
+// An effect that a scene does not name is an empty optional here, and is not constructed (see simulation.h).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/parameter_tree.h"
+#include "dccd/types.h"
+
+namespace dccd::scene {
+
+/// A rows x cols grid of vertices. A tube closes its columns around its axis; a rope is a grid of one row.
+struct Shape {
+  enum class Kind { SHEET, TUBE, ROPE };
+  Kind kind = Kind::SHEET;
+  int rows = 1;
+  int cols = 2;
+  Vec3 size_m = Vec3::Zero();        ///< sheet: width (cols), height (rows); tube: radius, length; rope: length
+  Vec3 center_m = Vec3::Zero();      ///< in the fixed frame
+  Vec3 rotation_rad = Vec3::Zero();  ///< rotation vector, applied about the center
+};
+
+/// Where a held or rigid thing is: at rest before the first key and after the last, smoothly between two.
+struct MotionKey {
+  double time_s = 0.0;
+  Vec3 offset_m = Vec3::Zero();      ///< from the start
+  Vec3 rotation_rad = Vec3::Zero();  ///< rotation vector about the start's centroid
+};
+using Motion = std::vector<MotionKey>;
+
+/// Vertices that follow a motion instead of the physics, until they are released.
+struct Gripper {
+  std::vector<int> vertices;
+  Motion motion;
+  std::optional<double> release_s;
+};
+
+struct Bending {
+  double stiffness = 0.0;  ///< 0 to 1, Bullet's linear stiffness of the bending links
+};
+
+struct SelfCollision {
+  int clusters = 64;  ///< convex clusters the body is cut into; more are finer and slower
+};
+
+/// How a body's frames are published.
+enum class MeshOutput { MESH_STAMPED, POINT_CLOUD_GRID, POLYGON_MESH, MARKER };
+
+struct Body {
+  std::string name;
+  std::string topic;
+  std::string frame;
+  MeshOutput output = MeshOutput::MESH_STAMPED;
+  Shape shape;
+  double mass_kg = 0.2;
+  double thickness_m = 0.004;      ///< distance that physics keeps between vertices and obstacles
+  double stretch_stiffness = 1.0;  ///< 0 to 1
+  double damping = 0.0;            ///< 0 to 1, share of the velocity lost in a step
+  double start_noise_m = 0.0;      ///< random offset of each vertex at the start: no two folds are alike
+  double tracker_noise_m = 0.0;    ///< random offset of each published coordinate
+  std::optional<Bending> bending;
+  std::optional<SelfCollision> self_collision;
+  std::optional<double> friction;  ///< 0 to 1
+  std::vector<Gripper> grippers;
+};
+
+struct Solid {
+  enum class Kind { BOX, RING };
+  Kind kind = Kind::BOX;
+  Box box;                       ///< BOX
+  Vec3 center_m = Vec3::Zero();  ///< RING: a torus around `axis`
+  Vec3 axis = Vec3::UnitZ();
+  double radius_m = 0.0;
+  double tube_radius_m = 0.0;
+};
+
+/// What the octomap shows. Physics only meets it where `collides` is set.
+struct Obstacle {
+  std::string topic;
+  std::string frame;
+  double resolution_m = 0.02;
+  bool binary = true;
+  bool collides = false;
+  double inset_m = 0.0;  ///< physics' solids are smaller by this: voxels reach beyond what they map
+  std::vector<Solid> solids;
+};
+
+/// A box that moves along a path; published as a tf frame, met by the bodies.
+struct RigidBody {
+  std::string name;
+  std::string frame;
+  Vec3 size_m = Vec3::Zero();
+  Vec3 start_m = Vec3::Zero();  ///< center at the start
+  Motion motion;
+};
+
+struct Wind {
+  Vec3 velocity_m_s = Vec3::Zero();
+  double drag = 0.0;
+  double lift = 0.0;
+  double gust = 0.0;  ///< share of the velocity that comes and goes
+  double gust_period_s = 1.0;
+};
+
+struct SceneSpec {
+  std::string name;
+  std::string description;
+  std::string fixed_frame;
+  double frame_rate_hz = 30.0;
+  int frames = 0;
+  int substeps = 8;  ///< physics steps per frame
+  std::optional<Vec3> gravity_m_s2;
+  std::optional<Wind> wind;
+  std::vector<Body> bodies;
+  std::optional<Obstacle> obstacle;
+  std::vector<RigidBody> rigid_bodies;
+  ParameterTree monitor;     ///< the scene's `monitor` block, as the node reads it
+  std::string monitor_yaml;  ///< the same as text, passed on as written
+};
+
+}  // namespace dccd::scene

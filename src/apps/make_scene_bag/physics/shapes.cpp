@@ -1,0 +1,105 @@
+#include "apps/make_scene_bag/physics/shapes.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dccd::scene {
+namespace {
+
+Eigen::Quaterniond rotation(const Vec3& rotation_rad) {
+  const double angle = rotation_rad.norm();
+  if (angle == 0.0) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_rad / angle));
+}
+
+Vec3 localVertex(const Shape& shape, int row, int col) {
+  const double across = shape.cols > 1 ? static_cast<double>(col) / (shape.cols - 1) - 0.5 : 0.0;
+  const double along = shape.rows > 1 ? static_cast<double>(row) / (shape.rows - 1) - 0.5 : 0.0;
+  switch (shape.kind) {
+    case Shape::Kind::TUBE: {
+      const double angle = 2.0 * M_PI * col / shape.cols;
+      return Vec3(shape.size_m[0] * std::cos(angle), along * shape.size_m[1], shape.size_m[0] * std::sin(angle));
+    }
+    case Shape::Kind::ROPE:
+      return Vec3(across * shape.size_m[0], 0.0, 0.0);
+    case Shape::Kind::SHEET:
+      break;
+  }
+  return Vec3(across * shape.size_m[0], along * shape.size_m[1], 0.0);
+}
+
+}  // namespace
+
+Positions startPositions(const Shape& shape) {
+  const Eigen::Quaterniond turn = rotation(shape.rotation_rad);
+  Positions positions;
+  positions.reserve(static_cast<std::size_t>(shape.rows) * shape.cols);
+  for (int row = 0; row < shape.rows; ++row) {
+    for (int col = 0; col < shape.cols; ++col)
+      positions.push_back(shape.center_m + turn * localVertex(shape, row, col));
+  }
+  return positions;
+}
+
+std::vector<Face> shapeFaces(const Shape& shape) {
+  std::vector<Face> faces;
+  if (shape.kind == Shape::Kind::ROPE) return faces;
+  const bool closed = shape.kind == Shape::Kind::TUBE;
+  const int cells = closed ? shape.cols : shape.cols - 1;
+  for (int row = 0; row + 1 < shape.rows; ++row) {
+    for (int col = 0; col < cells; ++col) {
+      const int next = (col + 1) % shape.cols;
+      const Index a = row * shape.cols + col, b = row * shape.cols + next;
+      const Index c = a + shape.cols, d = b + shape.cols;
+      if ((row + col) % 2 == 0) {
+        faces.push_back({a, b, d});
+        faces.push_back({a, d, c});
+      } else {
+        faces.push_back({a, b, c});
+        faces.push_back({b, d, c});
+      }
+    }
+  }
+  return faces;
+}
+
+Eigen::Isometry3d motionAt(const Motion& motion, const Vec3& centroid_m, double time_s) {
+  MotionKey now;
+  const auto after = std::upper_bound(motion.begin(), motion.end(), time_s,
+                                      [](double time, const MotionKey& key) { return time < key.time_s; });
+  if (after == motion.end()) {
+    if (!motion.empty()) now = motion.back();
+  } else {
+    const MotionKey before = after == motion.begin() ? MotionKey{} : *(after - 1);
+    const double share = std::clamp((time_s - before.time_s) / (after->time_s - before.time_s), 0.0, 1.0);
+    // Velocity is zero at both keys: a gripper that starts with a jerk tears at the cloth.
+    const double smooth = share * share * (3.0 - 2.0 * share);
+    now.offset_m = before.offset_m + smooth * (after->offset_m - before.offset_m);
+    now.rotation_rad = before.rotation_rad + smooth * (after->rotation_rad - before.rotation_rad);
+  }
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = rotation(now.rotation_rad).toRotationMatrix();
+  pose.translation() = centroid_m + now.offset_m - pose.linear() * centroid_m;
+  return pose;
+}
+
+bool contains(const Solid& solid, const Vec3& point_m) {
+  if (solid.kind == Solid::Kind::BOX) {
+    return (point_m.array() >= solid.box.min.array()).all() && (point_m.array() <= solid.box.max.array()).all();
+  }
+  const Vec3 from_center = point_m - solid.center_m;
+  const double height = from_center.dot(solid.axis);
+  const double from_circle = (from_center - height * solid.axis).norm() - solid.radius_m;
+  return std::hypot(height, from_circle) <= solid.tube_radius_m;
+}
+
+Box bounds(const Solid& solid) {
+  if (solid.kind == Solid::Kind::BOX) return solid.box;
+  Box box;
+  const Vec3 reach = Vec3::Constant(solid.radius_m + solid.tube_radius_m);
+  box.min = solid.center_m - reach;
+  box.max = solid.center_m + reach;
+  return box;
+}
+
+}  // namespace dccd::scene

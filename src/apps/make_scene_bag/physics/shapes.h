@@ -1,0 +1,24 @@
+// Geometry of a scene's shapes, solids and motions; free of Bullet.
+#pragma once
+
+#include <vector>
+
+#include "apps/make_scene_bag/physics/scene_spec.h"
+
+namespace dccd::scene {
+
+/// Vertices of a shape at the start, row-major, in the fixed frame [m].
+Positions startPositions(const Shape& shape);
+
+/// Triangles of a shape; the diagonals alternate, so that no direction folds more easily. None for a rope.
+std::vector<Face> shapeFaces(const Shape& shape);
+
+/// The pose of a motion at a time: offset and rotation about the start's centroid.
+Eigen::Isometry3d motionAt(const Motion& motion, const Vec3& centroid_m, double time_s);
+
+/// True if the point lies in the solid, its surface included.
+bool contains(const Solid& solid, const Vec3& point_m);
+
+Box bounds(const Solid& solid);
+
+}  // namespace dccd::scene

@@ -1,0 +1,293 @@
+#include "step/patches/patches.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "obstacle/burst.h"
+#include "step/pairs/closest_points.h"
+
+namespace dccd {
+namespace {
+
+Vec3 along(const Body& body, Index v, double toc) {
+  const Vec3 &from = (*body.t0)[v], &to = (*body.t1)[v];
+  return toc == 0 ? from : Vec3(from + toc * (to - from));
+}
+
+/// Towards the side of `from_second`, which leads from the second feature to the first.
+Vec3 towards(const Vec3& cross, const Vec3& from_second) {
+  const Vec3 normal = unitOr(cross, Vec3::Zero());
+  return normal.dot(from_second) < 0 ? Vec3(-normal) : normal;
+}
+
+/// The point of the segment that is in the triangle's plane.
+Vec3 throughPlane(const Vec3& p, const Vec3& q, const Vec3& corner, const Vec3& normal) {
+  const double from = normal.dot(p - corner), to = normal.dot(q - corner), share = from / (from - to);
+  return std::isfinite(share) ? Vec3(p + std::clamp(share, 0.0, 1.0) * (q - p)) : Vec3(0.5 * (p + q));
+}
+
+/// Ties stay in the canonical order.
+bool isEarlier(const Contact& a, const Contact& b) {
+  return a.expected != b.expected ? b.expected : a.toc_lower < b.toc_lower;
+}
+
+}  // namespace
+
+const char* toString(PatchBeginning beginning) {
+  static const char* const NAMES[] = {"NEW", "INITIAL", "MAP_CHANGED"};
+  return NAMES[static_cast<std::size_t>(beginning)];
+}
+
+const char* toString(PatchEventKind kind) {
+  static const char* const NAMES[] = {"BEGAN", "ENDED", "SPLIT", "MERGED", "UNEXPECTED"};
+  return NAMES[static_cast<std::size_t>(kind)];
+}
+
+void PatchMaker::begin(const Outcome& outcome) {
+  releaseBurst(touches_);
+  releaseBurst(order_);
+  releaseBurst(parts_);
+  releaseBurst(spots_);
+  spots_.clear();
+  unexpected_.clear();
+  graph_.setBodies(outcome.step->bodies);
+  contacts_ = outcome.contacts.size();
+  touches_.reserve(contacts_ + outcome.intersections.size());
+  touches_.resize(contacts_);
+}
+
+void PatchMaker::connect(const Outcome& outcome) {
+  for (const StartIntersection& crossing : outcome.intersections) {
+    // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
+    if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
+  }
+  patch_of_ = &graph_.components(touches_);
+  const std::size_t count = graph_.componentCount();
+  begin_.assign(count + 2, 0);
+  for (const std::uint32_t p : *patch_of_) ++begin_[p + 2];
+  for (std::size_t p = 1; p < begin_.size(); ++p) begin_[p] += begin_[p - 1];
+  order_.resize(touches_.size());
+  for (std::uint32_t t = 0; t < touches_.size(); ++t) order_[begin_[(*patch_of_)[t] + 1]++] = t;
+  parts_.assign(count + pieces(), Part());
+}
+
+PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) const {
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  const Touch& touch = touches_[t];
+  const Body& a = bodies[touch.body[0]];
+  const auto local = [&](int i, int side) { return touch.point[i] - graph_.firstVertex(touch.body[side]); };
+  if (touch.kind == Touch::CROSSING) {
+    const Body& b = bodies[touch.body[1]];
+    const Vec3 &f0 = (*b.t0)[local(2, 1)], &f1 = (*b.t0)[local(3, 1)], &f2 = (*b.t0)[local(4, 1)];
+    return {throughPlane((*a.t0)[local(0, 0)], (*a.t0)[local(1, 0)], f0, (f1 - f0).cross(f2 - f0)), Vec3::Zero()};
+  }
+  const Contact& contact = outcome.contacts[t];
+  if (touch.onMap() && outcome.substeps == 1) return placeOnMap(outcome, contact);
+  if (outcome.substeps > 1) {
+    const ContactGeometry geometry = contactGeometry(outcome, contact);
+    return {geometry.point, geometry.normal};
+  }
+  const Body& b = bodies[touch.body[1]];
+  const double toc = contact.toc_lower;
+  if (contact.kind == PairKind::VERTEX_FACE) {
+    const Vec3 &f0 = (*b.t0)[contact.vertex[1]], &f1 = (*b.t0)[contact.vertex[2]], &f2 = (*b.t0)[contact.vertex[3]];
+    const Vec3& v = (*a.t0)[contact.vertex[0]];
+    return {along(a, contact.vertex[0], toc), towards((f1 - f0).cross(f2 - f0), v - f0)};
+  }
+  const Vec3 &a0 = (*a.t0)[contact.vertex[0]], &a1 = (*a.t0)[contact.vertex[1]];
+  const Vec3 &b0 = (*b.t0)[contact.vertex[2]], &b1 = (*b.t0)[contact.vertex[3]];
+  const Closest closest = closestOnSegments(along(a, contact.vertex[0], toc), along(a, contact.vertex[1], toc),
+                                            along(b, contact.vertex[2], toc), along(b, contact.vertex[3], toc));
+  return {0.5 * (closest.on_first + closest.on_second), towards((a1 - a0).cross(b1 - b0), a0 - b0)};
+}
+
+/// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.
+PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& contact) const {
+  const Eigen::Isometry3d& map_from_fixed = outcome.step->map.map_from_fixed;
+  const Body& body = outcome.step->bodies[contact.body[0]];
+  const auto at = [&](int i) -> Vec3 { return map_from_fixed * along(body, contact.vertex[i], contact.toc_lower); };
+  const double resolution_m = outcome.obstacle->resolution(), half_m = 0.5 * contact.voxel_size * resolution_m;
+  const Vec3 center = Vec3(voxelPlane(contact.voxel.x, resolution_m), voxelPlane(contact.voxel.y, resolution_m),
+                           voxelPlane(contact.voxel.z, resolution_m)) +
+                      Vec3::Constant(half_m);
+  Vec3 point = at(0), normal;
+  if (contact.kind == PairKind::VERTEX_VOXEL_FACE) {
+    int axis = 0;
+    (point - center).cwiseAbs().maxCoeff(&axis);
+    normal = (point[axis] < center[axis] ? -1 : 1) * Vec3::Unit(axis);
+  } else if (contact.kind == PairKind::EDGE_VOXEL_EDGE) {
+    const Closest closest = closestOnSegments(point, at(1), center, center);
+    normal = unitOr(closest.on_first - center, Vec3::Zero());
+    point = closest.on_first;
+  } else {
+    const Vec3 corner = point;
+    normal = unitOr((at(1) - corner).cross(at(2) - corner), Vec3::Zero());
+    const double above = normal.dot(corner - center);
+    point = center + above * normal;
+    if (above < 0) normal = -normal;
+  }
+  point = point.cwiseMax(center - Vec3::Constant(half_m)).cwiseMin(center + Vec3::Constant(half_m));
+  const Eigen::Matrix3d turn = map_from_fixed.linear().transpose();
+  return {turn * (point - map_from_fixed.translation()), turn * normal};
+}
+
+void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
+  const std::size_t end = std::min(touches_.size(), (piece + 1) * PIECE);
+  std::uint32_t p = NO_PATCH;
+  Vec3 first_normal = Vec3::Zero();
+  for (std::size_t i = piece * PIECE; i < end; ++i) {
+    const std::uint32_t t = order_[i];
+    const Touch& touch = touches_[t];
+    if ((*patch_of_)[t] != p) {
+      p = (*patch_of_)[t];
+      first_normal = placeOf(outcome, order_[begin_[p]]).normal;
+    }
+    Part& part = parts_[piece + p];
+    part.expected += touch.expected;
+    if (!touch.expected) (touch.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
+    if (touch.kind == Touch::CROSSING) {
+      ++part.crossings;
+      part.toc_lower = part.toc_upper = 0;
+      if (touches_[order_[begin_[p]]].kind != Touch::CROSSING) continue;  // the contacts say where the patch is
+    }
+    const Place at = placeOf(outcome, t);
+    part.centroid += at.point;
+    part.box.min = part.box.min.cwiseMin(at.point);
+    part.box.max = part.box.max.cwiseMax(at.point);
+    // Of a body with itself neither side is the first: all are turned to the side of the first one.
+    const bool self = touch.body[0] == touch.body[1];
+    const bool turned = self ? first_normal.dot(at.normal) < 0 : touch.body[0] > touch.body[1];
+    part.normal += turned ? Vec3(-at.normal) : at.normal;
+    if (touch.kind == Touch::CROSSING) continue;
+    const Contact& contact = outcome.contacts[t];
+    if (part.contacts == 0 || isEarlier(contact, part.earliest)) part.earliest = contact;
+    ++part.contacts;
+    part.certain += touch.certain;
+    part.initial += touch.initial;
+    part.toc_lower = std::min(part.toc_lower, contact.toc_lower);
+    part.toc_upper = std::min(part.toc_upper, contact.toc_upper);
+  }
+}
+
+void PatchMaker::make(Outcome& outcome) {
+  std::vector<Patch>& patches = outcome.patches;
+  patches.resize(graph_.componentCount());
+  unexpected_.assign(patches.size(), PatchUnexpected());
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    Patch& patch = patches[p];
+    patch.body = touches_[order_[begin_[p]]].body;
+    if (patch.body[0] > patch.body[1]) std::swap(patch.body[0], patch.body[1]);
+    for (std::size_t piece = begin_[p] / PIECE; piece * PIECE < begin_[p + 1]; ++piece) {
+      const Part& part = parts_[piece + p];
+      if (part.contacts > 0 && (patch.contacts == 0 || isEarlier(part.earliest, patch.earliest))) {
+        patch.earliest = part.earliest;
+      }
+      unexpected_[p].is_new |= part.unexpected.is_new;
+      unexpected_[p].is_initial |= part.unexpected.is_initial;
+      patch.contacts += part.contacts;
+      patch.certain += part.certain;
+      patch.initial += part.initial;
+      patch.crossings += part.crossings;
+      patch.expected += part.expected;
+      patch.toc_lower = std::min(patch.toc_lower, part.toc_lower);
+      patch.toc_upper = std::min(patch.toc_upper, part.toc_upper);
+      patch.centroid += part.centroid;
+      patch.normal += part.normal;
+      patch.box.min = patch.box.min.cwiseMin(part.box.min);
+      patch.box.max = patch.box.max.cwiseMax(part.box.max);
+    }
+    patch.centroid /= static_cast<double>(patch.contacts > 0 ? patch.contacts : patch.crossings);
+    patch.normal = unitOr(patch.normal, Vec3::Zero());
+    const bool self = patch.body[0] == patch.body[1];
+    patch.area_m2 = self ? areas_[2 * p] / 2 : std::min(areas_[2 * p], areas_[2 * p + 1]);
+  }
+}
+
+/// Of the faces that have a vertex that touches something; where it is when the step begins.
+void PatchMaker::findVertexAreas(const Step& step) {
+  vertex_area_.assign(graph_.vertexCount(), 0);
+  const auto isTouched = [&](Index vertex) { return seen_[vertex].patch != NO_PATCH; };
+  for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+    const Index base = graph_.firstVertex(b);
+    const Positions& x = *step.bodies[b].t0;
+    for (const Face& face : step.bodies[b].topology->faces()) {
+      if (!isTouched(base + face[0]) && !isTouched(base + face[1]) && !isTouched(base + face[2])) continue;
+      const double third = (x[face[1]] - x[face[0]]).cross(x[face[2]] - x[face[0]]).norm() / 6;
+      if (!std::isfinite(third)) continue;
+      for (const Index v : face) vertex_area_[base + v] += third;
+    }
+  }
+}
+
+void PatchMaker::findAreas(const Outcome& outcome) {
+  findSpots();
+  findVertexAreas(*outcome.step);
+  areas_.assign(2 * graph_.componentCount(), 0);
+  for (const PatchSpot& spot : spots_) areas_[2 * spot.patch + spot.side] += vertex_area_[spot.vertex];
+  for (std::uint32_t p = 0; p < graph_.componentCount(); ++p) {
+    if (touches_[order_[begin_[p]]].onMap()) areas_[2 * p + 1] = leafArea(p, outcome.obstacle->resolution());
+  }
+}
+
+void PatchMaker::findSpots() {
+  seen_.assign(graph_.vertexCount(), {NO_PATCH, 0});
+  std::uint32_t patch = NO_PATCH;
+  bool some_expected = false;  // of the patch's spots
+  for (const std::uint32_t t : order_) {
+    const Touch& touch = touches_[t];
+    if ((*patch_of_)[t] != patch) {
+      patch = (*patch_of_)[t];
+      some_expected = false;
+    }
+    const int first = touch.firstSize(), all = first + touch.secondSize();
+    for (int i = 0; i < all; ++i) {
+      const Index vertex = touch.point[i];
+      Seen& seen = seen_[vertex];
+      if (seen.patch == patch) {
+        if (some_expected && !touch.expected) spots_[seen.spot].expected = false;
+        continue;
+      }
+      seen = {patch, static_cast<std::uint32_t>(spots_.size())};
+      some_expected = some_expected || touch.expected;
+      const bool is_first = i < first;
+      const Index across = touch.onMap() ? NO_INDEX : touch.point[is_first ? first : 0];
+      const auto side =
+          static_cast<std::uint8_t>(touch.body[is_first ? 0 : 1] != std::min(touch.body[0], touch.body[1]));
+      spots_.push_back({vertex, across, patch, side, touch.expected});
+    }
+  }
+}
+
+/// Each leaf that the patch touches counts once.
+double PatchMaker::leafArea(std::uint32_t patch, double resolution_m) {
+  leaves_.clear();
+  for (std::uint32_t i = begin_[patch]; i < begin_[patch + 1]; ++i) {
+    const Touch& touch = touches_[order_[i]];
+    leaves_.push_back(std::uint64_t{touch.level} << 48 | std::uint64_t{touch.point[3]} << 16 | touch.point[4]);
+  }
+  std::sort(leaves_.begin(), leaves_.end());
+  leaves_.erase(std::unique(leaves_.begin(), leaves_.end()), leaves_.end());
+  double area_m2 = 0;
+  for (const std::uint64_t leaf : leaves_) {
+    const double edge_m = std::ldexp(resolution_m, static_cast<int>(leaf >> 48));
+    area_m2 += edge_m * edge_m;
+  }
+  return area_m2;
+}
+
+void PatchMaker::list(Outcome& outcome) const {
+  const std::vector<Contact>& contacts = outcome.contacts;
+  if (contacts.size() == contacts_) {
+    outcome.patch_of.assign(patch_of_->begin(), patch_of_->begin() + static_cast<std::ptrdiff_t>(contacts_));
+    return;
+  }
+  outcome.patch_of.reserve(contacts.size());
+  std::size_t t = 0;
+  for (const Contact& contact : contacts) {
+    const Touch touch = graph_.touchOf(contact);
+    while (touches_[t].key() != touch.key()) ++t;
+    outcome.patch_of.push_back((*patch_of_)[t]);
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,151 @@
+// The start state of a step (doc/algorithm.md): do an edge and a face already meet at t=0?
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+#include "culling/cluster_pairs.h"
+#include "culling/scene_arrays.h"
+#include "dccd/deadline.h"
+#include "step/pairs/found_limit.h"
+
+namespace dccd {
+
+/// Exact: do the closed segment pq and the closed triangle abc meet? Any finite doubles, degenerate ones included.
+/// Each argument: x, y, z.
+bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c);
+
+/// Goes on with a search that a deadline cut: through the pairs of bodies in ascending order from `next` on, of which
+/// the first one begins at `place`, all later ones at 0. search() says whether it came to its pair's end. False: to the
+/// last one's it did not, and `next` and `place` are where it goes on.
+template <class Place, class Search>
+bool goOn(std::vector<std::array<std::uint32_t, 2>>& pairs, std::array<std::uint32_t, 2>& next, Place& place,
+          const Search& search) {
+  std::sort(pairs.begin(), pairs.end());
+  for (auto pair = std::lower_bound(pairs.begin(), pairs.end(), next); pair != pairs.end(); ++pair) {
+    if (*pair != next) place = 0;
+    next = *pair;
+    if (!search()) return false;
+  }
+  return true;
+}
+
+/// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those
+/// of the bodies' setups: within bodies with self_collision, between bodies with against_bodies.
+///
+/// What is known at the start of one step is carried over to the next, so that only the first frame, frames after a
+/// reset and the surroundings of contacts are tested. Why that is complete: let edge e and face f, which share no
+/// vertex, be apart at t=0 and meet during the step, first at t* > 0. Suppose that at t* neither end of e is on f and e
+/// meets no edge of f. Then the common point is inside of f, so f has an area (a face without area is the union of its
+/// edges), and inside of e. Were e in the plane of f, it would leave f across an edge of f or end on f; so it crosses
+/// the plane there, and still does so inside of f a little earlier: not the first time. Hence whatever starts to meet
+/// during a step shows a contact of an end of e with f (VF) or of e with an edge of f (EE), and neither pair shares a
+/// vertex, since e and f do not. So after a step in which every pair was decided, or kept where it was not, the next
+/// start needs to look at:
+///   EE contact (e, e'): e against the faces at e', e' against the faces at e;
+///   VF contact (v, f): the edges at v against f;
+///   and the pairs that met already at the step's start.
+/// The same holds for any part of the pairs. So a search that a deadline cuts goes on in the next step where it ended:
+/// what it was past is carried over, what it had not come to is looked at then.
+class StartStateSearch {
+ public:
+  /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
+  /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
+  /// effect START_STATE. Nothing more is tested once the deadline is over, but for what it takes to list what is
+  /// found; isWhole() is false then. Of more than most_found the first ones to be found are listed; isCut() is true
+  /// then, and the next run() begins anew.
+  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const Deadline& deadline,
+                                            StepStats& stats, std::size_t most_found = FoundLimit::NONE);
+
+  /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
+  bool isWhole() const { return whole_; }
+  bool isCut() const { return cut_; }
+  /// For what comes before run(): what the run() before found is listed again first.
+  Deadline beforeListing(const Deadline& deadline) const { return beforeListing(found_, deadline); }
+
+  /// Whether run() would search the bodies' trees.
+  bool needsTrees(bool continues) const { return !(continues && known_ && searched_); }
+
+  /// Contacts of the step just done (undecided ones included). complete: no other pair touches during it.
+  void remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete);
+
+  /// After remember(): whether listEnd() can tell what meets at t=1.
+  bool knowsEnd() const { return known_ && searched_; }
+  /// What meets at t=1, listed as run() would for a step that continues. False: the deadline ended it. Changes nothing.
+  bool listEnd(const SceneArrays& scene, const Deadline& deadline, std::vector<StartIntersection>& out);
+
+  /// Nothing is known of a step before: the next run() is a full test.
+  void clear();
+  bool isClear() const { return !known_ && !searched_ && found_.empty() && candidates_.empty() && touched_.empty(); }
+  /// The bodies change: what was learnt of their meshes is forgotten.
+  void forgetBodies() { neighbourhoods_.clear(); }
+
+ private:
+  /// By slot in the bodies' trees, so that sorted candidates are also near each other in memory.
+  struct EdgeFace {
+    std::uint32_t edge_body, edge, face_body, face;
+    std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t> key() const {
+      return {edge_body, edge, face_body, face};
+    }
+    friend bool operator<(const EdgeFace& x, const EdgeFace& y) { return x.key() < y.key(); }
+    friend bool operator==(const EdgeFace& x, const EdgeFace& y) { return x.key() == y.key(); }
+  };
+  /// Slots of the features at each used vertex of a body: those of vertex i are slots[begin[i]] to slots[begin[i + 1]].
+  struct SlotsAtVertex {
+    std::vector<std::uint32_t> begin, slots;
+    void build(const SceneBody& body, FeatureKind kind);
+  };
+  struct Neighbourhood {
+    std::vector<Index> internal_of_local;
+    SlotsAtVertex edges, faces;
+  };
+
+  /// The features of a contact: what crosses after it lies around them.
+  struct Touched {
+    PairKind kind;
+    std::uint16_t first_body, second_body;
+    std::array<Index, 4> vertex;
+  };
+  using BodyPair = std::array<std::uint32_t, 2>;  // of the edge, of the face
+
+  static Deadline beforeListing(const std::vector<EdgeFace>& found, const Deadline& deadline);
+  template <class HasMore, class Expand, class Test>
+  static bool inBlocks(std::vector<EdgeFace>& pairs, const std::vector<EdgeFace>& found, const Deadline& deadline,
+                       const HasMore& hasMore, const Expand& expand, const Test& test);
+  void testCandidates(const SceneArrays& scene, const Deadline& deadline);
+  void search(const SceneArrays& scene, const Deadline& deadline);
+  bool searchBodies(const SceneArrays& scene, const Deadline& deadline);
+  void test(const SceneArrays& scene, const EdgeFace& pair);
+  static bool meet(const SceneArrays& scene, const EdgeFace& pair, int at);  ///< at: 0 or 1, of the step's ends
+  /// What was checked in the step before need not be in this one.
+  static bool isChecked(const SceneArrays& scene, const EdgeFace& pair);
+  static void list(const SceneArrays& scene, std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
+  void addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out);
+  void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
+                      const Index* other_edge, std::vector<EdgeFace>& out);
+  void learnNeighbourhoods(const SceneArrays& scene);
+  bool hasEnough() const { return found_.size() > most_found_; }
+
+  bool whole_ = false, has_deadline_ = false;
+  bool cut_ = false;  // there was more to find than most_found_
+  std::size_t most_found_ = FoundLimit::NONE;
+  bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
+  bool searched_ = false;   // the search has come to its end
+  BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the groups of edges
+  std::uint32_t next_group_ = 0;
+  std::vector<Touched> touched_;      // of the last step; after run() those that the deadline left
+  std::vector<EdgeFace> candidates_;  // to be looked at; after run() those that the deadline left
+  std::vector<EdgeFace> found_;
+  std::vector<StartIntersection> intersections_;
+  std::vector<std::uint32_t> groups_, scratch_, overlapping_;
+  std::vector<BodyPair> body_pairs_;
+  std::vector<std::array<std::uint32_t, 2>> by_group_;
+  ClusterPairStream stream_;
+  std::vector<Neighbourhood> neighbourhoods_;  // one a body; empty until a step has contacts
+  std::uint64_t tested_ = 0;
+};
+
+}  // namespace dccd

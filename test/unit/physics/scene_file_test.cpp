@@ -1,0 +1,194 @@
+// Scene files: what is read, and what is refused with file, line, key and what to write instead.
+#include "apps/make_scene_bag/physics/scene_file.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace dccd::scene {
+namespace {
+
+const char* const GOOD = R"(name: drop
+description: A sheet falls
+frames: 5
+physics:
+  gravity_m_s2: [0, 0, -9.81]
+bodies:
+  - name: sheet
+    mass_kg: 0.1
+    sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}
+)";
+
+std::string errorOf(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  text.replace(at, from.size(), to);
+  try {
+    parseScene(text, "s.yaml");
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(SceneFile, ReadsWhatItSays) {
+  const SceneSpec spec = parseScene(GOOD, "s.yaml");
+  EXPECT_EQ(spec.name, "drop");
+  EXPECT_EQ(spec.frames, 5);
+  ASSERT_EQ(spec.bodies.size(), 1u);
+  EXPECT_EQ(spec.bodies[0].topic, "/sheet");
+  EXPECT_EQ(spec.bodies[0].shape.rows, 3);
+  EXPECT_EQ(spec.bodies[0].shape.cols, 4);
+  EXPECT_TRUE(spec.gravity_m_s2.has_value());
+  EXPECT_FALSE(spec.wind.has_value());
+  EXPECT_FALSE(spec.obstacle.has_value());
+  EXPECT_FALSE(spec.bodies[0].bending.has_value());
+  EXPECT_FALSE(spec.bodies[0].self_collision.has_value());
+  EXPECT_FALSE(spec.bodies[0].friction.has_value());
+}
+
+TEST(SceneFile, AnUnknownKeyIsNamedWithItsLineAndTheKnownOnes) {
+  const std::string error = errorOf(GOOD, "mass_kg", "mas_kg");
+  EXPECT_NE(error.find("s.yaml:"), std::string::npos) << error;
+  EXPECT_NE(error.find("mass_kg is needed: a number from"), std::string::npos) << error;
+  const std::string extra = errorOf(GOOD, "    mass_kg: 0.1\n", "    mass_kg: 0.1\n    colour: red\n");
+  EXPECT_NE(extra.find("s.yaml:9: bodies[0]/colour is not known; nearest is bodies[0]/"), std::string::npos) << extra;
+}
+
+TEST(SceneFile, ValuesOutOfRangeOrOfTheWrongTypeAreRefused) {
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: -1").find("s.yaml:8: bodies[0]/mass_kg is -1, it must be from"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: .nan").find("mass_kg is nan, it must be from"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "mass_kg: 0.1", "mass_kg: heavy").find("is a string, a number is needed"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: 2.5").find("an integer is needed"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "rows: 3", "rows: 1").find("rows"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "[0, -9.81]").find("a list of 3 numbers"), std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "[0, 0, -9.81]", "9.81").find("a list of 3 numbers"), std::string::npos);
+}
+
+TEST(SceneFile, ContradictionsAreRefused) {
+  EXPECT_NE(errorOf(GOOD, "sheet: {rows: 3", "grippers: [{vertices: [12]}]\n    sheet: {rows: 3").find("from 0 to 11"),
+            std::string::npos);
+  EXPECT_NE(
+      errorOf(GOOD, "sheet: {rows: 3", "grippers: [{row: 0, col: 0}]\n    sheet: {rows: 3").find("needs just one of"),
+      std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "    sheet: {rows: 3, cols: 4, size_m: [0.3, 0.2], center_m: [0, 0, 1]}",
+                    "    rope: {points: 9, length_m: 1, center_m: [0, 0, 1]}")
+                .find("a rope has no faces"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "bodies:",
+                    "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 1], max_m: [1, 1, 1]}}]}\nbodies:")
+                .find("max_m must be above min_m"),
+            std::string::npos);
+  EXPECT_NE(errorOf(GOOD, "bodies:", "obstacle: {resolution_m: 0.1}\nbodies:").find("at least one solid"),
+            std::string::npos);
+  EXPECT_NE(
+      errorOf(GOOD, "bodies:",
+              "rigid_bodies:\n  - {name: a, size_m: [1, 1, 1], start_m: [0, 0, 0], self_collision: true}\nbodies:")
+          .find("s.yaml:7: rigid_bodies[0]/self_collision has no meaning: the body is rigid and cannot meet itself; "
+                "remove this line"),
+      std::string::npos);
+}
+
+TEST(SceneFile, WhatContradictsTheMonitorsBlockIsRefused) {
+  const auto with = [](const std::string& monitor) {
+    return errorOf(GOOD, "bodies:", "monitor:\n" + monitor + "bodies:");
+  };
+  EXPECT_EQ(with("  minimum_separation_m: 0.01\n  bodies:\n    cloth: {topic: /sheet, topology: {rows: 3, cols: 4}}\n"),
+            "accepted");
+  EXPECT_NE(with("  minimum_separation_m: -0.01\n")
+                .find("s.yaml:7: monitor/minimum_separation_m is -0.01, it must be from 0"),
+            std::string::npos);
+  EXPECT_NE(with("  minimum_separation_m: .nan\n").find("monitor/minimum_separation_m is nan, it must be from 0"),
+            std::string::npos);
+  EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, minimum_separation_m: .inf}\n")
+                .find("s.yaml:8: monitor/bodies/cloth/minimum_separation_m is inf, it must be from 0"),
+            std::string::npos);
+  EXPECT_NE(with("  bodies:\n    cloth: {topic: /sheet, topology: {rows: 4, cols: 4}}\n")
+                .find("s.yaml:8: monitor/bodies/cloth/topology/rows and cols are 4 x 4 = 16, but sheet has 12 points; "
+                      "write rows: "
+                      "3, cols: 4"),
+            std::string::npos);
+  EXPECT_NE(with("  bodies:\n    finger: {rigid: {mesh: a.stl, frame: finger}, self_collision: true}\n")
+                .find("s.yaml:8: monitor/bodies/finger/self_collision has no meaning: the body is rigid"),
+            std::string::npos);
+}
+
+TEST(SceneFile, WhatItExpectsIsReadStrictly) {
+  // Five frames at 30 Hz: the last one comes after 0.133 s.
+  const std::string scene = std::string(GOOD) +
+                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
+                            "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n";
+  const auto with = [&](const std::string& expect) {
+    return errorOf(scene, "bodies:", "expect:\n" + expect + "bodies:");
+  };
+  const auto expectTold = [&](const std::string& expect, const std::string& part) {
+    const std::string error = with(expect);
+    EXPECT_NE(error.find(part), std::string::npos) << expect << error;
+  };
+  EXPECT_EQ(with("  octomap: {first_contact_s: [0.05, 0.1], contacts_at_least: 3}\n  self: none\n"
+                 "  body: {names: [sheet, finger], first_contact_s: [0.05, 0.05]}\n"
+                 "  clear: {until_s: 0.05, again_s: 0.1, share_at_least: 0.5}\n"),
+            "accepted");
+  EXPECT_EQ(with("  clear: {share_at_least: 1}\n"), "accepted");
+  EXPECT_EQ(with("  self: {first_contact_s: [0, 0.1], ends_s: [0.1, 0.13]}\n"), "accepted");
+  EXPECT_EQ(with("  self: {first_contact_s: [0, 0.1], lasts: true}\n"), "accepted");
+  expectTold("  self: {first_contact_s: [0, 0.1], ends_s: [0.1, 0.13], lasts: true}\n", "lasts contradicts ends_s");
+  expectTold("  self: {first_contact_s: [0.1, 0.12], ends_s: [0.01, 0.05]}\n", "ends_s is before first_contact_s");
+
+  expectTold("  selv: none\n", "s.yaml:7: expect/selv is not known; nearest is expect/self");
+  expectTold("  {}\n", "expect needs at least one fact");
+  expectTold("  self: never\n", "s.yaml:7: expect/self is a string, a section is needed");
+  expectTold("  self: {}\n", "expect/self/first_contact_s is needed: a list of 2 numbers");
+  expectTold("  self: {first_contact_s: 0.1}\n", "expect/self/first_contact_s must be a list of 2 numbers");
+  expectTold("  self: {first_contact_s: [0.1, 0.05]}\n",
+             "expect/self/first_contact_s must be the earliest time, then the latest");
+  expectTold("  self: {first_contact_s: [0.1, 0.2]}\n",
+             "expect/self/first_contact_s is 0.2, it must be from 0 to 0.133");
+  expectTold("  self: {first_contact_s: [0, 0.1], contacts_at_least: 0}\n",
+             "contacts_at_least is 0, it must be from 1");
+  expectTold("  self: {first_contact_s: [0, 0.1], least: 1}\n", "expect/self/least is not known");
+  expectTold("  body: {first_contact_s: [0, 0.1]}\n", "expect/body/names is needed");
+  expectTold("  body: {names: [sheet], first_contact_s: [0, 0.1]}\n", "expect/body/names must be a list of 2 texts");
+  expectTold("  body: {names: [sheet, [a]], first_contact_s: [0, 0.1]}\n",
+             "expect/body/names must be a list of 2 texts");
+  expectTold("  body: {names: [sheet, thumb], first_contact_s: [0, 0.1]}\n",
+             "has 'thumb', which is no body of the scene");
+  expectTold("  body: {names: [sheet, sheet], first_contact_s: [0, 0.1]}\n", "has one name twice");
+  expectTold("  clear: {until_s: 0.2}\n", "expect/clear/until_s is 0.2, it must be from 0 to 0.133");
+  expectTold("  clear: {until_s: 0.1, again_s: 0.05}\n", "expect/clear/again_s is 0.05, it must be from 0.1 to 0.133");
+  expectTold("  clear: {share_at_least: 2}\n", "expect/clear/share_at_least is 2, it must be from 0 to 1");
+  expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {until_s: 0.06}\n",
+             "expect/clear/until_s contradicts first_contact_s: [0.05, 0.1]; write no later time than its first");
+  expectTold("  self: {first_contact_s: [0.05, 0.1]}\n  clear: {again_s: 0.09}\n",
+             "expect/clear/again_s contradicts first_contact_s: [0.05, 0.1]; write no earlier time than its last");
+  EXPECT_NE(errorOf(GOOD, "bodies:", "expect: {octomap: {first_contact_s: [0, 0.1]}}\nbodies:")
+                .find("expect/octomap has no meaning without an obstacle; remove this line"),
+            std::string::npos);
+  EXPECT_EQ(errorOf(GOOD, "bodies:", "expect: {octomap: none}\nbodies:"), "accepted");
+}
+
+TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
+  EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
+  EXPECT_THROW(readSceneFile("no/such/scene.yaml"), ParameterError);
+  EXPECT_THROW(parseScene("", "s.yaml"), ParameterError);
+  EXPECT_THROW(parseScene("- a\n- b\n", "s.yaml"), ParameterError);
+  EXPECT_THROW(parseScene("name: &a [*a]\n", "s.yaml"), ParameterError) << "an anchor within itself";
+}
+
+TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
+  int scenes = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const SceneSpec spec = readSceneFile(entry.path().string());
+    EXPECT_EQ(spec.name, entry.path().stem().string());
+    EXPECT_FALSE(spec.monitor_yaml.empty()) << spec.name;
+    ++scenes;
+  }
+  EXPECT_GE(scenes, 6);
+}
+
+}  // namespace
+}  // namespace dccd::scene

@@ -1,0 +1,201 @@
+// The physics that records scenes: only the named effects, equal seeds give equal motion, and motion that can be
+// checked by hand comes out as it should.
+#include "apps/make_scene_bag/physics/simulation.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "apps/make_scene_bag/physics/scene_file.h"
+#include "apps/make_scene_bag/physics/shapes.h"
+
+namespace dccd::scene {
+namespace {
+
+SceneSpec bareScene() {
+  return parseScene(R"(name: bare
+description: A sheet in empty space
+frames: 30
+frame_rate_hz: 30
+physics: {substeps: 8}
+bodies:
+  - name: sheet
+    mass_kg: 0.1
+    sheet: {rows: 5, cols: 5, size_m: [0.4, 0.4], center_m: [0, 0, 1]}
+)",
+                    "bare");
+}
+
+Obstacle floorAt(double top_m) {
+  Obstacle obstacle;
+  obstacle.collides = true;
+  Solid solid;
+  solid.box.min = Vec3(-1, -1, top_m - 0.2);
+  solid.box.max = Vec3(1, 1, top_m);
+  obstacle.solids.push_back(solid);
+  return obstacle;
+}
+
+double lowest(const Positions& positions) {
+  double z = positions.front()[2];
+  for (const Vec3& p : positions) z = std::min(z, p[2]);
+  return z;
+}
+
+TEST(Simulation, ConstructsNoEffectThatTheSceneDoesNotName) {
+  SceneSpec spec = bareScene();
+  Simulation simulation(spec, 1);
+  EXPECT_TRUE(simulation.effects().empty());
+  const Positions start = simulation.observe(0);
+  for (int i = 0; i < 30; ++i) simulation.step();
+  const Positions end = simulation.observe(0);
+  for (std::size_t i = 0; i < start.size(); ++i) EXPECT_LT((end[i] - start[i]).norm(), 1e-12) << "nothing moves it";
+}
+
+TEST(Simulation, ConstructsEachNamedEffect) {
+  SceneSpec spec = bareScene();
+  spec.gravity_m_s2 = Vec3(0, 0, -9.81);
+  spec.wind = Wind{Vec3(1, 0, 0), 0.1, 0.0, 0.0, 1.0};
+  spec.obstacle = floorAt(0.0);
+  spec.rigid_bodies.push_back({"finger", "finger", Vec3(0.1, 0.1, 0.1), Vec3(3, 0, 0), {}});
+  spec.bodies[0].bending = Bending{0.5};
+  spec.bodies[0].self_collision = SelfCollision{4};
+  spec.bodies[0].friction = 0.5;
+  spec.bodies[0].grippers.push_back({{0}, {}, {}});
+  const std::vector<std::string> expected = {
+      "gravity",         "wind",          "obstacle", "finger: rigid body", "sheet: bending", "sheet: self-collision",
+      "sheet: friction", "sheet: gripper"};
+  EXPECT_EQ(Simulation(spec, 1).effects(), expected);
+}
+
+TEST(Simulation, AnObstacleThatDoesNotCollideIsOnlyMapped) {
+  SceneSpec spec = bareScene();
+  spec.obstacle = floorAt(0.9);
+  spec.obstacle->collides = false;
+  EXPECT_TRUE(Simulation(spec, 1).effects().empty());
+}
+
+TEST(Simulation, FallsFreely) {
+  SceneSpec spec = bareScene();
+  spec.gravity_m_s2 = Vec3(0, 0, -9.81);
+  Simulation simulation(spec, 1);
+  for (int i = 0; i < 15; ++i) simulation.step();
+  const double t = simulation.time_s();
+  EXPECT_NEAR(t, 0.5, 1e-12);
+  // The integrator is of first order: half a step of velocity at most.
+  const double bound = 9.81 * t / (spec.frame_rate_hz * spec.substeps);
+  for (const Vec3& p : simulation.observe(0)) EXPECT_NEAR(p[2], 1.0 - 0.5 * 9.81 * t * t, bound);
+}
+
+TEST(Simulation, RestsOnTheObstacleAtItsThickness) {
+  SceneSpec spec = bareScene();
+  spec.gravity_m_s2 = Vec3(0, 0, -9.81);
+  spec.obstacle = floorAt(0.9);
+  spec.bodies[0].damping = 0.05;
+  spec.bodies[0].thickness_m = 0.005;
+  Simulation simulation(spec, 1);
+  for (int i = 0; i < 60; ++i) simulation.step();
+  const Positions positions = simulation.observe(0);
+  EXPECT_NEAR(lowest(positions), 0.905, 0.003);
+}
+
+TEST(Simulation, GrippedVerticesFollowTheirPathToTheLastBitAndAreLetGo) {
+  SceneSpec spec = bareScene();
+  spec.gravity_m_s2 = Vec3(0, 0, -9.81);
+  spec.bodies[0].grippers.push_back(
+      {{0, 4}, {{0.0, Vec3::Zero(), Vec3::Zero()}, {0.5, Vec3(0, 0, 0.2), Vec3::Zero()}}, 0.6});
+  Simulation simulation(spec, 1);
+  const Positions start = simulation.observe(0);
+  for (int i = 0; i < 15; ++i) simulation.step();
+  const Vec3 centroid = 0.5 * (start[0] + start[4]);
+  const Eigen::Isometry3d pose = motionAt(spec.bodies[0].grippers[0].motion, centroid, simulation.time_s());
+  EXPECT_EQ(simulation.observe(0)[0], pose * start[0]);
+  EXPECT_NEAR(simulation.observe(0)[4][2], 1.2, 1e-9);
+  for (int i = 0; i < 15; ++i) simulation.step();
+  EXPECT_LT(simulation.observe(0)[0][2], 1.1) << "released at 0.6 s";
+}
+
+TEST(Simulation, EqualSeedsGiveEqualMotionOthersDoNot) {
+  SceneSpec spec = bareScene();
+  spec.gravity_m_s2 = Vec3(0, 0, -9.81);
+  spec.obstacle = floorAt(0.95);
+  spec.bodies[0].start_noise_m = 0.002;
+  spec.bodies[0].tracker_noise_m = 0.001;
+  Simulation a(spec, 7), b(spec, 7), c(spec, 8);
+  for (int i = 0; i < 20; ++i) {
+    a.step();
+    b.step();
+    c.step();
+  }
+  const Positions of_a = a.observe(0);
+  EXPECT_EQ(of_a, b.observe(0));
+  EXPECT_NE(of_a, c.observe(0));
+}
+
+TEST(Simulation, RigidBodiesMoveAlongTheirKeys) {
+  SceneSpec spec = bareScene();
+  spec.rigid_bodies.push_back({"finger",
+                               "finger",
+                               Vec3(0.1, 0.1, 0.1),
+                               Vec3(3, 0, 0),
+                               {{0.0, Vec3::Zero(), Vec3::Zero()}, {1.0, Vec3(0, 0, 1), Vec3(0, 0, 0.5)}}});
+  Simulation simulation(spec, 1);
+  EXPECT_TRUE(simulation.rigidPose(0).translation().isApprox(Vec3(3, 0, 0)));
+  for (int i = 0; i < 30; ++i) simulation.step();
+  EXPECT_TRUE(simulation.rigidPose(0).translation().isApprox(Vec3(3, 0, 1), 1e-9));
+  EXPECT_NEAR(Eigen::AngleAxisd(simulation.rigidPose(0).linear()).angle(), 0.5, 1e-9);
+}
+
+TEST(Simulation, TheDemosClothStartsAboveTheTableLiesOnItFoldedAndEndsLiftedOff) {
+  const SceneSpec spec = readSceneFile(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/table_edge.yaml");
+  ASSERT_TRUE(spec.obstacle.has_value());
+  const double top = spec.obstacle->solids.at(0).box.max[2];
+  Simulation simulation(spec, 1);
+  EXPECT_GT(lowest(simulation.observe(0)), top + 0.15);
+  const int folded = 72, lifted = 105;  // 2.4 s: the right hand is over the left side; 3.5 s: it is up
+  for (int frame = 1; frame < spec.frames; ++frame) {
+    simulation.step();
+    const Positions cloth = simulation.observe(0);
+    if (frame >= lifted) {
+      EXPECT_GT(lowest(cloth), top + 0.1) << "frame " << frame;
+    }
+    if (frame != folded) continue;
+    EXPECT_NEAR(lowest(cloth), top + spec.bodies[0].thickness_m, 0.003);
+    for (const Vec3& p : cloth) EXPECT_LT(p[2], top + 0.1) << "it lies flat";
+    // The two sides that the hands held, 50 cm apart at the start, are over each other.
+    const Shape& sheet = spec.bodies[0].shape;
+    const Vec3 across = cloth[sheet.cols - 1] - cloth[0];
+    EXPECT_LT(across.norm(), 0.1);
+  }
+}
+
+TEST(Shapes, FacesCoverTheGridOnce) {
+  Shape sheet;
+  sheet.rows = 4;
+  sheet.cols = 5;
+  EXPECT_EQ(shapeFaces(sheet).size(), 2u * 3 * 4);
+  sheet.kind = Shape::Kind::TUBE;
+  EXPECT_EQ(shapeFaces(sheet).size(), 2u * 3 * 5);
+  for (const Face& face : shapeFaces(sheet)) {
+    EXPECT_NE(face[0], face[1]);
+    EXPECT_NE(face[1], face[2]);
+    EXPECT_LT(*std::max_element(face.begin(), face.end()), 20u);
+  }
+}
+
+TEST(Shapes, ATorusHasAHole) {
+  Solid ring;
+  ring.kind = Solid::Kind::RING;
+  ring.radius_m = 1.0;
+  ring.tube_radius_m = 0.2;
+  EXPECT_FALSE(contains(ring, Vec3::Zero()));
+  EXPECT_TRUE(contains(ring, Vec3(1, 0, 0)));
+  EXPECT_TRUE(contains(ring, Vec3(0, 1.19, 0)));
+  EXPECT_FALSE(contains(ring, Vec3(0, 1.21, 0)));
+  EXPECT_FALSE(contains(ring, Vec3(1, 0, 0.21)));
+}
+
+}  // namespace
+}  // namespace dccd::scene
