@@ -36,6 +36,9 @@ struct SeparationFrom {
   }
 };
 
+/// Body::own_voxels_m, whatever the map's resolution.
+constexpr double ONE_VOXEL = -1;
+
 /// Large parts are shared, never changed: a copy of a body costs no positions.
 struct Body {
   // What it is and what it is tested against: the same in every step of a stream.
@@ -45,7 +48,10 @@ struct Body {
   bool self_collision = true;
   bool against_bodies = true;
   bool against_obstacle = true;
-  bool shell = false;                       ///< a container: closed, but others may be inside of it
+  bool shell = false;  ///< a container: closed, but others may be inside of it
+  /// In a stream: how far from its surface the sensor that made the map may have put its points; what the map first
+  /// shows there is the body's own, and no obstacle [m]. 0: nothing is. ONE_VOXEL: as far as a voxel is long.
+  double own_voxels_m = 0;
   double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
   std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
   std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
@@ -80,6 +86,7 @@ inline bool sameBody(const Body& a, const Body& b) {
 inline bool meetsItself(const Body& body) { return body.self_collision && !body.rigid; }
 inline bool meet(const Body& a, const Body& b) { return a.against_bodies && b.against_bodies; }
 inline bool meetsMap(const Body& body) { return body.against_obstacle; }
+inline bool ownsVoxels(const Body& body) { return body.own_voxels_m > 0 || body.own_voxels_m == ONE_VOXEL; }
 
 /// What the body names as its separation from another one, by its number (or itself, or OBSTACLE_BODY) [m]; null: none.
 inline const double* namedSeparation(const Body& body, std::size_t other) {

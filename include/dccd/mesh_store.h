@@ -67,6 +67,7 @@ class DCCD_EXPORT MeshStore {
 
   bool empty() const { return frames_.empty(); }
   std::size_t size() const { return frames_.size(); }
+  const MeshFrame& oldest() const { return *frames_.front().frame; }
   const MeshFrame& newest() const { return *frames_.back().frame; }
   std::shared_ptr<const MeshFrame> newestShared() const { return frames_.back().frame; }
   /// The frame before the newest in the same run, or null.
@@ -84,6 +85,14 @@ class DCCD_EXPORT MeshStore {
   std::shared_ptr<const MeshFrame> frameAt(StampNs stamp_ns) const;
   /// The frames between two stamps, neither included.
   std::vector<std::shared_ptr<const MeshFrame>> framesWithin(StampNs from_ns, StampNs to_ns) const;
+
+  /// A part of the path between two frames without a seam between them, or one that no other joins, alone.
+  struct Stretch {
+    std::shared_ptr<const MeshFrame> from, to;
+    double first = 0, last = 0;  ///< [1] where it begins and ends between the two
+  };
+  /// The path from one stamp to another, both included, newest stretch first.
+  std::vector<Stretch> pathWithin(StampNs from_ns, StampNs to_ns) const;
 
   /// The poses seen between two stamps, neither included.
   std::vector<SeenPose> seenWithin(StampNs from_ns, StampNs to_ns) const;

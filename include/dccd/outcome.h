@@ -56,7 +56,8 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
 /// - minimum_separation: pairs that carry a distance into the elementary test, and no uncertainty;
 /// - tracker_noise: pairs whose vertices bring an uncertainty radius;
 /// - look_ahead: of the last prediction, pairs past the filters, and contacts;
-/// - patches: contacts and edges through faces at the start, and patches.
+/// - patches: contacts and edges through faces at the start, and patches;
+/// - own_voxels: voxels of the map near to bodies that were asked for, and those that are own or in doubt.
 #define DCCD_EFFECTS(ROW)                     \
   ROW(SELF_COLLISION, self_collision)         \
   ROW(BODY_BODY, body_body)                   \
@@ -67,7 +68,8 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
   ROW(MINIMUM_SEPARATION, minimum_separation) \
   ROW(TRACKER_NOISE, tracker_noise)           \
   ROW(LOOK_AHEAD, look_ahead)                 \
-  ROW(PATCHES, patches)
+  ROW(PATCHES, patches)                       \
+  ROW(OWN_VOXELS, own_voxels)
 #define DCCD_EFFECT_ENUMERATOR(EFFECT, name) EFFECT,
 enum class Effect : std::uint8_t { DCCD_EFFECTS(DCCD_EFFECT_ENUMERATOR) COUNT };
 #undef DCCD_EFFECT_ENUMERATOR

@@ -6,9 +6,27 @@
 #include <vector>
 
 #include "dccd/body.h"
+#include "dccd/known_space.h"
 #include "dccd/voxel_surface.h"
 
 namespace dccd {
+
+/// A finest voxel of a map that a tracked body accounts for.
+struct OwnVoxel {
+  VoxelKey key;
+  std::uint16_t body = 0;
+  bool doubted = false;  ///< it was there in the first map: body or obstacle, nobody can tell
+};
+
+/// What was taken out of a map since it is a body's own (doc/algorithm.md, "Own voxels").
+struct OwnVoxels {
+  std::uint64_t looked_at = 0;  ///< voxels near to bodies of which it was asked
+  std::uint64_t own = 0, doubted = 0;
+  std::string excluded, doubt;  ///< both in words; empty: there are none, or of doubted ones the step touches none
+  // Not recorded.
+  std::shared_ptr<const std::vector<OwnVoxel>> voxels{};  ///< for display; null: none
+  std::shared_ptr<const VoxelSurface> doubted_surface{};  ///< of those in doubt; null: there are none
+};
 
 /// The map of a step. None: surface null. Valid and empty: a surface without leaves.
 struct ObstacleMap {
@@ -16,7 +34,11 @@ struct ObstacleMap {
   StampNs stamp_ns = 0;
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();  ///< at the map's stamp, held for the whole step
   std::string frame_id;                                              ///< the name of its frame, for sentences
-  std::string problem;                                               ///< why there is none, for the reason of NO_MAP
+  std::string problem{};                                             ///< why there is none, for the reason of NO_MAP
+  std::shared_ptr<const KnownSpace> known{};                         ///< what it has seen; null: it does not tell
+  std::int64_t arrival_ns = 0;                                       ///< of its message, by any clock
+  bool trusted = false;                                              ///< nothing of it is ever a body's own
+  OwnVoxels own{};                                                   ///< what was taken out of it
 };
 
 struct Step {

@@ -26,7 +26,10 @@ struct MonitorOptions {
   /// With obstacle_expected, a map whose stamp is further than this from the end of the step, before or after it, is no
   /// map; 0: never. (Where none is expected, leaving a map out would go unsaid: it is used whatever its age.)
   double octomap_timeout_s = 0;
-  double look_ahead_s = 0;  ///< horizon of predictions; 0: none
+  /// How much older than its stamp what a map shows may be, for the bodies' own voxels [s].
+  double own_voxels_lag_s = 0.1;
+  bool own_voxels_trust = false;  ///< what the first map shows where a body is, is its own
+  double look_ahead_s = 0;        ///< horizon of predictions; 0: none
   /// A patch that comes back within this is the same one; of steps that were answered whole. With
   /// detector.patches.
   double patch_gap_s = tolerance::PATCH_GAP_S;
@@ -87,9 +90,13 @@ class DCCD_EXPORT Monitor {
   /// again.
   void withdraw(std::size_t body);
 
-  /// The map from the next step on.
+  /// The map from the next step on whose end is not before its stamp, where bodies have own voxels; else from the next
+  /// step on. Of one that is trusted nothing is a body's own.
   void setMap(ObstacleMap map);
-  const ObstacleMap& map() const;
+  /// What is occupied besides, from the next map on: it is trusted, and has the frame and resolution of the others.
+  void setMapBeside(ObstacleMap map);
+  const ObstacleMap& map() const;       ///< as it was given last
+  const ObstacleMap& mapInUse() const;  ///< of the last step, and of the next one where none waits
   /// Where the frame of what holds at all times was, up to the stamps of the steps to come: of a static body
   /// (fixed_from_frame, as MeshFrame::pose) or of the map (body OBSTACLE_BODY, map_from_fixed). A step in which it is
   /// not where push() or setMap() had it is PARTIAL.

@@ -219,6 +219,17 @@ constexpr unsigned long long MAP_NODE_BUILDING = 86, MAP_NODE = 70;
 /// of nodes included, of which it needs at most one of three: a list that grows, three times; a tree that is built and
 /// two surfaces.
 constexpr unsigned long long MAP_LEAF_ADDED = 200;
+/// [1] of a coordinate or a distance: what a body's own voxel must be nearer than own_voxels_m, for the rounding of the
+/// points that show it (some 20 units in the last place). Larger: voxels at the very rim are obstacles.
+constexpr double OWN_REACH = 0x1p-44;
+/// [1] of a voxel: how far a body's points go from one place to the next at which it is asked what it reaches. Larger:
+/// voxels near the rim of a fast body's way are obstacles. Smaller: more time.
+constexpr double OWN_PLACES = 0.5;
+/// [1] Places between two frames, and voxels near to bodies that are asked for; what is left out is an obstacle.
+constexpr int MOST_OWN_PLACES = 64;
+constexpr std::size_t MOST_OWN_ASKED = std::size_t{1} << 21;
+/// [s] How far back a body's way is known at the most, where maps come seldom.
+constexpr double OWN_PATH_S = 10;
 
 }  // namespace tolerance
 }  // namespace dccd

@@ -4,6 +4,14 @@
 
 namespace dccd {
 
+double ownVoxelsOf(ParameterReader& reader, double fallback) {
+  if (const ParameterTree& given = reader.raw("own_voxels_m"); given.kind == ParameterTree::Kind::TEXT) {
+    reader.choice("own_voxels_m", "auto", {"auto"});
+    return ONE_VOXEL;
+  }
+  return reader.number("own_voxels_m", fallback, 0, LARGE);
+}
+
 double separationOf(ParameterReader& reader, double fallback) {
   return reader.number("minimum_separation_m", fallback, 0, LARGE);
 }
@@ -138,6 +146,7 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   body.body.against_obstacle = reader.get("against_obstacle", !body.isDepthImage());
   body.body.shell = reader.get("shell", false);
   body.body.minimum_separation_m = separationOf(reader, config.minimum_separation_m);
+  body.body.own_voxels_m = ownVoxelsOf(reader, config.own_voxels_m);
 }
 
 /// Two bodies, in either order, of an entry of minimum_separation_pairs.

@@ -11,6 +11,8 @@ namespace dccd {
 constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
 
+/// own_voxels_m of the section [m], or the fallback; `auto`: ONE_VOXEL.
+double ownVoxelsOf(ParameterReader& reader, double fallback);
 /// minimum_separation_m of the section [m], or the fallback.
 double separationOf(ParameterReader& reader, double fallback);
 /// The two that an entry names under `between`: bodies, "octomap", which comes second then, and "self" for the other

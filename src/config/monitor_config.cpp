@@ -139,6 +139,10 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
       << 20;
   if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
   config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
+  config.own_voxels_m = ownVoxelsOf(reader, 0);
+  config.monitor.own_voxels_lag_s =
+      reader.number("own_voxels_lag_s", config.monitor.own_voxels_lag_s, 0, tolerance::OWN_PATH_S);
+  config.monitor.own_voxels_trust = reader.choice("own_voxels_doubt", "unproved", {"unproved", "trust"}) == "trust";
   const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
   config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
                          : unknown == "occupied" ? UnknownSpace::OCCUPIED
@@ -252,10 +256,20 @@ void applyEffects(MonitorConfig& config) {
       body.input.noise_radius_m = 0;
     }
   }
+  if (off(Effect::OWN_VOXELS)) {
+    for (BodyConfig& body : config.bodies) body.body.own_voxels_m = 0;
+  }
   if (off(Effect::START_STATE)) config.monitor.detector.check_start_state = false;
   if (off(Effect::LOOK_AHEAD)) config.monitor.look_ahead_s = 0;
   config.monitor.detector.patches = !off(Effect::PATCHES) && !config.monitor.detector.earliest_only;
   if (off(Effect::UNKNOWN_SPACE)) config.unknown_space = UnknownSpace::FREE;
+}
+
+void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) {
+  if (!config.ownsVoxels() || config.unknown_space != UnknownSpace::OCCUPIED) return;
+  reader.fail("own_voxels_m",
+              "is above 0, but with unknown_space: occupied a body's own voxels cannot be told from what "
+              "is unknown; write unknown_space: report, or own_voxels_m: 0");
 }
 
 /// The same text for the same values, wherever they were read from.
@@ -331,6 +345,10 @@ bool MonitorConfig::namesOctomap() const {
   return automatic ? octomap_topic_named || !octomap_file.empty() : setting->second == EffectSetting::ON;
 }
 
+bool MonitorConfig::ownsVoxels() const {
+  return std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return dccd::ownsVoxels(body.body); });
+}
+
 bool MonitorConfig::holdsDistance() const {
   return std::any_of(bodies.begin(), bodies.end(),
                      [](const BodyConfig& body) { return body.isUncertain() || largestSeparation({body.body}) > 0; });
@@ -366,6 +384,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
   applyEffects(config);
+  checkOwnVoxels(reader, config);
   settleAccuracy(reader, config);
   config.given_hash = hashOf(givenText(tree));
   return config;

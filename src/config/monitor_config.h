@@ -54,6 +54,7 @@ struct MonitorConfig {
   MonitorOptions monitor;
   EffectSettings effects;
   double minimum_separation_m = 0;  ///< of bodies that name none
+  double own_voxels_m = 0;          ///< the same
   /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
   std::vector<Expectation> expected_contacts;
   std::string phase;  ///< of the task, in force; empty: none
@@ -85,6 +86,9 @@ struct MonitorConfig {
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
   /// A separation or an uncertainty is asked for, so that only conservative will do.
+  bool ownsVoxels() const;
+  /// Free leaves of maps are asked for, too.
+  bool needsKnownSpace() const { return unknown_space != UnknownSpace::FREE || ownsVoxels(); }
   bool holdsDistance() const;
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
   std::uint64_t hash() const;

@@ -44,7 +44,8 @@ void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
   if (maps_.size() < MAX_OPEN) maps_.push_back({name, now_ns});
 }
 
-void Liveness::mapSettled(std::int64_t name) {
+void Liveness::mapSettled(std::int64_t name, std::int64_t placed) {
+  maps_placed_ = placed;
   while (!maps_.empty() && maps_.front().name <= name) maps_.pop_front();
 }
 
@@ -77,7 +78,7 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (newest_.came_ns != NEVER && secondsBetween(newest_.came_ns, now_ns) > limits_.max_step_s) {
     add(Fault::Kind::SILENCE, "no frame has come for more than " + seconds(limits_.max_step_s));
   }
-  if (!maps_.empty() && maps_.front().name < answered_) {
+  if (!maps_.empty() && maps_.front().name < answered_ && maps_.front().name > maps_placed_) {
     add(Fault::Kind::NEWER_MAP, "a newer map came before the last frame that was answered, and is not in use yet");
   } else if (!maps_.empty() && secondsBetween(maps_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
     add(Fault::Kind::NEWER_MAP,

@@ -36,7 +36,9 @@ class Liveness {
   void outcome(std::int64_t name, double map_age_s, std::int64_t now_ns);
   /// A map came, under a name as frames have. It and all before it are in use, gave way to it or were refused.
   void mapCame(std::int64_t name, std::int64_t now_ns);
-  void mapSettled(std::int64_t name);
+  /// Those up to `placed` have a place, and are in use from the first frame on that is not before their stamp; they
+  /// have answer_timeout_s for that.
+  void mapSettled(std::int64_t name, std::int64_t placed);
 
   /// A frame of a static body came: what was said is void until a step that used it is answered. One that follows the
   /// last one within max_step_s, as a depth camera's do all the time, has answer_timeout_s for that.
@@ -63,7 +65,8 @@ class Liveness {
   LivenessLimits limits_;
   std::deque<Frame> open_;  // without an outcome; at most a few thousand, of which the oldest counts
   Frame newest_{0, NEVER};
-  std::deque<Frame> maps_;                               // not in use; at most as many
+  std::deque<Frame> maps_;  // not in use; at most as many
+  std::int64_t maps_placed_ = NEVER;
   std::int64_t answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
   std::uint64_t static_came_ = 0, static_in_use_ = 0, static_answered_ = 0;  // frames: in all, in use, in an answer

@@ -22,7 +22,7 @@ namespace {
 OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std::size_t& unknown) {
   OctomapLimits limits;
   limits.max_bytes = largestMapMessage(config);
-  limits.free_leaves = config.unknown_space != UnknownSpace::FREE;
+  limits.free_leaves = config.needsKnownSpace();
   if (!memory) return limits;
   limits.max_leaves = std::numeric_limits<std::size_t>::max();
   limits.accept = [&unknown, memory](const OctomapCounts& counts) { unknown = memory->accept(counts); };
@@ -33,7 +33,8 @@ OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std
 void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, std::size_t max_unknown,
            LoadedMap& map) {
   const auto counted = [memory](auto made) { return memory ? memory->counted(std::move(made)) : made; };
-  if (config.unknown_space != UnknownSpace::FREE) {
+  // A map that has nothing free does not tell what it has seen: for own voxels, what is not occupied is free there.
+  if (config.unknown_space != UnknownSpace::FREE || (config.needsKnownSpace() && !decoded.free.empty())) {
     std::vector<OccupiedLeaf> known;
     known.reserve(decoded.occupied.size() + decoded.free.size());
     known.assign(decoded.occupied.begin(), decoded.occupied.end());

@@ -20,9 +20,9 @@ std::size_t built(std::size_t leaves, std::size_t nodes) {
   return std::max<std::size_t>(leaves * MAP_LEAF_SORTING, leaves * MAP_LEAF_BUILDING + nodes * MAP_NODE_BUILDING);
 }
 
-Need needOf(const OctomapCounts& counts, UnknownSpace unknown) {
+Need needOf(const OctomapCounts& counts, bool with_known) {
   const std::size_t surface = counts.occupied * MAP_LEAF_IN_SURFACE + counts.occupied_nodes * MAP_NODE;
-  if (unknown == UnknownSpace::FREE) return {built(counts.occupied, counts.occupied_nodes), surface};
+  if (!with_known) return {built(counts.occupied, counts.occupied_nodes), surface};
   const std::size_t all = counts.occupied + counts.free;
   const std::size_t known = all * MAP_LEAF_IN_TREE + counts.known_nodes * MAP_NODE;
   const std::size_t most = std::max<std::size_t>(counts.occupied * MAP_LEAF_LISTED + built(all, counts.known_nodes),
@@ -36,10 +36,11 @@ std::string inMegabytes(std::size_t bytes) { return std::to_string((bytes + (1 <
 
 std::size_t MapMemory::accept(const OctomapCounts& counts) const {
   const std::size_t room = config_.max_map_bytes / 8 * 5, held = *held_;
-  const Need need = needOf(counts, config_.unknown_space);
-  // One that is in use, one that follows, and while steps are without voxels in boxes what is left of both.
+  const Need need = needOf(counts, config_.needsKnownSpace());
+  // One that is in use, one that follows, and while steps are without some voxels what is left of both.
   std::size_t least = need.most + 2 * need.kept;
-  if (!config_.monitor.detector.exclude_boxes.empty()) {
+  const bool excludes = !config_.monitor.detector.exclude_boxes.empty();
+  for (int copies = excludes + config_.ownsVoxels(); copies > 0; --copies) {
     least += built(counts.occupied, counts.occupied_nodes) + need.kept + MAX_ADDED_LEAVES * MAP_LEAF_ADDED;
   }
   const std::size_t wanted = std::max(least, need.most + held);

@@ -164,7 +164,9 @@ std::string MonitorPipeline::phaseInWords() const {
 }
 
 void MonitorPipeline::measureUnknown(Outcome& outcome) const {
-  if (config_.unknown_space != UnknownSpace::REPORT || !known_ || !outcome.answered || !outcome.obstacle) return;
+  if (config_.unknown_space != UnknownSpace::REPORT || !outcome.answered || !outcome.obstacle) return;
+  const std::shared_ptr<const KnownSpace>& known = outcome.step->map.known;
+  if (!known) return;
   const auto start = std::chrono::steady_clock::now();
   const Deadline deadline = monitor_->restOf(outcome);
   SweptSpace sum;
@@ -180,7 +182,7 @@ void MonitorPipeline::measureUnknown(Outcome& outcome) const {
     transform(outcome.step->map.map_from_fixed, map_t0);
     transform(outcome.step->map.map_from_fixed, map_t1);
     const SweptSpace one =
-        known_->sweptSpace(topology, map_t0, map_t1, active.data(), KnownSpace::MOST_BLOCKS, deadline);
+        known->sweptSpace(topology, map_t0, map_t1, active.data(), KnownSpace::MOST_BLOCKS, deadline);
     sum.voxels += one.voxels;
     sum.unknown += one.unknown;
     sum.complete = sum.complete && one.complete;
@@ -287,6 +289,10 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   expectMap();
+  if (map.trusted && config_.octomap_topic_named) {
+    trusted_map_ = std::move(map);
+    return;
+  }
   if (!unplaced_map_) unplaced_since_ns_ = now_ns;
   unplaced_map_ = std::move(map);
 }

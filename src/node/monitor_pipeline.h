@@ -22,11 +22,12 @@ namespace dccd {
 /// A decoded map in its own frame.
 struct LoadedMap {
   std::shared_ptr<const VoxelSurface> surface;  ///< null: `problem` says why
-  std::shared_ptr<const KnownSpace> known;      ///< when unknown_space is not free
+  std::shared_ptr<const KnownSpace> known;      ///< when unknown_space is not free, or bodies have own voxels
   std::string frame_id;                         ///< empty: the fixed frame
   StampNs stamp_ns = 0;                         ///< 0: no stamp; the latest transform is taken
   std::int64_t arrival_ns = 0;                  ///< by the clock that frames' are of
   std::string problem;
+  bool trusted = false;  ///< octomap_file: nothing of it is a body's own, and it is used together with a live one
 };
 
 /// What a body's mesh is taken for: a topology on the same vertices, the same object for the same one. The positions
@@ -51,7 +52,12 @@ class MonitorPipeline {
   void setTopologyFilter(TopologyFilter filter) { topology_filter_ = std::move(filter); }
   void setMap(LoadedMap map, std::int64_t now_ns);
   /// When the newest map that is in use or was refused came; one that was set and has no place yet is neither.
-  std::int64_t settledMapNs() const { return settled_map_ns_; }
+  std::int64_t settledMapNs() const {
+    return monitor_->mapInUse().arrival_ns == monitor_->map().arrival_ns ? settled_map_ns_
+                                                                         : monitor_->mapInUse().arrival_ns;
+  }
+  /// The same of the newest that has a place, or was refused.
+  std::int64_t placedMapNs() const { return settled_map_ns_; }
   /// Somebody is there who publishes maps: from now on a step without one lacks it.
   void expectMap() { effects_.expectMap(); }
   /// The next outcome; frames that wait for tf move on as far as they can. False: nothing more for now.
@@ -119,7 +125,8 @@ class MonitorPipeline {
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
   std::optional<LoadedMap> unplaced_map_;
-  std::shared_ptr<const KnownSpace> known_;  // of the map in use
+  std::optional<LoadedMap> trusted_map_;  // beside live ones
+  bool trusted_placed_ = false;
   std::int64_t unplaced_since_ns_ = 0, settled_map_ns_ = 0;
   std::string map_note_;
   StampNs clock_ns_ = 0;  // of the clock body's last frame that was placed; 0: none
@@ -164,6 +171,8 @@ class MonitorPipeline {
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
   bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
+  bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
+  bool placeTrusted(std::int64_t now_ns);
   void placeMap(std::int64_t now_ns);
   /// Poses that were seen, of a body by its number, or of the map.
   using SeenPoses = std::vector<std::pair<std::size_t, std::vector<SeenPose>>>;

@@ -147,6 +147,49 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   return true;
 }
 
+/// The map in the fixed frame, by the transform at its stamp.
+bool MonitorPipeline::findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason) {
+  const std::string frame = loaded.frame_id.empty() ? fixed_frame_ : loaded.frame_id;
+  map.surface = loaded.surface;
+  map.stamp_ns = loaded.stamp_ns;
+  map.arrival_ns = loaded.arrival_ns;
+  map.known = loaded.known;
+  map.trusted = loaded.trusted;
+  map.frame_id = frame;
+  if (transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason)) return true;
+  // A latched map is older than all of tf that a monitor hears that starts later.
+  const std::optional<StampNs> first_ns = transforms_.firstStamp(frame, fixed_frame_);
+  std::string unused;
+  if (!first_ns || *first_ns <= map.stamp_ns ||
+      !transforms_.lookup(frame, fixed_frame_, *first_ns, map.map_from_fixed, unused)) {
+    return false;
+  }
+  std::ostringstream text;
+  text << "the octomap is older than all transforms of its frame '" << frame << "': it is placed by the first, "
+       << secondsBetween(map.stamp_ns, *first_ns) << " s after its stamp";
+  map_note_ = text.str();
+  return true;
+}
+
+/// Whether what octomap_file holds beside live maps has its place, without which none of these is used.
+bool MonitorPipeline::placeTrusted(std::int64_t now_ns) {
+  if (!trusted_map_ || trusted_placed_) return true;
+  if (!trusted_map_->surface) {
+    monitor_->setMap(noMap(trusted_map_->problem));
+    return false;
+  }
+  ObstacleMap map;
+  std::string reason;
+  trusted_placed_ = findPlace(*trusted_map_, map, reason);
+  if (trusted_placed_) {
+    monitor_->setMapBeside(std::move(map));
+  } else if (finishing_ || secondsBetween(unplaced_since_ns_, now_ns) >= config_.transform_timeout_s) {
+    monitor_->setMap(noMap("no transform from '" + fixed_frame_ + "' to the frame of octomap_file '" + map.frame_id +
+                           "': " + reason + unusableTransforms()));
+  }
+  return trusted_placed_;
+}
+
 void MonitorPipeline::placeMap(std::int64_t now_ns) {
   if (!unplaced_map_) return;
   if (!unplaced_map_->surface) {
@@ -155,32 +198,17 @@ void MonitorPipeline::placeMap(std::int64_t now_ns) {
     settled_map_ns_ = unplaced_map_->arrival_ns;
     unplaced_map_.reset();
     placed_map_.reset();
-    known_.reset();
     return;
   }
   if (fixed_frame_.empty()) return;
-  const std::string frame = unplaced_map_->frame_id.empty() ? fixed_frame_ : unplaced_map_->frame_id;
+  if (!placeTrusted(now_ns)) return;
   ObstacleMap map;
-  map.surface = unplaced_map_->surface;
-  map.stamp_ns = unplaced_map_->stamp_ns;
-  map.frame_id = frame;
-  std::string reason, unused;
-  bool placed = transforms_.lookup(frame, fixed_frame_, map.stamp_ns, map.map_from_fixed, reason);
-  // A latched map is older than all of tf that a monitor hears that starts later.
-  const std::optional<StampNs> first_ns = placed ? std::nullopt : transforms_.firstStamp(frame, fixed_frame_);
-  if (first_ns && *first_ns > map.stamp_ns) {
-    placed = transforms_.lookup(frame, fixed_frame_, *first_ns, map.map_from_fixed, unused);
-    if (placed) {
-      std::ostringstream text;
-      text << "the octomap is older than all transforms of its frame '" << frame << "': it is placed by the first, "
-           << secondsBetween(map.stamp_ns, *first_ns) << " s after its stamp";
-      map_note_ = text.str();
-    }
-  }
+  std::string reason;
+  const bool placed = findPlace(*unplaced_map_, map, reason);
+  const std::string frame = map.frame_id;
   if (placed) {
     monitor_->setMap(std::move(map));
     lookBack(OBSTACLE_BODY, frame, fixed_frame_);
-    known_ = unplaced_map_->known;
     settled_map_ns_ = unplaced_map_->arrival_ns;
     if (config_.fixed_frame.empty()) placed_map_ = std::move(unplaced_map_);
     unplaced_map_.reset();
@@ -242,6 +270,7 @@ std::vector<SeenPose> MonitorPipeline::posesBetween(const std::string& target, c
 
 void MonitorPipeline::learnAnew(StepStatus status) {
   if (!config_.fixed_frame.empty()) return;
+  trusted_placed_ = false;
   fixed_frame_.clear();
   frame_answered_ = false;
   monitor_->reset(status);
@@ -261,7 +290,6 @@ void MonitorPipeline::learnAnew(StepStatus status) {
   if (!placed_map_) return;
   if (!unplaced_map_) unplaced_map_ = std::move(placed_map_);
   placed_map_.reset();
-  known_.reset();
   unplaced_since_ns_ = 0;
   monitor_->setMap({});
 }

@@ -142,7 +142,7 @@ void CollisionMonitor::Impl::publishOutcome(Outcome& outcome) {
 void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   const auto& bodies = pipeline.monitor().bodies();
   const std::string& frame = pipeline.fixedFrame();
-  state.mapSettled(pipeline.settledMapNs());
+  state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
   log.tell(outcome);
   newest_ns = outcome.stamp_ns;
   // Before the contacts, though these then wait some 50 us longer for roscpp: a long list is not to keep a clear state
@@ -237,7 +237,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   if (holdsStaticFrames()) state.staticInUse(static_frames);
   Outcome outcome;
   while (!stopping && pipeline.nextOutcome(steadyNs(), outcome)) publishOutcome(outcome);
-  state.mapSettled(pipeline.settledMapNs());
+  state.mapSettled(pipeline.settledMapNs(), pipeline.placedMapNs());
   tellComplaints();
   const std::string surprise = recorder.takeSurprise();
   if (!surprise.empty()) log.alarm("surprise", surprise);

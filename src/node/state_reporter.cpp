@@ -59,9 +59,9 @@ void StateReporter::mapCame(std::int64_t arrival_ns) {
   liveness_.mapCame(arrival_ns, clock_.now());
 }
 
-void StateReporter::mapSettled(std::int64_t arrival_ns) {
+void StateReporter::mapSettled(std::int64_t arrival_ns, std::int64_t placed_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  liveness_.mapSettled(arrival_ns);
+  liveness_.mapSettled(arrival_ns, placed_ns);
 }
 
 void StateReporter::staticCame(const std::string& body) {

@@ -43,7 +43,7 @@ class StateReporter {
   void frameCame(std::int64_t arrival_ns);
   /// A map came; the node uses or has refused those that came up to then.
   void mapCame(std::int64_t arrival_ns);
-  void mapSettled(std::int64_t arrival_ns);
+  void mapSettled(std::int64_t arrival_ns, std::int64_t placed_ns);
   /// A static body's frame came.
   void staticCame(const std::string& body);
   std::uint64_t staticFrames();

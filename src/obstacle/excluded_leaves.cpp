@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "obstacle/leaf_sets.h"
+
 namespace dccd {
 namespace {
 
@@ -49,15 +51,7 @@ class Splitter {
     parts_ += 8;
     const std::size_t first = remaining_.leaves.size();
     const std::uint64_t before = remaining_.excluded_voxels;
-    const std::uint32_t half = leaf.size / 2;
-    for (std::uint32_t child = 0; child < 8; ++child) {
-      OccupiedLeaf part;
-      part.size = half;
-      part.min.x = static_cast<std::uint16_t>(leaf.min.x + (child & 1) * half);
-      part.min.y = static_cast<std::uint16_t>(leaf.min.y + (child >> 1 & 1) * half);
-      part.min.z = static_cast<std::uint16_t>(leaf.min.z + (child >> 2) * half);
-      add(part);
-    }
+    for (const OccupiedLeaf& part : eighthsOf(leaf)) add(part);
     if (remaining_.excluded_voxels > before) return;
     remaining_.leaves.resize(first);
     remaining_.leaves.push_back(leaf);

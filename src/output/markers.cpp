@@ -152,6 +152,21 @@ void addObstacle(const Outcome& outcome, double within_m, const std::string& fra
   for (auto& voxels : by_size) out.markers.push_back(std::move(voxels.second));
 }
 
+/// What is a body's own, and what is in doubt, is no obstacle and not among those above.
+void addOwn(const Outcome& outcome, const std::string& frame, MarkerArray& out) {
+  const auto& voxels = outcome.step->map.own.voxels;
+  if (!outcome.obstacle || !voxels || voxels->empty()) return;
+  const double edge = outcome.obstacle->resolution();
+  Marker marker = list(outcome, frame, "own", Marker::CUBE_LIST, 0.97 * edge);
+  placeInMap(outcome, marker);
+  for (std::size_t i = 0; i < std::min(voxels->size(), MAX_VOXELS_SHOWN); ++i) {
+    const OwnVoxel& voxel = (*voxels)[i];
+    marker.points.push_back(point(voxelMin(voxel.key, edge) + Vec3::Constant(0.5 * edge)));
+    marker.colors.push_back(voxel.doubted ? color(0.95, 0.75, 0.2, 0.4) : color(0.35, 0.65, 0.45, 0.25));
+  }
+  out.markers.push_back(std::move(marker));
+}
+
 /// Its edges, so that it hides nothing of what touches it; in the map's pose.
 void addVoxel(const Outcome& outcome, const Contact& contact, Marker& edges) {
   if (contact.body[1] != OBSTACLE_BODY) return;
@@ -313,6 +328,7 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
     addFace(outcome, contact, faces);
   }
   addObstacle(outcome, config.obstacle_m, frame, out);
+  addOwn(outcome, frame, out);
   if (config.mesh) {
     addMeshes(outcome, bodies, config, frame, out);
     addLegend(outcome, frame, out);

@@ -310,6 +310,11 @@ void visit(Archive& a, Recording& r) {
   a.number(r.step.map.stamp_ns);
   visitPose(a, r.step.map.map_from_fixed);
   a.text(r.step.map.problem);
+  a.number(r.step.map.own.looked_at);
+  a.number(r.step.map.own.own);
+  a.number(r.step.map.own.doubted);
+  a.text(r.step.map.own.excluded);
+  a.text(r.step.map.own.doubt);
   a.flag(r.has_answer);
   visitAnswer(a, r.answer);
 }

@@ -143,6 +143,7 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
     say(StepStatus::NO_MAP, step.map.problem + "; checked without it");
   }
   // None of these changes the status: the step was computed as it was asked for.
+  if (!step.map.own.doubt.empty()) outcome.unproved.push_back(step.map.own.doubt);
   for (const Body& body : step.bodies) {
     if (!isMaskedWhole(body)) continue;
     outcome.unproved.push_back("vertex_mask names every vertex of body '" + body.name +
@@ -173,6 +174,7 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
   if (!options.exclude_boxes.empty()) {
     excluded.push_back(std::to_string(excluded_voxels) + " voxels of the map by exclude_boxes");
   }
+  if (!step.map.own.excluded.empty()) excluded.push_back(step.map.own.excluded);
   return excluded;
 }
 
@@ -259,6 +261,8 @@ void conclude(const Options& options, const Step& step, std::size_t needed_parts
   countContacts(outcome);
   keepEarliest(options.max_contacts, outcome.contacts);
   judge(options, step, needed_parts, outcome);
+  outcome.stats[Effect::OWN_VOXELS].in = step.map.own.looked_at;
+  outcome.stats[Effect::OWN_VOXELS].out = step.map.own.own + step.map.own.doubted;
   outcome.excluded = excludedByChoice(options, step, outcome.excluded_voxels);
   outcome.expected = describe(options.expected, step.bodies);
   outcome.touching = touchingOf(outcome, suppressed_unexpected);

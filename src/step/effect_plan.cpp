@@ -200,10 +200,22 @@ Finding patches(const EffectScene& scene) {
   return wanted("contacts that belong together are told as one");
 }
 
+Finding ownVoxels(const EffectScene& scene) {
+  std::string bodies;
+  for (const Body& body : scene.bodies) {
+    if (!ownsVoxels(body)) continue;
+    append(bodies, ", ",
+           body.name + " within " + (body.own_voxels_m > 0 ? metres(body.own_voxels_m) + " m" : "a voxel"));
+  }
+  if (bodies.empty()) return impossible("own_voxels_m is 0 for every body; set it above");
+  if (!scene.map_used) return idle("there is no map");
+  return wanted("what the map first shows where a body is, is no obstacle: " + bodies);
+}
+
 /// By Effect: what a scene says of it.
 constexpr Finding (*FIND[])(const EffectScene&) = {
-    selfCollision, bodyBody,          octomap,      startState, rigidBodies,
-    unknownSpace,  minimumSeparation, trackerNoise, lookAhead,  patches,
+    selfCollision,     bodyBody,     octomap,   startState, rigidBodies, unknownSpace,
+    minimumSeparation, trackerNoise, lookAhead, patches,    ownVoxels,
 };
 static_assert(std::size(FIND) == static_cast<std::size_t>(Effect::COUNT), "one for each effect");
 

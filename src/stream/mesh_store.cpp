@@ -182,6 +182,24 @@ std::vector<std::shared_ptr<const MeshFrame>> MeshStore::framesWithin(StampNs fr
   return within;
 }
 
+std::vector<MeshStore::Stretch> MeshStore::pathWithin(StampNs from_ns, StampNs to_ns) const {
+  std::vector<Stretch> path;
+  for (std::size_t i = frames_.size(); i-- > 0;) {
+    const std::shared_ptr<const MeshFrame>& to = frames_[i].frame;
+    const bool joined = i > 0 && frames_[i - 1].run == frames_[i].run;
+    const bool goes_on = i + 1 < frames_.size() && frames_[i + 1].run == frames_[i].run;
+    if (joined) {
+      const std::shared_ptr<const MeshFrame>& from = frames_[i - 1].frame;
+      if (from->stamp_ns > to_ns || to->stamp_ns < from_ns) continue;
+      path.push_back({from, to, fraction(from->stamp_ns, to->stamp_ns, std::max(from_ns, from->stamp_ns)),
+                      fraction(from->stamp_ns, to->stamp_ns, std::min(to_ns, to->stamp_ns))});
+    } else if (!goes_on && to->stamp_ns >= from_ns && to->stamp_ns <= to_ns) {
+      path.push_back({to, to, 0, 0});
+    }
+  }
+  return path;
+}
+
 std::vector<SeenPose> MeshStore::seenWithin(StampNs from_ns, StampNs to_ns) const {
   std::vector<SeenPose> within;
   for (std::size_t i = firstAtOrAfter(from_ns + 1); i < frames_.size(); ++i) {

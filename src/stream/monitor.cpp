@@ -24,6 +24,9 @@ void checkStream(const MonitorOptions& options, std::size_t bodies) {
   require(options.octomap_timeout_s >= 0, "octomap_timeout_s must be 0 (never) or more");
   require(options.look_ahead_s >= 0 && std::isfinite(options.look_ahead_s),
           "look_ahead_s must be finite and 0 (off) or more, is " + std::to_string(options.look_ahead_s));
+  require(options.own_voxels_lag_s >= 0 && options.own_voxels_lag_s <= tolerance::OWN_PATH_S,
+          "own_voxels_lag_s must be 0 to " + std::to_string(static_cast<int>(tolerance::OWN_PATH_S)) + ", is " +
+              std::to_string(options.own_voxels_lag_s));
   require(options.patch_gap_s >= 0 && std::isfinite(options.patch_gap_s),
           "patch_gap_s must be finite and 0 or more, is " + std::to_string(options.patch_gap_s));
 }
@@ -72,7 +75,6 @@ double Monitor::stepMs() const {
   const double limit_ms = timeLimitMs(impl_->options.detector);
   return impl_->options.look_ahead_s > 0 ? (1 - tolerance::LOOK_AHEAD_SHARE) * limit_ms : limit_ms;
 }
-const ObstacleMap& Monitor::map() const { return impl_->map; }
 const std::vector<LeftOutPair>& Monitor::leftOut() const { return impl_->history.leftOut(); }
 const FrameCounters& Monitor::counters(std::size_t body) const { return impl_->counters.at(body); }
 
@@ -225,7 +227,8 @@ void Monitor::Impl::forgetLast() {
 }
 
 Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline) {
-  const Step step = place(pending);
+  Step step = place(pending);
+  settleDoubt(step, deadline);
   // A step continues the last one if it begins at that one's end and no body has begun a new run in between (ready()
   // has set the runs): only then are interpolated positions at the stamp in common the same bits.
   if (!last || last->stamp_ns != step.start_ns || last_runs != runs) forgetLast();
@@ -237,6 +240,8 @@ Outcome Monitor::Impl::runStep(const Pending& pending, const Deadline& deadline)
   Outcome outcome = detect(step, options.detector, history, deadline);
   last = outcome.step;
   last_runs = runs;
+  outcome.stats[Effect::OWN_VOXELS].ms += own_voxels_ms;
+  outcome.stats.total_ms += own_voxels_ms;
   follow(outcome);
   return outcome;
 }

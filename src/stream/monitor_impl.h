@@ -1,5 +1,5 @@
 // What a monitor holds and does: monitor.cpp has its frames and steps, monitor_inputs.cpp what a step is made of
-// (bodies, references, map), monitor_questions.cpp what is asked between steps.
+// (bodies, references), monitor_maps.cpp its map, monitor_questions.cpp what is asked between steps.
 #pragma once
 
 #include <atomic>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dccd/stream.h"
+#include "stream/own_voxels.h"
 #include "stream/patch_tracker.h"
 
 namespace dccd {
@@ -41,11 +42,14 @@ struct Monitor::Impl {
   std::vector<MeshStore> stores;
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
-  ObstacleMap map;
-  std::string map_frame;  // of the last map that there was
+  ObstacleMap map, trusted;              // in force; what is occupied besides
+  std::deque<ObstacleMap> maps_to_come;  // by stamp, as they were given: newer than what is known of the bodies
+  OwnVoxelFinder own_voxels;
+  double own_voxels_ms = 0;  // of the step that is made
+  std::string map_frame;     // of the last map that there was
   /// Per body, and last of the map: for the steps to come, by stamp.
   std::vector<std::map<StampNs, Eigen::Isometry3d>> held_seen;
-  History history, side_history;  // of steps; of predictions and checks
+  History history, side_history, doubt_history;  // of steps; of predictions and checks; of voxels in doubt
   PatchTracker tracker;
   std::shared_ptr<const Step> last;  // the step before, where nothing has come between; null: none
   References references;
@@ -94,6 +98,10 @@ struct Monitor::Impl {
   /// Nothing is carried over a seam.
   void forgetLast();
   bool separates(const Body& body) const;
+  std::vector<TrackedBody> tracked() const;
+  void takeMaps(StampNs known_until_ns);
+  void settleDoubt(Step& step, const Deadline& deadline);
+  StampNs wayNeededFrom(std::size_t body, StampNs stamp_ns) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;
   Outcome runStep(const Pending& pending, const Deadline& deadline);
   void follow(Outcome& outcome);

@@ -209,6 +209,7 @@ Step Monitor::Impl::place(const Pending& pending) {
   step.start_ns = pending.from->stamp_ns;
   step.stamp_ns = pending.to->stamp_ns;
   step.sequence = pending.sequence;
+  takeMaps(step.stamp_ns);
   step.map = usableMap(step.stamp_ns);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Body& body = step.bodies[b];
@@ -222,7 +223,7 @@ Step Monitor::Impl::place(const Pending& pending) {
       placeBetween(stores[b].frameAt(step.start_ns), stores[b].frameAt(step.stamp_ns), body);
       lookBetween(b, step);
     }
-    stores[b].forgetBefore(step.stamp_ns);
+    stores[b].forgetBefore(wayNeededFrom(b, step.stamp_ns));
   }
   lookAtHeld(step);
   keepReferences(step, references);
@@ -264,14 +265,6 @@ bool Monitor::Impl::separates(const Body& body) const {
          std::any_of(body.separations.begin(), body.separations.end(), named);
 }
 
-void Monitor::setMap(ObstacleMap map) {
-  // Steps that wait may have another map, of the same frame, after none.
-  if (!map.frame_id.empty() && map.frame_id != std::exchange(impl_->map_frame, map.frame_id)) {
-    impl_->held_seen.back().clear();
-  }
-  impl_->map = std::move(map);
-}
-
 void Monitor::seen(std::size_t body, const std::vector<SeenPose>& poses) {
   auto& all = impl_->held_seen.at(body == OBSTACLE_BODY ? impl_->bodies.size() : body);
   for (const SeenPose& one : poses) all.insert_or_assign(one.stamp_ns, one.pose);
@@ -286,28 +279,6 @@ StampNs Monitor::Impl::oldestStart(StampNs otherwise) const {
     if (step.from) oldest = std::min(oldest, step.from->stamp_ns);
   }
   return oldest;
-}
-
-ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
-  ObstacleMap used = map;
-  if (!options.detector.obstacle_expected) return used;
-  if (!used.surface) {
-    if (used.problem.empty()) used.problem = "no octomap has been received yet";
-    return used;
-  }
-  if (!(options.octomap_timeout_s > 0) || used.stamp_ns <= 0) return used;
-  // Also one from the future: by its stamp it would be fresh for ever, and its clock is not that of the meshes.
-  const double age_s = secondsBetween(used.stamp_ns, stamp_ns);
-  if (std::abs(age_s) <= options.octomap_timeout_s) return used;
-  used.surface = nullptr;
-  std::ostringstream problem;
-  if (age_s > 0) {
-    problem << "the octomap is older than octomap_timeout_s";
-  } else {
-    problem << "the octomap is stamped " << -age_s << " s after the end of the step, more than octomap_timeout_s";
-  }
-  used.problem = problem.str();
-  return used;
 }
 
 }  // namespace dccd

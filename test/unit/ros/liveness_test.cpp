@@ -82,9 +82,9 @@ TEST(Liveness, AMapThatGrowsOldAndOneThatIsOnItsWay) {
   liveness.mapCame(2, 310 * MS);
   liveness.mapCame(3, 400 * MS);
   EXPECT_EQ(kinds(liveness, 411 * MS), (Kinds{Fault::Kind::NEWER_MAP, Fault::Kind::OLD_MAP}));
-  liveness.mapSettled(2);
+  liveness.mapSettled(2, 2);
   EXPECT_EQ(kinds(liveness, 411 * MS), Kinds{Fault::Kind::OLD_MAP}) << "the second has waited for 11 ms";
-  liveness.mapSettled(3);
+  liveness.mapSettled(3, 3);
   liveness.frame(4, 420 * MS);
   liveness.outcome(4, -1, 430 * MS);
   EXPECT_EQ(kinds(liveness, 5000 * MS), Kinds{}) << "without a map none is old";
@@ -100,7 +100,7 @@ TEST(Liveness, AFrameAnsweredWithoutTheMapThatCameBeforeItProvesNothing) {
   EXPECT_EQ(kinds(liveness, 30 * MS), Kinds{}) << "and waits for it";
   liveness.outcome(3, -1, 40 * MS);
   EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_MAP});
-  liveness.mapSettled(2);
+  liveness.mapSettled(2, 2);
   EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{});
 }
 

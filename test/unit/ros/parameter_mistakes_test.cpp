@@ -79,6 +79,19 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
          t["accuracy"] = "exact";
          t["uncertainty"]["radius_m"] = 0.01;
        }},
+      {"~own_voxels_m is -1, it must be from 0", [](XmlRpcValue& t) { t["own_voxels_m"] = -1; }},
+      {"~own_voxels_m is inf, it must be from 0", [](XmlRpcValue& t) { t["own_voxels_m"] = INFINITY; }},
+      {"~own_voxels_m is 'automatic', it must be one of auto", [](XmlRpcValue& t) { t["own_voxels_m"] = "automatic"; }},
+      {"~bodies/cloth/own_voxels_m is nan", [](XmlRpcValue& t) { t["bodies"]["cloth"]["own_voxels_m"] = NAN; }},
+      {"~own_voxels_lag_s is 11, it must be from 0 to 10", [](XmlRpcValue& t) { t["own_voxels_lag_s"] = 11; }},
+      {"~own_voxels_doubt is 'none', it must be one of unproved, trust",
+       [](XmlRpcValue& t) { t["own_voxels_doubt"] = "none"; }},
+      {"with unknown_space: occupied a body's own voxels cannot be told from what is unknown; write unknown_space: "
+       "report",
+       [](XmlRpcValue& t) {
+         t["own_voxels_m"] = "auto";
+         t["unknown_space"] = "occupied";
+       }},
       {"~minimum_separation_m is -0.1, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
       {"~minimum_separation_m is nan, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = NAN; }},
       {"~minimum_separation_m is inf, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = INFINITY; }},

@@ -103,6 +103,18 @@ TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
   EXPECT_EQ(reason(EffectPlan(first, {}), "patches"), "earliest_only is true, and patches are made of all contacts");
   EXPECT_THROW(on(first, Effect::PATCHES), std::invalid_argument);
 
+  EffectScene seen = cloth();
+  EXPECT_EQ(reason(EffectPlan(seen, {}), "own_voxels"), "own_voxels_m is 0 for every body; set it above");
+  EXPECT_THROW(on(seen, Effect::OWN_VOXELS), std::invalid_argument);
+  seen.bodies[0].own_voxels_m = 0.02;
+  EXPECT_EQ(reason(on(seen, Effect::OWN_VOXELS), "own_voxels"), "there is no map");
+  seen.map_used = true;
+  EXPECT_EQ(reason(EffectPlan(seen, {}), "own_voxels"),
+            "what the map first shows where a body is, is no obstacle: cloth within 0.02 m");
+  EXPECT_TRUE(EffectPlan(seen, {}).running(Effect::OWN_VOXELS));
+  seen.bodies[0].own_voxels_m = ONE_VOXEL;
+  EXPECT_NE(reason(EffectPlan(seen, {}), "own_voxels").find("cloth within a voxel"), std::string::npos);
+
   EffectScene ahead = cloth();
   ahead.look_ahead_s = 0.5;
   EXPECT_FALSE(on(ahead, Effect::LOOK_AHEAD).running(Effect::LOOK_AHEAD));

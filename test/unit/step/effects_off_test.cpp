@@ -112,6 +112,12 @@ std::vector<Case> cases() {
        }},
       {Effect::PATCHES, [](Scene& s) { s.body.self_collision = true; },
        [](Scene& s) { s.options.detector.patches = true; }},
+      {Effect::OWN_VOXELS,
+       [=](Scene& s) {
+         s.map.surface = surface;
+         s.body.against_obstacle = true;
+       },
+       [](Scene& s) { s.body.own_voxels_m = 0.1; }},
       {Effect::MINIMUM_SEPARATION, [](Scene& s) { s.body.self_collision = true; },
        [](Scene& s) { s.body.minimum_separation_m = 0.2; }},
       {Effect::TRACKER_NOISE, [](Scene& s) { s.body.self_collision = true; },

@@ -1,0 +1,127 @@
+// Which map a step has: the newest one whose own voxels can be told, with the one that is trusted.
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "step/history.h"
+#include "stream/monitor_impl.h"
+
+namespace dccd {
+
+namespace {
+
+/// Maps that may wait for the bodies' frames. Of more, the oldest and the newest ones are kept.
+constexpr std::size_t MOST_MAPS_TO_COME = 4;
+
+}  // namespace
+
+const ObstacleMap& Monitor::map() const {
+  return impl_->maps_to_come.empty() ? impl_->map : impl_->maps_to_come.back();
+}
+
+const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
+
+void Monitor::setMap(ObstacleMap map) {
+  Impl& m = *impl_;
+  // Steps that wait may have another map, of the same frame, after none.
+  if (!map.frame_id.empty() && map.frame_id != std::exchange(m.map_frame, map.frame_id)) m.held_seen.back().clear();
+  if (!map.surface || map.trusted) {  // what was there before is void, and what is to come is older
+    m.maps_to_come.clear();
+    m.map = std::move(map);
+    return;
+  }
+  if (m.maps_to_come.size() >= MOST_MAPS_TO_COME) m.maps_to_come.erase(m.maps_to_come.begin() + 1);
+  m.maps_to_come.push_back(std::move(map));
+  if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().stamp_ns);
+}
+
+void Monitor::setMapBeside(ObstacleMap map) { impl_->trusted = std::move(map); }
+
+std::vector<TrackedBody> Monitor::Impl::tracked() const {
+  std::vector<TrackedBody> tracked;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (ownsVoxels(bodies[b]))
+      tracked.push_back(
+          {static_cast<std::uint16_t>(b), bodies[b].name, bodies[b].own_voxels_m, &stores[b], !isStream(b)});
+  }
+  return tracked;
+}
+
+/// Until when the bodies' ways are known. Of several maps up to then the newest is taken: what the others showed is
+/// asked of it.
+void Monitor::Impl::takeMaps(StampNs known_until_ns) {
+  own_voxels_ms = 0;
+  const std::vector<TrackedBody> bodies_tracked = tracked();
+  std::size_t taken = maps_to_come.size();
+  while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].stamp_ns > known_until_ns) --taken;
+  if (bodies_tracked.empty()) own_voxels.forget();
+  if (taken == 0) return;
+  const ObstacleMap newest = std::move(maps_to_come[taken - 1]);
+  maps_to_come.erase(maps_to_come.begin(), maps_to_come.begin() + static_cast<std::ptrdiff_t>(taken));
+  const VoxelSurface* sure = trusted.surface.get();
+  if (sure && (trusted.frame_id != newest.frame_id || sure->resolution() != newest.surface->resolution())) {
+    std::ostringstream problem;
+    problem << "the octomap has voxels of " << newest.surface->resolution() << " m in frame '" << newest.frame_id
+            << "', and octomap_file of " << sure->resolution() << " m in '" << trusted.frame_id
+            << "'; used together they must have the same";
+    map = ObstacleMap();
+    map.problem = problem.str();
+    return;
+  }
+  if (bodies_tracked.empty() && !sure) {
+    map = newest;
+    return;
+  }
+  const auto start = Deadline::Clock::now();
+  map = own_voxels.reduce(newest, sure, bodies_tracked, options.own_voxels_lag_s, options.own_voxels_trust);
+  own_voxels_ms = msSince(start);
+}
+
+/// What is in doubt matters to a step that would touch it, were it an obstacle.
+void Monitor::Impl::settleDoubt(Step& step, const Deadline& deadline) {
+  if (!step.map.own.doubted_surface || !step.map.surface) return;
+  Step asked = step;
+  asked.map.surface = asked.map.own.doubted_surface;
+  for (Body& body : asked.bodies) body.self_collision = body.against_bodies = false;
+  Options how = options.detector;
+  how.check_start_state = how.patches = how.suppress_initial = false;
+  how.expected.clear();
+  how.exclude_boxes.clear();
+  const Outcome outcome = detect(asked, how, doubt_history, deadline);
+  if (outcome.complete && outcome.total_contacts == 0) step.map.own.doubt.clear();
+}
+
+StampNs Monitor::Impl::wayNeededFrom(std::size_t body, StampNs stamp_ns) const {
+  if (!ownsVoxels(bodies[body])) return stamp_ns;
+  const StampNs map_ns = maps_to_come.empty() ? stamp_ns : std::min(stamp_ns, maps_to_come.front().stamp_ns);
+  return own_voxels.pathNeededFrom(map_ns, options.own_voxels_lag_s);
+}
+
+ObstacleMap Monitor::Impl::usableMap(StampNs stamp_ns) const {
+  ObstacleMap used = map;
+  if (!options.detector.obstacle_expected) return used;
+  if (!used.surface) {
+    if (used.problem.empty()) {
+      used.problem = maps_to_come.empty()
+                         ? "no octomap has been received yet"
+                         : "the octomap is stamped after the end of the step, and where the bodies are "
+                           "at its stamp, which tells their own voxels, is not known yet";
+    }
+    return used;
+  }
+  if (!(options.octomap_timeout_s > 0) || used.stamp_ns <= 0) return used;
+  // Also one from the future: by its stamp it would be fresh for ever, and its clock is not that of the meshes.
+  const double age_s = secondsBetween(used.stamp_ns, stamp_ns);
+  if (std::abs(age_s) <= options.octomap_timeout_s) return used;
+  used.surface = nullptr;
+  std::ostringstream problem;
+  if (age_s > 0) {
+    problem << "the octomap is older than octomap_timeout_s";
+  } else {
+    problem << "the octomap is stamped " << -age_s << " s after the end of the step, more than octomap_timeout_s";
+  }
+  used.problem = problem.str();
+  return used;
+}
+
+}  // namespace dccd

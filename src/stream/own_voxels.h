@@ -1,0 +1,57 @@
+// Which voxels of a map a tracked body accounts for: the sensor that made the map saw the body there, not an obstacle.
+//
+// The rule, voxel by voxel, from one map to the next:
+// 1. A voxel of a map that is trusted (octomap_file) is an obstacle.
+// 2. A voxel that was not occupied in the map before is own, if at some time between that map's stamp less the lag and
+//    this one's a body's surface was within own_voxels_m of it, or its middle was inside of a closed rigid one; else it
+//    is an obstacle.
+// 3. An obstacle stays one as long as maps show it; also where it comes back after it vanished within reach of a body,
+//    or without having been seen free.
+// 4. What is own stays own until a map does not show it.
+// 5. What the first map shows within reach is in doubt: no obstacle, but no proof either of a step that touches it,
+// until
+//    a map does not show it, or shows it with no body in reach, which makes it an obstacle.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "dccd/mesh_store.h"
+#include "dccd/step.h"
+
+namespace dccd {
+
+/// Where a body was at the stamps that are asked for, and how far from its surface a voxel may be its own.
+struct TrackedBody {
+  std::uint16_t body = 0;
+  std::string name;
+  double reach_m = 0;  ///< Body::own_voxels_m
+  const MeshStore* frames = nullptr;
+  bool holds_always = false;  ///< static: its newest frame, at all stamps
+};
+
+/// Not thread-safe.
+class OwnVoxelFinder {
+ public:
+  /// The map without what is own or in doubt, with what is trusted (null: nothing), and both in words. `trusted` has
+  /// the map's frame and resolution. Maps come in the order of their stamps; one of another
+  /// frame or resolution, or after forget(), is a first one. Where ObstacleMap::known does not tell, what is not
+  /// occupied counts as free. Bodies are known at the map's stamp; trust_first: what is in doubt is own.
+  ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies, double lag_s,
+                     bool trust_first);
+  void forget();
+  /// For a map of this stamp, or a later one: since when the bodies' ways are needed.
+  StampNs pathNeededFrom(StampNs now_ns, double lag_s) const;
+
+ private:
+  std::shared_ptr<const VoxelSurface> before_;  // as it was given; null: none
+  StampNs before_ns_ = 0;
+  std::string frame_id_;
+  std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
+  std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
+};
+
+}  // namespace dccd

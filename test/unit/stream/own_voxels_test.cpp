@@ -1,0 +1,359 @@
+// Which voxels of a map are a body's own: the rule of stream/own_voxels.h, each of its sentences.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <set>
+
+#include "dccd/assurance.h"
+#include "unit/stream/monitor_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr double VOXEL_M = 0.1;
+
+/// A voxel's place from the map's origin, in voxels.
+using Cell = std::array<int, 3>;
+using Cells = std::set<Cell>;
+
+Cells operator+(Cells a, const Cells& b) {
+  a.insert(b.begin(), b.end());
+  return a;
+}
+
+/// 10 x 10 voxels below z = `top` * 0.1 m, one thick.
+Cells slab(int top) {
+  Cells cells;
+  for (int x = 0; x < 10; ++x) {
+    for (int y = 0; y < 10; ++y) cells.insert({x, y, top - 1});
+  }
+  return cells;
+}
+
+OccupiedLeaf leafOf(const Cell& cell, std::uint32_t size = 1) {
+  const auto key = [](int i) { return static_cast<std::uint16_t>(32768 + i); };
+  return {{key(cell[0]), key(cell[1]), key(cell[2])}, size};
+}
+
+ObstacleMap mapOf(double resolution_m, std::vector<OccupiedLeaf> leaves, StampNs stamp_ns,
+                  const std::string& frame_id = "map") {
+  ObstacleMap map;
+  map.surface = VoxelSurface::build(resolution_m, std::move(leaves));
+  map.stamp_ns = stamp_ns;
+  map.frame_id = frame_id;
+  return map;
+}
+
+/// A square sheet of 0.4 m side at x, y in [0.31, 0.71], flat at the height z.
+MeshFrame sheet(StampNs stamp_ns, double z) {
+  static const auto topology = std::make_shared<const Topology>(Topology::grid(9, 9));
+  MeshFrame frame{stamp_ns, topology, {}, false, Eigen::Isometry3d::Identity()};
+  for (int i = 0; i < 81; ++i) frame.positions.push_back({0.31 + 0.05 * (i % 9), 0.31 + 0.05 * (i / 9), z});
+  return frame;
+}
+
+/// The voxels in which a sheet lies.
+Cells voxelsOf(double z) {
+  Cells cells;
+  for (int x = 3; x <= 7; ++x) {
+    for (int y = 3; y <= 7; ++y) cells.insert({x, y, static_cast<int>(std::floor(z / VOXEL_M))});
+  }
+  return cells;
+}
+
+class OwnVoxels : public ::testing::Test {
+ protected:
+  void SetUp() override { start(0.05); }
+  void start(double reach_m, bool trust = false, double lag_s = 0) {
+    Body body = named("cloth");
+    body.own_voxels_m = reach_m;
+    MonitorOptions options = loose();
+    options.detector.obstacle_expected = true;
+    options.own_voxels_lag_s = lag_s;
+    options.own_voxels_trust = trust;
+    monitor_ = std::make_unique<Monitor>(options, std::vector<Body>{body});
+  }
+  void map(StampNs stamp_ns, const Cells& cells, const Cells* known = nullptr) {
+    std::vector<OccupiedLeaf> leaves, seen;
+    for (const Cell& cell : cells) leaves.push_back(leafOf(cell));
+    ObstacleMap map = mapOf(VOXEL_M, leaves, stamp_ns);
+    if (known) {
+      for (const Cell& cell : cells + *known) seen.push_back(leafOf(cell));
+      map.known = KnownSpace::build(VOXEL_M, seen);
+    }
+    monitor_->setMap(std::move(map));
+  }
+  Outcome feed(StampNs stamp_ns, double z) {
+    monitor_->countReceived(0);
+    monitor_->push(0, sheet(stamp_ns, z), NOW);
+    return only(*monitor_);
+  }
+  /// The sheet at z = 0.55 m, 0.5 m above a floor that the first map showed without it.
+  void hoverAboveFloor() {
+    feed(0, 0.55);
+    map(0, slab(1));
+    ASSERT_TRUE(assuranceOf(feed(100 * MS, 0.55)).clear());
+  }
+  static std::uint64_t own(const Outcome& outcome) { return outcome.step->map.own.own; }
+  static std::uint64_t doubted(const Outcome& outcome) { return outcome.step->map.own.doubted; }
+
+  std::unique_ptr<Monitor> monitor_;
+};
+
+TEST_F(OwnVoxels, WhatAMapFirstShowsWhereTheBodyIsIsNoObstacle) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  const Outcome outcome = feed(200 * MS, 0.55);
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
+  EXPECT_EQ(own(outcome), 25u);
+  EXPECT_EQ(outcome.excluded, std::vector<std::string>{"25 voxels of the map as own of body 'cloth'"});
+  EXPECT_EQ(outcome.stats[Effect::OWN_VOXELS].out, 25u);
+  EXPECT_GE(outcome.stats[Effect::OWN_VOXELS].in, 25u);
+  start(0);
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  EXPECT_EQ(assuranceOf(feed(200 * MS, 0.55)).touching, Touching::LASTING) << "none are own where none may be";
+}
+
+TEST_F(OwnVoxels, WhatWasThereBeforeStaysAnObstacle) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  feed(200 * MS, 0.12);
+  map(200 * MS, slab(1) + voxelsOf(0.12));
+  const Outcome near = feed(300 * MS, 0.12);
+  EXPECT_TRUE(assuranceOf(near).clear());
+  EXPECT_EQ(own(near), 25u) << "the floor's voxels lie within reach, and are older";
+  const Outcome on = feed(400 * MS, 0.09);
+  EXPECT_EQ(assuranceOf(on).touching, Touching::NEW);
+  EXPECT_NEAR(on.earliest_toc, 2.0 / 3, 1e-6);
+}
+
+TEST_F(OwnVoxels, WhatIsOwnStaysSoUntilAMapHasClearedIt) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  feed(200 * MS, 0.25);
+  map(200 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(0.25));  // slow to clear
+  EXPECT_EQ(own(feed(300 * MS, 0.25)), 50u);
+  EXPECT_TRUE(assuranceOf(feed(400 * MS, 0.55)).clear()) << "back through its own trail";
+  feed(500 * MS, 0.25);
+  map(500 * MS, slab(1) + voxelsOf(0.25));
+  EXPECT_EQ(own(feed(600 * MS, 0.25)), 25u);
+  map(600 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(0.25));
+  const Outcome back = feed(700 * MS, 0.55);
+  EXPECT_EQ(assuranceOf(back).touching, Touching::NEW) << "it was cleared, and came back where no body was";
+}
+
+TEST_F(OwnVoxels, WhatTheFirstMapShowsWithinReachIsInDoubt) {
+  feed(0, 0.55);
+  map(0, slab(1) + voxelsOf(0.55));
+  const Outcome first = feed(100 * MS, 0.55);
+  EXPECT_EQ(first.touching, Touching::NONE) << "no alarm";
+  EXPECT_EQ(doubted(first), 25u);
+  ASSERT_EQ(first.unproved.size(), 1u);
+  EXPECT_NE(
+      first.unproved[0].find("the step touches one of 25 voxels near body 'cloth' that were there in the first map"),
+      std::string::npos)
+      << first.unproved[0];
+  EXPECT_TRUE(first.excluded.empty());
+  feed(200 * MS, 0.35);
+  map(200 * MS, slab(1) + voxelsOf(0.35));
+  const Outcome cleared = feed(300 * MS, 0.35);
+  EXPECT_TRUE(assuranceOf(cleared).clear());
+  EXPECT_EQ(own(cleared), 25u);
+}
+
+TEST_F(OwnVoxels, WhatStaysThereWithoutTheBodyIsAnObstacle) {
+  feed(0, 0.55);
+  map(0, slab(1) + voxelsOf(0.55));
+  feed(100 * MS, 0.35);
+  map(100 * MS, slab(1) + voxelsOf(0.55));
+  const Outcome beside = feed(200 * MS, 0.35);
+  EXPECT_EQ(doubted(beside), 25u) << "since the first map the body was there";
+  EXPECT_TRUE(assuranceOf(beside).clear()) << "but it does not touch them now";
+  map(200 * MS, slab(1) + voxelsOf(0.55));
+  EXPECT_TRUE(assuranceOf(feed(300 * MS, 0.35)).clear());
+  EXPECT_EQ(assuranceOf(feed(400 * MS, 0.55)).touching, Touching::NEW);
+}
+
+TEST_F(OwnVoxels, TheFirstMapOnTrust) {
+  start(0.05, true);
+  feed(0, 0.55);
+  map(0, slab(1) + voxelsOf(0.55));
+  const Outcome first = feed(100 * MS, 0.55);
+  EXPECT_TRUE(assuranceOf(first).clear());
+  ASSERT_EQ(first.excluded.size(), 1u);
+  EXPECT_NE(first.excluded[0].find("own_voxels_doubt: trust"), std::string::npos);
+}
+
+// The price: an obstacle that appears within reach.
+TEST_F(OwnVoxels, WhatAppearsWithinReachOfABodyIsNamedAsLeftOut) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{8, 5, 5}, {9, 5, 5}});  // beside it: 0.09 and 0.19 m away
+  start(0.1);
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{8, 5, 5}, {9, 5, 5}});
+  const Outcome outcome = feed(200 * MS, 0.55);
+  EXPECT_EQ(own(outcome), 26u);
+  EXPECT_EQ(outcome.excluded, std::vector<std::string>{"26 voxels of the map as own of body 'cloth'"});
+  ASSERT_NE(outcome.obstacle->leafAt({0.95, 0.55, 0.55}), nullptr) << "beyond reach it is an obstacle";
+  EXPECT_EQ(outcome.obstacle->leafAt({0.85, 0.55, 0.55}), nullptr);
+}
+
+TEST_F(OwnVoxels, WhatTheCameraSawBeforeItsStampIsOwnWithinTheLag) {
+  for (const double lag_s : {0.0, 0.06}) {
+    start(0.05, false, lag_s);
+    hoverAboveFloor();
+    feed(110 * MS, 0.85);
+    map(150 * MS, slab(1) + voxelsOf(0.55));
+    feed(150 * MS, 0.85);
+    map(200 * MS, slab(1) + voxelsOf(0.85) + voxelsOf(0.55));
+    EXPECT_EQ(own(feed(200 * MS, 0.85)), 50u) << "both lie on the way since the map before";
+    map(250 * MS, slab(1) + voxelsOf(0.85));
+    feed(260 * MS, 0.25);
+    map(270 * MS, slab(1) + voxelsOf(0.85));
+    feed(300 * MS, 0.25);
+    map(320 * MS, slab(1) + voxelsOf(0.55));
+    const Outcome late = feed(320 * MS, 0.25);
+    EXPECT_EQ(own(late), lag_s > 0 ? 25u : 0u) << "passed there at 0.255 s, 0.065 s before the map";
+  }
+}
+
+TEST_F(OwnVoxels, AnObstacleThatABodyHidesForAWhileStaysOne) {
+  hoverAboveFloor();
+  feed(150 * MS, 0.12);
+  map(150 * MS, voxelsOf(0.12));  // the floor is gone below the sheet
+  feed(200 * MS, 0.12);
+  map(200 * MS, slab(1) + voxelsOf(0.12));
+  const Outcome outcome = feed(300 * MS, 0.09);
+  EXPECT_EQ(own(outcome), 25u);
+  EXPECT_EQ(assuranceOf(outcome).touching, Touching::NEW);
+}
+
+// octomap_server restarted: what it knew is gone, which is not the same as seen free.
+TEST_F(OwnVoxels, AnObstacleThatAMapForgetsStaysOne) {
+  for (const bool tells_free : {true, false}) {
+    start(0.05);
+    const Cells above = slab(3), nothing;
+    feed(0, 0.55);
+    map(0, slab(1), &above);
+    feed(100 * MS, 0.55);
+    map(100 * MS, {}, tells_free ? &nothing : nullptr);
+    feed(200 * MS, 0.12);
+    map(200 * MS, slab(1) + voxelsOf(0.12), &nothing);
+    feed(300 * MS, 0.12);
+    const Outcome outcome = feed(400 * MS, 0.09);
+    EXPECT_EQ(assuranceOf(outcome).touching, tells_free ? Touching::NEW : Touching::NONE);
+    EXPECT_GE(own(outcome), tells_free ? 25u : 50u);
+  }
+}
+
+TEST_F(OwnVoxels, OfALargeLeafOnlyWhatIsWithinReach) {
+  hoverAboveFloor();
+  const auto large = [&](StampNs stamp_ns) { monitor_->setMap(mapOf(VOXEL_M, {leafOf({0, 0, 0}, 8)}, stamp_ns)); };
+  large(150 * MS);
+  const Outcome outcome = feed(200 * MS, 0.551);
+  EXPECT_EQ(own(outcome), 36u + 25u) << "of its own layer, and of the one that begins 0.049 m above it";
+  EXPECT_EQ(outcome.obstacle->leafAt({0.55, 0.55, 0.55}), nullptr);
+  std::uint64_t left = 0;
+  for (const OccupiedLeaf& leaf : outcome.obstacle->leaves()) left += leaf.size * leaf.size * leaf.size;
+  EXPECT_EQ(left, 512u - 61u);
+}
+
+TEST_F(OwnVoxels, AMapWaitsUntilTheBodyIsKnownAtItsStamp) {
+  feed(0, 0.55);
+  map(150 * MS, slab(1));
+  const Outcome before = feed(100 * MS, 0.55);
+  EXPECT_EQ(before.status, StepStatus::NO_MAP);
+  EXPECT_NE(before.reason.find("stamped after the end of the step"), std::string::npos) << before.reason;
+  EXPECT_TRUE(assuranceOf(feed(200 * MS, 0.55)).clear());
+  map(250 * MS, slab(1) + voxelsOf(0.55));
+  map(260 * MS, {});
+  const Outcome newest = feed(300 * MS, 0.09);
+  EXPECT_TRUE(assuranceOf(newest).clear()) << "of several the newest";
+}
+
+TEST_F(OwnVoxels, AnotherFrameOrResolutionIsAFirstMap) {
+  hoverAboveFloor();
+  monitor_->setMap(mapOf(0.2, {leafOf({1, 1, 2})}, 150 * MS));
+  EXPECT_EQ(doubted(feed(200 * MS, 0.55)), 1u);
+  monitor_->setMap(mapOf(0.2, {leafOf({1, 1, 2})}, 250 * MS, "odom"));
+  EXPECT_EQ(doubted(feed(300 * MS, 0.55)), 1u);
+}
+
+TEST_F(OwnVoxels, OverATeleportWhatIsOwnStaysOwn) {
+  MonitorOptions options = monitor_->options();
+  options.store.max_vertex_step_m = 0.3;
+  monitor_->setOptions(options);
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  EXPECT_EQ(own(feed(200 * MS, 0.55)), 25u);
+  EXPECT_EQ(feed(300 * MS, 2.05).status, StepStatus::TELEPORT);
+  map(350 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(1.25) + voxelsOf(2.05));
+  const Outcome outcome = feed(400 * MS, 2.05);
+  EXPECT_EQ(own(outcome), 50u) << "where it was and where it is; nobody saw it on the way";
+  EXPECT_NE(outcome.obstacle->leafAt({0.55, 0.55, 1.25}), nullptr);
+}
+
+// What a camera sees through the gaps of a robot's link, or what noise puts there.
+TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
+  for (const bool closed : {true, false}) {
+    for (const bool inside_out : {true, false}) {
+      Body body = named("link");
+      body.own_voxels_m = 0.05;
+      body.rigid = true;
+      MonitorOptions options = loose();
+      options.own_voxels_lag_s = 0;
+      Monitor monitor(options, {body});
+      std::vector<Face> faces{{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                              {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+      if (!closed) faces.pop_back();
+      for (Face& face : faces) {
+        if (inside_out) std::swap(face[1], face[2]);
+      }
+      const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(8, faces));
+      const auto box = [&](StampNs stamp_ns) {
+        MeshFrame frame{stamp_ns, topology, {}, true, Eigen::Isometry3d::Identity()};
+        for (int i = 0; i < 8; ++i) frame.positions.push_back(Vec3(i & 1, i >> 1 & 1, i >> 2));
+        return frame;
+      };
+      monitor.push(0, box(0), NOW);
+      only(monitor);
+      monitor.setMap(mapOf(VOXEL_M, {}, 0));
+      monitor.push(0, box(100 * MS), NOW);
+      only(monitor);
+      monitor.setMap(mapOf(VOXEL_M, {leafOf({5, 5, 5}), leafOf({15, 5, 5})}, 150 * MS));
+      monitor.push(0, box(200 * MS), NOW);
+      EXPECT_EQ(own(only(monitor)), closed ? 1u : 0u);
+    }
+  }
+}
+
+TEST_F(OwnVoxels, WhatIsTrustedIsNeverOwn) {
+  ObstacleMap table = mapOf(VOXEL_M, {leafOf({4, 4, 4})}, 0);
+  monitor_->setMapBeside(table);
+  feed(0, 0.55);
+  EXPECT_EQ(feed(50 * MS, 0.55).status, StepStatus::NO_MAP) << "it is no map by itself";
+  map(50 * MS, slab(1) + voxelsOf(0.55) + Cells{{4, 4, 4}});
+  const Outcome outcome = feed(100 * MS, 0.545);
+  EXPECT_EQ(doubted(outcome), 25u);
+  EXPECT_NE(outcome.obstacle->leafAt({0.45, 0.45, 0.45}), nullptr);
+  EXPECT_EQ(outcome.obstacle->leafCount(), 101u);
+  EXPECT_EQ(assuranceOf(feed(200 * MS, 0.49)).touching, Touching::NEW);
+  monitor_->setMap(mapOf(0.2, {}, 150 * MS));
+  const Outcome other = feed(300 * MS, 0.55);
+  EXPECT_EQ(other.status, StepStatus::NO_MAP);
+  EXPECT_NE(other.reason.find("octomap_file of 0.1 m"), std::string::npos) << other.reason;
+
+  start(0.05);
+  feed(0, 0.545);
+  table.trusted = true;
+  monitor_->setMap(table);
+  const Outcome alone = feed(50 * MS, 0.545);
+  EXPECT_TRUE(alone.unproved.empty()) << "a first map, but nothing of it is in doubt";
+  EXPECT_EQ(alone.obstacle->leafCount(), 1u);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
