@@ -38,7 +38,7 @@ struct Arguments {
 Arguments parse(int argc, char** argv, CLI::App& app) {
   Arguments a;
   app.add_option("FRAME", a.frames,
-                 "meshes with the same faces, two or more, each a step after the one before (.ply, .obj)")
+                 "meshes with the same faces, two or more, each a step after the one before (.ply, .obj, .stl, .dae)")
       ->required()
       ->expected(2, -1);
   app.add_option(
@@ -195,10 +195,8 @@ void print(const Run& run) {
             << run.times.at("total").median() << std::defaultfloat << std::setprecision(6) << '\n';
 }
 
-MeshFile frameOf(const std::string& path) {
-  MeshFile frame = loadMeshFile(path);
-  for (const std::string& remark : frame.remarks) std::cerr << "check_step: " << path << ": " << remark << '\n';
-  return frame;
+void remark(const std::string& path, const std::string& text) {
+  std::cerr << "check_step: " << path << ": " << text << '\n';
 }
 
 std::string sizesOf(const MeshFile& frame) {
@@ -206,8 +204,37 @@ std::string sizesOf(const MeshFile& frame) {
          " faces and " + std::to_string(frame.edges.size()) + " edges of lines";
 }
 
+std::vector<MeshFile> framesOf(const std::vector<std::string>& paths) {
+  std::vector<MeshFile> frames;
+  for (const std::string& path : paths) {
+    frames.push_back(loadMeshFile(path));
+    const MeshFile &first = frames.front(), &next = frames.back();
+    if (first.is_soup != next.is_soup) {
+      throw std::runtime_error(path + ": of it and " + paths[0] +
+                               " just one numbers its vertices (OBJ, PLY); write all frames in one format");
+    }
+    const bool same = first.is_soup ? first.polygons.ends == next.polygons.ends
+                                    : first.positions.size() == next.positions.size() &&
+                                          first.polygons == next.polygons && first.edges == next.edges;
+    if (!same) {
+      throw std::runtime_error(path + ": not the topology of " + paths[0] + " (" + sizesOf(next) + ", expected " +
+                               sizesOf(first) + ", the same ones)");
+    }
+  }
+  if (const std::size_t apart = frames[0].is_soup ? matchSoups(frames) : 0; apart > 0) {
+    remark(paths[0], std::to_string(apart) +
+                         " vertices come apart in a later frame: their corners are vertices of their own, which touch "
+                         "where they are equal; write OBJ or PLY if they are to be one");
+  }
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (const std::string& text : frames[i].remarks) remark(paths[i], text);
+  }
+  return frames;
+}
+
 std::vector<Step> stepsOf(const Arguments& a) {
-  const MeshFile first = frameOf(a.frames[0]);
+  const std::vector<MeshFile> frames = framesOf(a.frames);
+  const MeshFile& first = frames[0];
   Step step;
   step.bodies.resize(1);
   step.bodies[0].name = a.frames[0];
@@ -216,15 +243,9 @@ std::vector<Step> stepsOf(const Arguments& a) {
   step.bodies[0].dropped_faces = first.unchecked.size();
   step.bodies[0].t1 = share(first.positions);
   std::vector<Step> steps;
-  for (std::size_t i = 1; i < a.frames.size(); ++i) {
-    const MeshFile next = frameOf(a.frames[i]);
-    if (first.positions.size() != next.positions.size() || !(first.polygons == next.polygons) ||
-        first.edges != next.edges) {
-      throw std::runtime_error(a.frames[i] + ": not the topology of " + a.frames[0] + " (" + sizesOf(next) +
-                               ", expected " + sizesOf(first) + ", the same ones)");
-    }
+  for (std::size_t i = 1; i < frames.size(); ++i) {
     step.bodies[0].t0 = step.bodies[0].t1;
-    step.bodies[0].t1 = share(next.positions);
+    step.bodies[0].t1 = share(frames[i].positions);
     steps.push_back(step);
   }
   return steps;

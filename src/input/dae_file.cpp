@@ -183,7 +183,9 @@ MeshFile loadDaeFile(const std::string& path) {
                         " s and 1 GiB, or crashed; the file is damaged");
   }
   if (corners.empty()) throw MeshFileError(path + ": there are no triangles");
-  return weldPolygons(corners, std::move(ends), path);
+  MeshFile mesh = weldPolygons(corners, std::move(ends), path);
+  remarkUnchecked([](std::size_t p) { return "polygon " + std::to_string(p) + " of the scene"; }, mesh);
+  return mesh;
 }
 
 }  // namespace dccd

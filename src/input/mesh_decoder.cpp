@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "input/marker_ropes.h"
 #include "input/short_text.h"
 #include "input/transforms.h"
 
@@ -52,15 +53,9 @@ void requireVertices(const Polygons& polygons, std::size_t points) {
   }
 }
 
-Eigen::Affine3d markerTransform(const MarkerView& marker) {
-  for (const double value : marker.pose) {
-    if (!std::isfinite(value)) refuse("pose is not finite");
-  }
-  const Eigen::Quaterniond q(marker.pose[6], marker.pose[3], marker.pose[4], marker.pose[5]);
-  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
-  // Publishers that leave the quaternion at zero mean none, and RViz shows it so.
-  if (q.norm() > 0) transform.linear() = q.normalized().toRotationMatrix();
-  transform.translation() = Vec3(marker.pose[0], marker.pose[1], marker.pose[2]);
+/// Of a triangle list. Of lines and points, scale is how thick they are drawn.
+Eigen::Affine3d poseAndScaleOf(const MarkerView& marker) {
+  Eigen::Affine3d transform = poseOf(marker);
   const Vec3 scale(marker.scale[0], marker.scale[1], marker.scale[2]);
   if (!scale.allFinite()) refuse("scale is not finite");
   if (scale.isZero(0)) return transform;  // it was never set
@@ -72,6 +67,15 @@ Eigen::Affine3d markerTransform(const MarkerView& marker) {
   }
   transform.linear() = transform.linear() * scale.asDiagonal();
   return transform;
+}
+
+/// Empty: there is nothing to say.
+std::string rowStepRemark(const CloudView& cloud) {
+  if (!cloud.wrong_row_step) return {};
+  return "row_step " + std::to_string(*cloud.wrong_row_step) + " contradicts the data, which are just " +
+         std::to_string(cloud.height) + " rows of " + std::to_string(cloud.width) + " points of " +
+         std::to_string(cloud.point_step) + " bytes and are read so; publish row_step " +
+         std::to_string(cloud.row_step);
 }
 
 }  // namespace
@@ -111,7 +115,7 @@ DecodedMesh MeshDecoder::decode(const TypedMesh& message) {
 
 void MeshDecoder::addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel) const {
   const bool from_field = !config_.noise_field.empty();
-  if (from_field && !cloud) {
+  if (from_field && !(cloud && cloud->extra)) {
     refuse("this type has no point fields, but parameter uncertainty/field names '" + config_.noise_field +
            "'; send a point cloud, or write uncertainty/radius_m");
   }
@@ -168,14 +172,6 @@ void MeshDecoder::takeFixed(std::size_t points, std::size_t grid_rows, std::size
     mesh.dropped_faces = config_.file_dropped_faces;
     return;
   }
-  if (config_.source == TopologySource::POLYLINE) {
-    if (points < 2) mismatch("a polyline needs 2");
-    if (!known_.topology || known_.topology->vertexCount() != points) {
-      known_ = {std::make_shared<const Topology>(Topology::polyline(points)), {}, {}};
-    }
-    mesh.topology = known_.topology;
-    return;
-  }
   const std::size_t rows = config_.rows ? config_.rows : grid_rows, cols = config_.cols ? config_.cols : grid_cols;
   if (rows * cols != points) {
     mismatch("topology/rows x topology/cols is " + std::to_string(rows) + " x " + std::to_string(cols) + " = " +
@@ -188,6 +184,25 @@ void MeshDecoder::takeFixed(std::size_t points, std::size_t grid_rows, std::size
     known_ = {std::make_shared<const Topology>(Topology::grid(rows, cols)), shape, {}};
   }
   mesh.topology = known_.topology;
+}
+
+void MeshDecoder::takeLines(const std::vector<Edge>& edges, DecodedMesh& mesh) {
+  Topology topology = Topology::fromEdges(mesh.positions.size(), edges);
+  if (!known_.topology || *known_.topology != topology) {
+    known_ = {std::make_shared<const Topology>(std::move(topology)), {}, {}};
+  }
+  mesh.topology = known_.topology;
+}
+
+void MeshDecoder::takePolylines(std::size_t length, DecodedMesh& mesh) {
+  if (length < 2) {
+    throw MeshError(StepStatus::VERTEX_COUNT, std::to_string(length) + " points, but a polyline needs 2");
+  }
+  std::vector<Edge> edges;
+  for (Index v = 1; v < mesh.positions.size(); ++v) {
+    if (v % length != 0) edges.push_back({v - 1, v});
+  }
+  takeLines(edges, mesh);
 }
 
 void MeshDecoder::takeFaces(Polygons sent, DecodedMesh& mesh) {
@@ -215,6 +230,7 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   }
   DecodedMesh mesh;
   start(cloud.header, mesh);
+  mesh.row_step_remark = rowStepRemark(cloud);
   const std::size_t pixels = keptPixels(cloud, config_.depth.stride);
   checkCount(pixels);
   checkFaces(2 * pixels);
@@ -230,23 +246,36 @@ DecodedMesh MeshDecoder::decodeDepthImage(const CloudView& cloud) const {
   return mesh;
 }
 
+bool MeshDecoder::hasFixedTopology() const {
+  return config_.source == TopologySource::FILE || config_.source == TopologySource::GRID || config_.rows > 0;
+}
+
+bool MeshDecoder::isRope(const CloudView& cloud) const {
+  return config_.source == TopologySource::POLYLINE ||
+         (config_.source == TopologySource::AUTO && cloud.is_rope && !hasFixedTopology());
+}
+
 DecodedMesh MeshDecoder::decodeView(const CloudView& cloud) {
   if (config_.source == TopologySource::DEPTH_IMAGE) return decodeDepthImage(cloud);
   DecodedMesh mesh;
   start(cloud.header, mesh);
+  mesh.row_step_remark = rowStepRemark(cloud);
   checkCount(cloud.size());
   const bool organised = cloud.height > 1;
   if (config_.source == TopologySource::MESSAGE || config_.source == TopologySource::FIRST_FRAME_WELD) {
     refuse("a point cloud has no triangles; set topology/source to grid (with rows, cols), polyline or file");
   }
-  if (config_.source == TopologySource::AUTO && !organised && !config_.rows && !config_.cols) {
+  const bool is_rope = isRope(cloud);
+  if (config_.source == TopologySource::AUTO && !is_rope && !organised && !config_.rows && !config_.cols) {
     refuse(
         "an unorganised point cloud has no topology; set topology/rows and topology/cols for a grid, or "
         "topology/source to polyline or file");
   }
-  takeFixed(cloud.size(), cloud.height, cloud.width, mesh);
+  if (!is_rope) takeFixed(cloud.size(), cloud.height, cloud.width, mesh);
   mesh.positions.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) mesh.positions[i] = cloud.point(i);
+  // Of a cloud of several rows and columns, each row is a rope.
+  if (is_rope) takePolylines(cloud.width > 1 ? cloud.width : cloud.size(), mesh);
   addRadii(&cloud, mesh);
   return mesh;
 }
@@ -285,9 +314,12 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
     mesh.topology = known_.topology;
     mesh.dropped_faces = known_.faces.unchecked.size();
     if (!known_.faces.unseen.empty()) takeFaces(known_.sent, mesh);
+  } else if (config_.source == TopologySource::POLYLINE) {
+    takePolylines(count, mesh);
   } else {
     takeFixed(count, 0, 0, mesh);
   }
+  if (view.cloud) mesh.row_step_remark = rowStepRemark(*view.cloud);
   addRadii(view.cloud ? &*view.cloud : nullptr, mesh);
   return mesh;
 }
@@ -295,30 +327,76 @@ DecodedMesh MeshDecoder::decodeView(const IndexedView& view) {
 DecodedMesh MeshDecoder::decodeView(const std::vector<MarkerView>& markers) {
   std::string seen;
   const MarkerView* taken = nullptr;
+  std::vector<const MarkerView*> lines, points;
   std::uint64_t unread = 0, unread_faces = 0;
   for (const MarkerView& marker : markers) {
     const bool wanted = (!config_.marker_namespace || marker.ns == *config_.marker_namespace) &&
-                        (!config_.marker_id || marker.id == *config_.marker_id);
-    if (wanted && marker.type == MARKER_TRIANGLE_LIST && marker.action == MARKER_ADD) {
+                        (!config_.marker_id || marker.id == *config_.marker_id) && marker.action == MARKER_ADD;
+    if (wanted && marker.type == MARKER_TRIANGLE_LIST && config_.source != TopologySource::POLYLINE) {
       if (taken) {
         ++unread;
         unread_faces += (marker.points.size + 2) / 3;
       } else {
         taken = &marker;
       }
+    } else if (wanted && isLineMarker(marker) && marker.points.size > 0) {
+      lines.push_back(&marker);
+    } else if (wanted && isPointMarker(marker) && marker.points.size > 0) {
+      points.push_back(&marker);
     } else if (seen.size() < 200) {
       seen += " ('" + std::string(marker.ns.substr(0, 32)) + "', " + std::to_string(marker.id) + ", type " +
-              std::to_string(marker.type) + ")";
+              std::to_string(marker.type) + (marker.points.size == 0 ? " without points)" : ")");
     }
   }
+  // What is drawn of a mesh besides its faces, or of a rope besides its lines, is nothing of its own.
   if (taken) {
     DecodedMesh mesh = decodeSoup(*taken);
     mesh.unread_lists = unread;
     mesh.dropped_faces += unread_faces;
     return mesh;
   }
-  refuse("no TRIANGLE_LIST marker with the wanted namespace and id; there are (namespace, id, type):" +
+  if (!lines.empty()) return decodeRopes(std::move(lines));
+  if (!points.empty() && config_.source != TopologySource::POLYLINE && !hasFixedTopology()) {
+    refuse("marker " + nameOf(*points[0]) +
+           " has points without a topology; set topology/source to polyline or file, or topology/rows and "
+           "topology/cols for a grid");
+  }
+  if (!points.empty()) return decodeRopes(std::move(points));
+  refuse("no " + std::string(config_.source == TopologySource::POLYLINE ? "" : "TRIANGLE_LIST marker and no ") +
+         "LINE_STRIP, LINE_LIST or POINTS with the wanted namespace and id; there are (namespace, id, type):" +
          (seen.empty() ? " none" : seen));
+}
+
+DecodedMesh MeshDecoder::decodeRopes(std::vector<const MarkerView*> markers) {
+  DecodedMesh mesh;
+  start(markers[0]->header, mesh);
+  std::size_t count = 0;
+  for (const MarkerView* one : markers) {
+    DecodedMesh other;
+    start(one->header, other);
+    if (other.frame_id != mesh.frame_id) {
+      refuse("marker " + nameOf(*one) + " is in frame '" + other.frame_id + "', and " + nameOf(*markers[0]) +
+             " in frame '" + mesh.frame_id + "'; publish the ropes of a message in one frame");
+    }
+    count += one->points.size;
+  }
+  checkCount(count);
+  Ropes ropes = ropesOf(markers);
+  if (hasFixedTopology()) {
+    mesh.positions = std::move(ropes.points);
+    takeFixed(count, 0, 0, mesh);
+    addRadii(nullptr, mesh);
+    return mesh;
+  }
+  SoupWeld weld = continues(known_ropes_, ropes.names) ? weld_ : SoupWeld();
+  mesh.weld_changes = joinEnds(config_.weld, weld, ropes);
+  if (ropes.edges.empty()) refuse("there is nothing to check: the lines have no length");
+  mesh.positions = std::move(ropes.points);
+  addRadii(nullptr, mesh);
+  takeLines(ropes.edges, mesh);
+  weld_ = std::move(weld);
+  known_ropes_ = std::move(ropes.names);
+  return mesh;
 }
 
 DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
@@ -328,12 +406,13 @@ DecodedMesh MeshDecoder::decodeSoup(const MarkerView& marker) {
   checkCount(count);
   checkFaces(count / 3);
   if (count % 3 != 0) refuse("a TRIANGLE_LIST of " + std::to_string(count) + " points, which is not a multiple of 3");
-  const Eigen::Affine3d transform = markerTransform(marker);
+  const Eigen::Affine3d transform = poseAndScaleOf(marker);
   Positions corners(count);
   for (std::size_t i = 0; i < count; ++i) {
     const auto p = marker.points[i];
     corners[i] = Vec3(p[0], p[1], p[2]);
   }
+  if (!known_ropes_.empty()) forgetWeld();  // it is of their ends
   const bool welds_anew = weld_.vertexOfCorner().size() != count;
   if (config_.weld && config_.source != TopologySource::FILE) {
     mesh.weld_changes = weld_.weld(corners);

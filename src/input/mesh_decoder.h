@@ -10,6 +10,7 @@
 
 #include "dccd/mesh_store.h"
 #include "input/depth_surface.h"
+#include "input/marker_ropes.h"
 #include "input/message_type.h"
 #include "input/polygons.h"
 #include "input/soup_weld.h"
@@ -51,6 +52,7 @@ struct DecodedMesh : MeshFrame {
   std::string frame_id;
   std::size_t weld_changes = 0;  ///< welded vertices whose corners came apart
   std::size_t unread_lists = 0;  ///< triangle lists beside the one that was taken
+  std::string row_step_remark;   ///< what a cloud says that its data contradict; empty: nothing
 };
 
 /// Keeps the topology from message to message, so that an unchanged one is one object. Not thread-safe.
@@ -63,8 +65,11 @@ class MeshDecoder {
   DecodedMesh decode(const std::string& datatype, const std::uint8_t* data, std::size_t size);
   /// The same of a message that was never serialised.
   DecodedMesh decode(const TypedMesh& message);
-  /// The next triangle soup is welded as a first one.
-  void forgetWeld() { weld_.forget(); }
+  /// The next triangle soup is welded as a first one, and so are the ends of lines.
+  void forgetWeld() {
+    weld_.forget();
+    known_ropes_.clear();
+  }
 
  private:
   MeshInputConfig config_;
@@ -76,7 +81,8 @@ class MeshDecoder {
     PolygonFaces faces;  // and what they became then: of that the topology is made
   };
   Known known_;
-  SoupWeld weld_;
+  SoupWeld weld_;                      // of a triangle soup's corners, or of the ends of lines
+  std::vector<RopeName> known_ropes_;  // of the last markers that were read
 
   template <typename View>
   DecodedMesh decodeAs(const std::string& datatype, View view);
@@ -85,6 +91,9 @@ class MeshDecoder {
   DecodedMesh decodeView(const std::vector<MarkerView>& markers);
   DecodedMesh decodeDepthImage(const CloudView& cloud) const;
   DecodedMesh decodeSoup(const MarkerView& marker);
+  DecodedMesh decodeRopes(std::vector<const MarkerView*> markers);
+  bool isRope(const CloudView& cloud) const;
+  bool hasFixedTopology() const;
   void checkFaces(std::size_t count) const;
   void checkCount(std::size_t count) const;
   void start(const HeaderView& header, DecodedMesh& mesh) const;
@@ -92,6 +101,9 @@ class MeshDecoder {
   void addRadii(const CloudView* cloud, DecodedMesh& mesh, const std::vector<std::uint32_t>* pixel = nullptr) const;
   /// The topology that the configuration says.
   void takeFixed(std::size_t points, std::size_t grid_rows, std::size_t grid_cols, DecodedMesh& mesh);
+  void takeLines(const std::vector<Edge>& edges, DecodedMesh& mesh);
+  /// Ropes of so many points each, one after the other.
+  void takePolylines(std::size_t length, DecodedMesh& mesh);
   /// Faces that a message brings, over mesh.positions.
   void takeFaces(Polygons sent, DecodedMesh& mesh);
 };

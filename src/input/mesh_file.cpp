@@ -7,11 +7,19 @@
 #include <map>
 
 #include "dccd/regular_file.h"
+#include "input/soup_weld.h"
 
 namespace dccd {
 namespace {
 
 constexpr std::uint64_t MAX_FILE_BYTES = std::uint64_t{512} << 20;
+
+/// Empty: all are checked.
+std::string uncheckedRemark(const MeshFile& mesh) {
+  if (mesh.unchecked.empty()) return {};
+  return std::to_string(mesh.unchecked.size()) + " polygons cannot be used and are unchecked, the first is " +
+         mesh.polygon_name(mesh.unchecked[0]);
+}
 
 }  // namespace
 
@@ -47,10 +55,9 @@ std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh) {
   return std::move(made.ends);
 }
 
-void remarkUnchecked(const std::function<std::string(std::size_t)>& name, MeshFile& mesh) {
-  if (mesh.unchecked.empty()) return;
-  mesh.remarks.push_back(std::to_string(mesh.unchecked.size()) +
-                         " polygons cannot be used and are unchecked, the first is " + name(mesh.unchecked[0]));
+void remarkUnchecked(std::function<std::string(std::size_t)> name, MeshFile& mesh) {
+  mesh.polygon_name = std::move(name);
+  if (!mesh.unchecked.empty()) mesh.remarks.push_back(uncheckedRemark(mesh));
 }
 
 bool isPadding(std::string_view bytes) {
@@ -66,6 +73,7 @@ MeshFile weldTriangles(const Positions& corners, const std::string& path) {
 
 MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path) {
   MeshFile mesh;
+  mesh.is_soup = true;
   Polygons polygons;
   polygons.ends = std::move(ends);
   std::map<std::array<double, 3>, Index> known;
@@ -77,6 +85,29 @@ MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, c
   }
   setPolygons(std::move(polygons), mesh);
   return mesh;
+}
+
+std::size_t matchSoups(std::vector<MeshFile>& frames) {
+  SoupWeld weld;
+  std::size_t apart = 0;
+  for (MeshFile& frame : frames) {
+    Positions corners;
+    corners.reserve(frame.polygons.corners.size());
+    for (const Index v : frame.polygons.corners) corners.push_back(frame.positions[v]);
+    frame.positions = std::move(corners);
+    apart += weld.weld(frame.positions);
+  }
+  for (MeshFile& frame : frames) {
+    Positions positions;
+    positions.reserve(weld.cornerOfVertex().size());
+    for (const Index corner : weld.cornerOfVertex()) positions.push_back(frame.positions[corner]);
+    frame.positions = std::move(positions);
+    auto& remarks = frame.remarks;
+    remarks.erase(std::remove(remarks.begin(), remarks.end(), uncheckedRemark(frame)), remarks.end());
+    setPolygons({weld.vertexOfCorner(), std::move(frame.polygons.ends)}, frame);
+    remarkUnchecked(std::move(frame.polygon_name), frame);
+  }
+  return apart;
 }
 
 }  // namespace dccd

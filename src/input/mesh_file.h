@@ -29,6 +29,8 @@ struct MeshFile {
   std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face
   std::vector<Edge> edges;             ///< of the lines of an OBJ, which then has no faces
   std::vector<std::string> remarks;    ///< sentences about what was skipped, for the user to see
+  bool is_soup = false;                ///< vertices are corners of equal coordinates, not what the file numbers
+  std::function<std::string(std::size_t)> polygon_name;  ///< where a polygon stands in the file, in words
 };
 
 /// The small letters behind a path's last dot; empty where there is none.
@@ -40,8 +42,8 @@ void requireReadable(const std::string& path);
 std::string readWholeFile(const std::string& path);
 /// Makes the mesh's faces of the polygons. Returns where each polygon ends among the faces.
 std::vector<std::size_t> setPolygons(Polygons polygons, MeshFile& mesh);
-/// A remark where polygons are unchecked. `name` says of the first one where it stands in the file.
-void remarkUnchecked(const std::function<std::string(std::size_t)>& name, MeshFile& mesh);
+/// A remark where polygons are unchecked. `name` becomes the mesh's.
+void remarkUnchecked(std::function<std::string(std::size_t)> name, MeshFile& mesh);
 /// What stands behind the end of a binary file can hold no geometry: zeros, blanks and ends of lines.
 bool isPadding(std::string_view bytes);
 /// Three corners a triangle to a mesh: corners with equal coordinates become one vertex, in the order of their first
@@ -49,5 +51,8 @@ bool isPadding(std::string_view bytes);
 MeshFile weldTriangles(const Positions& corners, const std::string& path);
 /// The same of polygons, each of the corners up to its end.
 MeshFile weldPolygons(const Positions& corners, std::vector<std::size_t> ends, const std::string& path);
+/// Gives soups of the same polygons the same vertices: corners are one that are equal in each of them, as SoupWeld has
+/// it. Returns how many vertices of the first one came apart.
+std::size_t matchSoups(std::vector<MeshFile>& frames);
 
 }  // namespace dccd

@@ -1,5 +1,8 @@
 #include "input/mesh_views.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace dccd {
 
 HeaderView readHeader(WireReader& wire) {
@@ -16,6 +19,19 @@ HeaderView readHeader(WireReader& wire) {
 namespace {
 
 constexpr std::uint8_t FLOAT32 = 7, FLOAT64 = 8;  // sensor_msgs/PointField
+
+/// Bytes of a FLOAT32 or FLOAT64.
+std::size_t sizeOf(const CloudView::Coordinate& coordinate) { return coordinate.is_double ? 8 : 4; }
+
+template <typename T>
+double numberAt(const std::uint8_t* at, bool big_endian) {
+  std::uint8_t bytes[sizeof(T)];
+  std::memcpy(bytes, at, sizeof(T));
+  if (big_endian) std::reverse(bytes, bytes + sizeof(T));
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return static_cast<double>(value);
+}
 
 CloudView::Coordinate fieldOf(std::string_view name, std::size_t offset, std::uint8_t datatype) {
   if (datatype != FLOAT32 && datatype != FLOAT64) {
@@ -41,9 +57,13 @@ void readFields(WireReader& wire, const std::string& extra_field, CloudView& clo
 }  // namespace
 
 void CloudFieldFinder::add(std::string_view name, std::size_t offset, std::uint8_t datatype, CloudView& cloud) {
-  if (!extra_field_.empty() && name == extra_field_) cloud.extra = fieldOf(name, offset, datatype);
+  if (!extra_field_.empty() && name == extra_field_) {
+    if (cloud.extra) throw WireError("there are two fields '" + extra_field_ + "'");
+    cloud.extra = fieldOf(name, offset, datatype);
+  }
   if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') return;
   const auto axis = static_cast<std::size_t>(name[0] - 'x');
+  if (found_[axis]) throw WireError("there are two fields '" + std::string(name) + "'");
   cloud.xyz[axis] = fieldOf(name, offset, datatype);
   found_[axis] = true;
 }
@@ -57,38 +77,42 @@ void CloudFieldFinder::finish(const CloudView& cloud) const {
   }
 }
 
-void checkStrides(const CloudView& cloud, std::size_t bytes) {
+void checkStrides(CloudView& cloud, std::size_t bytes) {
   for (const CloudView::Coordinate& coordinate :
        {cloud.xyz[0], cloud.xyz[1], cloud.xyz[2], cloud.extra.value_or(cloud.xyz[0])}) {
-    if (coordinate.offset + (coordinate.is_double ? 8 : 4) > cloud.point_step) {
+    if (coordinate.offset + sizeOf(coordinate) > cloud.point_step) {
       throw WireError("a coordinate's offset " + std::to_string(coordinate.offset) + " reaches past point_step " +
                       std::to_string(cloud.point_step));
     }
   }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const CloudView::Coordinate &one = cloud.xyz[axis], &other = cloud.xyz[(axis + 1) % 3];
+    if (one.offset < other.offset + sizeOf(other) && other.offset < one.offset + sizeOf(one)) {
+      throw WireError(std::string("fields '") + "xyz"[axis] + "' and '" + "xyz"[(axis + 1) % 3] + "' have offsets " +
+                      std::to_string(one.offset) + " and " + std::to_string(other.offset) + ", so that they overlap");
+    }
+  }
   if (cloud.size() == 0) return;
-  // All factors are 32 bits wide, so that the products fit; a single row need not state its stride.
+  // All factors are 32 bits wide, so that products of two fit; a single row need not state its stride.
   const std::uint64_t row = static_cast<std::uint64_t>(cloud.width) * cloud.point_step;
-  if (cloud.height > 1 && cloud.row_step < row) {
-    throw WireError("row_step " + std::to_string(cloud.row_step) + " is less than width x point_step " +
-                    std::to_string(row));
+  const std::uint64_t stride = std::max<std::uint64_t>(cloud.row_step, 1);
+  const bool fits = row <= bytes && cloud.height - 1 <= (bytes - row) / stride;
+  if (cloud.height == 1 ? row <= bytes : fits && cloud.row_step >= row) return;
+  if (cloud.height > 1 && bytes % row == 0 && bytes / row == cloud.height) {
+    cloud.wrong_row_step = std::exchange(cloud.row_step, row);
+    return;
   }
-  const std::uint64_t stride = cloud.row_step;
-  if (row > bytes || (cloud.height - 1) > (bytes - row) / (stride ? stride : 1)) {
-    throw WireError(std::to_string(cloud.height) + " x " + std::to_string(cloud.width) + " points of " +
-                    std::to_string(cloud.point_step) + " bytes do not fit into data of " + std::to_string(bytes));
-  }
+  throw WireError((cloud.height == 1 || cloud.row_step == row
+                       ? ""
+                       : "row_step " + std::to_string(cloud.row_step) + " is not width x point_step " +
+                             std::to_string(row) + ", and ") +
+                  std::to_string(cloud.height) + " x " + std::to_string(cloud.width) + " points of " +
+                  std::to_string(cloud.point_step) + " bytes do not fit into data of " + std::to_string(bytes));
 }
 
 double CloudView::value(std::size_t i, const Coordinate& field) const {
   const std::uint8_t* at = data + (i / width) * (height > 1 ? row_step : 0) + (i % width) * point_step + field.offset;
-  if (field.is_double) {
-    double value;
-    std::memcpy(&value, at, 8);
-    return value;
-  }
-  float value;
-  std::memcpy(&value, at, 4);
-  return static_cast<double>(value);
+  return field.is_double ? numberAt<double>(at, big_endian) : numberAt<float>(at, big_endian);
 }
 
 Vec3 CloudView::point(std::size_t i) const { return {value(i, xyz[0]), value(i, xyz[1]), value(i, xyz[2])}; }
@@ -99,7 +123,7 @@ CloudView readCloud(WireReader& wire, const std::string& extra_field) {
   cloud.height = wire.read<std::uint32_t>("height");
   cloud.width = wire.read<std::uint32_t>("width");
   readFields(wire, extra_field, cloud);
-  if (wire.read<std::uint8_t>("is_bigendian")) throw WireError("is_bigendian is set; send little-endian clouds");
+  cloud.big_endian = wire.read<std::uint8_t>("is_bigendian") != 0;
   cloud.point_step = wire.read<std::uint32_t>("point_step");
   cloud.row_step = wire.read<std::uint32_t>("row_step");
   const WireSpan<std::uint8_t> data = wire.readArray<std::uint8_t>("data");

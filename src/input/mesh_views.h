@@ -28,6 +28,9 @@ struct CloudView {
   HeaderView header;
   std::size_t height = 0, width = 0, point_step = 0, row_step = 0;
   const std::uint8_t* data = nullptr;
+  bool big_endian = false;
+  bool is_rope = false;                       ///< of a type whose points make a line, unless the topology is given
+  std::optional<std::size_t> wrong_row_step;  ///< what the message says, where its data contradict it
   struct Coordinate {
     std::size_t offset = 0;
     bool is_double = false;
@@ -56,8 +59,9 @@ class CloudFieldFinder {
   const std::string& extra_field_;
   std::array<bool, 3> found_{};
 };
-/// Throws WireError unless every coordinate of every point lies within `bytes` of data.
-void checkStrides(const CloudView& cloud, std::size_t bytes);
+/// Throws WireError unless the coordinates lie side by side, those of every point within `bytes` of data. Corrects a
+/// row_step that contradicts data that are exactly height x width x point_step.
+void checkStrides(CloudView& cloud, std::size_t bytes);
 
 using PointOnWire = std::array<double, 3>;
 using TriangleOnWire = std::array<std::uint32_t, 3>;
@@ -72,7 +76,7 @@ struct IndexedView {
   std::size_t size() const { return cloud ? cloud->size() : points.size; }
 };
 
-/// One marker, of whatever type; a triangle list is a soup.
+/// One marker, of whatever type; a triangle list is a soup, lines are ropes.
 struct MarkerView {
   HeaderView header;
   std::string_view ns;
@@ -81,7 +85,8 @@ struct MarkerView {
   std::array<double, 3> scale{};
   WireSpan<PointOnWire> points;
 };
-constexpr std::int32_t MARKER_TRIANGLE_LIST = 11;
+constexpr std::int32_t MARKER_LINE_STRIP = 4, MARKER_LINE_LIST = 5, MARKER_SPHERE_LIST = 7, MARKER_POINTS = 8,
+                       MARKER_TRIANGLE_LIST = 11;
 constexpr std::int32_t MARKER_ADD = 0;
 
 using MeshView = std::variant<CloudView, IndexedView, std::vector<MarkerView>>;

@@ -48,7 +48,8 @@ class ObjReader {
                           "), and a mesh is of the ones or the others; write them to two files");
     }
     nameGroups(setPolygons(std::move(polygons_), mesh_));
-    remarkUnchecked([&](std::size_t p) { return "in line " + std::to_string(face_lines_[p]); }, mesh_);
+    remarkUnchecked([lines = std::move(face_lines_)](std::size_t p) { return "in line " + std::to_string(lines[p]); },
+                    mesh_);
     if (unknown_lines_ > 0) {
       mesh_.remarks.push_back(std::to_string(unknown_lines_) +
                               " lines with unknown keywords are skipped, the first is " + first_unknown_);

@@ -35,7 +35,7 @@ CloudView viewOfCloud(const Cloud& cloud, const std::string& extra_field) {
   CloudFieldFinder finder(extra_field);
   for (const auto& field : cloud.fields) finder.add(field.name, field.offset, field.datatype, view);
   finder.finish(view);
-  if (cloud.is_bigendian) throw WireError("is_bigendian is set; send little-endian clouds");
+  view.big_endian = cloud.is_bigendian != 0;
   view.point_step = cloud.point_step;
   view.row_step = cloud.row_step;
   view.data = cloud.data.data();

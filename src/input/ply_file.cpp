@@ -181,7 +181,8 @@ class PlyText : public PlyBody {
     if (isInteger(type)) return static_cast<double>(lines_.integer(word));
     const double value = lines_.number(word);
     if (type == Number::DOUBLE || !std::isfinite(value)) return value;
-    if (std::abs(value) > double{std::numeric_limits<float>::max()}) lines_.fail(word, "is too large for a float");
+    // Up to half a unit in the last place above the largest float it is rounded to that.
+    if (std::abs(value) >= 0x1.ffffffp127) lines_.fail(word, "is too large for a float");
     return double{static_cast<float>(value)};
   }
   std::int64_t integer(Number) override { return lines_.integer(take()); }
@@ -288,9 +289,10 @@ class PlyReader {
     }
     if (std::string remark = body->finish(); !remark.empty()) mesh_.remarks.push_back(std::move(remark));
     setPolygons(std::move(polygons_), mesh_);
-    const auto name = [&](std::size_t p) {
-      return p >= faces_begin_ && p < faces_end_ ? "polygon " + std::to_string(p - faces_begin_)
-                                                 : std::string("a triangle of a strip");
+    const auto name = [begin = faces_begin_, end = faces_end_, strips = std::move(strip_ends_)](std::size_t p) {
+      if (p >= begin && p < end) return "polygon " + std::to_string(p - begin);
+      const auto strip = std::upper_bound(strips.begin(), strips.end(), p) - strips.begin();
+      return "a triangle of strip " + std::to_string(strip);
     };
     remarkUnchecked(name, mesh_);
     return std::move(mesh_);
@@ -423,6 +425,7 @@ class PlyReader {
       }
       if (strips) {
         addStrip();
+        strip_ends_.push_back(polygons_.size());
       } else {
         polygons_.add(corners_);
       }
@@ -438,6 +441,7 @@ class PlyReader {
   Polygons polygons_;
   std::uint64_t vertices_ = 0;
   std::size_t faces_begin_ = 0, faces_end_ = 0;  // of the element `face` among the polygons
+  std::vector<std::size_t> strip_ends_;          // of each strip among the polygons
   std::vector<Index> corners_;
 };
 

@@ -24,9 +24,9 @@ Positions binaryCorners(const std::string& bytes, std::size_t triangles) {
 /// solid NAME, then facets, then endsolid NAME; as often as there are solids. Words in letters of either case.
 class AsciiReader {
  public:
-  AsciiReader(const std::string& text, const std::string& path) : lines_(text, path) {}
+  AsciiReader(const std::string& text, const std::string& path) : path_(path), lines_(text, path) {}
 
-  Positions read() {
+  MeshFile read() {
     while (lines_.nextWithWords()) {
       at_ = 0;
       expect("solid");
@@ -35,12 +35,19 @@ class AsciiReader {
       expect("endsolid");
       skipName();
     }
-    return std::move(corners_);
+    MeshFile mesh = weldTriangles(corners_, path_);
+    const auto name = [lines = std::move(facet_lines_)](std::size_t t) {
+      return "triangle " + std::to_string(t) + ", in line " + std::to_string(lines[t]);
+    };
+    remarkUnchecked(name, mesh);
+    return mesh;
   }
 
  private:
   void readFacet() {
-    for (const char* word : {"facet", "normal"}) expect(word);
+    expect("facet");
+    facet_lines_.push_back(lines_.line());
+    expect("normal");
     for (int axis = 0; axis < 3; ++axis) take("a facet's normal");  // the corners' order tells it, too
     for (const char* word : {"outer", "loop"}) expect(word);
     for (int corner = 0; corner < 3; ++corner) {
@@ -75,16 +82,12 @@ class AsciiReader {
     return inSmallLetters(word("'" + keyword + "' or 'endsolid'").text) == keyword;
   }
 
+  const std::string& path_;
   TextLines lines_;
   std::size_t at_ = 0;  // among the line's words
   Positions corners_;
+  std::vector<std::size_t> facet_lines_;
 };
-
-MeshFile meshOf(const Positions& corners, const std::string& path) {
-  MeshFile mesh = weldTriangles(corners, path);
-  remarkUnchecked([](std::size_t t) { return "triangle " + std::to_string(t); }, mesh);
-  return mesh;
-}
 
 bool isText(const std::string& bytes, const std::string& path) {
   TextLines lines(bytes, path);
@@ -102,7 +105,7 @@ MeshFile loadStlFile(const std::string& path) {
   // count are more than any file has that is read.
   const std::size_t end = BEGIN_BYTES + std::size_t{triangles} * TRIANGLE_BYTES;
   if (bytes.size() < BEGIN_BYTES || bytes.size() < end) {
-    if (isText(bytes, path)) return meshOf(AsciiReader(bytes, path).read(), path);
+    if (isText(bytes, path)) return AsciiReader(bytes, path).read();
     throw MeshFileError(
         path + ": neither an ASCII STL nor a binary one of the size that it states: " + std::to_string(triangles) +
         " triangles take " + std::to_string(end) + " bytes, and it has " + std::to_string(bytes.size()));
@@ -112,7 +115,8 @@ MeshFile loadStlFile(const std::string& path) {
     throw MeshFileError(path + ": states " + std::to_string(triangles) + " triangles, and " + rest +
                         " that are not empty follow them; correct the count (byte 80), or cut them off");
   }
-  MeshFile mesh = meshOf(binaryCorners(bytes, triangles), path);
+  MeshFile mesh = weldTriangles(binaryCorners(bytes, triangles), path);
+  remarkUnchecked([](std::size_t t) { return "triangle " + std::to_string(t); }, mesh);
   if (bytes.size() > end) mesh.remarks.push_back(rest + " of padding after the last triangle are skipped");
   return mesh;
 }

@@ -261,7 +261,8 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   }
   refused_[body].clear();
   checked_[body] = waiting.mesh.topology;
-  if (is_new) {
+  const bool first_remark = !waiting.mesh.row_step_remark.empty() && wrong_row_steps_++ == 0;
+  if (is_new || first_remark) {
     hints_[body] = joined(remarks_[body], meshHint(waiting.mesh, config_.bodies[body].input));
   }
   const bool unstamped = waiting.mesh.stamp_ns == 0;

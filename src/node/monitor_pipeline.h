@@ -95,6 +95,8 @@ class MonitorPipeline {
   const std::string& fixedFrame() const { return fixed_frame_; }
   std::uint64_t transformsUnusable() const { return transforms_.unusable(); }
   std::uint64_t weldChanges() const { return weld_changes_; }
+  /// Clouds with a row_step that their data contradict.
+  std::uint64_t wrongRowSteps() const { return wrong_row_steps_; }
   /// A mesh that cannot be placed or a message that is refused, since the last call; for the log. Empty: none. Of a
   /// static body's frame that waits on it is said once.
   std::string takeComplaint(std::size_t body);
@@ -135,7 +137,7 @@ class MonitorPipeline {
   std::vector<std::optional<DecodedMesh>> static_meshes_;
   std::optional<LoadedMap> placed_map_;
   bool frame_answered_ = false;  // a step was answered in it
-  std::uint64_t weld_changes_ = 0;
+  std::uint64_t weld_changes_ = 0, wrong_row_steps_ = 0;
   bool finishing_ = false;
 
   void loadFiles();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "dccd/new_contacts.h"
 #include "output/patch_messages.h"
@@ -28,6 +29,9 @@ static_assert(static_cast<int>(Touching::LASTING) == static_cast<int>(deformable
 static_assert(static_cast<int>(Touching::NEW) == static_cast<int>(deformable_ccd::State::NEW));
 static_assert(static_cast<int>(Touching::EXPECTED) == static_cast<int>(deformable_ccd::State::EXPECTED));
 static_assert(OBSTACLE_BODY == ContactMessage::OBSTACLE);
+
+/// What is not there is NaN: plots leave it out, while an infinity takes their axes away.
+double plottable(double value) { return std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN(); }
 
 std::string nameOf(const Contact& contact, const std::vector<Body>& bodies) {
   static const char* const SIZED[] = {"", "vertex ", "edge ", "face "};
@@ -126,7 +130,7 @@ void fillContacts(const Outcome& outcome, StatsMessage& out) {
   out.contacts_expected = static_cast<std::uint32_t>(outcome.counts.expected);
   out.suppressed = static_cast<std::uint32_t>(outcome.suppressed);
   out.intersections = static_cast<std::uint32_t>(outcome.intersections.size());
-  out.earliest_toc = outcome.earliest_toc;
+  out.earliest_toc = plottable(outcome.earliest_toc);
 }
 
 void fillStages(const StepStats& stats, StatsMessage& out) {
@@ -249,7 +253,7 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
   out.pairs = toPairContacts(outcome, bodies);
   out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(outcome));
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
-  out.toc = out.seconds_from_start = toc;
+  out.toc = out.seconds_from_start = plottable(toc);
   const Contact* first = nullptr;
   const std::vector<NewContact> found = newContacts(outcome);
   for (const NewContact& one : found) {
@@ -353,7 +357,7 @@ deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double 
   out.pairs = toPairContacts(prediction, bodies);
   out.lasting_patches = static_cast<std::uint32_t>(lastingPatches(prediction));
   out.expected_contacts = static_cast<std::uint32_t>(prediction.counts.expected);
-  out.seconds = toc * horizon_s;
+  out.seconds = plottable(toc * horizon_s);
   // Rounded to the nearest it could be late.
   if (out.contact && std::fma(toc, horizon_s, -out.seconds) < 0) out.seconds = std::nextafter(out.seconds, 0);
   return out;

@@ -148,8 +148,10 @@ OBJ_TRIANGLES = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 %(z)s\nv 0.3 0.2 %(z)s\nv 
 PLY_HEAD = 'ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n'
 
 
-class FilesTest(unittest.TestCase):
-    """Small files of odd but legal form, of which the contacts are known."""
+class Files(unittest.TestCase):
+    """Steps of two small files, of which the contacts are known."""
+
+    TOC = 0.5
 
     def check(self, ending, first, second):
         with tempfile.TemporaryDirectory() as folder:
@@ -164,10 +166,14 @@ class FilesTest(unittest.TestCase):
         for row in rows:
             kind, *vertices, lower, upper, certainty = row.split(',')
             self.assertEqual(certainty, 'certain')
-            self.assertLessEqual(float(lower), 0.5)
-            self.assertLess(0.5, float(upper))
+            self.assertLessEqual(float(lower), self.TOC)
+            self.assertLess(self.TOC, float(upper))
             self.contacts.append((kind, *map(int, vertices)))
         return done.returncode
+
+
+class FilesTest(Files):
+    """Odd but legal form."""
 
     THROUGH = [('VF', v, 0, 1, 2) for v in (3, 4, 5)]
 
@@ -226,6 +232,83 @@ class FilesTest(unittest.TestCase):
                                '0 0 0\n1 0 0\n0 1 0\n1 0\n0\n')
         self.assertEqual(self.check('.ply', text, text), 1)
         self.assertIn('range grid', self.remarks)
+
+
+def stl(*triangles):
+    facets = ['facet normal 0 0 0\nouter loop\n' + ''.join('vertex %r %r %r\n' % corner for corner in triangle) +
+              'endloop\nendfacet\n' for triangle in triangles]
+    return 'solid a\n' + ''.join(facets) + 'endsolid a\n'
+
+
+def dae(*triangles):
+    corners = [corner for triangle in triangles for corner in triangle]
+    numbers = ' '.join('%r %r %r' % corner for corner in corners)
+    return ('<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/><library_geometries>'
+            '<geometry id="g"><mesh><source id="p"><float_array id="a" count="%d">%s</float_array><technique_common>'
+            '<accessor source="#a" count="%d" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>'
+            '<param name="Z" type="float"/></accessor></technique_common></source><vertices id="v"><input semantic="POSITION" '
+            'source="#p"/></vertices><triangles count="%d"><input semantic="VERTEX" source="#v" offset="0"/><p>%s</p></triangles>'
+            '</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry '
+            'url="#g"/></node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>'
+            % (3 * len(corners), numbers, len(corners), len(triangles), ' '.join(map(str, range(len(corners))))))
+
+
+class SoupsTest(Files):
+    """Frames whose vertices have no numbers: a quadrilateral of two triangles, a small triangle that falls through it."""
+
+    FLOOR = [[(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 0), (1, 0, 0), (1, 1, 0)]]
+    THROUGH = [('VF', v, 0, 1, 2) for v in (4, 5, 6)]
+
+    def falling(self, z):
+        return [(0.25, 0.25, z), (0.375, 0.25, z), (0.25, 0.375, z)]
+
+    def test_a_step(self):
+        for ending, write_frame in (('.stl', stl), ('.dae', dae)):
+            frames = [write_frame(*self.FLOOR, self.falling(z)) for z in (0.5, -0.5)]
+            self.assertEqual(self.check(ending, *frames), 0, self.said)
+            self.assertEqual(self.remarks, '')
+            self.assertEqual(self.contacts, self.THROUGH)
+
+    def test_what_meets_in_a_later_frame_is_contact(self):
+        lower = [(0, 0, -1), (1, 0, -1), (0, 1, -1)]
+        self.assertEqual(self.check('.stl', stl(*self.FLOOR, [(x, y, 1) for x, y, _ in lower]), stl(*self.FLOOR, lower)), 0)
+        self.assertIn(('VF', 4, 0, 1, 2), self.contacts, 'it comes to lie on the floor, corner on corner, at half the step')
+        self.assertEqual(self.remarks, '')
+
+    def test_what_comes_apart_is_said(self):
+        away = [(x, y, z + 1) for x, y, z in self.FLOOR[1]]
+        self.TOC = 0
+        self.assertEqual(self.check('.stl', stl(*self.FLOOR), stl(self.FLOOR[0], away)), 0)
+        self.assertIn('what touches did so when the step began', self.said)
+        self.assertIn('0.stl: 2 vertices come apart in a later frame', self.remarks)
+
+    def test_what_is_no_sequence(self):
+        self.assertEqual(self.check('.stl', stl(*self.FLOOR), stl(self.FLOOR[0])), 1)
+        self.assertIn('1.stl: not the topology of', self.remarks)
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / '0.stl').write_text(stl(*self.FLOOR))
+            write(pathlib.Path(folder) / '1.ply', [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (2, 1, 3)])
+            done = subprocess.run([tool(), folder + '/0.stl', folder + '/1.ply'], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn('write all frames in one format', done.stderr)
+
+    def test_a_triangle_that_repeats_a_corner_is_named(self):
+        thin = [(5, 0, 0), (6, 0, 0), (6, 0, 0)]
+        self.assertEqual(self.check('.stl', *2 * [stl(*self.FLOOR, thin)]), NOT_PROVED)
+        self.assertIn('0.stl: 1 polygons cannot be used and are unchecked, the first is triangle 2, in line 16', self.remarks)
+        self.assertEqual(self.check('.dae', *2 * [dae(*self.FLOOR, thin)]), NOT_PROVED)
+        self.assertIn('the first is polygon 2 of the scene', self.remarks)
+
+    def test_three_frames(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            for k, z in enumerate((1.0, 0.5, -0.5)):
+                (folder / ('%d.stl' % k)).write_text(stl(*self.FLOOR, self.falling(z)))
+            done = subprocess.run([tool(), *(str(folder / ('%d.stl' % k)) for k in range(3)), '--contacts', str(folder / 'out.csv')],
+                                  capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr), (0, ''))
+            rows = [row.split(',')[:6] for row in (folder / 'out.csv').read_text().splitlines()[1:]]
+            self.assertEqual(rows, [['1', *map(str, contact)] for contact in self.THROUGH])
 
 
 class SequenceTest(unittest.TestCase):

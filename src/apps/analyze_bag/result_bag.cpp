@@ -30,6 +30,7 @@ static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplayS
   context.frames = pipeline.monitor().total();
   context.weld_changes = pipeline.weldChanges();
   context.transforms_unusable = pipeline.transformsUnusable();
+  context.wrong_row_steps = pipeline.wrongRowSteps();
   context.maps_received = so_far.maps;
   context.maps_refused = so_far.maps_refused;
   return context;

@@ -1,4 +1,4 @@
-// visualization_msgs/Marker and MarkerArray: a triangle soup, three points a face.
+// visualization_msgs/Marker and MarkerArray: a triangle soup, three points a face; ropes, as lines or points.
 #include <visualization_msgs/MarkerArray.h>
 
 #include "input/message_type.h"
@@ -9,8 +9,10 @@ namespace {
 
 using Markers = std::vector<MarkerView>;
 
-static_assert(MARKER_TRIANGLE_LIST == visualization_msgs::Marker::TRIANGLE_LIST &&
-              MARKER_ADD == visualization_msgs::Marker::ADD);
+using visualization_msgs::Marker;
+static_assert(MARKER_TRIANGLE_LIST == Marker::TRIANGLE_LIST && MARKER_LINE_STRIP == Marker::LINE_STRIP &&
+              MARKER_LINE_LIST == Marker::LINE_LIST && MARKER_SPHERE_LIST == Marker::SPHERE_LIST &&
+              MARKER_POINTS == Marker::POINTS && MARKER_ADD == Marker::ADD);
 
 MarkerView readMarker(WireReader& wire) {
   MarkerView marker;
@@ -70,8 +72,13 @@ Markers viewOfArray(const visualization_msgs::MarkerArray& message, const std::s
   return markers;
 }
 
-/// An array has no header of its own; that of its first marker stands in.
-HeaderView readFirstHeader(WireReader& wire) { return readCountOfMarkers(wire) == 0 ? HeaderView{} : readHeader(wire); }
+/// An array has no header of its own; that of its first marker stands in, but for those that only take others away.
+HeaderView readFirstHeader(WireReader& wire) {
+  for (std::size_t left = readCountOfMarkers(wire); left > 0; --left) {
+    if (const MarkerView marker = readMarker(wire); marker.action == MARKER_ADD) return marker.header;
+  }
+  return {};
+}
 
 const MeshTypeRegistration ONE(meshType<visualization_msgs::Marker, readOne, viewOfOne>("marker"));
 const MeshTypeRegistration ARRAY(

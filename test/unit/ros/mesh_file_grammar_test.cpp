@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <regex>
 #include <set>
 
@@ -380,7 +381,35 @@ TEST_F(StlGrammar, NotFinite) {
 TEST_F(StlGrammar, RepeatedCorners) {
   const std::string thin = facet({"0 0 0", "1 0 0", "1 0 0"}), apart = facet({"5 0 0", "6 0 0", "6 0 0"});
   expectTwo(read("a.stl", solid(two() + thin)), "an edge of a face");
-  expectUnchecked(read("a.stl", solid(two() + apart)), {2}, "triangle 2");
+  expectUnchecked(read("a.stl", solid(two() + apart)), {2}, "triangle 2, in line 16");
+  std::string bytes = binary(3) + std::string(50, '\0');
+  const float far = 7;
+  for (std::size_t k = 1; k <= 3; ++k) std::memcpy(&bytes[84 + 2 * 50 + 12 * k], &far, sizeof far);
+  expectUnchecked(read("a.stl", bytes), {2}, "triangle 2");
+}
+
+TEST_F(StlGrammar, Sequences) {
+  const auto frames = [&](const std::string& first, const std::string& second) {
+    return std::vector<MeshFile>{read("0.stl", solid(first)), read("1.stl", solid(second))};
+  };
+  const std::string thin = facet({"5 0 0", "6 0 0", "6 0 0"}), wide = facet({"5 0 0", "6 0 0", "6 1 0"});
+  std::vector<MeshFile> moved = frames(two(), facet({"0 0 1", "1 0 1", "0 1 1"}) + facet({"0 1 1", "1 0 1", "0 0 1"}));
+  EXPECT_EQ(moved[1].positions.size(), 3u) << "by itself: two vertices meet in it";
+  EXPECT_EQ(matchSoups(moved), 0u);
+  expectTwo(moved[0], "as it is alone");
+  EXPECT_EQ(moved[1].positions, (Positions{{0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {0, 0, 1}})) << "what meets is contact";
+  std::vector<MeshFile> torn = frames(two(), facet({"0 0 0", "1 0 0", "0 1 0"}) + facet({"0 1 1", "1 0 0", "1 1 0"}));
+  EXPECT_EQ(matchSoups(torn), 1u);
+  EXPECT_EQ(torn[0].faces, (std::vector<Face>{{0, 1, 2}, {3, 1, 4}}));
+  EXPECT_EQ(torn[0].positions[2], torn[0].positions[3]);
+  std::vector<MeshFile> grown = frames(two() + thin, two() + wide);
+  ASSERT_EQ(grown[0].remarks.size(), 1u) << "unchecked by itself";
+  EXPECT_EQ(matchSoups(grown), 1u);
+  EXPECT_EQ(grown[0].faces.size(), 3u);
+  EXPECT_TRUE(grown[0].unchecked.empty() && grown[0].remarks.empty()) << "a triangle that grows";
+  std::vector<MeshFile> still = frames(two() + thin, two() + thin);
+  EXPECT_EQ(matchSoups(still), 0u);
+  expectUnchecked(still[1], {2}, "triangle 2, in line 16");
 }
 
 // --- PLY
@@ -508,6 +537,10 @@ TEST_F(PlyGrammar, Numbers) {
   EXPECT_EQ(read("a.ply", head(xyz(1)) + "0.1 1e-320 1e300\n").positions[0], Vec3(0.1, 1e-320, 1e300));
   EXPECT_EQ(read("a.ply", head(xyz(1, "float")) + "0.1 0 0\n").positions[0].x(), double{0.1f});
   expectRefused("a.ply", head(xyz(1, "float")) + "0 1e39 0\n", "a.ply:8: ", "too large for a float");
+  EXPECT_EQ(read("a.ply", head(xyz(1, "float")) + "3.4028235e38 1e-46 1e-400\n").positions[0],
+            Vec3(double{std::numeric_limits<float>::max()}, 0, 0))
+      << "the largest float, as it is written";
+  EXPECT_EQ(read("a.ply", head(xyz(1)) + "1e-400 -1e-400 0\n").positions[0], Vec3::Zero());
   EXPECT_TRUE(std::isnan(read("a.ply", head(xyz(1)) + "nan 0 inf\n").positions[0].x()));
 }
 
@@ -559,7 +592,8 @@ TEST_F(PlyGrammar, Strips) {
   expectTwo(read("a.ply", strips("3 0 1 2\n3 2 1 3\n", "2")), "two of them");
   EXPECT_EQ(read("a.ply", strips("6 3 0 1 2 -1 0\n")).faces, (std::vector<Face>{{3, 0, 1}, {1, 0, 2}}));
   expectRefused("a.ply", strips("4 0 1 2 -2\n"), "a.ply:14: ", "strip 0 names vertex -2 of 4");
-  expectUnchecked(read("a.ply", strips("6 0 1 2 -1 1 3\n")), {1}, "of a strip");
+  expectUnchecked(read("a.ply", strips("6 0 1 2 -1 1 3\n")), {1}, "a triangle of strip 0");
+  expectUnchecked(read("a.ply", strips("3 0 1 2\n2 1 3\n", "2")), {1}, "a triangle of strip 1");
 }
 
 TEST_F(PlyGrammar, OtherElements) {
@@ -591,6 +625,105 @@ TEST_F(PlyGrammar, EndOfBytes) {
         << mesh.remarks.back();
   }
   expectRefused("a.ply", bytes + "\1", "a.ply: ", "counts are too low");
+}
+
+// --- DAE
+
+class DaeGrammar : public Grammar {
+ protected:
+  static std::string list(const std::string& kind, int count, const std::string& rest) {
+    return "<" + kind + " count=\"" + std::to_string(count) +
+           "\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>" + rest + "</" + kind + ">";
+  }
+  static std::string two() { return list("triangles", 2, "<p>0 1 2 2 1 3</p>"); }
+  static std::string node(const std::string& before = "") {
+    return "<node id=\"n\">" + before + "<instance_geometry url=\"#g\"/></node>";
+  }
+  static std::string dae(const std::string& primitives, const std::string& nodes = node(),
+                         const std::string& points = "0 0 0 1 0 0 0 1 0 1 1 0.25",
+                         const std::string& asset = "<unit name=\"metre\" meter=\"1\"/><up_axis>Z_UP</up_axis>") {
+    return "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+           "<asset>" +
+           asset +
+           "</asset><library_geometries><geometry id=\"g\"><mesh><source id=\"p\">"
+           "<float_array id=\"a\" count=\"12\">" +
+           points +
+           "</float_array><technique_common>"
+           "<accessor source=\"#a\" count=\"4\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+           "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+           "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>" +
+           primitives + "</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\">" +
+           nodes +
+           "</visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
+  }
+  MeshFile readDae(const std::string& text) { return read("a.dae", text); }
+  static void expectNear(const Positions& positions, const Positions& expected) {
+    ASSERT_EQ(positions.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_LT((positions[i] - expected[i]).norm(), 1e-6) << i;
+  }
+};
+
+TEST_F(DaeGrammar, Primitives) {
+  for (const std::string& primitives :
+       {two(), list("polylist", 2, "<vcount>3 3</vcount><p>0 1 2 2 1 3</p>"),
+        list("polygons", 2, "<p>0 1 2</p><p>2 1 3</p>"), list("tristrips", 1, "<p>0 1 2 3</p>")}) {
+    expectTwo(readDae(dae(primitives)), primitives);
+  }
+  EXPECT_EQ(readDae(dae(list("trifans", 1, "<p>0 1 3 2</p>"))).faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST_F(DaeGrammar, Units) {
+  const std::string unit = "<unit name=\"centimetre\" meter=\"0.01\"/>";
+  for (const char* axis : {"X_UP", "Y_UP", "Z_UP"}) {
+    const std::string asset = unit + "<up_axis>" + axis + "</up_axis>";
+    expectNear(readDae(dae(two(), node(), "0 0 0 100 0 0 0 100 0 100 100 25", asset)).positions, SQUARE);
+  }
+  expectTwo(readDae(dae(two(), node(), "0 0 0 1 0 0 0 1 0 1 1 0.25", "")), "no unit");
+}
+
+TEST_F(DaeGrammar, Nodes) {
+  const Positions mirrored{{3, 0, 0}, {2, 0, 0}, {3, 1, 0}, {2, 1, 0.25}};
+  const std::string by_scale = "<translate>3 0 0</translate><scale>-1 1 1</scale>",
+                    by_matrix = "<matrix>-1 0 0 3 0 1 0 0 0 0 1 0 0 0 0 1</matrix>";
+  for (const std::string& transform : {by_scale, by_matrix}) {
+    const MeshFile mesh = readDae(dae(two(), node(transform)));
+    EXPECT_EQ(mesh.positions, mirrored) << transform;
+    EXPECT_EQ(mesh.faces, TWO);
+  }
+  const std::string turned =
+      "<node id=\"m\"><rotate>0 0 1 90</rotate>" + node("<translate>1 0 0</translate>") + "</node>";
+  expectNear(readDae(dae(two(), turned)).positions, {{0, 1, 0}, {0, 2, 0}, {-1, 1, 0}, {-1, 2, 0.25}});
+  const MeshFile both = readDae(dae(two(), node() + "<node id=\"m\"><translate>0 0 1</translate>"
+                                                    "<instance_geometry url=\"#g\"/></node>"));
+  EXPECT_EQ(both.positions.size(), 8u) << "as often as it stands in the scene";
+  EXPECT_EQ(both.faces.size(), 4u);
+}
+
+TEST_F(DaeGrammar, SinglePrecision) {
+  EXPECT_EQ(readDae(dae(two(), node(), "0.1 0 0 1 0 0 0 1 0 1 1 0.25")).positions[0].x(), double{0.1f});
+  const std::string far = "1000000 0 0 1000000.01 0 0 1000000 1 0 1000001 1 0";
+  expectUnchecked(readDae(dae(list("triangles", 1, "<p>0 1 2</p>"), node(), far)), {0}, "polygon 0 of the scene");
+  EXPECT_EQ(readDae(dae(list("triangles", 2, "<p>0 2 3 1 2 3</p>"), node(), far)).positions.size(), 3u);
+}
+
+TEST_F(DaeGrammar, Lines) {
+  const std::string line = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>";
+  const auto lines = [&](const std::string& p) {
+    return two() + "<lines count=\"1\">" + line + "<p>" + p + "</p></lines>";
+  };
+  expectTwo(readDae(dae(lines("1 2"))), "the edge of a face");
+  expectUnchecked(readDae(dae(lines("0 3"))), {2}, "polygon 2 of the scene");
+}
+
+TEST_F(DaeGrammar, WhatIsRefused) {
+  const std::string hole = list("polygons", 1, "<ph><p>0 1 3 2</p><h>0 1 2</h></ph>");
+  expectRefused("a.dae", dae(hole), "a.dae: ", "<h>");
+  for (const std::string count : {"1", "3"}) {
+    expectRefused("a.dae", dae(list("triangles", std::stoi(count), "<p>0 1 2 2 1 3</p>")), "a.dae: ", "index count");
+  }
+  for (const std::string word : {"nan", "1e39"}) {
+    expectRefused("a.dae", dae(two(), node(), word + " 0 0 1 0 0 0 1 0 1 1 0.25"), "a.dae: ", "is not finite");
+  }
 }
 
 // --- the page

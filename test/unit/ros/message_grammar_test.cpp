@@ -1,10 +1,12 @@
 // The grammar of messages: each row of the tables in doc/messages.md is a test of its name here.
+#include <geometry_msgs/PoseArray.h>
 #include <gtest/gtest.h>
 #include <pcl_msgs/PolygonMesh.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <shape_msgs/Mesh.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -121,11 +123,36 @@ TEST_F(CloudGrammar, Rows) {
   padded.row_step = 100;
   padded.data.insert(padded.data.begin() + 80, 20, 0x77);
   EXPECT_EQ(read(padded).positions, SQUARE) << "bytes between two rows";
-  padded.row_step = 79;
-  EXPECT_TRUE(mentions(refusalOf(padded), "row_step 79"));
+  EXPECT_EQ(read(padded).row_step_remark, "");
+  for (const std::uint32_t row_step : {0u, 79u, 101u, 200u}) {
+    padded.row_step = row_step;
+    EXPECT_TRUE(mentions(refusalOf(padded), "row_step " + std::to_string(row_step))) << "of data of 180 bytes";
+  }
   sensor_msgs::PointCloud2 one = cloud();
-  one.row_step = 0;
-  EXPECT_EQ(read(one).positions, SQUARE) << "a single row needs none";
+  for (const std::uint32_t row_step : {0u, 4u, 1000u}) {
+    one.row_step = row_step;
+    EXPECT_EQ(read(one).positions, SQUARE) << "a single row needs none";
+    EXPECT_EQ(read(one).row_step_remark, "");
+  }
+}
+
+TEST_F(CloudGrammar, WrongRowSteps) {
+  sensor_msgs::PointCloud2 rows = cloud();
+  rows.height = rows.width = 2;
+  for (const std::uint32_t row_step : {0u, 2u, 40u, 79u, 81u, 160u, 4294967295u}) {
+    rows.row_step = row_step;
+    const DecodedMesh mesh = read(rows);
+    EXPECT_EQ(mesh.positions, SQUARE) << row_step;
+    EXPECT_TRUE(mentions(mesh.row_step_remark, "row_step " + std::to_string(row_step) + " contradicts"));
+    EXPECT_TRUE(mentions(mesh.row_step_remark, "publish row_step 80")) << mesh.row_step_remark;
+  }
+  rows.row_step = 80;
+  EXPECT_EQ(read(rows).row_step_remark, "");
+  rows.row_step = 160;
+  for (const std::size_t bytes : {159u, 161u, 239u}) {
+    rows.data.resize(bytes);
+    EXPECT_TRUE(mentions(refusalOf(rows), "row_step 160 is not width x point_step 80")) << refusalOf(rows);
+  }
 }
 
 TEST_F(CloudGrammar, LengthOfTheData) {
@@ -137,9 +164,40 @@ TEST_F(CloudGrammar, LengthOfTheData) {
 }
 
 TEST_F(CloudGrammar, BigEndian) {
-  sensor_msgs::PointCloud2 big = cloud();
-  big.is_bigendian = true;
-  EXPECT_TRUE(mentions(refusalOf(big), "is_bigendian"));
+  config.noise_field = "sigma";
+  constexpr std::uint8_t FLOAT32 = sensor_msgs::PointField::FLOAT32, FLOAT64 = sensor_msgs::PointField::FLOAT64;
+  for (const std::uint8_t datatype : {FLOAT32, FLOAT64}) {
+    const std::ptrdiff_t bytes = datatype == sensor_msgs::PointField::FLOAT32 ? 4 : 8;
+    sensor_msgs::PointCloud2 message = cloud(datatype);
+    sensor_msgs::PointField sigma = message.fields[0];
+    sigma.name = "sigma";
+    message.fields.push_back(sigma);  // the bytes of z
+    anew();
+    const DecodedMesh little = read(message);
+    message.is_bigendian = true;
+    for (std::ptrdiff_t at = 0; at < 160; at += 8) {
+      std::reverse(message.data.begin() + at, message.data.begin() + at + bytes);
+    }
+    anew();
+    const DecodedMesh big = read(message);
+    EXPECT_EQ(big.positions, little.positions);
+    EXPECT_EQ(big.radius_m, little.radius_m);
+    EXPECT_EQ(big.radius_m[3], bytes == 4 ? static_cast<double>(0.1f) : 0.1);
+  }
+}
+
+TEST_F(CloudGrammar, FieldsThatContradict) {
+  sensor_msgs::PointCloud2 twice = cloud();
+  twice.fields.push_back(twice.fields[3]);
+  EXPECT_TRUE(mentions(refusalOf(twice), "two fields 'y'"));
+  sensor_msgs::PointCloud2 overlapping = cloud();
+  for (auto& field : overlapping.fields) field.offset = 0;
+  EXPECT_TRUE(mentions(refusalOf(overlapping), "fields 'x' and 'y' have offsets 0 and 0"));
+  overlapping = cloud();
+  overlapping.fields[0].offset = 23;
+  EXPECT_TRUE(mentions(refusalOf(overlapping), "fields 'y' and 'z' have offsets 24 and 23")) << refusalOf(overlapping);
+  overlapping.fields[0].offset = 33;
+  EXPECT_TRUE(mentions(refusalOf(overlapping), "reaches past point_step 40"));
 }
 
 TEST_F(CloudGrammar, PointsThatAreNotFinite) {
@@ -163,6 +221,20 @@ TEST_F(CloudGrammar, Topology) {
   config.rows = 2;
   config.cols = 3;
   EXPECT_TRUE(mentions(refusalOf(cloud()), "VERTEX_COUNT: 4 points, but topology/rows x topology/cols is 2 x 3"));
+}
+
+TEST_F(CloudGrammar, Ropes) {
+  EXPECT_EQ(read(cloud()).topology->edges(), (std::vector<Edge>{{0, 1}, {1, 2}, {2, 3}}));
+  sensor_msgs::PointCloud2 rows = cloud();
+  rows.height = rows.width = 2;
+  rows.row_step = 80;
+  EXPECT_EQ(read(rows).topology->edges(), (std::vector<Edge>{{0, 1}, {2, 3}})) << "each row is one";
+  rows.height = 4;
+  rows.width = 1;
+  rows.row_step = 40;
+  EXPECT_EQ(read(rows).topology->edges().size(), 3u) << "a column is one";
+  rows.height = 1;
+  EXPECT_TRUE(mentions(refusalOf(rows), "VERTEX_COUNT: 1 points, but a polyline needs 2"));
 }
 
 // --- headers
@@ -318,9 +390,22 @@ TEST_F(MarkerGrammar, Scales) {
 TEST_F(MarkerGrammar, OtherTypesAndActions) {
   visualization_msgs::Marker cubes = marker(), gone = marker();
   cubes.type = visualization_msgs::Marker::CUBE_LIST;
-  EXPECT_TRUE(mentions(refusalOf(cubes), "no TRIANGLE_LIST marker"));
-  gone.action = visualization_msgs::Marker::DELETE;
-  EXPECT_TRUE(mentions(refusalOf(gone), "no TRIANGLE_LIST marker"));
+  EXPECT_TRUE(mentions(refusalOf(cubes), "no TRIANGLE_LIST marker and no LINE_STRIP"));
+  for (const int action : {2, 3}) {  // DELETE, DELETEALL
+    gone.action = action;
+    EXPECT_TRUE(mentions(refusalOf(gone), "no TRIANGLE_LIST marker"));
+    visualization_msgs::MarkerArray both;
+    both.markers = {gone, marker()};
+    EXPECT_EQ(read(both).positions.size(), 3u) << "what was there before goes, and what follows is the mesh";
+  }
+}
+
+TEST_F(MarkerGrammar, LifetimeAndFrameLocked) {
+  visualization_msgs::Marker kept = marker();
+  kept.lifetime = ros::Duration(0.1);
+  kept.frame_locked = true;
+  kept.color.a = 0;
+  EXPECT_EQ(read(kept).positions, read(marker()).positions) << "what RViz makes of it is no matter of the mesh";
 }
 
 TEST_F(MarkerGrammar, SeveralLists) {
@@ -331,6 +416,171 @@ TEST_F(MarkerGrammar, SeveralLists) {
   anew();
   config.marker_id = 3;
   EXPECT_EQ(read(two).dropped_faces, 0u) << "one that is asked for is alone";
+}
+
+// --- ropes as markers
+
+struct RopeGrammar : MarkerGrammar {
+  using Edges = std::vector<Edge>;
+  static visualization_msgs::Marker rope(std::int32_t type, const Positions& points, std::int32_t id = 0) {
+    visualization_msgs::Marker out = marker(points);
+    out.ns = "rope";
+    out.id = id;
+    out.type = type;
+    out.scale.x = 0.01;
+    return out;
+  }
+  static visualization_msgs::Marker strip(const Positions& points, std::int32_t id = 0) {
+    return rope(visualization_msgs::Marker::LINE_STRIP, points, id);
+  }
+  static visualization_msgs::Marker segments(const Positions& points, std::int32_t id = 0) {
+    return rope(visualization_msgs::Marker::LINE_LIST, points, id);
+  }
+  static visualization_msgs::MarkerArray all(const std::vector<visualization_msgs::Marker>& markers) {
+    visualization_msgs::MarkerArray out;
+    out.markers = markers;
+    return out;
+  }
+  const Vec3 a{0, 0, 0}, b{1, 0, 0}, c{2, 0, 0}, d{2, 1, 0}, e{2, 2, 0};
+};
+
+TEST_F(RopeGrammar, Strips) {
+  visualization_msgs::Marker moved = strip({a, b, c, d});
+  moved.pose.position.z = 2;
+  const DecodedMesh mesh = read(moved);
+  EXPECT_EQ(mesh.topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}}));
+  EXPECT_EQ(mesh.positions[3], Vec3(2, 1, 2)) << "the pose moves it, the scale is how thick it is drawn";
+  EXPECT_FALSE(mesh.topology->hasFaces());
+  EXPECT_EQ(read(strip({b, b, c, d})).topology, mesh.topology) << "the same rope in motion";
+  EXPECT_TRUE(mentions(refusalOf(strip({a})), "has 1 point, and a rope needs 2"));
+  EXPECT_TRUE(mentions(refusalOf(strip({})), "('rope', 0, type 4 without points)"));
+}
+
+TEST_F(RopeGrammar, ClosedStrips) {
+  const DecodedMesh loop = read(strip({a, b, c, d, a}));
+  EXPECT_EQ(loop.positions, (Positions{a, b, c, d}));
+  EXPECT_EQ(loop.topology->edges(), (Edges{{0, 1}, {0, 3}, {1, 2}, {2, 3}}));
+  EXPECT_TRUE(mentions(refusalOf(strip({a, a})), "the lines have no length"));
+}
+
+TEST_F(RopeGrammar, Segments) {
+  const DecodedMesh chain = read(segments({a, b, b, c, c, d}));
+  EXPECT_EQ(chain.positions, (Positions{a, b, c, d}));
+  EXPECT_EQ(chain.topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}}));
+  const DecodedMesh fork = read(segments({a, b, d, b, b, c}));
+  EXPECT_EQ(fork.positions, (Positions{a, b, d, c}));
+  EXPECT_EQ(fork.topology->edges(), (Edges{{0, 1}, {1, 2}, {1, 3}}));
+  EXPECT_TRUE(mentions(refusalOf(segments({a, b, c})), "has 3 points, and a LINE_LIST two for each segment"));
+  anew();
+  config.weld = false;
+  EXPECT_EQ(read(segments({a, b, b, c})).positions.size(), 4u);
+}
+
+TEST_F(RopeGrammar, SegmentsWithoutALength) {
+  EXPECT_EQ(read(segments({a, b, b, b, b, c})).topology->edges(), (Edges{{0, 1}, {1, 2}}));
+  EXPECT_TRUE(mentions(refusalOf(segments({a, a})), "the lines have no length"));
+}
+
+TEST_F(RopeGrammar, WhatComesApartOrTogether) {
+  const DecodedMesh two = read(segments({a, b, c, d}));
+  EXPECT_EQ(two.positions.size(), 4u);
+  EXPECT_EQ(read(segments({a, b, b, d})).topology, two.topology) << "what touches later is contact, no joint";
+  anew();
+  const DecodedMesh chain = read(segments({a, b, b, c, c, d}));
+  EXPECT_EQ(read(segments({a, c, c, d, d, e})).topology, chain.topology);
+  const DecodedMesh cut = read(segments({a, b, c, d, d, e}));
+  EXPECT_NE(cut.topology, chain.topology) << "a seam";
+  EXPECT_EQ(cut.topology->edges(), (Edges{{0, 1}, {2, 3}, {3, 4}}));
+  EXPECT_EQ(cut.weld_changes, 1u);
+  EXPECT_EQ(read(segments({b, c, d, e, c, d})).topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}})) << "joined anew";
+  EXPECT_NE(*read(segments({a, b, b, c})).topology, *chain.topology) << "another number of points";
+}
+
+TEST_F(RopeGrammar, Points) {
+  EXPECT_TRUE(mentions(refusalOf(rope(visualization_msgs::Marker::POINTS, SQUARE)), "set topology/source to polyline"));
+  anew();
+  config.source = TopologySource::POLYLINE;
+  for (const std::int32_t type : {MARKER_POINTS, MARKER_SPHERE_LIST}) {
+    const DecodedMesh mesh = read(rope(type, {a, b, c, a}));
+    EXPECT_EQ(mesh.topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}})) << "no end is joined";
+    EXPECT_EQ(read(all({rope(type, {a, b}, 1), rope(type, {c, d}, 2)})).topology->edges(), (Edges{{0, 1}, {2, 3}}));
+  }
+  EXPECT_TRUE(mentions(refusalOf(marker()), "no LINE_STRIP, LINE_LIST or POINTS")) << "a triangle list";
+  anew();
+  config.source = TopologySource::AUTO;
+  config.rows = config.cols = 2;
+  EXPECT_EQ(read(rope(visualization_msgs::Marker::POINTS, SQUARE)).topology->faces().size(), 2u);
+}
+
+TEST_F(RopeGrammar, SeveralRopes) {
+  const DecodedMesh two = read(all({strip({c, d, e}, 7), strip({a, b}, 3)}));
+  EXPECT_EQ(two.positions, (Positions{a, b, c, d, e})) << "by namespace and id, in whatever order they come";
+  EXPECT_EQ(two.topology->edges(), (Edges{{0, 1}, {2, 3}, {3, 4}}));
+  EXPECT_EQ(read(all({strip({a, b}, 3), strip({c, d, e}, 7)})).topology, two.topology);
+  const std::string other = refusalOf(all({strip({a, b}, 3), strip({c, d, e}, 8)}));
+  EXPECT_TRUE(mentions(other, "('rope', 8) stands where ('rope', 7) was")) << other;
+  EXPECT_EQ(read(all({strip({a, b}, 3), strip({c, d, e}, 7)})).topology, two.topology) << "what was known stays";
+  EXPECT_EQ(read(all({strip({a, b}, 3), strip({c, d}, 8)})).topology->edges().size(), 2u) << "another topology";
+  EXPECT_EQ(read(strip({a, b, c}, 1)).topology, read(strip({a, b, c}, 2)).topology) << "one alone has any id";
+  EXPECT_EQ(read(all({strip({a, b}, 1), strip({b, c}, 2)})).topology->edges(), (Edges{{0, 1}, {1, 2}})) << "one rope";
+  visualization_msgs::Marker far = strip({c, d}, 2);
+  far.header.frame_id = "camera";
+  const std::string frames = refusalOf(all({strip({a, b}, 1), far}));
+  EXPECT_TRUE(mentions(frames, "('rope', 2) is in frame 'camera', and ('rope', 1) in frame 'world'")) << frames;
+}
+
+TEST_F(RopeGrammar, WhatIsDrawnBesides) {
+  const visualization_msgs::Marker dots = rope(visualization_msgs::Marker::SPHERE_LIST, {a, b, c}, 1);
+  EXPECT_EQ(read(all({dots, strip({a, b, c}, 2)})).positions.size(), 3u) << "points of a rope's lines";
+  anew();
+  const DecodedMesh mesh = read(all({strip({a, b, c}, 2), marker()}));
+  EXPECT_TRUE(mesh.topology->hasFaces()) << "lines on a mesh";
+  EXPECT_EQ(mesh.dropped_faces, 0u);
+  config.marker_namespace = "rope";
+  anew();
+  EXPECT_FALSE(read(all({strip({a, b, c}, 2), marker()})).topology->hasFaces()) << "lines that are asked for";
+}
+
+TEST_F(RopeGrammar, ATopologyThatIsGiven) {
+  config.source = TopologySource::FILE;
+  config.file_topology =
+      std::make_shared<const Topology>(Topology::fromTriangles(4, std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(read(strip(SQUARE)).topology, config.file_topology);
+  EXPECT_TRUE(mentions(refusalOf(strip({a, b, c})), "VERTEX_COUNT: 3 points, but the topology file has 4"));
+}
+
+// --- geometry_msgs/PoseArray
+
+struct PoseArrayGrammar : RopeGrammar {
+  static geometry_msgs::PoseArray poses(const Positions& points) {
+    geometry_msgs::PoseArray out;
+    out.header.frame_id = "world";
+    out.poses.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      out.poses[i].position = pointsOf(points)[i];
+      out.poses[i].orientation.x = NOT_A_NUMBER;  // of no matter
+    }
+    return out;
+  }
+};
+
+TEST_F(PoseArrayGrammar, Positions) {
+  const DecodedMesh mesh = read(poses(SQUARE));
+  EXPECT_EQ(mesh.positions, SQUARE);
+  EXPECT_EQ(mesh.topology->edges(), (Edges{{0, 1}, {1, 2}, {2, 3}}));
+  EXPECT_NE(read(poses({a, b, c})).topology, mesh.topology) << "another number is another topology";
+  EXPECT_FALSE(read(poses({a, {NOT_A_NUMBER, 0, 0}, c})).positions[1].allFinite()) << "unchecked";
+  EXPECT_TRUE(mentions(refusalOf(poses({a})), "VERTEX_COUNT: 1 points, but a polyline needs 2"));
+  EXPECT_TRUE(mentions(refusalOf(poses({})), "there are no vertices"));
+  anew();
+  config.noise_field = "sigma";
+  EXPECT_TRUE(mentions(refusalOf(poses(SQUARE)), "this type has no point fields"));
+}
+
+TEST_F(PoseArrayGrammar, ATopologyThatIsGiven) {
+  config.rows = config.cols = 2;
+  EXPECT_EQ(read(poses(SQUARE)).topology->faces().size(), 2u);
+  EXPECT_TRUE(mentions(refusalOf(poses({a, b})), "topology/rows x topology/cols is 2 x 2"));
 }
 
 }  // namespace

@@ -1,0 +1,107 @@
+#include "input/marker_ropes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "input/short_text.h"
+
+namespace dccd {
+
+namespace {
+
+std::string nameOf(std::string_view ns, std::int32_t id) {
+  return "('" + std::string(ns.substr(0, 32)) + "', " + std::to_string(id) + ")";
+}
+
+void requirePoints(const MarkerView& marker) {
+  const bool pairs = marker.type == MARKER_LINE_LIST;
+  if (pairs ? marker.points.size % 2 == 0 : marker.points.size > 1) return;
+  throw WireError("marker " + nameOf(marker) + " has " + std::to_string(marker.points.size) +
+                  (pairs ? " points, and a LINE_LIST two for each segment" : " point, and a rope needs 2"));
+}
+
+void add(const MarkerView& marker, Ropes& ropes) {
+  const Eigen::Affine3d pose = poseOf(marker);
+  const bool pairs = marker.type == MARKER_LINE_LIST;
+  for (std::size_t i = 0; i < marker.points.size; ++i) {
+    const auto p = marker.points[i];
+    const auto v = static_cast<Index>(ropes.points.size());
+    ropes.points.push_back(pose * Vec3(p[0], p[1], p[2]));
+    if (pairs ? i % 2 == 1 : i > 0) ropes.edges.push_back({v - 1, v});
+    if (pairs || (isLineMarker(marker) && (i == 0 || i + 1 == marker.points.size))) ropes.ends.push_back(v);
+  }
+}
+
+}  // namespace
+
+std::string nameOf(const MarkerView& marker) { return nameOf(marker.ns, marker.id); }
+
+Eigen::Affine3d poseOf(const MarkerView& marker) {
+  for (const double value : marker.pose) {
+    if (!std::isfinite(value)) throw WireError("pose is not finite");
+  }
+  const Eigen::Quaterniond q(marker.pose[6], marker.pose[3], marker.pose[4], marker.pose[5]);
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  // Publishers that leave the quaternion at zero mean none, and RViz shows it so.
+  if (q.norm() > 0) transform.linear() = q.normalized().toRotationMatrix();
+  transform.translation() = Vec3(marker.pose[0], marker.pose[1], marker.pose[2]);
+  return transform;
+}
+
+Ropes ropesOf(std::vector<const MarkerView*> markers) {
+  std::stable_sort(markers.begin(), markers.end(), [](const MarkerView* a, const MarkerView* b) {
+    return std::tie(a->ns, a->id) < std::tie(b->ns, b->id);
+  });
+  Ropes ropes;
+  for (const MarkerView* one : markers) {
+    requirePoints(*one);
+    // Of a name as long as a message no more is kept than tells ropes apart.
+    ropes.names.push_back({std::string(one->ns.substr(0, MAX_NAME)), one->id, one->type, one->points.size});
+    add(*one, ropes);
+  }
+  return ropes;
+}
+
+bool continues(const std::vector<RopeName>& before, const std::vector<RopeName>& ropes) {
+  const auto alike = [](const RopeName& a, const RopeName& b) { return a.type == b.type && a.points == b.points; };
+  const auto named = [](const RopeName& a, const RopeName& b) { return a.ns == b.ns && a.id == b.id; };
+  if (!std::equal(before.begin(), before.end(), ropes.begin(), ropes.end(), alike)) return false;
+  const auto [was, is] = std::mismatch(before.begin(), before.end(), ropes.begin(), named);
+  if (ropes.size() == 1 || was == before.end()) return true;
+  throw WireError("marker " + nameOf(is->ns, is->id) + " stands where " + nameOf(was->ns, was->id) +
+                  " was, so that it is not known which rope it is; keep namespaces and ids, or call ~reset");
+}
+
+std::size_t joinEnds(bool joins, SoupWeld& weld, Ropes& ropes) {
+  Positions ends;
+  for (const Index end : ropes.ends) ends.push_back(ropes.points[end]);
+  std::size_t apart = 0;
+  if (!joins) {
+    weld.keepApart(ends.size());
+  } else if (apart = weld.weld(ends); apart > 0) {
+    weld.forget();  // what goes on where is another matter now
+    weld.weld(ends);
+  }
+  std::vector<Index> vertex(ropes.points.size(), NO_INDEX);
+  for (std::size_t e = 0; e < ends.size(); ++e) {
+    vertex[ropes.ends[e]] = ropes.ends[weld.cornerOfVertex()[weld.vertexOfCorner()[e]]];
+  }
+  Positions points;
+  for (Index i = 0; i < vertex.size(); ++i) {
+    if (vertex[i] == NO_INDEX || vertex[i] == i) {
+      vertex[i] = static_cast<Index>(points.size());
+      points.push_back(ropes.points[i]);
+    } else {
+      vertex[i] = vertex[vertex[i]];  // of a point before it
+    }
+  }
+  ropes.points = std::move(points);
+  for (Edge& edge : ropes.edges) edge = {vertex[edge[0]], vertex[edge[1]]};
+  const auto has_no_length = [](const Edge& edge) { return edge[0] == edge[1]; };
+  ropes.edges.erase(std::remove_if(ropes.edges.begin(), ropes.edges.end(), has_no_length), ropes.edges.end());
+  return apart;
+}
+
+}  // namespace dccd

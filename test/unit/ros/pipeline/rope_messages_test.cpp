@@ -1,0 +1,126 @@
+// Ropes as markers and poses, and clouds with a wrong row_step, through the whole pipeline.
+#include <geometry_msgs/PoseArray.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+template <typename Message>
+void feed(Driven& driven, const Message& message) {
+  driven.pipeline.take(0, {ros::message_traits::datatype(message), bytesOf(message), 0, 0});
+  ASSERT_TRUE(driven.pipeline.nextOutcome(0, driven.outcome));
+}
+
+visualization_msgs::Marker rope(double stamp_s, std::int32_t id, std::int32_t type, const Positions& points) {
+  visualization_msgs::Marker out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = "world";
+  out.id = id;
+  out.type = type;
+  out.scale.x = 0.01;
+  for (const Vec3& p : points) {
+    geometry_msgs::Point point;
+    point.x = p.x(), point.y = p.y(), point.z = p.z();
+    out.points.push_back(point);
+  }
+  return out;
+}
+
+/// A rope along x at rest, and one across it that falls from `z`.
+visualization_msgs::MarkerArray crossing(double stamp_s, double z, std::int32_t type) {
+  using Marker = visualization_msgs::Marker;
+  const Vec3 left(0, 0, 0), middle(0.5, 0, 0), right(1, 0, 0);
+  visualization_msgs::MarkerArray out;
+  out.markers.resize(1);
+  out.markers[0].action = Marker::DELETEALL;
+  out.markers.push_back(rope(stamp_s, 5, Marker::LINE_STRIP, {{0.3, -0.2, z}, {0.3, 0.2, z}}));
+  out.markers.push_back(
+      rope(stamp_s, 2, type,
+           type == Marker::LINE_LIST ? Positions{left, middle, middle, right} : Positions{left, middle, right}));
+  return out;
+}
+
+void expectOneContactAtHalf(const Outcome& outcome, const std::vector<Index>& vertices) {
+  EXPECT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+  ASSERT_EQ(outcome.contacts.size(), 1u);
+  const Contact& contact = outcome.contacts[0];
+  EXPECT_EQ(contact.kind, PairKind::EDGE_EDGE);
+  EXPECT_TRUE(std::equal(vertices.begin(), vertices.end(), contact.vertex.begin()));
+  EXPECT_EQ(contact.certainty, Certainty::CERTAIN);
+  EXPECT_LE(contact.toc_lower, 0.5);
+  EXPECT_LT(0.5, contact.toc_upper);
+}
+
+TEST(RopeMessages, TwoRopesThatCross) {
+  for (const std::int32_t type : {MARKER_LINE_STRIP, MARKER_LINE_LIST}) {
+    Driven ropes(scene());
+    feed(ropes, crossing(1, 0.4, type));
+    feed(ropes, crossing(1.1, -0.4, type));
+    expectOneContactAtHalf(ropes.outcome, {0, 1, 3, 4});
+    feed(ropes, crossing(1.2, -0.5, type));
+    EXPECT_EQ(ropes.outcome.total_contacts, 0u);
+    EXPECT_TRUE(assuranceOf(ropes.outcome).clear());
+  }
+}
+
+TEST(RopeMessages, AnotherRopeIsASeam) {
+  Driven ropes(scene());
+  feed(ropes, crossing(1, 0.4, visualization_msgs::Marker::LINE_STRIP));
+  feed(ropes, crossing(1.1, -0.4, visualization_msgs::Marker::LINE_LIST));
+  EXPECT_TRUE(ropes.outcome.answered) << "the same ropes, drawn in another way";
+  visualization_msgs::MarkerArray longer = crossing(1.2, 0.4, visualization_msgs::Marker::LINE_LIST);
+  for (std::uint32_t more = 0; more < 2; ++more) longer.markers[2].points.push_back(longer.markers[2].points[3 * more]);
+  feed(ropes, longer);
+  EXPECT_EQ(ropes.outcome.status, StepStatus::TOPOLOGY_CHANGED);
+  visualization_msgs::MarkerArray renamed = crossing(1.3, 0.4, visualization_msgs::Marker::LINE_STRIP);
+  feed(ropes, renamed);
+  renamed = crossing(1.4, 0.4, visualization_msgs::Marker::LINE_STRIP);
+  renamed.markers[1].id = 6;
+  feed(ropes, renamed);
+  EXPECT_EQ(ropes.outcome.status, StepStatus::BAD_MESSAGE);
+  EXPECT_NE(ropes.outcome.reason.find("('', 6) stands where ('', 5) was"), std::string::npos) << ropes.outcome.reason;
+  ropes.pipeline.reset(StepStatus::RESET);
+  feed(ropes, renamed);
+  EXPECT_EQ(ropes.outcome.status, StepStatus::FIRST_FRAME);
+}
+
+TEST(RopeMessages, PosesOfARopeThatCrossesItself) {
+  const auto poses = [](double stamp_s, double z) {
+    geometry_msgs::PoseArray out;
+    out.header.stamp = ros::Time(stamp_s);
+    out.header.frame_id = "world";
+    for (const Vec3& p : Positions{{0, 0, 0}, {1, 0, 0}, {1, 1, z}, {0.5, -1, z}}) {
+      geometry_msgs::Pose pose;
+      pose.position.x = p.x(), pose.position.y = p.y(), pose.position.z = p.z();
+      out.poses.push_back(pose);
+    }
+    return out;
+  };
+  Driven rope(scene());
+  feed(rope, poses(1, 0.25));
+  feed(rope, poses(1.1, -0.25));
+  expectOneContactAtHalf(rope.outcome, {0, 1, 2, 3});
+}
+
+TEST(RowStep, WrongOnesAreCountedAndSaidOnce) {
+  Driven cloth(scene());
+  cloth.feed(1, 0.1f);
+  EXPECT_EQ(cloth.pipeline.hint(0), "");
+  const std::uint32_t wrong = 64;  // of the whole cloud
+  for (const double stamp_s : {1.1, 1.2}) {
+    std::vector<std::uint8_t> bytes = cloud(stamp_s, 0.1f);
+    std::memcpy(&bytes[bytes.size() - 1 - 64 - 4 - 4], &wrong, sizeof wrong);
+    cloth.pipeline.take(0, {"sensor_msgs/PointCloud2", bytes, 0, 0});
+    ASSERT_TRUE(cloth.pipeline.nextOutcome(0, cloth.outcome));
+    EXPECT_EQ(cloth.outcome.status, StepStatus::OK) << "the step goes on: " << cloth.outcome.reason;
+  }
+  EXPECT_EQ(cloth.pipeline.wrongRowSteps(), 2u);
+  EXPECT_NE(cloth.pipeline.hint(0).find("row_step 64 contradicts the data"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
