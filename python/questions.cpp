@@ -161,7 +161,6 @@ py::list explainStep(py::handle bodies, py::handle kind_given, py::handle vertic
   const PairKind kind = kindOf(kind_given);
   const PairKindFacts& facts = factsOf(kind);
   const std::vector<Index> given = firstVertices(vertices, kind);
-  if (whose.size() != 2) throw py::value_error("bodies has to name two");
   if (facts.isOnMap()) {
     if (voxel.is_none()) throw py::type_error(std::string("kind ") + facts.name + " needs a voxel's key");
     const Integers key = integersOf(voxel, "voxel", {3}, 65535);

@@ -19,12 +19,13 @@ import dataclasses
 import os
 from typing import TYPE_CHECKING, Any, Sequence
 
+import numpy as np
+
 from . import _dccd
 from ._dccd import KINDS, NO_INDEX, OBSTACLE_BODY, Body, History, Mesh, Outcome, Stream, Voxels, __version__
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ['Body', 'EDGE_EDGE', 'EDGE_VOXEL_EDGE', 'FACE_VOXEL_CORNER', 'History', 'KINDS', 'Mesh', 'NO_INDEX',
            'OBSTACLE_BODY', 'Outcome', 'PairResult', 'Replay', 'Stream', 'TraceLine', 'VERTEX_FACE', 'VERTEX_VOXEL_FACE',
@@ -141,7 +142,7 @@ def detect(bodies: Body | Sequence[Body], *, voxels: Voxels | None = None, histo
 
 
 def pairs(kind: int | str, t0: ArrayLike, t1: ArrayLike, *, minimum_separation_m: float = 0.0,
-          **options: Any) -> np.ndarray:
+          **options: Any) -> NDArray[np.void]:
     """Tests pairs of moving features, each by itself: do the two meet during the step, and when first?
 
     Parameters
@@ -180,7 +181,7 @@ def pair(kind: int | str, t0: ArrayLike, t1: ArrayLike, *, minimum_separation_m:
     >>> dccd.pair('VF', [[.2, .2, 1]] + face, [[.2, .2, -1]] + face)
     PairResult(contact=True, undecided=False, toc_lower=0.5, toc_upper=0.5000000002328306)
     """
-    row = pairs(kind, [t0], [t1], minimum_separation_m=minimum_separation_m, **options)[0]
+    row = pairs(kind, np.asarray(t0)[None], np.asarray(t1)[None], minimum_separation_m=minimum_separation_m, **options)[0]
     return PairResult(*row.tolist())
 
 
@@ -217,10 +218,12 @@ def explain(bodies: Body | Sequence[Body], kind: int | str | np.void, vertices: 
     >>> for line in dccd.explain(cloth, outcome.contacts[0]):
     ...     print(line.stage, line.says, line.text)
     """
-    if hasattr(kind, 'dtype') and kind.dtype.names:
+    if isinstance(kind, np.void):
         row = kind
-        kind, vertices, whose, voxel = int(row['kind']), row['vertices'], tuple(map(int, row['bodies'])), row['voxel']
-    return [TraceLine(*line) for line in _dccd.explain(bodies, kind, vertices, tuple(whose), voxel, voxels, options)]
+        kind, vertices, whose, voxel = int(row['kind']), row['vertices'], row['bodies'].tolist(), row['voxel']
+    one, other = whose
+    lines = _dccd.explain(bodies, kind, [] if vertices is None else vertices, (one, other), voxel, voxels, options)
+    return [TraceLine(*line) for line in lines]
 
 
 def replay(path: str | os.PathLike[str], num_threads: int = 1) -> Replay:
