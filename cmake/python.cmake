@@ -3,6 +3,9 @@ option(DEFORMABLE_CCD_PYTHON "Build the Python module where pybind11 is installe
 if(NOT DEFORMABLE_CCD_PYTHON OR DEFORMABLE_CCD_SANITIZE OR DEFORMABLE_CCD_FUZZ OR CMAKE_CROSSCOMPILING)
   return()
 endif()
+if(PYTHON_EXECUTABLE AND NOT Python3_EXECUTABLE)
+  set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE})  # the one that catkin found
+endif()
 find_package(Python3 QUIET COMPONENTS Interpreter Development)
 find_package(pybind11 CONFIG QUIET)
 if(NOT Python3_Development_FOUND OR NOT pybind11_FOUND)

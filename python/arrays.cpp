@@ -1,5 +1,6 @@
 #include "arrays.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -111,7 +112,8 @@ py::array matrixOf(const Eigen::Isometry3d& pose) {
   return py::array_t<double>({4, 4}, rows.data());
 }
 
-py::dtype structured(const std::vector<Field>& fields, std::size_t bytes) {
+py::dtype structured(std::vector<Field> fields, std::size_t bytes) {
+  std::sort(fields.begin(), fields.end(), [](const Field& a, const Field& b) { return a.offset < b.offset; });
   py::list names, formats, offsets;
   for (const Field& field : fields) {
     names.append(field.name);

@@ -47,13 +47,13 @@ py::array sharedArray(const std::shared_ptr<const std::vector<T>>& values, const
 py::object arrayOf(const std::shared_ptr<const Positions>& positions);  ///< None: there are none
 py::array matrixOf(const Eigen::Isometry3d& pose);
 
-/// A field of a structured dtype: numpy's name of its format, and where it lies.
+/// A field of a structured dtype: numpy's name of its format, and where it lies. In this order numpy can save it.
 struct Field {
   const char* name;
   const char* format;
   std::size_t offset;
 };
-py::dtype structured(const std::vector<Field>& fields, std::size_t bytes);
+py::dtype structured(std::vector<Field> fields, std::size_t bytes);
 
 }  // namespace python
 }  // namespace dccd

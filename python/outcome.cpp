@@ -13,17 +13,17 @@ namespace {
 // The types are never freed: at exit that would come after the interpreter's end.
 const py::dtype& contactType() {
   static_assert(sizeof(Contact) == 56 && sizeof(Certainty) == 1 && sizeof(PairKind) == 1);
-  static const auto* const TYPE = new py::dtype(structured({{"kind", "u1", offsetof(Contact, kind)},
-                                                            {"bodies", "(2,)u2", offsetof(Contact, body)},
-                                                            {"vertices", "(4,)u4", offsetof(Contact, vertex)},
-                                                            {"toc_lower", "f8", offsetof(Contact, toc_lower)},
+  static const auto* const TYPE = new py::dtype(structured({{"toc_lower", "f8", offsetof(Contact, toc_lower)},
                                                             {"toc_upper", "f8", offsetof(Contact, toc_upper)},
+                                                            {"vertices", "(4,)u4", offsetof(Contact, vertex)},
+                                                            {"bodies", "(2,)u2", offsetof(Contact, body)},
+                                                            {"voxel", "(3,)u2", offsetof(Contact, voxel)},
+                                                            {"voxel_size", "u4", offsetof(Contact, voxel_size)},
+                                                            {"kind", "u1", offsetof(Contact, kind)},
                                                             {"certain", "?", offsetof(Contact, certainty)},
                                                             {"initial", "?", offsetof(Contact, initial)},
                                                             {"leaving", "?", offsetof(Contact, leaving)},
-                                                            {"expected", "?", offsetof(Contact, expected)},
-                                                            {"voxel", "(3,)u2", offsetof(Contact, voxel)},
-                                                            {"voxel_size", "u4", offsetof(Contact, voxel_size)}},
+                                                            {"expected", "?", offsetof(Contact, expected)}},
                                                            sizeof(Contact)));
   return *TYPE;
 }
@@ -150,19 +150,19 @@ outcome's own memory; copy one to change it.
 
 The fields of `contacts`, a row each, sorted by kind, bodies, vertices:
 
-    kind        uint8       dccd.VERTEX_FACE (0), EDGE_EDGE, VERTEX_VOXEL_FACE, EDGE_VOXEL_EDGE or
-                            FACE_VOXEL_CORNER (4); dccd.KINDS has their names
-    bodies      uint16[2]   places in the list of bodies; dccd.OBSTACLE_BODY: the voxels
-    vertices    uint32[4]   of the two features, each counted within its body. VERTEX_FACE: the vertex, then the
-                            face's three; EDGE_EDGE: two and two; dccd.NO_INDEX where a kind has fewer
     toc_lower   float64     with 'exact' the true time of contact is in [toc_lower, toc_upper), or both are 1 where
     toc_upper   float64     it is 1
+    vertices    uint32[4]   of the two features, each counted within its body. VERTEX_FACE: the vertex, then the
+                            face's three; EDGE_EDGE: two and two; dccd.NO_INDEX where a kind has fewer
+    bodies      uint16[2]   places in the list of bodies; dccd.OBSTACLE_BODY: the voxels
+    voxel       uint16[3]   with the voxels: smallest key of the cube, and its edge length in finest voxels
+    voxel_size  uint32
+    kind        uint8       dccd.VERTEX_FACE (0), EDGE_EDGE, VERTEX_VOXEL_FACE, EDGE_VOXEL_EDGE or
+                            FACE_VOXEL_CORNER (4); dccd.KINDS has their names
     certain     bool        False: undecided; a contact, if there is one, is not before toc_lower
     initial     bool        the features touch when the step begins
     leaving     bool        on its way out of a voxel that it was in when the step began
-    expected    bool        by the option `expected`
-    voxel       uint16[3]   with the voxels: smallest key of the cube, and its edge length in finest voxels
-    voxel_size  uint32)";
+    expected    bool        by the option `expected`)";
 
 template <class Class>
 void bindAnswer(Class& c) {

@@ -182,7 +182,7 @@ def pair(kind: int | str, t0: ArrayLike, t1: ArrayLike, *, minimum_separation_m:
     PairResult(contact=True, undecided=False, toc_lower=0.5, toc_upper=0.5000000002328306)
     """
     row = pairs(kind, np.asarray(t0)[None], np.asarray(t1)[None], minimum_separation_m=minimum_separation_m, **options)[0]
-    return PairResult(*row.tolist())
+    return PairResult(**{name: row[name].item() for name in row.dtype.names})
 
 
 def explain(bodies: Body | Sequence[Body], kind: int | str | np.void, vertices: ArrayLike | None = None,

@@ -6,6 +6,7 @@ import inspect
 import math
 import os
 import pathlib
+import pickle
 import pydoc
 import signal
 import subprocess
@@ -116,10 +117,12 @@ class AnswersTest(PythonTestCase):
             lines = csv.read_text().splitlines()[1:]
             self.assertEqual(len(outcome.contacts), len(lines))
             names = ['VF', 'EE']
-            for line, c in zip(lines, outcome.contacts.tolist()):
+            contacts = outcome.contacts
+            columns = [contacts[name].tolist() for name in ('kind', 'vertices', 'toc_lower', 'toc_upper')]
+            for line, kind, vertices, lower, upper in zip(lines, *columns):
                 words = line.split(',')
-                self.assertEqual((names[c[0]], c[2].tolist()), (words[0], [int(v) for v in words[1:5]]))
-                self.assertEqual((c[3], c[4]), (float(words[5]), float(words[6])))
+                self.assertEqual((names[kind], vertices), (words[0], [int(v) for v in words[1:5]]))
+                self.assertEqual((lower, upper), (float(words[5]), float(words[6])))
 
     @unittest.skipUnless((DATA / 'ccd_queries').is_dir(), 'no public data')
     def test_pairs_of_the_benchmark_are_decided_right(self):
@@ -402,6 +405,16 @@ class ArraysTest(PythonTestCase):
         for array, copy in zip(arrays, copies):
             np.testing.assert_array_equal(array, copy)
         del junk
+
+    def test_results_are_arrays_like_others(self):
+        outcome = dccd.detect(dccd.Body(self.t0, self.t1, FACES), patches=True)
+        for rows in (outcome.contacts, outcome.intersections, outcome.patches, outcome.geometry()):
+            np.save(self.folder / 'rows.npy', rows)
+            again = np.load(self.folder / 'rows.npy')
+            for name in rows.dtype.names:
+                np.testing.assert_array_equal(again[name], rows[name])
+        self.assertEqual(np.sort(outcome.contacts, order='vertices').dtype, outcome.contacts.dtype)
+        self.assertEqual(pickle.loads(pickle.dumps(outcome.contacts)).tolist()[0][0], .5)
 
     def test_what_is_not_finite_is_unchecked_and_said(self):
         for value in (math.nan, math.inf):
