@@ -7,9 +7,9 @@ if(PYTHON_EXECUTABLE AND NOT Python3_EXECUTABLE)
   set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE})  # the one that catkin found
 endif()
 find_package(Python3 QUIET COMPONENTS Interpreter Development)
-find_package(pybind11 CONFIG QUIET)
+find_package(pybind11 2.6 CONFIG QUIET)
 if(NOT Python3_Development_FOUND OR NOT pybind11_FOUND)
-  message(STATUS "pybind11 and Python's headers (pybind11-dev, python3-dev) are not installed: no Python module dccd")
+  message(STATUS "pybind11 2.6 or Python's headers (pybind11-dev, python3-dev) are not installed: no Python module dccd")
   return()
 endif()
 

@@ -437,6 +437,8 @@ std::vector<Body> bodiesOf(py::handle value) {
       given.push_back(item.cast<const NamedBody*>());
     }
   }
+  // It would be answered: nothing touches.
+  if (given.empty()) throw py::value_error("there is no body");
   std::vector<Body> bodies;
   for (const NamedBody* body : given) {
     bodies.push_back(body->body);
@@ -480,11 +482,12 @@ NamedBody named(const Body& body, const std::vector<Body>& bodies) {
   return out;
 }
 
-ObstacleMap mapOf(const Voxels* voxels) {
+ObstacleMap mapOf(py::handle voxels) {
   ObstacleMap map;
-  if (!voxels) return map;
-  map.surface = voxels->surface;
-  map.map_from_fixed = voxels->map_from_fixed;
+  if (voxels.is_none()) return map;
+  if (!py::isinstance<Voxels>(voxels)) throw py::type_error("voxels: expected dccd.Voxels or None");
+  map.surface = voxels.cast<const Voxels&>().surface;
+  map.map_from_fixed = voxels.cast<const Voxels&>().map_from_fixed;
   return map;
 }
 

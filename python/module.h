@@ -39,7 +39,7 @@ std::uint16_t bodyOf(py::handle name_or_number, const std::vector<Body>& bodies)
 NamedBody named(const Body& body, const std::vector<Body>& bodies);
 /// The core looks at the sizes alone.
 std::shared_ptr<const std::vector<double>> radiiOf(py::handle radii, const std::string& name);
-ObstacleMap mapOf(const Voxels* voxels);
+ObstacleMap mapOf(py::handle voxels);  ///< None: there is none
 
 /// Throws a TypeError that names an option which nobody knows, or whose value has another type.
 void setOptions(const py::dict& values, const std::vector<Body>& bodies, Options& options);

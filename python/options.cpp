@@ -39,8 +39,7 @@ void read(py::handle value, const std::string& name, T& out) {
       // So that math.inf is a limit that nothing reaches.
       const bool infinite = py::isinstance<py::float_>(value) && value.cast<double>() == HUGE_VAL;
       if (!infinite && py::isinstance<py::int_>(value)) {
-        throw py::value_error(name + " is " + py::cast<std::string>(py::repr(value)) + "; expected " +
-                              std::to_string(std::numeric_limits<T>::min()) + " or more");
+        throw py::value_error(name + " is " + py::cast<std::string>(py::repr(value)) + ", which is out of range");
       }
       if (!infinite) refuseType(name, value, "an integer");
       out = std::numeric_limits<T>::max();

@@ -29,21 +29,24 @@ std::function<void()> cancelBy(std::atomic<bool>& cancelled, bool is_long) {
   return [&] { cancelled = true; };
 }
 
-Answer detectStep(py::handle bodies, const Voxels* voxels, const std::shared_ptr<SharedHistory>& history,
-                  const py::dict& options) {
+Answer detectStep(py::handle bodies, py::handle voxels, py::handle history, const py::dict& options) {
   Step step;
   step.bodies = bodiesOf(bodies);
   step.map = mapOf(voxels);
   Options wanted;
   setOptions(options, step.bodies, wanted);
-  const std::shared_ptr<SharedHistory> own = history ? history : std::make_shared<SharedHistory>();
+  if (!history.is_none() && !py::isinstance<SharedHistory>(history)) {
+    throw py::type_error("history: expected dccd.History or None");
+  }
+  const auto own =
+      history.is_none() ? std::make_shared<SharedHistory>() : history.cast<std::shared_ptr<SharedHistory>>();
   std::atomic<bool> cancelled{false};
   Outcome outcome;
   const auto work = [&] {
     const std::lock_guard<std::mutex> lock(own->mutex);
     outcome = detect(step, wanted, own->history, deadlineOf(wanted).orWhen(cancelled));
   };
-  runUnlocked(work, cancelBy(cancelled, isLong(step.bodies, voxels != nullptr)));
+  runUnlocked(work, cancelBy(cancelled, isLong(step.bodies, step.map.surface != nullptr)));
   return Answer(std::move(outcome));
 }
 
@@ -151,7 +154,7 @@ py::list linesOf(const std::vector<TraceLine>& trace) {
 }
 
 py::list explainStep(py::handle bodies, py::handle kind_given, py::handle vertices, py::tuple whose, py::handle voxel,
-                     const Voxels* voxels, const py::dict& options) {
+                     py::handle voxels, const py::dict& options) {
   Step step;
   step.bodies = bodiesOf(bodies);
   step.map = mapOf(voxels);
@@ -255,8 +258,7 @@ void bindQuestions(py::module_& m) {
             shared.history.clear();
           },
           py::call_guard<py::gil_scoped_release>(), "clear(self)\n--\n\nThe next step continues no other one.");
-  m.def("detect", &detectStep, py::arg("bodies"), py::arg("voxels").none(true), py::arg("history").none(true),
-        py::arg("options"), "detect(bodies, voxels, history, options)\n--\n\nFor dccd.detect().");
+  m.def("detect", &detectStep, "detect(bodies, voxels, history, options)\n--\n\nFor dccd.detect().");
   m.def("pairs", &testPairs, "pairs(kind, t0, t1, minimum_separation_m, options)\n--\n\nFor dccd.pairs().");
   m.def("explain", &explainStep,
         "explain(bodies, kind, vertices, whose, voxel, voxels, options)\n--\n\nFor dccd.explain().");

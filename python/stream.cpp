@@ -85,10 +85,10 @@ class Stream {
     return Answer(std::move(outcome));
   }
 
-  void setVoxels(const Voxels* voxels, double stamp_s) {
+  void setVoxels(py::handle voxels, double stamp_s) {
     ObstacleMap map = mapOf(voxels);
     map.stamp_ns = stampOf(stamp_s);
-    has_map_ = voxels != nullptr;
+    has_map_ = map.surface != nullptr;
     locked([&] { monitor_->setMap(std::move(map)); });
   }
 
@@ -214,7 +214,7 @@ void bindStream(py::module_& m) {
            "that. Status NO_BODY where no step was answered yet.")
       .def("check_now", &Stream::checkNow,
            "check_now(self)\n--\n\nThe newest frames as a step without motion: is anything in contact now?")
-      .def("set_voxels", &Stream::setVoxels, py::arg("voxels").none(true), "stamp_s"_a = 0.0,
+      .def("set_voxels", &Stream::setVoxels, "voxels"_a, "stamp_s"_a = 0.0,
            "set_voxels(self, voxels, stamp_s=0.0)\n--\n\nThe Voxels from the next step on; None: none.")
       .def("finish", &Stream::finish,
            "finish(self)\n--\n\nThere are no more frames: steps are not waiting for other bodies any longer.")

@@ -17,15 +17,14 @@ import time
 import unittest
 from fractions import Fraction
 
-from checkout import CHECKOUT, TOOLS, FolderTestCase
-
-if os.environ.get('DEFORMABLE_CCD_SANITIZED'):
-    raise unittest.SkipTest('the module is not built with sanitizers: the interpreter does not load them')
-
 import meshio
 import numpy as np
 
-import dccd
+from checkout import CHECKOUT, TOOLS, FolderTestCase
+
+SANITIZED = os.environ.get('DEFORMABLE_CCD_SANITIZED')
+if not SANITIZED:
+    import dccd
 
 DATA = pathlib.Path(os.environ.get('DEFORMABLE_CCD_DATA', CHECKOUT.parent / 'shared/data'))
 EXAMPLES = CHECKOUT / 'examples/python'
@@ -48,6 +47,7 @@ def sheet(size, z=0.0):
     return np.stack([0.01 * x, 0.01 * y, np.full(x.shape, z)], axis=2).reshape(-1, 3)
 
 
+@unittest.skipIf(SANITIZED, 'the module is not built with sanitizers: the interpreter does not load them')
 class PythonTestCase(FolderTestCase):
     def assert_same_rows(self, a, b):
         """Field by field: between fields there may be anything."""
@@ -470,7 +470,7 @@ class ArraysTest(PythonTestCase):
                 ({'toc_bits': 60}, ValueError, 'toc_bits'), ({'toc_bits': 'all'}, TypeError, "toc_bits is 'all'; expected an integer"),
                 ({'num_threads': 0}, ValueError, 'num_threads = 0 is out of range; 1 to 1024'),
                 ({'num_threads': 1.5}, TypeError, 'num_threads is 1.5; expected an integer'),
-                ({'max_contacts': -1}, ValueError, 'max_contacts is -1; expected 0 or more'),
+                ({'max_contacts': -1}, ValueError, 'max_contacts is -1, which is out of range'),
                 ({'step_budget_ms': -1}, ValueError, 'step_budget_ms = -1'),
                 ({'step_budget_ms': None}, TypeError, 'step_budget_ms is None; expected a number'),
                 ({'patches': 'yes'}, TypeError, "patches is 'yes'; expected True or False"),
@@ -483,11 +483,14 @@ class ArraysTest(PythonTestCase):
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
                 dccd.detect(body, **options)
         for bodies, error, sentence in [
-                (self.t0, TypeError, 'expected a dccd.Body or a list of them'), ([body, 3], TypeError, r'bodies\[1\] is no dccd.Body'),
+                ([], ValueError, 'there is no body'), (self.t0, TypeError, 'expected a dccd.Body or a list of them'), ([body, 3], TypeError, r'bodies\[1\] is no dccd.Body'),
                 ([body, body], ValueError, "another body is called 'cloth', too"),
                 (dccd.Body(mesh=body.mesh), ValueError, "body 'body_0' needs 6 positions at t0 and t1, got 0 and 0")]:
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
                 dccd.detect(bodies)
+        for what in ('voxels', 'history'):
+            with self.assertRaisesRegex(TypeError, what + ': expected dccd.'):
+                dccd.detect(body, **{what: 3})
         self.assertEqual(len(dccd.detect(body, max_contacts=math.inf).contacts), 3)
         # What was refused left no trace.
         self.assert_same_rows(dccd.detect(body).contacts, self.wanted)
