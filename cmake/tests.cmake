@@ -66,6 +66,10 @@ endfunction()
 if(DEFORMABLE_CCD_VARIABLE_MARGINS)
   add_test_tool(cut_margins test/margins/cut_margins.cpp)
 endif()
+if(TARGET deformable_ccd_python)
+  add_test_tool(write_steps test/python/write_steps.cpp)
+  set_target_properties(write_steps PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/gtest)
+endif()
 
 # scripts/test reads this list: a suite that is on it but was not built counts as failed.
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "")

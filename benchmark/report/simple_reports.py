@@ -165,6 +165,14 @@ def write_first(folder, rows):
     return save(folder, "first", "# The first contact only\n\n" + table(header, lines))
 
 
+def write_python(folder, rows):
+    header = ["step", "triangles", "contacts", "the core, ms", "Python above it, ms", "least", "share"]
+    lines = [[r["step"], str(r["triangles"]), str(r["contacts"]), "%.4g" % r["core_ms"], "%.2g" % r["over_ms"], "%.2g" % r["least_over_ms"],
+              "%.2g %%" % (100 * r["over_ms"] / r["core_ms"])] for r in rows]
+    write_rows(os.path.join(folder, "python.csv"), header, lines)
+    return save(folder, "python", "# The Python module\n\n" + table(header, lines))
+
+
 def write_budget(folder, result):
     header = ["input", "without, ms", "budget ms", "cut", "p50", "p95", "p99", "max", "allowed"]
     rows = []

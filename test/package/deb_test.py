@@ -35,6 +35,7 @@ done
 rosmsg show deformable_ccd/ContactArray | grep 'Contact\[\] contacts' >/dev/null
 rosmsg show octomap_msgs/Octomap | grep 'int8\[\] data' >/dev/null
 python3 -c 'import deformable_ccd.cfg.CollisionMonitorConfig, deformable_ccd.msg, octomap_msgs.msg, octomap_msgs.srv'
+python3 $share/examples/python/two_frames.py | grep '5 contacts, starts CLEAR' >/dev/null
 
 rosrun deformable_ccd make_scene_bag $share/config/scenes/table_edge.yaml scene.bag --frames 30 --quiet
 rosrun deformable_ccd analyze_bag scene.bag --report report --quiet

@@ -1,0 +1,754 @@
+"""The Python module: its answers are those of C++ bit for bit, it takes what numpy users have, refuses the rest with a sentence, and lets
+other threads and Ctrl-C in."""
+import ast
+import gc
+import inspect
+import math
+import os
+import pathlib
+import pickle
+import pydoc
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import unittest
+from fractions import Fraction
+
+import meshio
+import numpy as np
+
+from checkout import CHECKOUT, TOOLS, FolderTestCase
+
+SANITIZED = os.environ.get('DEFORMABLE_CCD_SANITIZED')
+if not SANITIZED:
+    import dccd
+
+DATA = pathlib.Path(os.environ.get('DEFORMABLE_CCD_DATA', CHECKOUT.parent / 'shared/data'))
+EXAMPLES = CHECKOUT / 'examples/python'
+WRITE_STEPS = TOOLS.parents[2] / 'build/deformable_ccd/gtest/write_steps'
+FACES = np.array([[0, 1, 2], [3, 4, 5]])
+ALL_RESULTS = ['status', 'reason', 'start_state', 'start_state_complete', 'complete', 'unchecked_toc_lower', 'earliest_toc',
+               'earliest_unexpected_toc', 'total_contacts', 'substeps', 'excluded_voxels', 'proved', 'missing', 'touching', 'expected']
+
+
+def two_triangles(dtype=float):
+    """One triangle falls through another one: its three vertices are there in the middle of the step."""
+    t0 = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [.25, .25, 1], [.5, .25, 1], [.25, .5, 1]], dtype=dtype)
+    t1 = t0.copy()
+    t1[3:, 2] = -1
+    return t0, t1
+
+
+def sheet(size, z=0.0):
+    x, y = np.meshgrid(np.arange(size), np.arange(size))
+    return np.stack([0.01 * x, 0.01 * y, np.full(x.shape, z)], axis=2).reshape(-1, 3)
+
+
+@unittest.skipIf(SANITIZED, 'the module is not built with sanitizers: the interpreter does not load them')
+class PythonTestCase(FolderTestCase):
+    def assert_same_rows(self, a, b):
+        """Field by field: between fields there may be anything."""
+        self.assertEqual((len(a), a.dtype), (len(b), b.dtype))
+        for name in a.dtype.names:
+            self.assertEqual(a[name].tobytes(), b[name].tobytes(), name)
+
+    def assert_same_answer(self, a, b):
+        for rows in ('contacts', 'intersections', 'patches'):
+            self.assert_same_rows(getattr(a, rows), getattr(b, rows))
+        self.assertEqual(a.patch_of.tolist(), b.patch_of.tolist())
+        for name in ALL_RESULTS:
+            self.assertEqual(getattr(a, name), getattr(b, name), name)
+
+
+class AnswersTest(PythonTestCase):
+    def rebuilt(self, body):
+        """The same body from arrays of ours."""
+        mesh = dccd.Mesh(body.mesh.vertex_count, np.array(body.mesh.triangles)) if len(body.mesh.triangles) else \
+            dccd.Mesh(body.mesh.vertex_count, edges=np.array(body.mesh.edges))
+        return dccd.Body(np.array(body.t0), np.array(body.t1), mesh=mesh, name=body.name, rigid=body.rigid, static=body.static,
+                         self_collision=body.self_collision, against_bodies=body.against_bodies,
+                         against_obstacle=body.against_obstacle, shell=body.shell, vertex_mask=body.vertex_mask,
+                         minimum_separation_m=body.minimum_separation_m, separations_m=body.separations_m,
+                         reference=body.reference, radius_m=body.radius_m, pose_t0=body.pose_t0, pose_t1=body.pose_t1)
+
+    def answer(self, step):
+        voxels = step.voxels and dccd.Voxels(step.voxels.resolution_m, keys=step.voxels.keys, sizes=step.voxels.sizes,
+                                             map_from_fixed=step.voxels.map_from_fixed)
+        return dccd.detect([self.rebuilt(body) for body in step.bodies], voxels=voxels, **step.options)
+
+    def test_random_steps_are_answered_as_by_the_library(self):
+        count = 4000 if os.environ.get('DEFORMABLE_CCD_LONG') else 400
+        subprocess.run([WRITE_STEPS, self.folder, '1', str(count)], check=True)
+        seen = {'contacts': 0, 'intersections': 0, 'with voxels': 0, 'expected': 0, 'undecided': 0}
+        for seed in range(1, count + 1):
+            step = dccd.replay(self.folder / ('%d.step' % seed))
+            with self.subTest(seed=seed):
+                self.assertEqual(step.differences, [])
+                self.assert_same_answer(self.answer(step), step.recorded)
+            contacts = step.recorded.contacts
+            seen['contacts'] += len(contacts)
+            seen['intersections'] += len(step.recorded.intersections)
+            seen['with voxels'] += np.count_nonzero(contacts['bodies'][:, 1] == dccd.OBSTACLE_BODY)
+            seen['expected'] += np.count_nonzero(contacts['expected'])
+            seen['undecided'] += np.count_nonzero(~contacts['certain'])
+        self.assertTrue(all(seen.values()), seen)
+
+    def test_recordings_of_the_node_are_answered_again(self):
+        """Bodies that turn, separations, radii, expected contacts."""
+        for name in ('everything', 'distances', 'conservative_without_map'):
+            step = dccd.replay(CHECKOUT / 'test/fuzz/corpus/recording' / name)
+            self.assertEqual(step.differences, [])
+            if name != 'distances':  # what its reference frame says, radii and all, no Body can be given
+                self.assert_same_rows(self.answer(step).contacts, step.recorded.contacts)
+            self.assertGreater(len(step.recorded.contacts), 0)
+
+    @unittest.skipUnless((DATA / 'scenes').is_dir(), 'no public data')
+    def test_real_scenes_are_answered_as_by_check_step(self):
+        for scene in ('cloth-ball', 'n-body'):
+            frames = [DATA / 'scenes' / scene / ('frame_%d.ply' % i) for i in (0, 1)]
+            csv = self.folder / 'contacts.csv'
+            subprocess.run([TOOLS / 'check_step', *frames, '--contacts', csv], stdout=subprocess.DEVNULL, check=True)
+            t0, t1 = map(meshio.read, frames)
+            outcome = dccd.detect(dccd.Body(t0.points, t1.points, t0.cells_dict['triangle']), num_threads=2)
+            self.assertTrue(outcome.proved)
+            lines = csv.read_text().splitlines()[1:]
+            self.assertEqual(len(outcome.contacts), len(lines))
+            names = ['VF', 'EE']
+            contacts = outcome.contacts
+            columns = [contacts[name].tolist() for name in ('kind', 'vertices', 'toc_lower', 'toc_upper')]
+            for line, kind, vertices, lower, upper in zip(lines, *columns):
+                words = line.split(',')
+                self.assertEqual((names[kind], vertices), (words[0], [int(v) for v in words[1:5]]))
+                self.assertEqual((lower, upper), (float(words[5]), float(words[6])))
+
+    @unittest.skipUnless((DATA / 'ccd_queries').is_dir(), 'no public data')
+    def test_pairs_of_the_benchmark_are_decided_right(self):
+        number = 0
+        for family in ('unit-tests', 'erleben-spikes'):
+            for kind in ('vertex-face', 'edge-edge'):
+                for path in sorted((DATA / 'ccd_queries' / family / kind).glob('*.csv')):
+                    rows = [list(map(int, line.split(','))) for line in path.read_text().split()][:8 * 4000]
+                    points = np.array([[float(Fraction(r[i], r[i + 1])) for i in (0, 2, 4)] for r in rows]).reshape(-1, 2, 4, 3)
+                    truth = np.array([r[6] for r in rows[::8]], dtype=bool)
+                    found = dccd.pairs(kind, points[:, 0], points[:, 1])
+                    self.assertEqual((found['contact'] != truth).sum(), 0, path)
+                    self.assertFalse(found['undecided'].any())
+                    number += len(truth)
+        self.assertGreater(number, 100)
+
+    def test_what_can_be_worked_out(self):
+        outcome = dccd.detect(dccd.Body(*two_triangles(), FACES, name='both'))
+        self.assertEqual(outcome.contacts['kind'].tolist(), [dccd.VERTEX_FACE] * 3)
+        self.assertEqual(outcome.contacts['vertices'].tolist(), [[v, 0, 1, 2] for v in (3, 4, 5)])
+        self.assertTrue((outcome.contacts['toc_lower'] == .5).all() and (outcome.contacts['toc_upper'] == .5 + 2**-32).all())
+        self.assertTrue(outcome.contacts['certain'].all() and not outcome.contacts['initial'].any())
+        self.assertEqual((outcome.status, outcome.start_state, outcome.proved, outcome.touching, outcome.clear, outcome.body_names),
+                         ('OK', 'CLEAR', True, 'NEW', False, ['both']))
+        geometry = outcome.geometry([0])[0]
+        np.testing.assert_allclose(geometry['point'], [.25, .25, 0], atol=1e-12)
+        np.testing.assert_allclose(geometry['normal'], [0, 0, 1], atol=1e-12)
+        self.assertEqual((len(outcome.geometry()), geometry['approach_speed']), (3, 2))
+        with self.assertRaisesRegex(IndexError, 'there is no contact 3; there are 3'):
+            outcome.geometry([3])
+        self.assertEqual(outcome.stats['vf_candidates'], 3)
+        self.assertEqual(outcome.counts['certain'], 3)
+
+    def test_nothing_touches(self):
+        t0, _ = two_triangles()
+        outcome = dccd.detect(dccd.Body(t0, t0, FACES))
+        self.assertTrue(outcome.clear)
+        self.assertEqual((len(outcome.contacts), outcome.earliest_toc, outcome.missing), (0, math.inf, []))
+        self.assertTrue(dccd.detect(dccd.Body(t0, triangles=FACES)).clear, 'without t1 it rests')
+        outcome = dccd.detect(dccd.Body(t0, t0, FACES), check_start_state=False)
+        self.assertFalse(outcome.proved)
+        self.assertTrue(outcome.missing)
+
+    def test_a_body_in_the_way_of_another(self):
+        t0, t1 = two_triangles()
+        still, falls = (dccd.Body(t0[i:i + 3], t1[i:i + 3], [[0, 1, 2]], name=name) for i, name in ((0, 'table'), (3, 'cloth')))
+        contacts = dccd.detect((still, falls)).contacts
+        self.assertEqual(contacts['bodies'].tolist(), [[1, 0]] * 3)
+        expected = dccd.detect([still, falls], expected=[{'between': ['cloth', 'table'], 'vertices': {'cloth': [0, 1]}}])
+        self.assertEqual(expected.contacts['expected'].tolist(), [True, True, False])
+        alone = dccd.Body(t0[3:], t1[3:], [[0, 1, 2]], against_bodies=False)
+        self.assertEqual(len(dccd.detect([still, alone]).contacts), 0)
+        self.assertEqual(dccd.detect([still, dccd.Body(t0[3:], t1[3:], [[0, 1, 2]])]).body_names, ['table', 'body_1'])
+        # Next step: it goes on to fall.
+        falls.move_to(t1[3:] - [0, 0, 1])
+        self.assertEqual((falls.t0.tolist(), falls.t1[0].tolist()), (t1[3:].tolist(), [.25, .25, -2]))
+        self.assertTrue(dccd.detect([still, falls]).clear)
+
+    def test_separations_and_noise(self):
+        t0, t1 = two_triangles()
+        t1[3:, 2] = .25
+        far = dccd.Body(t0, t1, FACES)
+        self.assertTrue(dccd.detect(far, accuracy='conservative').clear)
+        near = dccd.Body(t0, t1, FACES, minimum_separation_m=.5)
+        contacts = dccd.detect(near, accuracy='conservative').contacts
+        contacts = contacts[(contacts['kind'] == dccd.VERTEX_FACE) & (contacts['vertices'][:, 0] >= 3)]
+        self.assertEqual(len(contacts), 3)
+        self.assertTrue((contacts['toc_lower'] <= 2 / 3).all() and (contacts['toc_lower'] > 2 / 3 - 1e-5).all())
+        noisy = dccd.Body(t0, t1, FACES, radius_m=np.full(6, .2))
+        self.assertGreater(len(dccd.detect(noisy, accuracy='conservative').contacts), 0)
+        with self.assertRaisesRegex(ValueError, 'needs accuracy = conservative'):
+            dccd.detect(near)
+        named = dccd.Body(t0, t1, FACES, name='it', minimum_separation_m=.5, separations_m={'self': 0})
+        self.assertTrue(dccd.detect(named, accuracy='conservative').clear)
+        with self.assertRaisesRegex(ValueError, "no body is called 'table'"):
+            dccd.detect(dccd.Body(t0, t1, FACES, separations_m={'table': 1}))
+
+    def test_a_body_that_turns(self):
+        """By half a turn about z: its tip passes x = 0 in the middle, at 1 m from the axis, where a chord would be at the axis."""
+        t0, poses = np.array([[1., 0, 0], [.5, 0, 0], [.5, 0, .1]]), [np.eye(4), np.diag([-1., -1, 1, 1])]
+        poses[1][:2, :2] = [[0, -1], [1, 0]]  # a quarter: two of them
+        t1 = t0 @ poses[1][:3, :3].T
+        post = dccd.Body([[.7, .7, -1], [.7, .7, 1], [.71, .71, 1]], triangles=[[0, 1, 2]], name='post')
+        outcome = dccd.detect([dccd.Body(t0, t1, [[0, 1, 2]], rigid=True, pose_t0=poses[0], pose_t1=poses[1]), post])
+        self.assertGreater(outcome.substeps, 4)
+        self.assertTrue(len(outcome.contacts) and (abs(outcome.contacts['toc_lower'] - .5) < .02).all())
+        self.assertTrue(dccd.detect([dccd.Body(t0, t1, [[0, 1, 2]], rigid=True), post]).clear, 'the chord is further in')
+
+    def test_voxels(self):
+        drop = dccd.Body([[.01, .01, 1]] + [[.01, .02, 1]], [[.01, .01, -1]] + [[.01, .02, -1]], edges=[[0, 1]])
+        by_centre = dccd.Voxels(.5, [[.1, .1, .1], [.4, .4, .4], [5, 5, 5]])
+        self.assertEqual(by_centre.keys.tolist(), [[32768] * 3, [32778] * 3])
+        self.assertEqual((by_centre.resolution_m, by_centre.sizes.tolist()), (.5, [1, 1]))
+        by_key = dccd.Voxels(.5, keys=by_centre.keys)
+        answers = [dccd.detect(drop, voxels=v).contacts for v in (by_centre, by_key)]
+        self.assert_same_rows(*answers)
+        c = answers[0]
+        self.assertEqual(set(c['kind'].tolist()), {dccd.VERTEX_VOXEL_FACE})
+        self.assertEqual((c['bodies'][0].tolist(), c['voxel'][0].tolist(), c['voxel_size'][0]), ([0, dccd.OBSTACLE_BODY], [32768] * 3, 1))
+        self.assertEqual(c['toc_lower'].tolist(), [.25, .25])
+        large = dccd.Voxels(.25, keys=[[32768] * 3], sizes=[2])
+        self.assertEqual(dccd.detect(drop, voxels=large).contacts['voxel_size'].tolist(), [2, 2])
+        lower = np.eye(4)
+        lower[2, 3] = .5  # the map's origin is half a metre below the bodies'
+        moved = dccd.Voxels(.5, [[.1, .1, .1]], map_from_fixed=lower)
+        self.assertEqual(dccd.detect(drop, voxels=moved).contacts['toc_lower'].tolist(), [.5, .5])
+        self.assertEqual(moved.map_from_fixed.tolist(), lower.tolist())
+        self.assertTrue(dccd.detect(drop, voxels=dccd.Voxels(.5, np.empty((0, 3)))).clear)
+        self.assertTrue(dccd.detect(drop, voxels=by_key, exclude_boxes=[[[0, 0, 0], [.5, .5, .5]]]).clear)
+        self.assertEqual(dccd.detect(drop, obstacle_expected=True).status, 'NO_MAP')
+        # On a plane that two voxels share, to the last bit.
+        for resolution in (.1, .3, 1 / 3):
+            for k in range(-50, 50):
+                plane = k * resolution
+                keys = dccd.Voxels(resolution, [[plane] * 3, [np.nextafter(plane, -math.inf)] * 3]).keys
+                self.assertEqual(sorted(keys[:, 0].tolist()), [32767 + k, 32768 + k])
+
+    def test_a_pair(self):
+        face = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        t0, t1 = [[.25, .25, 1]] + face, [[.25, .25, -1]] + face
+        for kind in (dccd.VERTEX_FACE, 'VF', 'vertex-face'):
+            self.assertEqual(dccd.pair(kind, t0, t1), dccd.PairResult(True, False, .5, .5 + 2**-32))
+        self.assertEqual(dccd.pair('VF', t0, t0), dccd.PairResult(False, False, math.inf, math.inf))
+        self.assertEqual(dccd.pair('EE', t0, t1, toc_bits=52).contact, False)
+        self.assertTrue(dccd.pair('VF', t0, t0, accuracy='conservative', minimum_separation_m=1).contact)
+        for arguments, error, sentence in [
+                (('VV', t0, t1), ValueError, "kind is 'VV'; expected one of vertex-face"),
+                ((7, t0, t1), ValueError, 'kind is 7'),
+                (('VF', t0[:3], t1), ValueError, r't0 has shape \(1, 3, 3\), expected \(n, 4, 3\)'),
+                (('VF', t0, [[.25, math.nan, 0]] + face), ValueError, 'pair 0, vertex 0 is not finite'),
+                (('vertex-voxel-face', t0, t1), ValueError, 'is not vertex-face or edge-edge')]:
+            with self.assertRaisesRegex(error, sentence):
+                dccd.pair(*arguments)
+        with self.assertRaisesRegex(ValueError, 'toc_bits'):
+            dccd.pair('VF', t0, t1, toc_bits=9)
+        with self.assertRaisesRegex(ValueError, 'needs the rung conservative'):
+            dccd.pair('VF', t0, t1, minimum_separation_m=1)
+
+    def test_why_a_pair_is_a_contact(self):
+        body = dccd.Body(*two_triangles(), FACES)
+        row = dccd.detect(body).contacts[1]
+        lines = dccd.explain(body, row)
+        self.assertEqual(lines, dccd.explain(body, 'VF', [4, 0, 1, 2]))
+        self.assertEqual([line.says for line in lines if line.stage == 'exact *'], ['contact'])
+        voxels = dccd.Voxels(.5, [[.25, .25, -.25]])
+        on_map = dccd.detect(body, voxels=voxels)
+        row = on_map.contacts[on_map.contacts['bodies'][:, 1] == dccd.OBSTACLE_BODY][0]
+        self.assertIn('contact', [line.says for line in dccd.explain(body, row, voxels=voxels)])
+        with self.assertRaisesRegex(ValueError, "body 'body_0' has no face 0 1 3"):
+            dccd.explain(body, 'VF', [4, 0, 1, 3])
+        with self.assertRaisesRegex(ValueError, 'vertices has 2; vertex-face has 4'):
+            dccd.explain(body, 'VF', [4, 0])
+
+    def test_a_history_changes_no_answer(self):
+        body, history = dccd.Body(sheet(20), triangles=dccd.Mesh.grid(20, 20).triangles), dccd.History()
+        floor = dccd.Voxels(.05, [[.02 * i, .02 * j, -.03] for i in range(10) for j in range(10)])
+        random = np.random.default_rng(1)
+        kept = 0
+        for _ in range(12):
+            body.move_to(body.t1 + random.normal(0, .004, (400, 3)) - [0, 0, .003])
+            outcome = dccd.detect(body, voxels=floor, history=history)
+            self.assert_same_answer(outcome, dccd.detect(body, voxels=floor))
+            kept += outcome.start_state == 'INTERSECTING'
+        self.assertGreater(kept, 0)
+        history.clear()
+
+
+class StreamTest(PythonTestCase):
+    def stream(self, **options):
+        return dccd.Stream(dccd.Body(mesh=dccd.Mesh(6, FACES), name='cloth'), max_vertex_step_m=0, **options)
+
+    def test_frames_become_steps(self):
+        t0, t1 = two_triangles()
+        stream = self.stream(patches=True)
+        self.assertEqual([stream.push(t0, 10.0), stream.push(t0, 10.1), stream.push(t1, 10.2, 'cloth')], ['FIRST_FRAME', 'OK', 'OK'])
+        outcomes = list(stream)
+        self.assertEqual([(o.status, o.sequence) for o in outcomes], [('FIRST_FRAME', 1), ('OK', 2), ('OK', 3)])
+        self.assertFalse(outcomes[0].proved)
+        self.assertTrue(outcomes[1].clear)
+        self.assert_same_rows(outcomes[2].contacts, dccd.detect(dccd.Body(t0, t1, FACES)).contacts)
+        self.assertEqual((outcomes[2].start_ns, outcomes[2].stamp_ns), (10100000000, 10200000000))
+        self.assertEqual((outcomes[2].patches['id'].tolist(), outcomes[2].patches['is_new'].tolist()), ([1], [True]))
+        self.assertEqual(outcomes[2].patch_events[0]['kind'], 'BEGAN')
+        self.assertIsNone(stream.next())
+
+    def test_seams_and_frames_that_cannot_be_used(self):
+        t0, t1 = two_triangles()
+        stream = self.stream()
+        self.assertEqual([stream.push(t0, 0.0), stream.push(t0, 0.0), stream.push(t0, 3.0), stream.push(t0, 2.9),
+                          stream.push(t0[:5], 3.0)], ['FIRST_FRAME', 'DUPLICATE', 'GAP', 'TIME_JUMP', 'VERTEX_COUNT'])
+        self.assertEqual([o.status for o in stream], ['FIRST_FRAME', 'DUPLICATE', 'GAP', 'TIME_JUMP', 'VERTEX_COUNT'])
+        stream.reset()
+        self.assertEqual(stream.push(t0[:3], 3.1, mesh=dccd.Mesh(3, [[0, 1, 2]])), 'FIRST_FRAME')
+
+    def test_other_bodies_are_interpolated(self):
+        """The table comes up to where the cloth rests, in a frame that ends after the cloth's."""
+        t0, _ = two_triangles()
+        bodies = [dccd.Body(mesh=dccd.Mesh(3, [[0, 1, 2]]), name=name) for name in ('cloth', 'table')]
+        stream = dccd.Stream(bodies, max_vertex_step_m=0)
+        for body, first in (('cloth', 3), ('table', 0)):
+            stream.push(t0[first:first + 3], 0.0, body)
+        stream.push(t0[3:], 0.1, 'cloth')
+        self.assertEqual([o.status for o in stream], ['FIRST_FRAME'])
+        self.assertIsNone(stream.next(), 'the table is not known at 0.1 s')
+        stream.push(t0[:3] + [0, 0, 4], 0.2, 1)
+        outcome = stream.next()
+        self.assertEqual((outcome.status, outcome.contacts['toc_lower'].tolist()), ('OK', [.5] * 3))
+
+    def test_what_will_be_and_what_is(self):
+        t0, _ = two_triangles()
+        stream = self.stream(look_ahead_s=0.2)
+        self.assertEqual(stream.predict().status, 'NO_BODY')
+        stream.push(t0, 0.0)
+        stream.push(np.where(t0 == 1, [1, 1, .9], t0), 0.1)
+        self.assertEqual(len(list(stream)), 2)
+        self.assertEqual(len(stream.predict().contacts), 0)
+        stream.push(np.where(t0 == 1, [1, 1, .15], t0), 0.2)
+        list(stream)
+        self.assertEqual(len(stream.predict().contacts), 3)
+        self.assertTrue(stream.check_now().clear)
+        stream.set_voxels(dccd.Voxels(1, [[.5, .5, .5]]))
+        self.assertFalse(stream.check_now().clear)
+        stream.finish()
+
+    def test_refusals(self):
+        with self.assertRaisesRegex(TypeError, "there is no option 'max_steps'"):
+            self.stream(max_steps=1)
+        with self.assertRaisesRegex(ValueError, 'max_step_s must be finite and above 0'):
+            self.stream(max_step_s=0)
+        with self.assertRaisesRegex(ValueError, "no body is called 'rope'"):
+            self.stream().push(two_triangles()[0], 0, 'rope')
+        with self.assertRaisesRegex(ValueError, 'there is no body 1; there are 1'):
+            self.stream().push(two_triangles()[0], 0, 1)
+        with self.assertRaisesRegex(ValueError, 'stamp_s is'):
+            self.stream().push(two_triangles()[0], math.nan)
+
+
+class ArraysTest(PythonTestCase):
+    """What numpy users have is taken, or refused with a sentence."""
+
+    def setUp(self):
+        self.t0, self.t1 = two_triangles()
+        self.wanted = dccd.detect(dccd.Body(self.t0, self.t1, FACES)).contacts
+
+    def test_any_layout_gives_the_same(self):
+        padded = np.zeros((6, 5))
+        padded[:, 1:4] = self.t0
+        for name, t0 in {'float32': self.t0.astype('f4'), 'big-endian': self.t0.astype('>f8'), 'Fortran': np.asfortranarray(self.t0),
+                         'a slice': padded[:, 1:4], 'backwards': self.t0[::-1].copy()[::-1], 'a list': self.t0.tolist()}.items():
+            with self.subTest(name):
+                self.assert_same_rows(dccd.detect(dccd.Body(t0, self.t1, FACES)).contacts, self.wanted)
+        for faces in (FACES.astype('u1'), FACES.astype('>i8'), np.asfortranarray(FACES), FACES.tolist(), [tuple(f) for f in FACES]):
+            self.assert_same_rows(dccd.detect(dccd.Body(self.t0, self.t1, faces)).contacts, self.wanted)
+
+    def test_read_only_arrays_are_taken_and_nothing_is_written(self):
+        faces = FACES.copy()
+        for array in (self.t0, self.t1, faces):
+            array.flags.writeable = False
+        before = [array.tobytes() for array in (self.t0, self.t1, faces)]
+        self.assert_same_rows(dccd.detect(dccd.Body(self.t0, self.t1, faces)).contacts, self.wanted)
+        self.assertEqual(before, [array.tobytes() for array in (self.t0, self.t1, faces)])
+
+    def test_a_body_does_not_change_with_the_callers_array(self):
+        body = dccd.Body(self.t0, self.t1, FACES)
+        self.t1[:] = 7
+        self.assert_same_rows(dccd.detect(body).contacts, self.wanted)
+
+    def test_results_are_read_only_and_outlive_their_outcome(self):
+        body = dccd.Body(self.t0, self.t1, FACES)
+        outcome = dccd.detect(body, patches=True)
+        arrays = [outcome.contacts, outcome.patches, outcome.patch_of, body.t0, body.mesh.triangles, body.mesh.edges]
+        for array in arrays:
+            with self.assertRaises(ValueError):
+                array[0] = array[0]
+        self.assertIs(outcome.contacts.base, outcome, 'a view')
+        copies = [array.copy() for array in arrays]
+        del body, outcome
+        gc.collect()
+        junk = [np.full(1000, 9.) for _ in range(1000)]
+        for array, copy in zip(arrays, copies):
+            np.testing.assert_array_equal(array, copy)
+        del junk
+
+    def test_results_are_arrays_like_others(self):
+        outcome = dccd.detect(dccd.Body(self.t0, self.t1, FACES), patches=True)
+        for rows in (outcome.contacts, outcome.intersections, outcome.patches, outcome.geometry()):
+            np.save(self.folder / 'rows.npy', rows)
+            again = np.load(self.folder / 'rows.npy')
+            for name in rows.dtype.names:
+                np.testing.assert_array_equal(again[name], rows[name])
+        self.assertEqual(np.sort(outcome.contacts, order='vertices').dtype, outcome.contacts.dtype)
+        self.assertEqual(pickle.loads(pickle.dumps(outcome.contacts)).tolist()[0][0], .5)
+
+    def test_what_is_not_finite_is_unchecked_and_said(self):
+        for value in (math.nan, math.inf):
+            self.t1[4, 1] = value
+            outcome = dccd.detect(dccd.Body(self.t0, self.t1, FACES))
+            self.assertEqual((outcome.status, outcome.proved, outcome.stats['unchecked_vertices']), ('PARTIAL', False, 1))
+            self.assertRegex(outcome.missing[0], '1 vert')
+
+    def test_bodies_are_refused_with_a_sentence(self):
+        t0, t1 = self.t0, self.t1
+        for arguments, error, sentence in [
+                ((t0.astype(complex), t1, FACES), TypeError, 't0 has dtype complex128; expected real numbers'),
+                ((t0.astype(np.longdouble), t1, FACES), TypeError, 't0 has dtype float128'),
+                ((t0.astype(str), t1, FACES), TypeError, 't0 has dtype <U'),
+                (([['a', None, {}]], t1, FACES), TypeError, 't0 has dtype object'),
+                (([[1, 2, 3], [1, 2]], t1, FACES), TypeError, 't0 is no array|t0 has dtype object'),
+                ((t0[:, :2], t1, FACES), ValueError, r't0 has shape \(6, 2\), expected \(n, 3\)'),
+                ((t0.ravel(), t1, FACES), ValueError, r't0 has shape \(18,\), expected \(n, 3\)'),
+                ((t0, t1[:5], FACES), ValueError, 't1 has 5 positions; the mesh has 6 vertices'),
+                ((t0, t1, [[0, 1, 6]]), ValueError, r'triangles\[0, 2\] is 6; expected 0 to 5'),
+                ((t0, t1, [[0, 1, 2], [3, -1, 5]]), ValueError, r'triangles\[1, 1\] is -1; expected 0 to 5'),
+                ((t0, t1, [[0, 1, 2**32]]), ValueError, r'triangles\[0, 2\] is 4294967296'),
+                ((t0, t1, [[0, 1, 1]]), ValueError, r'face 0 \(0, 1, 1\) repeats a vertex'),
+                ((t0, t1, [[0, 1, 2, 3]]), ValueError, r'triangles has shape \(1, 4\), expected \(n, 3\)'),
+                ((t0, t1, FACES.astype(float)), TypeError, 'triangles has dtype float64; expected integers'),
+                ((t0, t1), TypeError, 'expected either triangles or edges'),
+                ((None, t1, FACES), TypeError, 'a body without t0 needs mesh')]:
+            with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
+                dccd.Body(*arguments)
+        turned = np.eye(4)
+        turned[0, 0] = 2
+        for options, error, sentence in [
+                ({'vertex_mask': [6]}, ValueError, "vertex_mask of body 'body_0' names vertex 6, but the mesh has 6"),
+                ({'vertex_mask': [[1]]}, ValueError, r'vertex_mask has shape \(1, 1\), expected \(n,\)'),
+                ({'radius_m': [-1.] * 6}, ValueError, r'radius_m\[0\] is -1'),
+                ({'radius_m': [1.]}, ValueError, 'radius_m has 1 radii; the mesh has 6 vertices'),
+                ({'minimum_separation_m': math.nan}, ValueError, 'minimum_separation_m = nan'),
+                ({'reference': t0[:2]}, ValueError, 'needs 6 positions'),
+                ({'pose_t0': np.eye(4)}, TypeError, 'pose_t0 and pose_t1 go together'),
+                ({'pose_t0': np.eye(4), 'pose_t1': turned}, ValueError, 'pose_t1 is no pose'),
+                ({'pose_t0': np.eye(4), 'pose_t1': np.eye(3)}, ValueError, r'pose_t1 has shape \(3, 3\), expected \(4, 4\)'),
+                ({'mesh': dccd.Mesh(6, FACES)}, TypeError, 'expected a mesh, or triangles, or edges'),
+                ({'colour': 1}, TypeError, 'incompatible constructor arguments')]:
+            with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
+                dccd.detect(dccd.Body(t0, t1, FACES, **options))
+
+    def test_options_and_steps_are_refused_with_a_sentence(self):
+        body = dccd.Body(self.t0, self.t1, FACES, name='cloth')
+        for options, error, sentence in [
+                ({'acuracy': 'exact'}, TypeError, "there is no option 'acuracy'; there are accuracy, tolerance_m"),
+                ({'accuracy': 'best'}, ValueError, 'accuracy: "best" is none of fast, conservative, exact'),
+                ({'accuracy': 1}, TypeError, 'accuracy is 1; expected a str'),
+                ({'toc_bits': 60}, ValueError, 'toc_bits'), ({'toc_bits': 'all'}, TypeError, "toc_bits is 'all'; expected an integer"),
+                ({'num_threads': 0}, ValueError, 'num_threads = 0 is out of range; 1 to 1024'),
+                ({'num_threads': 1.5}, TypeError, 'num_threads is 1.5; expected an integer'),
+                ({'max_contacts': -1}, ValueError, 'max_contacts is -1, which is out of range'),
+                ({'step_budget_ms': -1}, ValueError, 'step_budget_ms = -1'),
+                ({'step_budget_ms': None}, TypeError, 'step_budget_ms is None; expected a number'),
+                ({'patches': 'yes'}, TypeError, "patches is 'yes'; expected True or False"),
+                ({'exclude_boxes': [[0, 0, 0, 1, 1, 1]]}, ValueError, r'exclude_boxes has shape \(1, 6\), expected \(n, 2, 3\)'),
+                ({'exclude_boxes': [[[1, 1, 1], [0, 0, 0]]]}, ValueError, "a box's min exceeds its max"),
+                ({'expected': [{'between': ['cloth', 'table']}]}, ValueError, "no body is called 'table'"),
+                ({'expected': [{'between': ['cloth']}]}, ValueError, r"expected\[0\]\['between'\] has to name two"),
+                ({'expected': [{'with': 1}]}, ValueError, "'with' is neither"),
+                ({'expected': [{'between': ['cloth', 'self'], 'vertices': {'cloth': [9]}}]}, ValueError, 'name vertex 9')]:
+            with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
+                dccd.detect(body, **options)
+        for bodies, error, sentence in [
+                ([], ValueError, 'there is no body'), (self.t0, TypeError, 'expected a dccd.Body or a list of them'), ([body, 3], TypeError, r'bodies\[1\] is no dccd.Body'),
+                ([body, body], ValueError, "another body is called 'cloth', too"),
+                (dccd.Body(mesh=body.mesh), ValueError, "body 'body_0' needs 6 positions at t0 and t1, got 0 and 0")]:
+            with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
+                dccd.detect(bodies)
+        for what in ('voxels', 'history'):
+            with self.assertRaisesRegex(TypeError, what + ': expected dccd.'):
+                dccd.detect(body, **{what: 3})
+        self.assertEqual(len(dccd.detect(body, max_contacts=math.inf).contacts), 3)
+        # What was refused left no trace.
+        self.assert_same_rows(dccd.detect(body).contacts, self.wanted)
+
+    def test_voxels_are_refused_with_a_sentence(self):
+        for arguments, options, error, sentence in [
+                ((0,), {'centres': [[0, 0, 0]]}, ValueError, 'resolution_m'), ((.1,), {}, TypeError, 'either centres or keys'),
+                ((.1, [[0, 0]]), {}, ValueError, r'centres has shape \(1, 2\), expected \(n, 3\)'),
+                ((.1, [[0, math.nan, 0]]), {}, ValueError, r'centres\[0, 1\] is nan'),
+                ((.1, [[0, 0, 1e9]]), {}, ValueError, r'centres\[0, 2\] is 1000000000'),
+                ((.1,), {'keys': [[0, 0, 65536]]}, ValueError, r'keys\[0, 2\] is 65536; expected 0 to 65535'),
+                ((.1,), {'keys': [[1, 0, 0]], 'sizes': [2]}, ValueError, 'multiple'),
+                ((.1,), {'keys': [[0, 0, 0]], 'sizes': [1, 1]}, ValueError, r'sizes has shape \(2,\), expected \(1,\)'),
+                ((.1,), {'keys': [[0, 0, 0], [0, 0, 0]]}, ValueError, 'overlap')]:
+            with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
+                dccd.Voxels(*arguments, **options)
+
+    def test_files_are_refused_with_a_sentence(self):
+        with self.assertRaises(FileNotFoundError):
+            dccd.replay(self.folder / 'no.step')
+        bad = self.folder / 'bad.step'
+        bad.write_bytes((CHECKOUT / 'test/fuzz/corpus/recording/one_body').read_bytes()[:-9])
+        with self.assertRaisesRegex(ValueError, r'bad.step: byte \d+: '):
+            dccd.replay(bad)
+
+
+# A step of a minute: triangles that fly through each other, a few million pairs a second.
+LONG_STEP = '''
+import threading, time
+import numpy as np, dccd
+random = np.random.default_rng(0)
+t0, t1 = (np.repeat(random.uniform(0, 30, (30000, 3)), 3, axis=0) + random.uniform(0, 2, (90000, 3)) for _ in range(2))
+body = dccd.Body(t0, t1, np.arange(90000).reshape(-1, 3))
+'''
+
+
+class ThreadsTest(PythonTestCase):
+    def start(self, program):
+        process = subprocess.Popen([sys.executable, '-c', LONG_STEP + textwrap.dedent(program)], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        return process
+
+    def test_ctrl_c_ends_a_long_step(self):
+        process = self.start('''
+            print('begun', flush=True)
+            try:
+                dccd.detect(body)
+            except KeyboardInterrupt:
+                print('interrupted', flush=True)
+            small = dccd.Body([[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles=[[0, 1, 2]])
+            print(dccd.detect(small).clear)''')
+        self.assertEqual(process.stdout.readline(), 'begun\n')
+        time.sleep(1)
+        self.assertIsNone(process.poll())
+        started = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        said, errors = process.communicate(timeout=60)
+        self.assertEqual((said, errors, process.returncode), ('interrupted\nTrue\n', '', 0))
+        self.assertLess(time.monotonic() - started, 10)
+
+    def test_ctrl_c_ends_a_stream(self):
+        process = self.start('''
+            stream = dccd.Stream(dccd.Body(mesh=body.mesh), max_vertex_step_m=0)
+            stream.push(body.t0, 0.0), stream.push(body.t1, 0.1)
+            print(stream.next().status, flush=True)
+            try:
+                stream.next()
+            except KeyboardInterrupt:
+                print('interrupted')
+            try:
+                stream.next()
+            except RuntimeError as error:
+                print(error)''')
+        self.assertEqual(process.stdout.readline(), 'FIRST_FRAME\n')
+        time.sleep(1)
+        process.send_signal(signal.SIGINT)
+        said, errors = process.communicate(timeout=60)
+        self.assertEqual((said, errors), ('interrupted\nthis stream was interrupted; make a new one\n', ''))
+
+    def test_a_handler_that_raises_nothing_ends_nothing(self):
+        process = self.start('''
+            import signal
+            signal.signal(signal.SIGINT, lambda *_: print('handled', flush=True))
+            print('begun', flush=True)
+            outcome = dccd.detect(body, step_budget_ms=3000)
+            print(outcome.status)''')
+        self.assertEqual(process.stdout.readline(), 'begun\n')
+        time.sleep(.5)
+        process.send_signal(signal.SIGINT)
+        said, errors = process.communicate(timeout=60)
+        self.assertEqual((said, errors), ('handled\nDEADLINE\n', ''))
+
+    def test_other_threads_run_meanwhile(self):
+        process = self.start('''
+            ticks = []
+            def tick():
+                while not done: ticks.append(time.sleep(.01))
+            done = False
+            thread = threading.Thread(target=tick)
+            thread.start()
+            outcome = dccd.detect(body, step_budget_ms=2000)
+            n, done = len(ticks), True
+            thread.join()
+            print(n > 20, outcome.status, outcome.proved, outcome.complete)''')
+        said, errors = process.communicate(timeout=120)
+        self.assertEqual((said, errors), ('True DEADLINE False False\n', ''))
+
+    def test_threads_may_share_a_history_and_a_stream(self):
+        t0, t1 = two_triangles()
+        body, history, wrong = dccd.Body(t0, t1, FACES), dccd.History(), []
+        stream = dccd.Stream(dccd.Body(mesh=body.mesh), max_vertex_step_m=0)
+
+        def work(thread):
+            for i in range(200):
+                if len(dccd.detect(body, history=history).contacts) != 3:
+                    wrong.append(i)
+                stream.push(t0, .001 * i + .0001 * thread)
+                stream.next()
+
+        threads = [threading.Thread(target=work, args=(n,)) for n in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(wrong, [])
+
+
+class PagesTest(PythonTestCase):
+    """What people and their tools read."""
+
+    def test_every_name_has_a_docstring(self):
+        for name in dccd.__all__:
+            value = getattr(dccd, name)
+            if inspect.isclass(value) or inspect.isfunction(value):
+                self.assertGreater(len(value.__doc__), 40, name)
+                for member, inner in vars(value).items() if value in vars(dccd._dccd).values() else []:
+                    if not member.startswith('_'):
+                        self.assertTrue(inner.__doc__, '%s.%s' % (name, member))
+
+    def test_pydoc_reads_well(self):
+        text = pydoc.render_doc(dccd, renderer=pydoc.plaintext)
+        self.assertNotRegex(text, r'_dccd\.|handle|std::|<object object')
+        self.assertLess(text.count('\n'), 900)
+
+    def test_detect_names_every_option(self):
+        options = dccd.replay(CHECKOUT / 'test/fuzz/corpus/recording/one_body').options
+        said = dccd.detect.__doc__.split('Returns')[0].replace(',', ' ').split()
+        self.assertEqual([name for name in options if name not in said], [])
+        header = (CHECKOUT / 'include/dccd/detect.h').read_text().split('struct Options {')[1].split('};')[0]
+        fields = [line.split('//')[0].split('=')[0].split(';')[0].split()[-1] for line in header.splitlines()
+                  if line.startswith('  ') and not line.strip().startswith('//') and ';' in line]
+        self.assertGreater(len(fields), 15)
+        self.assertEqual(set(fields) - set(options), {'off'}, 'what else has no name there; `off` is the flags of a Body')
+
+    def test_stubs_are_those_of_the_module(self):
+        tree = ast.parse((CHECKOUT / 'python/dccd/_dccd.pyi').read_text())
+        module = dccd._dccd
+
+        def arguments(function, skip_self):
+            a = function.args
+            names = [x.arg for x in a.posonlyargs + a.args][skip_self:] + ['*' + x.arg for x in a.kwonlyargs]
+            return names + (['**' + a.kwarg.arg] if a.kwarg else [])
+
+        def parameters(callable_, skip_self):
+            found = list(inspect.signature(callable_).parameters.values())[skip_self:]
+            marks = {inspect.Parameter.KEYWORD_ONLY: '*', inspect.Parameter.VAR_KEYWORD: '**'}
+            return [marks.get(p.kind, '') + p.name for p in found]
+
+        names = set()
+        for node in tree.body:
+            if isinstance(node, ast.AnnAssign):
+                names.add(node.target.id)
+            elif isinstance(node, ast.FunctionDef):
+                names.add(node.name)
+                self.assertEqual(arguments(node, 0), parameters(getattr(module, node.name), 0), node.name)
+            elif isinstance(node, ast.ClassDef):
+                names.add(node.name)
+                value, members = getattr(module, node.name), set()
+                for inner in node.body:
+                    members.add(inner.name)
+                    words = {getattr(d, 'id', getattr(d, 'attr', '')) for d in inner.decorator_list}
+                    if words & {'property', 'setter'}:
+                        self.assertIsInstance(vars(value)[inner.name], property)
+                        self.assertEqual('setter' in words, vars(value)[inner.name].fset is not None and 'setter' in words)
+                    elif inner.name != '__iter__':
+                        skip = 0 if words else 1
+                        self.assertEqual(arguments(inner, skip), parameters(getattr(value, inner.name), skip), inner.name)
+                public = {m for m in vars(value) if not m.startswith('_') or m == '__iter__'}
+                self.assertEqual(members - {'__init__'}, public, node.name)
+        public = {n for n in vars(module) if not n.startswith('_')} | {'__version__'}
+        self.assertEqual(names, public)
+
+    def test_it_is_marked_as_typed(self):
+        installed = pathlib.Path(dccd.__file__).parent
+        self.assertTrue((installed / 'py.typed').exists() and (installed / '_dccd.pyi').exists())
+
+    def test_the_version_is_the_packages(self):
+        self.assertIn('<version>%s</version>' % dccd.__version__, (CHECKOUT / 'package.xml').read_text())
+
+
+class ExamplesTest(PythonTestCase):
+    def run_example(self, name, *arguments):
+        ran = subprocess.run([sys.executable, EXAMPLES / name, *map(str, arguments)], capture_output=True, text=True, check=False)
+        self.assertEqual((ran.returncode, ran.stderr), (0, ''))
+        return ran.stdout.splitlines()
+
+    def test_every_example_is_run_here(self):
+        self.assertEqual({p.name for p in EXAMPLES.iterdir() if p.suffix == '.py'},
+                         {'two_frames.py', 'contacts_over_time.py', 'valid_step.py', 'read_tables.py'})
+
+    def test_two_frames_say_what_the_cpp_example_says(self):
+        lines = self.run_example('two_frames.py')
+        self.assertIn('vertex-face 5 2 8 3  at 0.500000000', lines)
+        self.assertEqual(lines[-1], '5 contacts, starts CLEAR; proved, something touches anew')
+
+    def test_a_step_is_not_valid_and_two_thirds_of_it_are(self):
+        self.assertEqual(self.run_example('valid_step.py'), ['not valid', 'the largest valid step: 0.666666666'])
+
+    def test_the_largest_step_is_the_largest(self):
+        """Against the time that the geometry has, on random heights, and starts that touch."""
+        sys.path.insert(0, str(EXAMPLES))
+        self.addCleanup(sys.path.remove, str(EXAMPLES))
+        from valid_step import is_valid, largest_valid_step
+        random = np.random.default_rng(2)
+        for _ in range(50):
+            before, after = two_triangles()
+            top, bottom = random.uniform(.1, 3), random.uniform(-3, .05)
+            before[3:, 2], after[3:, 2] = top, bottom
+            part = largest_valid_step(before, after, FACES)
+            self.assertTrue(is_valid(before, before + part * (after - before), FACES))
+            self.assertAlmostEqual(part, min(1, top / (top - bottom)), delta=1e-8)
+        before[3:, 2] = 0
+        self.assertEqual(largest_valid_step(before, after, FACES), 0)
+
+    def test_tables_of_a_report(self):
+        bag = self.folder / 'scene.bag'
+        subprocess.run([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', bag, '--frames', '45', '--quiet'], check=True)
+        subprocess.run([TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet', '--no-accuracy-table'],
+                       stdout=subprocess.DEVNULL, check=True)
+        lines = self.run_example('read_tables.py', self.folder / 'report')
+        self.assertRegex(lines[0], r'^\d+ of \d+ steps are clear$')
+        self.assertRegex(lines[-1], r'^mesh +octomap +\d+ +\d+ +\d')
+
+    def test_contacts_over_time(self):
+        frames = self.folder / 'frames'
+        frames.mkdir()
+        t0, _ = two_triangles()
+        for i in range(5):
+            t0[3:, 2] = 1 - .4 * i
+            meshio.write(frames / ('%02d.ply' % i), meshio.Mesh(t0, [('triangle', FACES.astype('i4'))]))
+        lines = self.run_example('contacts_over_time.py', frames, self.folder / 'contacts.png', 10)
+        self.assertEqual(len(lines), 4)
+        self.assertEqual(lines[0], '0.100 s: proved, nothing touches')
+        self.assertEqual(lines[2], '0.300 s: proved, something touches anew')
+        self.assertEqual((self.folder / 'contacts.png').read_bytes()[1:4], b'PNG')
+
+
+if __name__ == '__main__':
+    unittest.main()
