@@ -101,15 +101,27 @@ class CameraRecorder {
   CameraRecorder(SceneBag& bag, const scene::SceneSpec& spec, bool binary)
       : bag_(bag), spec_(spec), binary_(binary), camera_(spec), map_(spec.obstacle->resolution_m) {}
 
+  /// Takes the clouds of the solids alone.
+  void seeSolids(const ros::Time& start) {
+    for (int i = spec_.camera->empty_clouds; i > 0; --i) {
+      take(scene::SceneState{}, start - ros::Duration(i / spec_.camera->rate_hz));
+    }
+  }
   /// Takes a cloud of the frame if one is due.
   void see(const scene::Simulation& simulation, const ros::Time& stamp) {
-    const scene::Camera& camera = *spec_.camera;
     // Half a microsecond: what is due with a frame is not late by rounding.
-    const double elapsed_s = simulation.time_s() + 5e-7;
-    if (elapsed_s * camera.rate_hz < due_) return;
+    const double due = (simulation.time_s() + 5e-7) * spec_.camera->rate_hz;
+    if (due < next_) return;
     scene::SceneState state;
     for (std::size_t b = 0; b < spec_.bodies.size(); ++b) state.bodies.push_back(simulation.positions(b));
     for (std::size_t r = 0; r < spec_.rigid_bodies.size(); ++r) state.rigid_bodies.push_back(simulation.rigidPose(r));
+    take(state, stamp);
+    next_ = static_cast<int>(std::floor(due)) + 1;
+  }
+
+ private:
+  void take(const scene::SceneState& state, const ros::Time& stamp) {
+    const scene::Camera& camera = *spec_.camera;
     std::vector<Eigen::Vector3f> points = camera_.look(state);
     const ros::Time told = stamp + ros::Duration(camera.lag_s);
     const auto seq = static_cast<std::uint32_t>(clouds_++);
@@ -119,16 +131,14 @@ class CameraRecorder {
     bag_.write(spec_.obstacle->topic, told,
                toOctomap(header(spec_.obstacle->frame, stamp, seq), spec_.obstacle->resolution_m,
                          map_.serialized(binary_), binary_));
-    due_ = static_cast<int>(std::floor(elapsed_s * camera.rate_hz)) + 1;
   }
 
- private:
   SceneBag& bag_;
   const scene::SceneSpec& spec_;
   bool binary_;
   scene::DepthCamera camera_;
   MapOfClouds map_;
-  int due_ = 0;     // number of the next cloud, counted from the start at the camera's rate
+  int next_ = 0;    // cloud of the scene, counted at the camera's rate
   int clouds_ = 0;  // taken
 };
 
@@ -189,14 +199,16 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
 
   SceneBag bag(bag_path);
   const ros::Time start(START_STAMP_S);
-  writeStaticTransforms(bag, spec, start);
+  // The first thing in the bag, though a camera may have been there before the bodies.
+  const ros::Time begin = start - ros::Duration(spec.camera ? spec.camera->empty_clouds / spec.camera->rate_hz : 0.0);
+  writeStaticTransforms(bag, spec, begin);
   const bool binary = spec.obstacle && spec.obstacle->binary && !options.full_octomap;
   if (spec.obstacle) {
-    bag.write(spec.camera ? spec.camera->truth_topic : spec.obstacle->topic, start,
-              toOctomap(header(spec.obstacle->frame, start, 0), *spec.obstacle, binary), true);
+    bag.write(spec.camera ? spec.camera->truth_topic : spec.obstacle->topic, begin,
+              toOctomap(header(spec.obstacle->frame, begin, 0), *spec.obstacle, binary), true);
   }
   std::optional<CameraRecorder> camera;
-  if (spec.camera) camera.emplace(bag, spec, binary);
+  if (spec.camera) camera.emplace(bag, spec, binary).seeSolids(start);
   ProgressBar progress(spec.name, static_cast<std::size_t>(spec.frames), !options.quiet);
   for (int frame = 0; frame < spec.frames; ++frame) {
     if (frame > 0) simulation.step();

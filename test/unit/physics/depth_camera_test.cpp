@@ -172,6 +172,14 @@ TEST(DepthCamera, AFaceThatReachesBehindTheCameraIsSeenBeforeIt) {
     ++seen;
   }
   EXPECT_EQ(seen, 48 * 36) << "the camera looks down at it everywhere";
+  const SceneSpec above = sceneOf(FAR_BOX, "", "sheet: {rows: 2, cols: 2, size_m: [40, 40], center_m: [0, 0, 3]}");
+  for (const Eigen::Vector3f& p : DepthCamera(above).look(startOf(above))) EXPECT_FALSE(isSeen(p)) << "behind it";
+}
+
+TEST(DepthCamera, SeesTheSolidsAloneWhereThereIsNothingElse) {
+  const SceneSpec spec = sceneOf(BOX, "", "sheet: {rows: 2, cols: 2, size_m: [40, 40], center_m: [0, 0, 0.5]}");
+  const Solid box = spec.obstacle->solids[0];
+  expectFirstInside(spec, DepthCamera(spec).look(SceneState{}), [&](const Vec3& p) { return contains(box, p); });
 }
 
 TEST(DepthCamera, NoiseLiesAlongTheRayAndIsAsLargeAsItSays) {

@@ -182,7 +182,8 @@ TEST(SceneFile, ACameraIsReadStrictly) {
   };
   const std::string at = "position_m: [0, 0, 2]", down = at + ", looks_at_m: [0, 0, 0]";
   EXPECT_EQ(with(down + size), "accepted");
-  EXPECT_EQ(with(down + size + ", noise_m: 0.003, lost_share: 1, lag_s: 0.1, inset_m: 0.05, seed: 7"), "accepted");
+  EXPECT_EQ(with(down + size + ", noise_m: 0.003, lost_share: 1, lag_s: 0.1, empty_clouds: 9, inset_m: 0.05, seed: 7"),
+            "accepted");
   EXPECT_EQ(with(at + ", quaternion: [1, 0, 0, 0]" + size), "accepted");
 
   expectTold(down + size + ", lens: 2", "s.yaml:6: camera/lens is not known; nearest is camera/");
@@ -191,6 +192,9 @@ TEST(SceneFile, ACameraIsReadStrictly) {
   expectTold(down + size + ", lag_s: .inf", "camera/lag_s is inf, it must be from 0 to 60");
   expectTold(down + size + ", lost_share: 1.5", "camera/lost_share is 1.5, it must be from 0 to 1");
   expectTold(down + size + ", seed: -1", "camera/seed is -1, it must be from 0");
+  expectTold(down + size + ", empty_clouds: -1", "camera/empty_clouds is -1, it must be from 0 to 1000");
+  expectTold(down + ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: 0.01, empty_clouds: 10",
+             "camera/empty_clouds take more than 600 s at rate_hz");
   expectTold(down + size + ", inset_m: 0.1", "camera/inset_m leaves nothing of a solid of the obstacle; write less");
   expectTold(down + ", width: 0, height: 3, field_of_view_rad: 1, rate_hz: 5", "camera/width is 0, it must be from 1");
   expectTold(down + ", width: 4, height: 5000, field_of_view_rad: 1, rate_hz: 5", "camera/height is 5000");

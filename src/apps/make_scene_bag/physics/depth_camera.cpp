@@ -170,7 +170,7 @@ double DepthCamera::gaussian() {  // Box and Muller
 
 std::vector<Eigen::Vector3f> DepthCamera::look(const SceneState& state) {
   Ranges ranges = background_;
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+  for (std::size_t b = 0; b < state.bodies.size(); ++b) {
     Positions in_camera;
     for (const Vec3& p : state.bodies[b]) in_camera.push_back(from_fixed_ * p);
     if (faces_[b].empty()) {
@@ -179,7 +179,7 @@ std::vector<Eigen::Vector3f> DepthCamera::look(const SceneState& state) {
       drawFaces(ranges, in_camera, faces_[b]);
     }
   }
-  for (std::size_t r = 0; r < rigid_bodies_.size(); ++r) {
+  for (std::size_t r = 0; r < state.rigid_bodies.size(); ++r) {
     drawBox(ranges, state.rigid_bodies[r], 0.5 * rigid_bodies_[r].size_m);
   }
   std::vector<Eigen::Vector3f> cloud;

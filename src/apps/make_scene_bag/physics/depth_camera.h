@@ -10,8 +10,8 @@ namespace dccd::scene {
 
 /// A scene at one time, in the fixed frame [m].
 struct SceneState {
-  std::vector<Positions> bodies;                ///< one for each of the scene's
-  std::vector<Eigen::Isometry3d> rigid_bodies;  ///< poses of their frames
+  std::vector<Positions> bodies;                ///< one for each of the scene's; none: its solids are alone
+  std::vector<Eigen::Isometry3d> rigid_bodies;  ///< poses of their frames, likewise
 };
 
 class DepthCamera {

@@ -228,6 +228,9 @@ Camera readCamera(ParameterReader map, const SceneSpec& spec) {
   camera.noise_m = map.number("noise_m", 0.0, 0.0, 1.0);
   camera.lost_share = map.number("lost_share", 0.0, 0.0, 1.0);
   camera.lag_s = map.number("lag_s", 0.0, 0.0, 60.0);
+  camera.empty_clouds = map.integer("empty_clouds", 0, 0, 1000);
+  if (camera.empty_clouds > 600 * camera.rate_hz)
+    map.fail("empty_clouds", "take more than 600 s at rate_hz; write fewer or a higher rate_hz");
   camera.inset_m = map.number("inset_m", 0.0, 0.0, 1.0);
   camera.seed = map.integer("seed", camera.seed, 0, 1000000000);
   checkCameraNames(map, camera, spec);

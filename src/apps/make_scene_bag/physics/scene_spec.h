@@ -109,6 +109,7 @@ struct Camera {
   double noise_m = 0.0;            ///< standard deviation of a range
   double lost_share = 0.0;         ///< 0 to 1, of the pixels
   double lag_s = 0.0;              ///< from the stamp of a cloud to when it and its map come
+  int empty_clouds = 0;            ///< before the scene begins, of the solids alone
   double inset_m = 0.0;            ///< the solids seen are smaller by this: their faces lie within voxels of the map
   int seed = 1;                    ///< of noise and lost pixels
 };
