@@ -69,7 +69,6 @@ void MapOfClouds::insert(const Vec3& camera_m, const std::vector<Eigen::Vector3f
     if (p.allFinite()) cloud.push_back(p[0], p[1], p[2]);
   }
   tree_->insertPointCloud(cloud, octomap::point3d(camera_m[0], camera_m[1], camera_m[2]));
-  tree_->prune();
 }
 
 std::vector<std::int8_t> MapOfClouds::serialized(bool binary) const { return streamOf(*tree_, binary); }
