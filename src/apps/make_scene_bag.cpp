@@ -13,7 +13,8 @@
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf. The same seed gives the same bag.");
+      "Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf, a camera's clouds. The same seed gives "
+      "the same bag.");
   std::string scene_path, bag_path;
   dccd::RecorderOptions options;
   app.add_option("scene", scene_path, "Scene file")->required();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "apps/make_scene_bag/physics/shapes.h"
 #include "octomap/map_builder.h"
@@ -15,6 +16,33 @@ geometry_msgs::Point toPoint(const Vec3& p) {
   point.y = p[1];
   point.z = p[2];
   return point;
+}
+
+/// Rows of `width` points; their coordinates follow each other as they are.
+template <class Point>
+sensor_msgs::PointCloud2 pointCloud(const std_msgs::Header& header, const std::vector<Point>& points,
+                                    std::size_t width) {
+  using Scalar = typename Point::Scalar;
+  sensor_msgs::PointCloud2 message;
+  message.header = header;
+  message.height = static_cast<std::uint32_t>(points.size() / width);
+  message.width = static_cast<std::uint32_t>(width);
+  for (int axis = 0; axis < 3; ++axis) {
+    sensor_msgs::PointField field;
+    field.name = std::string(1, static_cast<char>('x' + axis));
+    field.offset = static_cast<std::uint32_t>(axis * sizeof(Scalar));
+    field.datatype = sizeof(Scalar) == 8 ? sensor_msgs::PointField::FLOAT64 : sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    message.fields.push_back(field);
+  }
+  message.point_step = 3 * sizeof(Scalar);
+  message.row_step = message.point_step * message.width;
+  message.is_dense = true;
+  message.data.resize(points.size() * message.point_step);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    std::memcpy(message.data.data() + i * message.point_step, points[i].data(), message.point_step);
+  }
+  return message;
 }
 
 }  // namespace
@@ -32,25 +60,13 @@ deformable_ccd::MeshStamped toMeshStamped(const std_msgs::Header& header, const 
 }
 
 sensor_msgs::PointCloud2 toPointCloud(const std_msgs::Header& header, const Positions& positions) {
-  sensor_msgs::PointCloud2 message;
-  message.header = header;
-  message.height = 1;
-  message.width = static_cast<std::uint32_t>(positions.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    sensor_msgs::PointField field;
-    field.name = std::string(1, static_cast<char>('x' + axis));
-    field.offset = static_cast<std::uint32_t>(axis * sizeof(double));
-    field.datatype = sensor_msgs::PointField::FLOAT64;
-    field.count = 1;
-    message.fields.push_back(field);
-  }
-  message.point_step = 3 * sizeof(double);
-  message.row_step = message.point_step * message.width;
-  message.is_dense = true;
-  message.data.resize(message.row_step);
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    std::memcpy(message.data.data() + i * message.point_step, positions[i].data(), message.point_step);
-  }
+  return pointCloud(header, positions, positions.size());
+}
+
+sensor_msgs::PointCloud2 toImageCloud(const std_msgs::Header& header, const std::vector<Eigen::Vector3f>& points,
+                                      int width) {
+  sensor_msgs::PointCloud2 message = pointCloud(header, points, static_cast<std::size_t>(width));
+  message.is_dense = false;
   return message;
 }
 
@@ -84,6 +100,17 @@ visualization_msgs::MarkerArray toMarkers(const std_msgs::Header& header, const 
   return message;
 }
 
+octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, double resolution_m, std::vector<std::int8_t> data,
+                                bool binary) {
+  octomap_msgs::Octomap message;
+  message.header = header;
+  message.binary = binary;
+  message.id = "OcTree";
+  message.resolution = resolution_m;
+  message.data = std::move(data);
+  return message;
+}
+
 octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, const scene::Obstacle& obstacle, bool binary) {
   Box bounds;
   for (const scene::Solid& solid : obstacle.solids) {
@@ -95,13 +122,8 @@ octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, const scene::Obs
     return std::any_of(obstacle.solids.begin(), obstacle.solids.end(),
                        [&center](const scene::Solid& solid) { return scene::contains(solid, center); });
   };
-  octomap_msgs::Octomap message;
-  message.header = header;
-  message.binary = binary;
-  message.id = "OcTree";
-  message.resolution = obstacle.resolution_m;
-  message.data = buildOctomap(obstacle.resolution_m, bounds, occupied, binary);
-  return message;
+  return toOctomap(header, obstacle.resolution_m, buildOctomap(obstacle.resolution_m, bounds, occupied, binary),
+                   binary);
 }
 
 geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child,

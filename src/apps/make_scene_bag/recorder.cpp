@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -10,8 +11,10 @@
 #include <boost/make_shared.hpp>
 
 #include "apps/make_scene_bag/messages.h"
+#include "apps/make_scene_bag/physics/depth_camera.h"
 #include "apps/make_scene_bag/physics/shapes.h"
 #include "apps/make_scene_bag/physics/simulation.h"
+#include "octomap/map_builder.h"
 #include "report/progress_bar.h"
 
 namespace dccd {
@@ -67,6 +70,10 @@ void writeStaticTransforms(SceneBag& bag, const scene::SceneSpec& spec, const ro
   for (const std::string& frame : frames) {
     message.transforms.push_back(toTransform(header(spec.fixed_frame, stamp, 0), frame, Eigen::Isometry3d::Identity()));
   }
+  if (spec.camera) {
+    message.transforms.push_back(
+        toTransform(header(spec.fixed_frame, stamp, 0), spec.camera->frame, spec.camera->pose));
+  }
   if (!message.transforms.empty()) bag.write("/tf_static", stamp, message, true);
 }
 
@@ -87,6 +94,53 @@ void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& a
       return;
   }
 }
+
+/// Writes what the scene's camera sees, and the map of all that it saw.
+class CameraRecorder {
+ public:
+  CameraRecorder(SceneBag& bag, const scene::SceneSpec& spec, bool binary)
+      : bag_(bag), spec_(spec), binary_(binary), camera_(spec), map_(spec.obstacle->resolution_m) {}
+
+  /// Takes the clouds of the solids alone.
+  void seeSolids(const ros::Time& start) {
+    for (int i = spec_.camera->empty_clouds; i > 0; --i) {
+      take(scene::SceneState{}, start - ros::Duration(i / spec_.camera->rate_hz));
+    }
+  }
+  /// Takes a cloud of the frame if one is due.
+  void see(const scene::Simulation& simulation, const ros::Time& stamp) {
+    // Half a microsecond: what is due with a frame is not late by rounding.
+    const double due = (simulation.time_s() + 5e-7) * spec_.camera->rate_hz;
+    if (due < next_) return;
+    scene::SceneState state;
+    for (std::size_t b = 0; b < spec_.bodies.size(); ++b) state.bodies.push_back(simulation.positions(b));
+    for (std::size_t r = 0; r < spec_.rigid_bodies.size(); ++r) state.rigid_bodies.push_back(simulation.rigidPose(r));
+    take(state, stamp);
+    next_ = static_cast<int>(std::floor(due)) + 1;
+  }
+
+ private:
+  void take(const scene::SceneState& state, const ros::Time& stamp) {
+    const scene::Camera& camera = *spec_.camera;
+    std::vector<Eigen::Vector3f> points = camera_.look(state);
+    const ros::Time told = stamp + ros::Duration(camera.lag_s);
+    const auto seq = static_cast<std::uint32_t>(clouds_++);
+    bag_.write(camera.topic, told, toImageCloud(header(camera.frame, stamp, seq), points, camera.width));
+    for (Eigen::Vector3f& p : points) p = (camera.pose * p.cast<double>()).cast<float>();
+    map_.insert(camera.pose.translation(), points);
+    bag_.write(spec_.obstacle->topic, told,
+               toOctomap(header(spec_.obstacle->frame, stamp, seq), spec_.obstacle->resolution_m,
+                         map_.serialized(binary_), binary_));
+  }
+
+  SceneBag& bag_;
+  const scene::SceneSpec& spec_;
+  bool binary_;
+  scene::DepthCamera camera_;
+  MapOfClouds map_;
+  int next_ = 0;    // cloud of the scene, counted at the camera's rate
+  int clouds_ = 0;  // taken
+};
 
 /// The same time in frames of another length; physics takes no longer steps than before.
 void overrideRate(scene::SceneSpec& spec, double rate_hz) {
@@ -118,6 +172,11 @@ std::string summary(const scene::SceneSpec& spec, const scene::Simulation& simul
   for (const scene::Body& body : spec.bodies) {
     text << "  " << body.topic << ": " << body.shape.rows * body.shape.cols << " vertices\n";
   }
+  if (spec.camera) {
+    text << "  " << spec.camera->topic << ": clouds of " << spec.camera->width << " x " << spec.camera->height << " at "
+         << spec.camera->rate_hz << " Hz, their map on " << spec.obstacle->topic << ", the true one on "
+         << spec.camera->truth_topic << "\n";
+  }
   text << "  physics:";
   for (const std::string& effect : simulation.effects()) {
     text << " " << effect << (&effect == &simulation.effects().back() ? "" : ",");
@@ -140,12 +199,16 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
 
   SceneBag bag(bag_path);
   const ros::Time start(START_STAMP_S);
-  writeStaticTransforms(bag, spec, start);
+  // The first thing in the bag, though a camera may have been there before the bodies.
+  const ros::Time begin = start - ros::Duration(spec.camera ? spec.camera->empty_clouds / spec.camera->rate_hz : 0.0);
+  writeStaticTransforms(bag, spec, begin);
+  const bool binary = spec.obstacle && spec.obstacle->binary && !options.full_octomap;
   if (spec.obstacle) {
-    const bool binary = spec.obstacle->binary && !options.full_octomap;
-    bag.write(spec.obstacle->topic, start, toOctomap(header(spec.obstacle->frame, start, 0), *spec.obstacle, binary),
-              true);
+    bag.write(spec.camera ? spec.camera->truth_topic : spec.obstacle->topic, begin,
+              toOctomap(header(spec.obstacle->frame, begin, 0), *spec.obstacle, binary), true);
   }
+  std::optional<CameraRecorder> camera;
+  if (spec.camera) camera.emplace(bag, spec, binary).seeSolids(start);
   ProgressBar progress(spec.name, static_cast<std::size_t>(spec.frames), !options.quiet);
   for (int frame = 0; frame < spec.frames; ++frame) {
     if (frame > 0) simulation.step();
@@ -159,6 +222,7 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
     for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
       writeBody(bag, spec.bodies[b], header(spec.bodies[b].frame, stamp, frame), simulation.observe(b), faces[b]);
     }
+    if (camera) camera->see(simulation, stamp);
     progress.advance();
   }
   bag.close();

@@ -169,6 +169,78 @@ TEST(SceneFile, WhatItExpectsIsReadStrictly) {
   EXPECT_EQ(errorOf(GOOD, "bodies:", "expect: {octomap: none}\nbodies:"), "accepted");
 }
 
+TEST(SceneFile, ACameraIsReadStrictly) {
+  const std::string scene = std::string(GOOD) +
+                            "rigid_bodies:\n  - {name: finger, size_m: [1, 1, 1], start_m: [0, 0, 0]}\n"
+                            "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 0.2]}}]}\n";
+  const std::string size = ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: 5";
+  const auto with = [&](const std::string& camera) {
+    return errorOf(scene, "bodies:", "camera: {" + camera + "}\nbodies:");
+  };
+  const auto expectTold = [&](const std::string& camera, const std::string& part) {
+    EXPECT_NE(with(camera).find(part), std::string::npos) << camera << ": " << with(camera);
+  };
+  const std::string at = "position_m: [0, 0, 2]", down = at + ", looks_at_m: [0, 0, 0]";
+  EXPECT_EQ(with(down + size), "accepted");
+  EXPECT_EQ(with(down + size + ", noise_m: 0.003, lost_share: 1, lag_s: 0.1, empty_clouds: 9, inset_m: 0.05, seed: 7"),
+            "accepted");
+  EXPECT_EQ(with(at + ", quaternion: [1, 0, 0, 0]" + size), "accepted");
+
+  expectTold(down + size + ", lens: 2", "s.yaml:6: camera/lens is not known; nearest is camera/");
+  expectTold(down + size + ", noise_m: .nan", "camera/noise_m is nan, it must be from 0 to 1");
+  expectTold(down + size + ", noise_m: -0.001", "camera/noise_m is -0.001, it must be from 0 to 1");
+  expectTold(down + size + ", lag_s: .inf", "camera/lag_s is inf, it must be from 0 to 60");
+  expectTold(down + size + ", lost_share: 1.5", "camera/lost_share is 1.5, it must be from 0 to 1");
+  expectTold(down + size + ", seed: -1", "camera/seed is -1, it must be from 0");
+  expectTold(down + size + ", empty_clouds: -1", "camera/empty_clouds is -1, it must be from 0 to 1000");
+  expectTold(down + ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: 0.01, empty_clouds: 10",
+             "camera/empty_clouds take more than 600 s at rate_hz");
+  expectTold(down + size + ", inset_m: 0.1", "camera/inset_m leaves nothing of a solid of the obstacle; write less");
+  expectTold(down + ", width: 0, height: 3, field_of_view_rad: 1, rate_hz: 5", "camera/width is 0, it must be from 1");
+  expectTold(down + ", width: 4, height: 5000, field_of_view_rad: 1, rate_hz: 5", "camera/height is 5000");
+  expectTold(down + ", width: 4, height: 3, field_of_view_rad: 4, rate_hz: 5", "field_of_view_rad is 4, it must be");
+  expectTold(down + ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: -5", "camera/rate_hz is -5, it must be");
+  expectTold(down + ", width: 4, height: 3, field_of_view_rad: 1, rate_hz: 31",
+             "camera/rate_hz is 31, it must be from 0.01 to 30");
+  expectTold(at + size, "camera needs just one of looks_at_m, quaternion: where it looks");
+  expectTold(down + ", quaternion: [1, 0, 0, 0]" + size, "camera needs just one of");
+  expectTold(at + ", looks_at_m: [0, 0, 2]" + size, "camera/looks_at_m is where the camera is");
+  expectTold(at + ", quaternion: [0, 0, 0, 0]" + size, "camera/quaternion is zero");
+  expectTold(at + ", quaternion: [1, 0, 0]" + size, "camera/quaternion must be a list of 4 numbers");
+  expectTold("position_m: [0.5, 0.5, 0.1], looks_at_m: [0, 0, 0]" + size, "camera/position_m lies in a solid");
+  expectTold(down + size + ", topic: /sheet", "camera/topic is another's, too");
+  expectTold(down + size + ", truth_topic: /octomap_binary", "camera/truth_topic is another's, too");
+  expectTold(down + size + ", frame: finger", "camera/frame is another's, too");
+  EXPECT_NE(errorOf(GOOD, "bodies:", "camera: {" + down + size + "}\nbodies:")
+                .find("s.yaml:6: camera needs an obstacle, whose topic and resolution its map has"),
+            std::string::npos);
+}
+
+TEST(SceneFile, ACameraLooksUprightAtItsPlace) {
+  const auto poseOf = [](const std::string& where) {
+    return parseScene(std::string(GOOD) +
+                          "obstacle: {resolution_m: 0.1, solids: [{box: {min_m: [0, 0, 0], max_m: [1, 1, 1]}}]}\n"
+                          "camera: {width: 4, height: 3, field_of_view_rad: 1, rate_hz: 5, " +
+                          where + "}\n",
+                      "s.yaml")
+        .camera->pose;
+  };
+  const Eigen::Isometry3d level = poseOf("position_m: [2, 0, 3], looks_at_m: [5, 0, 3]");
+  EXPECT_LT((level.translation() - Vec3(2, 0, 3)).norm(), 1e-12);
+  EXPECT_LT((level.linear() * Vec3::UnitZ() - Vec3::UnitX()).norm(), 1e-12) << "forward";
+  EXPECT_LT((level.linear() * Vec3::UnitX() + Vec3::UnitY()).norm(), 1e-12) << "to the right of x forward lies -y";
+  EXPECT_LT((level.linear() * Vec3::UnitY() + Vec3::UnitZ()).norm(), 1e-12) << "down";
+  for (const char* where :
+       {"position_m: [2, 0, 3], looks_at_m: [2, 0, 0]", "position_m: [2, 0, 3], looks_at_m: [1, 4, 0]",
+        "position_m: [2, 0, 3], quaternion: [1, 2, 3, 4]"}) {
+    const Eigen::Matrix3d turn = poseOf(where).linear();
+    EXPECT_LT((turn * turn.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12) << where;
+    EXPECT_NEAR(turn.determinant(), 1.0, 1e-12) << where;
+  }
+  const Eigen::Isometry3d turned = poseOf("position_m: [2, 0, 3], quaternion: [1, 0, 0, 0]");
+  EXPECT_LT((turned.linear() * Vec3::UnitZ() + Vec3::UnitZ()).norm(), 1e-12) << "half a turn about x looks down";
+}
+
 TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
   EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
   EXPECT_THROW(readSceneFile("no/such/scene.yaml"), ParameterError);

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "apps/make_scene_bag/physics/expectations.h"
+#include "apps/make_scene_bag/physics/shapes.h"
 
 namespace dccd::scene {
 namespace {
@@ -172,6 +173,77 @@ RigidBody readRigidBody(ParameterReader map) {
   return body;
 }
 
+Eigen::Isometry3d readCameraPose(ParameterReader& map) {
+  const bool aimed = map.has("looks_at_m"), turned = map.has("quaternion");
+  if (aimed + turned != 1) map.fail("", "needs just one of looks_at_m, quaternion: where it looks");
+  const Vec3 position_m = map.vector("position_m");
+  Eigen::Isometry3d pose(Eigen::Translation3d{position_m});
+  if (turned) {
+    const ParameterTree& list = map.raw("quaternion");
+    if (list.items.size() != 4) map.fail("quaternion", "must be a list of 4 numbers: x, y, z, w");
+    const std::vector<double> q = map.numbers(list, "quaternion", 4);
+    const Eigen::Quaterniond turn(q[3], q[0], q[1], q[2]);
+    if (turn.norm() < 1e-6) map.fail("quaternion", "is zero; write x, y, z, w of the optical frame");
+    pose.linear() = turn.normalized().toRotationMatrix();
+    return pose;
+  }
+  const Vec3 way_m = map.vector("looks_at_m") - position_m;
+  if (way_m.norm() < 1e-6) map.fail("looks_at_m", "is where the camera is; write a place before it");
+  const Vec3 forward = way_m.normalized();
+  // Upright; a camera that looks straight up or down has the fixed frame's x to its right.
+  const Vec3 right = forward.cross(Vec3::UnitZ()).norm() < 1e-6 ? Vec3(Vec3::UnitX())
+                                                                : Vec3(forward.cross(Vec3::UnitZ()).normalized());
+  pose.linear() << right, forward.cross(right), forward;
+  return pose;
+}
+
+/// Of a camera, what others have as well.
+void checkCameraNames(ParameterReader& map, const Camera& camera, const SceneSpec& spec) {
+  std::vector<std::string> topics{spec.obstacle->topic}, frames{spec.obstacle->frame, spec.fixed_frame};
+  for (const Body& body : spec.bodies) {
+    topics.push_back(body.topic);
+    frames.push_back(body.frame);
+  }
+  for (const RigidBody& body : spec.rigid_bodies) frames.push_back(body.frame);
+  const auto isIn = [](const std::string& name, const std::vector<std::string>& others) {
+    return std::find(others.begin(), others.end(), name) != others.end();
+  };
+  if (isIn(camera.topic, topics)) map.fail("topic", "is another's, too; write a topic of its own");
+  topics.push_back(camera.topic);
+  if (isIn(camera.truth_topic, topics)) map.fail("truth_topic", "is another's, too; write a topic of its own");
+  if (isIn(camera.frame, frames)) map.fail("frame", "is another's, too; write a frame of its own");
+}
+
+Camera readCamera(ParameterReader map, const SceneSpec& spec) {
+  if (!spec.obstacle) map.fail("", "needs an obstacle, whose topic and resolution its map has; write one");
+  Camera camera;
+  camera.topic = map.text("topic", "/camera/points");
+  camera.truth_topic = map.text("truth_topic", "/truth/octomap");
+  camera.frame = map.text("frame", "camera");
+  camera.pose = readCameraPose(map);
+  camera.width = map.integer("width", 1, 4096);
+  camera.height = map.integer("height", 1, 4096);
+  camera.field_of_view_rad = map.number("field_of_view_rad", 0.01, 3.0);
+  camera.rate_hz = map.number("rate_hz", 0.01, spec.frame_rate_hz);
+  camera.noise_m = map.number("noise_m", 0.0, 0.0, 1.0);
+  camera.lost_share = map.number("lost_share", 0.0, 0.0, 1.0);
+  camera.lag_s = map.number("lag_s", 0.0, 0.0, 60.0);
+  camera.empty_clouds = map.integer("empty_clouds", 0, 0, 1000);
+  if (camera.empty_clouds > 600 * camera.rate_hz)
+    map.fail("empty_clouds", "take more than 600 s at rate_hz; write fewer or a higher rate_hz");
+  camera.inset_m = map.number("inset_m", 0.0, 0.0, 1.0);
+  camera.seed = map.integer("seed", camera.seed, 0, 1000000000);
+  checkCameraNames(map, camera, spec);
+  for (const Solid& solid : spec.obstacle->solids) {
+    if (contains(solid, camera.pose.translation()))
+      map.fail("position_m", "lies in a solid of the obstacle; write a place outside");
+    if (empty(shrunk(solid, camera.inset_m)))
+      map.fail("inset_m", "leaves nothing of a solid of the obstacle; write less than half of its smallest size");
+  }
+  map.finish();
+  return camera;
+}
+
 Wind readWind(ParameterReader map) {
   Wind wind;
   wind.velocity_m_s = map.vector("velocity_m_s");
@@ -233,6 +305,7 @@ SceneSpec readScene(const ParameterTree& tree) {
   if (spec.bodies.empty()) map.fail("bodies", "must hold at least one body: what moves in this scene");
   if (map.has("obstacle")) spec.obstacle = readObstacle(map.section("obstacle"), spec.fixed_frame);
   for (ParameterReader& body : map.sections("rigid_bodies")) spec.rigid_bodies.push_back(readRigidBody(body));
+  if (map.has("camera")) spec.camera = readCamera(map.section("camera"), spec);
   checkMonitor(map, spec);
   if (map.has("expect")) checkExpectations(map.section("expect"), spec);
   spec.monitor = map.raw("monitor");

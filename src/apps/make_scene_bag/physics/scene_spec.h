@@ -96,6 +96,24 @@ struct RigidBody {
   Motion motion;
 };
 
+/// A depth camera that looks on. Its frame is an optical one: x to the right, y down, z forward.
+struct Camera {
+  std::string topic;        ///< of its clouds; its map comes on the obstacle's topic
+  std::string truth_topic;  ///< of the map that the obstacle's solids make, latched at the start
+  std::string frame;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< of `frame` in the fixed frame
+  int width = 0;                                           ///< pixels
+  int height = 0;
+  double field_of_view_rad = 0.0;  ///< from the left side of the image to the right one
+  double rate_hz = 0.0;            ///< clouds a second, at most one a frame
+  double noise_m = 0.0;            ///< standard deviation of a range
+  double lost_share = 0.0;         ///< 0 to 1, of the pixels
+  double lag_s = 0.0;              ///< from the stamp of a cloud to when it and its map come
+  int empty_clouds = 0;            ///< before the scene begins, of the solids alone
+  double inset_m = 0.0;            ///< the solids seen are smaller by this: their faces lie within voxels of the map
+  int seed = 1;                    ///< of noise and lost pixels
+};
+
 struct Wind {
   Vec3 velocity_m_s = Vec3::Zero();
   double drag = 0.0;
@@ -116,8 +134,9 @@ struct SceneSpec {
   std::vector<Body> bodies;
   std::optional<Obstacle> obstacle;
   std::vector<RigidBody> rigid_bodies;
-  ParameterTree monitor;     ///< the scene's `monitor` block, as the node reads it
-  std::string monitor_yaml;  ///< the same as text, passed on as written
+  std::optional<Camera> camera;  ///< where there is one, there is an obstacle
+  ParameterTree monitor;         ///< the scene's `monitor` block, as the node reads it
+  std::string monitor_yaml;      ///< the same as text, passed on as written
 };
 
 }  // namespace dccd::scene

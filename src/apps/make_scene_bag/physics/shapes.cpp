@@ -87,10 +87,14 @@ bool contains(const Solid& solid, const Vec3& point_m) {
   if (solid.kind == Solid::Kind::BOX) {
     return (point_m.array() >= solid.box.min.array()).all() && (point_m.array() <= solid.box.max.array()).all();
   }
-  const Vec3 from_center = point_m - solid.center_m;
-  const double height = from_center.dot(solid.axis);
-  const double from_circle = (from_center - height * solid.axis).norm() - solid.radius_m;
-  return std::hypot(height, from_circle) <= solid.tube_radius_m;
+  return distanceToRing(solid, point_m) <= 0.0;
+}
+
+double distanceToRing(const Solid& ring, const Vec3& point_m) {
+  const Vec3 from_center = point_m - ring.center_m;
+  const double height = from_center.dot(ring.axis);
+  const double from_circle = (from_center - height * ring.axis).norm() - ring.radius_m;
+  return std::hypot(height, from_circle) - ring.tube_radius_m;
 }
 
 Box bounds(const Solid& solid) {
@@ -100,6 +104,19 @@ Box bounds(const Solid& solid) {
   box.min = solid.center_m - reach;
   box.max = solid.center_m + reach;
   return box;
+}
+
+Solid shrunk(const Solid& solid, double inset_m) {
+  Solid inner = solid;
+  inner.box.min.array() += inset_m;
+  inner.box.max.array() -= inset_m;
+  inner.tube_radius_m -= inset_m;
+  return inner;
+}
+
+bool empty(const Solid& solid) {
+  if (solid.kind == Solid::Kind::RING) return !(solid.tube_radius_m > 0.0);
+  return !(solid.box.min.array() < solid.box.max.array()).all();
 }
 
 }  // namespace dccd::scene

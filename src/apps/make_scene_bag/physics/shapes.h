@@ -19,6 +19,13 @@ Eigen::Isometry3d motionAt(const Motion& motion, const Vec3& centroid_m, double 
 /// True if the point lies in the solid, its surface included.
 bool contains(const Solid& solid, const Vec3& point_m);
 
+/// From the surface of a RING to the point; negative within [m].
+double distanceToRing(const Solid& ring, const Vec3& point_m);
+
 Box bounds(const Solid& solid);
+
+/// The solid without what lies within `inset_m` of its surface; empty() tells whether anything is left.
+Solid shrunk(const Solid& solid, double inset_m);
+bool empty(const Solid& solid);
 
 }  // namespace dccd::scene

@@ -264,16 +264,20 @@ void Simulation::step() {
 
 double Simulation::time_s() const { return impl_->time; }
 
+Positions Simulation::positions(std::size_t body) const {
+  const btSoftBody& soft = *impl_->soft[body];
+  Positions positions(static_cast<std::size_t>(soft.m_nodes.size()));
+  for (int i = 0; i < soft.m_nodes.size(); ++i) positions[i] = fromBullet(soft.m_nodes[i].m_x);
+  return positions;
+}
+
 Positions Simulation::observe(std::size_t body) {
   Impl& impl = *impl_;
   const double amplitude = impl.spec.bodies[body].tracker_noise_m;
-  const btSoftBody& soft = *impl.soft[body];
-  Positions positions(static_cast<std::size_t>(soft.m_nodes.size()));
-  for (int i = 0; i < soft.m_nodes.size(); ++i) {
-    positions[i] = fromBullet(soft.m_nodes[i].m_x);
-    if (amplitude > 0.0) positions[i] += Vec3(impl.noise(amplitude), impl.noise(amplitude), impl.noise(amplitude));
-  }
-  return positions;
+  Positions seen = positions(body);
+  if (amplitude == 0.0) return seen;
+  for (Vec3& p : seen) p += Vec3(impl.noise(amplitude), impl.noise(amplitude), impl.noise(amplitude));
+  return seen;
 }
 
 Eigen::Isometry3d Simulation::rigidPose(std::size_t rigid_body) const {
