@@ -157,18 +157,6 @@ nlohmann::json Report::json() const {
   for (std::size_t t = 0; t < sum_.tiers.settled.size(); ++t) {
     j["tiers"][toString(static_cast<Tier>(t))] = sum_.tiers.settled[t];
   }
-  j["rungs"] = nlohmann::json::array();
-  for (const RungCost& r : rungs_) {
-    j["rungs"].push_back({{"rung", r.rung},
-                          {"steps", r.steps},
-                          {"contacts", r.contacts},
-                          {"missed", r.missed},
-                          {"false", r.false_contacts},
-                          {"undecided", r.undecided},
-                          {"median_ms", r.median_ms},
-                          {"p95_ms", r.p95_ms},
-                          {"max_toc_error", r.max_toc_error}});
-  }
   j["study"] = study_;
   j["partners"] = lanes_.json();
   j["bodies"] = heatJson();

@@ -34,8 +34,7 @@ RUNG = {
     'src/elementary/toy.cpp': (None, TOY_RUNG),
     'src/elementary/elementary.cpp': [
         ('\nnamespace {\n', '\nstd::unique_ptr<Rung> makeToyRung(const AccuracyOptions& options);\n\nnamespace {\n'),
-        ('{"exact", makeExactRung, false, true},\n',
-         '{"exact", makeExactRung, false, true},\n    {"toy", makeToyRung, false, false},\n')],
+        ('{"exact", makeExactRung, false},\n', '{"exact", makeExactRung, false},\n    {"toy", makeToyRung, false},\n')],
 }
 EFFECT = {
     'include/dccd/outcome.h': ('ROW(PATCHES, patches)\n', 'ROW(PATCHES, patches) \\\n  ROW(TOY, toy)\n'),

@@ -17,7 +17,6 @@
 #include "apps/analyze_bag/thinned_mesh.h"
 #include "dccd/accuracy.h"
 #include "dccd/regular_file.h"
-#include "report/accuracy_settings.h"
 #include "stream/quantile.h"
 
 namespace dccd {
@@ -49,6 +48,37 @@ std::string text(double value) {
     out << std::setprecision(2) << value;
   }
   return out.str();
+}
+
+struct AccuracySetting {
+  std::string name;
+  AccuracyOptions accuracy;
+};
+
+/// One for each rung and knob that makes a difference.
+std::vector<AccuracySetting> accuracySettings() {
+  std::vector<AccuracySetting> settings;
+  for (const auto& [text, tolerance_m] : {std::pair("1e-3", 1e-3), {"1e-6", 1e-6}, {"1e-9", 1e-9}}) {
+    settings.push_back({std::string("conservative ") + text, {}});
+    settings.back().accuracy.rung = Accuracy::CONSERVATIVE;
+    settings.back().accuracy.tolerance_m = tolerance_m;
+  }
+  for (const int bits : {10, 32, 52}) {
+    settings.push_back({"exact 2^-" + std::to_string(bits), {}});
+    settings.back().accuracy.toc_bits = bits;
+  }
+  return settings;
+}
+
+/// Every contact of the bag is wanted and nothing ends a step: no budget, no limit, no predictions.
+MonitorConfig unlimited(MonitorConfig config) {
+  Options& detector = config.monitor.detector;
+  detector.step_budget_ms = detector.max_compute_ms = 0;
+  detector.max_contacts = std::numeric_limits<std::size_t>::max();
+  detector.max_found = detector.max_found_per_feature = 0;
+  config.monitor.look_ahead_s = 0;
+  config.effects.erase(Effect::LOOK_AHEAD);
+  return config;
 }
 
 AccuracyOptions finest(const MonitorConfig& config) {
@@ -207,16 +237,6 @@ class StudyRunner {
 };
 
 }  // namespace
-
-MonitorConfig unlimited(MonitorConfig config) {
-  Options& detector = config.monitor.detector;
-  detector.step_budget_ms = detector.max_compute_ms = 0;
-  detector.max_contacts = std::numeric_limits<std::size_t>::max();
-  detector.max_found = detector.max_found_per_feature = 0;
-  config.monitor.look_ahead_s = 0;
-  config.effects.erase(Effect::LOOK_AHEAD);
-  return config;
-}
 
 AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options,
                        const std::string& folder) {
