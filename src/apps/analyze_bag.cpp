@@ -30,7 +30,7 @@ struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh, command;
   double look_ahead_s = 0;
   int threads = 0;
-  bool without_map = false, no_table = false, study = false, quiet = false, forget = false;
+  bool without_map = false, no_table = false, study = false, quiet = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -48,9 +48,7 @@ MonitorConfig configure(const Arguments& a) {
   if (!a.accuracy.empty()) tree.put("accuracy", a.accuracy);
   if (a.look_ahead_s > 0) tree.put("look_ahead_s", a.look_ahead_s);
   if (a.threads > 0) tree.put("num_threads", a.threads);
-  MonitorConfig config = readConfig(tree, a.params.empty() ? "--" : "");
-  config.monitor.detector.keep_bounds = !a.forget;
-  return config;
+  return readConfig(tree, a.params.empty() ? "--" : "");
 }
 
 std::string seconds(double s) {
@@ -142,7 +140,6 @@ int analyze(const Arguments& a) {
   std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   BagReplay replay(a.bag, config, options);
   Report report(a.report);
-  report.setAccuracy(config.monitor.detector.accuracy);
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
@@ -188,7 +185,6 @@ int main(int argc, char** argv) {
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
-  app.add_flag("--forget", a.forget, "nothing is kept of bodies at rest; no answer changes");
   app.add_flag("--no-accuracy-table", a.no_table)->group("");  // there is none any more; taken, so that old calls run
   app.add_flag("--accuracy-study", a.study,
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "

@@ -25,7 +25,7 @@ constexpr int NOT_PROVED = 3;  // CLI11 and this program's own errors have other
 struct Arguments {
   std::vector<std::string> frames;
   std::string contacts, stats;
-  std::string accuracy = "exact", broad_phase = "clustered", simd = "auto";
+  std::string accuracy = "exact", simd = "auto";
   double tolerance_m = AccuracyOptions().tolerance_m, budget_ms = 0;
   int toc_bits = AccuracyOptions().toc_bits, threads = 1, repeat = 1;
   bool no_start_state = false, earliest_only = false, forget = false;
@@ -43,9 +43,6 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_option("--accuracy", a.accuracy, "conservative or exact")->capture_default_str();
   app.add_option("--tolerance", a.tolerance_m, "of conservative [m]")->capture_default_str();
   app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
-      ->capture_default_str();
-  app.add_option("--broad-phase", a.broad_phase, "clustered or brute_force")
-      ->check(CLI::IsMember({"clustered", "brute_force"}))
       ->capture_default_str();
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
@@ -134,7 +131,6 @@ Options optionsOf(const Arguments& a) {
   options.step_budget_ms = a.budget_ms;
   options.earliest_only = a.earliest_only;
   options.check_start_state = !a.no_start_state;
-  options.broad_phase = a.broad_phase == "clustered" ? BroadPhase::CLUSTERED : BroadPhase::BRUTE_FORCE;
   return options;
 }
 

@@ -205,5 +205,3 @@ document.getElementById('effects_note').textContent =
     'pairs tested', 'steps cut', 'bound of the rest'], rows.map(r => [r.varied, r.setting, short(r.ms_per_s), percent(r.share_of_time), ...['patches', 'vertices'].flatMap(of =>
       ['touched', 'missed', 'invented', 'median_ms', 'p95_ms', 'early_ms', 'late_ms'].map(what => r[of + '_' + what])),
       percent(r.pairs_share), r.cut_steps, r.cut_steps ? r.bound : null])); }
-{ const tiers = Object.entries(R.tiers), most = longest(tiers.map(t => t[1]));
-  table('tiers', ['tier', 'pairs settled', ''], tiers.map(([name, n]) => [name, n, bar(n / most)])); }

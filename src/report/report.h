@@ -30,8 +30,6 @@ class Report {
 
   void add(const Outcome& outcome, const std::vector<Body>& bodies);
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
-  /// Before the first outcome: what they are answered with.
-  void setAccuracy(const AccuracyOptions& accuracy) { player_.setAccuracy(accuracy); }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);

@@ -154,9 +154,6 @@ nlohmann::json Report::json() const {
   j["left_out"] = {{"pairs", left_out_}, {"met", sum_.left_out_met}};
   j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
-  for (std::size_t t = 0; t < sum_.tiers.settled.size(); ++t) {
-    j["tiers"][toString(static_cast<Tier>(t))] = sum_.tiers.settled[t];
-  }
   j["study"] = study_;
   j["partners"] = lanes_.json();
   j["bodies"] = heatJson();

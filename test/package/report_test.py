@@ -61,7 +61,7 @@ class ReportPageTest(unittest.TestCase):
         heat = body[body.index('id="heat"'):].split('<h2')[0]
         self.assertEqual(heat.count('<canvas'), 2, 'how often, and when first: of a sheet one side')
         self.assertNotIn('seen from', heat)
-        for name in ('seams', 'stages', 'effects', 'study', 'tiers'):
+        for name in ('seams', 'stages', 'effects', 'study'):
             rows = body[body.index('id="%s"' % name):].split('</table>')[0].count('<tr')
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
@@ -124,7 +124,7 @@ class ReportPageTest(unittest.TestCase):
         actions.pointer_action.move_to_location(round(x), round(y)).click()
         actions.perform()
         self.assertRegex(text('picked'), r'^Contact, .*: cloth vert.* \d.*; certain, new\. Time of contact between .* wide\. '
-                                         r'Settled by tier \w+\. Part of patch \d+\.$')
+                                         r'Part of patch \d+\.$')
         near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
             return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)
         self.assertIn(text('picked'), near, 'what was clicked, or what lies on the same spot')
