@@ -209,7 +209,7 @@ void removeRigidBodies(MonitorConfig& config) {
 std::vector<std::string> takenAway(const MonitorConfig& config) {
   std::vector<std::string> sentences;
   const auto add = [&](Effect effect, const std::string& what) {
-    if (!config.monitor.detector.off.has(effect) || what.empty()) return;
+    if (settingOf(config.effects, effect) != EffectSetting::OFF || what.empty()) return;
     sentences.push_back(what + " by effects/" + toString(effect) + ": off");
   };
   std::string rigid;
@@ -227,11 +227,8 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
 
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
-  for (const auto& [effect, setting] : config.effects) {
-    if (setting == EffectSetting::OFF) config.monitor.detector.off.add(effect);
-  }
   config.monitor.detector.excluded = takenAway(config);
-  const auto off = [&](Effect effect) { return config.monitor.detector.off.has(effect); };
+  const auto off = [&](Effect effect) { return settingOf(config.effects, effect) == EffectSetting::OFF; };
   if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {
@@ -321,9 +318,8 @@ std::vector<Body> MonitorConfig::monitorBodies() const {
 }
 
 bool MonitorConfig::namesOctomap() const {
-  const auto setting = effects.find(Effect::OCTOMAP);
-  const bool automatic = setting == effects.end() || setting->second == EffectSetting::AUTO;
-  return automatic ? octomap_topic_named || !octomap_file.empty() : setting->second == EffectSetting::ON;
+  const EffectSetting setting = settingOf(effects, Effect::OCTOMAP);
+  return setting == EffectSetting::AUTO ? octomap_topic_named || !octomap_file.empty() : setting == EffectSetting::ON;
 }
 
 bool MonitorConfig::holdsDistance() const {
