@@ -312,6 +312,20 @@ void RecordingImage::build(const StepRecording& recording) {
   visit(writer, recording);
 }
 
+std::vector<std::uint8_t> recordedBytes(const Contact& contact) {
+  RecordingImage image;
+  RecordingWriter writer(image);
+  visitContact(writer, contact);
+  return writer.bytes();
+}
+
+std::vector<std::uint8_t> recordedBytes(const Outcome& answer) {
+  RecordingImage image;
+  RecordingWriter writer(image);
+  visitAnswer(writer, answer);
+  return writer.bytes();
+}
+
 StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {
   RecordingReader reader(data, size, name);
   char magic[sizeof MAGIC] = {};

@@ -74,6 +74,16 @@ TEST(StepReplay, WithoutAMapTheStatusIsTheSame) {
   EXPECT_TRUE(replay.differences.empty());
 }
 
+TEST(StepReplay, WhatWasLeftOutBeforeTheStepIsNoDifference) {
+  MonitorOptions options;
+  options.detector.excluded = {"rigid body 'finger' by effects/rigid_bodies: off"};
+  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(options));
+  const StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  ASSERT_FALSE(read.answer.excluded.empty());
+  EXPECT_TRUE(read.options.excluded.empty()) << "no option that changes an answer";
+  EXPECT_TRUE(replayStep(read).differences.empty());
+}
+
 TEST(StepReplay, OneBitIsADifference) {
   StepRecording r = recordScene();
   ASSERT_FALSE(r.answer.contacts.empty());
