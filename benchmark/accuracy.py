@@ -105,7 +105,7 @@ def per_pair(tools, queries, scenes, repeat):
 
 
 def studies(tools, bags, out):
-    """What fewer frames, triangles and voxels do to first contacts; analyze_bag keeps each run, so that what was stopped goes on."""
+    """What fewer frames, triangles and voxels do to first contacts."""
     found = {}
     for given in bags:
         bag, _, params = given.partition(":")

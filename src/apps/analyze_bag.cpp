@@ -158,7 +158,7 @@ int analyze(const Arguments& a) {
   std::string study_line;
   if (a.study) {  // takes long, and what there is should not be lost with it
     out.reset();
-    const AccuracyStudy study = runStudy(a.bag, config, options, a.report + "/study");
+    const AccuracyStudy study = runStudy(a.bag, config, options);
     study.write(a.report + "/study.csv");
     report.setStudy(study.json());
     report.finish();
@@ -188,7 +188,7 @@ int main(int argc, char** argv) {
   app.add_flag("--no-accuracy-table", a.no_table)->group("");  // there is none any more; taken, so that old calls run
   app.add_flag("--accuracy-study", a.study,
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
-               "does to first contacts; what was stopped goes on");
+               "does to first contacts");
   app.add_flag("--quiet", a.quiet, "no progress");
   app.footer(
       "Exit status:\n"
