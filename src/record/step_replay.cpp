@@ -14,12 +14,7 @@ bool isSame(const Contact& a, const Contact& b) { return recordedBytes(a) == rec
 std::string pairText(const Contact& c) {
   std::ostringstream text;
   text.precision(17);
-  text << toString(c.kind) << " of bodies " << c.body[0] << ", " << c.body[1] << ", vertices";
-  for (const Index v : c.vertex) {
-    if (v != NO_INDEX) text << ' ' << v;
-  }
-  if (c.body[1] == OBSTACLE_BODY) text << ", voxel " << c.voxel.x << ' ' << c.voxel.y << ' ' << c.voxel.z;
-  text << ", toc [" << c.toc_lower << ", " << c.toc_upper << "]";
+  text << describeContact(c, {}) << ", toc [" << c.toc_lower << ", " << c.toc_upper << "]";
   return text.str();
 }
 

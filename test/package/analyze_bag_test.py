@@ -1,7 +1,6 @@
 """analyze_bag as people use it: the same output for any number of threads, exit statuses, phases, the report at once."""
 import csv
 import io
-import json
 import subprocess
 import unittest
 
