@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """What accuracy costs in time: every rung on whole steps and per pair, as CSV, JSON, a table and a plot.
 
-The whole step: check_step runs all settings in turns on the real scenes; answers are held against the scenes' truth
-before a time is printed. Per pair: accuracy_pairs on hard queries and on what the filters leave of the scenes, FCL's
-elementary tests in the same run.
+The whole step: step_settings runs all settings in turns on the real scenes; answers are held against the scenes' truth
+before a time is printed. Per pair: accuracy_pairs on hard queries and on what the filters leave of the scenes, `fast` and
+FCL's elementary tests in the same run.
 """
 import argparse
 import csv
@@ -27,7 +27,7 @@ HARD_QUERIES_APART = 7279
 
 
 def write_truth(scene_dir, path):
-    """The scene's contacts and, where others found them, their times, as check_step reads them."""
+    """The scene's contacts and, where others found them, their times, as step_settings reads them."""
     with open(path, "w") as out:
         for kind, name in (("VF", "vf.txt.gz"), ("EE", "ee.txt.gz"), ("VF", "toc_vf.txt.gz")):
             if not os.path.exists(os.path.join(scene_dir, name)):
@@ -52,10 +52,10 @@ def whole_steps(tools, scenes, repeat):
             truth, stats = os.path.join(folder, "truth.txt"), os.path.join(folder, "stats.json")
             write_truth(scene, truth)
             frames = [os.path.join(scene, "frame_%d.ply" % i) for i in (0, 1)]
-            done = subprocess.run([os.path.join(tools, "check_step"), *frames, "--accuracy", "all", "--truth", truth, "--stats", stats,
-                                   "--no-start-state", "--repeat", str(repeat)], stdout=subprocess.PIPE, universal_newlines=True)
-            if done.returncode not in (0, 3):  # 3: not proved, as nothing is without the start state
-                sys.exit("check_step ended with %d" % done.returncode)
+            done = subprocess.run([os.path.join(tools, "step_settings"), *frames, "--truth", truth, "--stats", stats,
+                                   "--rounds", str(repeat)], stdout=subprocess.PIPE, universal_newlines=True)
+            if done.returncode != 0:
+                sys.exit("step_settings ended with %d" % done.returncode)
             print(name + ": " + done.stdout, flush=True)
             with open(stats) as f:
                 details[name] = json.load(f)
@@ -66,7 +66,7 @@ def whole_steps(tools, scenes, repeat):
             rows.append(dict(zip(STEP_COLUMNS, [name, setting, s["contacts"], s["missed"], s["false"], s["undecided"], s["toc_error"],
                                                 s["ms"]["total"]["best"], s["ms"]["total"]["median"], s["ratio"]["low"],
                                                 s["ratio"]["median"], s["ratio"]["high"], s["rounds"]])))
-    order = ["fast", "conservative 1e-3", "conservative 1e-6", "conservative 1e-9", "exact 2^-10", "exact 2^-32", "exact 2^-52"]
+    order = ["conservative 1e-3", "conservative 1e-6", "conservative 1e-9", "exact 2^-10", "exact 2^-32", "exact 2^-52"]
     rows.sort(key=lambda r: (r["scene"], order.index(r["setting"])))
     return rows, details
 
@@ -80,16 +80,16 @@ def add_second_run(rows, again):
             print("%s on %s: the two runs do not agree" % (row["setting"], row["scene"]), flush=True)
 
 
-def with_fcl(details, pairs):
-    """A row a scene: FCL's elementary tests in the place of ours, behind the same filters."""
+def with_rivals(details, pairs):
+    """A row for each scene and rival: its elementary tests in the place of ours, behind the same filters."""
     rows = []
-    for scene, settings in details.items():
-        exact = settings["exact 2^-32"]
-        mine = [r for r in pairs if r["source"] == scene + " survivors" and r["rung"] == "FCL"]
+    for scene, rival in ((scene, rival) for scene in details for rival in ("fast", "FCL")):
+        exact = details[scene]["exact 2^-32"]
+        mine = [r for r in pairs if r["source"] == scene + " survivors" and r["rung"] == rival]
         if not mine:
             continue
         tests_ms = sum(int(r["pairs"]) * float(r["median_ns"]) * 1e-6 for r in mine)
-        rows.append({"scene": scene, "setting": "FCL's tests", "missed": sum(int(r["missed"]) for r in mine),
+        rows.append({"scene": scene, "setting": rival + "'s tests", "missed": sum(int(r["missed"]) for r in mine),
                      "false": sum(int(r["false_contacts"]) for r in mine), "toc_error": max(float(r["max_toc_error"]) for r in mine),
                      "median_ms": exact["ms"]["total"]["median"] - exact["ms"]["elementary"]["median"] + tests_ms})
     return rows
@@ -104,32 +104,14 @@ def per_pair(tools, queries, scenes, repeat):
     return list(csv.DictReader(text.splitlines()))
 
 
-def recordings(tools, bags):
-    """Every rung over whole recordings (mesh against itself and an octomap), by analyze_bag's own table."""
-    rows = []
-    for bag in bags:
-        name = os.path.splitext(os.path.basename(bag))[0]
-        with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([os.path.join(tools, "analyze_bag"), bag, "--report", folder, "--quiet"], check=True,
-                           stdout=subprocess.DEVNULL)
-            with open(os.path.join(folder, "report.json")) as f:
-                report = json.load(f)
-        for r in report["rungs"]:
-            rows.append({"recording": name, **r})
-            print("%-14s %-13s %5d steps %7d reported %5d missed %6d false %7d undecided  toc error %-9.2g %7.2f ms (95 %%: %.2f)"
-                  % (name, r["rung"], r["steps"], r["contacts"], r["missed"], r["false"], r["undecided"], r["max_toc_error"],
-                     r["median_ms"], r["p95_ms"]), flush=True)
-    return rows
-
-
 def studies(tools, bags, out):
-    """What fewer frames, triangles and voxels do to first contacts; analyze_bag keeps each run, so that what was stopped goes on."""
+    """What fewer frames, triangles and voxels do to first contacts."""
     found = {}
     for given in bags:
         bag, _, params = given.partition(":")
         name = os.path.splitext(os.path.basename(bag))[0]
         folder = os.path.join(out, name)
-        command = [os.path.join(tools, "analyze_bag"), bag, "--report", folder, "--no-accuracy-table", "--accuracy-study"]
+        command = [os.path.join(tools, "analyze_bag"), bag, "--report", folder, "--accuracy-study"]
         done = subprocess.run(command + (["--params", params] if params else []), stdout=subprocess.DEVNULL)
         if done.returncode not in (0, 3):  # 3: not all of the recording is proved
             sys.exit("analyze_bag ended with %d" % done.returncode)
@@ -191,13 +173,13 @@ def label(axes, rows):
                       xytext=(10, -3), textcoords="offset points", fontsize=7)
 
 
-def plot_errors(axes, scene, steps, fcl, colour):
+def plot_errors(axes, scene, steps, others, colour):
     """Time across, error up, of one scene. A mark a setting; crossed where answers are missing, ringed where some are false."""
     mine = [r for r in steps if r["scene"] == scene]
-    line, rivals = front(mine), [r for r in fcl if r["scene"] == scene]
+    line, rivals = front(mine), [r for r in others if r["scene"] == scene]
     axes.plot([r["median_ms"] for r in line], [r["toc_error"] for r in line], color=colour, linewidth=0.8, drawstyle="steps-post")
     for r in mine + rivals:
-        marker = {"exact": "o", "conservative": "s", "fast": "D"}.get(r["setting"].split()[0], "^")
+        marker = {"exact": "o", "conservative": "s", "fast's": "D"}.get(r["setting"].split()[0], "^")
         axes.plot(r["median_ms"], r["toc_error"], color=colour, linestyle="none", markersize=6, marker=marker)
         if r["missed"]:
             axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="x", markersize=13, markeredgewidth=1.5)
@@ -208,10 +190,10 @@ def plot_errors(axes, scene, steps, fcl, colour):
     axes.set(yscale="log", xscale="log", xlim=(0.85 * min(times), 2.2 * max(times)), title=scene, xlabel="whole step, one thread, median [ms]")
 
 
-def plot_wrong(axes, steps, fcl):
+def plot_wrong(axes, steps, rivals):
     """The same times against the number of wrong answers, with what others were measured at."""
     for k, scene in enumerate(dict.fromkeys(r["scene"] for r in steps)):
-        for r in [r for r in steps + fcl if r["scene"] == scene]:
+        for r in [r for r in steps + rivals if r["scene"] == scene]:
             for what, marker in (("missed", "x"), ("false", "o")):
                 axes.plot(r["median_ms"], r[what], color="C%d" % k, marker=marker, fillstyle="none", linestyle="none")
         axes.plot([], [], color="C%d" % k, marker="o", linestyle="none", label=scene)
@@ -220,12 +202,10 @@ def plot_wrong(axes, steps, fcl):
                 continue
             axes.plot(1e3 * seconds, false, color="C%d" % k, marker="o", fillstyle="none", linestyle="none", alpha=0.5)
             axes.annotate(name + ", measured apart", (1e3 * seconds, false), xytext=(-6, -11), ha="right", textcoords="offset points", fontsize=7)
-    for r in [r for r in steps if r["setting"] == "fast"]:
-        axes.annotate("fast", (r["median_ms"], max(r["missed"], r["false"])), xytext=(-6, 2), ha="right", textcoords="offset points", fontsize=7)
     axes.annotate("conservative, exact", (max(r["median_ms"] for r in steps), 0), xytext=(9, 1), textcoords="offset points", fontsize=7)
     axes.legend(fontsize=8, loc="center")
-    for r in fcl:
-        axes.annotate("FCL's tests", (r["median_ms"], max(r["missed"], r["false"])), xytext=(7, 0), textcoords="offset points", fontsize=7)
+    for r in rivals:
+        axes.annotate(r["setting"], (r["median_ms"], max(r["missed"], r["false"])), xytext=(7, 0), textcoords="offset points", fontsize=7)
     axes.set_yscale("symlog", linthresh=1)
     axes.set_ylim(bottom=-0.3)
     axes.set(xscale="log", xlabel="whole step, one thread, median [ms]", ylabel="x missed, o invented")
@@ -257,7 +237,7 @@ def plot_hard(axes, pairs):
     axes.set(xscale="log", xlabel="one pair of the hard queries [us]", ylabel="share of wrong answers")
 
 
-def plot(steps, fcl, pairs, folder):
+def plot(steps, rivals, pairs, folder):
     import matplotlib
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.fonttype"] = "none"  # names as text, a tenth of the file
@@ -269,11 +249,11 @@ def plot(steps, fcl, pairs, folder):
     upper = []
     for k, scene in enumerate(scenes[:2]):
         upper.append(figure.add_subplot(grid[0, k], sharey=upper[0] if upper else None))
-        plot_errors(upper[k], scene, steps, fcl, "C%d" % k)
+        plot_errors(upper[k], scene, steps, rivals, "C%d" % k)
     upper[0].set_ylabel("largest error of a time of contact [step]")
     figure.suptitle("What accuracy costs: cross = contacts missed, ring = contacts invented, line = the front", fontsize=11)
     lower, hard = (figure.add_subplot(grid[row, :]) for row in (1, 2))
-    plot_wrong(lower, steps, fcl)
+    plot_wrong(lower, steps, rivals)
     plot_hard(hard, pairs)
     for axes in (*upper, lower, hard):
         axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1, 2, 5)))
@@ -287,7 +267,7 @@ def plot(steps, fcl, pairs, folder):
         figure.savefig(os.path.join(folder, "accuracy." + ending), dpi=130)
 
 
-def markdown(rows, bags, pairs):
+def markdown(rows, rivals, pairs):
     """The tables of doc/accuracy.md."""
     lines = ["| scene | setting | contacts | missed | false | undecided | error of the TOC up to | median ms | ratio, 95 % | again: ms | ratio, 95 % |",
              "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]
@@ -296,12 +276,10 @@ def markdown(rows, bags, pairs):
                      tuple(r[c] for c in ("scene", "setting", "contacts", "missed", "false", "undecided", "toc_error", "median_ms",
                                           "ratio", "ratio_low", "ratio_high", "again_median_ms", "again_ratio", "again_ratio_low",
                                           "again_ratio_high")))
-    if bags:
-        lines += ["", "| recording | rung | steps | contacts | missed | false | undecided | median ms | 95 % ms |",
-                  "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
-    for r in bags:
-        lines.append("| %s | %s | %d | %d | %d | %d | %d | %.2f | %.2f |" %
-                     tuple(r[c] for c in ("recording", "rung", "steps", "contacts", "missed", "false", "undecided", "median_ms", "p95_ms")))
+    lines += ["", "| scene | | missed | false | error of the TOC up to | median ms |", "|---|---|--:|--:|--:|--:|"]
+    for r in rivals:
+        lines.append("| %s | %s | %d | %d | %.0e | %.1f |" %
+                     tuple(r[c] for c in ("scene", "setting", "missed", "false", "toc_error", "median_ms")))
     columns = [(s, k) for s in dict.fromkeys(r["source"] for r in pairs) for k in ("VF", "EE")]
     lines += ["", "| ns | " + " | ".join("%s, %s" % c for c in columns) + " |", "|---|" + "--:|" * len(columns)]
     for rung in dict.fromkeys(r["rung"] for r in pairs):
@@ -316,9 +294,8 @@ def markdown(rows, bags, pairs):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tools", required=True, help="folder of check_step and accuracy_pairs")
+    parser.add_argument("--tools", required=True, help="folder of step_settings, accuracy_pairs and, for --study, analyze_bag")
     parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
-    parser.add_argument("--bag", action="append", default=[], help="a recording, repeatable; needs analyze_bag among the tools")
     parser.add_argument("--study", action="append", default=[],
                         help="a recording, or RECORDING:PARAMETERS, to study with fewer frames, vertices and voxels; repeatable")
     parser.add_argument("--out", required=True, help="folder for the results")
@@ -329,20 +306,17 @@ def main():
     scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
     steps, details = whole_steps(a.tools, scenes, a.rounds)
     add_second_run(steps, whole_steps(a.tools, scenes, a.rounds)[0])
-    bags = recordings(a.tools, a.bag)
     pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
-    fcl = with_fcl(details, pairs)
+    rivals = with_rivals(details, pairs)
     found = studies(a.tools, a.study, a.out)
     write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
     write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
-    if bags:
-        write_csv(os.path.join(a.out, "accuracy_recordings.csv"), bags)
     with open(os.path.join(a.out, "accuracy.json"), "w") as f:
-        json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "fcl": fcl, "stages": details,
-                   "recordings": bags, "pairs": pairs, "studies": found}, f, indent=1)
+        json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "rivals": rivals, "stages": details,
+                   "pairs": pairs, "studies": found}, f, indent=1)
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
-        f.write(markdown(steps, bags, pairs) + study_tables(found))
-    plot(steps, fcl, pairs, a.out)
+        f.write(markdown(steps, rivals, pairs) + study_tables(found))
+    plot(steps, rivals, pairs, a.out)
     print("results: " + a.out)
 
 

@@ -1,5 +1,5 @@
-// accuracy_pairs: what each rung costs per pair and how wrong it is, with FCL's elementary tests as the rival in the
-// same run. Pairs: hard queries (DIR...) and what the filters leave of real steps (--scene FRAME_0 FRAME_1).
+// accuracy_pairs: what each rung costs per pair and how wrong it is, with `fast` and FCL's elementary tests as rivals
+// in the same run. Pairs: hard queries (DIR...) and what the filters leave of real steps (--scene FRAME_0 FRAME_1).
 //
 // Time: whole batches, several repeats; best and median nanoseconds per pair. Truth: for queries the truth column; for
 // survivors the exact rung at 52 bits, which the tests hold against an oracle of their own and against the scenes'
@@ -19,6 +19,7 @@
 #include "culling/scene_arrays.h"
 #include "dccd/elementary.h"
 #include "oracle/query_file.h"
+#include "paper/fast_rival.h"
 #include "simd/fused_filter.h"
 #include "support/detector.h"
 #include "support/scene_data.h"
@@ -71,8 +72,7 @@ void runFcl(const PairBatch& b, ElementaryResult* out) {
   }
 }
 
-TimedRung library(const std::string& name, const AccuracyOptions& options) {
-  const std::shared_ptr<const Rung> test = makeRung(options);
+TimedRung timed(const std::string& name, std::shared_ptr<const Rung> test) {
   return {name, [test](const PairBatch& b, ElementaryResult* out) {
             TierCounters counters;
             test->run(b, out, counters);
@@ -82,21 +82,20 @@ TimedRung library(const std::string& name, const AccuracyOptions& options) {
 std::vector<TimedRung> rungs() {
   std::vector<TimedRung> list;
   AccuracyOptions o;
-  o.rung = Accuracy::FAST;
-  list.push_back(library("fast", o));
   o.rung = Accuracy::CONSERVATIVE;
   for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
     o.tolerance_m = tolerance;
     char name[32];
     std::snprintf(name, sizeof name, "conservative %.0e", tolerance);
-    list.push_back(library(name, o));
+    list.push_back(timed(name, makeRung(o)));
   }
   o.tolerance_m = 1e-6;
   o.rung = Accuracy::EXACT;
   for (const int bits : {10, 32, 52}) {
     o.toc_bits = bits;
-    list.push_back(library("exact " + std::to_string(bits), o));
+    list.push_back(timed("exact " + std::to_string(bits), makeRung(o)));
   }
+  list.push_back(timed("fast", makeFastRival()));
   list.push_back({"FCL", runFcl});
   return list;
 }

@@ -17,6 +17,7 @@
 #include "dccd/elementary.h"
 #include "oracle/oracle.h"
 #include "oracle/promises.h"
+#include "paper/fast_rival.h"
 #include "support/generators.h"
 #include "support/structured_pairs.h"
 #include "support/timing.h"
@@ -55,10 +56,7 @@ void runFcl(const PairBatch& b, ElementaryResult* out) {
   }
 }
 
-Answer answerOf(Accuracy rung) {
-  AccuracyOptions options;
-  options.rung = rung;
-  const std::shared_ptr<const Rung> test = makeRung(options);
+Answer answerOf(std::shared_ptr<const Rung> test) {
   return [test](const PairBatch& b, ElementaryResult* out) {
     TierCounters counters;
     test->run(b, out, counters);
@@ -107,7 +105,7 @@ std::size_t wrongVerdicts(const std::vector<bool>& truth, const StructuredPairs&
 }
 
 nlohmann::json measured(const StructuredPairs& set, std::size_t judged, int repeats) {
-  const Answer exact = answerOf(Accuracy::EXACT), fast = answerOf(Accuracy::FAST);
+  const Answer exact = answerOf(makeRung(AccuracyOptions())), fast = answerOf(makeFastRival());
   std::vector<ElementaryResult> answers(set.pairs.size());
   exact(batchOf(set), answers.data());
   const std::size_t stride = std::max<std::size_t>(1, set.pairs.size() / judged);
@@ -162,7 +160,7 @@ StructuredPairs hardPairs(test::Hardness hardness, PairKind kind, std::size_t co
 /// A contact of the family, for its picture: the first one that is not at t = 0, else any pair.
 nlohmann::json exampleOf(const StructuredPairs& set) {
   std::vector<ElementaryResult> answers(set.pairs.size());
-  answerOf(Accuracy::EXACT)(batchOf(set), answers.data());
+  answerOf(makeRung(AccuracyOptions()))(batchOf(set), answers.data());
   std::size_t at = 0;
   double toc = 0;
   for (std::size_t i = 0; i < answers.size(); ++i) {

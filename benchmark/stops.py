@@ -34,7 +34,7 @@ def record(tools, scene, folder, look_ahead_s, loops):
     if loops > 1:
         bag = looped(bag, loops)
     done = subprocess.run([os.path.join(tools, "analyze_bag"), bag, "--params", params, "--output", out, "--report",
-                           os.path.join(folder, name), "--no-accuracy-table", "--quiet"], **quiet)
+                           os.path.join(folder, name), "--quiet"], **quiet)
     if done.returncode not in (0, 3):
         sys.exit("analyze_bag ended with %d on %s" % (done.returncode, name))
     return out

@@ -1,5 +1,5 @@
 # The core: Eigen, oneTBB, Highway and GMP, and nothing else. Compiled once, linked twice: the shared library shows its
-# users the public headers' functions and hides the rest; tests, benchmarks and run_queries, which look at the rest, take
+# users the public headers' functions and hides the rest; tests and benchmarks, which look at the rest, take
 # the same objects as an archive that nobody installs.
 file(GLOB CORE_SOURCES CONFIGURE_DEPENDS
   src/culling/*.cpp src/simd/*.cpp src/elementary/*.cpp src/obstacle/*.cpp src/step/*.cpp src/step/*/*.cpp

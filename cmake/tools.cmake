@@ -7,7 +7,7 @@ endif()
 find_package(CLI11 ${TOOLS_NEED} PATHS ${BUILT_DEPENDENCIES})
 find_package(nlohmann_json ${TOOLS_NEED})
 
-# The exact oracle: judges the rungs in the tests and in the tools that report errors. The libraries never link it.
+# The exact oracle: judges the rungs in the tests and the benchmarks. The libraries and tools never link it.
 file(GLOB ORACLE_SOURCES CONFIGURE_DEPENDS oracle/*.cpp)
 add_library(deformable_ccd_oracle STATIC EXCLUDE_FROM_ALL ${ORACLE_SOURCES})
 target_include_directories(deformable_ccd_oracle PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
@@ -40,15 +40,12 @@ if(nlohmann_json_FOUND)
   target_link_libraries(deformable_ccd_report PUBLIC deformable_ccd_headers nlohmann_json::nlohmann_json)
 endif()
 
-# run_queries shows filters and bounds that the library hides, and so takes the archive.
-set(CORE_TOOLS run_queries replay_step)
-set(run_queries_LIBRARIES deformable_ccd_oracle deformable_ccd_archive)
-set(replay_step_LIBRARIES deformable_ccd)
+set(CORE_TOOLS replay_step)
 if(CLI11_FOUND)
   foreach(tool ${CORE_TOOLS})
     add_executable(${tool} src/apps/${tool}.cpp)
     target_include_directories(${tool} PRIVATE src)
-    target_link_libraries(${tool} ${${tool}_LIBRARIES} CLI11::CLI11)
+    target_link_libraries(${tool} deformable_ccd CLI11::CLI11)
     list(APPEND TOOL_TARGETS ${tool})
   endforeach()
 endif()

@@ -35,7 +35,7 @@ def analyze(fleet, recording, folder):
     unfinished = folder.with_name(folder.name + '.part')
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.parent.mkdir(parents=True, exist_ok=True)
-    command = [fleet['tool'], recording['bag'], '--report', str(unfinished), '--quiet', '--no-accuracy-table',
+    command = [fleet['tool'], recording['bag'], '--report', str(unfinished), '--quiet',
                '--threads', str(fleet['threads']), *fleet['options']]
     start = time.time()
     ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)

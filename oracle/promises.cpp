@@ -61,7 +61,7 @@ std::string brokenInterval(const AccuracyOptions& options, const Query& query, d
 std::string brokenPromise(const AccuracyOptions& options, const Query& query, std::optional<Root>& toc,
                           const ElementaryResult& result) {
   const std::string range = outOfRange(result);
-  if (!range.empty() || options.rung == Accuracy::FAST) return range;
+  if (!range.empty()) return range;
   if (result.verdict == Verdict::NO_CONTACT) return toc ? "a contact is missed" : "";
   if (options.rung == Accuracy::EXACT) {
     if (result.verdict == Verdict::UNDECIDED) return "undecided";

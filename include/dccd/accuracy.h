@@ -8,11 +8,9 @@
 
 namespace dccd {
 
-/// Cheapest first.
+/// In the order of their values.
 DCCD_EXPORT const std::vector<Accuracy>& allRungs();
 /// Whether the rung can hold a minimum separation or an uncertainty above 0.
 DCCD_EXPORT bool holdsDistance(Accuracy rung);
-/// Whether the rung misses nothing. What does not is a rival to measure against, and no setting of a monitor.
-DCCD_EXPORT bool provesAnswers(Accuracy rung);
 
 }  // namespace dccd

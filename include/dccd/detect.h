@@ -49,9 +49,6 @@ struct Options {
   std::vector<Box> exclude_boxes;     ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;     ///< without a map the status is NO_MAP
   std::vector<Expectation> expected;  ///< in force for this step; not with earliest_only, which may find nothing else
-  /// Effects that do nothing, whatever the scene calls for. The flow asks here for those that have no other switch: the
-  /// start state, patches and what is a matter of bodies or of the map are switched where their numbers are.
-  EffectSet off;
   bool patches = false;  ///< say which contacts belong together: Outcome::patches
   /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
   /// answer.

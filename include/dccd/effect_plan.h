@@ -17,6 +17,10 @@ enum class EffectSetting : std::uint8_t { AUTO, ON, OFF };
 DCCD_EXPORT const char* toString(EffectSetting setting);
 
 using EffectSettings = std::map<Effect, EffectSetting>;  ///< what is missing is auto
+inline EffectSetting settingOf(const EffectSettings& settings, Effect effect) {
+  const auto setting = settings.find(effect);
+  return setting == settings.end() ? EffectSetting::AUTO : setting->second;
+}
 
 /// What the plan is derived from: the bodies that the flow is given, and what it is not told.
 struct EffectScene {

@@ -46,8 +46,8 @@ inline constexpr PairKindFacts PAIR_KINDS[] = {
 static_assert(std::size(PAIR_KINDS) == static_cast<std::size_t>(PairKind::FACE_VOXEL_CORNER) + 1, "a row for each");
 constexpr const PairKindFacts& factsOf(PairKind kind) { return PAIR_KINDS[static_cast<std::size_t>(kind)]; }
 
-/// Rungs of the accuracy ladder, cheapest first. Recordings hold the values; 0 was one that decided nothing.
-enum class Accuracy : std::uint8_t { FAST = 1, CONSERVATIVE = 2, EXACT = 3 };
+/// Rungs of the accuracy ladder. Recordings hold the values; 0 and 1 were rungs that proved nothing.
+enum class Accuracy : std::uint8_t { CONSERVATIVE = 2, EXACT = 3 };
 
 struct AccuracyOptions {
   Accuracy rung = Accuracy::EXACT;
@@ -133,7 +133,7 @@ DCCD_EXPORT ElementaryResult testPair(const Rung& test, PairKind kind, const Pai
 DCCD_EXPORT const char* toString(PairKind kind);
 DCCD_EXPORT const char* toString(Accuracy rung);
 DCCD_EXPORT const char* toString(Tier tier);
-/// Parses "fast", "conservative", "exact". Throws std::invalid_argument naming the text.
+/// Parses "conservative", "exact". Throws std::invalid_argument naming the text.
 DCCD_EXPORT Accuracy accuracyFromString(const char* text);
 
 }  // namespace dccd

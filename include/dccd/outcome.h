@@ -73,22 +73,6 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
 #define DCCD_EFFECT_ENUMERATOR(EFFECT, name) EFFECT,
 enum class Effect : std::uint8_t { DCCD_EFFECTS(DCCD_EFFECT_ENUMERATOR) COUNT };
 #undef DCCD_EFFECT_ENUMERATOR
-/// A set of them.
-class EffectSet {
- public:
-  EffectSet() = default;
-  /// One bit for each effect, in their order; those of no effect are left out.
-  explicit EffectSet(std::uint64_t bits) : bits_(bits & (bitOf(Effect::COUNT) - 1)) {}
-  void add(Effect effect) { bits_ |= bitOf(effect); }
-  bool has(Effect effect) const { return (bits_ & bitOf(effect)) != 0; }
-  std::uint64_t bits() const { return bits_; }
-  friend bool operator==(const EffectSet& a, const EffectSet& b) { return a.bits_ == b.bits_; }
-
- private:
-  static constexpr std::uint64_t bitOf(Effect effect) { return std::uint64_t{1} << static_cast<int>(effect); }
-  static_assert(static_cast<int>(Effect::COUNT) < 64, "a bit for each");
-  std::uint64_t bits_ = 0;
-};
 DCCD_EXPORT const char* toString(Stage stage);
 DCCD_EXPORT const char* toString(Effect effect);
 

@@ -30,7 +30,7 @@ struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh, command;
   double look_ahead_s = 0;
   int threads = 0;
-  bool without_map = false, no_rungs = false, study = false, quiet = false, forget = false;
+  bool without_map = false, no_table = false, study = false, quiet = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
@@ -48,33 +48,7 @@ MonitorConfig configure(const Arguments& a) {
   if (!a.accuracy.empty()) tree.put("accuracy", a.accuracy);
   if (a.look_ahead_s > 0) tree.put("look_ahead_s", a.look_ahead_s);
   if (a.threads > 0) tree.put("num_threads", a.threads);
-  MonitorConfig config = readConfig(tree, a.params.empty() ? "--" : "");
-  config.monitor.detector.keep_bounds = !a.forget;
-  return config;
-}
-
-std::vector<RungCost> otherRungs(const Arguments& a, const MonitorConfig& config, const BagReplayOptions& options) {
-  std::vector<std::string> names;
-  for (const Accuracy rung : allRungs()) {
-    if (!config.holdsDistance() || holdsDistance(rung)) names.push_back(toString(rung));
-  }
-  const auto run = [&](const std::string& name) {
-    MonitorConfig one = unlimited(config);
-    one.monitor.detector.accuracy.rung = accuracyFromString(name.c_str());
-    if (!a.quiet) std::cerr << "accuracy table: " << name << '\n';
-    ContactLog log;
-    BagReplay(a.bag, one, options)
-        .run([&](const Outcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { log.add(o); });
-    return log;
-  };
-  // The last is what the others are held against; a log holds every contact of the bag, so no more than two are kept.
-  const ContactLog truth = run(names.back());
-  const RungCost best = truth.against(truth, names.back());
-  names.pop_back();
-  std::vector<RungCost> rungs;
-  for (const std::string& name : names) rungs.push_back(run(name).against(truth, name));
-  rungs.push_back(best);
-  return rungs;
+  return readConfig(tree, a.params.empty() ? "--" : "");
 }
 
 std::string seconds(double s) {
@@ -166,7 +140,6 @@ int analyze(const Arguments& a) {
   std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   BagReplay replay(a.bag, config, options);
   Report report(a.report);
-  report.setAccuracy(config.monitor.detector.accuracy);
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {
@@ -182,15 +155,10 @@ int analyze(const Arguments& a) {
       });
   describe(a, config, summary, report);
   report.finish();
-  if (!a.no_rungs) {  // takes long, and what there is should not be lost with it
-    out.reset();
-    report.setRungs(otherRungs(a, config, options));
-    report.finish();
-  }
   std::string study_line;
-  if (a.study) {
+  if (a.study) {  // takes long, and what there is should not be lost with it
     out.reset();
-    const AccuracyStudy study = runStudy(a.bag, config, options, a.report + "/study");
+    const AccuracyStudy study = runStudy(a.bag, config, options);
     study.write(a.report + "/study.csv");
     report.setStudy(study.json());
     report.finish();
@@ -217,11 +185,10 @@ int main(int argc, char** argv) {
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
-  app.add_flag("--forget", a.forget, "nothing is kept of bodies at rest; no answer changes");
-  app.add_flag("--no-accuracy-table", a.no_rungs, "do not run the other rungs");
+  app.add_flag("--no-accuracy-table", a.no_table)->group("");  // there is none any more; taken, so that old calls run
   app.add_flag("--accuracy-study", a.study,
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
-               "does to first contacts; what was stopped goes on");
+               "does to first contacts");
   app.add_flag("--quiet", a.quiet, "no progress");
   app.footer(
       "Exit status:\n"

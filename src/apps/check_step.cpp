@@ -13,22 +13,19 @@
 #include "dccd/detect.h"
 #include "dccd/simd_target.h"
 #include "input/mesh_formats.h"
-#include "report/accuracy_settings.h"
 #include "report/progress_bar.h"
+#include "stream/quantile.h"
 
 namespace {
 
 using namespace dccd;
 
-constexpr int MOST_ROUNDS = 60, LEAST_ROUNDS = 8;
-constexpr double NARROW = 0.02;  // the interval of a ratio is narrow enough within this of its median
-
 constexpr int NOT_PROVED = 3;  // CLI11 and this program's own errors have others
 
 struct Arguments {
   std::vector<std::string> frames;
-  std::string contacts, stats, truth;
-  std::string accuracy = "exact", broad_phase = "clustered", simd = "auto";
+  std::string contacts, stats;
+  std::string accuracy = "exact", simd = "auto";
   double tolerance_m = AccuracyOptions().tolerance_m, budget_ms = 0;
   int toc_bits = AccuracyOptions().toc_bits, threads = 1, repeat = 1;
   bool no_start_state = false, earliest_only = false, forget = false;
@@ -41,26 +38,15 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
                  "meshes with the same faces, two or more, each a step after the one before (.ply, .obj, .stl, .dae)")
       ->required()
       ->expected(2, -1);
-  app.add_option(
-      "--contacts", a.contacts,
-      "write the contacts as CSV, of several steps with the step first, from 0; with --accuracy all a file for "
-      "each setting");
+  app.add_option("--contacts", a.contacts, "write the contacts as CSV, of several steps with the step first, from 0");
   app.add_option("--stats", a.stats, "write pairs and milliseconds per stage as JSON");
-  app.add_option("--accuracy", a.accuracy, "fast, conservative or exact; all: all settings in turns, as a table")
-      ->capture_default_str();
+  app.add_option("--accuracy", a.accuracy, "conservative or exact")->capture_default_str();
   app.add_option("--tolerance", a.tolerance_m, "of conservative [m]")->capture_default_str();
   app.add_option("--toc-bits", a.toc_bits, "of exact: the TOC's cell is 2^-bits of the step, 10 to 52")
       ->capture_default_str();
-  app.add_option("--broad-phase", a.broad_phase, "clustered or brute_force")
-      ->check(CLI::IsMember({"clustered", "brute_force"}))
-      ->capture_default_str();
   app.add_option("--budget", a.budget_ms, "step budget [ms], 0: none")->capture_default_str();
   app.add_option("--threads", a.threads, "worker threads")->capture_default_str();
-  app.add_option("--truth", a.truth,
-                 "with --accuracy all: the contacts that there are, 'VF|EE v0 v1 v2 v3 [toc]' a line, to hold the "
-                 "answers against; else exact 2^-52 is taken for it");
-  app.add_option("--repeat", a.repeat,
-                 "run the step this often for the times; with --accuracy all at most this often (else 60 times)")
+  app.add_option("--repeat", a.repeat, "run the step this often for the times")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--simd", a.simd, "SIMD target, or auto")->capture_default_str();
@@ -69,9 +55,6 @@ Arguments parse(int argc, char** argv, CLI::App& app) {
   app.add_flag("--forget", a.forget, "of several steps: nothing is kept of bodies at rest; no answer changes");
   requireDecimalNumbers(app);
   app.parse(argc, argv);
-  if (a.accuracy == "all" && a.isSequence()) throw std::runtime_error("--accuracy all takes two frames");
-  if (a.accuracy == "all" && app.count("--repeat") == 0) a.repeat = MOST_ROUNDS;
-  if (a.accuracy != "all" && !a.truth.empty()) throw std::runtime_error("--truth goes with --accuracy all");
   return a;
 }
 
@@ -96,14 +79,13 @@ void writeContacts(const std::string& path, const std::vector<std::vector<Contac
 struct Times {
   std::vector<double> ms;
   double best() const { return *std::min_element(ms.begin(), ms.end()); }
-  double median() const { return medianOf(ms).median; }
+  double median() const { return quantile(ms, 0.5); }
   double mean() const { return std::accumulate(ms.begin(), ms.end(), 0.0) / static_cast<double>(ms.size()); }
   nlohmann::json json() const { return {{"best", best()}, {"median", median()}, {"mean", mean()}}; }
 };
 
-/// One way to answer the steps, as often as they were run.
+/// The answers to the steps, as often as they were run.
 struct Run {
-  std::string name;
   Options options;
   History history;
   Outcome result;                              // of the last step
@@ -139,18 +121,17 @@ struct Run {
   }
 };
 
-Run runOf(const Arguments& a, const std::string& name, const AccuracyOptions& accuracy) {
-  Run run;
-  run.name = name;
-  Options& options = run.options;
+Options optionsOf(const Arguments& a) {
+  Options options;
   options.keep_bounds = a.isSequence() && !a.forget;  // else the same step again and again
-  options.accuracy = accuracy;
+  options.accuracy.rung = accuracyFromString(a.accuracy.c_str());
+  options.accuracy.tolerance_m = a.tolerance_m;
+  options.accuracy.toc_bits = a.toc_bits;
   options.num_threads = a.threads;
   options.step_budget_ms = a.budget_ms;
   options.earliest_only = a.earliest_only;
   options.check_start_state = !a.no_start_state;
-  options.broad_phase = a.broad_phase == "clustered" ? BroadPhase::CLUSTERED : BroadPhase::BRUTE_FORCE;
-  return run;
+  return options;
 }
 
 nlohmann::json statsJson(const Arguments& a, const Run& run) {
@@ -167,7 +148,7 @@ nlohmann::json statsJson(const Arguments& a, const Run& run) {
   for (const StepCounter& counter : STEP_COUNTERS) j[counter.name] = run.sum.*counter.value;
   j["threads"] = a.threads;
   j["simd_target"] = simdTarget();
-  j["accuracy"] = run.name;
+  j["accuracy"] = a.accuracy;
   j["contacts"] = run.contactCount();
   // Of the first step that is not proved, else of the last; then of the last.
   j["proved"] = run.assurance.proved;
@@ -180,12 +161,12 @@ nlohmann::json statsJson(const Arguments& a, const Run& run) {
   return j;
 }
 
-void print(const Run& run) {
+void print(const Arguments& a, const Run& run) {
   std::cout << std::left << std::setw(14) << "accuracy" << std::right << std::setw(10) << "contacts" << std::setw(11)
             << "undecided" << std::setw(14) << "earliest toc" << std::setw(11) << "best ms" << std::setw(11)
             << "median ms" << '\n';
   const double earliest = run.result.earliest_toc;
-  std::cout << std::left << std::setw(14) << run.name << std::right << std::setw(10) << run.contactCount()
+  std::cout << std::left << std::setw(14) << a.accuracy << std::right << std::setw(10) << run.contactCount()
             << std::setw(11) << run.sum.undecided << std::setw(14);
   if (earliest <= 1)
     std::cout << earliest;
@@ -251,118 +232,24 @@ std::vector<Step> stepsOf(const Arguments& a) {
   return steps;
 }
 
-/// Times of the same rounds, divided: what slows the machine down slows both.
-MedianInterval ratioOf(const Run& run, const Run& to) {
-  const std::vector<double>&ms = run.times.at("total").ms, &other = to.times.at("total").ms;
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < ms.size(); ++i) ratios.push_back(ms[i] / other[i]);
-  return medianOf(std::move(ratios));
-}
-
-/// All of them in turns, each round beginning with another, until the ratios are known or the rounds are over.
-void runInTurns(const std::vector<Step>& steps, std::size_t most, std::vector<Run>& runs, const Run& usual) {
-  ProgressBar progress("rounds, at most " + std::to_string(most), most * runs.size() * steps.size());
-  for (std::size_t round = 0; round < most; ++round) {
-    for (std::size_t i = 0; i < runs.size(); ++i) runs[(round + i) % runs.size()].once(steps, progress);
-    const bool narrow = std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
-      const MedianInterval ratio = ratioOf(run, usual);
-      return ratio.high <= ratio.median * (1 + NARROW) && ratio.low >= ratio.median * (1 - NARROW);
-    });
-    if (round + 1 >= LEAST_ROUNDS && narrow) break;
-  }
-}
-
-/// "contacts.csv" and "exact 2^-32" to "contacts-exact-2^-32.csv".
-std::string fileOf(const std::string& path, std::string name) {
-  std::replace(name.begin(), name.end(), ' ', '-');
-  const std::size_t dot = path.find_last_of("./");
-  const std::size_t end = dot == std::string::npos || path[dot] == '/' ? path.size() : dot;
-  return path.substr(0, end) + '-' + name + path.substr(end);
-}
-
-void printRow(const Run& run, const AccuracyErrors& errors, const MedianInterval& ratio) {
-  std::cout << std::left << std::setw(18) << run.name << std::right << std::setw(9) << run.result.contacts.size()
-            << std::setw(8) << errors.missed << std::setw(7) << errors.false_contacts << std::setw(10)
-            << errors.undecided << std::setw(11) << std::scientific << std::setprecision(1) << errors.toc_error
-            << std::fixed << std::setprecision(2) << std::setw(9) << run.times.at("total").median()
-            << std::setprecision(3) << std::setw(8) << ratio.median << " [" << ratio.low << ", " << ratio.high << "]"
-            << std::setprecision(1);
-  for (const Stage stage : {Stage::BROAD_PHASE, Stage::PLANAR, Stage::ELEMENTARY, Stage::SORT}) {
-    std::cout << std::setw(12) << run.times.at(toString(stage)).median();
-  }
-  std::cout << std::defaultfloat << std::setprecision(6) << '\n';
-}
-
-nlohmann::json compareSettings(const Arguments& a, std::vector<Run>& runs, const Run& usual) {
-  const KnownContacts finest = KnownContacts::fromOutcome(runs.back().result);
-  const KnownContacts truth = a.truth.empty() ? finest : KnownContacts::fromFile(a.truth);
-  const std::size_t rounds = usual.times.at("total").ms.size();
-  std::cout << rounds << " rounds in turns; ms: medians; ratio: to " << usual.name
-            << " in the same round, median and 95 % interval"
-            << "\nmissed and false: against "
-            << (a.truth.empty() ? runs.back().name + ", for want of --truth" : a.truth) << '\n'
-            << std::left << std::setw(18) << "setting" << std::right << std::setw(9) << "contacts" << std::setw(8)
-            << "missed" << std::setw(7) << "false" << std::setw(10) << "undecided" << std::setw(11) << "TOC error"
-            << std::setw(9) << "ms" << std::setw(8) << "ratio" << std::setw(18) << "95 %";
-  for (const char* stage : {"broad phase", "planar", "elementary", "sort"}) std::cout << std::setw(12) << stage;
-  std::cout << '\n';
-  nlohmann::json all;
-  std::size_t timed_by_truth = 0;
-  for (const Run& run : runs) {
-    const AccuracyErrors errors = errorsOf(run.result, truth, finest);
-    const MedianInterval ratio = ratioOf(run, usual);
-    printRow(run, errors, ratio);
-    nlohmann::json j = statsJson(a, run);
-    j["missed"] = errors.missed;
-    j["false"] = errors.false_contacts;
-    j["undecided"] = errors.undecided;
-    j["toc_error"] = errors.toc_error;
-    j["rounds"] = rounds;
-    j["ratio"] = {{"to", usual.name}, {"low", ratio.low}, {"median", ratio.median}, {"high", ratio.high}};
-    all[run.name] = std::move(j);
-    timed_by_truth = errors.timed_by_truth;
-    if (!a.contacts.empty()) writeContacts(fileOf(a.contacts, run.name), run.contacts);
-  }
-  std::cout << "TOC error: of either end of the interval, in steps; " << timed_by_truth
-            << " times are the truth's, the others' the cells of " << runs.back().name << '\n';
-  return all;
-}
-
 int checkStep(const Arguments& a) {
   setSimdTarget(a.simd);
   const std::vector<Step> steps = stepsOf(a);
-  nlohmann::json all;
-  std::vector<Run> runs;
-  if (a.accuracy == "all") {
-    for (const AccuracySetting& setting : accuracySettings()) runs.push_back(runOf(a, setting.name, setting.accuracy));
-    const Run& usual = *std::find_if(runs.begin(), runs.end(), [](const Run& r) { return r.name == DEFAULT_SETTING; });
-    runInTurns(steps, static_cast<std::size_t>(a.repeat), runs, usual);
-    all = compareSettings(a, runs, usual);
-  } else {
-    AccuracyOptions accuracy;
-    accuracy.rung = accuracyFromString(a.accuracy.c_str());
-    accuracy.tolerance_m = a.tolerance_m;
-    accuracy.toc_bits = a.toc_bits;
-    runs.push_back(runOf(a, a.accuracy, accuracy));
-    {
-      ProgressBar progress("steps", static_cast<std::size_t>(a.repeat) * steps.size());
-      for (int i = 0; i < a.repeat; ++i) runs[0].once(steps, progress);
-    }
-    print(runs[0]);
-    all = statsJson(a, runs[0]);
-    if (!a.contacts.empty()) writeContacts(a.contacts, runs[0].contacts);
+  Run run;
+  run.options = optionsOf(a);
+  {
+    ProgressBar progress("steps", static_cast<std::size_t>(a.repeat) * steps.size());
+    for (int i = 0; i < a.repeat; ++i) run.once(steps, progress);
   }
-  bool proved = false;
-  for (const Run& run : runs) {
-    proved = run.assurance.proved;  // of several settings the last and most accurate one's
-    std::cout << run.name << ": " << describe(run.assurance) << '\n';
-  }
+  print(a, run);
+  if (!a.contacts.empty()) writeContacts(a.contacts, run.contacts);
+  std::cout << a.accuracy << ": " << describe(run.assurance) << '\n';
   if (!a.stats.empty()) {
     std::ofstream out(a.stats);
-    out << all.dump(2) << '\n';
+    out << statsJson(a, run).dump(2) << '\n';
     if (!out) throw std::runtime_error(a.stats + ": cannot be written");
   }
-  return proved ? 0 : NOT_PROVED;
+  return run.assurance.proved ? 0 : NOT_PROVED;
 }
 
 }  // namespace

@@ -69,37 +69,34 @@ std::uint16_t bodyOf(const Arguments& a, std::size_t side, const StepRecording& 
 }
 
 std::vector<TraceLine> traceOf(const std::string& text, const Arguments& a, const StepRecording& recording) {
-  const std::string kind = text.substr(0, 3);
-  if (kind == "VF:" || kind == "EE:") {
-    PairQuestion q;
-    q.kind = kind == "VF:" ? PairKind::VERTEX_FACE : PairKind::EDGE_EDGE;
-    const std::vector<std::uint32_t> numbers = numbersOf(text, 4);
-    std::copy(numbers.begin(), numbers.end(), q.vertex.begin());
-    for (std::size_t side = 0; side < 2; ++side) q.body[side] = bodyOf(a, side, recording);
-    return explain(recording.step, recording.options, q);
-  }
-  const std::size_t vertices = kind == "VX:" ? 1 : kind == "EX:" ? 2 : kind == "FX:" ? 3 : 0;
-  if (vertices == 0) {
+  static const char* const KINDS[] = {"VF:", "EE:", "VX:", "EX:", "FX:"};  // by PairKind
+  const auto kind = std::find(std::begin(KINDS), std::end(KINDS), text.substr(0, 3));
+  if (kind == std::end(KINDS)) {
     throw std::invalid_argument("--pair " + text +
                                 ": write VF:v,a,b,c, EE:a,b,c,d, VX:v,x,y,z, EX:a,b,x,y,z or FX:a,b,c,x,y,z");
   }
-  static const PairKind KINDS[] = {PairKind::VERTEX_VOXEL_FACE, PairKind::EDGE_VOXEL_EDGE, PairKind::FACE_VOXEL_CORNER};
-  std::vector<std::uint32_t> numbers = numbersOf(text, vertices + 3);
-  const std::uint32_t* key = numbers.data() + vertices;
-  if (*std::max_element(key, key + 3) > 65535)
-    throw std::invalid_argument("--pair " + text + ": a voxel's key is at most 65535");
-  VoxelQuestion q;
-  q.kind = KINDS[vertices - 1];
-  q.body = bodyOf(a, 0, recording);
-  q.vertex.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(vertices));
-  q.voxel = {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]),
-             static_cast<std::uint16_t>(key[2])};
+  PairQuestion q;
+  q.kind = static_cast<PairKind>(kind - KINDS);
+  for (std::size_t side = 0; side < 2; ++side) q.body[side] = bodyOf(a, side, recording);
+  const auto& facts = factsOf(q.kind);
+  const std::ptrdiff_t vertices = facts.vertices[0] + facts.vertices[1];
+  const std::vector<std::uint32_t> numbers =
+      numbersOf(text, static_cast<std::size_t>(vertices) + (facts.isOnMap() ? 3 : 0));
+  q.vertex.assign(numbers.begin(), numbers.begin() + vertices);
+  if (facts.isOnMap()) {
+    const std::uint32_t* key = numbers.data() + vertices;
+    if (*std::max_element(key, key + 3) > 65535) {
+      throw std::invalid_argument("--pair " + text + ": a voxel's key is at most 65535");
+    }
+    q.voxel = {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]),
+               static_cast<std::uint16_t>(key[2])};
+  }
   return explain(recording.step, recording.options, q);
 }
 
 void trace(const Arguments& a, const StepRecording& recording) {
   for (const std::string& text : a.pairs) {
-    std::cout << '\n' << text << "  (* the rung of the recording)\n";
+    std::cout << '\n' << text << '\n';
     std::size_t part = 0;
     for (const TraceLine& line : traceOf(text, a, recording)) {
       if (line.part != part) std::cout << "  part " << (part = line.part) + 1 << " of the step\n";

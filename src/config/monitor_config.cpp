@@ -15,13 +15,8 @@ using Kind = ParameterTree::Kind;
 namespace {
 
 Accuracy readRung(ParameterReader& reader) {
-  std::vector<std::string> names, refused;
-  for (const Accuracy rung : allRungs()) (provesAnswers(rung) ? names : refused).push_back(toString(rung));
-  const std::string asked = reader.text("accuracy", "exact");
-  if (std::find(refused.begin(), refused.end(), asked) != refused.end()) {
-    reader.fail("accuracy", "is '" + asked + "', which proves nothing and is no setting of a monitor; write exact, " +
-                                "which takes about as long");
-  }
+  std::vector<std::string> names;
+  for (const Accuracy rung : allRungs()) names.push_back(toString(rung));
   return accuracyFromString(reader.choice("accuracy", "exact", names).c_str());
 }
 
@@ -218,7 +213,7 @@ void removeRigidBodies(MonitorConfig& config) {
 std::vector<std::string> takenAway(const MonitorConfig& config) {
   std::vector<std::string> sentences;
   const auto add = [&](Effect effect, const std::string& what) {
-    if (!config.monitor.detector.off.has(effect) || what.empty()) return;
+    if (settingOf(config.effects, effect) != EffectSetting::OFF || what.empty()) return;
     sentences.push_back(what + " by effects/" + toString(effect) + ": off");
   };
   std::string rigid;
@@ -236,11 +231,8 @@ std::vector<std::string> takenAway(const MonitorConfig& config) {
 
 /// What is switched off is off everywhere: no later stage asks again.
 void applyEffects(MonitorConfig& config) {
-  for (const auto& [effect, setting] : config.effects) {
-    if (setting == EffectSetting::OFF) config.monitor.detector.off.add(effect);
-  }
   config.monitor.detector.excluded = takenAway(config);
-  const auto off = [&](Effect effect) { return config.monitor.detector.off.has(effect); };
+  const auto off = [&](Effect effect) { return settingOf(config.effects, effect) == EffectSetting::OFF; };
   if (off(Effect::RIGID_BODIES)) removeRigidBodies(config);
   if (off(Effect::MINIMUM_SEPARATION)) config.minimum_separation_m = 0;
   for (BodyConfig& body : config.bodies) {
@@ -340,9 +332,8 @@ std::vector<Body> MonitorConfig::monitorBodies() const {
 }
 
 bool MonitorConfig::namesOctomap() const {
-  const auto setting = effects.find(Effect::OCTOMAP);
-  const bool automatic = setting == effects.end() || setting->second == EffectSetting::AUTO;
-  return automatic ? octomap_topic_named || !octomap_file.empty() : setting->second == EffectSetting::ON;
+  const EffectSetting setting = settingOf(effects, Effect::OCTOMAP);
+  return setting == EffectSetting::AUTO ? octomap_topic_named || !octomap_file.empty() : setting == EffectSetting::ON;
 }
 
 bool MonitorConfig::ownsVoxels() const {

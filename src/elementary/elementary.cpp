@@ -13,7 +13,6 @@
 namespace dccd {
 
 // Each in the file of its rung. Options are validated here, once for all of them.
-std::unique_ptr<Rung> makeFastRung(const AccuracyOptions& options);
 std::unique_ptr<Rung> makeConservativeRung(const AccuracyOptions& options);
 std::unique_ptr<Rung> makeExactRung(const AccuracyOptions& options);
 
@@ -33,22 +32,21 @@ void validate(const AccuracyOptions& options) {
   }
 }
 
-/// A rung of the ladder; its place in the list, from 1, is its value as Accuracy.
+/// A rung of the ladder; its place in the list, from the first one's value on, is its value as Accuracy.
 struct RungRow {
   const char* name;
   std::unique_ptr<Rung> (*make)(const AccuracyOptions&);
   bool holds_distance;
-  bool proves;
 };
 constexpr RungRow RUNGS[] = {
-    {"fast", makeFastRung, false, false},
-    {"conservative", makeConservativeRung, true, true},
-    {"exact", makeExactRung, false, true},
+    {"conservative", makeConservativeRung, true},
+    {"exact", makeExactRung, false},
 };
+constexpr std::size_t FIRST = static_cast<std::size_t>(Accuracy::CONSERVATIVE);
 
 const RungRow* rowOf(Accuracy rung) {
   const std::size_t value = static_cast<std::size_t>(rung);
-  return value >= 1 && value <= std::size(RUNGS) ? &RUNGS[value - 1] : nullptr;
+  return value >= FIRST && value - FIRST < std::size(RUNGS) ? &RUNGS[value - FIRST] : nullptr;
 }
 
 }  // namespace
@@ -63,7 +61,7 @@ std::unique_ptr<Rung> makeRung(const AccuracyOptions& options) {
 const std::vector<Accuracy>& allRungs() {
   static const std::vector<Accuracy> all = [] {
     std::vector<Accuracy> rungs;
-    for (std::size_t i = 1; i <= std::size(RUNGS); ++i) rungs.push_back(static_cast<Accuracy>(i));
+    for (std::size_t i = 0; i < std::size(RUNGS); ++i) rungs.push_back(static_cast<Accuracy>(FIRST + i));
     return rungs;
   }();
   return all;
@@ -72,11 +70,6 @@ const std::vector<Accuracy>& allRungs() {
 bool holdsDistance(Accuracy rung) {
   const RungRow* row = rowOf(rung);
   return row && row->holds_distance;
-}
-
-bool provesAnswers(Accuracy rung) {
-  const RungRow* row = rowOf(rung);
-  return row && row->proves;
 }
 
 simd::BatchInput inputOf(const PairBatch& batch, Accuracy rung) {

@@ -35,10 +35,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   plan_ = EffectPlan(scene_, settings_);
 }
 
-bool EffectTracker::mayUseMap() const {
-  const auto setting = settings_.find(Effect::OCTOMAP);
-  return setting == settings_.end() || setting->second != EffectSetting::OFF;
-}
+bool EffectTracker::mayUseMap() const { return settingOf(settings_, Effect::OCTOMAP) != EffectSetting::OFF; }
 
 void EffectTracker::expectMap() {
   if (scene_.map_seen) return;

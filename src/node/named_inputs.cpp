@@ -40,8 +40,7 @@ std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
     text += body.isRigid() ? "tf frame " + body.tf_frame : node.resolveName(body.topic) + howNamed(body.topic_named);
     text += ", ";
   }
-  const auto setting = config.effects.find(Effect::OCTOMAP);
-  const bool off = setting != config.effects.end() && setting->second == EffectSetting::OFF;
+  const bool off = settingOf(config.effects, Effect::OCTOMAP) == EffectSetting::OFF;
   text += "octomap: " + (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
   return text + ", tf";
 }

@@ -86,10 +86,6 @@ struct Reconfigure::Impl {
     MonitorOptions options = start.monitor;
     MarkerConfig markers = start.markers;
     fromLive(live, options, markers);
-    const Accuracy rung = options.detector.accuracy.rung;
-    if (!provesAnswers(rung)) {
-      return std::string(toString(rung)) + " proves nothing and is no setting of a monitor; write exact";
-    }
     try {
       check(options.detector, bodies);
       const MeshStore store(options.store);

@@ -64,6 +64,16 @@ class RecordingWriter {
     number(static_cast<std::uint64_t>(values.size()));
   }
 
+  std::vector<std::uint8_t> bytes() const {
+    std::vector<std::uint8_t> all;
+    for (const auto& piece : image_.pieces_) {
+      const auto* begin =
+          piece.data ? static_cast<const std::uint8_t*>(piece.data) : image_.heads_.data() + piece.offset;
+      all.insert(all.end(), begin, begin + piece.size);
+    }
+    return all;
+  }
+
   void map(const std::shared_ptr<const VoxelSurface>& surface) {
     number(surface->resolution());
     if (image_.surface_ != surface) {

@@ -49,17 +49,6 @@ void visitExpectations(Archive& a, Expectations& expected) {
   }
 }
 
-/// An effect that is unknown here is of a later program, which cannot be replayed.
-template <typename Archive, typename Effects>
-void visitEffects(Archive& a, Effects& off) {
-  std::uint64_t bits = off.bits();
-  a.number(bits);
-  if constexpr (Archive::READS) {
-    off = EffectSet(bits);
-    if (off.bits() != bits) a.fail("an effect is off that this program does not know");
-  }
-}
-
 template <typename Archive, typename Rung>
 void visitRung(Archive& a, Rung& rung) {
   a.choice(rung, allRungs().back());
@@ -82,8 +71,6 @@ void visitOption(Archive& a, Value& value) {
     visitRung(a, value);
   } else if constexpr (std::is_same_v<Type, BroadPhase>) {
     a.choice(value, BroadPhase::BRUTE_FORCE);
-  } else if constexpr (std::is_same_v<Type, EffectSet>) {
-    visitEffects(a, value);
   } else if constexpr (std::is_same_v<Type, std::vector<Expectation>>) {
     visitExpectations(a, value);
   } else {
@@ -328,6 +315,20 @@ void RecordingImage::build(const StepRecording& recording) {
   for (const char c : MAGIC) writer.number(c);
   writer.number(RECORDING_VERSION);
   visit(writer, recording);
+}
+
+std::vector<std::uint8_t> recordedBytes(const Contact& contact) {
+  RecordingImage image;
+  RecordingWriter writer(image);
+  visitContact(writer, contact);
+  return writer.bytes();
+}
+
+std::vector<std::uint8_t> recordedBytes(const Outcome& answer) {
+  RecordingImage image;
+  RecordingWriter writer(image);
+  visitAnswer(writer, answer);
+  return writer.bytes();
 }
 
 StepRecording readRecording(const void* data, std::size_t size, const std::string& name) {

@@ -68,6 +68,10 @@ DCCD_EXPORT void writeRecording(const std::string& path, const StepRecording& re
 /// The same into a file that was not there before: STEM.step, or STEM_2.step and so on. Returns its name.
 DCCD_EXPORT std::string writeNewRecording(const std::string& stem, const StepRecording& recording);
 
+/// What a file holds of them: those of two that are the same are the same.
+std::vector<std::uint8_t> recordedBytes(const Contact& contact);
+std::vector<std::uint8_t> recordedBytes(const Outcome& answer);
+
 /// Lengths are held against the bytes that are there before anything is allocated. Throws RecordingError.
 DCCD_EXPORT StepRecording readRecording(const void* data, std::size_t size, const std::string& name);
 DCCD_EXPORT StepRecording readRecordingFile(const std::string& path);

@@ -129,13 +129,6 @@ void matchPatches(const RunRecord& run, const RunRecord& reference, StampNs end_
   setErrors(errors_ms, errors.patches);
 }
 
-nlohmann::json jsonOf(const TimeSpan& span) { return {span.from_ns, span.to_ns}; }
-TimeSpan spanOf(const nlohmann::json& json) { return {json.at(0).get<StampNs>(), json.at(1).get<StampNs>()}; }
-nlohmann::json jsonOf(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-Vec3 pointOf(const nlohmann::json& json) {
-  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
-}
-
 }  // namespace
 
 void RunRecorder::add(const Outcome& outcome) {
@@ -216,58 +209,6 @@ RunErrors errorsOf(const RunRecord& run, const RunRecord& reference) {
   matchPatches(run, reference, end_ns, errors);
   errors.pairs_share = reference.pairs > 0 ? static_cast<double>(run.pairs) / static_cast<double>(reference.pairs) : 1;
   return errors;
-}
-
-nlohmann::json RunRecord::json() const {
-  nlohmann::json j{{"voxel_m", voxel_m},       {"end_ns", end_ns}, {"steps", steps},   {"ms", ms},
-                   {"duration_s", duration_s}, {"pairs", pairs},   {"bounds", bounds}, {"step_ms", step_ms}};
-  j["bodies"] = j["patches"] = nlohmann::json::array();
-  for (const BodyRecord& body : bodies) {
-    nlohmann::json first = nlohmann::json::array();
-    for (const auto& [v, span] : body.first) first.push_back({v, span.from_ns, span.to_ns});
-    j["bodies"].push_back({{"first", std::move(first)},
-                           {"vertices", body.vertices},
-                           {"edge_m", body.edge_m},
-                           {"comparable", body.comparable}});
-  }
-  for (const PatchLife& life : patches) {
-    nlohmann::json seen = nlohmann::json::array();
-    for (const PatchLife::Seen& one : life.seen) {
-      seen.push_back({jsonOf(one.step), jsonOf(one.box.min), jsonOf(one.box.max)});
-    }
-    j["patches"].push_back({{"body", life.body}, {"began", jsonOf(life.began)}, {"seen", std::move(seen)}});
-  }
-  return j;
-}
-
-RunRecord RunRecord::fromJson(const nlohmann::json& j) {
-  RunRecord run;
-  j.at("voxel_m").get_to(run.voxel_m);
-  j.at("end_ns").get_to(run.end_ns);
-  j.at("steps").get_to(run.steps);
-  j.at("ms").get_to(run.ms);
-  j.at("duration_s").get_to(run.duration_s);
-  j.at("pairs").get_to(run.pairs);
-  j.at("bounds").get_to(run.bounds);
-  j.at("step_ms").get_to(run.step_ms);
-  for (const nlohmann::json& one : j.at("bodies")) {
-    BodyRecord& body = run.bodies.emplace_back();
-    for (const nlohmann::json& first : one.at("first")) {
-      body.first[first.at(0).get<Index>()] = {first.at(1).get<StampNs>(), first.at(2).get<StampNs>()};
-    }
-    one.at("vertices").get_to(body.vertices);
-    one.at("edge_m").get_to(body.edge_m);
-    one.at("comparable").get_to(body.comparable);
-  }
-  for (const nlohmann::json& one : j.at("patches")) {
-    PatchLife& life = run.patches.emplace_back();
-    one.at("body").get_to(life.body);
-    life.began = spanOf(one.at("began"));
-    for (const nlohmann::json& seen : one.at("seen")) {
-      life.seen.push_back({spanOf(seen.at(0)), {pointOf(seen.at(1)), pointOf(seen.at(2))}});
-    }
-  }
-  return run;
 }
 
 }  // namespace dccd

@@ -9,8 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "dccd/outcome.h"
 
 namespace dccd {
@@ -51,9 +49,6 @@ struct RunRecord {
   std::vector<double> step_ms;
 
   double msPerSecond() const { return duration_s > 0 ? ms / duration_s : 0; }
-  nlohmann::json json() const;
-  /// Throws nlohmann::json::exception for what json() did not write.
-  static RunRecord fromJson(const nlohmann::json& json);
 };
 
 /// Makes a RunRecord of a run's outcomes, which come in order and with patches.

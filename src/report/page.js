@@ -197,12 +197,6 @@ document.getElementById('effects_note').textContent =
 { const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
   [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);
   else document.getElementById('look_ahead').textContent = 'Off: look_ahead_s is 0.'; }
-frontPlot('rungs_plot', R.rungs.map(r => ({ x: r.median_ms, y: r.max_toc_error, name: r.rung, group: 'rung', missed: r.missed, invented: r.false })),
-  'a step, median [ms]', 'largest error of a time [step]', 1e-12);
-if (R.rungs.length) document.getElementById('rungs_note').textContent = `Missed and false are against the run with ${R.rungs[R.rungs.length - 1].rung}; ` + document.getElementById('rungs_note').textContent;
-{ const most = longest(R.rungs.map(r => r.median_ms));
-  table('rungs', ['rung', 'steps', 'contacts', 'missed', 'false', 'undecided', 'worst TOC error', 'median ms', '', '95 % ms'],
-    R.rungs.map(r => [r.rung, r.steps, r.contacts, r.missed, r.false, r.undecided, r.max_toc_error, r.median_ms, bar(r.median_ms / most), r.p95_ms])); }
 { const rows = R.study ? R.study.rows : [], percent = v => `${(100 * v).toFixed(v < 0.0995 ? 1 : 0)} %`;
   document.getElementById('study_sentence').textContent = R.study ? R.study.sentence : 'Not asked for: --accuracy-study runs it.';
   frontPlot('study_plot', rows.map(r => ({ x: r.ms_per_s, y: r.patches_missed < r.patches_touched ? r.patches_p95_ms : null, name: r.setting, group: r.varied, missed: r.patches_missed, invented: r.patches_invented })),
@@ -211,5 +205,3 @@ if (R.rungs.length) document.getElementById('rungs_note').textContent = `Missed 
     'pairs tested', 'steps cut', 'bound of the rest'], rows.map(r => [r.varied, r.setting, short(r.ms_per_s), percent(r.share_of_time), ...['patches', 'vertices'].flatMap(of =>
       ['touched', 'missed', 'invented', 'median_ms', 'p95_ms', 'early_ms', 'late_ms'].map(what => r[of + '_' + what])),
       percent(r.pairs_share), r.cut_steps, r.cut_steps ? r.bound : null])); }
-{ const tiers = Object.entries(R.tiers), most = longest(tiers.map(t => t[1]));
-  table('tiers', ['tier', 'pairs settled', ''], tiers.map(([name, n]) => [name, n, bar(n / most)])); }

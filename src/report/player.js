@@ -153,13 +153,11 @@ const player = (() => {
     `between ${digits(low)} and ${digits(high)} of the step, from ${seconds(f.from + low * (f.to - f.from))} after the start, ${((high - low) * (f.to - f.from)).toExponential(1)} s wide`;
   function items(f) {
     if (!f.details) return [];
-    const contacts = f.details.c.map(([kind, b0, b1, v, flags, low, high, tier, at, patch, voxel]) => {
+    const contacts = f.details.c.map(([kind, b0, b1, v, flags, low, high, at, patch, voxel]) => {
       const is = bit => (flags & bit) !== 0;
       const states = [is(1) ? 'certain' : 'undecided', is(2) ? 'there when the step began' : 'new', is(4) && 'leaving', is(8) && 'expected'].filter(Boolean);
-      const settled = tier ? `Settled by tier ${tier}.` : D.rung && D.rung !== 'exact' ? `The rung ${D.rung} has no tiers.` :
-        voxel ? 'Tiers are told for pairs of meshes.' : 'Its tier is not told: the pair alone does not tell how it was settled.';
       return { kind: 'contact', at, rgb: is(8) ? MUTED : rgb(colour(low)), title: features(kind, v, b0, b1, voxel) + (is(2) ? ', there when the step began' : ''),
-        text: `Contact, ${KIND[kind]}: ${features(kind, v, b0, b1, voxel)}; ${states.join(', ')}. Time of contact ${interval(f, low, high)}. ` + settled + (patch ? ` Part of patch ${patch}.` : '') };
+        text: `Contact, ${KIND[kind]}: ${features(kind, v, b0, b1, voxel)}; ${states.join(', ')}. Time of contact ${interval(f, low, high)}.` + (patch ? ` Part of patch ${patch}.` : '') };
     });
     const patches = f.details.p.map(([id, b0, b1, beginning, n, crossings, expected, low, high, area, at, normal, from, to]) => {
       const began = to === null ? 'When it began is not known.' : from === null ? `It began at or before ${seconds(to)}.` : `It began between ${seconds(from)} and ${seconds(to)}.`;

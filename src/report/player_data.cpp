@@ -56,28 +56,6 @@ void appendDifferences(const PlayerData::Quanta& now, const PlayerData::Quanta* 
   }
 }
 
-void PlayerData::setAccuracy(const AccuracyOptions& accuracy) {
-  rung_name_ = toString(accuracy.rung);
-  if (accuracy.rung == Accuracy::EXACT) rung_ = makeRung(accuracy);
-}
-
-// The pair alone through the same rung. It is only told where the answer is that of the run, bit for bit.
-std::string PlayerData::tierOf(const Outcome& o, const Contact& c) const {
-  if (!rung_) return "";
-  if (c.body[1] == OBSTACLE_BODY) return "";
-  PairMotion pair;
-  for (int i = 0; i < 4; ++i) {
-    const Body& body = o.step->bodies[c.bodyOf(i)];
-    if (body.turns || !body.t0 || !body.t1) return "";
-    std::copy_n((*body.t0)[c.vertex[i]].data(), 3, pair.x[0][i]);
-    std::copy_n((*body.t1)[c.vertex[i]].data(), 3, pair.x[1][i]);
-  }
-  const ElementaryResult again = testPair(*rung_, c.kind, pair);
-  const bool is_same = again.verdict == (c.certainty == Certainty::CERTAIN ? Verdict::CONTACT : Verdict::UNDECIDED) &&
-                       again.toc_lower == c.toc_lower && again.toc_upper == c.toc_upper;
-  return is_same ? toString(again.tier) : "";
-}
-
 std::size_t PlayerData::shapeOf(const std::shared_ptr<const Topology>& topology) {
   const auto same = [&](const Shape& s) { return s.topology && (s.topology == topology || *s.topology == *topology); };
   // The newest first: a body that changes is seldom what it was long ago.
@@ -141,7 +119,6 @@ std::string PlayerData::detailsOf(const Outcome& o, StampNs origin_ns) const {
                   (c.expected ? 8 : 0));
     row.push_back(c.toc_lower);
     row.push_back(c.toc_upper);
-    row.push_back(tierOf(o, c));
     row.push_back(rounded(contactGeometry(o, c).point));
     const std::uint32_t patch = i < o.patch_of.size() ? o.patch_of[i] : NO_PATCH;
     row.push_back(patch == NO_PATCH ? 0 : o.patches[patch].id);
@@ -322,7 +299,7 @@ std::string PlayerData::json() {
   }
   // In the order of the frames: of each body its shape, or -1; then its positions in `bytes`.
   std::string text =
-      "{\"bodies\":" + dumped(bodies) + ",\"rung\":" + dumped(rung_name_) + ",\"seen\":" + std::to_string(seen_) +
+      "{\"bodies\":" + dumped(bodies) + ",\"seen\":" + std::to_string(seen_) +
       ",\"not_finite\":" + std::to_string(NOT_FINITE) + ",\"most_contacts\":" + std::to_string(MOST_CONTACTS) +
       ",\"maps_left_out\":" + std::to_string(maps_left_out_) + ",\"maps\":" + dumped(maps) + ",\"shapes\":[";
   for (std::size_t s = 0; s < shapes_.size(); ++s) text += (s ? "," : "") + shapes_[s].json;

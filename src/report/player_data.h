@@ -25,8 +25,6 @@ class PlayerData {
 
   explicit PlayerData(std::size_t budget_bytes = BUDGET_BYTES) : budget_bytes_(budget_bytes) {}
 
-  /// What the run was answered with: the tier of a contact is found by asking its pair again.
-  void setAccuracy(const AccuracyOptions& accuracy);
   /// `keep`: this frame is never left out.
   void add(const Outcome& outcome, const std::vector<Body>& bodies, StampNs origin_ns, bool keep);
   /// JSON of all of it; at most about the budget, except for what may never be left out.
@@ -72,7 +70,6 @@ class PlayerData {
   Place placeOf(std::size_t body, const Body& what, bool at_start);
   std::size_t shapeOf(const std::shared_ptr<const Topology>& topology);
   std::string detailsOf(const Outcome& outcome, StampNs origin_ns) const;
-  std::string tierOf(const Outcome& outcome, const Contact& contact) const;
   void addFrame(Frame frame);
   void addVoxels(const Outcome& outcome, double from_s);
   void thin();
@@ -89,8 +86,6 @@ class PlayerData {
   std::uint64_t count_[3] = {0, 0, 0};
   StampNs end_ns_ = 0;
   bool any_ = false;
-  std::unique_ptr<Rung> rung_;  // null: not asked
-  std::string rung_name_;
   std::vector<Voxels> voxels_;
   std::size_t voxels_kept_ = 0, maps_left_out_ = 0;
   std::shared_ptr<const VoxelSurface> surface_;

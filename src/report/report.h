@@ -13,7 +13,6 @@
 #include "dccd/effect_plan.h"
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
-#include "report/contact_log.h"
 #include "report/lanes.h"
 #include "report/latency_histogram.h"
 #include "report/player_data.h"
@@ -31,12 +30,9 @@ class Report {
 
   void add(const Outcome& outcome, const std::vector<Body>& bodies);
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
-  /// Before the first outcome: what they are answered with.
-  void setAccuracy(const AccuracyOptions& accuracy) { player_.setAccuracy(accuracy); }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
-  void setRungs(const std::vector<RungCost>& rungs) { rungs_ = rungs; }
   /// AccuracyStudy::json().
   void setStudy(nlohmann::json study) { study_ = std::move(study); }
   /// Facts for the head of the page: name -> value, in the order given.
@@ -99,7 +95,6 @@ class Report {
   std::vector<EffectDecision> effects_;
   ContactLanes lanes_;
   PlayerData player_;
-  std::vector<RungCost> rungs_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
   FrameCounters counters_;

@@ -154,21 +154,6 @@ nlohmann::json Report::json() const {
   j["left_out"] = {{"pairs", left_out_}, {"met", sum_.left_out_met}};
   j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
-  for (std::size_t t = 0; t < sum_.tiers.settled.size(); ++t) {
-    j["tiers"][toString(static_cast<Tier>(t))] = sum_.tiers.settled[t];
-  }
-  j["rungs"] = nlohmann::json::array();
-  for (const RungCost& r : rungs_) {
-    j["rungs"].push_back({{"rung", r.rung},
-                          {"steps", r.steps},
-                          {"contacts", r.contacts},
-                          {"missed", r.missed},
-                          {"false", r.false_contacts},
-                          {"undecided", r.undecided},
-                          {"median_ms", r.median_ms},
-                          {"p95_ms", r.p95_ms},
-                          {"max_toc_error", r.max_toc_error}});
-  }
   j["study"] = study_;
   j["partners"] = lanes_.json();
   j["bodies"] = heatJson();

@@ -120,10 +120,6 @@ HWY_INLINE void runBatch(const BatchInput& in, const BatchOutput& out) {
   }
 }
 
-void exactBatchOn(const BatchInput& in, const BatchOutput& out) { runBatch<true>(in, out); }
-void fastBatchOn(const BatchInput& in, const BatchOutput& out) { runBatch<false>(in, out); }
-const char* targetName() { return hwy::TargetName(HWY_TARGET); }
-
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
 }  // namespace dccd

@@ -12,19 +12,29 @@
 
 #include "simd/exact_batch-inl.h"
 
+HWY_BEFORE_NAMESPACE();
+namespace dccd {
+namespace simd {
+namespace HWY_NAMESPACE {
+
+void exactBatchOn(const BatchInput& in, const BatchOutput& out) { runBatch<true>(in, out); }
+const char* targetName() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace simd
+}  // namespace dccd
+HWY_AFTER_NAMESPACE();
+
 #if HWY_ONCE
 namespace dccd {
 namespace simd {
 
 HWY_EXPORT(exactBatchOn);
-HWY_EXPORT(fastBatchOn);
 HWY_EXPORT(targetName);
 
 void exactBatch(const BatchInput& input, const BatchOutput& output) {
   HWY_DYNAMIC_DISPATCH(exactBatchOn)(input, output);
 }
-
-void fastBatch(const BatchInput& input, const BatchOutput& output) { HWY_DYNAMIC_DISPATCH(fastBatchOn)(input, output); }
 
 const char* batchTargetName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
 

@@ -1,7 +1,7 @@
 // Batched elementary tests: pairs as lanes, double precision, 1/2/4/8 wide by SIMD target, chosen at run time.
 // exactBatch() is tier T1 of the exact test: every verdict but UNDECIDED is proved, rounding included (the bounds are
-// derived in exact_batch_bounds.h). fastBatch() is the same kernel without the bounds. Both use only correctly rounded
-// operations in one fixed order, so that each lane's result is the same bit for bit on every target.
+// derived in exact_batch_bounds.h). It uses only correctly rounded operations in one fixed order, so that each lane's
+// result is the same bit for bit on every target. The rival `fast` (paper/) is the same kernel without the bounds.
 // Raw arrays only: this folder includes nothing of the package.
 #pragma once
 
@@ -43,10 +43,6 @@ struct BatchOutput {
 
 /// The certified double tier. Allocates nothing; safe from several threads. Rounding must be to nearest.
 void exactBatch(const BatchInput& input, const BatchOutput& output);
-
-/// The same kernel without bounds: BATCH_NO or BATCH_YES for every pair, either of which may be wrong near a tie;
-/// lo = hi = the approximate TOC, cell its cell.
-void fastBatch(const BatchInput& input, const BatchOutput& output);
 
 /// Name of the SIMD target in use, e.g. "AVX2".
 const char* batchTargetName();

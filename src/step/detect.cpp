@@ -291,7 +291,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const bool all_pairs = result.complete;
   if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (map_reduced && scene.meetsObstacle()) runMap(part);
-  rememberApart(all_pairs && !options->earliest_only && provesAnswers(options->accuracy.rung));
+  rememberApart(all_pairs && !options->earliest_only);
   if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
   runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
   addPart(part.index, part.count, result, outcome);

@@ -252,9 +252,7 @@ const char* toString(Effect effect) {
 EffectPlan::EffectPlan(const EffectScene& scene, const EffectSettings& settings) {
   for (std::size_t e = 0; e < std::size(FIND); ++e) {
     const Effect effect = static_cast<Effect>(e);
-    const auto setting = settings.find(effect);
-    decisions_.push_back(
-        decide(toString(effect), setting == settings.end() ? EffectSetting::AUTO : setting->second, FIND[e](scene)));
+    decisions_.push_back(decide(toString(effect), settingOf(settings, effect), FIND[e](scene)));
   }
   if (!running(Effect::OCTOMAP)) return;
   const bool faces = !ropesOnly(scene);

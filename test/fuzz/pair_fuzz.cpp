@@ -104,8 +104,6 @@ const std::vector<FuzzedRung>& rungs() {
     }
     options.rung = Accuracy::CONSERVATIVE;
     add(options);
-    options.rung = Accuracy::FAST;
-    add(options);
     return result;
   }();
   return all;

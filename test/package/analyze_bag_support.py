@@ -29,13 +29,13 @@ class AnalyzeBagTestCase(FolderTestCase):
     def analyze(cls, name, bag, *words):
         """The folder of the report, which has the contacts of some steps."""
         report = cls.folder / name
-        cls.tool('analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words)
+        cls.tool('analyze_bag', bag, '--report', report, '--quiet', *words)
         return report
 
     def analyzed(self, name, bag, *words):
         """Exit status, standard output and error, and the statuses of the steps; whatever comes of it."""
         report = self.folder / name
-        command = [TOOLS / 'analyze_bag', bag, '--report', report, '--no-accuracy-table', '--quiet', *words]
+        command = [TOOLS / 'analyze_bag', bag, '--report', report, '--quiet', *words]
         ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
         self.assertIn(ran.returncode, (0, 3), ran.stderr)
         return ran.returncode, ran.stdout, ran.stderr, self.statuses_of(report)

@@ -46,7 +46,7 @@ class FleetTest(FolderTestCase):
         self.assertEqual(states['corrupt'], 'failed')
         for name, bag in (('first', self.first), ('second', self.second)):
             whole = self.folder / ('whole_' + name)
-            run(TOOLS / 'analyze_bag', bag, '--report', whole, '--no-accuracy-table', '--quiet', '--params', self.params)
+            run(TOOLS / 'analyze_bag', bag, '--report', whole, '--quiet', '--params', self.params)
             for table in TABLES:
                 self.assertEqual((self.out / 'recordings' / name / 'report' / table).read_bytes(), (whole / table).read_bytes(), table)
             events = list(csv.DictReader((whole / 'events.csv').read_text().splitlines()))

@@ -92,11 +92,6 @@ class CheckStepTest(unittest.TestCase):
     def test_a_budget_that_was_cut(self):
         self.refused('the step budget ran out', sheet(0) + sheet(0.1), sheet(0) + sheet(-0.1), '--budget', '0.001')
 
-    def test_fast(self):
-        self.refused('accuracy fast', sheet(0) + sheet(0.1), sheet(0) + sheet(0.05), '--accuracy', 'fast')
-        self.assertEqual(self.check(sheet(0) + sheet(0.1), sheet(0) + sheet(0.05), '--accuracy', 'all'), 0, 'exact decides')
-        self.assertIn('fast: not proved', self.said)
-
     def obj(self, points, polygons, ends=None):
         """The step of an OBJ from the points to the ends."""
         with tempfile.TemporaryDirectory() as folder:

@@ -12,7 +12,6 @@ OPTIONS = {
     'check_step': (['a.obj', 'a.obj'], ['--threads', '--toc-bits', '--repeat'], ['--tolerance', '--budget']),
     'analyze_bag': (['a.obj', '--report', 'report'], ['--threads'], ['--look-ahead']),
     'replay_step': (['a.obj'], ['--threads', '--show'], []),
-    'run_queries': (['.'], ['--toc-bits', '--max-subdivisions'], ['--tolerance']),
     'make_scene_bag': (['a.yaml', 'a.bag'], ['--frames', '--seed'], ['--rate']),
     'analyze_fleet': (['--out', 'out'], ['--threads', '--jobs'], []),
 }

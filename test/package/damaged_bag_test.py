@@ -33,8 +33,7 @@ class DamagedBagTest(FolderTestCase):
         bag.close()
 
     def analyze(self, bag):
-        command = [str(TOOLS / 'analyze_bag'), str(bag), '--mesh', '/cloth', '--report', str(self.folder / 'report'),
-                   '--no-accuracy-table', '--quiet']
+        command = [str(TOOLS / 'analyze_bag'), str(bag), '--mesh', '/cloth', '--report', str(self.folder / 'report'), '--quiet']
         return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
 
     def refused(self, bag):
@@ -89,7 +88,7 @@ class DamagedBagTest(FolderTestCase):
         params = self.folder / 'world.yaml'
         params.write_text('fixed_frame: world\n')
         ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(path), '--mesh', '/cloth', '--params', str(params), '--report',
-                              str(self.folder / 'report'), '--no-accuracy-table', '--quiet'],
+                              str(self.folder / 'report'), '--quiet'],
                              capture_output=True, text=True, check=False, timeout=60)
         self.assertEqual(ran.returncode, 3, ran.stderr)
         words = "transforms of 'camera' are left out: its rotation x y z w (0 0 0 1.2) has the length 1.2; publish a quaternion"

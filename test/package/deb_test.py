@@ -29,7 +29,7 @@ STORY = r'''
 # Not grep -q: what writes to a pipe that is closed fails.
 share=/usr/share/deformable_ccd
 [ "$(rospack find deformable_ccd)" = $share ]
-for tool in make_scene_bag analyze_bag check_step run_queries replay_step; do
+for tool in make_scene_bag analyze_bag check_step replay_step; do
   rosrun deformable_ccd $tool --help >/dev/null
 done
 rosmsg show deformable_ccd/ContactArray | grep 'Contact\[\] contacts' >/dev/null

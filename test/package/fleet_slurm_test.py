@@ -124,7 +124,7 @@ class SlurmTest(FolderTestCase):
         self.assertEqual((states['failed'], states['missing']), (1, 0), (states, again.stderr))
         whole = self.folder / 'whole'
         for bag, _ in made[:3]:
-            run(TOOLS / 'analyze_bag', bag, '--report', whole, '--no-accuracy-table', '--quiet', '--params', params)
+            run(TOOLS / 'analyze_bag', bag, '--report', whole, '--quiet', '--params', params)
             for table in TABLES:
                 self.assertEqual((out / 'recordings' / bag.stem / 'report' / table).read_bytes(), (whole / table).read_bytes(), table)
 

@@ -81,9 +81,8 @@ class LayeringTest(unittest.TestCase):
         self.assertEqual(wrong, [])
 
     def test_libraries_and_tools_need_neither_tests_nor_paper(self):
-        """run_queries shows how the rungs err, and so needs the oracle; nothing else does."""
         wrong = ['%s includes %s' % (name(path), target) for path in code_under('src') for _, target in includes(path)
-                 if target.startswith(OUTSIDE) and not (path.name == 'run_queries.cpp' and target.startswith('oracle/'))]
+                 if target.startswith(OUTSIDE)]
         self.assertEqual(wrong, [])
 
     def test_core_handles_no_signals_and_writes_no_page(self):

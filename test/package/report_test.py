@@ -54,14 +54,14 @@ class ReportPageTest(unittest.TestCase):
     def test_draws_in_a_browser(self):
         body, console = self.dom()
         self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
-        for name, least in (('contacts', 10), ('toc', 10), ('rungs_plot', 2), ('study_plot', 15)):
+        for name, least in (('contacts', 10), ('toc', 10), ('study_plot', 15)):
             drawn = body[body.index('id="%s"' % name):].split('</svg>')[0]
             self.assertGreater(len(re.findall(r'<(?:rect|circle)\b', drawn)), least, name)
         self.assertIn('<polyline', body)
         heat = body[body.index('id="heat"'):].split('<h2')[0]
         self.assertEqual(heat.count('<canvas'), 2, 'how often, and when first: of a sheet one side')
         self.assertNotIn('seen from', heat)
-        for name in ('seams', 'stages', 'effects', 'rungs', 'study', 'tiers'):
+        for name in ('seams', 'stages', 'effects', 'study'):
             rows = body[body.index('id="%s"' % name):].split('</table>')[0].count('<tr')
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
@@ -80,7 +80,6 @@ class ReportPageTest(unittest.TestCase):
         self.assertRegex(facts, r'deformable_ccd \d+\.\d+\.\d+, compiled by ')
         self.assertRegex(facts, r'<summary>\S*scene\.yaml</summary><pre>[^<]*minimum_separation_m: 0\.012')
         self.assertRegex(facts, r'\d+ CLEAR, \d+ INTERSECTING, \d+ NOT_CHECKED; frames without an answer: 1')
-        self.assertRegex(body, r'id="rungs_note">Missed and false are against the run with conservative[^;]*; ')
 
     def browser(self):
         """A page of 1280 x 1000 pixels, drawn by software; its console is empty at the end."""
@@ -125,7 +124,7 @@ class ReportPageTest(unittest.TestCase):
         actions.pointer_action.move_to_location(round(x), round(y)).click()
         actions.perform()
         self.assertRegex(text('picked'), r'^Contact, .*: cloth vert.* \d.*; certain, new\. Time of contact between .* wide\. '
-                                         r'Settled by tier \w+\. Part of patch \d+\.$')
+                                         r'Part of patch \d+\.$')
         near = page.execute_script("""return player.items().filter((_, i) => { const [x, y] = player.screenOf(i);
             return Math.hypot(x - arguments[0], y - arguments[1]) < 2; }).map(item => item.text)""", x, y)
         self.assertIn(text('picked'), near, 'what was clicked, or what lies on the same spot')

@@ -64,7 +64,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
         rope, params, out = self.folder / 'rope.bag', self.folder / 'rope.yaml', self.folder / 'rope_out.bag'
         self.tool('make_scene_bag', CHECKOUT / 'config/scenes/rope_through_ring.yaml', rope, '--monitor-config', params, '--quiet')
         params.write_text(params.read_text() + '\nmarkers: {mesh: true}\nexpected_contacts:\n  - {between: [rope, octomap]}\n')
-        self.analyze('rope', rope, '--params', params, '--no-accuracy-table', '-o', out)
+        self.analyze('rope', rope, '--params', params, '-o', out)
         drawn = [{m.ns: m for m in message.markers} for topic, message, _ in messages_of(out) if topic == OWN + 'markers']
         meshes = [markers['mesh/rope'] for markers in drawn if 'mesh/rope' in markers]
         self.assertEqual({m.type for m in meshes}, {Marker.TRIANGLE_LIST})
@@ -75,7 +75,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
     def test_the_bag_of_results_has_every_topic_of_the_node(self):
         out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
         params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\n')  # more than the cloth's edges
-        self.analyze('all', self.bag, '--params', params, '--no-accuracy-table', '-o', out)
+        self.analyze('all', self.bag, '--params', params, '-o', out)
         by_topic = collections.defaultdict(list)
         for topic, message, _ in messages_of(out):
             by_topic[topic].append(message)

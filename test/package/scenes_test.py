@@ -32,7 +32,7 @@ def analyse(scene, folder):
     recorded = run(TOOLS / 'make_scene_bag', scene, bag, '--monitor-config', config, '--quiet')
     assert recorded.returncode == 0, recorded.stderr
     report = folder / scene.stem
-    analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet', '--no-accuracy-table')
+    analysed = run(TOOLS / 'analyze_bag', bag, '--report', report, '--params', config, '--quiet')
     assert analysed.returncode == 0, analysed.stderr
     return steps_of(report), events_of(report), json.loads((report / 'report.json').read_text())
 

@@ -49,11 +49,9 @@ std::vector<AccuracyOptions> allRungs() {
     options.toc_bits = bits;
     rungs.push_back(options);
   }
-  for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::FAST}) {
-    options = AccuracyOptions();
-    options.rung = rung;
-    rungs.push_back(options);
-  }
+  options = AccuracyOptions();
+  options.rung = Accuracy::CONSERVATIVE;
+  rungs.push_back(options);
   return rungs;
 }
 

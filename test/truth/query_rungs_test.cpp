@@ -16,8 +16,6 @@ namespace {
 std::vector<AccuracyOptions> allOptions() {
   std::vector<AccuracyOptions> all;
   AccuracyOptions options;
-  options.rung = Accuracy::FAST;
-  all.push_back(options);
   options.rung = Accuracy::CONSERVATIVE;
   for (double tolerance : {1e-3, 1e-6, 1e-9}) {
     options.tolerance_m = tolerance;

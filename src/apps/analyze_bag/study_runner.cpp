@@ -1,32 +1,24 @@
 #include "apps/analyze_bag/study_runner.h"
 
 #include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <limits>
-#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
 
 #include "apps/analyze_bag/thinned_mesh.h"
 #include "dccd/accuracy.h"
-#include "dccd/regular_file.h"
-#include "report/accuracy_settings.h"
 #include "stream/quantile.h"
 
 namespace dccd {
 namespace {
 
-namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr int FORMAT = 1;  // of the kept runs
 constexpr std::size_t FRAMES[] = {2, 4, 8}, ROWS[] = {2, 4}, VOXELS[] = {2, 4, 8};
 constexpr double NOISE_M[] = {0.001, 0.003};
 constexpr int BUDGETS[] = {1, 2, 4};  // parts of what 95 % of the reference's steps keep to
@@ -49,6 +41,37 @@ std::string text(double value) {
     out << std::setprecision(2) << value;
   }
   return out.str();
+}
+
+struct AccuracySetting {
+  std::string name;
+  AccuracyOptions accuracy;
+};
+
+/// One for each rung and knob that makes a difference.
+std::vector<AccuracySetting> accuracySettings() {
+  std::vector<AccuracySetting> settings;
+  for (const auto& [text, tolerance_m] : {std::pair("1e-3", 1e-3), {"1e-6", 1e-6}, {"1e-9", 1e-9}}) {
+    settings.push_back({std::string("conservative ") + text, {}});
+    settings.back().accuracy.rung = Accuracy::CONSERVATIVE;
+    settings.back().accuracy.tolerance_m = tolerance_m;
+  }
+  for (const int bits : {10, 32, 52}) {
+    settings.push_back({"exact 2^-" + std::to_string(bits), {}});
+    settings.back().accuracy.toc_bits = bits;
+  }
+  return settings;
+}
+
+/// Every contact of the bag is wanted and nothing ends a step: no budget, no limit, no predictions.
+MonitorConfig unlimited(MonitorConfig config) {
+  Options& detector = config.monitor.detector;
+  detector.step_budget_ms = detector.max_compute_ms = 0;
+  detector.max_contacts = std::numeric_limits<std::size_t>::max();
+  detector.max_found = detector.max_found_per_feature = 0;
+  config.monitor.look_ahead_s = 0;
+  config.effects.erase(Effect::LOOK_AHEAD);
+  return config;
 }
 
 AccuracyOptions finest(const MonitorConfig& config) {
@@ -126,50 +149,27 @@ std::vector<Variant> coarserThings(const Variant& whole, const RunRecord& refere
   return variants;
 }
 
-/// A file is known by its size and its time.
-nlohmann::json identityOf(const std::string& file) {
-  if (file.empty()) return nullptr;
-  return {fs::file_size(file), fs::last_write_time(file).time_since_epoch().count()};
-}
-
 class StudyRunner {
  public:
-  StudyRunner(const std::string& bag, const BagReplayOptions& options, const std::string& folder)
-      : bag_(bag), options_(options), folder_(folder) {
-    fs::create_directories(folder_);
-  }
+  StudyRunner(const std::string& bag, const BagReplayOptions& options) : bag_(bag), options_(options) {}
 
-  /// The kept run, or a new one, which is kept; `left`: how many come after it.
+  /// `left`: how many come after it.
   RunRecord run(const Variant& variant, std::size_t left) {
-    const std::string name = variant.varied + ' ' + variant.setting;
-    const nlohmann::json key{{"format", FORMAT},
-                             {"bag", identityOf(bag_)},
-                             {"octomap", identityOf(options_.octomap_file)},
-                             {"parameters", variant.config.hash()},
-                             {"variant", name}};
-    const fs::path file = folder_ / (fileName(name) + ".json");
-    if (std::optional<RunRecord> kept = read(file, key)) return *std::move(kept);
-    if (options_.show_progress) std::cerr << "accuracy study: " << name << timeLeft(left + 1) << '\n';
+    if (options_.show_progress) {
+      std::cerr << "accuracy study: " << variant.varied << ' ' << variant.setting << timeLeft(left + 1) << '\n';
+    }
     const Clock::time_point start = Clock::now();
     BagReplayOptions options = options_;
     options.variation = variant.variation;
     RunRecorder recorder;
     BagReplay(bag_, variant.config, options)
         .run([&](const Outcome& o, MonitorPipeline&, const BagReplaySummary&, const ros::Time&) { recorder.add(o); });
-    const RunRecord record = recorder.take();
     spent_s_ += std::chrono::duration<double>(Clock::now() - start).count();
     ++runs_;
-    write(file, key, record);
-    return record;
+    return recorder.take();
   }
 
  private:
-  static std::string fileName(std::string name) {
-    std::replace_if(
-        name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '-'; }, '_');
-    return name;
-  }
-
   std::string timeLeft(std::size_t runs) const {
     const std::string count = ", " + std::to_string(runs) + (runs == 1 ? " run left" : " runs left");
     if (runs_ == 0) return count;
@@ -177,49 +177,15 @@ class StudyRunner {
     return count + ", about " + std::to_string(std::lround(std::ceil(left_s))) + " s";
   }
 
-  static std::optional<RunRecord> read(const fs::path& file, const nlohmann::json& key) {
-    std::ifstream in;
-    if (regularFileProblem(file).empty()) in.open(file);
-    if (!in.is_open()) return std::nullopt;
-    try {
-      const nlohmann::json kept = nlohmann::json::parse(in);
-      if (kept.at("key") == key) return RunRecord::fromJson(kept.at("run"));
-    } catch (const nlohmann::json::exception&) {  // of another version, or by another's hand: it is run anew
-    }
-    return std::nullopt;
-  }
-
-  /// Under its name when it is whole.
-  static void write(const fs::path& file, const nlohmann::json& key, const RunRecord& record) {
-    const fs::path unfinished = file.string() + ".part";
-    std::ofstream out(unfinished);
-    out << nlohmann::json{{"key", key}, {"run", record.json()}} << '\n';
-    out.close();
-    if (!out) throw std::runtime_error(unfinished.string() + ": cannot be written");
-    fs::rename(unfinished, file);
-  }
-
   std::string bag_;
   BagReplayOptions options_;
-  fs::path folder_;
   double spent_s_ = 0;
   std::size_t runs_ = 0;
 };
 
 }  // namespace
 
-MonitorConfig unlimited(MonitorConfig config) {
-  Options& detector = config.monitor.detector;
-  detector.step_budget_ms = detector.max_compute_ms = 0;
-  detector.max_contacts = std::numeric_limits<std::size_t>::max();
-  detector.max_found = detector.max_found_per_feature = 0;
-  config.monitor.look_ahead_s = 0;
-  config.effects.erase(Effect::LOOK_AHEAD);
-  return config;
-}
-
-AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options,
-                       const std::string& folder) {
+AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options) {
   Variant whole{REFERENCE, "", unlimited(config), {}, false};
   Options& detector = whole.config.monitor.detector;
   detector.accuracy = finest(config);
@@ -227,7 +193,7 @@ AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, cons
   detector.suppress_initial = false;
   detector.earliest_only = false;
   whole.setting = nameOf(detector.accuracy);
-  StudyRunner runner(bag, options, folder);
+  StudyRunner runner(bag, options);
   constexpr std::size_t ABOUT = 20;  // how many runs there are is known once the reference is
   AccuracyStudy study(runner.run(whole, ABOUT));
   study.add(whole.varied, whole.setting, study.reference());

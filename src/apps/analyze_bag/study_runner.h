@@ -8,13 +8,8 @@
 
 namespace dccd {
 
-/// For a run of which every contact of the bag is wanted and nothing ends a step: no budget, no limit, no predictions.
-MonitorConfig unlimited(MonitorConfig config);
-
-/// The reference is the bag as it was recorded, with the finest setting that the configuration allows. Each run is kept
-/// as a file of `folder`, and taken from there when bag and configuration are the same: what was stopped goes on.
-/// Throws what BagReplay throws, and std::runtime_error naming a file that cannot be written.
-AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options,
-                       const std::string& folder);
+/// The reference is the bag as it was recorded, with the finest setting that the configuration allows. Throws what
+/// BagReplay throws.
+AccuracyStudy runStudy(const std::string& bag, const MonitorConfig& config, const BagReplayOptions& options);
 
 }  // namespace dccd

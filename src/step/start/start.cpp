@@ -1,6 +1,5 @@
 // What meets, or is inside of something, where a step begins: when it is looked for, for how long, and what is kept of
 // it.
-#include "dccd/accuracy.h"
 #include "step/history.h"
 
 namespace dccd {
@@ -36,10 +35,8 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   if (isStartKnown()) {
     forget();
   } else {
-    // With earliest_only the later contacts are unknown, and a rung may miss some, so nothing may be concluded about
-    // the end of the step.
-    const bool complete =
-        all_pairs && !options->earliest_only && stats.unchecked_vertices == 0 && provesAnswers(options->accuracy.rung);
+    // With earliest_only the later contacts are unknown: nothing may be concluded about the end of the step.
+    const bool complete = all_pairs && !options->earliest_only && stats.unchecked_vertices == 0;
     carried.start_state.remember(scene, result.contacts, complete);
     carried.inside.remember(scene, result.contacts, complete);
   }

@@ -28,7 +28,6 @@ StepRecording alone(std::size_t body) {
 std::map<std::string, StepRecording> seeds() {
   MonitorOptions all = expecting();
   all.detector.patches = true;
-  all.detector.off.add(Effect::LOOK_AHEAD);
   StepRecording nothing;
   nothing.step.stamp_ns = 1;
   return {{"conservative_without_map", recordScene(with(Accuracy::CONSERVATIVE), false)},

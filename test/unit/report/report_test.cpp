@@ -51,10 +51,9 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
             "No contact found in 2 answered steps; not proved: 1 of 4 frames: NO_TRANSFORM: no transform from 'camera' "
             "to 'world' (1).");
   Outcome doubtful = clear;
-  doubtful.unproved = {"accuracy fast misses contacts and proves nothing", "and more"};
+  doubtful.unproved = {"1 vertices are not finite", "and more"};
   EXPECT_EQ(headlineOf({doubtful}),
-            "No contact found in 1 answered steps; not proved: 1 of 1 frames: accuracy fast "
-            "misses contacts and proves nothing (1).");
+            "No contact found in 1 answered steps; not proved: 1 of 1 frames: 1 vertices are not finite (1).");
 }
 
 TEST(Headline, ExpectedContactsAreToldApart) {

@@ -36,9 +36,9 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   suppressed.suppressed = 3;
   suppressed.touching = Touching::LASTING;
   EXPECT_EQ(summaryOf(suppressed), "no contact found, but 3 initial ones suppressed, starts CLEAR");
-  Outcome fast = nothingFound(StepStatus::OK, StartState::CLEAR);
-  fast.unproved = {"accuracy fast misses contacts and proves nothing"};
-  EXPECT_EQ(summaryOf(fast), "no contact found, but accuracy fast misses contacts and proves nothing, starts CLEAR");
+  Outcome doubtful = nothingFound(StepStatus::OK, StartState::CLEAR);
+  doubtful.unproved = {"1 vertices are not finite"};
+  EXPECT_EQ(summaryOf(doubtful), "no contact found, but 1 vertices are not finite, starts CLEAR");
   Outcome unanswered;
   unanswered.status = StepStatus::GAP;
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");

@@ -24,7 +24,7 @@ TEST(Parameters, TheHashTellsConfigurationsApart) {
 TEST(Parameters, TheHashTellsLiveValuesApart) {
   const MonitorConfig given = readConfig(XmlRpcValue());
   const std::function<void(MonitorConfig&)> changes[] = {
-      [](MonitorConfig& c) { c.monitor.detector.accuracy.rung = Accuracy::FAST; },
+      [](MonitorConfig& c) { c.monitor.detector.accuracy.rung = Accuracy::CONSERVATIVE; },
       [](MonitorConfig& c) { c.monitor.detector.step_budget_ms = 5; },
       [](MonitorConfig& c) { c.monitor.store.max_step_s = 0.25; },
       [](MonitorConfig& c) { c.monitor.store.max_vertex_step_m = 0.25; },

@@ -50,8 +50,6 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
     std::function<void(XmlRpcValue&)> set;
   };
   const Case cases[] = {
-      {"~accuracy is 'fast', which proves nothing and is no setting of a monitor; write exact",
-       [](XmlRpcValue& t) { t["accuracy"] = "fast"; }},
       {"~accuracy is 'exactly', it must be one of conservative, exact; nearest is 'exact'",
        [](XmlRpcValue& t) { t["accuracy"] = "exactly"; }},
       {"~record_stesp is not known; nearest is ~record_steps", [](XmlRpcValue& t) { t["record_stesp"] = 3; }},

@@ -96,18 +96,6 @@ TEST(Parameters, ADistanceMakesItConservativeWhereNothingElseIsChosen) {
   EXPECT_FALSE(off.holdsDistance());
 }
 
-TEST(Parameters, TheFlowIsToldOfEachEffectThatIsOff) {
-  for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
-    const Effect effect = static_cast<Effect>(e);
-    XmlRpcValue tree;
-    tree["bodies"]["cloth"]["topic"] = "cloth";
-    tree["effects"][toString(effect)] = "off";
-    EffectSet only;
-    only.add(effect);
-    EXPECT_TRUE(readConfig(tree).monitor.detector.off == only) << toString(effect);
-  }
-}
-
 TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
   XmlRpcValue tree;
   tree["bodies"]["a_finger"]["rigid"]["mesh"] = "no_such_file.stl";

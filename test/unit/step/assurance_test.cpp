@@ -92,7 +92,6 @@ const std::vector<Missing>& list() {
        }},
       {"the start state", "whether surfaces cross at the start", [](Asked& a) { a.options.check_start_state = false; }},
       {"the time that it takes", "the step budget ran out", [](Asked& a) { a.options.step_budget_ms = 1e-6; }},
-      {"a rung that proves", "accuracy fast", [](Asked& a) { a.options.accuracy.rung = Accuracy::FAST; }},
       {"paths that were seen", "was seen elsewhere", [](Asked& a) { a.step.off_path = "upper was seen elsewhere"; }},
       {"parts enough for a turn", "max_substeps is 2", turnFar},
   };

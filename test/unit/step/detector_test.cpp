@@ -30,7 +30,7 @@ std::string differenceOfResults(const Outcome& x, const Outcome& y) {
 TEST(Detector, TheSameForAnyNumberOfThreadsAndAnyTarget) {
   const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
   const TestStep step = crumpled(1, 3, 14);
-  for (const Accuracy rung : {Accuracy::FAST, Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
+  for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
     Options options;
     options.accuracy.rung = rung;
     const Outcome expected = runOnce(step, options);

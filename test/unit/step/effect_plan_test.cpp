@@ -394,18 +394,5 @@ TEST(EffectPlan, LinesSayOneThingEach) {
   EXPECT_EQ(plan.lines()[0], "self_collision: on, cloth deforms");
 }
 
-/// What a file or a caller says of effects that there are not is none of them, so that equal sets are equal.
-TEST(EffectSet, HoldsEffectsAndNothingElse) {
-  EffectSet all;
-  for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
-    const auto effect = static_cast<Effect>(e);
-    EXPECT_FALSE(all.has(effect)) << toString(effect);
-    all.add(effect);
-    EXPECT_TRUE(all.has(effect)) << toString(effect);
-    EXPECT_TRUE(EffectSet(all.bits()) == all);
-  }
-  EXPECT_TRUE(EffectSet(~std::uint64_t{0}) == all);
-}
-
 }  // namespace
 }  // namespace dccd

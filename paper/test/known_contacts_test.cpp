@@ -1,4 +1,4 @@
-#include "report/accuracy_settings.h"
+#include "paper/known_contacts.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,6 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
-
-#include "report/contact_log.h"
 
 namespace dccd {
 namespace test {
@@ -45,22 +43,6 @@ struct TruthFile {
     return "";
   }
 };
-
-TEST(AccuracySettings, ThereIsTheDefaultAndTheFinestIsTheLast) {
-  const std::vector<AccuracySetting> settings = accuracySettings();
-  EXPECT_EQ(settings.back().accuracy.rung, Accuracy::EXACT);
-  EXPECT_EQ(settings.back().accuracy.toc_bits, 52);
-  std::size_t usual = 0;
-  for (const AccuracySetting& setting : settings) {
-    EXPECT_NO_THROW(makeRung(setting.accuracy)) << setting.name;
-    if (setting.name != DEFAULT_SETTING) continue;
-    ++usual;
-    const AccuracyOptions options;
-    EXPECT_EQ(setting.accuracy.rung, options.rung);
-    EXPECT_EQ(setting.accuracy.toc_bits, options.toc_bits);
-  }
-  EXPECT_EQ(usual, 1u);
-}
 
 TEST(KnownContacts, PairsAreTheSameWhicheverWayRoundTheyAreGiven) {
   using K = KnownContacts;
@@ -119,14 +101,6 @@ TEST(AccuracyErrors, TheWidthOfTheCellsCounts) {
   EXPECT_EQ(tocError({0.25, 0.5}, {0.25, 0.5}), 0.25) << "the time may be at the other end";
   EXPECT_EQ(tocError({0, 1}, {0.25, 0.25}), 0.75);
   EXPECT_EQ(tocError({0.5, 0.5}, {0.25, 0.375}), 0.25);
-}
-
-TEST(ContactLog, ALateUpperEndIsAnErrorToo) {
-  ContactLog exact, rung;
-  exact.add(answer({contact(PairKind::VERTEX_FACE, {7, 1, 2, 3}, 0.5, 0.5)}));
-  rung.add(answer({contact(PairKind::VERTEX_FACE, {7, 1, 2, 3}, 0.5, 0.75)}));
-  EXPECT_EQ(rung.against(exact, "r").max_toc_error, 0.25);
-  EXPECT_EQ(exact.against(exact, "e").max_toc_error, 0);
 }
 
 TEST(MedianOf, OrderStatisticsOfKnownValues) {

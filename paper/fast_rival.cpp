@@ -1,9 +1,9 @@
-// The rung `fast`: the batched kernel of the exact test without its bounds. Floating point all the way: an answer near
-// a tie may be wrong either way, and the TOC is approximate.
-#include <algorithm>
+#include "paper/fast_rival.h"
 
-#include "dccd/elementary.h"
-#include "elementary/batch_input.h"
+#include <algorithm>
+#include <stdexcept>
+
+#include "paper/simd/fast_batch.h"
 #include "simd/float_mode.h"
 
 namespace dccd {
@@ -11,19 +11,25 @@ namespace {
 
 constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs lie on the stack at once
 
-class FastRung : public Rung {
+class FastRival : public Rung {
  public:
   void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const override;
 };
 
-void FastRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+void FastRival::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
+  if (factsOf(batch.kind).isOnMap() || batch.minimum_separation_m) {
+    throw std::invalid_argument("fast takes pairs of mesh features without a separation");
+  }
   const ScopedFloatMode mode;
   std::uint8_t verdict[BLOCK];
   std::uint64_t cell[BLOCK];
   double lo[BLOCK], hi[BLOCK];
-  simd::BatchInput input = inputOf(batch, Accuracy::FAST);
+  simd::BatchInput input;
+  input.vertices = reinterpret_cast<const double*>(batch.vertices);
+  input.kind = batch.kind == PairKind::VERTEX_FACE ? simd::BatchKind::VERTEX_FACE : simd::BatchKind::EDGE_EDGE;
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
-    setBlock(batch, begin, BLOCK, input);
+    input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
+    input.count = std::min(BLOCK, batch.count - begin);
     simd::fastBatch(input, {verdict, cell, lo, hi});
     for (std::size_t i = 0; i < input.count; ++i) {
       ElementaryResult& result = results[begin + i];
@@ -40,6 +46,6 @@ void FastRung::run(const PairBatch& batch, ElementaryResult* results, TierCounte
 
 }  // namespace
 
-std::unique_ptr<Rung> makeFastRung(const AccuracyOptions&) { return std::make_unique<FastRung>(); }
+std::unique_ptr<Rung> makeFastRival() { return std::make_unique<FastRival>(); }
 
 }  // namespace dccd

@@ -1,4 +1,4 @@
-#include "report/accuracy_settings.h"
+#include "paper/known_contacts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -56,25 +56,6 @@ std::optional<Line> parse(std::string text) {
 }
 
 }  // namespace
-
-std::vector<AccuracySetting> accuracySettings() {
-  std::vector<AccuracySetting> settings;
-  const auto add = [&](const std::string& name, Accuracy rung, double tolerance_m, int toc_bits) {
-    AccuracySetting setting;
-    setting.name = name;
-    setting.accuracy.rung = rung;
-    setting.accuracy.tolerance_m = tolerance_m;
-    setting.accuracy.toc_bits = toc_bits;
-    settings.push_back(setting);
-  };
-  const AccuracyOptions usual;
-  add("fast", Accuracy::FAST, usual.tolerance_m, usual.toc_bits);
-  add("conservative 1e-3", Accuracy::CONSERVATIVE, 1e-3, usual.toc_bits);
-  add("conservative 1e-6", Accuracy::CONSERVATIVE, 1e-6, usual.toc_bits);
-  add("conservative 1e-9", Accuracy::CONSERVATIVE, 1e-9, usual.toc_bits);
-  for (const int bits : {10, 32, 52}) add("exact 2^-" + std::to_string(bits), Accuracy::EXACT, usual.tolerance_m, bits);
-  return settings;
-}
 
 double tocError(const TimeCell& found, const TimeCell& truth) {
   return std::max({std::abs(found.lower - truth.lower), std::abs(found.lower - truth.upper),

@@ -1,4 +1,4 @@
-// Settings of the accuracy ladder side by side: which there are, what each gets wrong, and how its time compares.
+// What a setting of the accuracy ladder gets wrong, and how its time compares.
 #pragma once
 
 #include <array>
@@ -12,15 +12,6 @@
 #include "dccd/outcome.h"
 
 namespace dccd {
-
-struct AccuracySetting {
-  std::string name;  ///< "exact 2^-32"
-  AccuracyOptions accuracy;
-};
-/// One setting for each rung and knob that makes a difference; the last is the finest.
-std::vector<AccuracySetting> accuracySettings();
-/// The one that the others' times are held against: what a monitor runs unless asked.
-constexpr const char* DEFAULT_SETTING = "exact 2^-32";
 
 /// An interval that holds a time of contact, in steps.
 struct TimeCell {

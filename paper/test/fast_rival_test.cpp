@@ -1,4 +1,4 @@
-// The rung `fast`: right away from ties, approximately in time, and close to the truth on the scenes.
+// The rival `fast`: right away from ties, approximately in time, and close to the truth on the scenes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +8,7 @@
 
 #include "dccd/elementary.h"
 #include "oracle/oracle.h"
+#include "paper/fast_rival.h"
 #include "support/data.h"
 #include "support/generators.h"
 #include "support/scene_data.h"
@@ -16,15 +17,9 @@ namespace dccd {
 namespace test {
 namespace {
 
-std::unique_ptr<Rung> fastTest() {
-  AccuracyOptions options;
-  options.rung = Accuracy::FAST;
-  return makeRung(options);
-}
-
-TEST(Fast, ApproximatesTheTimeOfContact) {
+TEST(FastRival, ApproximatesTheTimeOfContact) {
   RandomSource random(5);
-  const auto test = fastTest();
+  const auto test = makeFastRival();
   int contacts = 0, wrong = 0;
   for (int i = 0; i < 3000; ++i) {
     const Query query = hardQuery(random, i % 2 ? PairKind::EDGE_EDGE : PairKind::VERTEX_FACE, Hardness::GENERAL);
@@ -43,10 +38,10 @@ TEST(Fast, ApproximatesTheTimeOfContact) {
   EXPECT_LE(wrong, 3);
 }
 
-TEST(Fast, NearlyRightOnClothBall) {
+TEST(FastRival, NearlyRightOnClothBall) {
   DEFORMABLE_CCD_REQUIRE_DATA();
   const SceneData scene = readScene("cloth-ball");
-  const auto test = fastTest();
+  const auto test = makeFastRival();
   for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     const auto& truth = kind == PairKind::VERTEX_FACE ? scene.vertex_face : scene.edge_edge;
     std::vector<Quad> quads;
@@ -69,8 +64,8 @@ TEST(Fast, NearlyRightOnClothBall) {
   }
 }
 
-TEST(Fast, RefusesWhatItCannotTest) {
-  const auto test = fastTest();
+TEST(FastRival, RefusesWhatItCannotTest) {
+  const auto test = makeFastRival();
   EXPECT_THROW(testPair(*test, PairKind::FACE_VOXEL_CORNER, PairMotion{}), std::invalid_argument);
   const double separation_m = 1e-3;
   const VertexMotion vertices[4] = {};

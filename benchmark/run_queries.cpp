@@ -141,10 +141,9 @@ class Runner {
   std::size_t complaints_ = 0;
 };
 
-std::vector<JudgedRung> makeRungs(const std::string& accuracy, const AccuracyOptions& options) {
+std::vector<JudgedRung> makeRungs(const AccuracyOptions& options) {
   std::vector<JudgedRung> rungs;
   for (const Accuracy each : allRungs()) {
-    if (accuracy != "all" && accuracyFromString(accuracy.c_str()) != each) continue;
     JudgedRung rung;
     rung.options = options;
     rung.options.rung = each;
@@ -226,9 +225,8 @@ void printTable(const Cells& cells) {
   }
 }
 
-int runQueries(const std::vector<std::string>& dirs, const std::string& accuracy, const AccuracyOptions& options,
-               bool as_csv) {
-  const std::vector<JudgedRung> rungs = makeRungs(accuracy, options);
+int runQueries(const std::vector<std::string>& dirs, const AccuracyOptions& options, bool as_csv) {
+  const std::vector<JudgedRung> rungs = makeRungs(options);
   Runner runner(rungs);
   for (const std::string& dir : dirs) runner.runFolder(dir);
   const Cells cells = makeCells(rungs, runner.rows(), !as_csv);
@@ -247,12 +245,9 @@ int main(int argc, char** argv) {
       "max_toc_error is in steps, against exact arithmetic. Exit status: 0 every promise kept, 1 one broken\n"
       "or a truth column wrong (listed on stderr), 2 bad input."};
   std::vector<std::string> dirs;
-  std::string accuracy = "all", format = "table";
+  std::string format = "table";
   dccd::AccuracyOptions options;
   app.add_option("DIR", dirs, "folders of query files")->required();
-  app.add_option("--accuracy", accuracy, "rung")
-      ->check(CLI::IsMember({"fast", "conservative", "exact", "all"}))
-      ->capture_default_str();
   app.add_option("--format", format, "output")->check(CLI::IsMember({"csv", "table"}))->capture_default_str();
   app.add_option("--tolerance", options.tolerance_m, "conservative: tolerance [m]")->capture_default_str();
   app.add_option("--toc-bits", options.toc_bits, "exact: bits of the TOC's cell, 10 to 52")->capture_default_str();
@@ -260,7 +255,7 @@ int main(int argc, char** argv) {
   try {
     dccd::requireDecimalNumbers(app);
     app.parse(argc, argv);
-    return dccd::runQueries(dirs, accuracy, options, format == "csv");
+    return dccd::runQueries(dirs, options, format == "csv");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
