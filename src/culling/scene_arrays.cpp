@@ -65,6 +65,11 @@ void check(const Body& body, std::size_t bodies) {
     if (from.body < bodies || from.body == OBSTACLE_BODY) continue;
     refuse("has a separation from body " + std::to_string(from.body) + "; there are " + std::to_string(bodies));
   }
+  const auto& apart = body.not_against;
+  const bool ascending = std::is_sorted(apart.begin(), apart.end());
+  if (!ascending || (!apart.empty() && apart.back() >= bodies)) {
+    refuse("lists bodies that it is not tested against; they must ascend, and there are " + std::to_string(bodies));
+  }
   const ReferenceFrame* reference = body.reference.get();
   if (reference &&
       (reference->positions.size() != n || (!reference->radius_m.empty() && reference->radius_m.size() != n))) {

@@ -150,7 +150,8 @@ class PairExplanation : Explanation {
       }
     }
     if (self && !meetsItself(a)) return "self-collision of '" + a.name + "' is off";
-    if (!self && !meet(a, b)) return "against_bodies of one of the bodies is off";
+    if (!self && !meet(a, features_[0].body, b, features_[1].body))
+      return "the two bodies are not tested against each other";
     return "";
   }
 

@@ -216,9 +216,10 @@ std::size_t History::Impl::neededParts(const Step& step, StepStats& stats) const
       std::count_if(step.bodies.begin(), step.bodies.end(), [](const Body& body) { return body.turns; });
   if (turning == 0) return 1;
   const Clock::time_point start = Clock::now();
-  const std::size_t needed = requiredSubsteps(step, options->rigid_tolerance_m);
+  const NeededParts needed = dccd::neededParts(step, options->rigid_tolerance_m);
+  stats.bodies_far = needed.far;
   stats[Effect::RIGID_BODIES] = {static_cast<std::uint64_t>(turning), 0, msSince(start)};
-  return needed;
+  return needed.parts;
 }
 
 bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome) {
