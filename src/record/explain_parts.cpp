@@ -91,7 +91,7 @@ Options plain(Options options) {
 Explanation::Explanation(const Step& step, const Options& options)
     : step_(step),
       options_(options),
-      parts_(std::min(neededParts(step, options.rigid_tolerance_m).parts, options.max_substeps)) {}
+      parts_(std::min(neededParts(step, options.rigid_tolerance_m), options.max_substeps)) {}
 
 void Explanation::say(const std::string& stage, Says says, const std::string& text) {
   lines_.push_back({part_, stage, says, text});

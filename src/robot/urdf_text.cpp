@@ -57,7 +57,7 @@ std::string problemOf(const XMLElement& collision) {
 
 /// Returns how many collision elements urdfdom is to read.
 std::size_t reduceLink(XMLElement& link, UrdfText& urdf) {
-  const std::string name = textOf(link, "name");
+  const std::string name = neededText(link, "name");
   bool seen = false;
   std::size_t number = 0, kept = 0;
   for (XMLElement *child = link.FirstChildElement(), *next = nullptr; child; child = next) {
@@ -79,6 +79,7 @@ std::size_t reduceLink(XMLElement& link, UrdfText& urdf) {
 
 /// How it moves is tf's matter; which links it joins is told of by groups.
 void reduceJoint(XMLElement& joint) {
+  neededText(joint, "name");
   joint.SetAttribute("type", "fixed");
   for (XMLElement *child = joint.FirstChildElement(), *next = nullptr; child; child = next) {
     next = child->NextSiblingElement();

@@ -107,8 +107,8 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
     // A list that is cut says nothing wrong about what touches, and all of it was looked at.
     if (status != StepStatus::TRUNCATED) outcome.unproved.push_back(reason);
   };
-  if (!step.off_path.empty()) say(StepStatus::PARTIAL, step.off_path);
   if (const std::string text = takeUnchecked(step, outcome.stats); !text.empty()) say(StepStatus::PARTIAL, text);
+  if (!step.off_path.empty()) say(StepStatus::PARTIAL, step.off_path);
   if (outcome.contacts.size() < outcome.total_contacts) {
     say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
                                    std::to_string(outcome.total_contacts) + " contacts are listed");

@@ -58,8 +58,7 @@ double partsFor(const Body& body, double pose_scale, double tolerance_m) {
   return std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius)));
 }
 
-NeededParts neededParts(const Step& step, double tolerance_m) {
-  NeededParts needed;
+std::size_t neededParts(const Step& step, double tolerance_m) {
   std::vector<std::optional<Eigen::AlignedBox3d>> bounds(step.bodies.size());
   const double margin_m = largestSeparation(step.bodies) + tolerance_m;  // the tolerance is far above all rounding
   const auto boundsOf = [&](std::size_t b) -> const Eigen::AlignedBox3d& {
@@ -79,15 +78,9 @@ NeededParts neededParts(const Step& step, double tolerance_m) {
     const Body& body = step.bodies[b];
     if (!body.turns) continue;
     const double own = partsFor(body, step.pose_scale, tolerance_m);
-    if (!(own > parts)) continue;
-    if (isNear(b)) {
-      parts = own;
-    } else {
-      ++needed.far;
-    }
+    if (own > parts && isNear(b)) parts = own;
   }
-  needed.parts = parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
-  return needed;
+  return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
 }
 
 void advance(const Step& step, std::size_t part, std::size_t parts, Step& at) {

@@ -5,18 +5,13 @@
 
 namespace dccd {
 
-struct NeededParts {
-  std::size_t parts = 1;  ///< up to 1e9; 1 where nothing turns
-  std::size_t far = 0;    ///< bodies that need more than that, but do not count
-};
-
 /// The parts that a step must be cut into so that the turning body's straight vertex paths stay within the tolerance of
 /// its arc [m]; not limited.
 double partsFor(const Body& body, double pose_scale, double tolerance_m);
 
-/// The most that a body needs. One does not count where neither its arcs nor its straight paths come near anything that
-/// it is tested against.
-NeededParts neededParts(const Step& step, double tolerance_m);
+/// The most that a body needs, up to 1e9; 1 where nothing turns. One does not count where neither its arcs nor its
+/// straight paths come near anything that it is tested against.
+std::size_t neededParts(const Step& step, double tolerance_m);
 
 /// Moves `at`, which ends where part `part` - 1 of `parts` equal parts ends, on by one part.
 void advance(const Step& step, std::size_t part, std::size_t parts, Step& at);

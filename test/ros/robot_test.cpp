@@ -22,12 +22,17 @@ struct WithRobot : MonitorTest {
   Probe<State> state{node, name_ + "/state"};
   Probe<deformable_ccd::FirstContact> first{node, name_ + "/first_contact"};
 
+  Probe<tf2_msgs::TFMessage> tf{node, "/tf"};
+
+  /// One by one: robot_state_publisher keeps no more than the newest message.
   void lift(double stamp_s, double height_m) {
     sensor_msgs::JointState message;
     message.header.stamp = ros::Time(stamp_s);
     message.name = {"lift"};
     message.position = {height_m};
+    const std::size_t seen = tf.count();
     joints.publish(message);
+    EXPECT_EQ(tf.after(seen).transforms.at(0).header.stamp, message.header.stamp);
   }
   /// What ~state says of a step that ends with the tip at this height.
   State moveTo(double z, double stamp_s) {

@@ -106,7 +106,7 @@ TEST(TurningBody, ThatComesNearNothingIsNotCut) {
   EXPECT_EQ(outcome.substeps, 1u);
   EXPECT_EQ(outcome.stats.bodies_far, 1u);
   EXPECT_TRUE(assuranceOf(outcome).clear());
-  EXPECT_EQ(step(monitor, tip(200 * MS, -1.01), 6.2).stats.bodies_far, 0u) << "its corners come to 1.02 m";
+  EXPECT_GT(step(monitor, tip(200 * MS, -1.01), 6.2).substeps, 30u) << "its corners come to 1.02 m";
   std::vector<Body> apart = clockAndBar();
   apart[0].not_against = {1};
   Monitor blind(loose(), apart);
@@ -167,13 +167,16 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
   const Outcome whole = run(0);
   ASSERT_EQ(whole.status, StepStatus::OK);
   ASSERT_GT(whole.substeps, 30u);
-  EXPECT_EQ(whole.stats.bodies_refitted + whole.stats.bodies_kept, 2 * whole.substeps) << "two bodies in every part";
+  const auto bodies = [](const StepStats& stats) {
+    return stats.bodies_refitted + stats.bodies_kept + stats.bodies_far;
+  };
+  EXPECT_EQ(bodies(whole.stats), 2 * whole.substeps) << "two bodies in every part";
   EXPECT_TRUE(run(1000).complete);
   const Outcome cut = run(1e-6);
   EXPECT_EQ(cut.status, StepStatus::DEADLINE);
   EXPECT_FALSE(cut.complete);
   EXPECT_FALSE(assuranceOf(cut).clear());
-  EXPECT_EQ(cut.stats.bodies_refitted + cut.stats.bodies_kept, 2u) << "the first part alone";
+  EXPECT_EQ(bodies(cut.stats), 2u) << "the first part alone";
   EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));
 }
 

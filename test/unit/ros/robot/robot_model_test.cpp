@@ -199,6 +199,7 @@ TEST_F(RobotModel, ATextThatIsNoUrdfIsNamedWithItsPlace) {
       {"<robot name='a'>\n<link name='b'>\n</robot>", "test.urdf is no XML: XML_ERROR_MISMATCHED_ELEMENT in line"},
       {"", "test.urdf is no XML: XML_ERROR_EMPTY_DOCUMENT"},
       {"\n<COLLADA/>", "test.urdf begins with <COLLADA> of line 2, where <robot> is needed"},
+      {robotOf("<link/>"), "test.urdf <link> of line 1 needs the attribute name"},
       {robotOf(""), "test.urdf No link elements found"},
       {robotOf(link("a", "") + link("a", "")), "link 'a' is not unique"},
       {robotOf(link("a", "") + link("b", "")), "Two root links found: [a] and [b]"},
