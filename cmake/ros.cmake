@@ -12,13 +12,14 @@ endif()
 
 # --- the node: what comes in, its options, what goes out, and the class that holds them ---------------------------------
 file(GLOB ROS_SOURCES CONFIGURE_DEPENDS
-  src/input/*.cpp src/input/message_types/*.cpp src/config/*.cpp src/output/*.cpp src/node/*.cpp)
+  src/input/*.cpp src/input/message_types/*.cpp src/config/*.cpp src/robot/*.cpp src/output/*.cpp src/node/*.cpp)
 list(APPEND ROS_LINK_LIBRARIES deformable_ccd ${catkin_LIBRARIES} yaml-cpp)
 if(ROS_SOURCES)
   add_library(deformable_ccd_ros SHARED ${ROS_SOURCES})
   add_dependencies(deformable_ccd_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
   target_include_directories(deformable_ccd_ros PUBLIC include PRIVATE src)
-  target_include_directories(deformable_ccd_ros SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS})
+  target_include_directories(deformable_ccd_ros SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS}
+    ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
   # The headers that nearly every file of this library reads, compiled once.
   target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> <map> <string> <vector>)
   target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb PRIVATE deformable_ccd_report)
@@ -35,7 +36,8 @@ if(ROS_SOURCES)
   if(ROS_USES_PCL)
     target_link_libraries(deformable_ccd_ros PRIVATE ${PCL_COMMON_LIBRARIES})
   endif()
-  target_link_libraries(deformable_ccd_ros PRIVATE ${ASSIMP_LIBRARY})
+  target_link_libraries(deformable_ccd_ros PRIVATE
+    ${ASSIMP_LIBRARY} ${URDF_LIBRARY} ${CONSOLE_BRIDGE_LIBRARY} ${TINYXML2_LIBRARY})
   list(INSERT ROS_LINK_LIBRARIES 0 deformable_ccd_ros)
 endif()
 

@@ -98,8 +98,12 @@ add_gtest_suite(octomap_tests SOURCES ${octomap_SOURCES} LIBRARIES deformable_cc
 find_library(PCL_IO_PLY_LIBRARY pcl_io_ply REQUIRED HINTS ${PCL_LIBRARY_DIRS})
 set_source_files_properties(test/unit/ros/mesh_file_differential_test.cpp PROPERTIES
   INCLUDE_DIRECTORIES "${PCL_INCLUDE_DIRS}")
+# Another one holds a robot's links beside KDL.
+find_library(KDL_PARSER_LIBRARY kdl_parser REQUIRED)
+find_library(KDL_LIBRARY orocos-kdl REQUIRED)
 add_gtest_suite(ros_tests SOURCES ${ros_SOURCES}
-  LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY})
+  LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY} ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
+target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
 if(TARGET deformable_ccd_physics)
   add_gtest_suite(physics_tests SOURCES ${physics_SOURCES} LIBRARIES deformable_ccd_physics deformable_ccd)
 endif()

@@ -55,6 +55,7 @@ struct Body {
   double minimum_separation_m = 0;          ///< [m]; a pair uses the larger of its two bodies'
   std::vector<Index> vertex_mask;           ///< vertices that are left out, with every feature on them (grasped ones)
   std::vector<SeparationFrom> separations;  ///< named by either of the two bodies
+  std::vector<std::uint16_t> not_against;   ///< bodies that it is not tested against, ascending; named by either
 
   // Its mesh.
   std::shared_ptr<const Topology> topology;
@@ -79,12 +80,17 @@ inline bool sameBody(const Body& a, const Body& b) {
          a.self_collision == b.self_collision && a.against_bodies == b.against_bodies &&
          a.against_obstacle == b.against_obstacle && a.shell == b.shell &&
          a.minimum_separation_m == b.minimum_separation_m && a.vertex_mask == b.vertex_mask &&
-         a.separations == b.separations;
+         a.separations == b.separations && a.not_against == b.not_against;
 }
 
-/// What a step looks at. The flow asks these, and so does the effect plan.
+/// What a step looks at. The flow asks these, and so does the effect plan. `a` and `b` are the numbers of two bodies.
 inline bool meetsItself(const Body& body) { return body.self_collision && !body.rigid; }
-inline bool meet(const Body& a, const Body& b) { return a.against_bodies && b.against_bodies; }
+inline bool meet(const Body& body_a, std::size_t a, const Body& body_b, std::size_t b) {
+  const auto names = [](const Body& body, std::size_t other) {
+    return std::binary_search(body.not_against.begin(), body.not_against.end(), other);
+  };
+  return body_a.against_bodies && body_b.against_bodies && !names(body_a, b) && !names(body_b, a);
+}
 inline bool meetsMap(const Body& body) { return body.against_obstacle; }
 inline bool ownsVoxels(const Body& body) { return body.own_voxels_m > 0 || body.own_voxels_m == ONE_VOXEL; }
 

@@ -100,6 +100,7 @@ struct StepStats {
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
   std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
+  std::uint64_t bodies_far = 0;        ///< near nothing that they are tested against; no bounds are computed
   std::uint64_t map_answers_kept = 0;  ///< bodies at rest whose contacts with the map are those of the step before
   std::uint64_t left_out_listed = 0;   ///< pairs closer than the separation in the reference frame
   std::uint64_t left_out_met = 0;      ///< of those, the ones that came to the elementary test, without a separation
@@ -125,6 +126,7 @@ struct StepStats {
   COUNTER(bodies_refitted, false)   \
   COUNTER(bodies_kept, false)       \
   COUNTER(body_pairs, false)        \
+  COUNTER(bodies_far, false)        \
   COUNTER(map_answers_kept, false)  \
   COUNTER(left_out_listed, true)    \
   COUNTER(left_out_met, false)

@@ -13,6 +13,7 @@
 #include "dccd/accuracy.h"
 #include "dccd/simd_target.h"
 #include "node/bag_replay.h"
+#include "node/robot_source.h"
 #include "report/report.h"
 
 namespace {
@@ -27,7 +28,7 @@ constexpr int ERROR = 1, NOT_PROVED = 3;
 #endif
 
 struct Arguments {
-  std::string bag, out, report, params, octomap, accuracy, mesh, command;
+  std::string bag, out, report, params, octomap, accuracy, mesh, robot, command;
   double look_ahead_s = 0;
   int threads = 0;
   bool without_map = false, no_table = false, study = false, quiet = false;
@@ -48,7 +49,13 @@ MonitorConfig configure(const Arguments& a) {
   if (!a.accuracy.empty()) tree.put("accuracy", a.accuracy);
   if (a.look_ahead_s > 0) tree.put("look_ahead_s", a.look_ahead_s);
   if (a.threads > 0) tree.put("num_threads", a.threads);
-  return readConfig(tree, a.params.empty() ? "--" : "");
+  if (!a.robot.empty()) {
+    ParameterTree robot = tree.has("robot") ? tree.members["robot"] : ParameterTree();
+    if (robot.kind == ParameterTree::Kind::TEXT) robot = ParameterTree();
+    robot.put("description", a.robot);
+    tree.put("robot", std::move(robot));
+  }
+  return readConfig(tree, a.params.empty() ? "--" : "", robotOfFiles());
 }
 
 std::string seconds(double s) {
@@ -177,6 +184,7 @@ int main(int argc, char** argv) {
   app.add_option("--report", a.report, "folder for the report")->required();
   app.add_option("--params", a.params, "YAML file with the node's parameters")->check(CLI::ExistingFile);
   app.add_option("--mesh", a.mesh, "mesh topic; without parameters the first one of the bag is taken");
+  app.add_option("--robot", a.robot, "URDF file of a robot, whose links tf carries")->check(CLI::ExistingFile);
   auto* octomap =
       app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
   app.add_flag("--without-map", a.without_map, "do without the map, also where the parameters call for one")

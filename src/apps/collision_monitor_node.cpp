@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   }
   const ros::NodeHandle node;  // outlives the monitor: with the last handle roscpp ends, and logging with it
   try {
-    dccd::CollisionMonitor monitor{node, ros::NodeHandle("~")};
+    dccd::CollisionMonitor monitor{node, ros::NodeHandle("~"), [] { return ros::ok() && !ended; }};
     monitor.takeProcess();
     while (ros::ok() && !ended) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
   } catch (const std::exception& error) {

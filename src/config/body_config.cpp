@@ -1,6 +1,8 @@
 #include "config/body_config.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 namespace dccd {
 
@@ -149,59 +151,78 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   body.body.own_voxels_m = ownVoxelsOf(reader, config.own_voxels_m);
 }
 
+std::vector<std::string> namesOfBodies(const MonitorConfig& config) {
+  std::vector<std::string> names{"octomap", "self"};
+  for (const BodyConfig& body : config.bodies) names.push_back(body.body.name);
+  names.insert(names.end(), config.robot.links.begin(), config.robot.links.end());
+  for (const auto& group : config.robot.groups) names.push_back("group " + group.first);
+  return names;
+}
+
 /// Two bodies, in either order, of an entry of minimum_separation_pairs.
 using NamedPair = std::pair<std::uint16_t, std::uint16_t>;
+using PairsBefore = std::map<NamedPair, std::size_t>;  // with the number of the entry
 
 /// One entry of minimum_separation_pairs: {between: [felt, finger], separation_m: 0.004}; "octomap" is the map.
 /// `before` are the pairs of the entries before it.
-void readSeparationPair(ParameterReader entry, MonitorConfig& config, std::vector<NamedPair>& before) {
-  const std::array<std::uint16_t, 2> pair = readPartners(entry, config);
-  const NamedPair named = std::minmax(pair[0], pair[1]);
-  const auto twice = std::find(before.begin(), before.end(), named);
-  if (twice != before.end()) {
-    const auto nameOf = [&](std::uint16_t body) {
-      return body == OBSTACLE_BODY ? "octomap" : config.bodies[body].body.name;
-    };
-    entry.fail("between", "names " + nameOf(pair[0]) + " and " + nameOf(pair[1]) + ", as minimum_separation_pairs[" +
-                              std::to_string(twice - before.begin()) + "] does; remove one of the two");
-  }
-  before.push_back(named);
+void readSeparationPair(ParameterReader entry, std::size_t number, MonitorConfig& config, PairsBefore& before) {
+  const std::vector<Partners> pairs = readPartners(entry, config);
   if (!entry.has("separation_m")) entry.fail("separation_m", "is needed");
   const double separation_m = entry.number("separation_m", 0.0, 0, LARGE);
   entry.finish();
-  config.bodies[pair[0]].body.separations.push_back({pair[1], separation_m});
+  for (const Partners& pair : pairs) {
+    const auto [twice, is_new] = before.try_emplace(std::minmax(pair[0], pair[1]), number);
+    if (!is_new) {
+      const auto nameOf = [&](std::uint16_t body) {
+        return body == OBSTACLE_BODY ? "octomap" : config.bodies[body].body.name;
+      };
+      entry.fail("between", "names " + nameOf(pair[0]) + " and " + nameOf(pair[1]) + ", as minimum_separation_pairs[" +
+                                std::to_string(twice->second) + "] does; remove one of the two");
+    }
+    config.bodies[pair[0]].body.separations.push_back({pair[1], separation_m});
+  }
 }
 
 }  // namespace
 
-std::array<std::uint16_t, 2> readPartners(ParameterReader& entry, const MonitorConfig& config) {
+std::vector<Partners> readPartners(ParameterReader& entry, const MonitorConfig& config) {
   constexpr std::uint16_t SELF = OBSTACLE_BODY - 1;
-  std::vector<std::string> known{"octomap", "self"};
-  for (const BodyConfig& body : config.bodies) known.push_back(body.body.name);
-  std::vector<std::uint16_t> pair;
+  std::vector<std::vector<std::uint16_t>> sides;
   for (const ParameterTree& name : entry.list("between")) {
-    const auto at = std::find(known.begin(), known.end(), name.text);
-    if (at == known.end()) {
+    const bool is_map = name.text == "octomap", is_self = name.text == "self";
+    const auto bodies = is_map || is_self ? std::vector{is_map ? OBSTACLE_BODY : SELF} : bodiesNamed(name.text, config);
+    if (!bodies) {
       entry.fail("between", "names '" + name.text + "', which is no body and not octomap; nearest is '" +
-                                nearestName(name.text, known) + "'");
+                                nearestName(name.text, namesOfBodies(config)) + "'");
     }
-    const std::ptrdiff_t place = at - known.begin();
-    pair.push_back(place == 0 ? OBSTACLE_BODY : place == 1 ? SELF : static_cast<std::uint16_t>(place - 2));
+    sides.push_back(*bodies);
   }
-  if (pair.size() != 2) entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
-  if (pair[0] >= SELF) std::swap(pair[0], pair[1]);
-  if (pair[0] == OBSTACLE_BODY && pair[1] == OBSTACLE_BODY) {
-    entry.fail("between", "names octomap twice; name a body and octomap");
+  if (sides.size() != 2) {
+    entry.fail("between", "must name two bodies, or one body and octomap; a body twice for itself");
   }
-  if (pair[0] >= SELF) entry.fail("between", "names self without a body; name the body first");
-  if (pair[1] == SELF) pair[1] = pair[0];
-  return {pair[0], pair[1]};
+  const auto isNoBody = [&](std::size_t side) { return !sides[side].empty() && sides[side][0] >= SELF; };
+  if (isNoBody(0)) std::swap(sides[0], sides[1]);
+  if (isNoBody(0)) {
+    const bool only_map = sides[0][0] == OBSTACLE_BODY && sides[1][0] == OBSTACLE_BODY;
+    entry.fail("between", only_map ? "names octomap twice; name a body and octomap"
+                                   : "names self without a body; name the body first");
+  }
+  std::vector<Partners> pairs;
+  std::set<NamedPair> named;  // of a group with itself each pair comes twice
+  for (const std::uint16_t one : sides[0]) {
+    for (const std::uint16_t name : sides[1]) {
+      const std::uint16_t other = name == SELF ? one : name;
+      if (named.insert(std::minmax(one, other)).second) pairs.push_back({one, other});
+    }
+  }
+  return pairs;
 }
 
 void readSeparationPairs(ParameterReader& reader, MonitorConfig& config) {
-  std::vector<NamedPair> before;
+  PairsBefore before;
+  std::size_t number = 0;
   for (const ParameterReader& entry : reader.sections("minimum_separation_pairs")) {
-    readSeparationPair(entry, config, before);
+    readSeparationPair(entry, number++, config, before);
   }
 }
 

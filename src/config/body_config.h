@@ -15,9 +15,10 @@ constexpr int MANY = 1000000000;
 double ownVoxelsOf(ParameterReader& reader, double fallback);
 /// minimum_separation_m of the section [m], or the fallback.
 double separationOf(ParameterReader& reader, double fallback);
-/// The two that an entry names under `between`: bodies, "octomap", which comes second then, and "self" for the other
-/// one again.
-std::array<std::uint16_t, 2> readPartners(ParameterReader& entry, const MonitorConfig& config);
+/// Two bodies that an entry names under `between`, or a body and OBSTACLE_BODY, or a body twice.
+using Partners = std::array<std::uint16_t, 2>;
+/// All that it names: a robot's link or group stands for its bodies, "octomap" is the map, "self" the other one again.
+std::vector<Partners> readPartners(ParameterReader& entry, const MonitorConfig& config);
 /// The bodies, and which of them is the clock. After the separation that is for all of them.
 void readBodies(ParameterReader& reader, MonitorConfig& config);
 /// minimum_separation_pairs. After the bodies.

@@ -1,5 +1,6 @@
 // expected_contacts: which contacts a task brings about, and in which of its phases.
 #include <algorithm>
+#include <utility>
 
 #include "config/body_config.h"
 
@@ -16,14 +17,10 @@ void readVertices(ParameterReader& section, const std::string& name, ExpectedPar
   if (partner.vertices.empty()) section.fail(name, "names no vertex; list some, or remove it for the whole body");
 }
 
-/// One entry: {between: [cloth, finger], vertices: {cloth: hem, finger: [3, 4]}, phase: carry}. Of a body with itself
-/// the body's own name stands for both sides, unless `self` names the other one.
-Expectation readExpectation(ParameterReader entry, const MonitorConfig& config) {
-  const std::array<std::uint16_t, 2> bodies = readPartners(entry, config);
-  Expectation one;
-  for (std::size_t side = 0; side < 2; ++side) one.partners[side].body = bodies[side];
-  const bool itself = bodies[0] == bodies[1];
-  ParameterReader vertices = entry.section("vertices");
+/// `vertices` of an entry: {cloth: hem, finger: [3, 4]}. Of a body with itself the body's own name stands for both
+/// sides, unless `self` names the other one. A link's are those of each of its bodies that the entry stands for.
+void readVerticesOf(ParameterReader& vertices, const MonitorConfig& config, Expectation& one) {
+  const bool itself = one.partners[0].body == one.partners[1].body;
   for (std::size_t side = 0; side < 2; ++side) {
     ExpectedPartner& partner = one.partners[side];
     if (partner.body == OBSTACLE_BODY) continue;
@@ -33,18 +30,33 @@ Expectation readExpectation(ParameterReader entry, const MonitorConfig& config) 
     if (body.isDepthImage()) vertices.fail(name, "has no meaning for a depth image; remove it");
     readVertices(vertices, name, partner);
   }
-  vertices.finish();
-  one.phase = entry.get("phase", std::string());
+}
+
+/// One entry: {between: [cloth, finger], vertices: {cloth: hem, finger: [3, 4]}, phase: carry}, which may name links
+/// and groups.
+void readExpectation(ParameterReader entry, std::size_t number, MonitorConfig& config) {
+  const std::vector<Partners> pairs = readPartners(entry, config);
+  ParameterReader vertices = entry.section("vertices");
+  const std::string phase = entry.get("phase", std::string());
+  config.expected_phases.push_back(phase);
+  for (const Partners& bodies : pairs) {
+    Expectation one;
+    for (std::size_t side = 0; side < 2; ++side) one.partners[side].body = bodies[side];
+    readVerticesOf(vertices, config, one);
+    one.phase = phase;
+    config.expected_contacts.push_back(std::move(one));
+    config.expected_entry.push_back(number);
+  }
+  // Where nobody is there, nothing can be told of the vertices either.
+  if (!pairs.empty()) vertices.finish();
   entry.finish();
-  return one;
 }
 
 }  // namespace
 
 void readExpectedContacts(ParameterReader& reader, MonitorConfig& config) {
-  for (const ParameterReader& entry : reader.sections("expected_contacts")) {
-    config.expected_contacts.push_back(readExpectation(entry, config));
-  }
+  std::size_t number = 0;
+  for (const ParameterReader& entry : reader.sections("expected_contacts")) readExpectation(entry, number++, config);
   config.phase = reader.get("phase", std::string());
   const std::vector<std::string> known = config.phases();
   if (!config.phase.empty() && std::find(known.begin(), known.end(), config.phase) == known.end()) {
@@ -54,8 +66,8 @@ void readExpectedContacts(ParameterReader& reader, MonitorConfig& config) {
 
 std::vector<std::string> MonitorConfig::phases() const {
   std::vector<std::string> names;
-  for (const Expectation& one : expected_contacts) {
-    if (!one.phase.empty()) names.push_back(one.phase);
+  for (const std::string& phase : expected_phases) {
+    if (!phase.empty()) names.push_back(phase);
   }
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());

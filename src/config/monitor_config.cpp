@@ -36,7 +36,11 @@ std::string distanceAskedBy(const std::string& path, const MonitorConfig& config
   const auto distance = [](const std::string& name, const std::string& what) {
     return "parameter " + name + " asks for " + what + ": write accuracy: conservative, or set it to 0";
   };
+  const auto pads = [](const BodyConfig& body) { return !body.link.empty() && body.body.minimum_separation_m > 0; };
   if (config.minimum_separation_m > 0) return distance(path + "minimum_separation_m", "a minimum separation");
+  if (std::any_of(config.bodies.begin(), config.bodies.end(), pads)) {
+    return distance(path + "robot/padding_m", "a minimum separation");
+  }
   for (const BodyConfig& body : config.bodies) {
     const std::string own = listed ? path + "bodies/" + body.body.name + "/" : path;
     if (body.body.minimum_separation_m > 0) return distance(own + "minimum_separation_m", "a minimum separation");
@@ -196,22 +200,27 @@ void removeRigidBodies(MonitorConfig& config) {
     config.bodies[b].body.separations = std::move(separations);
   }
   std::vector<Expectation> expected;
-  for (Expectation& one : config.expected_contacts) {
+  std::vector<std::size_t> entry;
+  for (std::size_t e = 0; e < config.expected_contacts.size(); ++e) {
+    Expectation& one = config.expected_contacts[e];
     bool gone = false;
     for (ExpectedPartner& partner : one.partners) {
       if (partner.body == OBSTACLE_BODY) continue;
       partner.body = moved_to[partner.body];
       gone = gone || partner.body == OBSTACLE_BODY;
     }
-    if (!gone) expected.push_back(std::move(one));
+    if (gone) continue;
+    expected.push_back(std::move(one));
+    entry.push_back(config.expected_entry[e]);
   }
   config.expected_contacts = std::move(expected);
+  config.expected_entry = std::move(entry);
 }
 
 /// What an effect that is off takes away before a step is made, so that no body of a step tells of it. What bodies tell
 /// of (self_collision, body_body, octomap) is not named twice.
 std::vector<std::string> takenAway(const MonitorConfig& config) {
-  std::vector<std::string> sentences;
+  std::vector<std::string> sentences = config.robot_excluded;
   const auto add = [&](Effect effect, const std::string& what) {
     if (settingOf(config.effects, effect) != EffectSetting::OFF || what.empty()) return;
     sentences.push_back(what + " by effects/" + toString(effect) + ": off");
@@ -357,9 +366,11 @@ std::uint64_t MonitorConfig::hash() const {
   return hashOf(text.str());
 }
 
-MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path) { return readConfig(treeOf(tree), path); }
+MonitorConfig readConfig(const XmlRpcValue& tree, const std::string& path, const RobotLoader& load) {
+  return readConfig(treeOf(tree), path, load);
+}
 
-MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, const RobotLoader& load) {
   ParameterReader reader(tree, path);
   MonitorConfig config;
   config.fixed_frame = reader.get("fixed_frame", std::string());
@@ -369,6 +380,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   readEffects(reader.section("effects"), config);
   readMarkers(reader.section("markers"), config.markers);
   readBodies(reader, config);
+  readRobot(reader, load, config);
   readSeparationPairs(reader, config);
   readExpectedContacts(reader, config);
   readLimits(reader, config);
@@ -377,7 +389,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path) {
   applyEffects(config);
   checkOwnVoxels(reader, config);
   settleAccuracy(reader, config);
-  config.given_hash = hashOf(givenText(tree));
+  config.given_hash = hashOf(givenText(tree) + config.robot.text);
   return config;
 }
 

@@ -9,6 +9,7 @@
 #include <xmlrpcpp/XmlRpcValue.h>
 
 #include "config/parameter_reader.h"
+#include "config/robot_config.h"
 #include "dccd/effect_plan.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
@@ -29,6 +30,9 @@ struct BodyConfig {
   std::string mesh_file;
   std::string tf_frame;
   double mesh_scale = 1;
+  // A robot's link: its mesh is made already.
+  std::string link;
+  std::shared_ptr<const MeshResource> link_mesh;
   bool isRigid() const { return body.rigid; }
   bool isDepthImage() const { return input.source == TopologySource::DEPTH_IMAGE; }
   bool isUncertain() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
@@ -49,15 +53,19 @@ constexpr std::size_t NO_MAP_LIMIT = std::size_t{1} << 50;
 constexpr const char* DEFAULT_OCTOMAP_TOPIC = "octomap_binary";
 
 struct MonitorConfig {
-  std::string fixed_frame;  ///< empty: the frame of the clock body's first message
-  std::vector<BodyConfig> bodies;
+  std::string fixed_frame;         ///< empty: the frame of the clock body's first message
+  std::vector<BodyConfig> bodies;  ///< the robot's links come last
+  Robot robot;
+  std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
   MonitorOptions monitor;
   EffectSettings effects;
   double minimum_separation_m = 0;  ///< of bodies that name none
   double own_voxels_m = 0;          ///< the same
   /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
   std::vector<Expectation> expected_contacts;
-  std::string phase;  ///< of the task, in force; empty: none
+  std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from
+  std::vector<std::string> expected_phases;  ///< that entries name, whether their bodies are there or not
+  std::string phase;                         ///< of the task, in force; empty: none
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
@@ -77,7 +85,7 @@ struct MonitorConfig {
   std::uint64_t given_hash = 0;  ///< of the parameters as they were given, without ~live, which the node writes back
   /// The bodies as the monitor is given them.
   std::vector<Body> monitorBodies() const;
-  /// Those that expected_contacts names, each once, in order.
+  /// Those of expected_phases, each once, in order.
   std::vector<std::string> phases() const;
   /// "known phases are 'carry' and 'grasp', and '' for none".
   std::string phasesInWords() const;
@@ -95,8 +103,8 @@ struct MonitorConfig {
 };
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
-MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~");
-MonitorConfig readConfig(const ParameterTree& tree, const std::string& path);
+MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~", const RobotLoader& load = {});
+MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, const RobotLoader& load = {});
 /// What bounds a live node's steps, from max_memory_mb, max_map_mb and max_compute_s, defaults included. Elsewhere a
 /// limit that was not given is none, so that no answer depends on a clock.
 void limitLive(MonitorConfig& config);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -64,6 +65,11 @@ void check(const Body& body, std::size_t bodies) {
     check_separation(from.separation_m);
     if (from.body < bodies || from.body == OBSTACLE_BODY) continue;
     refuse("has a separation from body " + std::to_string(from.body) + "; there are " + std::to_string(bodies));
+  }
+  const auto& apart = body.not_against;
+  const bool ascending = std::is_sorted(apart.begin(), apart.end());
+  if (!ascending || (!apart.empty() && apart.back() >= bodies)) {
+    refuse("lists bodies that it is not tested against; they must ascend, and there are " + std::to_string(bodies));
   }
   const ReferenceFrame* reference = body.reference.get();
   if (reference &&
@@ -211,6 +217,24 @@ bool SceneArrays::isStill(const SceneBody& body) const {
   return body.translates && std::equal(first.t0, first.t0 + 3, first.t1);
 }
 
+/// By coordinates, which are projections without rounding.
+bool SceneArrays::isFar(std::size_t b) const {
+  const SceneBody& body = bodies_[b];
+  if (meetsItself(body.setup) || meetsMap(body.setup) || uncertain_) return false;
+  const double reach_m = 2 * body.reach_m, up = std::numeric_limits<double>::infinity();  // of both bodies, all alike
+  const auto below = [&](const SceneBody& one, const SceneBody& other) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::nextafter(one.bounds_max[axis] + reach_m, up) < other.bounds_min[axis]) return true;
+    }
+    return false;
+  };
+  for (std::size_t other = 0; other < bodies_.size(); ++other) {
+    if (other == b || !meet(body.setup, b, bodies_[other].setup, other)) continue;
+    if (!below(body, bodies_[other]) && !below(bodies_[other], body)) return false;
+  }
+  return true;
+}
+
 void SceneArrays::refitBodies() {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     // All three trees: a feature is widened by the largest radius of its vertices, which may lie in another group of
@@ -218,6 +242,7 @@ void SceneArrays::refitBodies() {
     std::int16_t* bounds = body_bounds_.data() + b * simd::AOS_SIZE;
     std::fill_n(bounds, simd::RECORD, simd::EMPTY_LO);
     std::fill_n(bounds + simd::RECORD, simd::RECORD, simd::EMPTY_HI);
+    if (bodies_[b].far) continue;
     for (const ClusterTree& tree : bodies_[b].trees) {
       const std::int16_t* top = tree.level(height_ - 1).aos.data();
       for (std::size_t k = 0; k < simd::RECORD; ++k) {

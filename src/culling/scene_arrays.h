@@ -41,6 +41,7 @@ struct SceneBody {
   bool unchanged = false;  ///< every vertex is at both ends where it was in the step before, bit for bit
   bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
   bool stale = false;      ///< its records and bounds are not those of its vertices
+  bool far = false;        ///< it comes near nothing that it is tested against, and has no bounds in this step
   bool recorded = false;   ///< it has been through a step since it was set
   double reach_m = 0;      ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
@@ -100,13 +101,16 @@ class SceneArrays {
   /// Off: every body is refitted in every step.
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
 
-  /// Records and bounds of every body that is not kept. pieces(n, f): calls f(first, last) over [0, n), in parallel or
-  /// not.
+  /// Records and bounds of every body that is neither kept nor far. pieces(n, f): calls f(first, last) over [0, n), in
+  /// parallel or not.
   template <class Pieces>
   void refit(const Pieces& pieces, StepStats& stats) {
-    for (SceneBody& body : bodies_) {
-      ++(body.kept ? stats.bodies_kept : stats.bodies_refitted);
-      if (body.kept && !body.stale) continue;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      SceneBody& body = bodies_[b];
+      body.far = isFar(b);
+      ++(body.far ? stats.bodies_far : body.kept ? stats.bodies_kept : stats.bodies_refitted);
+      body.stale = body.stale || !body.kept;
+      if (body.far || !body.stale) continue;
       body.stale = false;
       pieces(body.usedCount(), [&](std::size_t first, std::size_t last) {
         quantize(body.internal_begin + first, body.internal_begin + last);
@@ -129,7 +133,7 @@ class SceneArrays {
     if (end == simd::WHOLE_STEP) return {};
     const bool swept = end <= SWEPT_AT_MOST;
     for (SceneBody& body : bodies_) {
-      if (isStill(body)) continue;  // its bounds at t1 are those of any time
+      if (body.far || isStill(body)) continue;  // its bounds at t1 are those of any time
       body.stale = true;
       for (ClusterTree& tree : body.trees) {
         for (std::size_t l = 0; l < tree.height(); ++l) {
@@ -218,6 +222,7 @@ class SceneArrays {
   void setMargin(const SceneBody& body, double reach_m, std::int16_t* margin16) const;
   std::int32_t endOf(double until) const;
   bool isStill(const SceneBody& body) const;
+  bool isFar(std::size_t b) const;
   void quantize(std::size_t first, std::size_t last);
   void refitLeaves(const SceneBody& body, ClusterTree& tree, std::size_t first, std::size_t last) const;
   void refitBodies();

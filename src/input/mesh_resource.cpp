@@ -10,8 +10,6 @@
 
 namespace dccd {
 
-namespace {
-
 std::string pathOf(const std::string& address) {
   const std::string package = "package://", file = "file://";
   if (address.compare(0, file.size(), file) == 0) return address.substr(file.size());
@@ -22,6 +20,8 @@ std::string pathOf(const std::string& address) {
   if (root.empty()) throw std::invalid_argument(address + ": there is no package '" + name + "'");
   return slash == std::string::npos ? root : root + address.substr(slash);
 }
+
+namespace {
 
 MeshResource resourceOf(const std::string& path, double scale) {
   MeshResource resource;

@@ -21,6 +21,10 @@ struct MeshResource {
   std::vector<Index> verticesOf(const std::string& group) const;
 };
 
+/// Where a file lies: a path, file:// or package:// address. Throws std::invalid_argument naming a package that is not
+/// found.
+std::string pathOf(const std::string& address);
+
 /// The mesh of a rigid body: PLY, OBJ, STL or DAE. The triangles of the last two are welded by exact coordinates.
 /// Throws std::invalid_argument naming the file and what is wrong with it, or the package that is not found.
 MeshResource loadMeshResource(const std::string& address, double scale);

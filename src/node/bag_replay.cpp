@@ -147,9 +147,11 @@ struct BagReplay::Run {
       if (!topic.empty()) {
         bodies_of_topic[topic].push_back(b);
       } else if (!pipeline.hint(b).empty()) {
-        complain("body '" + r.config_.bodies[b].body.name + "': " + pipeline.hint(b));
+        complain(sourceOf(b) + ": " + pipeline.hint(b));
       }
     }
+    for (const std::string& sentence : r.config_.robot.missing) complain(sentence);
+    for (const std::string& sentence : r.config_.robot.remarks) complain("robot: " + sentence);
   }
 
   /// The prediction that follows from an answered outcome, whose statistics get its cost.
@@ -161,6 +163,12 @@ struct BagReplay::Run {
     look_ahead->predict(*prediction);
     outcome.stats[Effect::LOOK_AHEAD] = lookAheadStats(*prediction);
     return prediction;
+  }
+
+  /// The body's topic, or of one that tf carries its name.
+  std::string sourceOf(std::size_t body) const {
+    const std::string& topic = summary.mesh_topics[body];
+    return topic.empty() ? "body '" + pipeline.config().bodies[body].body.name + "'" : topic;
   }
 
   void complain(const std::string& text) {
@@ -187,7 +195,7 @@ struct BagReplay::Run {
     }
     for (std::size_t b = 0; b < summary.mesh_topics.size(); ++b) {
       const std::string complaint = pipeline.takeComplaint(b);
-      if (!complaint.empty()) complain(summary.mesh_topics[b] + ": " + complaint);
+      if (!complaint.empty()) complain(sourceOf(b) + ": " + complaint);
     }
     const std::string note = pipeline.takeMapNote();
     if (!note.empty()) complain(note);

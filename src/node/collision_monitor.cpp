@@ -9,6 +9,7 @@
 
 #include "dccd/simd_target.h"
 #include "input/message_bytes.h"
+#include "node/robot_source.h"
 
 namespace dccd {
 namespace {
@@ -20,10 +21,13 @@ constexpr double SERVICE_TIMEOUT_S = 10;
 // Of the second in which the process is to end.
 constexpr std::chrono::milliseconds END_AFTER{700};
 
-MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& private_node) {
+MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                       const std::function<bool()>& goes_on) {
   XmlRpc::XmlRpcValue tree;
   private_node.getParam(private_node.getNamespace(), tree);
-  MonitorConfig config = readConfig(tree);
+  MonitorConfig config = readConfig(tree, "~", robotOfParameters(node, goes_on));
+  for (const std::string& sentence : config.robot.missing) ROS_WARN_STREAM(sentence);
+  for (const std::string& sentence : config.robot.remarks) ROS_WARN_STREAM("robot: " << sentence);
   takeRemappings(node, config);
   limitLive(config);
   // It is the process's: another nodelet may have named one, and its worker may be at it.
@@ -244,8 +248,9 @@ void CollisionMonitor::Impl::endInTime() {
   }).detach();
 }
 
-CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
-    : impl_(std::make_unique<Impl>(node, private_node, configOf(node, private_node))) {
+CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                                   const std::function<bool()>& goes_on)
+    : impl_(std::make_unique<Impl>(node, private_node, configOf(node, private_node, goes_on))) {
   impl_->start();
 }
 

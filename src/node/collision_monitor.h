@@ -1,8 +1,10 @@
 // The node's class: the same object as a node (collision_monitor_node) and as a nodelet.
 #pragma once
 
+#include <functional>
 #include <memory>
 
+#include <ros/init.h>
 #include <ros/node_handle.h>
 
 namespace dccd {
@@ -11,7 +13,9 @@ class CollisionMonitor {
  public:
   /// Reads the parameters under `private_node`, subscribes, advertises and starts its own threads: callbacks never wait
   /// for a step. Throws ParameterError or std::invalid_argument with one sentence that names the parameter.
-  CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
+  /// Waits for a robot's description, while `goes_on` holds and up to robot/timeout_s.
+  CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                   const std::function<bool()>& goes_on = ros::ok);
   /// Stops in mid-stream: the step that runs is cut, nothing is published after it.
   ~CollisionMonitor();
   CollisionMonitor(const CollisionMonitor&) = delete;

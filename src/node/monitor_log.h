@@ -35,7 +35,11 @@ class MonitorLog {
   /// What looks like a mistake now; empty: nothing does.
   const std::string& hint() const { return hint_; }
 
-  std::string topicOf(std::size_t body) const { return node_.resolveName(config_.bodies[body].topic); }
+  /// The body's topic; of a robot's link its name.
+  std::string topicOf(std::size_t body) const {
+    const BodyConfig& one = config_.bodies[body];
+    return one.link.empty() ? node_.resolveName(one.topic) : "body '" + one.body.name + "'";
+  }
   std::string mapSource() const { return mapSourceOf(node_, config_); }
 
  private:

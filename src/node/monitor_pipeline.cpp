@@ -86,6 +86,8 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
 
 void MonitorPipeline::loadFiles() {
   rigid_.resize(config_.bodies.size());
+  link_poses_.resize(config_.bodies.size());
+  lost_.resize(config_.bodies.size());
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     BodyConfig& body = config_.bodies[b];
     if (!body.topology_file.empty()) {
@@ -98,18 +100,31 @@ void MonitorPipeline::loadFiles() {
       checkGrid(body);
     }
     if (!body.isRigid()) continue;
-    MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
-                                 [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
+    if (body.link_mesh) {
+      setRigid(b, *body.link_mesh);
+      continue;
+    }
+    const MeshResource mesh = loadFile(body, "rigid/mesh", "an STL, OBJ, PLY or DAE",
+                                       [&] { return loadMeshResource(body.mesh_file, body.mesh_scale); });
     addGroups(mesh, body.mesh_file, setsNamed(b), body);
     remarks_[b] = remarksOf(body.mesh_file, mesh);
     hints_[b] = joined(remarks_[b], rigidHint(body.mesh_file, mesh.positions, body.mesh_scale));
-    MeshFrame& frame = rigid_[b].emplace();
-    frame.topology = mesh.topology;
-    frame.positions = std::move(mesh.positions);
-    frame.dropped_faces = mesh.dropped_faces;
-    frame.rigid = true;
-    if (body.input.noise_radius_m > 0) frame.radius_m.assign(frame.positions.size(), body.input.noise_radius_m);
+    setRigid(b, mesh);
   }
+}
+
+void MonitorPipeline::setRigid(std::size_t body, const MeshResource& mesh) {
+  MeshFrame& frame = rigid_[body].emplace();
+  frame.topology = mesh.topology;
+  frame.positions = mesh.positions;
+  frame.dropped_faces = mesh.dropped_faces;
+  frame.rigid = true;
+  const double radius_m = config_.bodies[body].input.noise_radius_m;
+  if (radius_m > 0) frame.radius_m.assign(frame.positions.size(), radius_m);
+}
+
+std::string MonitorPipeline::expectedEntry(std::size_t expectation) const {
+  return "expected_contacts[" + std::to_string(config_.expected_entry[expectation]) + "]";
 }
 
 std::set<std::string> MonitorPipeline::setsNamed(std::size_t body) const {
@@ -129,12 +144,12 @@ void MonitorPipeline::findSets() {
       const BodyConfig& body = config_.bodies[partner.body];
       const auto found = body.sets.find(partner.set);
       if (found == body.sets.end()) {
-        throw ParameterError("parameter expected_contacts[" + std::to_string(e) + "]/vertices names '" + partner.set +
+        throw ParameterError("parameter " + expectedEntry(e) + "/vertices names '" + partner.set +
                              "', which is no set of body '" + body.body.name + "'; " + setsOf(body));
       }
       if (found->second.empty()) {
-        throw ParameterError("parameter expected_contacts[" + std::to_string(e) + "]/vertices names '" + partner.set +
-                             "' of body '" + body.body.name + "', a group without faces");
+        throw ParameterError("parameter " + expectedEntry(e) + "/vertices names '" + partner.set + "' of body '" +
+                             body.body.name + "', a group without faces");
       }
       partner.vertices = found->second;
     }
@@ -213,7 +228,7 @@ std::string MonitorPipeline::indexProblem(std::size_t body, const Topology& topo
     for (const ExpectedPartner& partner : config_.expected_contacts[e].partners) {
       if (!found.empty() || partner.body != body) continue;
       const std::string set = partner.set.empty() ? "" : " (set '" + partner.set + "')";
-      found = problem("expected_contacts[" + std::to_string(e) + "]/vertices" + set, partner.vertices);
+      found = problem(expectedEntry(e) + "/vertices" + set, partner.vertices);
     }
   }
   return found;
@@ -317,6 +332,7 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   effects_.learn(outcome, *monitor_);
   frame_answered_ = frame_answered_ || outcome.answered;
   nameMissing(outcome);
+  nameUnwatched(outcome);
   measureUnknown(outcome);
   return true;
 }
@@ -363,7 +379,13 @@ Outcome MonitorPipeline::checkNow() {
   }
   outcome = monitor_->checkNow();
   nameMissing(outcome);
+  nameUnwatched(outcome);
   return outcome;
+}
+
+void MonitorPipeline::nameUnwatched(Outcome& outcome) const {
+  if (!outcome.answered) return;
+  outcome.unproved.insert(outcome.unproved.end(), config_.robot.missing.begin(), config_.robot.missing.end());
 }
 
 std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }

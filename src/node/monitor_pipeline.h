@@ -121,8 +121,10 @@ class MonitorPipeline {
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
-  std::vector<bool> placed_;                     // a static body of which the monitor has a frame
-  std::vector<std::optional<MeshFrame>> rigid_;  // as the mesh file has them
+  std::vector<bool> placed_;                                  // a static body of which the monitor has a frame
+  std::vector<std::optional<MeshFrame>> rigid_;               // as the mesh file has them
+  std::vector<std::optional<Eigen::Isometry3d>> link_poses_;  // the last ones, of rigid bodies
+  std::vector<bool> lost_;                                    // a robot's link without a transform at the last frame
   std::vector<std::string> complaints_, hints_, remarks_;
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
@@ -141,6 +143,9 @@ class MonitorPipeline {
   bool finishing_ = false;
 
   void loadFiles();
+  void setRigid(std::size_t body, const MeshResource& mesh);
+  /// The parameter that one of the expectations is from.
+  std::string expectedEntry(std::size_t expectation) const;
   /// Of the body, by expected_contacts.
   std::set<std::string> setsNamed(std::size_t body) const;
   /// The vertices of the sets that expected_contacts names. Throws ParameterError.
@@ -168,11 +173,15 @@ class MonitorPipeline {
   std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
+  /// Adds what of the robot should be watched and is not.
+  void nameUnwatched(Outcome& outcome) const;
   /// False: still waits.
   bool placeFrame(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
-  bool placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason);
-  bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason);
+  bool placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
+  /// may_lose_links: those of a robot that have no transform stand in nobody's way any longer.
+  bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason);
+  void loseLink(std::size_t body, MeshFrame& frame);
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
   void placeMap(std::int64_t now_ns);

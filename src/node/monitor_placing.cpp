@@ -36,23 +36,43 @@ std::string MonitorPipeline::unusableTransforms() const {
   return unusable.empty() ? "" : "; " + shortText(unusable);
 }
 
-bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, std::string& reason) {
+/// A robot's link that has no place stays where it was, and all of it is unknown there: unchecked.
+void MonitorPipeline::loseLink(std::size_t body, MeshFrame& frame) {
+  frame.pose = link_poses_[body].value_or(Eigen::Isometry3d::Identity());
+  for (Vec3& p : frame.positions) p.setConstant(std::numeric_limits<double>::quiet_NaN());
+  frame.seen = {unknownAt(frame.stamp_ns - 1)};
+}
+
+bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason) {
   std::vector<std::pair<std::size_t, MeshFrame>> frames;
+  std::vector<std::string> lost(rigid_.size());  // why; empty: it is not
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
     MeshFrame frame = *rigid_[b];
     frame.stamp_ns = stamp_ns;
     const std::string& carrier = config_.bodies[b].tf_frame;
-    if (!transforms_.lookup(fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
+    if (transforms_.lookup(fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
+      transform(frame.pose, frame.positions);
+      frame.seen = posesBetween(fixed_frame_, carrier, clock_ns_, stamp_ns);
+    } else {
       reason = noTransform(carrier, fixed_frame_, reason) + unusableTransforms() + "; body '" +
                config_.bodies[b].body.name + "' is carried by it";
-      return false;
+      if (!may_lose_links || config_.bodies[b].link.empty()) return false;
+      loseLink(b, frame);
+      lost[b] = reason;
     }
-    transform(frame.pose, frame.positions);
-    frame.seen = posesBetween(fixed_frame_, carrier, clock_ns_, stamp_ns);
     frames.emplace_back(b, std::move(frame));
   }
   for (auto& frame : frames) {
+    const std::size_t b = frame.first;
+    if (lost[b].empty()) {
+      // It was lost at the start of the step that ends here.
+      if (lost_[b]) frame.second.seen.push_back(unknownAt(stamp_ns - 1));
+      link_poses_[b] = frame.second.pose;
+    } else if (!lost_[b]) {
+      complaints_[b] = "not watched meanwhile: " + lost[b];
+    }
+    lost_[b] = !lost[b].empty();
     monitor_->countReceived(frame.first);
     monitor_->push(frame.first, std::move(frame.second), now_ns);
   }
@@ -89,9 +109,11 @@ std::size_t MonitorPipeline::misplaced() const {
   return b;
 }
 
-bool MonitorPipeline::placeOthers(std::int64_t now_ns, StepStatus& problem, std::string& reason) {
+bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason) {
   const std::size_t body = misplaced();
-  if (body == waiting_.size()) return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, reason);
+  if (body == waiting_.size()) {
+    return placeRigid(waiting_[config_.monitor.clock_body]->mesh.stamp_ns, now_ns, overdue, reason);
+  }
   problem = StepStatus::NO_BODY;
   reason = missing(body);
   return false;
@@ -112,7 +134,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     // In time for a step that says so, if it does not come.
     if (!findHeld(waiting.mesh.stamp_ns, held) && !overdue) return false;
   }
-  const bool placed = has_place && (!is_clock || placeOthers(now_ns, problem, reason));
+  const bool placed = has_place && (!is_clock || placeOthers(now_ns, overdue, problem, reason));
   if (!placed) {
     if (!has_place) reason = noTransform(waiting.mesh.frame_id, fixed_frame_, reason) + unusableTransforms();
     waiting.reason = reason;

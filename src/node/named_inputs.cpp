@@ -36,10 +36,12 @@ std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config
 std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
   std::string text;
   for (const BodyConfig& body : config.bodies) {
+    if (!body.link.empty()) continue;
     text += body.body.name + ": ";
     text += body.isRigid() ? "tf frame " + body.tf_frame : node.resolveName(body.topic) + howNamed(body.topic_named);
     text += ", ";
   }
+  if (config.robot.named) text += "robot: " + std::to_string(config.robot.parts.size()) + " bodies by tf, ";
   const bool off = settingOf(config.effects, Effect::OCTOMAP) == EffectSetting::OFF;
   text += "octomap: " + (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
   return text + ", tf";

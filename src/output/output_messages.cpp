@@ -278,7 +278,7 @@ deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) 
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     out.checked_self |= meetsItself(bodies[b]);
     out.checked_map |= outcome.step->map.surface && meetsMap(bodies[b]);
-    for (std::size_t other = 0; other < b; ++other) out.checked_bodies |= meet(bodies[other], bodies[b]);
+    for (std::size_t other = 0; other < b; ++other) out.checked_bodies |= meet(bodies[other], other, bodies[b], b);
   }
   if (out.checked_map) {
     out.map_stamp = toRosTime(outcome.step->map.stamp_ns);

@@ -176,7 +176,7 @@ class Explanation {
       : step_(step),
         options_(plain(options)),
         kind_(question.kind),
-        parts_(std::min(requiredSubsteps(step, options.rigid_tolerance_m), options.max_substeps)) {
+        parts_(std::min(neededParts(step, options.rigid_tolerance_m), options.max_substeps)) {
     const auto& size = factsOf(kind_).vertices;
     features_.push_back(featureOf(step, question.body[0], question.vertex.data(), size[0]));
     if (!isOnMap()) features_.push_back(featureOf(step, question.body[1], question.vertex.data() + size[0], size[1]));
@@ -221,7 +221,9 @@ class Explanation {
     }
     if (isOnMap()) return meetsMap(body(0)) ? "" : "against_obstacle of '" + body(0).name + "' is off";
     if (features_[0].body != features_[1].body) {
-      return meet(body(0), body(1)) ? "" : "against_bodies of one of the bodies is off";
+      return meet(body(0), features_[0].body, body(1), features_[1].body)
+                 ? ""
+                 : "the two bodies are not tested against each other";
     }
     for (const Index v : features_[0].vertex) {
       if (std::binary_search(features_[1].vertex.begin(), features_[1].vertex.end(), v)) {

@@ -240,6 +240,7 @@ void visitSeparations(Archive& a, Body& body) {
     a.number(from.body);
     a.number(from.separation_m);
   }
+  a.array(body.not_against);
   a.shared(body.radius_m);
 }
 

@@ -105,8 +105,8 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
     // A list that is cut says nothing wrong about what touches, and all of it was looked at.
     if (status != StepStatus::TRUNCATED) outcome.unproved.push_back(reason);
   };
-  if (!step.off_path.empty()) say(StepStatus::PARTIAL, step.off_path);
   if (const std::string text = takeUnchecked(step, outcome.stats); !text.empty()) say(StepStatus::PARTIAL, text);
+  if (!step.off_path.empty()) say(StepStatus::PARTIAL, step.off_path);
   if (outcome.contacts.size() < outcome.total_contacts) {
     say(StepStatus::TRUNCATED, "the earliest " + std::to_string(outcome.contacts.size()) + " of " +
                                    std::to_string(outcome.total_contacts) + " contacts are listed");
@@ -155,16 +155,26 @@ void judge(const Options& options, const Step& step, std::size_t needed_parts, O
 /// What was left out on request: whoever reads "proved" must see it.
 std::vector<std::string> excludedByChoice(const Options& options, const Step& step, std::uint64_t excluded_voxels) {
   std::vector<std::string> excluded = options.excluded;
-  const auto add = [&](const Body& body, const std::string& what) {
-    excluded.push_back("body '" + body.name + "': " + what);
-  };
+  const bool others = step.bodies.size() > 1;
   for (const Body& body : step.bodies) {
-    if (!body.vertex_mask.empty()) add(body, std::to_string(body.vertex_mask.size()) + " vertices by vertex_mask");
-    if (!body.self_collision && !body.rigid) add(body, "not against itself");
-    if (!body.against_bodies && step.bodies.size() > 1) add(body, "not against other bodies");
-    if (!body.against_obstacle) add(body, "not against the map");
-    if (body.shell && step.bodies.size() > 1) add(body, "others may be inside of it");
+    if (body.vertex_mask.empty()) continue;
+    excluded.push_back("body '" + body.name + "': " + std::to_string(body.vertex_mask.size()) +
+                       " vertices by vertex_mask");
   }
+  const auto add = [&](const std::string& what, const auto& holds) {
+    std::string names;
+    std::size_t count = 0;
+    for (const Body& body : step.bodies) {
+      if (!holds(body)) continue;
+      names += (names.empty() ? "'" : ", '") + body.name + "'";
+      ++count;
+    }
+    if (count > 0) excluded.push_back((count == 1 ? "body " : "bodies ") + names + ": " + what);
+  };
+  add("not against itself", [](const Body& body) { return !body.self_collision && !body.rigid; });
+  add("not against other bodies", [&](const Body& body) { return !body.against_bodies && others; });
+  add("not against the map", [](const Body& body) { return !body.against_obstacle; });
+  add("others may be inside of it", [&](const Body& body) { return body.shell && others; });
   if (!options.exclude_boxes.empty()) {
     excluded.push_back(std::to_string(excluded_voxels) + " voxels of the map by exclude_boxes");
   }

@@ -69,7 +69,7 @@ Finding bodyBody(const EffectScene& scene) {
   const std::vector<Body>& bodies = scene.bodies;
   if (bodies.size() < 2) return impossible("there is only one body");
   std::size_t able = 0;
-  for (const Body& body : bodies) able += meet(body, body);
+  for (const Body& body : bodies) able += body.against_bodies;
   if (able < 2) return idle("against_bodies is false for all of them but " + std::to_string(able));
   return wanted("there are " + std::to_string(able) + " bodies");
 }
@@ -90,10 +90,11 @@ Finding octomap(const EffectScene& scene) {
 /// Of the bodies that one would take for solid and that others could be inside of, those for which that is not asked.
 /// A cloth, or a camera's view, has a border by nature.
 std::string notSolid(const EffectScene& scene) {
-  if (std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return meet(b, b); }) < 2) return "";
+  if (std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.against_bodies; }) < 2)
+    return "";
   std::string border, mask;
   for (const Body& body : scene.bodies) {
-    if (!body.rigid || !body.topology || !body.topology->hasFaces() || body.shell || !meet(body, body)) continue;
+    if (!body.rigid || !body.topology || !body.topology->hasFaces() || body.shell || !body.against_bodies) continue;
     const bool sewn = body.t0 && !seamsOf(*body.topology, *body.t0, *body.t0).vertices.empty();
     if (!body.topology->isClosed() && !sewn) {
       append(border, ", ", body.name);
@@ -145,7 +146,7 @@ CarriedSeparations carriedSeparations(const std::vector<Body>& bodies) {
     if (meetsItself(bodies[a])) raise(carried.own_m, separationBetween(bodies[a], a, bodies[a], a));
     if (meetsMap(bodies[a])) raise(carried.map_m, separationFromMap(bodies[a]));
     for (std::size_t b = a + 1; b < bodies.size(); ++b) {
-      if (meet(bodies[a], bodies[b])) raise(carried.bodies_m, separationBetween(bodies[a], a, bodies[b], b));
+      if (meet(bodies[a], a, bodies[b], b)) raise(carried.bodies_m, separationBetween(bodies[a], a, bodies[b], b));
     }
   }
   return carried;
@@ -164,7 +165,7 @@ Finding minimumSeparation(const EffectScene& scene) {
 
 bool meetsAnotherBody(const std::vector<Body>& bodies, std::size_t b) {
   for (std::size_t other = 0; other < bodies.size(); ++other) {
-    if (other != b && meet(bodies[b], bodies[other])) return true;
+    if (other != b && meet(bodies[b], b, bodies[other], other)) return true;
   }
   return false;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "dccd/mesh_store.h"
 
@@ -18,18 +19,66 @@ Eigen::Isometry3d movedBy(const Step& step, const Body& body, double u) {
   return interpolate(body.pose_t0, body.pose_t1, u * step.pose_scale) * body.pose_t0.inverse();
 }
 
+double radiusOf(const Body& body) {
+  double radius = 0;
+  for (const Vec3& p : *body.t0) radius = std::max(radius, (p - body.pose_t0.translation()).norm());
+  return radius;
+}
+
+/// Holds all of the body's ways through the step. One that turns does so about its frame's origin, which moves
+/// straight: on whichever way, no vertex is further from there than its radius.
+Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margin_m) {
+  Eigen::AlignedBox3d bounds;
+  if (body.turns) {
+    const Vec3 from = body.pose_t0.translation();
+    bounds.extend(from);
+    bounds.extend(Vec3(from + step.pose_scale * (body.pose_t1.translation() - from)));
+    margin_m += radiusOf(body);
+  } else {
+    for (const Positions* positions : {body.t0.get(), body.t1.get()}) {
+      for (const Vec3& p : *positions) {
+        if (p.allFinite()) bounds.extend(p);
+      }
+    }
+  }
+  if (body.radius_m && !body.radius_m->empty()) {
+    margin_m += *std::max_element(body.radius_m->begin(), body.radius_m->end());
+  }
+  bounds.min().array() -= margin_m;
+  bounds.max().array() += margin_m;
+  return bounds;
+}
+
 }  // namespace
 
-std::size_t requiredSubsteps(const Step& step, double tolerance_m) {
+double partsFor(const Body& body, double pose_scale, double tolerance_m) {
+  const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1), radius = radiusOf(body);
+  // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
+  if (radius * (1 - std::cos(std::min(angle, 2 * M_PI) / 2)) <= tolerance_m) return 1;
+  return std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius)));
+}
+
+std::size_t neededParts(const Step& step, double tolerance_m) {
+  std::vector<std::optional<Eigen::AlignedBox3d>> bounds(step.bodies.size());
+  const double margin_m = largestSeparation(step.bodies) + tolerance_m;  // the tolerance is far above all rounding
+  const auto boundsOf = [&](std::size_t b) -> const Eigen::AlignedBox3d& {
+    if (!bounds[b]) bounds[b] = sweptBounds(step, step.bodies[b], margin_m);
+    return *bounds[b];
+  };
+  const auto isNear = [&](std::size_t b) {
+    if (meetsMap(step.bodies[b]) && step.map.surface) return true;
+    for (std::size_t other = 0; other < step.bodies.size(); ++other) {
+      const bool tested = other != b && meet(step.bodies[b], b, step.bodies[other], other);
+      if (tested && boundsOf(b).intersects(boundsOf(other))) return true;
+    }
+    return false;
+  };
   double parts = 1;
-  for (const Body& body : step.bodies) {
+  for (std::size_t b = 0; b < step.bodies.size(); ++b) {
+    const Body& body = step.bodies[b];
     if (!body.turns) continue;
-    const double angle = step.pose_scale * rotationAngle(body.pose_t0, body.pose_t1);
-    double radius = 0;
-    for (const Vec3& p : *body.t0) radius = std::max(radius, (p - body.pose_t0.translation()).norm());
-    // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
-    if (radius * (1 - std::cos(std::min(angle, 2 * M_PI) / 2)) <= tolerance_m) continue;
-    parts = std::max(parts, std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius))));
+    const double own = partsFor(body, step.pose_scale, tolerance_m);
+    if (own > parts && isNear(b)) parts = own;
   }
   return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);
 }

@@ -5,9 +5,13 @@
 
 namespace dccd {
 
-/// Parts that the step must be cut into so that each turning body's straight vertex paths stay within the tolerance of
-/// its arc [m]: 1 where nothing turns. Not limited.
-std::size_t requiredSubsteps(const Step& step, double tolerance_m);
+/// The parts that a step must be cut into so that the turning body's straight vertex paths stay within the tolerance of
+/// its arc [m]; not limited.
+double partsFor(const Body& body, double pose_scale, double tolerance_m);
+
+/// The most that a body needs, up to 1e9; 1 where nothing turns. One does not count where neither its arcs nor its
+/// straight paths come near anything that it is tested against.
+std::size_t neededParts(const Step& step, double tolerance_m);
 
 /// Moves `at`, which ends where part `part` - 1 of `parts` equal parts ends, on by one part.
 void advance(const Step& step, std::size_t part, std::size_t parts, Step& at);

@@ -32,6 +32,7 @@ accuracy: conservative
 num_threads: 3
 step_budget_ms: 7.5
 look_ahead_s: 0.5
+robot: {description: robot_from_file, semantic: semantic_from_file}
 '''
 # What the launch files set where the file does not.
 DEFAULTS = {'monitor.launch': {}, 'replay.launch': {'default_topic': '/cloth'}}
@@ -90,7 +91,8 @@ class LaunchTest(unittest.TestCase):
         given = {'fixed_frame': ('fixed_frame', 'mine'), 'octomap_file': ('octomap_file', '/mine.bt'), 'topology': ('topology/source', 'auto'),
                  'rows': ('topology/rows', 0), 'cols': ('topology/cols', 0), 'accuracy': ('accuracy', 'exact'),
                  'num_threads': ('num_threads', 1), 'step_budget_ms': ('step_budget_ms', 0.0),
-                 'look_ahead_s': ('look_ahead_s', 0.0)}
+                 'look_ahead_s': ('look_ahead_s', 0.0), 'robot': ('robot/description', '/r'),
+                 'semantic': ('robot/semantic', '/s')}
         for launch in DEFAULTS:
             with self.subTest(launch):
                 arguments = [self.file(EVERYTHING), 'mesh:=/mine', 'octomap:=/my_map']

@@ -23,8 +23,9 @@ MAY_INCLUDE = {
     'octomap': {'obstacle'},
     'input': {'obstacle'},
     'config': {'input'},
+    'robot': {'input', 'config'},
     'output': {'input', 'config', 'report'},
-    'node': {'input', 'config', 'output', 'octomap', 'record', 'report'},
+    'node': {'input', 'config', 'robot', 'output', 'octomap', 'record', 'report'},
     'apps': None,  # everything
 }
 ROS_ROOMS = ('input', 'config', 'output', 'node', 'apps')

@@ -158,7 +158,7 @@ void History::Impl::findPairs(const StepContext& context, Share share) {
     for (std::size_t p = 0; p < body_pairs.size(); p += 2) {
       const std::uint16_t a = static_cast<std::uint16_t>(body_pairs[p]),
                           b = static_cast<std::uint16_t>(body_pairs[p + 1]);
-      if (!meet(scene.bodies()[a].setup, scene.bodies()[b].setup)) continue;
+      if (!meet(scene.bodies()[a].setup, a, scene.bodies()[b].setup, b)) continue;
       ++result.stats.body_pairs;
       addTasks(PairKind::VERTEX_FACE, a, b, context, share);
       addTasks(PairKind::VERTEX_FACE, b, a, context, share);

@@ -162,7 +162,7 @@ void InsideSearch::search(const SceneArrays& scene, const Deadline& deadline) {
   }
   for (std::size_t p = 0; p < overlapping_.size(); p += 2) {
     const std::uint32_t a = overlapping_[p], b = overlapping_[p + 1];
-    if (!meet(bodies[a].setup, bodies[b].setup)) continue;
+    if (!meet(bodies[a].setup, a, bodies[b].setup, b)) continue;
     if (bodies[b].hasInside()) body_pairs_.push_back({a, b});
     if (bodies[a].hasInside()) body_pairs_.push_back({b, a});
   }

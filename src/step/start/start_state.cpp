@@ -160,7 +160,7 @@ void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline
   if (bodies.size() > 1) scene.overlappingBodies(true, overlapping_, scratch_);
   for (std::size_t p = 0; p < overlapping_.size(); p += 2) {
     const std::uint32_t a = overlapping_[p], b = overlapping_[p + 1];
-    if (!dccd::meet(bodies[a].setup, bodies[b].setup)) continue;
+    if (!dccd::meet(bodies[a].setup, a, bodies[b].setup, b)) continue;
     body_pairs_.push_back({a, b});
     body_pairs_.push_back({b, a});
   }

@@ -59,6 +59,7 @@ TEST(StepReplay, DistancesAndWhatTheyLeaveOutAreRecordedToo) {
   };
   EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[0].radius_m = share(std::vector<double>(20, 0.05)); }));
   EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[2].separations.clear(); }));
+  EXPECT_TRUE(differs([](StepRecording& c) { c.step.bodies[0].not_against = {2}; }));
   EXPECT_TRUE(differs([](StepRecording& c) {
     ReferenceFrame spread = *c.step.bodies[0].reference;
     for (Vec3& p : spread.positions) p *= 10;  // nothing is close in it, so nothing is left out

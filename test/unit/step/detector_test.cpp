@@ -122,6 +122,32 @@ TEST(Detector, ManyBodies) {
   for (const Contact& c : result.contacts) EXPECT_EQ(c.body[0] / 2, c.body[1] / 2);
 }
 
+// Which of the two names the other does not matter; all other pairs are as they were.
+TEST(Detector, BodiesThatAreNamedAreNotTestedAgainstEachOther) {
+  TestStep step = crumpled(5, 3, 8);
+  for (StepBody& body : step.bodies) body.self_collision = false;
+  Step motion = step.motion();
+  const auto answer = [](const Step& to_do) {
+    History history;
+    return detect(to_do, {}, history);
+  };
+  const Outcome all = answer(motion);
+  for (const auto& [namer, named] : {std::pair<std::size_t, std::uint16_t>{0, 2}, {2, 0}}) {
+    motion = step.motion();
+    motion.bodies[namer].not_against = {named};
+    const Outcome some = answer(motion);
+    std::vector<Contact> expected;
+    std::copy_if(all.contacts.begin(), all.contacts.end(), std::back_inserter(expected),
+                 [](const Contact& c) { return c.body[0] == 1 || c.body[1] == 1; });
+    EXPECT_LT(expected.size(), all.contacts.size());
+    EXPECT_EQ(difference(some.contacts, expected), "");
+    for (const StartIntersection& one : some.intersections) EXPECT_TRUE(one.body[0] == 1 || one.body[1] == 1);
+    EXPECT_LT(some.intersections.size(), all.intersections.size());
+  }
+  motion.bodies[0].not_against = {3};
+  EXPECT_THROW(answer(motion), std::invalid_argument) << "there is no body 3";
+}
+
 TEST(Detector, EffectsThatAreOffCostNothing) {
   TestStep step = crumpled(5, 2, 8);
   for (StepBody& body : step.bodies) body.self_collision = false;

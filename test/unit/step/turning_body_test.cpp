@@ -60,47 +60,60 @@ Outcome step(Monitor& monitor, MeshFrame clock, double angle) {
 }
 
 TEST(TurningBody, IsCutIntoAsManyPartsAsTheToleranceAsksFor) {
-  Step turning;
-  turning.bodies.resize(1);
-  Body& body = turning.bodies[0];
+  Body body;
   body.t0 = share(Positions{{0, 0, 0}, {1, 0, 0}, {1, 0.1, 0}});
   body.turns = true;
   body.pose_t1.linear() = Eigen::AngleAxisd(3.1, Vec3::UnitY()).toRotationMatrix();
-  const std::size_t parts = requiredSubsteps(turning, 1e-3);
-  EXPECT_GT(parts, 30u);
-  EXPECT_LT(parts, 40u);
-  EXPECT_LE(1.005 * (1 - std::cos(3.1 / (2.0 * static_cast<double>(parts)))), 1e-3);
-  body.turns = false;
-  EXPECT_EQ(requiredSubsteps(turning, 1e-3), 1u);
+  const double parts = partsFor(body, 1, 1e-3);
+  EXPECT_GT(parts, 30);
+  EXPECT_LT(parts, 40);
+  EXPECT_LE(1.005 * (1 - std::cos(3.1 / (2 * parts))), 1e-3);
+  body.pose_t1 = body.pose_t0;
+  EXPECT_EQ(partsFor(body, 1, 1e-3), 1);
 }
 
 // A prediction may turn a body by more than half a turn. Then its chord leaves the arc by more than the body's radius.
 TEST(TurningBody, MoreThanHalfATurnLeavesTheArcByMoreThanTheRadius) {
   constexpr double RADIUS_M = 0.8e-3, TOLERANCE_M = 1e-3;
-  Step turning;
-  turning.bodies.resize(1);
-  Body& body = turning.bodies[0];
+  Body body;
   body.t0 = share(Positions{{RADIUS_M, 0, 0}, {0, 0, 0}, {0, 0, RADIUS_M}});
   body.turns = true;
   body.pose_t1.linear() = Eigen::AngleAxisd(0.75 * M_PI, Vec3::UnitY()).toRotationMatrix();
-  EXPECT_EQ(requiredSubsteps(turning, TOLERANCE_M), 1u);
-  turning.pose_scale = 2;
+  EXPECT_EQ(partsFor(body, 1, TOLERANCE_M), 1);
   ASSERT_GT(RADIUS_M * (1 - std::cos(0.75 * M_PI)), TOLERANCE_M);
-  EXPECT_EQ(requiredSubsteps(turning, TOLERANCE_M), 2u);
+  EXPECT_EQ(partsFor(body, 2, TOLERANCE_M), 2);
 }
 
 // A bar of 1 m turns by nearly 180 degrees about its end; half way its other end passes what no chord comes near.
 TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
   Monitor far(loose(), clockAndBar());
-  step(far, tip(0, -3), 0);
-  const Outcome missed = step(far, tip(100 * MS, -3), 3.1);
+  step(far, tip(0, -1.01), 0);
+  const Outcome missed = step(far, tip(100 * MS, -1.01), 3.1);
   EXPECT_GT(missed.substeps, 30u);
-  ASSERT_TRUE(missed.contacts.empty()) << "the tip is 2 m below";
+  ASSERT_TRUE(missed.contacts.empty()) << "the tip is 1 cm below";
   Monitor near(loose(), clockAndBar());
   step(near, tip(0, -0.9), 0);
   const Outcome met = step(near, tip(100 * MS, -0.9), 3.1);
   ASSERT_EQ(met.status, StepStatus::OK) << met.reason;
   EXPECT_NEAR(met.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
+}
+
+// A step is not split for a body that turns far from all that it is tested against.
+TEST(TurningBody, ThatComesNearNothingIsNotCut) {
+  Monitor monitor(loose(), clockAndBar());
+  step(monitor, tip(0, -1.03), 0);
+  const Outcome outcome = step(monitor, tip(100 * MS, -1.03), 3.1);
+  EXPECT_EQ(outcome.substeps, 1u);
+  EXPECT_EQ(outcome.stats.bodies_far, 1u);
+  EXPECT_TRUE(assuranceOf(outcome).clear());
+  EXPECT_GT(step(monitor, tip(200 * MS, -1.01), 6.2).substeps, 30u) << "its corners come to 1.02 m";
+  std::vector<Body> apart = clockAndBar();
+  apart[0].not_against = {1};
+  Monitor blind(loose(), apart);
+  step(blind, tip(0, -0.9), 0);
+  const Outcome unseen = step(blind, tip(100 * MS, -0.9), 3.1);
+  EXPECT_EQ(unseen.substeps, 1u);
+  EXPECT_TRUE(unseen.contacts.empty());
 }
 
 // The point that is shown lies on the arc, where the part's straight paths meet, not half way of the whole step's
@@ -148,19 +161,22 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
     MonitorOptions options = loose();
     options.detector.step_budget_ms = budget_ms;
     Monitor monitor(options, clockAndBar());
-    step(monitor, tip(0, -3), 0);
-    return step(monitor, tip(100 * MS, -3), 3.1);
+    step(monitor, tip(0, -1.01), 0);
+    return step(monitor, tip(100 * MS, -1.01), 3.1);
   };
   const Outcome whole = run(0);
   ASSERT_EQ(whole.status, StepStatus::OK);
   ASSERT_GT(whole.substeps, 30u);
-  EXPECT_EQ(whole.stats.bodies_refitted + whole.stats.bodies_kept, 2 * whole.substeps) << "two bodies in every part";
+  const auto bodies = [](const StepStats& stats) {
+    return stats.bodies_refitted + stats.bodies_kept + stats.bodies_far;
+  };
+  EXPECT_EQ(bodies(whole.stats), 2 * whole.substeps) << "two bodies in every part";
   EXPECT_TRUE(run(1000).complete);
   const Outcome cut = run(1e-6);
   EXPECT_EQ(cut.status, StepStatus::DEADLINE);
   EXPECT_FALSE(cut.complete);
   EXPECT_FALSE(assuranceOf(cut).clear());
-  EXPECT_EQ(cut.stats.bodies_refitted + cut.stats.bodies_kept, 2u) << "the first part alone";
+  EXPECT_EQ(bodies(cut.stats), 2u) << "the first part alone";
   EXPECT_LE(cut.unchecked_toc_lower, 1.0 / static_cast<double>(cut.substeps));
 }
 

@@ -90,7 +90,8 @@ struct Driven {
   MonitorPipeline pipeline;
   Outcome outcome;
 
-  explicit Driven(const XmlRpcValue& tree) : config(readConfig(tree)), pipeline(config, feed_tf) {}
+  explicit Driven(const XmlRpcValue& tree, const RobotLoader& load = {})
+      : config(readConfig(tree, "~", load)), pipeline(config, feed_tf) {}
 
   void giveMap(double stamp_s) {
     LoadedMap loaded = decodeMapMessage(map(stamp_s), config);

@@ -1,0 +1,98 @@
+#include "node/robot_source.h"
+
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include <ros/console.h>
+
+#include "config/parameter_tree.h"
+#include "input/mesh_formats.h"
+#include "input/mesh_resource.h"
+#include "robot/robot_model.h"
+
+namespace dccd {
+namespace {
+
+constexpr double LOOK_AGAIN_S = 0.1;
+
+bool isFile(const std::string& name) {
+  const std::string ending = fileEnding(name);
+  return name.find("://") != std::string::npos || ending == "urdf" || ending == "srdf" || ending == "xml";
+}
+
+RobotText readFile(const std::string& name, const std::string& what) {
+  RobotText read;
+  read.name = name;
+  if (name.empty()) return read;
+  try {
+    read.text = yamlText(pathOf(name), what);
+  } catch (const std::invalid_argument& error) {
+    read.problem = std::string("cannot be read: ") + error.what();
+  }
+  if (read.text.empty() && read.problem.empty()) read.problem = "is empty";
+  return read;
+}
+
+/// Asks the parameter server until it has both or time is up.
+class ParameterTexts {
+ public:
+  ParameterTexts(const ros::NodeHandle& node, double timeout_s, const std::function<bool()>& goes_on)
+      : node_(node),
+        timeout_s_(timeout_s),
+        until_(Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * timeout_s))),
+        goes_on_(goes_on) {}
+
+  RobotText read(const std::string& name, const std::string& what) const {
+    if (name.empty() || isFile(name)) return readFile(name, what);
+    RobotText read;
+    try {
+      read.name = "parameter " + node_.resolveName(name);
+      bool told = false;
+      while (!node_.getParam(name, read.text) && goes_on_() && Clock::now() < until_) {
+        if (node_.hasParam(name)) break;  // it is there, and no text
+        if (!std::exchange(told, true)) ROS_INFO_STREAM("waits for " << read.name << ", " << what);
+        ros::WallDuration(LOOK_AGAIN_S).sleep();
+      }
+    } catch (const ros::Exception& error) {
+      read.name = "parameter " + name;
+      read.problem = std::string("cannot be asked for: ") + error.what();
+      return read;
+    }
+    if (!read.text.empty()) return read;
+    read.problem = node_.hasParam(name) ? "is empty or no text; " + what + " is needed"
+                                        : "was set by nobody for " + std::to_string(static_cast<int>(timeout_s_)) +
+                                              " s (robot/timeout_s); publish it before, or correct robot";
+    return read;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const ros::NodeHandle& node_;
+  double timeout_s_;
+  Clock::time_point until_;
+  const std::function<bool()>& goes_on_;
+};
+
+}  // namespace
+
+RobotLoader robotOfParameters(const ros::NodeHandle& node, std::function<bool()> goes_on) {
+  return [node, goes_on = std::move(goes_on)](const RobotConfig& config, double tolerance_m) {
+    const ParameterTexts texts(node, config.timeout_s, goes_on);
+    const RobotText description = texts.read(config.description, "a URDF");
+    return makeRobot(description, texts.read(config.semantic, "an SRDF"), config, tolerance_m);
+  };
+}
+
+RobotLoader robotOfFiles() {
+  return [](const RobotConfig& config, double tolerance_m) {
+    for (const std::string& name : {config.description, config.semantic}) {
+      if (name.empty() || isFile(name)) continue;
+      throw ParameterError("robot names '" + name +
+                           "', but there is no parameter server: write the path of a file .urdf or .srdf");
+    }
+    return makeRobot(readFile(config.description, "a URDF"), readFile(config.semantic, "an SRDF"), config, tolerance_m);
+  };
+}
+
+}  // namespace dccd

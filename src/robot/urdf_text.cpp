@@ -1,0 +1,127 @@
+#include "robot/urdf_text.h"
+
+#include <mutex>
+#include <utility>
+
+#include <console_bridge/console.h>
+#include <tinyxml2.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include "robot/xml_text.h"
+
+namespace dccd {
+namespace {
+
+using tinyxml2::XMLElement;
+
+/// What urdfdom says of its errors while this lives, instead of the console. One at a time: the handler is the
+/// process's.
+class HeardErrors : public console_bridge::OutputHandler {
+ public:
+  HeardErrors() : lock_(mutex()), before_(console_bridge::getOutputHandler()) {
+    console_bridge::useOutputHandler(this);
+  }
+  ~HeardErrors() override { console_bridge::useOutputHandler(before_); }
+  HeardErrors(const HeardErrors&) = delete;
+  HeardErrors& operator=(const HeardErrors&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) said_ += (said_.empty() ? "" : "; ") + text;
+  }
+  const std::string& said() const { return said_; }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex one;
+    return one;
+  }
+  std::lock_guard<std::mutex> lock_;
+  console_bridge::OutputHandler* before_;
+  std::string said_;
+};
+
+/// What is wrong with a collision element's geometry; empty: urdfdom knows it.
+std::string problemOf(const XMLElement& collision) {
+  const XMLElement* geometry = collision.FirstChildElement("geometry");
+  const XMLElement* shape = geometry ? geometry->FirstChildElement() : nullptr;
+  if (!shape) return "has no geometry";
+  const std::string name = shape->Name();
+  for (const char* known : {"box", "cylinder", "sphere", "mesh"}) {
+    if (name == known) return "";
+  }
+  if (name == "capsule") {
+    return "is a capsule, which URDF readers before urdfdom 5.1 do not know; write a cylinder and two spheres";
+  }
+  return "is <" + name + ">, which is no geometry; write box, cylinder, sphere or mesh";
+}
+
+/// Returns how many collision elements urdfdom is to read.
+std::size_t reduceLink(XMLElement& link, UrdfText& urdf) {
+  const std::string name = neededText(link, "name");
+  bool seen = false;
+  std::size_t number = 0, kept = 0;
+  for (XMLElement *child = link.FirstChildElement(), *next = nullptr; child; child = next) {
+    next = child->NextSiblingElement();
+    const std::string tag = child->Name();
+    seen = seen || tag == "visual";
+    const std::string problem = tag == "collision" ? problemOf(*child) : "";
+    if (tag == "collision") ++number;
+    if (tag == "collision" && problem.empty()) ++kept;
+    if (!problem.empty()) {
+      urdf.refused[name].push_back("its collision element " + std::to_string(number) + " (line " +
+                                   std::to_string(child->GetLineNum()) + ") " + problem);
+    }
+    if (tag != "collision" || !problem.empty()) link.DeleteChild(child);
+  }
+  if (seen && number == 0) urdf.visual_only.insert(name);
+  return kept;
+}
+
+/// How it moves is tf's matter; which links it joins is told of by groups.
+void reduceJoint(XMLElement& joint) {
+  neededText(joint, "name");
+  joint.SetAttribute("type", "fixed");
+  for (XMLElement *child = joint.FirstChildElement(), *next = nullptr; child; child = next) {
+    next = child->NextSiblingElement();
+    const std::string tag = child->Name();
+    if (tag != "parent" && tag != "child") joint.DeleteChild(child);
+  }
+}
+
+}  // namespace
+
+UrdfText parseUrdf(const std::string& text) {
+  UrdfText urdf;
+  tinyxml2::XMLDocument document;
+  XMLElement& robot = parseRobotXml(text, document);
+  std::map<std::string, std::size_t> elements;  // of each link
+  for (XMLElement *child = robot.FirstChildElement(), *next = nullptr; child; child = next) {
+    next = child->NextSiblingElement();
+    const std::string tag = child->Name();
+    if (tag == "link") {
+      elements[textOf(*child, "name")] = reduceLink(*child, urdf);
+    } else if (tag == "joint") {
+      reduceJoint(*child);
+    } else {
+      robot.DeleteChild(child);
+    }
+  }
+  tinyxml2::XMLPrinter printer(nullptr, true);
+  document.Print(&printer);
+  HeardErrors errors;
+  try {
+    urdf.model = urdf::parseURDF(printer.CStr());
+  } catch (const std::exception& error) {
+    throw RobotTextError(error.what());
+  }
+  if (!urdf.model) throw RobotTextError(errors.said().empty() ? "the URDF reader refuses it" : errors.said());
+  // Of a link it drops an element that it cannot read, and all that follow, and goes on.
+  for (const auto& [name, link] : urdf.model->links_) {
+    if (link->collision_array.size() == elements[name]) continue;
+    urdf.refused[name].push_back("of its " + std::to_string(elements[name]) + " collision elements " +
+                                 std::to_string(link->collision_array.size()) + " could be read: " + errors.said());
+  }
+  return urdf;
+}
+
+}  // namespace dccd

@@ -1,0 +1,36 @@
+#include "robot/xml_text.h"
+
+#include "robot/urdf_text.h"
+
+namespace dccd {
+
+tinyxml2::XMLElement& parseRobotXml(const std::string& text, tinyxml2::XMLDocument& document) {
+  document.Parse(text.data(), text.size());
+  if (document.Error()) {
+    throw RobotTextError("is no XML: " + std::string(tinyxml2::XMLDocument::ErrorIDToName(document.ErrorID())) +
+                         " in line " + std::to_string(document.ErrorLineNum()));
+  }
+  tinyxml2::XMLElement* root = document.RootElement();
+  if (!root) throw RobotTextError("holds no XML element");
+  if (std::string(root->Name()) != "robot") {
+    throw RobotTextError("begins with " + placeOf(*root) + ", where <robot> is needed");
+  }
+  return *root;
+}
+
+std::string textOf(const tinyxml2::XMLElement& element, const char* attribute) {
+  const char* text = element.Attribute(attribute);
+  return text ? text : "";
+}
+
+std::string neededText(const tinyxml2::XMLElement& element, const char* attribute) {
+  const std::string text = textOf(element, attribute);
+  if (text.empty()) throw RobotTextError(placeOf(element) + " needs the attribute " + attribute);
+  return text;
+}
+
+std::string placeOf(const tinyxml2::XMLElement& element) {
+  return "<" + std::string(element.Name()) + "> of line " + std::to_string(element.GetLineNum());
+}
+
+}  // namespace dccd
