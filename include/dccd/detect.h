@@ -49,7 +49,7 @@ struct Options {
   std::vector<Box> exclude_boxes;     ///< [m], fixed frame: voxels with their centre inside count as free
   bool obstacle_expected = false;     ///< without a map the status is NO_MAP
   std::vector<Expectation> expected;  ///< in force for this step; not with earliest_only, which may find nothing else
-  bool patches = false;  ///< say which contacts belong together: Outcome::patches
+  bool patches = false;               ///< say which contacts belong together: Outcome::patches
   /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
   /// answer.
   std::vector<std::string> excluded;
