@@ -38,27 +38,46 @@ std::uint64_t blockBits(const VoxelTree& tree, std::uint32_t node, bool region_f
   return parent.full >> cell & 1 ? ~std::uint64_t{0} : 0;
 }
 
-/// Masks of the leaves of one level 0 node, given which of its cells are exposed in each direction. A leaf of two
-/// voxels a side takes the union over its cells: faces between its own cells are covered and add nothing.
+/// Bits 0 to 7 of the index, a byte each.
+std::array<std::uint64_t, 256> makeByteOfBit() {
+  std::array<std::uint64_t, 256> table{};
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    for (int i = 0; i < 8; ++i) table[bits] |= std::uint64_t{bits >> i & 1} << (8 * i);
+  }
+  return table;
+}
+
+const std::array<std::uint64_t, 256> BYTE_OF_BIT = makeByteOfBit();
+
+/// Masks of the leaves of one level 0 node, given which of its cells are exposed in each direction, eight cells at a
+/// time. A leaf of two voxels a side takes the union over its cells: faces between its own cells are covered and add
+/// nothing.
 void blockFeatures(const VoxelTree::Node& node, const std::array<std::uint64_t, FACE_DIRECTIONS>& exposed,
-                   std::vector<FeatureMask>& masks) {
-  std::uint64_t any = 0;
-  for (const std::uint64_t bits : exposed) any |= bits;
-  if (any == 0) return;
-  std::uint32_t next_leaf = node.first_leaf;
-  for (std::uint64_t cells = node.full; cells != 0; cells &= cells - 1) {
-    const unsigned bit = lowestBit(cells);
-    next_leaf += static_cast<std::uint32_t>(node.start >> bit & 1);
-    unsigned faces = 0;
-    for (int d = 0; d < FACE_DIRECTIONS; ++d) faces |= static_cast<unsigned>(exposed[d] >> bit & 1) << d;
-    masks[next_leaf - 1] |= FEATURES_OF_FACES[faces];
+                   FeatureMask* masks) {
+  for (int shift = 0; shift < 64; shift += 8) {
+    std::uint64_t cells = node.full >> shift & 0xff;
+    if (cells == 0) continue;
+    std::uint64_t faces = 0;  // a byte for each cell
+    for (int d = 0; d < FACE_DIRECTIONS; ++d) faces |= BYTE_OF_BIT[exposed[d] >> shift & 0xff] << d;
+    const bool is_one = cells == 0xff && (node.start >> shift & 0xff) == 1;
+    for (; cells != 0; cells &= cells - 1) {
+      *masks |= FEATURES_OF_FACES[faces >> (8 * lowestBit(cells)) & 0x3f];
+      masks += !is_one;
+    }
+    masks += is_one;
   }
 }
 
-/// Leaves of one and two voxels, a level 1 node (16 voxels a side) at a time.
-void smallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>& masks) {
+/// Leaves of one and two voxels, a level 1 node (16 voxels a side) at a time; of its blocks those that are `wanted`
+/// (null: all).
+void smallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>& masks,
+                 const std::vector<std::uint8_t>* wanted) {
   const VoxelTree::Node& parent = tree.nodes(1)[index];
   if (parent.child == 0) return;
+  if (wanted != nullptr) {
+    const auto first = wanted->begin() + parent.first_child;
+    if (std::find(first, first + bitCount(parent.child), 1) == first + bitCount(parent.child)) return;
+  }
   const std::array<std::uint16_t, 3>& at = tree.nodeCell(1, index);
   std::array<std::uint32_t, FACE_DIRECTIONS> next;
   std::array<bool, FACE_DIRECTIONS> next_full{};
@@ -72,6 +91,7 @@ void smallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>&
   }
   for (std::uint64_t children = parent.child; children != 0; children &= children - 1) {
     const unsigned bit = lowestBit(children);
+    if (wanted != nullptr && !(*wanted)[parent.childAt(bit)]) continue;
     const VoxelTree::Node& node = tree.nodes(0)[parent.childAt(bit)];
     const std::array<std::uint8_t, 3>& cell = CELL_COORDINATES[bit];
     std::array<std::uint64_t, FACE_DIRECTIONS> exposed;
@@ -83,7 +103,7 @@ void smallLeaves(VoxelTree& tree, std::uint32_t index, std::vector<FeatureMask>&
       const std::uint64_t block = blockBits(tree, inside ? index : next[d], next_full[d], beside_bit);
       exposed[d] = node.full & ~neighbourBits(node.full, block, d);
     }
-    blockFeatures(node, exposed, masks);
+    blockFeatures(node, exposed, masks.data() + node.first_leaf);
     const std::uint64_t x = exposed[0] | exposed[1], y = exposed[2] | exposed[3], z = exposed[4] | exposed[5];
     tree.setFeatureCells(0, parent.childAt(bit), (x & y) | (y & z) | (z & x), x & y & z);
   }
@@ -173,19 +193,108 @@ void markFeatureCells(VoxelTree& tree, int level, std::uint32_t index, const std
   tree.setFeatureCells(level, index, edges, corners);
 }
 
-}  // namespace
-
-std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
-  std::vector<FeatureMask> masks(tree.leaves().size(), 0);
-  for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node) smallLeaves(tree, node, masks);
-  for (std::size_t leaf = tree.firstLeafOfLevel(1); leaf < masks.size(); ++leaf) {
-    masks[leaf] = largeLeaf(tree, tree.leaves()[leaf]);
-  }
+/// Of all leaves, once those of level 0 are known.
+void markFeatureCells(VoxelTree& tree, const std::vector<FeatureMask>& masks) {
   for (int level = 1; level < VoxelTree::LEVELS; ++level) {
     for (std::uint32_t index = 0; index < tree.nodes(level).size(); ++index) {
       markFeatureCells(tree, level, index, masks);
     }
   }
+  tree.raiseFeatureCells();
+}
+
+/// What a change can have given other masks: nodes of level 0, and leaves of the levels above.
+struct Reach {
+  std::vector<std::uint8_t> nodes, large;
+};
+
+/// A mask depends on its leaf and on the voxels beside that leaf's faces.
+Reach reachOf(const VoxelTree& tree, const VoxelTree::Change& change) {
+  const std::uint32_t first_large = tree.firstLeafOfLevel(1);
+  Reach reach;
+  for (const std::uint32_t before : change.node_before) reach.nodes.push_back(before == VoxelTree::NONE);
+  for (const std::uint32_t before : change.large_before) reach.large.push_back(before == VoxelTree::NONE);
+  /// The leaf of four voxels and more that holds the block of 4^3 voxels.
+  const auto markLarge = [&](const Cell& block) {
+    for (int level = 1; level < VoxelTree::LEVELS && !reach.large.empty(); ++level) {
+      if (tree.firstLeafOfLevel(level) == tree.firstLeafOfLevel(level + 1)) continue;
+      const int shift = 2 * level;
+      const std::uint32_t index = tree.find(level, block[0] >> shift, block[1] >> shift, block[2] >> shift);
+      if (index == VoxelTree::NONE) continue;
+      const VoxelTree::Node& node = tree.nodes(level)[index];
+      const unsigned bit = cellBit(block[0] >> (shift - 2), block[1] >> (shift - 2), block[2] >> (shift - 2));
+      if (node.full >> bit & 1) reach.large[node.leafAt(bit) - first_large] = 1;
+    }
+  };
+  for (const VoxelTree::Change::Block& block : change.blocks) {
+    for (int d = 0; d < FACE_DIRECTIONS; ++d) {
+      const int axis = d >> 1, side = d & 1;
+      if ((block.voxels & RANGE_MASKS[axis][3 * side][3 * side]) == 0) continue;
+      Cell beside{block.cell[0], block.cell[1], block.cell[2]};
+      beside[axis] += side ? 1 : -1;
+      const std::uint32_t parent = tree.find(1, beside[0] >> 2, beside[1] >> 2, beside[2] >> 2);
+      const unsigned bit = cellBit(beside[0], beside[1], beside[2]);
+      if (parent != VoxelTree::NONE && (tree.nodes(1)[parent].child >> bit & 1)) {
+        reach.nodes[tree.nodes(1)[parent].childAt(bit)] = 1;
+      } else {
+        markLarge(beside);
+      }
+    }
+  }
+  for (const OccupiedLeaf& leaf : change.large) {
+    KeyBox box;
+    const std::int32_t min[3] = {leaf.min.x, leaf.min.y, leaf.min.z}, size = static_cast<std::int32_t>(leaf.size);
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lo[axis] = std::max(min[axis] - 1, 0);
+      box.hi[axis] = std::min(min[axis] + size, VoxelTree::KEYS - 1);
+    }
+    tree.visitLeaves(box, [&](std::uint32_t index) {
+      if (index >= first_large) {
+        reach.large[index - first_large] = 1;
+        return true;
+      }
+      const auto after =
+          std::upper_bound(tree.nodes(0).begin(), tree.nodes(0).end(), index,
+                           [](std::uint32_t i, const VoxelTree::Node& node) { return i < node.first_leaf; });
+      reach.nodes[static_cast<std::size_t>(after - tree.nodes(0).begin()) - 1] = 1;
+      return true;
+    });
+  }
+  return reach;
+}
+
+}  // namespace
+
+std::vector<FeatureMask> exposedFeatures(VoxelTree& tree) {
+  std::vector<FeatureMask> masks(tree.leaves().size(), 0);
+  for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node) smallLeaves(tree, node, masks, nullptr);
+  for (std::size_t leaf = tree.firstLeafOfLevel(1); leaf < masks.size(); ++leaf) {
+    masks[leaf] = largeLeaf(tree, tree.leaves()[leaf]);
+  }
+  markFeatureCells(tree, masks);
+  return masks;
+}
+
+std::vector<FeatureMask> exposedFeatures(VoxelTree& tree, const VoxelTree& before,
+                                         const std::vector<FeatureMask>& masks_before,
+                                         const VoxelTree::Change& change) {
+  const std::uint32_t first_large = tree.firstLeafOfLevel(1);
+  const std::vector<VoxelTree::Node>& nodes = tree.nodes(0);
+  const Reach reach = reachOf(tree, change);
+  std::vector<FeatureMask> masks(tree.leaves().size(), 0);
+  for (std::uint32_t node = 0; node < nodes.size(); ++node) {
+    if (reach.nodes[node]) continue;
+    const std::uint32_t first = nodes[node].first_leaf;
+    const std::uint32_t end = node + 1 < nodes.size() ? nodes[node + 1].first_leaf : first_large;
+    std::copy_n(masks_before.begin() + before.nodes(0)[change.node_before[node]].first_leaf, end - first,
+                masks.begin() + first);
+  }
+  for (std::uint32_t node = 0; node < tree.nodes(1).size(); ++node) smallLeaves(tree, node, masks, &reach.nodes);
+  for (std::size_t i = 0; i < reach.large.size(); ++i) {
+    const std::size_t leaf = first_large + i;
+    masks[leaf] = reach.large[i] ? largeLeaf(tree, tree.leaves()[leaf]) : masks_before[change.large_before[i]];
+  }
+  markFeatureCells(tree, masks);
   return masks;
 }
 

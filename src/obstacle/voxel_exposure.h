@@ -26,4 +26,8 @@ constexpr int cornerBit(int side_x, int side_y, int side_z) { return 18 + side_x
 /// Also tells the tree which cells hold edges and corners.
 std::vector<FeatureMask> exposedFeatures(VoxelTree& tree);
 
+/// The same of a tree that followed another one, whose masks these are: only what the change reaches is looked at.
+std::vector<FeatureMask> exposedFeatures(VoxelTree& tree, const VoxelTree& before,
+                                         const std::vector<FeatureMask>& masks_before, const VoxelTree::Change& change);
+
 }  // namespace dccd

@@ -4,35 +4,26 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "dccd/next_surface.h"
 #include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
 namespace dccd {
 namespace {
 
-double checkedResolution(double resolution_m) {
-  if (isResolution(resolution_m)) return resolution_m;
-  throw std::invalid_argument(noResolution("resolution_m", resolution_m));
+void checkResolution(double resolution_m) {
+  if (!isResolution(resolution_m)) throw std::invalid_argument(noResolution("resolution_m", resolution_m));
 }
 
 }  // namespace
 
-VoxelSurface::Impl::Impl(double resolution, const std::vector<OccupiedLeaf>& leaves)
-    : resolution_m(checkedResolution(resolution)),
+VoxelSurface::Impl::Impl(double resolution, VoxelTree of, std::vector<FeatureMask> exposed)
+    : resolution_m(resolution),
       inverse_resolution(1.0 / resolution),
-      tree(leaves),
-      features(exposedFeatures(tree)) {
-  std::int64_t lo[3] = {VoxelTree::KEYS, VoxelTree::KEYS, VoxelTree::KEYS};
-  std::int64_t hi[3] = {0, 0, 0};
-  for (std::size_t i = 0; i < features.size(); ++i) {
-    const OccupiedLeaf& leaf = tree.leaves()[i];
-    const std::int64_t key[3] = {leaf.min.x, leaf.min.y, leaf.min.z};
-    for (int axis = 0; axis < 3; ++axis) {
-      lo[axis] = std::min(lo[axis], key[axis]);
-      hi[axis] = std::max(hi[axis], key[axis] + leaf.size);
-    }
-  }
-  if (features.empty()) return;
+      tree(std::move(of)),
+      features(std::move(exposed)) {
+  std::array<std::int32_t, 3> lo, hi;
+  if (!tree.occupiedKeys(lo, hi)) return;
   for (int axis = 0; axis < 3; ++axis) {
     bounds.min[axis] = voxelPlane(lo[axis], resolution_m);
     bounds.max[axis] = voxelPlane(hi[axis], resolution_m);
@@ -49,7 +40,23 @@ KeyBox VoxelSurface::Impl::keysOf(const double* lo, const double* hi) const {
 }
 
 std::shared_ptr<const VoxelSurface> VoxelSurface::build(double resolution_m, std::vector<OccupiedLeaf> leaves) {
-  return std::make_shared<const VoxelSurface>(std::make_unique<Impl>(resolution_m, leaves));
+  checkResolution(resolution_m);
+  VoxelTree tree(leaves);
+  std::vector<FeatureMask> features = exposedFeatures(tree);
+  return std::make_shared<const VoxelSurface>(
+      std::make_unique<Impl>(resolution_m, std::move(tree), std::move(features)));
+}
+
+std::shared_ptr<const VoxelSurface> nextSurface(double resolution_m, std::vector<OccupiedLeaf> leaves,
+                                                const VoxelSurface& before) {
+  // Where voxels have another size little is in common, whatever the keys say.
+  if (resolution_m != before.resolution()) return VoxelSurface::build(resolution_m, std::move(leaves));
+  VoxelTree::Change change;
+  auto tree = VoxelTree::following(leaves, before.impl().tree, change);
+  if (!tree) return VoxelSurface::build(resolution_m, std::move(leaves));
+  std::vector<FeatureMask> features = exposedFeatures(*tree, before.impl().tree, before.impl().features, change);
+  return std::make_shared<const VoxelSurface>(
+      std::make_unique<VoxelSurface::Impl>(resolution_m, std::move(*tree), std::move(features)));
 }
 
 VoxelSurface::VoxelSurface(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

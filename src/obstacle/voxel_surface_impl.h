@@ -11,7 +11,7 @@
 namespace dccd {
 
 struct VoxelSurface::Impl {
-  explicit Impl(double resolution, const std::vector<OccupiedLeaf>& leaves);
+  Impl(double resolution, VoxelTree of, std::vector<FeatureMask> exposed);
 
   /// Keys of all voxels that a closed range of coordinates [m] may touch, closed voxels: at least these.
   KeyBox keysOf(const double* lo, const double* hi) const;

@@ -1,6 +1,7 @@
 #include "obstacle/voxel_tree.h"
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -25,19 +26,32 @@ void checkLeaf(const OccupiedLeaf& leaf) {
   }
 }
 
+bool isLeaf(const OccupiedLeaf& leaf) {
+  const std::uint32_t size = leaf.size;
+  return size != 0 && size <= static_cast<std::uint32_t>(VoxelTree::KEYS) && (size & (size - 1)) == 0 &&
+         ((leaf.min.x | leaf.min.y | leaf.min.z) & (size - 1)) == 0;
+}
+
+bool areSame(const OccupiedLeaf* a, const OccupiedLeaf* b, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (std::memcmp(&a[i].min, &b[i].min, sizeof(VoxelKey)) != 0 || a[i].size != b[i].size) return false;
+  }
+  return true;
+}
+
 struct CodedLeaf {
   std::uint64_t code;
   std::uint32_t index;
 };
 
 // What is allocated below, leaf by leaf and node by node. While leaves are sorted: the list, the order (twice while the
-// radix sort runs, then codes and sorted leaves instead); then list, codes and leaves. A node: itself, its cell, a
-// table of two to four entries, and the codes of two levels while it is built.
+// radix sort runs), then the sorted list and the leaves; then list and leaves. A node: itself, its cell, a table of two
+// to four entries, and the codes of two levels while it is built.
 static_assert(tolerance::MAP_LEAF_LISTED == sizeof(OccupiedLeaf), "");
-static_assert(tolerance::MAP_LEAF_SORTING >= 2 * sizeof(OccupiedLeaf) + sizeof(CodedLeaf) + sizeof(std::uint64_t) &&
-                  tolerance::MAP_LEAF_SORTING >= sizeof(OccupiedLeaf) + 2 * sizeof(CodedLeaf),
+static_assert(tolerance::MAP_LEAF_SORTING >= sizeof(OccupiedLeaf) + 2 * sizeof(CodedLeaf) &&
+                  tolerance::MAP_LEAF_SORTING >= 2 * sizeof(OccupiedLeaf) + sizeof(CodedLeaf),
               "");
-static_assert(tolerance::MAP_LEAF_BUILDING >= 2 * sizeof(OccupiedLeaf) + sizeof(std::uint64_t), "");
+static_assert(tolerance::MAP_LEAF_BUILDING >= 2 * sizeof(OccupiedLeaf), "");
 static_assert(tolerance::MAP_LEAF_IN_TREE == sizeof(OccupiedLeaf), "");
 static_assert(tolerance::MAP_NODE >=
                   sizeof(VoxelTree::Node) + sizeof(std::array<std::uint16_t, 3>) + 4 * sizeof(std::uint32_t),
@@ -60,35 +74,58 @@ void radixSort(std::vector<CodedLeaf>& items) {
   }
 }
 
+/// Of a node of level 0, in units of the node.
+using Cell = std::array<std::uint16_t, 3>;
+
+Cell cellOf(const OccupiedLeaf& leaf) {
+  return {static_cast<std::uint16_t>(leaf.min.x >> 2), static_cast<std::uint16_t>(leaf.min.y >> 2),
+          static_cast<std::uint16_t>(leaf.min.z >> 2)};
+}
+
+std::uint64_t codeOf(const Cell& cell) { return mortonCode(cell[0], cell[1], cell[2]); }
+std::uint64_t codeOf(const OccupiedLeaf& leaf) { return mortonCode(leaf.min.x, leaf.min.y, leaf.min.z); }
+
+/// Whether both lie in the same node of the level. Most leaves follow one of which that is so, and need no code.
+bool shareNode(const OccupiedLeaf& a, const OccupiedLeaf& b, int level) {
+  return ((a.min.x ^ b.min.x) | (a.min.y ^ b.min.y) | (a.min.z ^ b.min.z)) >> (2 * (level + 1)) == 0;
+}
+
+std::vector<OccupiedLeaf> sorted(const std::vector<OccupiedLeaf>& leaves) {
+  std::vector<CodedLeaf> order(leaves.size());
+  for (std::size_t i = 0; i < leaves.size(); ++i) order[i] = {codeOf(leaves[i]), static_cast<std::uint32_t>(i)};
+  radixSort(order);
+  std::vector<OccupiedLeaf> list(leaves.size());
+  for (std::size_t i = 0; i < order.size(); ++i) list[i] = leaves[order[i].index];
+  return list;
+}
+
 }  // namespace
 
 VoxelTree::VoxelTree(const std::vector<OccupiedLeaf>& leaves) {
   if (leaves.size() >= NONE) throw std::invalid_argument("too many leaves: " + std::to_string(leaves.size()));
-  std::vector<std::uint64_t> codes, prefixes;
-  sortLeaves(leaves, codes);
+  if (!takeSorted(leaves)) takeSorted(sorted(leaves));
   if (leaves_.empty()) return;
-  for (int level = 0; level < LEVELS; ++level) buildLevel(level, codes, prefixes);
+  std::vector<std::uint64_t> prefixes;
+  for (int level = 0; level < LEVELS; ++level) buildLevel(level, prefixes);
 }
 
-void VoxelTree::sortLeaves(const std::vector<OccupiedLeaf>& leaves, std::vector<std::uint64_t>& codes) {
-  std::vector<CodedLeaf> order(leaves.size());
-  bool sorted = true;
+bool VoxelTree::takeSorted(const std::vector<OccupiedLeaf>& leaves) {
+  std::array<std::uint32_t, LEVELS + 1> next{};
+  std::uint64_t block = 0, end = 0;  // codes: of the last leaf's block of 4^3 voxels, and of what follows that leaf
+  std::size_t blocks = 0;            // in which a smaller leaf lies
   for (std::size_t i = 0; i < leaves.size(); ++i) {
     const OccupiedLeaf& leaf = leaves[i];
     checkLeaf(leaf);
-    order[i] = {mortonCode(leaf.min.x, leaf.min.y, leaf.min.z), static_cast<std::uint32_t>(i)};
-    sorted = sorted && (i == 0 || order[i - 1].code <= order[i].code);
-  }
-  if (!sorted) radixSort(order);
-
-  std::array<std::uint32_t, LEVELS + 1> next{};
-  std::uint64_t end = 0;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const OccupiedLeaf& leaf = leaves[order[i].index];
-    if (order[i].code < end) {
-      throw std::invalid_argument(describe(leaf) + " overlaps " + describe(leaves[order[i - 1].index]));
+    if (i == 0 || !shareNode(leaf, leaves[i - 1], 0)) {
+      block = codeOf(leaf) & ~std::uint64_t{63};
+      blocks += leaf.size < 4;
     }
-    end = order[i].code + std::uint64_t{leaf.size} * leaf.size * leaf.size;
+    const std::uint64_t code = block | cellBit(leaf.min.x, leaf.min.y, leaf.min.z);
+    if (code < end) {
+      if (code < codeOf(leaves[i - 1])) return false;
+      throw std::invalid_argument(describe(leaf) + " overlaps " + describe(leaves[i - 1]));
+    }
+    end = code + std::uint64_t{leaf.size} * leaf.size * leaf.size;
     ++next[levelOfSize(leaf.size) + 1];
   }
   for (int level = 0; level < LEVELS; ++level) {
@@ -96,22 +133,24 @@ void VoxelTree::sortLeaves(const std::vector<OccupiedLeaf>& leaves, std::vector<
     next[level + 1] += next[level];
   }
   first_leaf_of_level_ = next;
-  leaves_.resize(leaves.size());
-  codes.resize(leaves.size());
-  for (const CodedLeaf& item : order) {
-    const std::uint32_t slot = next[levelOfSize(leaves[item.index].size)]++;
-    leaves_[slot] = leaves[item.index];
-    codes[slot] = item.code;
+  levels_[0].nodes.reserve(blocks);
+  levels_[0].cells.reserve(blocks);
+  if (levels_with_leaves_ == 1) {
+    leaves_ = leaves;
+    return true;
   }
+  leaves_.resize(leaves.size());
+  for (const OccupiedLeaf& leaf : leaves) leaves_[next[levelOfSize(leaf.size)]++] = leaf;
+  return true;
 }
 
-std::size_t VoxelTree::countNodes(int level, const std::vector<std::uint64_t>& codes,
-                                  const std::vector<std::uint64_t>& prefixes) const {
+std::size_t VoxelTree::countNodes(int level, const std::vector<std::uint64_t>& prefixes) const {
   const int shift = 6 * (level + 1);
   std::uint32_t leaf = first_leaf_of_level_[level];
   std::size_t child = 0, count = 0;
   for (std::uint64_t last = ~std::uint64_t{0}; leaf < first_leaf_of_level_[level + 1] || child < prefixes.size();) {
-    const std::uint64_t of_leaf = leaf < first_leaf_of_level_[level + 1] ? codes[leaf] >> shift : ~std::uint64_t{0};
+    const std::uint64_t of_leaf =
+        leaf < first_leaf_of_level_[level + 1] ? codeOf(leaves_[leaf]) >> shift : ~std::uint64_t{0};
     const std::uint64_t of_child = child < prefixes.size() ? prefixes[child] >> 6 : ~std::uint64_t{0};
     const std::uint64_t prefix = std::min(of_leaf, of_child);
     count += prefix != last;
@@ -122,7 +161,7 @@ std::size_t VoxelTree::countNodes(int level, const std::vector<std::uint64_t>& c
   return count;
 }
 
-void VoxelTree::buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes) {
+void VoxelTree::buildLevel(int level, std::vector<std::uint64_t>& prefixes) {
   // Merge this level's leaves with the nodes below (prefixes: their codes), both sorted by code.
   Level& l = levels_[level];
   const int shift = 6 * (level + 1);
@@ -130,19 +169,23 @@ void VoxelTree::buildLevel(int level, const std::vector<std::uint64_t>& codes, s
   std::uint32_t leaf = first_leaf_of_level_[level];
   std::size_t child = 0;
   std::vector<std::uint64_t> own;
-  const std::size_t count = countNodes(level, codes, prefixes);  // lists that grow would take three times as much
-  l.nodes.reserve(count);
-  l.cells.reserve(count);
-  own.reserve(count);
+  if (level > 0) {  // lists that grow would take three times as much; those of level 0 were counted before
+    const std::size_t count = countNodes(level, prefixes);
+    l.nodes.reserve(count);
+    l.cells.reserve(count);
+  }
+  own.reserve(l.nodes.capacity());
   while (leaf < leaf_end || child < prefixes.size()) {
-    std::uint64_t prefix = leaf < leaf_end ? codes[leaf] >> shift : ~std::uint64_t{0};
-    if (child < prefixes.size()) prefix = std::min(prefix, prefixes[child] >> 6);
+    std::uint64_t prefix = leaf < leaf_end ? codeOf(leaves_[leaf]) >> shift : ~std::uint64_t{0};
+    const bool has_leaf = child == prefixes.size() || prefix <= prefixes[child] >> 6;
+    if (!has_leaf) prefix = prefixes[child] >> 6;
     Node node;
     node.first_leaf = leaf;
     node.first_child = static_cast<std::uint32_t>(child);
-    for (; leaf < leaf_end && codes[leaf] >> shift == prefix; ++leaf) {
-      const unsigned bit = static_cast<unsigned>(codes[leaf] >> (shift - 6) & 63);
-      const std::uint32_t side = leaves_[leaf].size >> (2 * level);  // 1, 2, or 4 for the root leaf
+    for (; has_leaf && leaf < leaf_end && shareNode(leaves_[leaf], leaves_[node.first_leaf], level); ++leaf) {
+      const OccupiedLeaf& one = leaves_[leaf];
+      const unsigned bit = cellBit(one.min.x >> 2 * level, one.min.y >> 2 * level, one.min.z >> 2 * level);
+      const std::uint32_t side = one.size >> (2 * level);  // 1, 2, or 4 for the root leaf
       const std::uint64_t cells = side == 1 ? 1u : side == 2 ? 0xffu : ~std::uint64_t{0};
       node.full |= cells << bit;
       node.start |= std::uint64_t{1} << bit;
@@ -212,19 +255,176 @@ std::size_t VoxelTree::memoryBytes() const {
 }
 
 void VoxelTree::setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners) {
-  // A node's cell in the node above holds what any of its cells does, and so on up.
-  while (edges != 0 || corners != 0) {
-    Node& at = levels_[level].nodes[node];
-    const bool new_edges = edges != 0 && at.edges == 0, new_corners = corners != 0 && at.corners == 0;
-    at.edges |= edges;
-    at.corners |= corners;
-    if (++level == LEVELS || !(new_edges || new_corners)) return;
-    const std::array<std::uint16_t, 3>& cell = levels_[level - 1].cells[node];
-    const std::uint64_t bit = std::uint64_t{1} << cellBit(cell[0], cell[1], cell[2]);
-    node = find(level, cell[0] >> 2, cell[1] >> 2, cell[2] >> 2);
-    edges = new_edges ? bit : 0;
-    corners = new_corners ? bit : 0;
+  levels_[level].nodes[node].edges = edges;
+  levels_[level].nodes[node].corners = corners;
+}
+
+void VoxelTree::raiseFeatureCells() {
+  for (int level = 1; level < LEVELS; ++level) {
+    for (Node& node : levels_[level].nodes) {
+      const Node* child = levels_[level - 1].nodes.data() + node.first_child;
+      for (std::uint64_t bits = node.child; bits != 0; bits &= bits - 1, ++child) {
+        const std::uint64_t bit = bits & (~bits + 1);
+        if (child->edges != 0) node.edges |= bit;
+        if (child->corners != 0) node.corners |= bit;
+      }
+    }
   }
+}
+
+bool VoxelTree::occupiedKeys(std::array<std::int32_t, 3>& lo, std::array<std::int32_t, 3>& hi) const {
+  lo = {KEYS, KEYS, KEYS};
+  hi = {0, 0, 0};
+  for (int level = 0; level < LEVELS; ++level) {
+    for (std::size_t n = 0; n < levels_[level].nodes.size(); ++n) {
+      const std::uint64_t full = levels_[level].nodes[n].full;
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::int32_t first = levels_[level].cells[n][axis] << (2 * (level + 1)), side = 1 << (2 * level);
+        if (full == 0 || (first >= lo[axis] && first + 4 * side <= hi[axis])) continue;
+        for (int i = 0; i < 4; ++i) {
+          if ((full & RANGE_MASKS[axis][i][i]) == 0) continue;
+          lo[axis] = std::min(lo[axis], first + i * side);
+          hi[axis] = std::max(hi[axis], first + (i + 1) * side);
+        }
+      }
+    }
+  }
+  return hi[0] > 0;
+}
+
+// --- a tree that follows another one ---------------------------------------------------------------------------------
+
+/// Sorts them by level, in the order in which they come.
+bool VoxelTree::takeLevels(std::vector<OccupiedLeaf>& leaves) {
+  std::uint32_t sizes = 0;
+  for (const OccupiedLeaf& leaf : leaves) sizes |= leaf.size;
+  std::array<std::uint32_t, LEVELS + 1> next{};
+  if (sizes < 4) {
+    next[1] = static_cast<std::uint32_t>(leaves.size());
+  } else {
+    for (const OccupiedLeaf& leaf : leaves) {
+      if (!isLeaf(leaf)) return false;
+      ++next[levelOfSize(leaf.size) + 1];
+    }
+  }
+  for (int level = 0; level < LEVELS; ++level) {
+    if (next[level + 1] != 0) levels_with_leaves_ |= 1u << level;
+    next[level + 1] += next[level];
+  }
+  first_leaf_of_level_ = next;
+  if (sizes < 4) {
+    leaves_.swap(leaves);
+    return true;
+  }
+  leaves_.resize(leaves.size());
+  for (const OccupiedLeaf& leaf : leaves) leaves_[next[levelOfSize(leaf.size)]++] = leaf;
+  return true;
+}
+
+bool VoxelTree::followBlocks(const VoxelTree& before, Change& change, std::vector<std::uint64_t>& prefixes) {
+  const Level& old = before.levels_[0];
+  std::vector<std::uint32_t> first_leaf;
+  std::vector<Node> changed;
+  first_leaf.reserve(old.nodes.size());
+  change.node_before.reserve(old.nodes.size());
+  std::uint32_t node = 0;
+  const auto isAt = [&](const Cell& cell) { return node < old.nodes.size() && old.cells[node] == cell; };
+  const auto passUpTo = [&](std::uint64_t code) {  // nodes that are no more
+    for (; node < old.nodes.size() && codeOf(old.cells[node]) < code; ++node) {
+      change.blocks.push_back({old.cells[node], old.nodes[node].full});
+    }
+  };
+  for (std::uint32_t leaf = 0, end = first_leaf_of_level_[1]; leaf < end;) {
+    const OccupiedLeaf& first = leaves_[leaf];
+    const Cell cell = cellOf(first);
+    if (isAt(cell)) {
+      const std::uint32_t next = leaf + before.leafEnd(node) - old.nodes[node].first_leaf;
+      if (next <= end && areSame(&first, &before.leaves_[old.nodes[node].first_leaf], next - leaf) &&
+          (next == end || !shareNode(leaves_[next], first, 0))) {
+        first_leaf.push_back(leaf);
+        change.node_before.push_back(node++);
+        leaf = next;
+        continue;
+      }
+    }
+    const std::uint64_t code = codeOf(cell);
+    if (!first_leaf.empty() && code <= codeOf(cellOf(leaves_[first_leaf.back()]))) return false;
+    passUpTo(code);
+    Node made;
+    made.first_leaf = leaf;
+    for (; leaf < end && shareNode(leaves_[leaf], first, 0); ++leaf) {
+      const OccupiedLeaf& one = leaves_[leaf];
+      const unsigned bit = cellBit(one.min.x, one.min.y, one.min.z);
+      if (!isLeaf(one) || made.full >> bit != 0) return false;
+      made.full |= (one.size == 1 ? std::uint64_t{1} : 0xffu) << bit;
+      made.start |= std::uint64_t{1} << bit;
+    }
+    const bool was_there = isAt(cell);
+    change.blocks.push_back({cell, made.full ^ (was_there ? old.nodes[node].full : 0)});
+    first_leaf.push_back(made.first_leaf);
+    change.node_before.push_back(NONE);
+    changed.push_back(made);
+    node += was_there;
+  }
+  passUpTo(~std::uint64_t{0});
+  placeBlocks(old, first_leaf, changed, change, prefixes);
+  return true;
+}
+
+void VoxelTree::placeBlocks(const Level& old, const std::vector<std::uint32_t>& first_leaf,
+                            const std::vector<Node>& changed, const Change& change,
+                            std::vector<std::uint64_t>& prefixes) {
+  Level& level = levels_[0];
+  level.nodes.reserve(first_leaf.size());
+  level.cells.reserve(first_leaf.size());
+  prefixes.reserve(first_leaf.size());
+  std::size_t next_changed = 0;
+  for (std::size_t n = 0; n < first_leaf.size(); ++n) {
+    const std::uint32_t same = change.node_before[n];
+    level.nodes.push_back(same == NONE ? changed[next_changed++] : old.nodes[same]);
+    level.nodes.back().first_leaf = first_leaf[n];
+    level.cells.push_back(same == NONE ? cellOf(leaves_[first_leaf[n]]) : old.cells[same]);
+    prefixes.push_back(codeOf(level.cells.back()));
+  }
+}
+
+bool VoxelTree::followLarge(const VoxelTree& before, Change& change) const {
+  change.large_before.reserve(leaves_.size() - first_leaf_of_level_[1]);
+  for (int level = 1; level < LEVELS; ++level) {
+    for (const Node& node : levels_[level].nodes) {
+      if ((node.full & node.child) != 0) return false;
+    }
+    std::uint32_t leaf = first_leaf_of_level_[level], old = before.first_leaf_of_level_[level];
+    const std::uint32_t leaf_end = first_leaf_of_level_[level + 1], old_end = before.first_leaf_of_level_[level + 1];
+    std::uint64_t end = 0;
+    while (leaf < leaf_end || old < old_end) {
+      const std::uint64_t code = leaf < leaf_end ? codeOf(leaves_[leaf]) : ~std::uint64_t{0};
+      const std::uint64_t old_code = old < old_end ? codeOf(before.leaves_[old]) : ~std::uint64_t{0};
+      if (code > old_code) {
+        change.large.push_back(before.leaves_[old++]);
+        continue;
+      }
+      const OccupiedLeaf& one = leaves_[leaf++];
+      if (code < end) return false;
+      end = code + std::uint64_t{one.size} * one.size * one.size;
+      const bool same = code == old_code && one.size == before.leaves_[old].size;
+      if (!same) change.large.push_back(one);
+      change.large_before.push_back(same ? old++ : NONE);
+    }
+  }
+  return true;
+}
+
+std::optional<VoxelTree> VoxelTree::following(std::vector<OccupiedLeaf>& leaves, const VoxelTree& before,
+                                              Change& change) {
+  std::optional<VoxelTree> tree = VoxelTree();
+  std::vector<std::uint64_t> prefixes;
+  if (leaves.empty() || leaves.size() >= NONE || !tree->takeLevels(leaves)) return std::nullopt;
+  bool follows = tree->followBlocks(before, change, prefixes);
+  for (int level = 1; follows && level < LEVELS; ++level) tree->buildLevel(level, prefixes);
+  if (follows && tree->followLarge(before, change)) return tree;
+  if (leaves.empty()) leaves.swap(tree->leaves_);
+  return std::nullopt;
 }
 
 }  // namespace dccd

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dccd/voxel_surface.h"
@@ -22,11 +23,7 @@ class VoxelTree {
  public:
   static constexpr int LEVELS = 8;
   /// The level whose nodes have leaves of this size: 4^level or 2 * 4^level; the root leaf fills a root node.
-  static int levelOfSize(std::uint32_t size) {
-    int log2 = 0;
-    while ((std::uint32_t{1} << log2) < size) ++log2;
-    return std::min(log2 / 2, LEVELS - 1);
-  }
+  static int levelOfSize(std::uint32_t size) { return std::min(static_cast<int>(lowestBit(size)) / 2, LEVELS - 1); }
   static constexpr std::int32_t KEYS = 65536;
   static constexpr std::uint32_t NONE = 0xffffffffu;
 
@@ -50,11 +47,30 @@ class VoxelTree {
   /// 65536, a key is no multiple of its size, or two leaves overlap.
   explicit VoxelTree(const std::vector<OccupiedLeaf>& leaves);
 
+  /// How a tree differs from one before it. What it has in common with that keeps its edges and corners.
+  struct Change {
+    struct Block {
+      std::array<std::uint16_t, 3> cell;  ///< of a node of level 0, in units of the node
+      std::uint64_t voxels;               ///< those that are occupied by its small leaves in one of the two trees alone
+    };
+    std::vector<std::uint32_t> node_before;   ///< of each node of level 0, the one with the same leaves; or NONE
+    std::vector<std::uint32_t> large_before;  ///< of each leaf of the levels above, the same leaf; or NONE
+    std::vector<Block> blocks;                ///< with other small leaves
+    std::vector<OccupiedLeaf> large;          ///< larger leaves that only one of the two has
+  };
+  /// The same tree, made of the one before it, where the leaves come in Morton order as a decoded map's do: then they
+  /// are taken. Where they do not, or cannot make a tree: nothing.
+  static std::optional<VoxelTree> following(std::vector<OccupiedLeaf>& leaves, const VoxelTree& before, Change& change);
+
   /// In the tree's order: by level, then by Morton code.
   const std::vector<OccupiedLeaf>& leaves() const { return leaves_; }
   const std::vector<Node>& nodes(int level) const { return levels_[level].nodes; }
-  /// Where convex edges and corners lie, for queries that want nothing else. Set once, when they are known.
+  /// Where convex edges and corners of the node's own leaves lie, for queries that want nothing else.
   void setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners);
+  /// Once they are set for all nodes: tells the nodes above.
+  void raiseFeatureCells();
+  /// Keys of what is occupied, the upper ones exclusive. False: nothing is.
+  bool occupiedKeys(std::array<std::int32_t, 3>& lo, std::array<std::int32_t, 3>& hi) const;
   /// Node coordinates, in units of the node's own size.
   const std::array<std::uint16_t, 3>& nodeCell(int level, std::uint32_t node) const {
     return levels_[level].cells[node];
@@ -86,6 +102,7 @@ class VoxelTree {
   bool reachesLeaf(const KeyBox& box) const;
 
  private:
+  VoxelTree() = default;
   struct Level {
     std::vector<Node> nodes;
     std::vector<std::array<std::uint16_t, 3>> cells;
@@ -93,10 +110,19 @@ class VoxelTree {
     int table_shift = 0;
   };
 
-  void sortLeaves(const std::vector<OccupiedLeaf>& leaves, std::vector<std::uint64_t>& codes);
-  std::size_t countNodes(int level, const std::vector<std::uint64_t>& codes,
-                         const std::vector<std::uint64_t>& prefixes) const;
-  void buildLevel(int level, const std::vector<std::uint64_t>& codes, std::vector<std::uint64_t>& prefixes);
+  /// Leaves of a node of level 0: from its first one on, up to this.
+  std::uint32_t leafEnd(std::uint32_t node) const {
+    return node + 1 < levels_[0].nodes.size() ? levels_[0].nodes[node + 1].first_leaf : first_leaf_of_level_[1];
+  }
+  bool takeLevels(std::vector<OccupiedLeaf>& leaves);
+  bool followBlocks(const VoxelTree& before, Change& change, std::vector<std::uint64_t>& prefixes);
+  void placeBlocks(const Level& old, const std::vector<std::uint32_t>& first_leaf, const std::vector<Node>& changed,
+                   const Change& change, std::vector<std::uint64_t>& prefixes);
+  bool followLarge(const VoxelTree& before, Change& change) const;
+  /// False, and nothing is taken, where leaves do not come in Morton order, as a decoded map's do.
+  bool takeSorted(const std::vector<OccupiedLeaf>& leaves);
+  std::size_t countNodes(int level, const std::vector<std::uint64_t>& prefixes) const;
+  void buildLevel(int level, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);
 
   /// Calls visit(leaf) for each leaf whose cells are in the box and in `wanted` of their node.

@@ -12,8 +12,7 @@
 #include "dccd/regular_file.h"
 #include "dccd/tolerances.h"
 #include "obstacle/resolution.h"
-#include "obstacle/voxel_bits.h"
-#include "obstacle/voxel_tree.h"
+#include "octomap/leaf_lists.h"
 #include "octomap/octomap_header.h"
 
 namespace dccd {
@@ -61,16 +60,7 @@ class Bytes {
   std::size_t at_ = 0;
 };
 
-/// A cube of the octree: its smallest key and its depth, the root's being 0.
-struct Cube {
-  std::uint32_t x = 0, y = 0, z = 0;
-  int depth = 0;
-  std::uint32_t size() const { return 65536u >> depth; }
-  Cube child(int index) const {
-    const std::uint32_t half = size() / 2;
-    return {x + (index & 1 ? half : 0), y + (index & 2 ? half : 0), z + (index & 4 ? half : 0), depth + 1};
-  }
-};
+using Cube = OctreeCube;
 
 void checkDepth(const Cube& parent, const Bytes& bytes) {
   if (parent.depth >= MAX_DEPTH) {
@@ -140,52 +130,8 @@ void walk(Bytes bytes, bool binary, TreeKind kind, Leaf&& leaf) {
   }
 }
 
-/// How many nodes a VoxelTree of leaves has that come in Morton order: a block of 4^(level + 1) voxels a side is one
-/// where a smaller leaf lies in it, and such leaves follow each other.
-class NodeCounter {
- public:
-  void add(const Cube& cube) {
-    const std::uint64_t code = mortonCode(cube.x, cube.y, cube.z);
-    const int own = VoxelTree::levelOfSize(cube.size());
-    for (int level = own; level < VoxelTree::LEVELS; ++level) {
-      const int shift = 6 * (level + 1);
-      if (level >= last_level_ && code >> shift == last_code_ >> shift) break;  // and so it is with those above
-      ++count_;
-    }
-    last_code_ = code;
-    last_level_ = own;
-  }
-  std::size_t count() const { return count_; }
-
- private:
-  std::uint64_t last_code_ = 0;
-  int last_level_ = VoxelTree::LEVELS;  // of no leaf
-  std::size_t count_ = 0;
-};
-
 void fillLeaves(Bytes bytes, bool binary, TreeKind kind, const OctomapLimits& limits, DecodedOctomap& map) {
-  // Twice over the data: what is wrong or too much is known before anything is allocated.
-  OctomapCounts counts;
-  NodeCounter occupied_nodes, known_nodes;
-  walk(bytes, binary, kind, [&](const Cube& cube, bool occupied) {
-    ++(occupied ? counts.occupied : counts.free);
-    if (occupied) occupied_nodes.add(cube);
-    known_nodes.add(cube);
-  });
-  counts.occupied_nodes = occupied_nodes.count();
-  counts.known_nodes = known_nodes.count();
-  if (counts.occupied + counts.free > limits.max_leaves) {
-    throw OctomapError("octomap data hold " + text(counts.occupied + counts.free) + " leaves, more than the limit of " +
-                       text(limits.max_leaves));
-  }
-  if (limits.accept) limits.accept(counts);
-  map.occupied.reserve(counts.occupied);
-  if (limits.free_leaves) map.free.reserve(counts.free);
-  walk(bytes, binary, kind, [&](const Cube& cube, bool occupied) {
-    const VoxelKey key{static_cast<std::uint16_t>(cube.x), static_cast<std::uint16_t>(cube.y),
-                       static_cast<std::uint16_t>(cube.z)};
-    if (occupied || limits.free_leaves) (occupied ? map.occupied : map.free).push_back({key, cube.size()});
-  });
+  listLeaves([&](auto&& leaf) { walk(bytes, binary, kind, leaf); }, limits, map);
 }
 
 void checkSize(std::size_t size, const OctomapLimits& limits) {

@@ -1,0 +1,75 @@
+// The leaves of an octree, wherever it comes from, as lists: counted first, so that what is too much is known before
+// anything is allocated.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "dccd/octomap_decode.h"
+#include "obstacle/voxel_bits.h"
+#include "obstacle/voxel_tree.h"
+
+namespace dccd {
+
+/// A cube of the octree: its smallest key and its depth, the root's being 0.
+struct OctreeCube {
+  std::uint32_t x = 0, y = 0, z = 0;
+  int depth = 0;
+  std::uint32_t size() const { return 65536u >> depth; }
+  OctreeCube child(int index) const {
+    const std::uint32_t half = size() / 2;
+    return {x + (index & 1 ? half : 0), y + (index & 2 ? half : 0), z + (index & 4 ? half : 0), depth + 1};
+  }
+};
+
+/// How many nodes a VoxelTree of leaves has that come in Morton order: a block of 4^(level + 1) voxels a side is one
+/// where a smaller leaf lies in it, and such leaves follow each other.
+class NodeCounter {
+ public:
+  void add(const OctreeCube& cube) {
+    const std::uint64_t code = mortonCode(cube.x, cube.y, cube.z);
+    const int own = VoxelTree::levelOfSize(cube.size());
+    for (int level = own; level < VoxelTree::LEVELS; ++level) {
+      const int shift = 6 * (level + 1);
+      if (level >= last_level_ && code >> shift == last_code_ >> shift) break;  // and so it is with those above
+      ++count_;
+    }
+    last_code_ = code;
+    last_level_ = own;
+  }
+  std::size_t count() const { return count_; }
+
+ private:
+  std::uint64_t last_code_ = 0;
+  int last_level_ = VoxelTree::LEVELS;  // of no leaf
+  std::size_t count_ = 0;
+};
+
+/// `walk(leaf)` calls leaf(cube, occupied) for each leaf in Morton order, the same each time. Throws OctomapError where
+/// the limits are exceeded.
+template <class Walk>
+void listLeaves(const Walk& walk, const OctomapLimits& limits, DecodedOctomap& map) {
+  OctomapCounts counts;
+  NodeCounter occupied_nodes, known_nodes;
+  walk([&](const OctreeCube& cube, bool occupied) {
+    ++(occupied ? counts.occupied : counts.free);
+    if (occupied) occupied_nodes.add(cube);
+    known_nodes.add(cube);
+  });
+  counts.occupied_nodes = occupied_nodes.count();
+  counts.known_nodes = known_nodes.count();
+  if (counts.occupied + counts.free > limits.max_leaves) {
+    throw OctomapError("octomap data hold " + std::to_string(counts.occupied + counts.free) +
+                       " leaves, more than the limit of " + std::to_string(limits.max_leaves));
+  }
+  if (limits.accept) limits.accept(counts);
+  map.occupied.reserve(counts.occupied);
+  if (limits.free_leaves) map.free.reserve(counts.free);
+  walk([&](const OctreeCube& cube, bool occupied) {
+    const VoxelKey key{static_cast<std::uint16_t>(cube.x), static_cast<std::uint16_t>(cube.y),
+                       static_cast<std::uint16_t>(cube.z)};
+    if (occupied || limits.free_leaves) (occupied ? map.occupied : map.free).push_back({key, cube.size()});
+  });
+}
+
+}  // namespace dccd
