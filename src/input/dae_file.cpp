@@ -172,7 +172,12 @@ bool readPolygons(const std::string& answer, Positions& corners, std::vector<std
 }  // namespace
 
 MeshFile loadDaeFile(const std::string& path) {
-  const std::string answer = askChild(path, readWholeFile(path));
+  const std::string bytes = readWholeFile(path);
+  // Not left to assimp: one that reads the outline alone would fill the holes.
+  if (bytes.find("<ph>") != std::string::npos) {
+    throw MeshFileError(path + ": has polygons with holes (<ph>), which are not read; write it with triangles");
+  }
+  const std::string answer = askChild(path, bytes);
   Positions corners;
   std::vector<std::size_t> ends;
   if (!answer.empty() && answer[0] == BAD) {

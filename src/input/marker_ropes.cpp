@@ -67,9 +67,12 @@ Ropes ropesOf(std::vector<const MarkerView*> markers) {
 bool continues(const std::vector<RopeName>& before, const std::vector<RopeName>& ropes) {
   const auto alike = [](const RopeName& a, const RopeName& b) { return a.type == b.type && a.points == b.points; };
   const auto named = [](const RopeName& a, const RopeName& b) { return a.ns == b.ns && a.id == b.id; };
+  const auto lower = [](const RopeName& a, const RopeName& b) { return std::tie(a.ns, a.id) < std::tie(b.ns, b.id); };
   if (!std::equal(before.begin(), before.end(), ropes.begin(), ropes.end(), alike)) return false;
   const auto [was, is] = std::mismatch(before.begin(), before.end(), ropes.begin(), named);
-  if (ropes.size() == 1 || was == before.end()) return true;
+  const auto stays = [&](const RopeName& one) { return std::binary_search(before.begin(), before.end(), one, lower); };
+  // Some publishers number all of them anew each time.
+  if (was == before.end() || std::none_of(ropes.begin(), ropes.end(), stays)) return true;
   throw WireError("marker " + nameOf(is->ns, is->id) + " stands where " + nameOf(was->ns, was->id) +
                   " was, so that it is not known which rope it is; keep namespaces and ids, or call ~reset");
 }

@@ -40,8 +40,8 @@ struct Ropes {
 /// Of markers that are lines, or points. Throws WireError for one of too few points.
 Ropes ropesOf(std::vector<const MarkerView*> markers);
 
-/// Whether these are the ropes of the message before: as many, of as many points. Throws WireError where several have
-/// other names then.
+/// Whether these are the ropes of the message before: as many, of as many points. Throws WireError where some have
+/// other names then, and others not.
 bool continues(const std::vector<RopeName>& before, const std::vector<RopeName>& ropes);
 
 /// Makes one point of ends that are equal, where `weld` knows or finds it; `joins` false: of none. Segments without a

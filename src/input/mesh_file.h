@@ -27,7 +27,7 @@ struct MeshFile {
   FaceGroups groups;                   ///< of an OBJ
   Polygons polygons;                   ///< as the file has them
   std::vector<std::size_t> unchecked;  ///< numbers of the polygons that lie in no face
-  std::vector<Edge> edges;             ///< of the lines of an OBJ, which then has no faces
+  std::vector<Edge> edges;             ///< of ropes: lines of an OBJ, edges of a PLY, which then have no faces
   std::vector<std::string> remarks;    ///< sentences about what was skipped, for the user to see
   bool is_soup = false;                ///< vertices are corners of equal coordinates, not what the file numbers
   std::function<std::string(std::size_t)> polygon_name;  ///< where a polygon stands in the file, in words

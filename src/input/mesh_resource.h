@@ -29,8 +29,8 @@ std::string pathOf(const std::string& address);
 /// Throws std::invalid_argument naming the file and what is wrong with it, or the package that is not found.
 MeshResource loadMeshResource(const std::string& address, double scale);
 
-/// The faces over the points that a tracker sends, or of an OBJ the lines between them: PLY, OBJ or STL. A DAE is
-/// refused, for its vertices are numbered by the library that reads it. Throws as above.
+/// The faces over the points that a tracker sends, or of an OBJ or PLY the lines between them: PLY, OBJ or STL. A DAE
+/// is refused, for its vertices are numbered by the library that reads it. Throws as above.
 MeshResource loadTopologyFile(const std::string& address);
 
 }  // namespace dccd

@@ -43,10 +43,7 @@ class ObjReader {
     if (mesh_.positions.empty()) throw MeshFileError(path_ + ": no vertices");
     // Faces and lines may name vertices that come after them.
     if (furthest_ >= mesh_.positions.size()) lines_.fail(furthest_word_, missing());
-    if (polygons_.size() > 0 && !mesh_.edges.empty()) {
-      throw MeshFileError(path_ + ": has faces and lines ('l', first in line " + std::to_string(first_line_element_) +
-                          "), and a mesh is of the ones or the others; write them to two files");
-    }
+    if (polygons_.size() > 0) makePolygonsOfLines();
     nameGroups(setPolygons(std::move(polygons_), mesh_));
     remarkUnchecked([lines = std::move(face_lines_)](std::size_t p) { return "in line " + std::to_string(lines[p]); },
                     mesh_);
@@ -136,14 +133,21 @@ class ObjReader {
 
   void readLine() {
     if (words_.size() < 3) lines_.fail(words_[0], "has fewer than two vertices");
-    if (mesh_.edges.empty()) first_line_element_ = words_[0].line;
     Index before = cornerOf(words_[1], 2);
     for (std::size_t w = 2; w < words_.size(); ++w) {
       const Index v = cornerOf(words_[w], 2);
       if (v == before) lines_.fail(words_[w], "is the vertex before it, too");
       mesh_.edges.push_back({std::min(before, v), std::max(before, v)});
+      edge_lines_.push_back(words_[0].line);
       before = v;
     }
+  }
+
+  /// Beside faces a segment is a polygon of two corners: unchecked, unless a face has that edge.
+  void makePolygonsOfLines() {
+    for (const Edge& edge : mesh_.edges) polygons_.add({edge[0], edge[1]});
+    face_lines_.insert(face_lines_.end(), edge_lines_.begin(), edge_lines_.end());
+    mesh_.edges.clear();
   }
 
   /// `v`, `v/vt` or `v/vt/vn`, of which all but the first may be empty.
@@ -207,11 +211,11 @@ class ObjReader {
   std::vector<TextWord> words_;  // of the statement
   MeshFile mesh_;
   Polygons polygons_;
-  std::vector<std::size_t> face_lines_;  // of the polygons
+  std::vector<std::size_t> face_lines_, edge_lines_;  // of the polygons, of the lines' segments
   std::vector<Index> corners_;
   Index furthest_ = 0;  // of the vertices that were named before they came
   TextWord furthest_word_{{}, 0};
-  std::size_t first_line_element_ = 0, unknown_lines_ = 0;
+  std::size_t unknown_lines_ = 0;
   std::string first_unknown_;
   std::set<std::string> groups_;  // of the faces since begin_
   std::size_t begin_ = 0;

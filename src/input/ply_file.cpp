@@ -283,6 +283,8 @@ class PlyReader {
         readVertices(element, *body);
       } else if (element.name == "face" || element.name == "tristrips") {
         readPolygons(element, *body);
+      } else if (element.name == "edge" && !hasFaces()) {
+        readEdges(element, *body);
       } else {
         skip(element, *body);
       }
@@ -306,10 +308,12 @@ class PlyReader {
     return nullptr;
   }
 
+  bool holds(std::string_view name) const { return elementNamed(name) && elementNamed(name)->count > 0; }
+  bool hasFaces() const { return holds("face") || holds("tristrips"); }
+
   void requireMesh() const {
-    const auto holds = [&](std::string_view name) { return elementNamed(name) && elementNamed(name)->count > 0; };
     if (!holds("vertex")) throw MeshFileError(path_ + ": no vertices");
-    if (holds("range_grid") && !holds("face") && !holds("tristrips")) {
+    if (holds("range_grid") && !hasFaces()) {
       throw MeshFileError(path_ +
                           ": has no faces, but a scanner's range grid (element 'range_grid'); convert it to faces");
     }
@@ -431,6 +435,29 @@ class PlyReader {
       }
     });
     if (!strips) faces_end_ = polygons_.size();
+  }
+
+  /// Of ropes: without faces. Beside them edges say nothing that the faces do not.
+  void readEdges(const Element& element, PlyBody& body) {
+    const std::size_t ends[] = {propertyOf(element, {"vertex1"}, false), propertyOf(element, {"vertex2"}, false)};
+    std::int64_t vertex[2] = {};
+    for (std::uint64_t row = 0; row < element.count; ++row) {
+      body.beginRow(rowName(element), row);
+      for (std::size_t p = 0; p < element.properties.size(); ++p) {
+        const Property& property = element.properties[p];
+        if (p != ends[0] && p != ends[1]) {
+          skipValue(property, body);
+        } else if (isInteger(property.type)) {
+          vertex[p == ends[1]] = body.integer(property.type);
+        } else {
+          body.fail("numbers its vertices by a type that is no integer");
+        }
+      }
+      body.endRow();
+      const Index a = vertexOf(vertex[0], body), b = vertexOf(vertex[1], body);
+      if (a == b) body.fail("names vertex " + std::to_string(a) + " twice");
+      mesh_.edges.push_back({std::min(a, b), std::max(a, b)});
+    }
   }
 
   const std::string& bytes_;

@@ -89,7 +89,8 @@ TEST_F(Mistake, NoTransform) {
 TEST_F(Mistake, WrongTopicType) {
   const auto publisher = advertiseAndWait<std_msgs::Bool>(node, "/wrong_type/mesh");
   expectTold("/wrong_type", "type std_msgs/Bool is not a mesh",
-             "publish deformable_ccd/MeshStamped, pcl_msgs/PolygonMesh", [&] { publisher.publish(std_msgs::Bool()); });
+             "publish deformable_ccd/MeshStamped, geometry_msgs/PoseArray",
+             [&] { publisher.publish(std_msgs::Bool()); });
 }
 
 TEST_F(Mistake, RowsAndColumnsSwapped) {
@@ -140,6 +141,18 @@ TEST_F(Mistake, CloudWithoutTopology) {
   expectTold("/no_topology", "an unorganised point cloud has no topology",
              "set topology/rows and topology/cols for a grid",
              [&] { publisher.publish(cloud(gridAt(3, 4, 0), tracker.next())); });
+}
+
+TEST_F(Mistake, WrongRowStep) {
+  Tracker tracker;
+  const auto publisher = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/row_step/mesh");
+  expectTold("/row_step", " contradicts the data, which are just 3 rows of 4 points", "publish row_step ", [&] {
+    sensor_msgs::PointCloud2 message = cloud(gridAt(3, 4, 0), tracker.next());
+    message.height = 3;
+    message.width = 4;
+    message.row_step = static_cast<std::uint32_t>(message.data.size());
+    publisher.publish(message);
+  });
 }
 
 TEST_F(Mistake, TopologyThatDoesNotFit) {

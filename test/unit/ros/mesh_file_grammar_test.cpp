@@ -202,7 +202,14 @@ TEST_F(ObjGrammar, Lines) {
   expectLine5("l 1 2 2\n", "'2'");
   expectLine5("l 1 2//3\n", "'2//3'");
   expectLine5("l 1 9\n", "'9'");
-  EXPECT_TRUE(mentions(error("a.obj", vertices() + "f 1 2 3\nl 3 4\n"), "line 6"));
+}
+
+TEST_F(ObjGrammar, LinesBesideFaces) {
+  expectFaces("f 1 2 3\nl 1 2 3\nf 3 2 4\n");
+  const MeshFile mesh = faces("l 3 2 1 4\nf 1 2 3\nf 3 2 4\n");
+  EXPECT_EQ(mesh.faces, TWO);
+  EXPECT_TRUE(mesh.edges.empty());
+  expectUnchecked(mesh, {4}, "in line 5");
 }
 
 TEST_F(ObjGrammar, Groups) {
@@ -607,6 +614,22 @@ TEST_F(PlyGrammar, OtherElements) {
   EXPECT_TRUE(mentions(mesh.remarks[1], "'material' (2)")) << mesh.remarks[1];
 }
 
+TEST_F(PlyGrammar, Edges) {
+  const auto edges = [](const std::string& rows, const std::string& type = "int") {
+    const auto count = std::to_string(std::count(rows.begin(), rows.end(), '\n'));
+    return head(xyz() + "element face 0\nproperty list uchar int vertex_indices\nelement edge " + count +
+                "\nproperty " + type + " vertex1\nproperty uchar red\nproperty " + type + " vertex2\n") +
+           points() + rows;
+  };
+  const MeshFile ropes = read("a.ply", edges("0 255 1\n3 0 2\n"));
+  EXPECT_EQ(ropes.edges, (std::vector<Edge>{{0, 1}, {2, 3}}));
+  EXPECT_TRUE(ropes.faces.empty() && ropes.remarks.empty());
+  expectRefused("a.ply", edges("0 0 4\n"), "a.ply:18: ", "edge 0 names vertex 4 of 4");
+  expectRefused("a.ply", edges("0 0 1\n2 0 2\n"), "a.ply:19: ", "edge 1 names vertex 2 twice");
+  expectRefused("a.ply", edges("0 0 1\n", "float"), "a.ply:18: ", "no integer");
+  expectRefused("a.ply", head(xyz() + "element edge 1\nproperty int a\n") + points() + "0\n", "a.ply: ", "'vertex1'");
+}
+
 TEST_F(PlyGrammar, RangeGrid) {
   const std::string grid = "element range_grid 2\nproperty list uchar int vertex_indices\n";
   EXPECT_TRUE(mentions(error("a.ply", head(xyz() + grid) + points() + "1 0\n0\n"), "range grid"));
@@ -717,9 +740,10 @@ TEST_F(DaeGrammar, Lines) {
 
 TEST_F(DaeGrammar, WhatIsRefused) {
   const std::string hole = list("polygons", 1, "<ph><p>0 1 3 2</p><h>0 1 2</h></ph>");
-  expectRefused("a.dae", dae(hole), "a.dae: ", "<h>");
+  expectRefused("a.dae", dae(hole), "a.dae: ", "has polygons with holes (<ph>)");
   for (const std::string count : {"1", "3"}) {
-    expectRefused("a.dae", dae(list("triangles", std::stoi(count), "<p>0 1 2 2 1 3</p>")), "a.dae: ", "index count");
+    expectRefused("a.dae", dae(list("triangles", std::stoi(count), "<p>0 1 2 2 1 3</p>")),
+                  "a.dae: ", "not a readable .dae mesh");
   }
   for (const std::string word : {"nan", "1e39"}) {
     expectRefused("a.dae", dae(two(), node(), word + " 0 0 1 0 0 0 1 0 1 1 0.25"), "a.dae: ", "is not finite");

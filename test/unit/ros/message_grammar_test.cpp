@@ -28,13 +28,27 @@ class MessageGrammar : public ::testing::Test {
  protected:
   MeshInputConfig config;
 
+  /// From its bytes, and from the object, which must be the same.
   template <typename Message>
   DecodedMesh read(const Message& message) {
-    std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
-    ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-    ros::serialization::serialize(stream, message);
-    if (!decoder_) decoder_.emplace(config);
-    return decoder_->decode(ros::message_traits::datatype(message), bytes.data(), bytes.size());
+    const MeshType& type = *findMeshType(ros::message_traits::datatype(message));
+    const std::vector<std::uint8_t> bytes = type.serialize(&message);
+    if (!decoder_) {
+      decoder_.emplace(config);
+      of_objects_.emplace(config);
+    }
+    const TypedMesh object{&type, boost::make_shared<Message>(message)};
+    try {
+      const DecodedMesh mesh = decoder_->decode(type.datatype, bytes.data(), bytes.size());
+      const DecodedMesh same = of_objects_->decode(object);
+      EXPECT_EQ(0, std::memcmp(mesh.positions.data(), same.positions.data(), 24 * mesh.positions.size()));
+      EXPECT_EQ(*mesh.topology, *same.topology);
+      EXPECT_EQ(mesh.row_step_remark, same.row_step_remark);
+      return mesh;
+    } catch (const MeshError& error) {
+      EXPECT_EQ(error.what(), errorOf([&] { of_objects_->decode(object); }));
+      throw;
+    }
   }
   template <typename Message>
   std::string refusalOf(const Message& message) {
@@ -48,7 +62,17 @@ class MessageGrammar : public ::testing::Test {
   void anew() { decoder_.reset(); }
 
  private:
-  std::optional<MeshDecoder> decoder_;
+  std::optional<MeshDecoder> decoder_, of_objects_;
+
+  template <typename Decode>
+  static std::string errorOf(Decode decode) {
+    try {
+      decode();
+    } catch (const MeshError& error) {
+      return error.what();
+    }
+    return "was read";
+  }
 };
 
 template <typename Point = geometry_msgs::Point>
@@ -521,6 +545,9 @@ TEST_F(RopeGrammar, SeveralRopes) {
   EXPECT_TRUE(mentions(other, "('rope', 8) stands where ('rope', 7) was")) << other;
   EXPECT_EQ(read(all({strip({a, b}, 3), strip({c, d, e}, 7)})).topology, two.topology) << "what was known stays";
   EXPECT_EQ(read(all({strip({a, b}, 3), strip({c, d}, 8)})).topology->edges().size(), 2u) << "another topology";
+  const DecodedMesh pair = read(all({strip({a, b}, 1), strip({d, e}, 2)}));
+  EXPECT_EQ(read(all({strip({a, b}, 3), strip({d, e}, 4)})).topology, pair.topology) << "all are numbered anew";
+  EXPECT_TRUE(mentions(refusalOf(all({strip({a, b}, 4), strip({d, e}, 5)})), "('rope', 4) stands where"));
   EXPECT_EQ(read(strip({a, b, c}, 1)).topology, read(strip({a, b, c}, 2)).topology) << "one alone has any id";
   EXPECT_EQ(read(all({strip({a, b}, 1), strip({b, c}, 2)})).topology->edges(), (Edges{{0, 1}, {1, 2}})) << "one rope";
   visualization_msgs::Marker far = strip({c, d}, 2);
