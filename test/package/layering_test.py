@@ -138,6 +138,13 @@ class LayeringTest(unittest.TestCase):
                  if ROS_OR_PCL.match(target)]
         self.assertEqual(wrong, [])
 
+    def test_the_python_module_takes_the_interface_and_recordings(self):
+        files = code_under('python')
+        self.assertGreater(len(files), 5)
+        wrong = ['%s includes %s' % (name(path), target) for path in files for _, target in includes(path)
+                 if ROS_OR_PCL.match(target) or target.split('/')[0] in set(MAY_INCLUDE) - {'record'}]
+        self.assertEqual(wrong, [])
+
     def test_pcl_stays_as_loud_as_the_process_wants_it(self):
         wrong = [name(path) for folder in ('src', 'include') for path in code_under(folder)
                  if 'pcl/console' in path.read_text() or 'setVerbosityLevel' in path.read_text()]
