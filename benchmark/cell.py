@@ -28,7 +28,7 @@ CELLS = {
     "towel_in_crack": ({"position_m": [0.3, -0.45, 0.8], "looks_at_m": [0, 0, 0.28], "field_of_view_rad": 0.75},
                        {"min_m": [-0.7, -0.5, -0.01], "max_m": [0.5, 0.7, 0]}),
     "felt_and_finger": ({"position_m": [0.5, -0.6, 0.9], "looks_at_m": [0, 0, 0.5], "field_of_view_rad": 0.8},
-                        {"min_m": [-1.6, -1, -0.04], "max_m": [1.2, 2.4, 0]}),
+                        {"min_m": [-2.6, -1, -0.04], "max_m": [1.2, 3, 0]}),
     "rope_through_ring": ({"position_m": [0.1, -0.6, 1.2], "looks_at_m": [-0.1, 0, 0.35], "field_of_view_rad": 1.0},
                           {"min_m": [-1.5, -0.6, -0.42], "max_m": [1.3, 1.5, -0.4]}),
 }
