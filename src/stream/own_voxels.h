@@ -19,19 +19,10 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dccd/mesh_store.h"
 #include "dccd/step.h"
+#include "stream/reach_search.h"
 
 namespace dccd {
-
-/// Where a body was at the stamps that are asked for, and how far from its surface a voxel may be its own.
-struct TrackedBody {
-  std::uint16_t body = 0;
-  std::string name;
-  double reach_m = 0;  ///< Body::own_voxels_m
-  const MeshStore* frames = nullptr;
-  bool holds_always = false;  ///< static: its newest frame, at all stamps
-};
 
 /// Not thread-safe.
 class OwnVoxelFinder {
@@ -47,6 +38,10 @@ class OwnVoxelFinder {
   StampNs pathNeededFrom(StampNs now_ns, double lag_s) const;
 
  private:
+  std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
+  std::vector<ReachedCube> cubesToAsk(const VoxelSurface& surface, const VoxelTree& sure, const KeyBox& region);
+  void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first);
+
   std::shared_ptr<const VoxelSurface> before_;  // as it was given; null: none
   StampNs before_ns_ = 0;
   std::string frame_id_;

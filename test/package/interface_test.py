@@ -84,7 +84,7 @@ class InterfaceTest(unittest.TestCase):
         self.assertGreater(len(units), 20, 'the search found too little to mean anything')
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
         numbers = numbers_of_bodies()
-        self.assertEqual(numbers, {'minimum_separation_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale',
+        self.assertEqual(numbers, {'minimum_separation_m', 'own_voxels_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale',
                                    'topology/max_edge_m', 'topology/max_range_m'})
         self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
