@@ -222,20 +222,8 @@ void bindJudgement(Class& c) {
   });
 }
 
-}  // namespace
-
-Answer::Answer(Outcome outcome) : outcome_(std::move(outcome)) {
-  // Numpy shows the byte as the bool `certain`, of which Certainty has the contrary.
-  static_assert(static_cast<int>(Certainty::CERTAIN) == 0 && static_cast<int>(Certainty::UNDECIDED) == 1);
-  for (Contact& contact : outcome_.contacts) {
-    contact.certainty = contact.certainty == Certainty::CERTAIN ? Certainty::UNDECIDED : Certainty::CERTAIN;
-  }
-}
-
-void bindOutcome(py::module_& m) {
-  auto c = bindClass<Answer>(m, "Outcome", OUTCOME_DOC);
-  bindAnswer(c);
-  bindJudgement(c);
+template <class Class>
+void bindValues(Class& c) {
   const auto plain = [&](const char* name, auto valueOf, const char* doc) {
     c.def_property_readonly(
         name, [valueOf](const Answer& a) { return valueOf(a.outcome()); }, doc);
@@ -284,6 +272,23 @@ void bindOutcome(py::module_& m) {
       "stamp_ns", [](const Outcome& o) { return o.stamp_ns; }, "int: stamp of the step's end [ns], in a Stream");
   plain(
       "sequence", [](const Outcome& o) { return o.sequence; }, "int: of the frames of a Stream's clock body, from 1");
+}
+
+}  // namespace
+
+Answer::Answer(Outcome outcome) : outcome_(std::move(outcome)) {
+  // Numpy shows the byte as the bool `certain`, of which Certainty has the contrary.
+  static_assert(static_cast<int>(Certainty::CERTAIN) == 0 && static_cast<int>(Certainty::UNDECIDED) == 1);
+  for (Contact& contact : outcome_.contacts) {
+    contact.certainty = contact.certainty == Certainty::CERTAIN ? Certainty::UNDECIDED : Certainty::CERTAIN;
+  }
+}
+
+void bindOutcome(py::module_& m) {
+  auto c = bindClass<Answer>(m, "Outcome", OUTCOME_DOC);
+  bindAnswer(c);
+  bindJudgement(c);
+  bindValues(c);
   c.def_property_readonly("counts", &countsOf,
                           "dict of int: of how many of all contacts what holds (certain, undecided, initial, leaving, "
                           "mesh, obstacle, expected, expected_initial)");
