@@ -635,7 +635,7 @@ class PagesTest(PythonTestCase):
     def test_pydoc_reads_well(self):
         text = pydoc.render_doc(dccd, renderer=pydoc.plaintext)
         self.assertNotRegex(text, r'_dccd\.|handle|std::|<object object')
-        self.assertLess(text.count('\n'), 900)
+        self.assertLess(text.count('\n'), 1200)
 
     def test_detect_names_every_option(self):
         options = dccd.replay(CHECKOUT / 'test/fuzz/corpus/recording/one_body').options
@@ -729,7 +729,8 @@ class ExamplesTest(PythonTestCase):
 
     def test_tables_of_a_report(self):
         bag = self.folder / 'scene.bag'
-        subprocess.run([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', bag, '--frames', '45', '--quiet'], check=True)
+        subprocess.run([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes/table_edge.yaml', bag, '--frames', '45', '--quiet'],
+                       stdout=subprocess.DEVNULL, check=True)
         subprocess.run([TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet', '--no-accuracy-table'],
                        stdout=subprocess.DEVNULL, check=True)
         lines = self.run_example('read_tables.py', self.folder / 'report')
