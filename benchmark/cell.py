@@ -40,8 +40,15 @@ LONGEST_TRAVEL_S = 0.5  # what barely moves may be as late as this
 GAP_S = 0.25            # what comes back within this had not gone: patch_gap_s
 COLUMNS = ("scene", "noise mm", "lag s", "maps/s", "own", "clear", "of true", "alarms true", "false", "false before", "missed",
            "in time", "first ms", "voxels", "blind %")
+MEANING = """Of contacts with the map. *clear, of true*: share of the steps that are clear with the true map, and how many those are.
+*alarms true, false*: alarms of the run that touch where and when the truth does, and the others. *false before*: of these, those before
+the first true one. *missed*: alarms of the truth that no alarm of the run matches. *in time*: share of them whose place is touched first
+within a voxel's travel of the true time. *first*: by how much the first contact is late, in time and as the way closed in that time.
+*blind*: share of the voxels shown as own or in doubt that the true map has. Two match if they are of one body, within two voxels of each
+other, and their times overlap within a voxel's travel: a voxel's length by the speed at which the two close, at most 0.5 s.
+"""
 
-Contact = collections.namedtuple("Contact", "time_s point patch speed_m_per_s")
+Contact = collections.namedtuple("Contact", "time_s point patch speed_m_per_s body")
 Step = collections.namedtuple("Step", "start_s end_s clear contacts")
 Run = collections.namedtuple("Run", "steps alarms own")
 
@@ -70,7 +77,7 @@ def run_tool(tools, name, *words):
 
 
 def analyse(tools, bag, monitor, folder, name, shows_own=False):
-    """A run of the monitor over a bag: its steps with the contacts with the map, its alarms, and in each step the own voxels that it shows."""
+    """A run of the monitor over a bag: its steps with the contacts with the map, its alarms, and in each step the own voxels shown."""
     params, results, report = (os.path.join(folder, name + ending) for ending in (".yaml", "_results.bag", "_report"))
     with open(params, "w") as stream:
         yaml.safe_dump(monitor, stream)
@@ -80,11 +87,12 @@ def analyse(tools, bag, monitor, folder, name, shows_own=False):
     steps, alarms, own = [], set(), []
     with rosbag.Bag(results) as stream:
         # Markers are long, and nobody asks for those of bodies without own voxels.
-        for topic, message, _ in stream.read_messages(["/collision_monitor/" + t for t in ["contacts", "patches"] + ["markers"] * shows_own]):
+        topics = ["contacts", "patches"] + ["markers"] * shows_own
+        for topic, message, _ in stream.read_messages(["/collision_monitor/" + name for name in topics]):
             if topic.endswith("/contacts") and message.answered:
                 start_s, end_s = message.start.to_sec(), message.header.stamp.to_sec()
                 found = [Contact(start_s if c.initial else start_s + c.toc_lower * (end_s - start_s),
-                                 (c.point.x, c.point.y, c.point.z), c.patch, c.approach_speed)
+                                 (c.point.x, c.point.y, c.point.z), c.patch, c.approach_speed, c.body[0])
                          for c in message.contacts if c.body[1] == c.OBSTACLE]
                 steps.append(Step(start_s, end_s, clear[message.header.stamp.to_nsec()], found))
             elif topic.endswith("/patches"):
@@ -103,18 +111,19 @@ class Touches:
         self.times_s = [c.time_s for c in self.contacts]
         self.points = np.array([c.point for c in self.contacts]).reshape(-1, 3)
 
-    def near(self, points, reach_m, from_s, to_s):
-        """Sorted times of contacts within reach of any of the points."""
+    def near(self, alarm, reach_m, from_s, to_s):
+        """Sorted times at which the alarm's body touches within reach of where it began."""
         first, last = bisect.bisect_left(self.times_s, from_s), bisect.bisect_right(self.times_s, to_s)
-        if first == last:
-            return []
         near = np.zeros(last - first, bool)
-        for point in points:
+        for point in alarm.points:
             near |= ((self.points[first:last] - point) ** 2).sum(axis=1) <= reach_m * reach_m
-        return [self.times_s[first + i] for i in np.flatnonzero(near)]
+        return [self.times_s[first + i] for i in np.flatnonzero(near) if self.contacts[first + i].body == alarm.body]
+
+    def matches(self, alarm, reach_m):
+        return bool(self.near(alarm, reach_m, alarm.time_s - alarm.travel_s, alarm.until_s + alarm.travel_s))
 
 
-Beginning = collections.namedtuple("Beginning", "time_s points travel_s until_s")
+Beginning = collections.namedtuple("Beginning", "time_s points travel_s until_s body")
 
 
 def beginnings(run, resolution_m):
@@ -129,13 +138,13 @@ def beginnings(run, resolution_m):
         first = [c for step, c in contacts if step is contacts[0][0]]
         speed = max(c.speed_m_per_s for c in first)
         travel_s = min(resolution_m / speed, LONGEST_TRAVEL_S) if speed > 0 else LONGEST_TRAVEL_S
-        found.append(Beginning(min(c.time_s for c in first), [c.point for c in first], travel_s, contacts[-1][1].time_s))
+        found.append(Beginning(min(c.time_s for c in first), [c.point for c in first], travel_s, contacts[-1][1].time_s, first[0].body))
     return sorted(found)
 
 
 def onset_error(touches, alarm, reach_m):
     """How much later than the truth it begins to touch at the place of a true alarm [s]."""
-    times = touches.near(alarm.points, reach_m, -np.inf, np.inf)
+    times = touches.near(alarm, reach_m, -np.inf, np.inf)
     onsets = [t for before, t in zip([-np.inf] + times, times) if t - before > GAP_S]
     return min((t - alarm.time_s for t in onsets), key=abs)
 
@@ -159,11 +168,11 @@ def judge(truth, run, truth_voxels, resolution_m):
     row = {"clear": sum(step.clear and step.end_s in clear for step in run.steps), "clear_of": len(clear)}
     true_alarms, alarms = beginnings(truth, resolution_m), beginnings(run, resolution_m)
     true_touches, touches = Touches(truth), Touches(run, run.alarms)
-    is_true = [bool(true_touches.near(a.points, reach_m, a.time_s - a.travel_s, a.until_s + a.travel_s)) for a in alarms]
+    is_true = [true_touches.matches(a, reach_m) for a in alarms]
     row["true"], row["false"] = sum(is_true), len(is_true) - sum(is_true)
     first_s = true_alarms[0].time_s if true_alarms else np.inf
     row["false_before"] = sum(a.time_s < first_s - a.travel_s for a, good in zip(alarms, is_true) if not good)
-    found = [a for a in true_alarms if touches.near(a.points, reach_m, a.time_s - a.travel_s, a.until_s + a.travel_s)]
+    found = [a for a in true_alarms if touches.matches(a, reach_m)]
     row["missed"], row["true_alarms"] = len(true_alarms) - len(found), len(true_alarms)
     row["in_time"] = sum(abs(onset_error(touches, a, reach_m)) <= a.travel_s for a in found)
     true_first, first = first_contact(truth), first_contact(run)
@@ -232,7 +241,7 @@ def table_line(row):
 
 def markdown(rows):
     head = ["| " + " | ".join(COLUMNS) + " |", "|---|--:|--:|--:|---|" + "--:|" * (len(COLUMNS) - 5)]
-    return "\n".join(head + [table_line(row) for row in rows]) + "\n"
+    return "\n".join(head + [table_line(row) for row in rows]) + "\n\n" + MEANING
 
 
 def main():

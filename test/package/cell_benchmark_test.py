@@ -17,10 +17,11 @@ RESOLUTION_M = 0.02
 
 
 def run_of(*contacts, clear_from=0):
-    """Ten steps of a tenth of a second. Contacts: (time, x, patch), that close with 0.2 m/s; all of their patches are alarms."""
+    """Ten steps of a tenth of a second. Contacts: (time, x, patch), that close with 0.2 m/s; all of their patches are alarms. Patches from
+    100 on are another body's."""
     steps = []
     for i in range(10):
-        found = [Contact(t, (x, 0, 0), patch, 0.2) for t, x, patch in contacts if i <= 10 * t < i + 1]
+        found = [Contact(t, (x, 0, 0), patch, 0.2, int(patch >= 100)) for t, x, patch in contacts if i <= 10 * t < i + 1]
         steps.append(Step(0.1 * i, 0.1 * (i + 1), not found and i >= clear_from, found))
     return Run(steps, {patch for _, _, patch in contacts}, [])
 
@@ -49,6 +50,9 @@ class JudgeTest(FolderTestCase):
     def test_a_true_alarm_is_found_within_two_voxels(self):
         self.expect(self.judged((0.35, 0.039, 1), (0.85, 1.041, 2)), true=1, false=1, false_before=0, missed=1)
 
+    def test_another_body_at_the_same_place_is_another_alarm(self):
+        self.expect(self.judged((0.35, 0.0, 100), (0.85, 1.0, 2)), true=1, false=1, missed=1)
+
     def test_the_same_place_at_another_time_is_neither_true_nor_found(self):
         """A voxel is a tenth of a second."""
         self.expect(self.judged((0.15, 0.0, 1), (0.95, 1.0, 2)), true=1, false=1, missed=1, in_time=1)
@@ -71,12 +75,12 @@ class JudgeTest(FolderTestCase):
                       table_line({'scene': 's', 'noise_m': 0.003, 'lag_s': 0, 'rate_hz': 5, 'own': 'with', **row}))
 
     def test_own_voxels_that_the_truth_has_are_blind(self):
-        voxels = occupied_voxels([{'box': {'min_m': [0, 0, 0], 'max_m': [0.04, 0.02, 0.02]}},
-                                  {'ring': {'center_m': [1, 0, 0], 'axis': [0, 0, 1], 'radius_m': 0.1, 'tube_radius_m': 0.03}}], RESOLUTION_M)
+        ring = {'center_m': [1, 0, 0], 'axis': [0, 0, 1], 'radius_m': 0.1, 'tube_radius_m': 0.03}
+        voxels = occupied_voxels([{'box': {'min_m': [0, 0, 0], 'max_m': [0.04, 0.02, 0.02]}}, {'ring': ring}], RESOLUTION_M)
         self.assertLessEqual({(0, 0, 0), (1, 0, 0), (55, 0, 0)}, voxels)
         self.assertTrue(voxels.isdisjoint({(2, 0, 0), (-1, 0, 0), (50, 0, 0)}))
-        own = [(0.01, 0.01, 0.01), (0.03, 0.01, 0.01), (0.05, 0.01, 0.01), (1.01, 0.01, 0.01)]
-        self.assertEqual(blind_percent(Run([], set(), own), voxels, RESOLUTION_M), 50)
+        own = [(0.01, 0.01, 0.01), (0.03, 0.01, 0.01), (0.05, 0.01, 0.01), (1.01, 0.01, 0.01), (1.11, 0.01, 0.01)]
+        self.assertEqual(blind_percent(Run([], set(), own), voxels, RESOLUTION_M), 60)
         self.assertIsNone(blind_percent(Run([], set(), []), voxels, RESOLUTION_M))
 
     def test_every_scene_can_be_recorded_with_its_camera(self):
