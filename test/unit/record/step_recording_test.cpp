@@ -123,11 +123,11 @@ TEST(StepRecording, LiesAreNamed) {
   bad[0] = 'X';
   EXPECT_NE(errorOf(bad).find("not a recording"), std::string::npos);
   bad = bytes;
-  for (const std::uint8_t other : {0, 1, 6, 8, 255}) {
+  for (const std::uint8_t other : {0, 1, 7, 9, 255}) {
     bad = bytes;
     bad[8] = other;
     EXPECT_EQ(errorOf(bad), "FILE: byte 12: version " + std::to_string(other) +
-                                " of the format, and this program reads version 7 alone; record the step again, or "
+                                " of the format, and this program reads version 8 alone; record the step again, or "
                                 "replay it by the program that recorded it");
   }
   StepRecording r = recordScene();
