@@ -1,6 +1,7 @@
 #include "node/robot_source.h"
 
 #include <chrono>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -60,9 +61,9 @@ class ParameterTexts {
       return read;
     }
     if (!read.text.empty()) return read;
-    read.problem = node_.hasParam(name) ? "is empty or no text; " + what + " is needed"
-                                        : "was set by nobody for " + std::to_string(static_cast<int>(timeout_s_)) +
-                                              " s (robot/timeout_s); publish it before, or correct robot";
+    std::ostringstream waited;
+    waited << "was set by nobody for " << timeout_s_ << " s (robot/timeout_s); publish it before, or correct robot";
+    read.problem = node_.hasParam(name) ? "is empty or no text; " + what + " is needed" : waited.str();
     return read;
   }
 

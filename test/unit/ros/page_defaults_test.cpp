@@ -64,6 +64,7 @@ Defaults inForce() {
   limitLive(config);
   const MonitorOptions& monitor = config.monitor;
   const Options& detector = monitor.detector;
+  const RobotConfig robot;
   constexpr std::size_t MB = std::size_t{1} << 20;
   return {{"accuracy", toString(detector.accuracy.rung)},
           {"tolerance_m", shown(detector.accuracy.tolerance_m)},
@@ -101,6 +102,11 @@ Defaults inForce() {
           {"markers/max_contacts", shown(config.markers.max_contacts)},
           {"markers/mesh", shown(config.markers.mesh)},
           {"markers/obstacle_m", shown(config.markers.obstacle_m)},
+          {"robot/timeout_s", shown(robot.timeout_s)},
+          {"robot/padding_m", shown(robot.padding_m)},
+          {"robot/scale", shown(robot.scale)},
+          {"robot/against_links", shown(robot.against_links)},
+          {"robot/against_map", shown(robot.against_map)},
           {"default_topic", config.bodies.at(0).topic}};
 }
 
@@ -114,9 +120,19 @@ TEST(PageDefaults, AreThoseInForceWhereNoneIsGiven) {
   // These have a sentence or nothing in place of a value.
   std::set<std::string> others;
   for (const auto& row : page) others.insert(row.first);
-  const std::set<std::string> without{
-      "clock_body",    "exclude_boxes", "expected_contacts", "fixed_frame", "minimum_separation_pairs", "octomap_file",
-      "octomap_frame", "phase",         "record_folder"};
+  const std::set<std::string> without{"clock_body",
+                                      "exclude_boxes",
+                                      "expected_contacts",
+                                      "fixed_frame",
+                                      "minimum_separation_pairs",
+                                      "octomap_file",
+                                      "octomap_frame",
+                                      "phase",
+                                      "record_folder",
+                                      "robot/description",
+                                      "robot/leave_out",
+                                      "robot/links",
+                                      "robot/semantic"};
   EXPECT_EQ(others, without);
 }
 

@@ -100,16 +100,17 @@ TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
 
 // A step is not split for a body that turns far from all that it is tested against.
 TEST(TurningBody, ThatComesNearNothingIsNotCut) {
-  Monitor monitor(loose(), clockAndBar());
+  std::vector<Body> bodies = clockAndBar();
+  bodies[1].against_obstacle = false;
+  Monitor monitor(loose(), bodies);
   step(monitor, tip(0, -1.03), 0);
   const Outcome outcome = step(monitor, tip(100 * MS, -1.03), 3.1);
   EXPECT_EQ(outcome.substeps, 1u);
   EXPECT_EQ(outcome.stats.bodies_far, 1u);
   EXPECT_TRUE(assuranceOf(outcome).clear());
   EXPECT_GT(step(monitor, tip(200 * MS, -1.01), 6.2).substeps, 30u) << "its corners come to 1.02 m";
-  std::vector<Body> apart = clockAndBar();
-  apart[0].not_against = {1};
-  Monitor blind(loose(), apart);
+  bodies[0].not_against = {1};
+  Monitor blind(loose(), bodies);
   step(blind, tip(0, -0.9), 0);
   const Outcome unseen = step(blind, tip(100 * MS, -0.9), 3.1);
   EXPECT_EQ(unseen.substeps, 1u);
@@ -187,7 +188,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
   const auto grid = std::make_shared<const Topology>(Topology::grid(SIZE, SIZE));
   Positions flat;
   for (std::size_t i = 0; i < SIZE * SIZE; ++i) {
-    flat.emplace_back(0.01 * static_cast<double>(i % SIZE), 0.01 * static_cast<double>(i / SIZE), -5);
+    flat.emplace_back(0.01 * static_cast<double>(i % SIZE), 0.01 * static_cast<double>(i / SIZE), -1.01);
   }
   int at = 0;
   const auto next = [&](Monitor& monitor) {
