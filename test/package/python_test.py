@@ -72,7 +72,8 @@ class AnswersTest(PythonTestCase):
                          self_collision=body.self_collision, against_bodies=body.against_bodies,
                          against_obstacle=body.against_obstacle, shell=body.shell, vertex_mask=body.vertex_mask,
                          minimum_separation_m=body.minimum_separation_m, separations_m=body.separations_m,
-                         reference=body.reference, radius_m=body.radius_m, pose_t0=body.pose_t0, pose_t1=body.pose_t1)
+                         reference=body.reference, reference_radius_m=body.reference_radius_m, radius_m=body.radius_m,
+                         pose_t0=body.pose_t0, pose_t1=body.pose_t1)
 
     def answer(self, step):
         voxels = step.voxels and dccd.Voxels(step.voxels.resolution_m, keys=step.voxels.keys, sizes=step.voxels.sizes,
@@ -101,8 +102,7 @@ class AnswersTest(PythonTestCase):
         for name in ('everything', 'distances', 'conservative_without_map'):
             step = dccd.replay(CHECKOUT / 'test/fuzz/corpus/recording' / name)
             self.assertEqual(step.differences, [])
-            if name != 'distances':  # what its reference frame says, radii and all, no Body can be given
-                self.assert_same_rows(self.answer(step).contacts, step.recorded.contacts)
+            self.assert_same_rows(self.answer(step).contacts, step.recorded.contacts)
             self.assertGreater(len(step.recorded.contacts), 0)
 
     @unittest.skipUnless((DATA / 'scenes').is_dir(), 'no public data')
@@ -453,6 +453,8 @@ class ArraysTest(PythonTestCase):
                 ({'radius_m': [1.]}, ValueError, 'radius_m has 1 radii; the mesh has 6 vertices'),
                 ({'minimum_separation_m': math.nan}, ValueError, 'minimum_separation_m = nan'),
                 ({'reference': t0[:2]}, ValueError, 'needs 6 positions'),
+                ({'reference_radius_m': [0.] * 6}, TypeError, 'reference_radius_m goes with reference'),
+                ({'reference': t0, 'reference_radius_m': [0.] * 5}, ValueError, 'no or as many radii in its reference frame'),
                 ({'pose_t0': np.eye(4)}, TypeError, 'pose_t0 and pose_t1 go together'),
                 ({'pose_t0': np.eye(4), 'pose_t1': turned}, ValueError, 'pose_t1 is no pose'),
                 ({'pose_t0': np.eye(4), 'pose_t1': np.eye(3)}, ValueError, r'pose_t1 has shape \(3, 3\), expected \(4, 4\)'),
@@ -483,7 +485,8 @@ class ArraysTest(PythonTestCase):
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
                 dccd.detect(body, **options)
         for bodies, error, sentence in [
-                ([], ValueError, 'there is no body'), (self.t0, TypeError, 'expected a dccd.Body or a list of them'), ([body, 3], TypeError, r'bodies\[1\] is no dccd.Body'),
+                ([], ValueError, 'there is no body'),
+                (self.t0, TypeError, 'expected a dccd.Body or a list of them'), ([body, 3], TypeError, r'bodies\[1\] is no dccd.Body'),
                 ([body, body], ValueError, "another body is called 'cloth', too"),
                 (dccd.Body(mesh=body.mesh), ValueError, "body 'body_0' needs 6 positions at t0 and t1, got 0 and 0")]:
             with self.subTest(sentence), self.assertRaisesRegex(error, sentence):
