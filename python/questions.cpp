@@ -164,24 +164,20 @@ py::list explainStep(py::handle bodies, py::handle kind_given, py::handle vertic
   const PairKind kind = kindOf(kind_given);
   const PairKindFacts& facts = factsOf(kind);
   const std::vector<Index> given = firstVertices(vertices, kind);
+  PairQuestion question;
+  question.kind = kind;
+  question.vertex = given;
+  for (std::size_t side = 0; side < (facts.isOnMap() ? 1 : 2); ++side) {
+    question.body[side] = bodyOf(whose[side], step.bodies);
+  }
   if (facts.isOnMap()) {
     if (voxel.is_none()) throw py::type_error(std::string("kind ") + facts.name + " needs a voxel's key");
     const Integers key = integersOf(voxel, "voxel", {3}, 65535);
     const std::int64_t* k = key.data();
-    VoxelQuestion question;
-    question.kind = kind;
-    question.body = bodyOf(whose[0], step.bodies);
-    question.vertex = given;
     question.voxel = {static_cast<std::uint16_t>(k[0]), static_cast<std::uint16_t>(k[1]),
                       static_cast<std::uint16_t>(k[2])};
-    runUnlocked([&] { trace = explain(step, wanted, question); });
-  } else {
-    PairQuestion question;
-    question.kind = kind;
-    for (std::size_t side = 0; side < 2; ++side) question.body[side] = bodyOf(whose[side], step.bodies);
-    std::copy(given.begin(), given.end(), question.vertex.begin());
-    runUnlocked([&] { trace = explain(step, wanted, question); });
   }
+  runUnlocked([&] { trace = explain(step, wanted, question); });
   return linesOf(trace);
 }
 

@@ -134,7 +134,7 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface,
   const auto ask = [&](const OccupiedLeaf& leaf, ReachedCube::Why why) {
     cubes.push_back({leaf, why, leafBox(leaf, surface.resolution()), -1});
   };
-  const VoxelTree nothing({}), remembered(remembered_), own = treeOf(own_);
+  const VoxelTree nothing{std::vector<OccupiedLeaf>()}, remembered(remembered_), own = treeOf(own_);
   const VoxelTree &now = surface.impl().tree, &before = before_ ? before_->impl().tree : nothing;
   auto appeared = [&](const OccupiedLeaf& voxel) {
     if (cubes.size() < tolerance::MOST_OWN_ASKED) ask(voxel, ReachedCube::Why::APPEARED);
@@ -193,7 +193,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
   }
   if (before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id)) forget();
-  const VoxelTree nothing({});
+  const VoxelTree nothing{std::vector<OccupiedLeaf>()};
   const VoxelTree &now = map.surface->impl().tree, &sure = trusted ? trusted->impl().tree : nothing;
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
   std::vector<ReachedCube> cubes = cubesToAsk(*map.surface, sure, reachedKeys(map, bodies, ways));
