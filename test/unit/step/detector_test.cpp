@@ -148,6 +148,40 @@ TEST(Detector, BodiesThatAreNamedAreNotTestedAgainstEachOther) {
   EXPECT_THROW(answer(motion), std::invalid_argument) << "there is no body 3";
 }
 
+// Bodies come near each other and go away again, move and rest. One that may meet a map always has its bounds.
+TEST(Detector, NothingIsLostOfBodiesThatAreFarFromAllOthers) {
+  std::uint64_t far = 0, contacts = 0, crossings = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const Draw draw = drawFrom(seed);
+    TestStep step = randomStep(draw, 12, Coordinates::REAL);
+    History with, without;
+    for (int i = 0; i < 6 && step.bodies.size() > 1; ++i) {
+      Step motion = step.motion();
+      for (Body& body : motion.bodies) body.self_collision = false;
+      const Outcome expected = detect(motion, {}, without);
+      for (Body& body : motion.bodies) body.against_obstacle = false;
+      const Outcome result = detect(motion, {}, with);
+      ASSERT_EQ(differenceOfResults(result, expected), "") << "seed " << seed << ", step " << i;
+      EXPECT_EQ(expected.stats.bodies_far, 0u);
+      far += result.stats.bodies_far;
+      contacts += result.contacts.size();
+      crossings += result.intersections.size();
+      std::vector<Positions> next;
+      for (const StepBody& body : step.bodies) {
+        next.push_back(body.t1);
+        const Vec3 move(draw(-3, 3), draw(0, 3) == 0 ? 0.25 : 0, 0);
+        if (draw(0, 2) > 0) {
+          for (Vec3& p : next.back()) p += move;
+        }
+      }
+      step = step.continued(next);
+    }
+  }
+  EXPECT_GT(far, 100u);
+  EXPECT_GT(contacts, 100u);
+  EXPECT_GT(crossings, 100u);
+}
+
 TEST(Detector, EffectsThatAreOffCostNothing) {
   TestStep step = crumpled(5, 2, 8);
   for (StepBody& body : step.bodies) body.self_collision = false;
