@@ -34,7 +34,8 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
 }  // namespace
 
 LivenessLimits livenessLimits(const MonitorConfig& config) {
-  return {config.answer_timeout_s, config.monitor.store.max_step_s, config.monitor.octomap_timeout_s};
+  return {config.answer_timeout_s, config.monitor.store.max_step_s, config.monitor.octomap_timeout_s,
+          config.takesClouds()};
 }
 
 CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle,
@@ -121,13 +122,12 @@ void CollisionMonitor::Impl::subscribe() {
       [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { onTransforms(*m, true); }); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
-  maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
+  maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });
   if (!config.octomap_file.empty()) {
     maps->submitFile(config.octomap_file, steadyNs());
   } else {
-    map_subscriber = input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) {
-      guarded(config.octomap_topic, [&] { onMap(m); });
-    });
+    map_subscriber = input.subscribe<ShapeShifter>(
+        config.mapName(), 2, [this](const ShapeShifter::ConstPtr& m) { guarded(config.mapName(), [&] { onMap(m); }); });
   }
 }
 

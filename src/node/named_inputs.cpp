@@ -12,14 +12,7 @@ bool isRemapped(const ros::NodeHandle& node, const std::string& name) {
   return node.resolveName(name) != plain || ros::names::getRemappings().count(plain) > 0;
 }
 
-std::string howNamed(bool named) { return named ? " (named)" : " (default)"; }
-
-}  // namespace
-
-void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
-  for (BodyConfig& body : config.bodies) {
-    if (!body.isRigid() && isRemapped(node, body.topic)) body.topic_named = true;
-  }
+void takeOctomapRemapping(const ros::NodeHandle& node, MonitorConfig& config) {
   if (config.octomap_topic_named || !config.octomap_file.empty()) return;
   for (const char* name : {DEFAULT_OCTOMAP_TOPIC, "octomap"}) {
     if (!isRemapped(node, name)) continue;
@@ -29,8 +22,21 @@ void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
   }
 }
 
+std::string howNamed(bool named) { return named ? " (named)" : " (default)"; }
+
+}  // namespace
+
+void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
+  for (BodyConfig& body : config.bodies) {
+    if (!body.isRigid() && isRemapped(node, body.topic)) body.topic_named = true;
+  }
+  config.cloud_named = config.cloud_named || isRemapped(node, DEFAULT_CLOUD_TOPIC);
+  takeOctomapRemapping(node, config);
+  config.checkMapNames();
+}
+
 std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
-  return config.octomap_file.empty() ? node.resolveName(config.octomap_topic) : config.octomap_file;
+  return config.octomap_file.empty() ? node.resolveName(config.mapName()) : config.octomap_file;
 }
 
 std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
@@ -42,7 +48,8 @@ std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
   }
   const auto setting = config.effects.find(Effect::OCTOMAP);
   const bool off = setting != config.effects.end() && setting->second == EffectSetting::OFF;
-  text += "octomap: " + (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
+  text += (config.takesClouds() ? "obstacle_cloud: " : "octomap: ") +
+          (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
   return text + ", tf";
 }
 
