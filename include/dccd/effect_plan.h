@@ -27,11 +27,12 @@ struct EffectScene {
   std::vector<Body> bodies;        ///< topology null: not known yet; t0 of rigid ones: wherever they were once
   std::vector<std::string> noise;  ///< per body, where its uncertainty radii come from, in words; empty: it has none
   std::string map_source;          ///< a topic or file, for the sentence
-  bool map_named = false;          ///< by the user, as a topic: it is missed until it comes
-  bool map_seen = false;           ///< a file is named, somebody publishes the topic, or a map has come
-  bool map_used = false;           ///< the last step that was answered had a map
-  bool predictions_heard = false;  ///< somebody subscribes to them
-  std::size_t left_out_pairs = 0;  ///< closer than the minimum separation in the reference frame
+  std::string map_parameter = "octomap_topic";  ///< which names it, for the sentence
+  bool map_named = false;                       ///< by the user, as a topic: it is missed until it comes
+  bool map_seen = false;                        ///< a file is named, somebody publishes the topic, or a map has come
+  bool map_used = false;                        ///< the last step that was answered had a map
+  bool predictions_heard = false;               ///< somebody subscribes to them
+  std::size_t left_out_pairs = 0;               ///< closer than the minimum separation in the reference frame
   double look_ahead_s = 0;
   bool unknown_space_counts = false;  ///< unknown_space is not `free`
   bool earliest_only = false;         ///< later contacts than the first are not looked for

@@ -80,7 +80,7 @@ def detect(bodies: Body | Sequence[Body], *, voxels: Voxels | None = None, histo
         For a sequence of steps: the same one each time saves time and changes no answer.
     accuracy : str
         'exact' (the default): no contact is missed, none invented. 'conservative': for distances (minimum_separation_m,
-        radius_m). 'fast': proves nothing.
+        radius_m).
     tolerance_m : float
         Of 'conservative': features that come this close [m] may be reported. 1e-6.
     toc_bits : int

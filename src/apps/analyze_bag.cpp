@@ -38,7 +38,8 @@ MonitorConfig configure(const Arguments& a) {
   ParameterTree tree;
   if (!a.params.empty()) tree = readYaml(a.params);
   if (!tree.has("bodies")) {
-    const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag) : a.mesh;
+    const std::string clouds = tree.has("obstacle_cloud_topic") ? tree.members["obstacle_cloud_topic"].text : "";
+    const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag, clouds) : a.mesh;
     if (!topic.empty() && !tree.has("topic")) tree.put("topic", topic);
   }
   if (a.without_map) {

@@ -125,6 +125,34 @@ void readLimits(ParameterReader& reader, MonitorConfig& config) {
   if (reader.has("max_compute_s")) limitTime(config);
 }
 
+void readSensorModel(ParameterReader section, CloudMapOptions& map) {
+  map.hit = section.number("hit", map.hit, 0.5, 0.9999);
+  map.miss = section.number("miss", map.miss, 0.0001, 0.5);
+  map.min = section.number("min", map.min, 0.0001, 0.5);
+  map.max = section.number("max", map.max, 0.5, 0.9999);
+  section.finish();
+}
+
+void readClouds(ParameterReader& reader, MonitorConfig& config) {
+  // What is said of clouds is said by somebody who has them.
+  for (const char* name : {"obstacle_cloud_topic", "obstacle_resolution_m", "obstacle_max_range_m", "sensor_model"}) {
+    config.cloud_named = config.cloud_named || reader.has(name);
+  }
+  config.cloud_topic = reader.get("obstacle_cloud_topic", config.cloud_topic);
+  if (config.cloud_topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
+  CloudMapOptions& map = config.cloud_map;
+  map.resolution_m = reader.number("obstacle_resolution_m", map.resolution_m, 1e-4, 1e3);
+  map.max_range_m = reader.number("obstacle_max_range_m", map.max_range_m, 0, LARGE);
+  if (map.max_range_m > CloudMap::MOST_RAY_VOXELS * map.resolution_m) {
+    std::ostringstream text;
+    text << "is " << map.resolution_m << ", too fine for obstacle_max_range_m " << map.max_range_m << ": a ray has "
+         << CloudMap::MOST_RAY_VOXELS << " voxels at most; write at least "
+         << map.max_range_m / CloudMap::MOST_RAY_VOXELS << ", or a shorter range";
+    reader.fail("obstacle_resolution_m", text.str());
+  }
+  readSensorModel(reader.section("sensor_model"), map);
+}
+
 void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.octomap_topic_named = reader.has("octomap_topic");
   config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
@@ -137,6 +165,7 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
       static_cast<std::size_t>(reader.integer("max_map_mb", static_cast<int>(config.max_map_bytes >> 20), 1, 1 << 20))
       << 20;
   if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
+  readClouds(reader, config);
   config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
   config.own_voxels_m = ownVoxelsOf(reader, 0);
   config.monitor.own_voxels_lag_s =
@@ -340,9 +369,20 @@ std::vector<Body> MonitorConfig::monitorBodies() const {
   return found;
 }
 
+const std::string& MonitorConfig::liveMapName() const { return cloud_named ? cloud_topic : octomap_topic; }
+
+const std::string& MonitorConfig::mapName() const { return takesMapFileAlone() ? octomap_file : liveMapName(); }
+
+void MonitorConfig::checkMapNames() const {
+  if (!cloud_named || !octomap_topic_named) return;
+  throw ParameterError("the map is to come both from the clouds on obstacle_cloud_topic '" + cloud_topic +
+                       "' and from octomap_topic '" + octomap_topic + "'; remove one of the two");
+}
+
 bool MonitorConfig::namesOctomap() const {
   const EffectSetting setting = settingOf(effects, Effect::OCTOMAP);
-  return setting == EffectSetting::AUTO ? octomap_topic_named || !octomap_file.empty() : setting == EffectSetting::ON;
+  if (setting != EffectSetting::AUTO) return setting == EffectSetting::ON;
+  return octomap_topic_named || cloud_named || !octomap_file.empty();
 }
 
 bool MonitorConfig::ownsVoxels() const {
@@ -386,6 +426,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, con
   readLimits(reader, config);
   reader.raw("live");  // dynamic_reconfigure's own (reconfigure.h); not read, but no mistake either
   reader.finish();
+  config.checkMapNames();
   applyEffects(config);
   checkOwnVoxels(reader, config);
   settleAccuracy(reader, config);

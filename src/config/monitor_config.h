@@ -10,6 +10,7 @@
 
 #include "config/parameter_reader.h"
 #include "config/robot_config.h"
+#include "dccd/cloud_map.h"
 #include "dccd/effect_plan.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
@@ -51,6 +52,8 @@ constexpr std::size_t NO_MAP_LIMIT = std::size_t{1} << 50;
 
 /// Where a map is looked for that nobody named.
 constexpr const char* DEFAULT_OCTOMAP_TOPIC = "octomap_binary";
+/// Where a sensor's clouds are looked for that somebody named without a topic.
+constexpr const char* DEFAULT_CLOUD_TOPIC = "obstacle_cloud";
 
 struct MonitorConfig {
   std::string fixed_frame;         ///< empty: the frame of the clock body's first message
@@ -69,7 +72,10 @@ struct MonitorConfig {
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
-  bool octomap_topic_named = false;                       ///< as BodyConfig::topic_named
+  bool octomap_topic_named = false;               ///< as BodyConfig::topic_named
+  std::string cloud_topic = DEFAULT_CLOUD_TOPIC;  ///< of clouds that are made a map
+  bool cloud_named = false;                       ///< they are called for: by any parameter of theirs
+  CloudMapOptions cloud_map;
   std::size_t max_map_bytes = std::size_t{512} << 20;     ///< see limitLive(); NO_MAP_LIMIT: none
   std::size_t max_memory_bytes = std::size_t{512} << 20;  ///< see limitLive()
   std::size_t max_queue_bytes = 0;                        ///< a quarter of it where it holds; 0: no limit
@@ -91,6 +97,15 @@ struct MonitorConfig {
   std::string phasesInWords() const;
   /// What is expected in that phase.
   std::vector<Expectation> expectedIn(const std::string& some_phase) const;
+  /// The map is made of clouds.
+  bool takesClouds() const { return cloud_named; }
+  /// octomap_file in the place of a live map, not beside it.
+  bool takesMapFileAlone() const { return !octomap_file.empty() && !octomap_topic_named && !cloud_named; }
+  /// Its file, or the topic of its messages or of its clouds, as the parameters have it.
+  const std::string& mapName() const;
+  const std::string& liveMapName() const;  ///< a topic
+  /// Throws ParameterError where both a map and clouds are named: there is one map.
+  void checkMapNames() const;
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
   /// A separation or an uncertainty is asked for, so that only conservative will do.

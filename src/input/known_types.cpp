@@ -2,17 +2,29 @@
 
 #include <deformable_ccd/ContactArray.h>
 #include <octomap_msgs/Octomap.h>
+#include <sensor_msgs/PointCloud2.h>
 
 #include "input/message_type.h"
 
 namespace dccd {
 
-std::string mapTypeProblem(const std::string& datatype, const std::string& md5) {
+namespace {
+
+template <class Message>
+std::string typeProblem(const std::string& datatype, const std::string& md5, const std::string& what) {
   namespace traits = ros::message_traits;
-  if (datatype == traits::datatype<octomap_msgs::Octomap>()) {
-    return md5Problem(datatype, md5, traits::md5sum<octomap_msgs::Octomap>());
-  }
-  return "type " + datatype + " is not an octomap; publish octomap_msgs/Octomap";
+  if (datatype == traits::datatype<Message>()) return md5Problem(datatype, md5, traits::md5sum<Message>());
+  return "type " + datatype + " is not " + what + "; publish " + traits::datatype<Message>();
+}
+
+}  // namespace
+
+std::string mapTypeProblem(const std::string& datatype, const std::string& md5) {
+  return typeProblem<octomap_msgs::Octomap>(datatype, md5, "an octomap");
+}
+
+std::string cloudTypeProblem(const std::string& datatype, const std::string& md5) {
+  return typeProblem<sensor_msgs::PointCloud2>(datatype, md5, "a cloud");
 }
 
 bool isMonitorsMarkers(const std::string& topic, const std::map<std::string, std::string>& types) {

@@ -9,6 +9,9 @@ namespace dccd {
 /// Empty when messages of this type can be read as an octomap; else one sentence. md5 "*" stands for any.
 std::string mapTypeProblem(const std::string& datatype, const std::string& md5);
 
+/// The same of a sensor's cloud.
+std::string cloudTypeProblem(const std::string& datatype, const std::string& md5);
+
 /// Where a monitor publishes unless it is renamed, and analyze_bag.
 constexpr const char* MONITOR_NAMESPACE = "/collision_monitor";
 

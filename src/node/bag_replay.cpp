@@ -64,6 +64,29 @@ LoadedMap readMap(const rosbag::MessageInstance& message, const MonitorConfig& c
   return map;
 }
 
+/// Clouds of a bag, of which one waits while the fixed frame is not known: the newest.
+class BagClouds {
+ public:
+  BagClouds(const MonitorConfig& config, const TransformFeed& feed, const MapMemory& memory)
+      : clouds_(config, feed, memory) {}
+
+  void hold(const rosbag::MessageInstance& message) {
+    bytes_ = bytesOf(message);
+    receipt_ns_ = static_cast<StampNs>(message.getTime().toNSec());
+  }
+  /// What the map is with the cloud that is held, once.
+  std::optional<LoadedMap> take(const std::string& fixed_frame) {
+    clouds_.setFrame(fixed_frame);
+    if (!bytes_ || !clouds_.hasFrame()) return std::nullopt;
+    return clouds_.add(*std::exchange(bytes_, std::nullopt), receipt_ns_, [] { return false; });
+  }
+
+ private:
+  CloudMapping clouds_;
+  std::optional<std::vector<std::uint8_t>> bytes_;
+  StampNs receipt_ns_ = 0;
+};
+
 std::string listOf(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
@@ -129,6 +152,8 @@ struct BagReplay::Run {
   tf2::BufferCore transforms{TF_KEPT + TF_AHEAD};
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
+  const MapMemory memory{pipeline.config()};
+  BagClouds clouds{pipeline.config(), feed, memory};
   std::optional<LookAheadScore> look_ahead;
   std::map<std::string, std::vector<std::size_t>> bodies_of_topic;  // several: parts of one message
   std::map<std::string, std::size_t> frames_of_topic;
@@ -180,10 +205,24 @@ struct BagReplay::Run {
     if (map.surface && variation.voxels > 1) map.surface = coarser(*map.surface, variation.voxels);
     if (!map.surface) {
       ++summary.maps_refused;
-      complain("octomap refused: " + map.problem);
-      map.problem = "the octomap was refused: " + map.problem;
+      complain((pipeline.config().takesClouds() ? "cloud refused: " : "octomap refused: ") + map.problem);
+      map.problem = whyRefused(map.problem, pipeline.config());
     }
     pipeline.setMap(std::move(map), now_ns);
+  }
+
+  void mapMessage(const rosbag::MessageInstance& message) {
+    const MonitorConfig& config = pipeline.config();
+    if (config.takesClouds() &&
+        mapMessageProblem(message.getDataType(), message.getMD5Sum(), message.size(), config).empty()) {
+      return clouds.hold(message);
+    }
+    setMap(readMap(message, config, memory), static_cast<std::int64_t>(message.getTime().toNSec()));
+  }
+
+  void placeCloud(const ros::Time& at) {
+    std::optional<LoadedMap> map = clouds.take(pipeline.fixedFrame());
+    if (map) setMap(std::move(*map), static_cast<std::int64_t>(at.toNSec()));
   }
 
   void drain(const ros::Time& at) {
@@ -216,7 +255,10 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
     : path_(bag), config_(std::move(config)), options_(std::move(options)) {
   // A frame whose transform the bag does not hold within the window will not get it: there is nothing to wait for.
   config_.transform_timeout_s = 0;
-  if (!options_.octomap_file.empty()) config_.octomap_file = options_.octomap_file;
+  if (!options_.octomap_file.empty()) {
+    config_.octomap_file = options_.octomap_file;
+    config_.octomap_topic_named = config_.cloud_named = false;
+  }
   rosbag::Bag file;
   openBag(path_, file);
   rosbag::View view(file);
@@ -240,13 +282,14 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
 }
 
 void BagReplay::chooseMapTopic() {
+  config_.cloud_topic = absolute(config_.cloud_topic);
   config_.octomap_topic = absolute(config_.octomap_topic);
   const bool there = std::find(map_topics_.begin(), map_topics_.end(), config_.octomap_topic) != map_topics_.end();
   if (!config_.octomap_topic_named && !there && !map_topics_.empty()) config_.octomap_topic = map_topics_.front();
 }
 
 std::string BagReplay::mapSource() const {
-  if (!config_.octomap_file.empty()) return config_.octomap_file + " (named)";
+  if (config_.takesMapFileAlone() || config_.cloud_named) return config_.mapName() + " (named)";
   if (config_.octomap_topic_named) return config_.octomap_topic + " (named)";
   if (config_.octomap_topic == absolute(DEFAULT_OCTOMAP_TOPIC)) return config_.octomap_topic + " (default)";
   return config_.octomap_topic + " (the first of the bag; nobody named one)";
@@ -257,14 +300,18 @@ std::string BagReplay::unheardMaps() const {
   for (const std::string& topic : map_topics_) {
     if (topic != config_.octomap_topic) unheard.push_back(topic);
   }
-  // A file was given to be taken instead.
-  if (unheard.empty() || !config_.octomap_file.empty()) return "";
+  // A file was given to be taken instead, or clouds.
+  if (unheard.empty() || config_.takesMapFileAlone() || config_.cloud_named) return "";
   return "nobody listens to the octomaps on " + listOf(unheard) + "; octomap_topic is " + config_.octomap_topic;
 }
 
 std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
   if (summary.maps > summary.maps_refused) return "";
-  const bool is_file = !config_.octomap_file.empty();
+  const bool is_file = config_.takesMapFileAlone();
+  if (config_.takesClouds()) {
+    return summary.maps > 0 ? "no cloud on " + config_.cloud_topic + " could be used"
+                            : "the bag has no cloud on " + config_.cloud_topic + ", which is to make the map";
+  }
   if (summary.maps > 0) {
     return (is_file ? "the octomap of " + config_.octomap_file : "no octomap on " + config_.octomap_topic) +
            (is_file ? " could not be used" : " could be used");
@@ -276,40 +323,40 @@ std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
 
 BagReplay::~BagReplay() = default;
 
-std::string BagReplay::firstMeshTopic(const std::string& bag) {
+std::string BagReplay::firstMeshTopic(const std::string& bag, const std::string& clouds) {
   rosbag::Bag file;
   openBag(bag, file);
   rosbag::View view(file);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) types[c->topic] = c->datatype;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
-    if (meshTypeProblem(c->datatype, c->md5sum).empty() && !isMonitorsMarkers(c->topic, types)) return c->topic;
+    if (c->topic == absolute(clouds) || isMonitorsMarkers(c->topic, types)) continue;
+    if (meshTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
   }
   return "";
 }
 
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
   Run run(*this, sink, predictions);
-  const std::string& map_topic = config_.octomap_topic;
+  const std::string& map_topic = config_.liveMapName();
   const bool may_use_map = run.pipeline.effects().mayUseMap();
-  const MapMemory memory(config_);
-  const bool bag_maps = config_.octomap_file.empty() && may_use_map;
+  const bool bag_maps = !config_.takesMapFileAlone() && may_use_map;
   run.summary.map_source = may_use_map ? mapSource() : "off";
 
   rosbag::View all(run.bag);
   if (all.size() == 0) return run.summary;
   run.summary.duration_s = (all.getEndTime() - all.getBeginTime()).toSec();
   if (!config_.octomap_file.empty() && may_use_map) {
-    run.setMap(loadMapFile(config_.octomap_file, config_, &memory), 0);
+    run.setMap(loadMapFile(config_.octomap_file, config_, &run.memory), 0);
   }
 
   rosbag::View maps(run.bag, rosbag::TopicQuery(map_topic));
   ros::Time first_map;
-  if (bag_maps && maps.size() > 0) {
+  if (bag_maps && !config_.takesClouds() && maps.size() > 0) {
     const rosbag::View::iterator at_first = maps.begin();  // owns the message that it refers to
     const rosbag::MessageInstance& first = *at_first;
     first_map = first.getTime();
-    run.setMap(readMap(first, config_, memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
+    run.setMap(readMap(first, config_, run.memory), static_cast<std::int64_t>(all.getBeginTime().toNSec()));
   }
 
   TransformWindow transforms(run.bag, run.feed);
@@ -330,9 +377,9 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
     for (const std::string& line : run.feed.takeComplaints()) run.complain("tf: " + line);
     if (is_mesh) {
       for (const std::size_t body : bodies->second) run.mesh(body, m, bytes);
-    } else if (bag_maps && m.getTopic() == map_topic && at > first_map) {
-      run.setMap(readMap(m, config_, memory), static_cast<std::int64_t>(at.toNSec()));
     }
+    if (bag_maps && m.getTopic() == map_topic && at > first_map) run.mapMessage(m);
+    run.placeCloud(at);
     progress.advance();
   }
   run.pipeline.finish();

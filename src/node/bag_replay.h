@@ -58,9 +58,9 @@ class BagReplay {
   BagReplay(const std::string& bag, MonitorConfig config, BagReplayOptions options);
   ~BagReplay();
 
-  /// The first topic of the bag that carries meshes and is no monitor's own, for configurations that name none. Empty:
-  /// none.
-  static std::string firstMeshTopic(const std::string& bag);
+  /// The first topic of the bag that carries meshes, is no monitor's own and not that of `clouds`, for configurations
+  /// that name none. Empty: none.
+  static std::string firstMeshTopic(const std::string& bag, const std::string& clouds);
 
   /// Tf is fed ahead of the messages by a window, so that no frame waits for a transform that the bag holds, but not
   /// across a loop's end before the meshes have come to it, too; a map that

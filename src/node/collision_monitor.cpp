@@ -38,7 +38,8 @@ MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& priva
 }  // namespace
 
 LivenessLimits livenessLimits(const MonitorConfig& config) {
-  return {config.answer_timeout_s, config.monitor.store.max_step_s, config.monitor.octomap_timeout_s};
+  return {config.answer_timeout_s, config.monitor.store.max_step_s, config.monitor.octomap_timeout_s,
+          config.takesClouds()};
 }
 
 CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle,
@@ -125,14 +126,12 @@ void CollisionMonitor::Impl::subscribe() {
       [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { onTransforms(*m, true); }); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
-  maps = std::make_unique<MapLoader>(config, [this] { queue.wake(); });
-  if (!config.octomap_file.empty()) {
-    maps->submitFile(config.octomap_file, steadyNs());
-  } else {
-    map_subscriber = input.subscribe<ShapeShifter>(config.octomap_topic, 2, [this](const ShapeShifter::ConstPtr& m) {
-      guarded(config.octomap_topic, [&] { onMap(m); });
-    });
-  }
+  maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });
+  if (config.takesMapFileAlone()) return maps->submitFile(config.octomap_file, steadyNs());
+  if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), steadyNs());
+  map_subscriber = input.subscribe<ShapeShifter>(config.liveMapName(), 2, [this](const ShapeShifter::ConstPtr& m) {
+    guarded(config.liveMapName(), [&] { onMap(m); });
+  });
 }
 
 // --- service thread --------------------------------------------------------------------------------------------------

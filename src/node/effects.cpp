@@ -25,10 +25,11 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
     scene_.bodies.push_back(body.body);
     scene_.noise.push_back(body.isUncertain() ? noiseOf(body.input) : "");
   }
-  scene_.map_source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
+  scene_.map_source = config.mapName();
   if (!map_source.empty()) scene_.map_source = map_source;
-  scene_.map_named = config.octomap_topic_named;
-  scene_.map_seen = !config.octomap_file.empty();
+  scene_.map_named = config.octomap_topic_named || config.cloud_named;
+  if (config.takesClouds()) scene_.map_parameter = "obstacle_cloud_topic";
+  scene_.map_seen = config.takesMapFileAlone();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
   scene_.earliest_only = config.monitor.detector.earliest_only;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;

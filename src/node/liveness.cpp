@@ -78,7 +78,7 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (newest_.came_ns != NEVER && secondsBetween(newest_.came_ns, now_ns) > limits_.max_step_s) {
     add(Fault::Kind::SILENCE, "no frame has come for more than " + seconds(limits_.max_step_s));
   }
-  if (!maps_.empty() && maps_.front().name < answered_ && maps_.front().name > maps_placed_) {
+  if (!maps_.empty() && !limits_.map_streams && maps_.front().name < answered_ && maps_.front().name > maps_placed_) {
     add(Fault::Kind::NEWER_MAP, "a newer map came before the last frame that was answered, and is not in use yet");
   } else if (!maps_.empty() && secondsBetween(maps_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
     add(Fault::Kind::NEWER_MAP,

@@ -14,6 +14,7 @@ struct LivenessLimits {
   double answer_timeout_s = 0.5;  ///< a frame has its outcome by then; > 0
   double max_step_s = 0.5;        ///< frames come more often than this; > 0
   double octomap_timeout_s = 0;   ///< a map in use is not older; 0: it may be
+  bool map_streams = false;       ///< maps come all the time: a newer one has answer_timeout_s until it is in use
 };
 
 /// What stands in the way of a proof apart from the step itself. One of a kind at a time.

@@ -1,10 +1,13 @@
 // octomap_msgs/Octomap as bytes, and map files, to surfaces.
+#include "node/map_decode.h"
+
 #include <algorithm>
 #include <exception>
 #include <limits>
 #include <new>
 
 #include "dccd/known_space.h"
+#include "dccd/next_surface.h"
 #include "dccd/octomap_decode.h"
 #include "dccd/tolerances.h"
 #include "input/known_types.h"
@@ -30,8 +33,8 @@ OctomapLimits limitsOf(const MonitorConfig& config, const MapMemory* memory, std
 }
 
 /// Each list ends before the next is made: what they take together is what MapMemory reckons with.
-void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, std::size_t max_unknown,
-           LoadedMap& map) {
+void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before,
+           std::size_t max_unknown, LoadedMap& map) {
   const auto counted = [memory](auto made) { return memory ? memory->counted(std::move(made)) : made; };
   // A map that has nothing free does not tell what it has seen: for own voxels, what is not occupied is free there.
   if (config.unknown_space != UnknownSpace::FREE || (config.needsKnownSpace() && !decoded.free.empty())) {
@@ -46,16 +49,29 @@ void build(DecodedOctomap decoded, const MonitorConfig& config, const MapMemory*
     const std::vector<OccupiedLeaf> unknown = map.known->unknownLeaves(config.unknown_box, max_unknown);
     decoded.occupied.insert(decoded.occupied.end(), unknown.begin(), unknown.end());
   }
-  map.surface = counted(VoxelSurface::build(decoded.resolution_m, std::move(decoded.occupied)));
+  std::vector<OccupiedLeaf>& occupied = decoded.occupied;
+  map.surface = counted(before ? nextSurface(decoded.resolution_m, std::move(occupied), *before)
+                               : VoxelSurface::build(decoded.resolution_m, std::move(occupied)));
 }
 
-/// What `decode` makes of the limits, as a map; never throws.
-template <class Decode>
-void load(const MonitorConfig& config, const MapMemory* memory, LoadedMap& map, Decode decode) {
+}  // namespace
+
+std::string frameNameOf(const HeaderView& header) {
+  std::string_view name = header.frame_id;
+  if (!name.empty() && name[0] == '/') name.remove_prefix(1);
+  const std::string frame(name.substr(0, MAX_NAME + 1));
+  if (!name.empty() && !frameNameProblem(frame).empty()) {
+    throw WireError("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
+  }
+  return frame;
+}
+
+void loadMap(const MonitorConfig& config, const MapMemory* memory, const VoxelSurface* before, LoadedMap& map,
+             const std::function<DecodedOctomap(const OctomapLimits&)>& decode) {
   try {
     std::size_t max_unknown = tolerance::MAX_UNKNOWN_LEAVES;
     DecodedOctomap decoded = decode(limitsOf(config, memory, max_unknown));
-    build(std::move(decoded), config, memory, std::min(max_unknown, tolerance::MAX_UNKNOWN_LEAVES), map);
+    build(std::move(decoded), config, memory, before, std::min(max_unknown, tolerance::MAX_UNKNOWN_LEAVES), map);
   } catch (const std::bad_alloc&) {
     map.problem = "there is not enough memory for this map";
   } catch (const std::exception& error) {  // whatever a decoder meets, the node goes on without this map
@@ -66,29 +82,27 @@ void load(const MonitorConfig& config, const MapMemory* memory, LoadedMap& map, 
   map.known = nullptr;
 }
 
-}  // namespace
-
 std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
                               const MonitorConfig& config) {
-  const std::string problem = mapTypeProblem(datatype, md5);
+  const std::string problem = config.takesClouds() ? cloudTypeProblem(datatype, md5) : mapTypeProblem(datatype, md5);
   if (!problem.empty() || size <= largestMapMessage(config)) return problem;
   return std::to_string(size) + " bytes are more than the eighth of max_map_mb " +
          std::to_string(config.max_map_bytes >> 20) + " that a message may have";
 }
 
-LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config,
-                           const MapMemory* memory) {
+std::string whyRefused(const std::string& problem, const MonitorConfig& config) {
+  if (problem.rfind("no transform", 0) == 0) return problem;
+  return (config.takesClouds() ? "the cloud was refused: " : "the octomap was refused: ") + problem;
+}
+
+LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config, const MapMemory* memory,
+                           const VoxelSurface* before) {
   LoadedMap map;
-  load(config, memory, map, [&](const OctomapLimits& limits) {
+  loadMap(config, memory, before, map, [&](const OctomapLimits& limits) {
     WireReader wire(bytes.data(), bytes.size());
     const HeaderView header = readHeader(wire);
     map.stamp_ns = header.stamp_ns;
-    std::string_view name = header.frame_id.empty() ? std::string_view(config.octomap_frame) : header.frame_id;
-    if (!name.empty() && name[0] == '/') name.remove_prefix(1);
-    map.frame_id = std::string(name.substr(0, MAX_NAME + 1));
-    if (!name.empty() && !frameNameProblem(map.frame_id).empty()) {
-      throw WireError("frame_id '" + shortText(name, MAX_NAME) + "' is no frame's name");
-    }
+    map.frame_id = frameNameOf(header.frame_id.empty() ? HeaderView{0, config.octomap_frame} : header);
     OctomapFields fields;
     fields.binary = wire.read<std::uint8_t>("binary") != 0;
     fields.id = std::string(wire.readString("id"));
@@ -104,7 +118,8 @@ LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const Monitor
 LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, const MapMemory* memory) {
   LoadedMap map;
   map.frame_id = config.octomap_frame;
-  load(config, memory, map, [&](const OctomapLimits& limits) { return readOctomapFile(file, limits); });
+  map.trusted = true;
+  loadMap(config, memory, nullptr, map, [&](const OctomapLimits& limits) { return readOctomapFile(file, limits); });
   return map;
 }
 

@@ -1,11 +1,23 @@
 #include "node/map_loader.h"
 
+#include <chrono>
 #include <utility>
+
+#include "dccd/types.h"
+#include "input/steady_clock.h"
 
 namespace dccd {
 
-MapLoader::MapLoader(const MonitorConfig& config, std::function<void()> ready)
-    : config_(config), ready_(std::move(ready)), thread_([this] { loop(); }) {}
+namespace {
+
+constexpr std::chrono::milliseconds POLL{2};  // of tf, where a cloud waits for it
+
+}  // namespace
+
+MapLoader::MapLoader(const MonitorConfig& config, const TransformFeed& transforms, std::function<void()> ready)
+    : config_(config), clouds_(config, transforms, memory_), ready_(std::move(ready)), thread_([this] { loop(); }) {
+  setFixedFrame(config.octomap_frame.empty() ? config.fixed_frame : config.octomap_frame);
+}
 
 MapLoader::~MapLoader() {
   {
@@ -20,7 +32,7 @@ void MapLoader::put(Job job) {
   ++received_;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!job_ && !decoding_ && !done_) busy_since_ns_ = job.arrival_ns;
+    if (!isBusy()) busy_since_ns_ = job.arrival_ns;
     job_ = std::move(job);
   }
   changed_.notify_one();
@@ -34,9 +46,29 @@ void MapLoader::submitFile(const std::string& file, std::int64_t arrival_ns) { p
 
 void MapLoader::refuse(const std::string& problem, std::int64_t arrival_ns) { put({{}, {}, 0, arrival_ns, problem}); }
 
-LoadedMap MapLoader::load(const Job& job) const {
+void MapLoader::setFixedFrame(const std::string& frame) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (frame_known_ || frame.empty()) return;
+    clouds_.setFrame(frame);
+    frame_known_ = true;
+  }
+  changed_.notify_one();
+}
+
+bool MapLoader::mayWait(const Job& job) {
+  if (secondsBetween(job.arrival_ns, steadyNs()) >= config_.transform_timeout_s) return false;
+  std::unique_lock<std::mutex> lock(mutex_);
+  return !changed_.wait_for(lock, POLL, [this] { return stopping_; });
+}
+
+LoadedMap MapLoader::load(const Job& job) {
   if (!job.file.empty()) return loadMapFile(job.file, config_, &memory_);
-  if (job.problem.empty()) return decodeMapMessage(job.bytes, config_, &memory_);
+  if (job.problem.empty() && config_.takesClouds()) {
+    return clouds_.add(
+        job.bytes, job.receipt_ns, [&] { return mayWait(job); }, last_.get());
+  }
+  if (job.problem.empty()) return decodeMapMessage(job.bytes, config_, &memory_, last_.get());
   LoadedMap refused;
   refused.problem = job.problem;
   return refused;
@@ -52,7 +84,7 @@ bool MapLoader::take(LoadedMap& map) {
 
 std::optional<std::int64_t> MapLoader::busySince() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!job_ && !decoding_ && !done_) return std::nullopt;
+  if (!isBusy()) return std::nullopt;
   return busy_since_ns_;
 }
 
@@ -61,7 +93,7 @@ void MapLoader::loop() {
     Job job;
     {
       std::unique_lock<std::mutex> lock(mutex_);
-      changed_.wait(lock, [this] { return stopping_ || job_; });
+      changed_.wait(lock, [this] { return stopping_ || isReady(); });
       if (stopping_) return;
       job = std::move(*job_);
       job_.reset();
@@ -71,6 +103,7 @@ void MapLoader::loop() {
     map.arrival_ns = job.arrival_ns;
     if (map.stamp_ns == 0) map.stamp_ns = job.receipt_ns;
     if (!map.surface) ++refused_;
+    last_ = map.surface;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       done_ = std::move(map);

@@ -1,5 +1,5 @@
-// Octomaps are decoded and their surface is built on a thread of its own; the worker swaps the finished one in between
-// steps. Of several that wait, only the newest is worth decoding.
+// Octomaps are decoded, or made of clouds, and their surface is built on a thread of its own; the worker swaps the
+// finished one in between steps. Of several that wait, only the newest is worth decoding.
 #pragma once
 
 #include <atomic>
@@ -12,36 +12,43 @@
 #include <thread>
 #include <vector>
 
+#include "node/cloud_mapping.h"
 #include "node/map_memory.h"
 #include "node/monitor_pipeline.h"
 
 namespace dccd {
 
-/// Why a message is no map, as far as its type and its size [bytes] tell; empty: it can be decoded.
+/// Why a message is no map, or no cloud where the map is made of these, as far as its type and its size [bytes] tell;
+/// empty: it can be decoded.
 std::string mapMessageProblem(const std::string& datatype, const std::string& md5, std::size_t size,
                               const MonitorConfig& config);
+/// Why there is no map, of one whose problem this is.
+std::string whyRefused(const std::string& problem, const MonitorConfig& config);
 /// A serialised octomap_msgs/Octomap to a map; never throws: what is wrong is in LoadedMap::problem.
-/// `memory`: what it must fit in; null: no limit but that of the message.
+/// `memory`: what it must fit in; null: no limit but that of the message. `before`: of an older map, or null; the same
+/// map is then made faster.
 LoadedMap decodeMapMessage(const std::vector<std::uint8_t>& bytes, const MonitorConfig& config,
-                           const MapMemory* memory = nullptr);
+                           const MapMemory* memory = nullptr, const VoxelSurface* before = nullptr);
 /// A .bt or .ot file. Never throws.
 LoadedMap loadMapFile(const std::string& file, const MonitorConfig& config, const MapMemory* memory = nullptr);
 
 class MapLoader {
  public:
   /// `ready` is called from the loader's thread when a map can be taken.
-  MapLoader(const MonitorConfig& config, std::function<void()> ready);
+  MapLoader(const MonitorConfig& config, const TransformFeed& transforms, std::function<void()> ready);
   ~MapLoader();
   MapLoader(const MapLoader&) = delete;
   MapLoader& operator=(const MapLoader&) = delete;
 
-  /// A serialised octomap_msgs/Octomap that came at `arrival_ns` of the steady clock; replaces one that still waits.
-  /// From any thread.
+  /// A serialised octomap_msgs/Octomap, or sensor_msgs/PointCloud2 where clouds make the map, that came at `arrival_ns`
+  /// of the steady clock; replaces one that still waits. From any thread.
   void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns, std::int64_t arrival_ns);
   void submitFile(const std::string& file, std::int64_t arrival_ns);
   /// A message that is refused undecoded takes its turn all the same: it is newer than the map in use, which is void
   /// with it. From any thread.
   void refuse(const std::string& problem, std::int64_t arrival_ns);
+  /// A cloud waits until the fixed frame is known. From any thread.
+  void setFixedFrame(const std::string& frame);
   /// The newest finished map, once.
   bool take(LoadedMap& map);
 
@@ -62,9 +69,12 @@ class MapLoader {
   };
   const MonitorConfig& config_;  // what it reads there does not change while the node runs
   const MapMemory memory_{config_};
+  CloudMapping clouds_;
+  std::shared_ptr<const VoxelSurface> last_;  // of the newest map, if that was not refused; the thread's
   std::function<void()> ready_;
   std::mutex mutex_;
   std::condition_variable changed_;
+  bool frame_known_ = false;  // and set in clouds_, which is the thread's from then on
   std::optional<Job> job_;
   std::optional<LoadedMap> done_;
   bool stopping_ = false, decoding_ = false;
@@ -72,7 +82,11 @@ class MapLoader {
   std::atomic<std::uint64_t> received_{0}, refused_{0};
   std::thread thread_;
 
-  LoadedMap load(const Job& job) const;
+  /// Nothing keeps the job that there is from being begun. The mutex is held.
+  bool isReady() const { return job_ && (frame_known_ || !config_.takesClouds() || !job_->problem.empty()); }
+  bool isBusy() const { return isReady() || decoding_ || done_; }
+  LoadedMap load(const Job& job);
+  bool mayWait(const Job& job);
   void put(Job job);
   void loop();
 };

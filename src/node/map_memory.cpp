@@ -35,7 +35,8 @@ std::string inMegabytes(std::size_t bytes) { return std::to_string((bytes + (1 <
 }  // namespace
 
 std::size_t MapMemory::accept(const OctomapCounts& counts) const {
-  const std::size_t room = config_.max_map_bytes / 8 * 5, held = *held_;
+  const bool clouds = config_.takesClouds();
+  const std::size_t room = config_.max_map_bytes / 8 * (clouds ? 3 : 5), held = *held_;
   const Need need = needOf(counts, config_.needsKnownSpace());
   // One that is in use, one that follows, and while steps are without some voxels what is left of both.
   std::size_t least = need.most + 2 * need.kept;
@@ -47,8 +48,8 @@ std::size_t MapMemory::accept(const OctomapCounts& counts) const {
   if (wanted <= room) return (room - wanted) / MAP_LEAF_ADDED;
   throw OctomapError("octomap data hold " + std::to_string(counts.occupied) + " occupied and " +
                      std::to_string(counts.free) + " free leaves, which need " + inMegabytes(wanted) +
-                     " where there is room for " + inMegabytes(room) + ", five eighths of max_map_mb " +
-                     inMegabytes(config_.max_map_bytes) +
+                     " where there is room for " + inMegabytes(room) + (clouds ? ", three" : ", five") +
+                     " eighths of max_map_mb " + inMegabytes(config_.max_map_bytes) +
                      (least <= room ? "; maps that are still held take " + inMegabytes(held) : ""));
 }
 

@@ -12,10 +12,10 @@
 
 namespace dccd {
 
-/// An eighth each for the message that waits, the one that is decoded, and older maps that recordings hold; the rest is
-/// for maps: two of them, the one in use and its successor, and what it takes to build one more. A map of which that is
-/// too much is refused whatever else there is, so that of two equal maps the second is not refused. Safe to use from
-/// any thread.
+/// The octree of a sensor's clouds, if they make the map, has a quarter. An eighth each for the message that waits, the
+/// one that is decoded, and older maps that recordings hold; the rest is for maps: two of them, the one in use and its
+/// successor, and what it takes to build one more. A map of which that is too much is refused whatever else there is,
+/// so that of two equal maps the second is not refused. Safe to use from any thread.
 class MapMemory {
  public:
   explicit MapMemory(const MonitorConfig& config) : config_(config) {}
@@ -34,6 +34,8 @@ class MapMemory {
 
 /// Bytes of a message that may wait, or of a file that may be read.
 inline std::size_t largestMapMessage(const MonitorConfig& config) { return config.max_map_bytes / 8; }
+/// Bytes of the octree of a sensor's clouds, with what it takes to make one more a part of it.
+inline std::size_t cloudMemory(const MonitorConfig& config) { return config.max_map_bytes / 4; }
 /// Bytes of older maps that recordings may hold on to.
 inline std::size_t recordedMaps(const MonitorConfig& config) { return config.max_map_bytes / 8; }
 

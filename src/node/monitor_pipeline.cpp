@@ -305,7 +305,7 @@ void MonitorPipeline::reconfigure(const std::function<void(MonitorOptions&, Mark
 
 void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
   expectMap();
-  if (map.trusted && config_.octomap_topic_named) {
+  if (map.trusted && !config_.takesMapFileAlone()) {
     trusted_map_ = std::move(map);
     return;
   }

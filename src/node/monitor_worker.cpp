@@ -59,7 +59,7 @@ void CollisionMonitor::Impl::takeMaps() {
   if (!maps || !maps->take(map)) return;
   if (!map.surface) {
     log.complain(config.bodies.size(), "map", "refused: " + map.problem);
-    map.problem = "the octomap was refused: " + map.problem;
+    map.problem = whyRefused(map.problem, config);
   }
   pipeline.setMap(std::move(map), steadyNs());
 }
@@ -234,6 +234,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   takeMaps();
   const std::uint64_t static_frames = state.staticFrames();  // before it: what comes from here on may not be taken
   takeMessages();
+  if (maps) maps->setFixedFrame(pipeline.fixedFrame());
   accountDropped();
   if (holdsStaticFrames()) state.staticInUse(static_frames);
   Outcome outcome;

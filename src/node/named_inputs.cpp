@@ -12,15 +12,8 @@ bool isRemapped(const ros::NodeHandle& node, const std::string& name) {
   return node.resolveName(name) != plain || ros::names::getRemappings().count(plain) > 0;
 }
 
-std::string howNamed(bool named) { return named ? " (named)" : " (default)"; }
-
-}  // namespace
-
-void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
-  for (BodyConfig& body : config.bodies) {
-    if (!body.isRigid() && isRemapped(node, body.topic)) body.topic_named = true;
-  }
-  if (config.octomap_topic_named || !config.octomap_file.empty()) return;
+void takeOctomapRemapping(const ros::NodeHandle& node, MonitorConfig& config) {
+  if (config.octomap_topic_named) return;
   for (const char* name : {DEFAULT_OCTOMAP_TOPIC, "octomap"}) {
     if (!isRemapped(node, name)) continue;
     config.octomap_topic = name;
@@ -29,8 +22,21 @@ void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
   }
 }
 
+std::string howNamed(bool named) { return named ? " (named)" : " (default)"; }
+
+}  // namespace
+
+void takeRemappings(const ros::NodeHandle& node, MonitorConfig& config) {
+  for (BodyConfig& body : config.bodies) {
+    if (!body.isRigid() && isRemapped(node, body.topic)) body.topic_named = true;
+  }
+  config.cloud_named = config.cloud_named || isRemapped(node, DEFAULT_CLOUD_TOPIC);
+  takeOctomapRemapping(node, config);
+  config.checkMapNames();
+}
+
 std::string mapSourceOf(const ros::NodeHandle& node, const MonitorConfig& config) {
-  return config.octomap_file.empty() ? node.resolveName(config.octomap_topic) : config.octomap_file;
+  return config.takesMapFileAlone() ? config.octomap_file : node.resolveName(config.mapName());
 }
 
 std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
@@ -43,7 +49,8 @@ std::string inputsOf(const ros::NodeHandle& node, const MonitorConfig& config) {
   }
   if (config.robot.named) text += "robot: " + std::to_string(config.robot.parts.size()) + " bodies by tf, ";
   const bool off = settingOf(config.effects, Effect::OCTOMAP) == EffectSetting::OFF;
-  text += "octomap: " + (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
+  text += (config.takesClouds() ? "obstacle_cloud: " : "octomap: ") +
+          (off ? "off" : mapSourceOf(node, config) + howNamed(config.namesOctomap()));
   return text + ", tf";
 }
 

@@ -83,7 +83,8 @@ bool nobodyMeetsMap(const EffectScene& scene) {
 Finding octomap(const EffectScene& scene) {
   if (nobodyMeetsMap(scene)) return idle(NOBODY_MEETS_MAP);
   if (scene.map_seen) return wanted("the map comes from " + scene.map_source);
-  if (scene.map_named) return wanted("octomap_topic names " + scene.map_source + ", from which no map has come");
+  if (scene.map_named)
+    return wanted(scene.map_parameter + " names " + scene.map_source + ", from which no map has come");
   return notWanted("nobody publishes " + scene.map_source + " and no octomap_file is given");
 }
 

@@ -1,10 +1,13 @@
 """Which map a bag is analysed against: wherever it was recorded, of a file, named, missing, refused, or named by nobody."""
 import copy
+import csv
 import json
+import struct
 import unittest
 
 import genpy
 import rosbag
+from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import MarkerArray
 
 from analyze_bag_support import AnalyzeBagTestCase
@@ -45,6 +48,39 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         statuses = self.analyzed('unstamped', unstamped, *self.params('max_step_s: 1.0\noctomap_timeout_s: 0.31\n'))[-1]
         self.assertEqual(statuses['NO_MAP'], frames, statuses)
         self.assertGreater(statuses['OK'], 2)
+
+    def test_a_map_that_is_made_of_clouds(self):
+        """A plate that a sensor at the world's origin sees below the cloth, which sinks onto it."""
+        clouded = self.folder / 'clouded.bag'
+        at = next(at for topic, _, at in self.messages if topic == '/cloth')
+        cloths = [message for topic, message, _ in self.messages if topic == '/cloth']
+        height = sum(min(v.z for v in cloth.vertices) for cloth in (cloths[0], cloths[-1])) / 2
+        points = [(0.02 * i - 1, 0.02 * k - 1, height) for i in range(100) for k in range(100)]
+        cloud = PointCloud2(height=1, width=len(points), point_step=12, row_step=12 * len(points),
+                            data=b''.join(struct.pack('<3f', *p) for p in points))
+        cloud.fields = [PointField(name=n, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate('xyz')]
+        cloud.header.frame_id = 'world'
+        cloud.header.stamp = at
+        with rosbag.Bag(str(clouded), 'w') as bag:
+            for topic, message, when in self.messages:
+                if topic == '/cloth':
+                    bag.write('/points', cloud, when - genpy.Duration.from_sec(0.001))
+                    bag.write(topic, message, when)
+        words = self.params('obstacle_cloud_topic: points\nobstacle_resolution_m: 0.02\n')
+        status, said, complaints, statuses = self.analyzed('clouded', clouded, *words)
+        self.assertEqual((status, set(statuses)), (0, {'FIRST_FRAME', 'OK'}), complaints)
+        self.assertIn('octomap: /points (named)', said)
+        with open(self.folder / 'clouded/contacts.csv') as file:
+            self.assertIn('octomap', {row['body_1'] for row in csv.DictReader(file)})
+        status, _, complaints, statuses = self.analyzed('cloudless', self.bag, *words)
+        self.assertEqual((status, set(statuses)), (3, {'FIRST_FRAME', 'NO_MAP'}))
+        self.assertIn('the bag has no cloud on /points, which is to make the map', complaints)
+        cloud.fields.pop()
+        with rosbag.Bag(str(clouded), 'a') as bag:
+            bag.write('/points', cloud, self.messages[-1][2] - genpy.Duration.from_sec(0.0001))
+        status, _, complaints, statuses = self.analyzed('refused', clouded, *words)
+        self.assertEqual((status, statuses['NO_MAP']), (3, 1))
+        self.assertIn("cloud refused: there is no field 'z'", complaints)
 
     def test_a_named_map_that_the_bag_does_not_have(self):
         for words in (self.params('octomap_topic: /octomap_binray\n'), self.params('octomap_topic: octomap\n')):

@@ -38,8 +38,9 @@ robot: {description: robot_from_file, semantic: semantic_from_file}
 DEFAULTS = {'monitor.launch': {}, 'replay.launch': {'default_topic': '/cloth'}}
 LAUNCH_FILES = sorted((CHECKOUT / 'launch').rglob('*.launch'))
 PRESETS = [path for path in LAUNCH_FILES if path.parent.name == 'presets']
-# What a launch file has another default for than monitor.launch: of the presets, one calls for a map.
-OWN_DEFAULTS = {'octomap_server.launch': {'octomap': '/octomap_binary'}, 'demo.launch': {'params', 'default_mesh'},
+# What a launch file has another default for than monitor.launch: of the presets, two call for a map.
+OWN_DEFAULTS = {'octomap_server.launch': {'octomap': '/octomap_binary'},
+                'realsense.launch': {'obstacle_cloud': '/camera/depth/color/points'}, 'demo.launch': {'params', 'default_mesh'},
                 'replay.launch': {'default_mesh'}}
 # A cloth among several bodies: its file has it under bodies/cloth.
 UNDER_BODIES = {'mesh', 'topology', 'rows', 'cols'}
@@ -107,6 +108,13 @@ class LaunchTest(unittest.TestCase):
         found = self.parameters('monitor.launch', self.file(EVERYTHING), 'octomap:=/my_map')
         self.assertEqual((found['octomap_topic'], found['octomap_file']), ('octomap_binary', ''))
 
+    def test_clouds_for_the_map(self):
+        for launch, defaults in DEFAULTS.items():
+            arguments = self.file('obstacle_resolution_m: 0.02\n'), 'obstacle_cloud:=/my_cloud'
+            self.assertEqual(self.parameters(launch, *arguments),
+                             {**defaults, 'obstacle_resolution_m': 0.02, 'obstacle_cloud_topic': 'obstacle_cloud'})
+            self.assertIn('obstacle_cloud:=/my_cloud', self.words(launch, *arguments))
+
     def test_neither(self):
         for launch, defaults in DEFAULTS.items():
             found = self.parameters(launch)
@@ -118,7 +126,7 @@ class LaunchTest(unittest.TestCase):
         """A remapping names a topic, and it holds for the resolved name, too: what the file calls /mesh would be sent
         elsewhere."""
         for launch in DEFAULTS:
-            self.assertFalse([word for word in self.words(launch) if word.startswith(('octomap:=', 'octomap_binary:=', 'mesh:='))], launch)
+            self.assertFalse([word for word in self.words(launch) if word.startswith(('octomap:=', 'octomap_binary:=', 'obstacle_cloud:=', 'mesh:='))], launch)
 
     def test_a_preset_keeps_what_is_its_own_under_a_file(self):
         for preset in PRESETS:
@@ -171,7 +179,7 @@ class LaunchTest(unittest.TestCase):
                 launched.wait(30)
 
     def test_everybody_looks_for_the_map_in_the_same_place(self):
-        """Node, nodelet, launch files, presets and analyze_bag: nobody named it, but for the one preset that does."""
+        """Node, nodelet, launch files, presets and analyze_bag: nobody named it, but for the presets that do."""
         default = 'octomap: /octomap_binary (default)'
         master = self.start_master()
         scene = self.scene()
@@ -187,7 +195,8 @@ class LaunchTest(unittest.TestCase):
                 started = self.start(*words)
                 wait_for(lambda: '/tf' in self.subscribed(master), 30, 'the monitor')
                 stop(started)  # which flushes what it said
-                said = default.replace('default', 'named') if name == 'octomap_server.launch' else default
+                said = {'octomap_server.launch': default.replace('default', 'named'),
+                        'realsense.launch': 'obstacle_cloud: /camera/depth/color/points (named)'}.get(name, default)
                 self.expect_said(said, words[0])
                 wait_for(lambda: not self.subscribed(master), 30, 'its end')
                 for parameter in ('/collision_monitor', '/use_sim_time'):
@@ -254,7 +263,7 @@ class ArgumentsTest(unittest.TestCase):
     def test_all_launch_files_pass_all_arguments_on(self):
         monitor = arguments_of(CHECKOUT / 'launch/monitor.launch')
         self.assertGreater(len(monitor), 12)
-        self.assertEqual(len(PRESETS), 5)
+        self.assertEqual(len(PRESETS), 6)
         for path in LAUNCH_FILES:
             for include in ElementTree.parse(path).getroot().findall('include'):
                 included = CHECKOUT / 'launch' / pathlib.Path(include.get('file')).name
@@ -273,7 +282,7 @@ class ArgumentsTest(unittest.TestCase):
         monitor = arguments_of(CHECKOUT / 'launch/monitor.launch')
         for path in LAUNCH_FILES:
             own = set(OWN_DEFAULTS.get(path.name, {'default_mesh', 'params'} if path in PRESETS else ()))
-            if path.name == 'octomap_server.launch':
+            if path.name in ('octomap_server.launch', 'realsense.launch'):
                 own |= {'params'}
             given = arguments_of(path)
             differing = {name for name in set(given) & set(monitor) if given[name] != monitor[name]}

@@ -118,8 +118,7 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
   diagnostics_.add(outcome, context.latency_s);
   const MonitorConfig& config = pipeline.config();
-  const std::string& source = config.octomap_file.empty() ? config.octomap_topic : config.octomap_file;
-  map_source_ = pipeline.effects().mapExpected() ? source : "";
+  map_source_ = pipeline.effects().mapExpected() ? config.mapName() : "";
 }
 
 void ResultBag::addPrediction(const Outcome& prediction, const MonitorPipeline& pipeline, const ros::Time& at) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "unit/ros/parameter_support.h"
 
@@ -56,6 +57,30 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
       {"~record_directory is not known; nearest is ~record_folder",
        [](XmlRpcValue& t) { t["record_directory"] = "steps"; }},
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
+      {"the map is to come both from the clouds on obstacle_cloud_topic '/points' and from octomap_topic '/map'; "
+       "remove "
+       "one of the two",
+       [](XmlRpcValue& t) {
+         t["obstacle_cloud_topic"] = "/points";
+         t["octomap_topic"] = "/map";
+       }},
+      {"and from octomap_file '/map.bt'; remove one of the two",
+       [](XmlRpcValue& t) {
+         t["obstacle_resolution_m"] = 0.02;
+         t["octomap_file"] = "/map.bt";
+       }},
+      {"~obstacle_resolution_m is 0.0005, too fine for obstacle_max_range_m 5: a ray has 4096 voxels at most; write at "
+       "least 0.0012207",
+       [](XmlRpcValue& t) {
+         t["obstacle_resolution_m"] = 0.0005;
+         t["obstacle_max_range_m"] = 5.0;
+       }},
+      {"~obstacle_resolution_m is nan",
+       [](XmlRpcValue& t) { t["obstacle_resolution_m"] = std::numeric_limits<double>::quiet_NaN(); }},
+      {"~obstacle_max_range_m is -1", [](XmlRpcValue& t) { t["obstacle_max_range_m"] = -1.0; }},
+      {"~sensor_model/hit is 0.3", [](XmlRpcValue& t) { t["sensor_model"]["hit"] = 0.3; }},
+      {"~sensor_model/mis is not known; nearest is ~sensor_model/min",
+       [](XmlRpcValue& t) { t["sensor_model"]["mis"] = 0.3; }},
       {"~accuracy is 'exact', which cannot hold a distance above 0; parameter ~minimum_separation_m asks for a minimum "
        "separation: write accuracy: conservative",
        [](XmlRpcValue& t) {

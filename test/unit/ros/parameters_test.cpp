@@ -33,6 +33,9 @@ TEST(Parameters, AMapIsNamedByItsTopicItsFileOrItsEffectButNotByADefault) {
   EXPECT_TRUE(with([](XmlRpcValue& t) { t["octomap_file"] = "/map.bt"; }).namesOctomap());
   EXPECT_TRUE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "on"; }).namesOctomap());
   EXPECT_FALSE(with([](XmlRpcValue& t) { t["effects"]["octomap"] = "auto"; }).namesOctomap());
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["obstacle_cloud_topic"] = "/points"; }).takesClouds());
+  EXPECT_TRUE(with([](XmlRpcValue& t) { t["obstacle_resolution_m"] = 0.02; }).namesOctomap());
+  EXPECT_FALSE(with([](XmlRpcValue&) {}).takesClouds()) << "a default names nothing";
   EXPECT_FALSE(with([](XmlRpcValue& t) {
                  t["octomap_topic"] = "/map";
                  t["effects"]["octomap"] = "off";

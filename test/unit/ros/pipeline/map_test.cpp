@@ -28,7 +28,7 @@ TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
   XmlRpcValue tree = scene();
   tree["max_map_mb"] = 1;
   Driven driven(tree);
-  MapLoader loader(driven.config, [] {});
+  MapLoader loader(driven.config, driven.feed_tf, [] {});
   const auto take = [&] {
     LoadedMap loaded;
     while (!loader.take(loaded)) std::this_thread::yield();

@@ -1,0 +1,62 @@
+#include "node/cloud_mapping.h"
+
+#include "input/mesh_views.h"
+#include "input/short_text.h"
+#include "input/wire.h"
+#include "node/map_decode.h"
+
+namespace dccd {
+
+void CloudMapping::setFrame(const std::string& fixed_frame) {
+  if (hasFrame()) return;
+  frame_ = config_.octomap_frame.empty() ? fixed_frame : config_.octomap_frame;
+}
+
+Positions CloudMapping::place(const std::vector<std::uint8_t>& bytes, StampNs receipt_ns,
+                              const std::function<bool()>& may_wait, LoadedMap& map, Vec3& sensor) const {
+  WireReader wire(bytes.data(), bytes.size());
+  const CloudView cloud = readCloud(wire, {});
+  map.stamp_ns = cloud.header.stamp_ns != 0 ? cloud.header.stamp_ns : receipt_ns;
+  if (cloud.size() == 0) throw WireError("it has no points");
+  const std::string frame = frameNameOf(cloud.header);
+  if (frame.empty()) throw WireError("frame_id is empty; it is to name the sensor's frame");
+  Eigen::Isometry3d map_from_sensor;
+  std::string reason;
+  while (!transforms_.lookup(frame_, frame, map.stamp_ns, map_from_sensor, reason)) {
+    if (may_wait()) continue;
+    const std::string unusable = transforms_.onlyUnusable();
+    throw WireError("no transform from '" + frame + "' to '" + frame_ + "': " + shortText(reason) +
+                    (unusable.empty() ? "" : "; " + shortText(unusable)) + "; the clouds on " + config_.cloud_topic +
+                    " need it");
+  }
+  Positions points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (const Vec3 p = cloud.point(i); p.allFinite()) points.push_back(map_from_sensor * p);
+  }
+  if (points.empty()) throw WireError("none of its " + std::to_string(cloud.size()) + " points is finite");
+  sensor = map_from_sensor.translation();
+  return points;
+}
+
+LoadedMap CloudMapping::add(const std::vector<std::uint8_t>& bytes, StampNs receipt_ns,
+                            const std::function<bool()>& may_wait, const VoxelSurface* before) {
+  LoadedMap map;
+  map.frame_id = frame_;
+  loadMap(config_, &memory_, before, map, [&](const OctomapLimits& limits) {
+    Vec3 sensor;
+    const Positions points = place(bytes, receipt_ns, may_wait, map, sensor);
+    if (!map_) map_.emplace(config_.cloud_map);
+    try {
+      map_->insert(sensor, points, cloudMemory(config_));
+    } catch (const OctomapError& error) {
+      throw OctomapError(error.what() + std::string("; a quarter of max_map_mb ") +
+                         std::to_string(config_.max_map_bytes >> 20) +
+                         " is for it: raise that or obstacle_resolution_m, or set obstacle_max_range_m");
+    }
+    return map_->leaves(limits);
+  });
+  return map;
+}
+
+}  // namespace dccd

@@ -1,0 +1,98 @@
+// A monitor that makes its map of a camera's clouds, at 5 Hz beside a cloth at 30 Hz: the camera is killed and comes
+// back, its tf stops, it sends what is no cloud. What is missing stands in ~state, and is there again afterwards.
+#include <deformable_ccd/State.h>
+
+#include <atomic>
+
+#include "ros/support/live_tests.h"
+#include "ros/support/monitor_fixture.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+/// Calls `tick` at that rate until it ends.
+class Rate {
+ public:
+  Rate(double hz, std::function<void()> tick)
+      : thread_([this, hz, tick = std::move(tick)] {
+          for (ros::WallRate rate(hz); !ended_; rate.sleep()) tick();
+        }) {}
+  ~Rate() {
+    ended_ = true;
+    thread_.join();
+  }
+
+ private:
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+struct Seeing : MonitorTest {
+  Probe<deformable_ccd::State> state{node, "/seeing/state"};
+
+  Seeing() : MonitorTest("/seeing") {}
+
+  /// The camera is 1 m below the world's origin and looks up, at the lower side of a plate.
+  static sensor_msgs::PointCloud2 plate() {
+    Positions points;
+    for (int i = 0; i < 400; ++i) points.emplace_back(0.025 * (i % 20), 0.025 * (i / 20), 0.55);
+    return cloud(points, ros::Time::now().toSec(), "camera");
+  }
+  bool becomesProved() {
+    return waitUntil([&] { return state.count() > 0 && state.last().proved && state.last().clear; }, 15);
+  }
+  bool misses(const std::string& words) {
+    return waitUntil(
+        [&] {
+          const deformable_ccd::State last = state.last();
+          for (const std::string& missing : last.missing) {
+            if (missing.find(words) != std::string::npos) return !last.proved && !clear.last().data;
+          }
+          return false;
+        },
+        15);
+  }
+};
+
+TEST_F(Seeing, SaysWhatOfTheCameraIsMissing) {
+  const auto mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/seeing/mesh");
+  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf");
+  std::atomic<bool> tf_comes{true}, is_whole{true};
+  const Rate transforms(50, [&] {
+    if (tf_comes) tf.publish(transformAt(ros::Time::now().toSec(), "camera", {0, 0, -1}));
+  });
+  const Rate cloth(30, [&] { mesh.publish(meshStamped(sheetAt(1, 4, 4), ros::Time::now().toSec())); });
+  EXPECT_TRUE(misses("no octomap has been received yet")) << state.last().reason;
+  const auto start = [&] {
+    const auto points =
+        std::make_shared<ros::Publisher>(advertiseAndWait<sensor_msgs::PointCloud2>(node, "/seeing/points"));
+    return std::make_unique<Rate>(5, [&, points] {
+      sensor_msgs::PointCloud2 message = plate();
+      if (!is_whole) message.fields.pop_back();
+      points->publish(message);
+    });
+  };
+  std::unique_ptr<Rate> camera = start();
+  EXPECT_TRUE(becomesProved()) << state.last().reason;
+  camera.reset();
+  EXPECT_TRUE(misses("older than")) << state.last().reason;
+  camera = start();
+  EXPECT_TRUE(becomesProved()) << "a new camera: " << state.last().reason;
+  tf_comes = false;
+  EXPECT_TRUE(misses("no transform from 'camera' to 'world'")) << state.last().reason;
+  tf_comes = true;
+  EXPECT_TRUE(becomesProved()) << "tf is back: " << state.last().reason;
+  is_whole = false;
+  EXPECT_TRUE(misses("the cloud was refused: there is no field 'z'")) << state.last().reason;
+  is_whole = true;
+  EXPECT_TRUE(becomesProved()) << "whole clouds again: " << state.last().reason;
+  EXPECT_GT(stats.last().maps_refused, 0u);
+  EXPECT_LT(stats.last().maps_refused, stats.last().maps_received);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
+
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "camera_test"); }

@@ -1,0 +1,232 @@
+// A map that is made of a sensor's clouds: what a step meets, and what is said of clouds that cannot become part of it.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <thread>
+
+#include "dccd/assurance.h"
+#include "input/steady_clock.h"
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr float LOST = std::numeric_limits<float>::quiet_NaN();
+
+/// A camera 1.05 m above the world's origin that looks straight down.
+geometry_msgs::TransformStamped cameraPose(double stamp_s) {
+  geometry_msgs::TransformStamped pose;
+  pose.header.stamp = ros::Time(stamp_s);
+  pose.header.frame_id = "world";
+  pose.child_frame_id = "camera";
+  pose.transform.translation.z = 1.05;
+  pose.transform.rotation.x = 1;  // half a turn about x: it sees along the world's -z, its y is the world's -y
+  return pose;
+}
+
+sensor_msgs::PointCloud2 cloudOf(double stamp_s, const std::vector<std::array<float, 3>>& points,
+                                 const std::string& frame = "camera") {
+  sensor_msgs::PointCloud2 out;
+  out.header.stamp = ros::Time(stamp_s);
+  out.header.frame_id = frame;
+  out.height = 1;
+  out.width = static_cast<std::uint32_t>(points.size());
+  for (const char* name : {"x", "y", "z"}) {
+    sensor_msgs::PointField field;
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    out.fields.push_back(field);
+  }
+  out.point_step = 12;
+  out.row_step = 12 * out.width;
+  out.data.resize(out.row_step);
+  if (!points.empty()) std::memcpy(out.data.data(), points.data(), out.data.size());
+  return out;
+}
+
+/// The top of a table at the world's z = 0.05, within its uppermost layer of voxels, 0 to 0.1; with lost pixels.
+sensor_msgs::PointCloud2 tableFrom(double stamp_s, const std::string& frame = "camera") {
+  std::vector<std::array<float, 3>> points{{LOST, LOST, LOST}};
+  for (int i = 0; i < 40; ++i) {
+    for (int k = 0; k < 40; ++k) {
+      points.push_back({0.0125f + 0.0125f * static_cast<float>(i), -0.0125f - 0.0125f * static_cast<float>(k), 1});
+    }
+  }
+  return cloudOf(stamp_s, points, frame);
+}
+
+XmlRpcValue cloudScene() {
+  XmlRpcValue tree = scene();
+  tree["obstacle_cloud_topic"] = "/camera/points";
+  tree["obstacle_resolution_m"] = 0.1;
+  return tree;
+}
+
+class Clouds : public ::testing::Test {
+ protected:
+  Driven driven{cloudScene()};
+  MapMemory memory{driven.config};
+  CloudMapping clouds{driven.config, driven.feed_tf, memory};
+
+  Clouds() { clouds.setFrame("world"); }
+  void tf(double stamp_s) {
+    tf2_msgs::TFMessage message;
+    message.transforms.push_back(cameraPose(stamp_s));
+    driven.feed_tf.add(message, false);
+  }
+  LoadedMap add(const sensor_msgs::PointCloud2& cloud) {
+    return clouds.add(bytesOf(cloud), 0, [] { return false; });
+  }
+  /// As the worker gives it on.
+  void give(LoadedMap map) {
+    if (!map.surface) map.problem = whyRefused(map.problem, driven.config);
+    driven.pipeline.setMap(std::move(map), 0);
+  }
+};
+
+TEST_F(Clouds, ATableIsMetWhereTheCameraSawIt) {
+  driven.feed(1, 0.35f);
+  EXPECT_EQ(driven.feed(1.1, 0.34f).status, StepStatus::NO_MAP) << "clouds are called for";
+  EXPECT_FALSE(assuranceOf(driven.outcome).proved);
+  tf(1.1);
+  give(add(tableFrom(1.1)));
+  EXPECT_EQ(driven.feed(1.2, 0.30f).status, StepStatus::OK) << driven.outcome.reason;
+  EXPECT_TRUE(assuranceOf(driven.outcome).clear());
+  EXPECT_EQ(driven.outcome.step->map.stamp_ns, 1'100'000'000) << "the cloud's";
+  EXPECT_EQ(driven.outcome.step->map.frame_id, "world");
+  // From 0.3 down to -0.1: the voxels' top at 0.1 is met half way.
+  driven.feed(1.3, -0.1f);
+  ASSERT_FALSE(driven.outcome.contacts.empty());
+  EXPECT_NEAR(driven.outcome.contacts.front().toc_lower, 0.5, 1e-6);
+}
+
+TEST_F(Clouds, EachOneBecomesPartOfTheSameMap) {
+  tf(1);
+  tf(2);
+  EXPECT_EQ(add(cloudOf(1, {{0.05f, -0.05f, 1}})).surface->leafCount(), 1u);
+  EXPECT_EQ(add(cloudOf(1.5, {{0.25f, -0.05f, 1}})).surface->leafCount(), 2u);
+  // What the first one saw is seen through three times: 0.85 - 3 * 0.41 < 0.
+  for (const double stamp_s : {1.6, 1.7}) {
+    EXPECT_EQ(add(cloudOf(stamp_s, {{0.07f, -0.07f, 1.4f}})).surface->leafCount(), 3u);
+  }
+  EXPECT_EQ(add(cloudOf(1.8, {{0.07f, -0.07f, 1.4f}})).surface->leafCount(), 2u);
+}
+
+TEST_F(Clouds, WhatCannotBecomePartOfTheMapIsSaid) {
+  tf(1);
+  sensor_msgs::PointCloud2 flat = tableFrom(1), integers = tableFrom(1), cut = tableFrom(1),
+                           nameless = tableFrom(1, "");
+  flat.fields.pop_back();
+  integers.fields[0].datatype = sensor_msgs::PointField::INT32;
+  cut.data.resize(100);
+  geometry_msgs::TransformStamped far = cameraPose(1);
+  far.child_frame_id = "far";
+  far.transform.translation.x = 4000;  // of the 3276.8 m that 0.1 m can span
+  driven.transforms.setTransform(far, "test", true);
+  const std::pair<sensor_msgs::PointCloud2, std::string> cases[] = {
+      {flat, "the cloud was refused: there is no field 'z'"},
+      {integers, "the cloud was refused: field 'x' has datatype 5; FLOAT32 (7) or FLOAT64 (8) is needed"},
+      {cut, "the cloud was refused: 1 x 1601 points of 12 bytes do not fit into data of 100"},
+      {nameless, "the cloud was refused: frame_id is empty; it is to name the sensor's frame"},
+      {cloudOf(1, {}), "the cloud was refused: it has no points"},
+      {cloudOf(1, {{LOST, 0, 1}, {0, 0, LOST}}), "the cloud was refused: none of its 2 points is finite"},
+      {tableFrom(1, "nowhere"), "no transform from 'nowhere' to 'world': "},
+      {tableFrom(9), "no transform from 'camera' to 'world': "},
+      {tableFrom(1, "//a"), "the cloud was refused: frame_id '/a' is no frame's name"},
+      {cloudOf(1, {{0, 0, 1}}, "far"),
+       "the cloud was refused: the sensor is at (4000 0 1.05) m, beyond the 65536 voxels"},
+  };
+  double stamp_s = 1;
+  driven.feed(stamp_s, 0.35f);
+  for (const auto& [cloud, expected] : cases) {
+    SCOPED_TRACE(expected);
+    give(add(tableFrom(1)));
+    EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::OK) << driven.outcome.reason;
+    give(add(cloud));
+    EXPECT_EQ(driven.feed(stamp_s += 0.1, 0.35f).status, StepStatus::NO_MAP) << "the map is void";
+    EXPECT_NE(driven.outcome.reason.find(expected), std::string::npos) << driven.outcome.reason;
+  }
+  give(add(tableFrom(1)));
+  EXPECT_EQ(driven.feed(stamp_s + 0.1, 0.35f).status, StepStatus::OK) << "and what was seen is not lost";
+}
+
+TEST_F(Clouds, UnknownSpaceIsWhatNoRayWentThrough) {
+  XmlRpcValue tree = cloudScene();
+  tree["unknown_space"] = "report";
+  Driven report(tree);
+  CloudMapping mapping(report.config, report.feed_tf, memory);
+  mapping.setFrame("world");
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(cameraPose(1));
+  report.feed_tf.add(message, true);
+  const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
+  ASSERT_TRUE(map.known) << map.problem;
+  EXPECT_TRUE(map.known->isKnown(Box{{0.05, 0.05, 0.05}, {0.2, 0.2, 0.3}}));
+  EXPECT_FALSE(map.known->isKnown(Box{{0.05, 0.05, -0.15}, {0.4, 0.4, -0.1}})) << "under the table";
+}
+
+TEST_F(Clouds, AnOctreeThatIsTooLargeIsRefusedWithWhatToDo) {
+  XmlRpcValue tree = cloudScene();
+  tree["obstacle_resolution_m"] = 0.001;
+  tree["max_map_mb"] = 1;
+  Driven small(tree);
+  const MapMemory little(small.config);
+  CloudMapping mapping(small.config, small.feed_tf, little);
+  mapping.setFrame("world");
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(cameraPose(1));
+  small.feed_tf.add(message, true);
+  const LoadedMap map = mapping.add(bytesOf(tableFrom(1)), 0, [] { return false; });
+  EXPECT_EQ(map.surface, nullptr);
+  EXPECT_NE(map.problem.find("a quarter of max_map_mb 1 is for it: raise that or obstacle_resolution_m"),
+            std::string::npos)
+      << map.problem;
+}
+
+LoadedMap next(MapLoader& loader) {
+  LoadedMap loaded;
+  while (!loader.take(loaded)) std::this_thread::yield();
+  return loaded;
+}
+
+TEST_F(Clouds, TheLoaderWaitsForTheFrameAndForTf) {
+  XmlRpcValue tree = cloudScene();
+  tree.clear();
+  tree["obstacle_cloud_topic"] = "/camera/points";
+  tree["transform_timeout_s"] = 60.0;
+  Driven learning(tree);
+  MapLoader loader(learning.config, learning.feed_tf, [] {});
+  loader.submit(bytesOf(tableFrom(1)), 0, steadyNs());
+  EXPECT_FALSE(loader.busySince()) << "no frame is to wait for a cloud that waits for the frame's frame";
+  loader.setFixedFrame("world");
+  EXPECT_TRUE(loader.busySince());
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  LoadedMap loaded;
+  EXPECT_FALSE(loader.take(loaded)) << "without tf";
+  tf2_msgs::TFMessage message;
+  message.transforms.push_back(cameraPose(1));
+  learning.feed_tf.add(message, false);
+  loaded = next(loader);
+  ASSERT_TRUE(loaded.surface) << loaded.problem;
+  EXPECT_EQ(loaded.frame_id, "world");
+  EXPECT_EQ(loader.refused(), 0u);
+}
+
+TEST_F(Clouds, TheLoaderRefusesWhatTfDoesNotPlaceInTime) {
+  MapLoader loader(driven.config, driven.feed_tf, [] {});
+  const std::int64_t start_ns = steadyNs();
+  loader.submit(bytesOf(tableFrom(1)), 0, start_ns);
+  const LoadedMap loaded = next(loader);
+  EXPECT_NE(loaded.problem.find("no transform from 'camera' to 'world'"), std::string::npos) << loaded.problem;
+  EXPECT_GE(secondsBetween(start_ns, steadyNs()), driven.config.transform_timeout_s);
+  EXPECT_EQ(loader.refused(), 1u);
+  EXPECT_EQ(mapMessageProblem("octomap_msgs/Octomap", "*", 1, driven.config),
+            "type octomap_msgs/Octomap is not a cloud; publish sensor_msgs/PointCloud2");
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
