@@ -11,7 +11,8 @@ double ownVoxelsOf(ParameterReader& reader, double fallback) {
     reader.choice("own_voxels_m", "auto", {"auto"});
     return ONE_VOXEL;
   }
-  return reader.number("own_voxels_m", fallback, 0, LARGE);
+  if (!reader.has("own_voxels_m")) return fallback;
+  return reader.number("own_voxels_m", 0, LARGE);
 }
 
 double separationOf(ParameterReader& reader, double fallback) {
