@@ -33,6 +33,8 @@ def read_parameters():
             found.add(prefix + parameter)
         if 'separationOf(' in body:
             found.add('minimum_separation_m')
+        if 'ownVoxelsOf(section' in body:
+            found.add(SECTIONS.get(name, '') + 'own_voxels_m')
     return found
 
 
