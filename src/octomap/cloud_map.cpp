@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 #include <unordered_map>
+#include <vector>
 
 #include <octomap/OcTree.h>
 
@@ -23,8 +24,9 @@ class VoxelSet {
  public:
   void add(const OcTreeKey& key) {
     const std::uint64_t block = (key[0] >> 2) | std::uint64_t(key[1] >> 2) << 16 | std::uint64_t(key[2] >> 2) << 32;
-    if (block != last_block_) last_ = &blocks_[last_block_ = block];
-    *last_ |= std::uint64_t{1} << cellBit(key[0], key[1], key[2]);
+    Recent& recent = recent_[(block ^ block >> 12 ^ block >> 24) % RECENT];
+    if (block != recent.block) recent = {block, &blocks_[block]};
+    *recent.bits |= std::uint64_t{1} << cellBit(key[0], key[1], key[2]);
   }
   /// Calls visit(key) for each that is not in `without`.
   template <class Visit>
@@ -44,9 +46,14 @@ class VoxelSet {
   std::size_t memoryBytes() const { return blocks_.size() * BLOCK_BYTES; }
 
  private:
+  /// Found without a search; what the map holds stays where it is.
+  struct Recent {
+    std::uint64_t block = ~std::uint64_t{0};
+    std::uint64_t* bits = nullptr;
+  };
+  static constexpr std::size_t RECENT = 4096;
   std::unordered_map<std::uint64_t, std::uint64_t> blocks_;
-  std::uint64_t last_block_ = ~std::uint64_t{0};
-  std::uint64_t* last_ = nullptr;
+  std::vector<Recent> recent_ = std::vector<Recent>(RECENT);
 };
 
 point3d pointOf(const Vec3& p) {
