@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "dccd/body.h"
 #include "input/mesh_resource.h"
 
 namespace dccd {
