@@ -25,8 +25,10 @@ void Monitor::setMap(ObstacleMap map) {
   Impl& m = *impl_;
   // Steps that wait may have another map, of the same frame, after none.
   if (!map.frame_id.empty() && map.frame_id != std::exchange(m.map_frame, map.frame_id)) m.held_seen.back().clear();
-  if (!map.surface || map.trusted) {  // what was there before is void, and what is to come is older
+  const bool as_it_is = map.trusted || (m.tracked().empty() && !m.trusted.surface);
+  if (!map.surface || as_it_is) {  // what was there before is void, and what is to come is older
     m.maps_to_come.clear();
+    if (as_it_is) m.own_voxels.forget();
     m.map = std::move(map);
     return;
   }
@@ -66,10 +68,6 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
             << "'; used together they must have the same";
     map = ObstacleMap();
     map.problem = problem.str();
-    return;
-  }
-  if (bodies_tracked.empty() && !sure) {
-    map = newest;
     return;
   }
   const auto start = Deadline::Clock::now();

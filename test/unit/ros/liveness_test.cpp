@@ -113,7 +113,20 @@ TEST(Liveness, OneOfAStreamOfMapsHasTheTimeOfAnAnswer) {
   liveness.outcome(3, 0, 40 * MS);
   EXPECT_EQ(kinds(liveness, 119 * MS), Kinds{});
   EXPECT_EQ(kinds(liveness, 121 * MS), Kinds{Fault::Kind::NEWER_MAP});
-  liveness.mapSettled(2);
+  liveness.mapSettled(2, 2);
+  EXPECT_EQ(kinds(liveness, 122 * MS), Kinds{});
+}
+
+// With own voxels a map counts from the first frame on that is not before its stamp.
+TEST(Liveness, AMapThatWaitsForTheBodiesHasTheTimeOfAnAnswer) {
+  Liveness liveness({0.1, 10, 0});
+  liveness.mapCame(2, 20 * MS);
+  liveness.mapSettled(0, 2);
+  liveness.frame(3, 30 * MS);
+  liveness.outcome(3, 0, 40 * MS);
+  EXPECT_EQ(kinds(liveness, 119 * MS), Kinds{});
+  EXPECT_EQ(kinds(liveness, 121 * MS), Kinds{Fault::Kind::NEWER_MAP});
+  liveness.mapSettled(2, 2);
   EXPECT_EQ(kinds(liveness, 122 * MS), Kinds{});
 }
 
