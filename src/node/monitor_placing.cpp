@@ -196,10 +196,6 @@ bool MonitorPipeline::findPlace(const LoadedMap& loaded, ObstacleMap& map, std::
 /// Whether what octomap_file holds beside live maps has its place, without which none of these is used.
 bool MonitorPipeline::placeTrusted(std::int64_t now_ns) {
   if (!trusted_map_ || trusted_placed_) return true;
-  if (!trusted_map_->surface) {
-    monitor_->setMap(noMap(trusted_map_->problem));
-    return false;
-  }
   ObstacleMap map;
   std::string reason;
   trusted_placed_ = findPlace(*trusted_map_, map, reason);
@@ -214,9 +210,10 @@ bool MonitorPipeline::placeTrusted(std::int64_t now_ns) {
 
 void MonitorPipeline::placeMap(std::int64_t now_ns) {
   if (!unplaced_map_) return;
-  if (!unplaced_map_->surface) {
-    // Refused: what was there before is out of date, and no map is better than a wrong one.
-    monitor_->setMap(noMap(unplaced_map_->problem));
+  const LoadedMap& refused = trusted_map_ && !trusted_map_->surface ? *trusted_map_ : *unplaced_map_;
+  if (!refused.surface) {
+    // What was there before is out of date, and no map is better than a wrong one.
+    monitor_->setMap(noMap(refused.problem));
     settled_map_ns_ = unplaced_map_->arrival_ns;
     unplaced_map_.reset();
     placed_map_.reset();

@@ -99,6 +99,7 @@ std::map<std::string, std::string> defaultsInTheCode() {
       {"against_obstacle", shown(body.body.against_obstacle)},
       {"shell", shown(body.body.shell)},
       {"minimum_separation_m", shown(body.body.minimum_separation_m)},
+      {"own_voxels_m", shown(body.body.own_voxels_m)},
       {"uncertainty/radius_m", shown(body.input.noise_radius_m)},
       {"uncertainty/field", shown(body.input.noise_field)},
       {"uncertainty/scale", shown(body.input.noise_scale)},

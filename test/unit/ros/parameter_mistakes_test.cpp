@@ -58,16 +58,10 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        [](XmlRpcValue& t) { t["record_directory"] = "steps"; }},
       {"both or neither", [](XmlRpcValue& t) { t["topology"]["rows"] = 3; }},
       {"the map is to come both from the clouds on obstacle_cloud_topic '/points' and from octomap_topic '/map'; "
-       "remove "
-       "one of the two",
+       "remove one of the two",
        [](XmlRpcValue& t) {
          t["obstacle_cloud_topic"] = "/points";
          t["octomap_topic"] = "/map";
-       }},
-      {"and from octomap_file '/map.bt'; remove one of the two",
-       [](XmlRpcValue& t) {
-         t["obstacle_resolution_m"] = 0.02;
-         t["octomap_file"] = "/map.bt";
        }},
       {"~obstacle_resolution_m is 0.0005, too fine for obstacle_max_range_m 5: a ray has 4096 voxels at most; write at "
        "least 0.0012207",
@@ -114,6 +108,7 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
        [](XmlRpcValue& t) {
          t["own_voxels_m"] = "auto";
          t["unknown_space"] = "occupied";
+         for (int i = 0; i < 6; ++i) t["unknown_box"][i] = i < 3 ? 0.0 : 1.0;
        }},
       {"~minimum_separation_m is -0.1, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = -0.1; }},
       {"~minimum_separation_m is nan, it must be from 0", [](XmlRpcValue& t) { t["minimum_separation_m"] = NAN; }},
