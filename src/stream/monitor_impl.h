@@ -100,6 +100,7 @@ struct Monitor::Impl {
   bool separates(const Body& body) const;
   std::vector<TrackedBody> tracked() const;
   void takeMaps(StampNs known_until_ns);
+  void takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked);
   void settleDoubt(Step& step, const Deadline& deadline);
   StampNs wayNeededFrom(std::size_t body, StampNs stamp_ns) const;
   ObstacleMap usableMap(StampNs stamp_ns) const;

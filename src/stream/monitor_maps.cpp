@@ -49,21 +49,25 @@ std::vector<TrackedBody> Monitor::Impl::tracked() const {
   return tracked;
 }
 
-/// Until when the bodies' ways are known. Of several maps up to then the newest is taken: what the others showed is
-/// asked of it.
+/// Until when the bodies' ways are known. Of several maps up to then each is looked at, and the newest is in force.
 void Monitor::Impl::takeMaps(StampNs known_until_ns) {
   own_voxels_ms = 0;
   const std::vector<TrackedBody> bodies_tracked = tracked();
   std::size_t taken = maps_to_come.size();
   while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].stamp_ns > known_until_ns) --taken;
   if (bodies_tracked.empty()) own_voxels.forget();
-  if (taken == 0) return;
-  const ObstacleMap newest = std::move(maps_to_come[taken - 1]);
-  maps_to_come.erase(maps_to_come.begin(), maps_to_come.begin() + static_cast<std::ptrdiff_t>(taken));
+  for (; taken > 0; --taken) {
+    const ObstacleMap next = std::move(maps_to_come.front());
+    maps_to_come.pop_front();
+    takeMap(next, bodies_tracked);
+  }
+}
+
+void Monitor::Impl::takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked) {
   const VoxelSurface* sure = trusted.surface.get();
-  if (sure && (trusted.frame_id != newest.frame_id || sure->resolution() != newest.surface->resolution())) {
+  if (sure && (trusted.frame_id != next.frame_id || sure->resolution() != next.surface->resolution())) {
     std::ostringstream problem;
-    problem << "the octomap has voxels of " << newest.surface->resolution() << " m in frame '" << newest.frame_id
+    problem << "the octomap has voxels of " << next.surface->resolution() << " m in frame '" << next.frame_id
             << "', and octomap_file of " << sure->resolution() << " m in '" << trusted.frame_id
             << "'; used together they must have the same";
     map = ObstacleMap();
@@ -71,8 +75,8 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
     return;
   }
   const auto start = Deadline::Clock::now();
-  map = own_voxels.reduce(newest, sure, bodies_tracked, options.own_voxels_lag_s, options.own_voxels_trust);
-  own_voxels_ms = msSince(start);
+  map = own_voxels.reduce(next, sure, bodies_tracked, options.own_voxels_lag_s, options.own_voxels_trust);
+  own_voxels_ms += msSince(start);
 }
 
 /// What is in doubt matters to a step that would touch it, were it an obstacle.

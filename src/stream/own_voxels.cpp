@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "dccd/tolerances.h"
@@ -118,8 +119,9 @@ std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodi
     } else if (body.holds_always) {
       ways.push_back({{frames.newestShared(), frames.newestShared(), 0, 0}});
     } else {
-      // What the first map shows is in doubt, not own: the first place that is known will do.
-      const StampNs until_ns = before_ ? stamp_ns : std::max(stamp_ns, frames.oldest().stamp_ns);
+      // What a map shows that is older than all that is known of the body is in doubt, not own: the first place will
+      // do.
+      const StampNs until_ns = std::max(stamp_ns, frames.oldest().stamp_ns);
       ways.push_back(
           frames.pathWithin(std::min(pathNeededFrom(stamp_ns, lag_s), stamp_ns - nanoseconds(lag_s)), until_ns));
     }
@@ -165,14 +167,17 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface,
 }
 
 /// The rule.
-void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first) {
+void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
+                            const std::set<int>& unknown_yet) {
   remembered_.clear();
   for (const ReachedCube& cube : cubes) {
     const bool reached = cube.body >= 0;
     const std::uint64_t key = packed(cube.leaf.min);
     switch (cube.why) {
       case ReachedCube::Why::APPEARED:
-        if (reached) own_[key] = {cube.leaf.min, static_cast<std::uint16_t>(cube.body), !before_ && !trust_first};
+        if (reached)
+          own_[key] = {cube.leaf.min, static_cast<std::uint16_t>(cube.body),
+                       !trust_first && (!before_ || unknown_yet.count(cube.body) > 0)};
         break;
       case ReachedCube::Why::VANISHED:
       case ReachedCube::Why::REMEMBERED:
@@ -198,7 +203,12 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
   std::vector<ReachedCube> cubes = cubesToAsk(*map.surface, sure, reachedKeys(map, bodies, ways));
   searchReach(bodies, ways, map.map_from_fixed, resolution_m, cubes);
-  follow(cubes, map.known.get(), trust_first);
+  std::set<int> unknown_yet;
+  for (const TrackedBody& body : bodies) {
+    const bool is_older = !body.holds_always && !body.frames->empty() && map.stamp_ns < body.frames->oldest().stamp_ns;
+    if (is_older) unknown_yet.insert(body.body);
+  }
+  follow(cubes, map.known.get(), trust_first, unknown_yet);
   before_ = map.surface;
   before_ns_ = map.stamp_ns;
   frame_id_ = map.frame_id;

@@ -8,13 +8,14 @@
 // 3. An obstacle stays one as long as maps show it; also where it comes back after it vanished within reach of a body,
 //    or without having been seen free.
 // 4. What is own stays own until a map does not show it.
-// 5. What the first map shows within reach is in doubt: no obstacle, but no proof either of a step that touches it,
-// until
+// 5. What the first map shows within reach, or one that is older than all that is known of the body, is in doubt: no
+// obstacle, but no proof either of a step that touches it, until
 //    a map does not show it, or shows it with no body in reach, which makes it an obstacle.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -40,7 +41,9 @@ class OwnVoxelFinder {
  private:
   std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
   std::vector<ReachedCube> cubesToAsk(const VoxelSurface& surface, const VoxelTree& sure, const KeyBox& region);
-  void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first);
+  /// unknown_yet: bodies of which nothing is known as old as the map.
+  void follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
+              const std::set<int>& unknown_yet);
 
   std::shared_ptr<const VoxelSurface> before_;  // as it was given; null: none
   StampNs before_ns_ = 0;

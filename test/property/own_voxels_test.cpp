@@ -89,7 +89,8 @@ class Model {
     const bool is_first = !before_ns_;
     const StampNs lag_ns = std::llround(lag_s * 1e9);
     const StampNs since_ns = (is_first ? stamp_ns : std::min(*before_ns_, stamp_ns)) - lag_ns;
-    const StampNs until_ns = is_first ? std::max(stamp_ns, frames.front().stamp_ns) : stamp_ns;
+    const bool is_older = stamp_ns < frames.front().stamp_ns;
+    const StampNs until_ns = std::max(stamp_ns, frames.front().stamp_ns);
     const auto reached = [&](const Cell& cell, bool otherwise) {
       const double m = nearest(cell, frames, since_ns, until_ns);
       return m > reach_m ? false : m <= reach_m - RIM_M ? true : otherwise;
@@ -105,7 +106,7 @@ class Model {
         state = was->second;
         if (state == State::DOUBTED && !reached(cell, said_doubted)) state = State::OBSTACLE;
       } else if (remembered_.count(cell) == 0 && reached(cell, said_own)) {
-        state = is_first ? State::DOUBTED : State::OWN;
+        state = is_first || is_older ? State::DOUBTED : State::OWN;
       }
       now[cell] = state;
       EXPECT_EQ(said_own, state != State::OBSTACLE) << cell[0] << ' ' << cell[1] << ' ' << cell[2];

@@ -273,6 +273,18 @@ TEST_F(OwnVoxels, AMapWaitsUntilTheBodyIsKnownAtItsStamp) {
   EXPECT_TRUE(assuranceOf(newest).clear()) << "of several the newest";
 }
 
+// A cell that was mapped before the tracker began.
+TEST_F(OwnVoxels, MapsOfBeforeTheFirstFrameAreLookedAtInTheirOrder) {
+  map(-400 * MS, slab(1));
+  map(-200 * MS, slab(1) + Cells{{5, 5, 5}});
+  map(0, slab(1) + voxelsOf(0.55));
+  feed(0, 0.55);
+  const Outcome outcome = feed(100 * MS, 0.55);
+  EXPECT_EQ(own(outcome), 24u);
+  EXPECT_EQ(doubted(outcome), 1u) << "where the body was at -0.2 s nobody knows";
+  EXPECT_FALSE(assuranceOf(outcome).proved);
+}
+
 TEST_F(OwnVoxels, AnotherFrameOrResolutionIsAFirstMap) {
   hoverAboveFloor();
   monitor_->setMap(mapOf(0.2, {leafOf({1, 1, 2})}, 150 * MS));
