@@ -309,6 +309,8 @@ void MonitorPipeline::setMap(LoadedMap map, std::int64_t now_ns) {
     trusted_map_ = std::move(map);
     return;
   }
+  // What is own follows from each map, not from the newest alone.
+  if (config_.ownsVoxels()) placeMap(now_ns);
   if (!unplaced_map_) unplaced_since_ns_ = now_ns;
   unplaced_map_ = std::move(map);
 }

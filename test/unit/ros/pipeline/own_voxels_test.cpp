@@ -62,6 +62,19 @@ TEST_F(OwnVoxelsOfANode, WithALiveMapAloneTheFirstOneIsInDoubt) {
   EXPECT_EQ(driven.feed(1.4, -0.05f).touching, Touching::NEW) << "the table stays";
 }
 
+TEST_F(OwnVoxelsOfANode, MapsOfACellWithoutTheBodyCountAlsoBeforeItsFirstFrame) {
+  XmlRpcValue tree = scene();
+  tree["own_voxels_m"] = "auto";
+  tree["octomap_topic"] = "/map";
+  Driven driven(tree);
+  give(driven, tableAnd(false), 0.8);
+  give(driven, tableAnd(true), 1);
+  driven.feed(1, 0.35f);
+  const Outcome& outcome = driven.feed(1.1, 0.35f);
+  EXPECT_TRUE(assuranceOf(outcome).clear()) << describe(assuranceOf(outcome));
+  EXPECT_EQ(outcome.step->map.own.own, 4u);
+}
+
 TEST_F(OwnVoxelsOfANode, WithAMapFileBesideNothingIsInDoubtThatLiesThere) {
   const std::string file = (folder_ / "table.bt").string();
   octomap::OcTree table = tableAnd(false);
