@@ -385,10 +385,6 @@ bool MonitorConfig::namesOctomap() const {
   return octomap_topic_named || cloud_named || !octomap_file.empty();
 }
 
-bool MonitorConfig::ownsVoxels() const {
-  return std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return dccd::ownsVoxels(body.body); });
-}
-
 bool MonitorConfig::holdsDistance() const {
   return std::any_of(bodies.begin(), bodies.end(),
                      [](const BodyConfig& body) { return body.isUncertain() || largestSeparation({body.body}) > 0; });

@@ -2,6 +2,7 @@
 // a YAML file; both see the same names, defaults and errors. doc/interface.md is the table for people.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
@@ -109,7 +110,9 @@ struct MonitorConfig {
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
   /// A separation or an uncertainty is asked for, so that only conservative will do.
-  bool ownsVoxels() const;
+  bool ownsVoxels() const {
+    return std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& b) { return dccd::ownsVoxels(b.body); });
+  }
   /// Free leaves of maps are asked for, too.
   bool needsKnownSpace() const { return unknown_space != UnknownSpace::FREE || ownsVoxels(); }
   bool holdsDistance() const;
