@@ -24,7 +24,7 @@ class CloudMapping {
   void setFrame(const std::string& fixed_frame);
   bool hasFrame() const { return !frame_.empty(); }
 
-  /// A serialised sensor_msgs/PointCloud2 becomes part of the map, which it returns; never throws: what is wrong is in
+  /// A serialised cloud (PointCloud2) becomes part of the map, which it returns; never throws: what is wrong is in
   /// LoadedMap::problem. `may_wait` is asked again and again while there is no transform at the cloud's stamp (without
   /// one: at its receipt); it says whether to go on, and takes its time. hasFrame() must hold.
   /// `before`: as decodeMapMessage()'s.

@@ -40,7 +40,7 @@ class MapLoader {
   MapLoader(const MapLoader&) = delete;
   MapLoader& operator=(const MapLoader&) = delete;
 
-  /// A serialised octomap_msgs/Octomap, or sensor_msgs/PointCloud2 where clouds make the map, that came at `arrival_ns`
+  /// A serialised octomap_msgs/Octomap, or a cloud (PointCloud2) where clouds make the map, that came at `arrival_ns`
   /// of the steady clock; replaces one that still waits. From any thread.
   void submit(std::vector<std::uint8_t> bytes, StampNs receipt_ns, std::int64_t arrival_ns);
   void submitFile(const std::string& file, std::int64_t arrival_ns);

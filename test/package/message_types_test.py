@@ -8,6 +8,8 @@ ROWS = CHECKOUT / 'src/input/message_types'
 # These write messages for others to read: the recorder of scenes, the bag of results, and what RViz shows.
 WRITERS = {'src/apps/analyze_bag/result_bag.cpp', 'src/apps/make_scene_bag/messages.cpp',
            'src/apps/make_scene_bag/messages.h', 'src/output/markers.cpp', 'src/output/markers.h', 'src/output/outputs.cpp'}
+# This one knows the types that make the map, a cloud among them.
+MAPS = {'src/input/known_types.cpp'}
 
 
 def registered():
@@ -24,7 +26,7 @@ def sources():
 
 class MessageTypesTest(unittest.TestCase):
     def test_every_type_stands_in_its_own_file_alone(self):
-        texts = {name: text for name, text in sources().items() if name not in WRITERS}
+        texts = {name: text for name, text in sources().items() if name not in WRITERS | MAPS}
         rows = registered()
         self.assertGreaterEqual(len(rows), 6, 'the search found too little to mean anything')
         for package, name, path in rows:
