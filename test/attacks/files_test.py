@@ -64,12 +64,6 @@ class FilesTest(AttackTest):
             self.refused([self.tool('analyze_bag'), bag, '--report', self.folder + '/report', '--octomap', path], words)
         for path in self.special_files('.yaml'):
             self.refused([self.tool('make_scene_bag'), path, self.folder + '/scene.bag'], words)
-        frame = pathlib.Path(self.folder) / 'frame.obj'
-        frame.write_text('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')
-        for path in self.special_files('.txt'):
-            with self.subTest(truth=path.name):
-                self.refused([self.tool('check_step'), frame, frame, '--contacts', self.folder + '/contacts.csv', '--stats',
-                              self.folder + '/stats.json', '--accuracy', 'all', '--truth', path], words)
 
     def test_two_monitors_in_one_folder(self):
         folder = pathlib.Path(self.folder) / 'shared'
