@@ -105,8 +105,9 @@ void OwnVoxelFinder::forget() {
 }
 
 StampNs OwnVoxelFinder::pathNeededFrom(StampNs now_ns, double lag_s) const {
+  // A map may be older than the one before it, after a clock that went back.
   const StampNs longest_ns = now_ns - nanoseconds(tolerance::OWN_PATH_S);
-  return (before_ ? std::max(before_ns_, longest_ns) : now_ns) - nanoseconds(lag_s);
+  return (before_ ? std::clamp(before_ns_, longest_ns, now_ns) : now_ns) - nanoseconds(lag_s);
 }
 
 std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns,
@@ -119,11 +120,9 @@ std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodi
     } else if (body.holds_always) {
       ways.push_back({{frames.newestShared(), frames.newestShared(), 0, 0}});
     } else {
-      // What a map shows that is older than all that is known of the body is in doubt, not own: the first place will
-      // do.
+      // What a map older than all frames of the body shows is in doubt, not own: the first place will do.
       const StampNs until_ns = std::max(stamp_ns, frames.oldest().stamp_ns);
-      ways.push_back(
-          frames.pathWithin(std::min(pathNeededFrom(stamp_ns, lag_s), stamp_ns - nanoseconds(lag_s)), until_ns));
+      ways.push_back(frames.pathWithin(pathNeededFrom(stamp_ns, lag_s), until_ns));
     }
   }
   return ways;

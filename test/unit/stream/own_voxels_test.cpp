@@ -285,6 +285,22 @@ TEST_F(OwnVoxels, MapsOfBeforeTheFirstFrameAreLookedAtInTheirOrder) {
   EXPECT_FALSE(assuranceOf(outcome).proved);
 }
 
+// A bag that loops: what is kept of the bodies' ways follows the clock.
+TEST_F(OwnVoxels, AfterAClockThatWentBackTheWayIsKept) {
+  start(0.05, false, 0.15);
+  hoverAboveFloor();
+  feed(300 * MS, 0.55);
+  map(300 * MS, slab(1) + voxelsOf(0.55));
+  ASSERT_EQ(own(feed(400 * MS, 0.55)), 25u);
+  EXPECT_EQ(feed(10 * MS, 0.85).status, StepStatus::TIME_JUMP);
+  feed(60 * MS, 0.85);
+  feed(110 * MS, 0.55);
+  feed(150 * MS, 0.55);
+  feed(190 * MS, 0.55);
+  map(190 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(0.85));
+  EXPECT_EQ(own(feed(200 * MS, 0.55)), 50u) << "it was at 0.85 m until 0.06 s, 0.13 s before the map";
+}
+
 TEST_F(OwnVoxels, AnotherFrameOrResolutionIsAFirstMap) {
   hoverAboveFloor();
   monitor_->setMap(mapOf(0.2, {leafOf({1, 1, 2})}, 150 * MS));
