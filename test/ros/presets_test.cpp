@@ -250,6 +250,18 @@ TEST_F(OctomapServer, MapThatHoldsTheClothItself) {
   EXPECT_GT(touching(), 0u) << "the table is no part of the cloth";
 }
 
+/// 3 x 3 vertices, 0.05 m apart, of now.
+deformable_ccd::MeshStamped smallCloth(double z) {
+  Mesh mesh{grid(3, 3, 0.05, z), {}};
+  for (const Index a : {0u, 1u, 3u, 4u}) {
+    mesh.faces.push_back({a, a + 1, a + 3});
+    mesh.faces.push_back({a + 1, a + 4, a + 3});
+  }
+  deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
+  message.header.stamp = ros::Time::now();
+  return message;
+}
+
 struct DepthCamera : Preset {
   DepthCamera() : Preset("depth_camera") {}
   /// A metre above the table, which it sees at depth 1; 525 pixels a metre. Every tenth pixel of every tenth row is
@@ -288,14 +300,7 @@ TEST_F(DepthCamera, ClothOnWhatTheCameraSees) {
   int frames = 0;
   drop(0.1, -0.05, [&](double z) {
     if (frames++ % 3 == 0) points.publish(seen(frame));  // a camera at 10 Hz
-    Mesh mesh{grid(3, 3, 0.05, z), {}};
-    for (const Index a : {0u, 1u, 3u, 4u}) {
-      mesh.faces.push_back({a, a + 1, a + 3});
-      mesh.faces.push_back({a + 1, a + 4, a + 3});
-    }
-    deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
-    message.header.stamp = ros::Time::now();
-    publisher.publish(message);
+    publisher.publish(smallCloth(z));
   });
   EXPECT_TRUE(rest.contacts.empty());
   // 150 mm in ten steps of 15 mm: the table is met in the seventh, two thirds of the way down.
@@ -333,14 +338,7 @@ TEST_F(Realsense, ClothOnTheMapThatTheMonitorMakesItself) {
   int frames = 0;
   drop(0.1, -0.05, [&](double z) {
     if (frames++ % 6 == 0) points.publish(seen());  // a camera at 5 Hz
-    Mesh mesh{grid(3, 3, 0.05, z), {}};
-    for (const Index a : {0u, 1u, 3u, 4u}) {
-      mesh.faces.push_back({a, a + 1, a + 3});
-      mesh.faces.push_back({a + 1, a + 4, a + 3});
-    }
-    deformable_ccd::MeshStamped message = meshStamped(mesh, 0, "map");
-    message.header.stamp = ros::Time::now();
-    publisher.publish(message);
+    publisher.publish(smallCloth(z));
   });
   EXPECT_TRUE(rest.contacts.empty());
   // 150 mm in ten steps of 15 mm: the voxels' top at 20 mm is met in the sixth, a third of the way down.

@@ -104,30 +104,21 @@ TEST(Liveness, AFrameAnsweredWithoutTheMapThatCameBeforeItProvesNothing) {
   EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{});
 }
 
-TEST(Liveness, OneOfAStreamOfMapsHasTheTimeOfAnAnswer) {
-  Liveness liveness({0.1, 10, 0, true});
-  liveness.frame(1, 0);
-  liveness.outcome(1, 0, 10 * MS);
-  liveness.mapCame(2, 20 * MS);
-  liveness.frame(3, 30 * MS);
-  liveness.outcome(3, 0, 40 * MS);
-  EXPECT_EQ(kinds(liveness, 119 * MS), Kinds{});
-  EXPECT_EQ(kinds(liveness, 121 * MS), Kinds{Fault::Kind::NEWER_MAP});
-  liveness.mapSettled(2, 2);
-  EXPECT_EQ(kinds(liveness, 122 * MS), Kinds{});
-}
-
-// With own voxels a map counts from the first frame on that is not before its stamp.
-TEST(Liveness, AMapThatWaitsForTheBodiesHasTheTimeOfAnAnswer) {
-  Liveness liveness({0.1, 10, 0});
-  liveness.mapCame(2, 20 * MS);
-  liveness.mapSettled(0, 2);
-  liveness.frame(3, 30 * MS);
-  liveness.outcome(3, 0, 40 * MS);
-  EXPECT_EQ(kinds(liveness, 119 * MS), Kinds{});
-  EXPECT_EQ(kinds(liveness, 121 * MS), Kinds{Fault::Kind::NEWER_MAP});
-  liveness.mapSettled(2, 2);
-  EXPECT_EQ(kinds(liveness, 122 * MS), Kinds{});
+TEST(Liveness, SomeMapsHaveTheTimeOfAnAnswer) {
+  // One of a stream; and with own voxels one that counts from the first frame on that is not before its stamp.
+  for (const bool streams : {true, false}) {
+    Liveness liveness({0.1, 10, 0, streams});
+    liveness.frame(1, 0);
+    liveness.outcome(1, 0, 10 * MS);
+    liveness.mapCame(2, 20 * MS);
+    if (!streams) liveness.mapSettled(1, 2);
+    liveness.frame(3, 30 * MS);
+    liveness.outcome(3, 0, 40 * MS);
+    EXPECT_EQ(kinds(liveness, 119 * MS), Kinds{});
+    EXPECT_EQ(kinds(liveness, 121 * MS), Kinds{Fault::Kind::NEWER_MAP});
+    liveness.mapSettled(2, 2);
+    EXPECT_EQ(kinds(liveness, 122 * MS), Kinds{});
+  }
 }
 
 TEST(Liveness, AStaticBodysNewerFrameVoidsWhatWasSaid) {
