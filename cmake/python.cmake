@@ -30,7 +30,13 @@ else()
   set(PYTHON_DESTINATION ${CATKIN_GLOBAL_PYTHON_DESTINATION}/dccd)
 endif()
 set_target_properties(deformable_ccd_python PROPERTIES
-  CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON OUTPUT_NAME _dccd LIBRARY_OUTPUT_DIRECTORY ${PYTHON_FOLDER})
+  CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON OUTPUT_NAME _dccd
+  LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/python_module)
+# CMake makes output folders before anything is built, and an empty one is a module to Python, without anything in it.
+add_custom_command(TARGET deformable_ccd_python POST_BUILD
+  COMMAND ${CMAKE_COMMAND} -E make_directory ${PYTHON_FOLDER}
+  COMMAND ${CMAKE_COMMAND} -E create_symlink $<TARGET_FILE:deformable_ccd_python>
+    ${PYTHON_FOLDER}/$<TARGET_FILE_NAME:deformable_ccd_python> VERBATIM)
 foreach(file __init__.py _dccd.pyi py.typed)
   add_custom_command(TARGET deformable_ccd_python POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E create_symlink ${TRUE_SOURCE_DIR}/python/dccd/${file} ${PYTHON_FOLDER}/${file} VERBATIM)
