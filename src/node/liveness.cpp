@@ -37,6 +37,7 @@ void Liveness::outcome(std::int64_t name, double map_age_s, std::int64_t now_ns)
   // MAX_OPEN frames had no answer, and the newest one was not kept: now it is the one that counts.
   if (open_.empty() && newest_.came_ns != NEVER && newest_.name > answered_) open_.push_back(newest_);
   map_age_s_ = map_age_s;
+  lacked_map_ = false;
   static_answered_ = static_in_use_;
 }
 
@@ -45,6 +46,7 @@ void Liveness::mapCame(std::int64_t name, std::int64_t now_ns) {
 }
 
 void Liveness::mapSettled(std::int64_t name, std::int64_t placed) {
+  lacked_map_ = lacked_map_ || lacksMap();
   maps_placed_ = placed;
   while (!maps_.empty() && maps_.front().name <= name) maps_.pop_front();
 }
@@ -63,6 +65,7 @@ void Liveness::forget() {
   newest_ = {0, NEVER};
   answered_ = answered_ns_ = NEVER;
   map_age_s_ = -1;
+  lacked_map_ = false;
   asked_.clear();
 }
 
@@ -78,8 +81,9 @@ std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {
   if (newest_.came_ns != NEVER && secondsBetween(newest_.came_ns, now_ns) > limits_.max_step_s) {
     add(Fault::Kind::SILENCE, "no frame has come for more than " + seconds(limits_.max_step_s));
   }
-  if (!maps_.empty() && !limits_.map_streams && maps_.front().name < answered_ && maps_.front().name > maps_placed_) {
-    add(Fault::Kind::NEWER_MAP, "a newer map came before the last frame that was answered, and is not in use yet");
+  if (lacked_map_ || lacksMap()) {
+    add(Fault::Kind::NEWER_MAP,
+        "a newer map came before the last frame that was answered, which was answered without it");
   } else if (!maps_.empty() && secondsBetween(maps_.front().came_ns, now_ns) > limits_.answer_timeout_s) {
     add(Fault::Kind::NEWER_MAP,
         "a newer map came and has not been in use for more than " + seconds(limits_.answer_timeout_s));

@@ -38,7 +38,7 @@ class Liveness {
   /// A map came, under a name as frames have. It and all before it are in use, gave way to it or were refused.
   void mapCame(std::int64_t name, std::int64_t now_ns);
   /// Those up to `placed` have a place, and are in use from the first frame on that is not before their stamp; they
-  /// have answer_timeout_s for that.
+  /// have answer_timeout_s for that. An answer that was given without one of them stays no proof.
   void mapSettled(std::int64_t name, std::int64_t placed);
 
   /// A frame of a static body came: what was said is void until a step that used it is answered. One that follows the
@@ -63,11 +63,17 @@ class Liveness {
   struct Frame {
     std::int64_t name, came_ns;
   };
+  /// The last answer was given without a map that had come before its frame.
+  bool lacksMap() const {
+    return !maps_.empty() && !limits_.map_streams && maps_.front().name < answered_ &&
+           maps_.front().name > maps_placed_;
+  }
   LivenessLimits limits_;
   std::deque<Frame> open_;  // without an outcome; at most a few thousand, of which the oldest counts
   Frame newest_{0, NEVER};
   std::deque<Frame> maps_;  // not in use; at most as many
   std::int64_t maps_placed_ = NEVER;
+  bool lacked_map_ = false;                              // lacksMap() held until that map got its place
   std::int64_t answered_ns_ = NEVER, answered_ = NEVER;  // the last one's arrival and name
   double map_age_s_ = -1;
   std::uint64_t static_came_ = 0, static_in_use_ = 0, static_answered_ = 0;  // frames: in all, in use, in an answer

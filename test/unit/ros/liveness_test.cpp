@@ -100,8 +100,13 @@ TEST(Liveness, AFrameAnsweredWithoutTheMapThatCameBeforeItProvesNothing) {
   EXPECT_EQ(kinds(liveness, 30 * MS), Kinds{}) << "and waits for it";
   liveness.outcome(3, -1, 40 * MS);
   EXPECT_EQ(kinds(liveness, 40 * MS), Kinds{Fault::Kind::NEWER_MAP});
+  liveness.mapSettled(1, 2);
+  EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{Fault::Kind::NEWER_MAP}) << "it has its place, the answer is the old one";
   liveness.mapSettled(2, 2);
-  EXPECT_EQ(kinds(liveness, 50 * MS), Kinds{});
+  EXPECT_EQ(kinds(liveness, 60 * MS), Kinds{Fault::Kind::NEWER_MAP});
+  liveness.frame(4, 70 * MS);
+  liveness.outcome(4, 0, 80 * MS);
+  EXPECT_EQ(kinds(liveness, 80 * MS), Kinds{}) << "answered with it";
 }
 
 TEST(Liveness, SomeMapsHaveTheTimeOfAnAnswer) {
