@@ -206,7 +206,6 @@ void Monitor::setBody(std::size_t body, Body what) {
   m.references.frames[body] = nullptr;
   m.references.topologies[body] = nullptr;
   m.held_seen[body].clear();
-  m.tracker.seam(body);
 }
 
 StampNs Monitor::nextStart() const { return impl_->oldestStart(0); }
