@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "dccd/contact_fields.h"
 #include "dccd/new_contacts.h"
 #include "output/patch_messages.h"
 
@@ -178,26 +179,14 @@ std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
 ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch) {
   const ContactGeometry geometry = contactGeometry(outcome, contact);
   ContactMessage out;
-  out.kind = static_cast<std::uint8_t>(contact.kind);
-  out.certainty = static_cast<std::uint8_t>(contact.certainty);
-  out.initial = contact.initial;
-  out.leaving = contact.leaving;
-  out.expected = contact.expected;
-  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
-  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
-  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
-  out.voxel_size = contact.voxel_size;
+#define DCCD_PUT_CONTACT(member, published) put(contact.member, out.published);
+  DCCD_CONTACT_FIELDS(DCCD_PUT_CONTACT)
+#undef DCCD_PUT_CONTACT
   out.patch = patch;
-  out.toc_lower = contact.toc_lower;
-  out.toc_upper = contact.toc_upper;
   out.time_of_contact = toRosTime(outcome.stampBefore(contact.toc_lower));
-  out.point.x = geometry.point.x();
-  out.point.y = geometry.point.y();
-  out.point.z = geometry.point.z();
-  out.normal.x = geometry.normal.x();
-  out.normal.y = geometry.normal.y();
-  out.normal.z = geometry.normal.z();
-  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
+  put(geometry.point, out.point);
+  put(geometry.normal, out.normal);
+  put(geometry.weights, out.weights);
   out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
   return out;
 }
@@ -233,8 +222,8 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
   }
   for (const StartIntersection& crossing : outcome.intersections) {
     deformable_ccd::Intersection message;
-    std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
-    std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
+    put(crossing.body, message.body);
+    put(crossing.vertex, message.vertex);
     message.expected = crossing.expected;
     out.intersections.push_back(message);
   }
