@@ -26,9 +26,7 @@ std_msgs::ColorRGBA color(double r, double g, double b, double a = 1) {
 
 geometry_msgs::Point point(const Vec3& p) {
   geometry_msgs::Point out;
-  out.x = p.x();
-  out.y = p.y();
-  out.z = p.z();
+  put(p, out);
   return out;
 }
 
@@ -116,15 +114,15 @@ Marker& voxelList(const Outcome& outcome, const std::string& frame, std::uint32_
   return by_size.emplace(size, std::move(marker)).first->second;
 }
 
-/// Box around all bodies at the end of the step, in the map's frame.
-Box boundsInMap(const Outcome& outcome) {
+/// Box around all bodies at the end of the step, in a frame of that pose.
+Box boundsIn(const Outcome& outcome, const Eigen::Isometry3d& frame_from_fixed) {
   Box box;
   for (const Body& body : outcome.step->bodies) {
     for (const Vec3& p : *body.t1) {
       if (!p.allFinite()) continue;
-      const Vec3 in_map = outcome.step->map.map_from_fixed * p;
-      box.min = box.min.cwiseMin(in_map);
-      box.max = box.max.cwiseMax(in_map);
+      const Vec3 in_frame = frame_from_fixed * p;
+      box.min = box.min.cwiseMin(in_frame);
+      box.max = box.max.cwiseMax(in_frame);
     }
   }
   return box;
@@ -136,7 +134,7 @@ constexpr std::size_t MAX_VOXELS_SHOWN = 200000;
 
 void addObstacle(const Outcome& outcome, double within_m, const std::string& frame, MarkerArray& out) {
   if (!outcome.obstacle || within_m <= 0) return;
-  const Box bodies = boundsInMap(outcome);
+  const Box bodies = boundsIn(outcome, outcome.step->map.map_from_fixed);
   const double resolution = outcome.obstacle->resolution();
   VoxelLists by_size;
   std::size_t shown = 0;
@@ -245,14 +243,7 @@ void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const Ma
 
 /// Beside the bodies, a line in each colour.
 void addLegend(const Outcome& outcome, const std::string& frame, MarkerArray& out) {
-  Box box;
-  for (const Body& body : outcome.step->bodies) {
-    for (const Vec3& p : *body.t1) {
-      if (!p.allFinite()) continue;
-      box.min = box.min.cwiseMin(p);
-      box.max = box.max.cwiseMax(p);
-    }
-  }
+  const Box box = boundsIn(outcome, Eigen::Isometry3d::Identity());
   if (box.empty()) return;
   const double height = 0.045 * (box.max - box.min).norm();
   Vec3 at(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + 12 * height);

@@ -98,6 +98,17 @@ std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, 
          nameOf(*first, bodies) + rest;
 }
 
+/// A message with what most of them say first.
+template <class Message>
+Message begun(const Outcome& outcome, StampNs stamp_ns, const std::string& frame) {
+  Message out;
+  out.header = headerOf(stamp_ns, frame);
+  put(outcome.status, out.status);
+  put(outcome.start_state, out.start_state);
+  out.answered = outcome.answered;
+  return out;
+}
+
 void fillFrames(const FrameCounters& frames, StatsMessage& out) {
   out.frames_received = frames.received;
   out.frames_processed = frames.processed();
@@ -201,13 +212,9 @@ ros::Time toRosTime(StampNs stamp_ns) {
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
-  deformable_ccd::ContactArray out;
-  out.header = headerOf(outcome.stamp_ns, frame);
+  auto out = begun<deformable_ccd::ContactArray>(outcome, outcome.stamp_ns, frame);
   out.start = toRosTime(outcome.start_ns);
-  out.status = static_cast<std::uint8_t>(outcome.status);
   out.reason = outcome.reason;
-  out.answered = outcome.answered;
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
   out.complete = outcome.complete;
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
@@ -232,11 +239,7 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
 
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
-  deformable_ccd::FirstContact out;
-  out.header = headerOf(outcome.stamp_ns, frame);
-  out.status = static_cast<std::uint8_t>(outcome.status);
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
-  out.answered = outcome.answered;
+  auto out = begun<deformable_ccd::FirstContact>(outcome, outcome.stamp_ns, frame);
   const double toc = earliestNewToc(outcome);
   out.contact = std::isfinite(toc);
   out.pairs = toPairContacts(outcome, bodies);
@@ -289,11 +292,7 @@ void fillState(const Assurance& assurance, deformable_ccd::State& message) {
 }
 
 StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
-  StatsMessage out;
-  out.header = headerOf(outcome.stamp_ns, frame);
-  out.status = static_cast<std::uint8_t>(outcome.status);
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
-  out.answered = outcome.answered;
+  auto out = begun<StatsMessage>(outcome, outcome.stamp_ns, frame);
   out.complete = outcome.complete;
   out.step = outcome.duration_s();
   out.latency = context.latency_s;
@@ -335,11 +334,7 @@ deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pair
 
 deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
                                               const std::vector<Body>& bodies, const std::string& frame) {
-  deformable_ccd::TimeToContact out;
-  out.header = headerOf(prediction.start_ns, frame);
-  out.status = static_cast<std::uint8_t>(prediction.status);
-  out.start_state = static_cast<std::uint8_t>(prediction.start_state);
-  out.answered = prediction.answered;
+  auto out = begun<deformable_ccd::TimeToContact>(prediction, prediction.start_ns, frame);
   out.horizon = horizon_s;
   const double toc = earliestNewToc(prediction);
   out.contact = std::isfinite(toc);
