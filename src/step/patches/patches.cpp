@@ -5,6 +5,7 @@
 
 #include "obstacle/burst.h"
 #include "step/pairs/closest_points.h"
+#include "step/patches/touch_lanes.h"
 
 namespace dccd {
 namespace {
@@ -81,43 +82,13 @@ PatchMaker::Place PatchMaker::placeOfCrossing(const Outcome& outcome, const Touc
   return {throughPlane(at(0, 0), at(1, 0), f0, (f1 - f0).cross(f2 - f0)), Vec3::Zero()};
 }
 
-/// Of contacts between meshes on straight paths a block of lanes at a time, of others one by one.
 void PatchMaker::findPlaces(const Outcome& outcome, std::size_t piece) {
-  const std::vector<Body>& bodies = outcome.step->bodies;
-  const std::size_t end = std::min(contacts_, (piece + 1) * PIECE);
-  std::array<simd::TouchBlock, 2> blocks;  // vertex-face, edge-edge
-  std::array<std::array<std::size_t, simd::TOUCHES>, 2> contact_of;
-  std::array<std::size_t, 2> used{0, 0};
-  const auto flush = [&](bool edges) {
-    const simd::TouchBlock& block = blocks[edges];
-    simd::touchPlaces(edges, used[edges], blocks[edges]);
-    for (std::size_t lane = 0; lane < used[edges]; ++lane) {
-      places_[contact_of[edges][lane]] = {Vec3(block.point[0][lane], block.point[1][lane], block.point[2][lane]),
-                                          Vec3(block.normal[0][lane], block.normal[1][lane], block.normal[2][lane])};
-    }
-    used[edges] = 0;
-  };
-  for (std::size_t c = piece * PIECE; c < end; ++c) {
-    const Contact& contact = outcome.contacts[c];
-    if (contact.body[1] == OBSTACLE_BODY || outcome.substeps > 1) {
-      places_[c] = placeOf(outcome, contact);
-      continue;
-    }
-    const bool edges = contact.kind == PairKind::EDGE_EDGE;
-    simd::TouchBlock& block = blocks[edges];
-    const std::size_t lane = used[edges]++;
-    contact_of[edges][lane] = c;
-    block.toc[lane] = contact.toc_lower;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Body& body = bodies[contact.bodyOf(k)];
-      const Vec3 &from = (*body.t0)[contact.vertex[k]], &to = (*body.t1)[contact.vertex[k]];
-      for (int axis = 0; axis < 3; ++axis) block.x[0][k][axis][lane] = from[axis];
-      if (!edges && k > 0) continue;
-      for (int axis = 0; axis < 3; ++axis) block.x[1][k][axis][lane] = to[axis];
-    }
-    if (used[edges] == simd::TOUCHES) flush(edges);
-  }
-  for (const bool edges : {false, true}) flush(edges);
+  inLanes(
+      outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces,
+      [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
+        places_[c] = {laneOf(block.point, lane), laneOf(block.normal, lane)};
+      },
+      [&](std::size_t c) { places_[c] = placeOf(outcome, outcome.contacts[c]); });
 }
 
 /// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.

@@ -5,7 +5,6 @@
 
 #include "dccd/outcome.h"
 #include "dccd/patch.h"
-#include "simd/touch_geometry.h"
 #include "step/patches/touch_graph.h"
 
 namespace dccd {
