@@ -1,10 +1,12 @@
 #include "output/output_messages.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 
+#include "dccd/contact_geometries.h"
 #include "dccd/new_contacts.h"
 #include "output/patch_messages.h"
 
@@ -119,7 +121,7 @@ void fillFrames(const FrameCounters& frames, StatsMessage& out) {
   out.seams_teleport = frames.of(StepStatus::TELEPORT);
 }
 
-void fillContacts(const Outcome& outcome, StatsMessage& out) {
+void fillCounts(const Outcome& outcome, StatsMessage& out) {
   out.contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.contacts_certain = static_cast<std::uint32_t>(outcome.counts.certain);
   out.contacts_undecided = static_cast<std::uint32_t>(outcome.counts.undecided);
@@ -166,18 +168,8 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.tier_big_integer = tier(Tier::BIG_INTEGER);
 }
 
-}  // namespace
-
-std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
-  std_msgs::Header out;
-  out.stamp = toRosTime(stamp_ns);
-  out.frame_id = frame;
-  return out;
-}
-
-ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch) {
-  const ContactGeometry geometry = contactGeometry(outcome, contact);
-  ContactMessage out;
+void fillContact(const Outcome& outcome, const Contact& contact, const ContactGeometry& geometry, std::uint64_t patch,
+                 ContactMessage& out) {
   out.kind = static_cast<std::uint8_t>(contact.kind);
   out.certainty = static_cast<std::uint8_t>(contact.certainty);
   out.initial = contact.initial;
@@ -199,6 +191,34 @@ ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::ui
   out.normal.z = geometry.normal.z();
   std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
   out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
+}
+
+void fillContacts(const Outcome& outcome, std::vector<ContactMessage>& out) {
+  out.resize(outcome.contacts.size());
+  std::array<ContactGeometry, 256> geometry;  // of some at a time, which stay in the first cache
+  for (std::size_t first = 0, last = 0; first < out.size(); first = last) {
+    last = std::min(first + geometry.size(), out.size());
+    contactGeometries(outcome, first, last, geometry.data());
+    for (std::size_t i = first; i < last; ++i) {
+      const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
+      const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
+      fillContact(outcome, outcome.contacts[i], geometry[i - first], patch, out[i]);
+    }
+  }
+}
+
+}  // namespace
+
+std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
+  std_msgs::Header out;
+  out.stamp = toRosTime(stamp_ns);
+  out.frame_id = frame;
+  return out;
+}
+
+ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch) {
+  ContactMessage out;
+  fillContact(outcome, contact, contactGeometry(outcome, contact), patch, out);
   return out;
 }
 
@@ -225,12 +245,7 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
   for (const Body& body : bodies) out.bodies.push_back(body.name);
-  out.contacts.reserve(outcome.contacts.size());
-  for (std::size_t i = 0; i < outcome.contacts.size(); ++i) {
-    const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
-    const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
-    out.contacts.push_back(toContact(outcome, outcome.contacts[i], patch));
-  }
+  fillContacts(outcome, out.contacts);
   for (const StartIntersection& crossing : outcome.intersections) {
     deformable_ccd::Intersection message;
     std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
@@ -311,7 +326,7 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.substeps = static_cast<std::uint32_t>(outcome.substeps);
   fillFrames(context.frames, out);
   out.weld_changes = context.weld_changes;
-  fillContacts(outcome, out);
+  fillCounts(outcome, out);
   fillStages(outcome.stats, out);
   out.map_present = outcome.obstacle != nullptr;
   if (outcome.obstacle) {
