@@ -59,6 +59,7 @@ constexpr const char* DEFAULT_CLOUD_TOPIC = "obstacle_cloud";
 struct MonitorConfig {
   std::string fixed_frame;         ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;  ///< the robot's links come last
+  bool bodies_listed = false;      ///< under bodies/, each with its own topic
   Robot robot;
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
   MonitorOptions monitor;

@@ -297,18 +297,25 @@ deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) 
   }
   if (out.checked_map) {
     out.map_stamp = toRosTime(outcome.step->map.stamp_ns);
-    out.map_age = secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns);
+    out.map_age = mapAge(outcome);
   }
   out.start = toRosTime(outcome.start_ns);
   out.holds_until = toRosTime(outcome.stamp_ns);
   return out;
 }
 
-void fillState(const Assurance& assurance, deformable_ccd::State& message) {
+double mapAge(const Outcome& outcome) {
+  const StampNs stamp_ns = outcome.step->map.stamp_ns;
+  return stamp_ns == 0 ? 0 : secondsBetween(stamp_ns, outcome.stamp_ns);
+}
+
+void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
+               deformable_ccd::State& message) {
   message.proved = assurance.proved;
   message.touching = static_cast<std::uint8_t>(assurance.touching);
   message.clear = assurance.clear();
-  message.reason = describe(assurance);
+  message.reason = describe(assurance, touches);
+  if (!assurance.proved && !remedy.empty()) message.reason += "; " + remedy;
   message.missing = assurance.missing;
   message.excluded = assurance.excluded;
   message.expected = assurance.expected;
@@ -331,7 +338,7 @@ StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, co
   out.map_present = outcome.obstacle != nullptr;
   if (outcome.obstacle) {
     out.map_leaves = outcome.obstacle->leafCount();
-    out.map_age = secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns);
+    out.map_age = mapAge(outcome);
   }
   out.excluded_voxels = outcome.excluded_voxels;
   out.unknown_fraction = outcome.unknown_fraction;

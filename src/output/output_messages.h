@@ -47,7 +47,11 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
                                             const std::string& frame);
 /// What was checked and when; what may be said of it comes by fillState().
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame);
-void fillState(const Assurance& assurance, deformable_ccd::State& message);
+/// `touches`: touchesInWords(); `remedy`: what to do about what is not proved. Either may be empty.
+void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
+               deformable_ccd::State& message);
+/// Of the map in use, at the step's end [s]; 0 where it carries no stamp, as one of a file.
+double mapAge(const Outcome& outcome);
 /// The message of the package, not StepStats.
 deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
 deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,

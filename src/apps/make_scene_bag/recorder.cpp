@@ -234,4 +234,19 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
   return summary(spec, simulation, bag_path);
 }
 
+std::string recordMap(const scene::Obstacle& obstacle, const std::string& path) {
+  const octomap_msgs::Octomap map = toOctomap({}, obstacle, true);
+  std::size_t nodes = 1;  // the root, and two bits for each child of a node that has children; 0: there is none
+  for (const std::int8_t byte : map.data) {
+    for (int shift = 0; shift < 8; shift += 2) nodes += ((byte >> shift) & 3) != 0;
+  }
+  std::ofstream file(path, std::ios::binary);
+  file << "# Octomap OcTree binary file\nid " << map.id << "\nsize " << nodes << "\nres " << map.resolution
+       << "\ndata\n";
+  file.write(reinterpret_cast<const char*>(map.data.data()), static_cast<std::streamsize>(map.data.size()));
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+  return path + ": a map of " + std::to_string(nodes) + " nodes, voxels of " + std::to_string(map.resolution) + " m\n";
+}
+
 }  // namespace dccd

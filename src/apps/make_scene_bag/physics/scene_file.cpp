@@ -322,6 +322,19 @@ SceneSpec parseScene(const std::string& text, const std::string& name) {
   return spec;
 }
 
+Obstacle readObstacleFile(const std::string& path) {
+  ParameterReader map(parseYaml(yamlText(path, "a file with an obstacle, such as examples/box.yaml"), path), "");
+  if (map.has("bodies")) {
+    const SceneSpec spec = readSceneFile(path);
+    if (!spec.obstacle) map.fail("obstacle", "is missing: the scene has no map");
+    return *spec.obstacle;
+  }
+  const std::string fixed_frame = map.text("fixed_frame", "world");
+  const Obstacle obstacle = readObstacle(map.neededSection("obstacle"), fixed_frame);
+  map.finish();
+  return obstacle;
+}
+
 SceneSpec readSceneFile(const std::string& path) {
   return parseScene(yamlText(path, "a scene file, such as config/scenes/table_edge.yaml"), path);
 }
