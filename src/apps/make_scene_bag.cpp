@@ -10,6 +10,7 @@
 #include "apps/make_scene_bag/monitor_check.h"
 #include "apps/make_scene_bag/physics/scene_file.h"
 #include "apps/make_scene_bag/recorder.h"
+#include "apps/make_scene_bag/scene_robot.h"
 
 int main(int argc, char** argv) {
   CLI::App app(
@@ -33,7 +34,8 @@ int main(int argc, char** argv) {
   dccd::requireDecimalNumbers(app);
   CLI11_PARSE(app, argc, argv);
   try {
-    const dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    dccd::addRobot(spec, scene_path);
     dccd::checkMonitorBlock(spec, scene_path);
     std::cout << dccd::recordScene(spec, bag_path, options);
   } catch (const std::exception& error) {
