@@ -178,9 +178,9 @@ nlohmann::json measure(const Panda& panda, const Scene& scene, int steps) {
   const Robot& robot = with->config.robot;
   const KDL::Vector hand = panda.place(jointsAt(panda, {"", 0, 0, 1, false}, 0), 0).from_base.at("panda_hand").p;
   const Vec3 tips(hand.x(), hand.y(), hand.z() - 0.11);
-  // The base is as high as it takes for the tips to be 5 cm above the map, or for the hand to be before the cloth.
-  const Eigen::Isometry3d base(Eigen::Translation3d(-tips.x(), scene.base_y_m, (scene.hangs ? 0.3 : 0.05) - tips.z()));
-  const Vec3 under(0, 0, scene.hangs ? 0.3 : 0);
+  // The base is as high as it takes for the tips to be 5 cm above the map, or 2 cm below the upper side of the cloth.
+  const Eigen::Isometry3d base(Eigen::Translation3d(-tips.x(), scene.base_y_m, (scene.hangs ? 0.6 : 0.05) - tips.z()));
+  const Vec3 under(0, 0, scene.hangs ? 0.34 : 0);
   const Topology topology = Topology::grid(ROWS, COLS);
   Fcl fcl(robot, topology, clothAt(scene, under, 0));
   std::vector<double> with_ms, without_ms, more_ms, fcl_ms;

@@ -261,6 +261,17 @@ class RobotTest(FolderTestCase):
     def test_the_same_seed_gives_the_same_bag(self):
         self.assertEqual(self.record('a.bag', 7).read_bytes(), self.record('b.bag', 7).read_bytes())
 
+    def test_without_own_voxels_the_arm_and_the_towel_are_obstacles(self):
+        """So that the page's fact of the map says something: the towel touches the table first, at 3.25 s or later."""
+        bag = self.record('all.bag', 90)
+        config = yaml.safe_load(self.SCENE.read_text())['monitor']
+        config['effects']['own_voxels'] = 'off'
+        del config['own_voxels_m']
+        (self.folder / 'all.yaml').write_text(yaml.safe_dump(config))
+        run(TOOLS / 'analyze_bag', bag, '--report', self.folder / 'all', '--params', self.folder / 'all.yaml', '--quiet')
+        story = tell(steps_of(self.folder / 'all'))
+        self.assertLess(story.first_s['octomap'], 1)
+
     def test_what_the_urdf_does_not_have_is_refused(self):
         urdf = 'package://deformable_ccd/config/scenes/robots/cloth_arm.urdf'
         for old, new, told in (
