@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t LEAST_ROUNDS = 9;
 constexpr double NARROW = 0.02;  // the interval of a ratio is narrow enough within this of its median
 constexpr int CELLS = 59;        // quads along a side of the sheets
-constexpr const char* WHOLE = "whole";
+constexpr const char *WHOLE = "whole", *WITHOUT_PATCHES = "without patches";
 constexpr const char* REFERENCE = "crossing at t = 1/2";  // of the sheets
 
 /// One step, or two to and fro that take turns, each beginning where the other ends.
@@ -57,6 +57,7 @@ struct Setting {
   }
 };
 
+/// The whole is the first, contacts alone the second.
 std::vector<Setting> settingsFor(const Case& of, int threads) {
   std::vector<Setting> settings;
   const auto add = [&](const std::string& name, const std::function<void(Options&)>& change) {
@@ -69,7 +70,7 @@ std::vector<Setting> settingsFor(const Case& of, int threads) {
   };
   add(WHOLE, [](Options&) {});
   add("contacts alone", [](Options& o) { o.patches = o.check_start_state = false; });
-  add("without patches", [](Options& o) { o.patches = false; });
+  add(WITHOUT_PATCHES, [](Options& o) { o.patches = false; });
   add("first contact only", [](Options& o) { o.earliest_only = true; });
   if (threads > 1) add("on one thread", [](Options& o) { o.num_threads = 1; });
   return settings;
@@ -134,6 +135,7 @@ nlohmann::json measure(const Case& of, int threads, std::size_t most) {
     row["contacts"] = setting.outcome.contacts.size();
     if (&setting != &whole) row["whole_to_it"] = toJson(ratioOf(whole, setting));
     if (&setting != &whole) row["it_to_whole"] = toJson(ratioOf(setting, whole));
+    if (setting.name == WITHOUT_PATCHES) row["to_contacts_alone"] = toJson(ratioOf(setting, settings[1]));
   }
   return j;
 }

@@ -17,6 +17,8 @@ namespace {
 using ContactMessage = deformable_ccd::Contact;
 using StatsMessage = deformable_ccd::StepStats;
 
+constexpr std::size_t KEPT_FOR_USE = 4, ALWAYS_KEPT = 1024;  // times what is in use, which counts as so much
+
 static_assert(static_cast<int>(StepStatus::OK) == static_cast<int>(deformable_ccd::ContactArray::OK));
 static_assert(static_cast<int>(StepStatus::GAP) == static_cast<int>(deformable_ccd::ContactArray::GAP));
 static_assert(static_cast<int>(StepStatus::NO_BODY) == static_cast<int>(deformable_ccd::ContactArray::NO_BODY));
@@ -193,8 +195,15 @@ void fillContact(const Outcome& outcome, const Contact& contact, const ContactGe
   out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
 }
 
+/// What the last message had room for is kept, but not what a burst made of it.
+template <class T>
+void resizeKept(std::vector<T>& list, std::size_t count) {
+  list.resize(count);
+  if (list.capacity() > KEPT_FOR_USE * std::max(count, ALWAYS_KEPT)) list.shrink_to_fit();
+}
+
 void fillContacts(const Outcome& outcome, std::vector<ContactMessage>& out) {
-  out.resize(outcome.contacts.size());
+  resizeKept(out, outcome.contacts.size());
   std::array<ContactGeometry, 256> geometry;  // of some at a time, which stay in the first cache
   for (std::size_t first = 0, last = 0; first < out.size(); first = last) {
     last = std::min(first + geometry.size(), out.size());
@@ -233,6 +242,12 @@ ros::Time toRosTime(StampNs stamp_ns) {
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::ContactArray out;
+  fillContactArray(outcome, bodies, frame, out);
+  return out;
+}
+
+void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
+                      deformable_ccd::ContactArray& out) {
   out.header = headerOf(outcome.stamp_ns, frame);
   out.start = toRosTime(outcome.start_ns);
   out.status = static_cast<std::uint8_t>(outcome.status);
@@ -244,16 +259,17 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
+  out.bodies.clear();
   for (const Body& body : bodies) out.bodies.push_back(body.name);
   fillContacts(outcome, out.contacts);
-  for (const StartIntersection& crossing : outcome.intersections) {
-    deformable_ccd::Intersection message;
+  resizeKept(out.intersections, outcome.intersections.size());
+  for (std::size_t i = 0; i < outcome.intersections.size(); ++i) {
+    const StartIntersection& crossing = outcome.intersections[i];
+    deformable_ccd::Intersection& message = out.intersections[i];
     std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
     std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
     message.expected = crossing.expected;
-    out.intersections.push_back(message);
   }
-  return out;
 }
 
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,

@@ -44,6 +44,9 @@ struct StatsContext {
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
+/// Fills the same into a message, which may have been another one before: its memory is used again.
+void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
+                      deformable_ccd::ContactArray& message);
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
 /// What was checked and when; what may be said of it comes by fillState().

@@ -83,12 +83,11 @@ PatchMaker::Place PatchMaker::placeOfCrossing(const Outcome& outcome, const Touc
 }
 
 void PatchMaker::findPlaces(const Outcome& outcome, std::size_t piece) {
-  inLanes(
-      outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces,
-      [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
-        places_[c] = {laneOf(block.point, lane), laneOf(block.normal, lane)};
-      },
-      [&](std::size_t c) { places_[c] = placeOf(outcome, outcome.contacts[c]); });
+  const auto use = [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
+    places_[c] = {laneOf(block.point, lane), laneOf(block.normal, lane)};
+  };
+  const auto other = [&](std::size_t c) { places_[c] = placeOf(outcome, outcome.contacts[c]); };
+  inLanes(outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces, use, other);
 }
 
 /// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.

@@ -173,6 +173,36 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_EQ(state.expected, quiet.expected);
 }
 
+/// Bytes as they go over the wire.
+template <class Message>
+std::string wireOf(const Message& message) {
+  const ros::SerializedMessage bytes = ros::serialization::serializeMessage(message);
+  return {reinterpret_cast<const char*>(bytes.buf.get()), bytes.num_bytes};
+}
+
+TEST(Lists, AMessageThatWasOneBeforeSaysTheSameAsANewOne) {
+  const Outcome alarm = resting(true), none = nothingFound(StepStatus::OK, StartState::CLEAR);
+  Outcome crossing = alarm;
+  crossing.intersections.resize(3);
+  const std::vector<Body>& bodies = alarm.step->bodies;
+  ASSERT_GT(alarm.contacts.size(), 0u);
+  deformable_ccd::ContactArray kept;
+  for (const Outcome* outcome : {&crossing, &none, &alarm, &crossing}) {
+    fillContactArray(*outcome, bodies, "world", kept);
+    EXPECT_EQ(wireOf(kept), wireOf(toContactArray(*outcome, bodies, "world")));
+  }
+}
+
+// A list is made with the geometry of many contacts at once, a first contact with that of one.
+TEST(Lists, EachContactIsWhatItIsByItself) {
+  const Outcome alarm = resting(true);
+  const auto list = toContactArray(alarm, alarm.step->bodies, "world");
+  ASSERT_EQ(list.contacts.size(), alarm.contacts.size());
+  for (std::size_t i = 0; i < alarm.contacts.size(); ++i) {
+    EXPECT_EQ(wireOf(list.contacts[i]), wireOf(toContact(alarm, alarm.contacts[i], list.contacts[i].patch))) << i;
+  }
+}
+
 TEST(Times, WhatRosCannotHoldIsTheNearestThatItCan) {
   EXPECT_EQ(toRosTime(1500000000), ros::Time(1, 500000000));
   EXPECT_EQ(toRosTime(-1), ros::Time(0, 0));
