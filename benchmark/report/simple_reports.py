@@ -199,6 +199,35 @@ def write_first(folder, rows):
     return save(folder, "first", "# The first contact only\n\n" + table(header, lines))
 
 
+TIERS = {
+    "coincidence": "vertices of both features in one place at the start: a comparison of bits",
+    "batch": "ordinary pairs: doubles with proved bounds, pairs as lanes",
+    "axis motion": "motion along one axis: integers of one or two words",
+    "simple times": "features at rest, contacts at times such as 1/2 and 1/3, motion along one axis: the same integers",
+    "subdivision": "features that are apart while their polynomials vanish",
+    "double-double": "nearly parallel edges, slivers, grazing features",
+    "fixed integers": "degenerate pairs whose coordinates are of similar size",
+    "lazy integers": "coordinates of all sizes: integers of any width, computed where doubles cannot tell the sign; else all are",
+}
+GROUPS = {"steps": "real steps", "queries": "hard queries", "families": "hard families", "sheets": "sheets"}
+
+
+def write_tiers(folder, result):
+    """Of each tier and group of inputs the input that is slowest without it, as a multiple of the time with it."""
+    header = ["tier", "what it is for"] + list(GROUPS.values()) + ["slower by half"]
+    lines = []
+    for tier, purpose in TIERS.items():
+        cells, slower = [], 0
+        for group in GROUPS:
+            ratios = [(r["seconds"][tier] / r["seconds"][""], r["name"]) for r in result["rows"] if r["group"] == group]
+            worst = max(ratios, default=(0, "not measured"))
+            slower += sum(ratio > 1.5 for ratio, _ in ratios)
+            cells.append("%.3g (%s)" % worst)
+        lines.append([tier, purpose] + cells + [str(slower)])
+    write_rows(os.path.join(folder, "tiers.csv"), header, lines)
+    return save(folder, "tiers", "# The tiers of `exact`, each left out\n\n" + table(header, lines))
+
+
 def write_python(folder, rows):
     header = ["step", "triangles", "contacts", "the core, ms", "Python above it, ms", "least", "share"]
     lines = [[r["step"], str(r["triangles"]), str(r["contacts"]), "%.4g" % r["core_ms"], "%.2g" % r["over_ms"], "%.2g" % r["least_over_ms"],

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "dccd/contact_fields.h"
 #include "dccd/contact_geometries.h"
 #include "dccd/new_contacts.h"
 #include "output/patch_messages.h"
@@ -172,26 +173,14 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
 
 void fillContact(const Outcome& outcome, const Contact& contact, const ContactGeometry& geometry, std::uint64_t patch,
                  ContactMessage& out) {
-  out.kind = static_cast<std::uint8_t>(contact.kind);
-  out.certainty = static_cast<std::uint8_t>(contact.certainty);
-  out.initial = contact.initial;
-  out.leaving = contact.leaving;
-  out.expected = contact.expected;
-  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
-  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
-  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
-  out.voxel_size = contact.voxel_size;
+#define DCCD_PUT_CONTACT(member, published) put(contact.member, out.published);
+  DCCD_CONTACT_FIELDS(DCCD_PUT_CONTACT)
+#undef DCCD_PUT_CONTACT
   out.patch = patch;
-  out.toc_lower = contact.toc_lower;
-  out.toc_upper = contact.toc_upper;
   out.time_of_contact = toRosTime(outcome.stampBefore(contact.toc_lower));
-  out.point.x = geometry.point.x();
-  out.point.y = geometry.point.y();
-  out.point.z = geometry.point.z();
-  out.normal.x = geometry.normal.x();
-  out.normal.y = geometry.normal.y();
-  out.normal.z = geometry.normal.z();
-  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
+  put(geometry.point, out.point);
+  put(geometry.normal, out.normal);
+  put(geometry.weights, out.weights);
   out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
 }
 
@@ -266,8 +255,8 @@ void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, c
   for (std::size_t i = 0; i < outcome.intersections.size(); ++i) {
     const StartIntersection& crossing = outcome.intersections[i];
     deformable_ccd::Intersection& message = out.intersections[i];
-    std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
-    std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
+    put(crossing.body, message.body);
+    put(crossing.vertex, message.vertex);
     message.expected = crossing.expected;
   }
 }
