@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "obstacle/voxel_surface_impl.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -82,12 +83,8 @@ TEST(KnownSpace, UnknownLeavesAreBounded) {
 }
 
 TEST(KnownSpace, AResolutionThatIsNoneIsNamed) {
-  try {
-    KnownSpace::build(-0.5, {});
-    ADD_FAILURE();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "resolution_m is -0.5, which is not a length from 1e-290 to 1e290 m");
-  }
+  const std::string text = test::said<std::invalid_argument>([&] { KnownSpace::build(-0.5, {}); });
+  EXPECT_EQ(text, "resolution_m is -0.5, which is not a length from 1e-290 to 1e290 m");
 }
 
 TEST(KnownSpace, SweptSpaceCountsVoxelsOnce) {
