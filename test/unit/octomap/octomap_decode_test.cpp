@@ -77,6 +77,7 @@ void paint(Tree& tree, int reach) {
   }
   tree.updateInnerOccupancy();
   tree.toMaxLikelihood();
+  tree.setNodeValue(octomap::OcTreeKey(32768 + 40, 32768, 32768), 0.0f);  // even odds
   tree.prune();
 }
 

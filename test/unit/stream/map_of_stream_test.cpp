@@ -78,7 +78,7 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   // The map's frame stands 10 m above the fixed frame's: voxel [0, 1]^3 there is [0, 1]^2 x [10, 11] here.
   ObstacleMap map{VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 1}}), 0, Eigen::Isometry3d::Identity(), {}};
   map.map_from_fixed.translation() = Vec3(0, 0, -10);
-  monitor.setMap(std::move(map));
+  monitor.setMap(map);
   feed(overTheVoxel(0, 12));
   const Outcome outcome = feed(overTheVoxel(100 * MS, 10));
   ASSERT_FALSE(outcome.contacts.empty());
@@ -98,6 +98,10 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   EXPECT_TRUE(excluded.contacts.empty());
   EXPECT_EQ(excluded.excluded_voxels, 1u);
   EXPECT_TRUE(assuranceOf(excluded).clear()) << "what is excluded is not looked at";
+  map.map_from_fixed.setIdentity();
+  monitor.setMap(map);
+  feed(overTheVoxel(400 * MS, 2));
+  EXPECT_NEAR(feed(overTheVoxel(500 * MS, 0)).earliest_toc, 0.5, 1e-9) << "the same map, moved out of the box";
 }
 
 // An excluded voxel is free space, so what lies behind it is exposed.
