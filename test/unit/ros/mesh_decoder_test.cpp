@@ -215,6 +215,8 @@ TEST(MeshDecoder, RefusesOtherTypesAndWhatIsTooMuch) {
   MeshInputConfig small;
   small.max_vertices = 3;
   EXPECT_TRUE(mentions(errorOf(small, MESH, mesh(SQUARE, HALVES)), "max_vertices"));
+  small.max_vertices = 4;
+  EXPECT_EQ(errorOf(small, MESH, mesh(SQUARE, HALVES)), "") << "so many may be";
   // Whatever makes the triangles: the message, its shape, or corners by three.
   small = grid(2, 2);
   small.max_faces = 1;
