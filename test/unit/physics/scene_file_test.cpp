@@ -1,5 +1,6 @@
 // Scene files: what is read, and what is refused with file, line, key and what to write instead.
 #include "apps/make_scene_bag/physics/scene_file.h"
+#include "support/said.h"
 
 #include <filesystem>
 #include <string>
@@ -24,12 +25,7 @@ std::string errorOf(std::string text, const std::string& from, const std::string
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
-  try {
-    parseScene(text, "s.yaml");
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return test::said<ParameterError>([&] { parseScene(text, "s.yaml"); }, "accepted");
 }
 
 TEST(SceneFile, ReadsWhatItSays) {
