@@ -235,6 +235,10 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
     readBodyEffects(reader, config, body);
     config.bodies.push_back(std::move(body));
   } else {
+    config.bodies_listed = true;
+    if (reader.has("topic")) {
+      reader.fail("topic", "(mesh:= of the launch files) has no place beside bodies; set bodies/NAME/topic instead");
+    }
     ParameterReader section = reader.section("bodies");
     for (const std::string& name : section.names()) {
       if (name == "octomap" || name == "self") {

@@ -135,6 +135,7 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
   markers.normal_length_m = section.number("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
   markers.line_width_m = section.number("line_width_m", markers.line_width_m, 1e-6, LARGE);
   markers.max_contacts = section.integer("max_contacts", markers.max_contacts, 1, MANY);
+  markers.swept = section.get("swept", markers.swept);
   markers.mesh = section.get("mesh", markers.mesh);
   markers.obstacle_m = section.number("obstacle_m", markers.obstacle_m, 0, LARGE);
   section.finish();
@@ -302,6 +303,7 @@ bool MonitorConfig::holdsDistance() const {
 std::uint64_t MonitorConfig::hash() const {
   std::ostringstream text;
   text << std::setprecision(17) << given_hash << ' ' << phase;
+  for (const Hold& hold : holds) text << ' ' << hold.closed;
 #define DCCD_HASH_SETTING(name, value) text << ' ' << static_cast<double>(value);
   DCCD_LIVE_SETTINGS(DCCD_HASH_SETTING)
 #undef DCCD_HASH_SETTING

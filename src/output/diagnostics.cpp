@@ -39,7 +39,7 @@ void Diagnostics::add(const Outcome& outcome, double latency_s) {
   if (!outcome.answered) return;
   map_present_ = outcome.obstacle != nullptr;
   map_reason_ = outcome.reason;
-  map_age_s_ = map_present_ ? secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns) : 0;
+  map_age_s_ = map_present_ ? mapAge(outcome) : 0;
 }
 
 void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, const std::string& map_topic,
@@ -107,6 +107,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   put(status, "frames handed over in process", context.frames_handed_over);
   put(status, "unusable transforms", context.transforms_unusable);
   put(status, "wrong row_steps", context.wrong_row_steps);
+  put(status, "refused requests for objects", context.requests_refused);
   put(status, "maps received", context.maps_received);
   put(status, "maps refused", context.maps_refused);
   if (map_present_) put(status, "map age [s]", map_age_s_);

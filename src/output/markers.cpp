@@ -45,17 +45,11 @@ Marker list(const Outcome& outcome, const std::string& frame, const std::string&
   return marker;
 }
 
-// What means what. The legend shows each in its own colour.
-const std_msgs::ColorRGBA EARLY = color(1, 0.1, 0), LATE = color(1, 1, 0), INITIAL = color(0.75, 0.4, 1),
-                          EXPECTED = color(0.65, 0.65, 0.68), PREDICTED = color(0.2, 0.9, 1),
-                          NORMAL = color(0.2, 0.9, 0.4), VOXEL = color(1, 0.55, 0.15);
-const std::pair<const char*, std_msgs::ColorRGBA> LEGEND[] = {{"contact, early in the step", EARLY},
-                                                              {"contact, late in it", LATE},
-                                                              {"touched before it", INITIAL},
-                                                              {"expected", EXPECTED},
-                                                              {"predicted", PREDICTED},
-                                                              {"normal of a patch", NORMAL},
-                                                              {"voxel that is touched", VOXEL}};
+// What means what: config/rviz/monitor.rviz says it beside the view.
+const std_msgs::ColorRGBA INITIAL = color(0.75, 0.4, 1), EXPECTED = color(0.65, 0.65, 0.68),
+                          PREDICTED = color(0.2, 0.9, 1), NORMAL = color(0.2, 0.9, 0.4), VOXEL = color(1, 0.55, 0.15),
+                          NAME = color(0.75, 0.85, 1);
+constexpr double TEXT = 3;    // letters are this much higher than a point
 constexpr double TOLD_S = 2;  // this long a patch's text says that it began
 
 Marker text(const Outcome& outcome, const std::string& frame, const std::string& ns, int id, const Vec3& at,
@@ -114,16 +108,18 @@ Marker& voxelList(const Outcome& outcome, const std::string& frame, std::uint32_
   return by_size.emplace(size, std::move(marker)).first->second;
 }
 
-/// Box around all bodies at the end of the step, in a frame of that pose.
-Box boundsIn(const Outcome& outcome, const Eigen::Isometry3d& frame_from_fixed) {
+/// By a point, if that is finite.
+void widen(Box& box, const Vec3& p) {
+  if (!p.allFinite()) return;
+  box.min = box.min.cwiseMin(p);
+  box.max = box.max.cwiseMax(p);
+}
+
+/// Box around all bodies at the end of the step, in the map's frame.
+Box boundsInMap(const Outcome& outcome) {
   Box box;
   for (const Body& body : outcome.step->bodies) {
-    for (const Vec3& p : *body.t1) {
-      if (!p.allFinite()) continue;
-      const Vec3 in_frame = frame_from_fixed * p;
-      box.min = box.min.cwiseMin(in_frame);
-      box.max = box.max.cwiseMax(in_frame);
-    }
+    for (const Vec3& p : *body.t1) widen(box, outcome.step->map.map_from_fixed * p);
   }
   return box;
 }
@@ -134,7 +130,7 @@ constexpr std::size_t MAX_VOXELS_SHOWN = 200000;
 
 void addObstacle(const Outcome& outcome, double within_m, const std::string& frame, MarkerArray& out) {
   if (!outcome.obstacle || within_m <= 0) return;
-  const Box bodies = boundsIn(outcome, outcome.step->map.map_from_fixed);
+  const Box bodies = boundsInMap(outcome);
   const double resolution = outcome.obstacle->resolution();
   VoxelLists by_size;
   std::size_t shown = 0;
@@ -237,21 +233,79 @@ void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const Ma
       if (topology.hasFaces()) break;
       if (at[e[0]].allFinite() && at[e[1]].allFinite()) addTube(at[e[0]], at[e[1]], 0.4 * config.point_size_m, marker);
     }
-    if (!marker.points.empty()) out.markers.push_back(std::move(marker));
+    if (marker.points.empty()) continue;
+    out.markers.push_back(std::move(marker));
+    Box box;
+    for (const Vec3& p : at) widen(box, p);
+    const double height = TEXT * config.point_size_m;
+    const Vec3 above(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + height);
+    out.markers.push_back(text(outcome, frame, "mesh/" + bodies[b].name, 1, above, height, NAME, bodies[b].name));
   }
 }
 
-/// Beside the bodies, a line in each colour.
-void addLegend(const Outcome& outcome, const std::string& frame, MarkerArray& out) {
-  const Box box = boundsIn(outcome, Eigen::Isometry3d::Identity());
-  if (box.empty()) return;
-  const double height = 0.045 * (box.max - box.min).norm();
-  Vec3 at(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + 12 * height);
-  for (const auto& [words, rgba] : LEGEND) {
-    const int id = static_cast<int>(out.markers.size());
-    out.markers.push_back(text(outcome, frame, "legend", id, at, height, rgba, words));
-    at.z() -= 1.3 * height;
+/// Each vertex by the separation along the mean of its faces' normals, as far as it takes for each of these faces.
+Positions grown(const Topology& topology, const Positions& at, double by_m) {
+  Positions normals(at.size(), Vec3::Zero()), out = at;
+  double volume = 0;
+  for (const Face& f : topology.faces()) {
+    const Vec3 area = (at[f[1]] - at[f[0]]).cross(at[f[2]] - at[f[0]]);
+    volume += at[f[0]].dot(area);
+    for (const Index v : f) normals[v] += area.normalized();
   }
+  if (topology.isClosed() && volume < 0) by_m = -by_m;  // its faces look inwards
+  for (std::size_t v = 0; v < at.size(); ++v) out[v] += by_m * normals[v].stableNormalized();
+  return out;
+}
+
+/// Of rigid bodies: what must not come nearer than their separation, roughly, and the box of all that they sweep.
+void addSwept(const Outcome& outcome, const MarkerConfig& config, const std::string& frame, MarkerArray& out) {
+  for (const Body& body : outcome.step->bodies) {
+    Box box;
+    for (const Positions* at : {body.t0.get(), body.t1.get()}) {
+      for (const Vec3& p : *at) {
+        box.min = box.min.cwiseMin(p);
+        box.max = box.max.cwiseMax(p);
+      }
+    }
+    if (!body.rigid || box.empty() || !box.min.allFinite() || !box.max.allFinite()) continue;
+    const double separation_m = body.minimum_separation_m;
+    if (separation_m > 0) {
+      Marker padding = list(outcome, frame, "padding/" + body.name, Marker::TRIANGLE_LIST, 1.0);
+      padding.color = color(1, 0.7, 0.2, 0.25);
+      const Positions at = grown(*body.topology, *body.t1, separation_m);
+      for (const Face& face : body.topology->faces()) {
+        for (const Index v : face) padding.points.push_back(point(at[v]));
+      }
+      out.markers.push_back(std::move(padding));
+    }
+    Marker edges = list(outcome, frame, "swept/" + body.name, Marker::LINE_LIST, config.line_width_m);
+    edges.color = color(0.5, 0.7, 1);
+    const Vec3 min = box.min - Vec3::Constant(separation_m), size = box.max + Vec3::Constant(separation_m) - min;
+    for (int a = 0; a < 3; ++a) {
+      for (int side = 0; side < 4; ++side) {
+        Vec3 from = min;
+        from[(a + 1) % 3] += (side & 1) * size[(a + 1) % 3];
+        from[(a + 2) % 3] += (side >> 1) * size[(a + 2) % 3];
+        edges.points.push_back(point(from));
+        edges.points.push_back(point(from + size[a] * Vec3::Unit(a)));
+      }
+    }
+    out.markers.push_back(std::move(edges));
+  }
+}
+
+/// Upwards until it covers none of the texts that stand already: each is some ten letters wide to either side.
+Vec3 clearOf(const MarkerArray& markers, Vec3 at, double height) {
+  const auto covers = [&](const Marker& other) {
+    if (other.type != Marker::TEXT_VIEW_FACING) return false;
+    const Vec3 away = at - Vec3(other.pose.position.x, other.pose.position.y, other.pose.position.z);
+    return std::abs(away.z()) < 1.2 * height && away.head<2>().norm() < 12 * height;
+  };
+  constexpr int MOST = 100;  // far from the origin a height may be too little to change a coordinate
+  for (int i = 0; i < MOST && std::any_of(markers.markers.begin(), markers.markers.end(), covers); ++i) {
+    at.z() += 0.4 * height;
+  }
+  return at;
 }
 
 /// At the patch of each pair of partners that began last, as long as that is news.
@@ -267,7 +321,7 @@ void addBeginnings(const Outcome& outcome, const std::vector<Body>& bodies, doub
   for (const auto& [body, patch] : newest) {
     const double ago_s = secondsBetween(patch->began_to_ns, outcome.stamp_ns);
     if (ago_s > TOLD_S || !patch->centroid.allFinite()) continue;
-    const Vec3 at = patch->centroid + Vec3(0, 0, 2 * height);
+    const Vec3 at = clearOf(out, patch->centroid + Vec3(0, 0, 2 * height), height);
     const std::string words = pairOf(body, bodies) + ", " + inSeconds(ago_s) + " ago";
     out.markers.push_back(text(outcome, frame, "began", id++, at, height, color(1, 1, 1), words));
   }
@@ -320,11 +374,9 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
   }
   addObstacle(outcome, config.obstacle_m, frame, out);
   addOwn(outcome, frame, out);
-  if (config.mesh) {
-    addMeshes(outcome, bodies, config, frame, out);
-    addLegend(outcome, frame, out);
-  }
-  addBeginnings(outcome, bodies, 2 * config.point_size_m, frame, out);
+  if (config.swept) addSwept(outcome, config, frame, out);
+  if (config.mesh) addMeshes(outcome, bodies, config, frame, out);
+  addBeginnings(outcome, bodies, TEXT * config.point_size_m, frame, out);
   for (Marker* marker : {&voxels, &faces, &normals, &expected, &initial, &contacts}) {
     if (!marker->points.empty()) out.markers.push_back(std::move(*marker));
   }
@@ -345,11 +397,13 @@ MarkerArray toPredictedMarkers(const Outcome& prediction, double horizon_s, cons
   }
   if (!points.points.empty()) out.markers.push_back(std::move(points));
   for (const NewContact& next : newContacts(prediction)) {
-    const Vec3 at = contactGeometry(prediction, next.contact).point + Vec3(0, 0, 2 * config.point_size_m);
+    // Below its place: what has begun is told above.
+    const double height = TEXT * config.point_size_m;
+    const Vec3 at = clearOf(out, contactGeometry(prediction, next.contact).point - Vec3(0, 0, 3 * height), height);
     const std::string words = pairOf(next.body, bodies) + " in " + inSeconds(next.contact.toc_lower * horizon_s);
     if (!at.allFinite()) continue;
-    out.markers.push_back(text(prediction, frame, "predicted first", static_cast<int>(out.markers.size()), at,
-                               2 * config.point_size_m, PREDICTED, words));
+    out.markers.push_back(
+        text(prediction, frame, "predicted first", static_cast<int>(out.markers.size()), at, height, PREDICTED, words));
   }
   for (Marker& marker : out.markers) marker.header.stamp = toRosTime(prediction.start_ns);
   return out;

@@ -54,6 +54,7 @@ struct StatsContext {
   std::uint64_t maps_received = 0, maps_refused = 0;
   std::uint64_t steps_unpublished = 0;  ///< of which not everything was published
   std::uint64_t transforms_unusable = 0;
+  std::uint64_t requests_refused = 0;    ///< of ~attach, ~detach and ~remove
   std::uint64_t wrong_row_steps = 0;     ///< clouds of which the data say it
   std::uint64_t frames_handed_over = 0;  ///< by publishers in the same process, never serialised
   LookAheadSummary look_ahead;
@@ -63,11 +64,18 @@ struct StatsContext {
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
+/// Fills the same into a message, which may have been another one before: its memory is used again.
+void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
+                      deformable_ccd::ContactArray& message);
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
 /// What was checked and when; what may be said of it comes by fillState().
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame);
-void fillState(const Assurance& assurance, deformable_ccd::State& message);
+/// `touches`: touchesInWords(); `remedy`: what to do about what is not proved. Either may be empty.
+void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
+               deformable_ccd::State& message);
+/// Of the map in use, at the step's end [s]; 0 where it carries no stamp, as one of a file.
+double mapAge(const Outcome& outcome);
 /// The message of the package, not StepStats.
 deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
 deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,

@@ -235,6 +235,7 @@ void Report::addProof(const Outcome& o) {
     ++lasting_[o.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(o.start_state)];
   }
   const Assurance assurance = assuranceOf(o);
+  first_frames_ += o.status == StepStatus::FIRST_FRAME;
   if (assurance.proved || o.status == StepStatus::FIRST_FRAME) return;
   const bool is_ok = o.status == StepStatus::OK;
   const std::string kind = is_ok ? assurance.missing.front() : toString(o.status);

@@ -7,6 +7,7 @@ import unittest
 
 import genpy
 import rosbag
+from geometry_msgs.msg import Pose, PoseArray
 from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import MarkerArray
 
@@ -93,6 +94,23 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
             status, _, said, steps = self.analyzed('without', self.bag, *words, '--without-map')
             self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), said)
             self.assertNotIn('octomap', said)
+            self.expect_mapless('without', 'nothing was checked against a map: effects/octomap is off')
+
+    def expect_mapless(self, name, sentence):
+        """In the headline, the facts and the last line: nobody shall take the run for one with a map."""
+        report = json.loads((self.folder / name / 'report.json').read_text())
+        self.assertIn('; %s' % sentence, report['headline'])
+        self.assertIn(['not looked at', sentence], report['facts'])
+        self.assertRegex(dict(report['facts'])['octomap'], '^(none on |off)')
+        self.assertEqual(report['proof']['not_looked_at'], [sentence])
+        self.assertIn(sentence, self.said.splitlines()[0])
+        self.assertEqual(self.said.splitlines()[-1], 'note: ' + sentence)
+
+    def test_what_else_the_bag_has_is_named(self):
+        rope = PoseArray(poses=[Pose(), Pose()])
+        status, said, _, _ = self.analyzed('rope', self.bag_with('rope.bag', ('/octomap_binary', self.octomap()), ('/rope', rope)))
+        self.assertEqual(status, 0)
+        self.assertEqual(said.splitlines()[-1], 'note: nothing was checked against what is on /rope')
 
     def test_a_named_map_of_which_nothing_is_usable(self):
         broken = copy.deepcopy(self.octomap())
@@ -108,6 +126,7 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         self.assertIn('the bag has no octomap on /octomap_binary, which effects/octomap calls for; it has none', said)
         status, _, said, steps = self.analyzed('nothing', nothing)
         self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), 'nobody called for one: ' + said)
+        self.expect_mapless('nothing', 'nothing was checked against a map: the bag has none')
 
     def test_a_refused_map_makes_the_one_before_void(self):
         start = self.messages[0][2]

@@ -65,6 +65,8 @@ class ReportPageTest(unittest.TestCase):
             rows = body[body.index('id="%s"' % name):].split('</table>')[0].count('<tr')
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
+        verdict = body[body.index('id="verdict"'):body.index('id="player"')]
+        self.assertRegex(verdict, r'All 79 steps are proved.*The map was used.*First new contact.*cloth with octomap: 0\.\d{3} s after')
         self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
@@ -80,6 +82,14 @@ class ReportPageTest(unittest.TestCase):
         self.assertRegex(facts, r'deformable_ccd \d+\.\d+\.\d+, compiled by ')
         self.assertRegex(facts, r'<summary>\S*scene\.yaml</summary><pre>[^<]*minimum_separation_m: 0\.012')
         self.assertRegex(facts, r'\d+ CLEAR, \d+ INTERSECTING, \d+ NOT_CHECKED; frames without an answer: 1')
+
+    @unittest.skipUnless(BROWSER, 'no Chromium is installed')
+    def test_a_run_without_a_map_says_so_on_top(self):
+        self.report('table_edge', 40, '--without-map')
+        body, _ = self.dom()
+        verdict = body[body.index('id="verdict"'):body.index('id="player"')]
+        self.assertRegex(verdict, r'No map was used.*Nothing was checked against a map: effects/octomap is off\..*Nothing was found to touch')
+        self.assertNotIn('id="study"', body, 'what was not asked for takes no place')
 
     def browser(self):
         """A page of 1280 x 1000 pixels, drawn by software; its console is empty at the end."""
@@ -106,6 +116,15 @@ class ReportPageTest(unittest.TestCase):
         def seek(seconds):
             page.execute_script("const s = document.getElementById('seek'); s.value = arguments[0];"
                                 "s.dispatchEvent(new Event('input'))", seconds)
+
+        # It opens at the first new contact, and fits a narrow window.
+        first = min((pair['first'] for pair in data['partners'] if pair['first']), key=lambda one: one['t'])
+        self.assertAlmostEqual(page.execute_script('return player.time()'), first['t'], 6)
+        page.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {'width': 400, 'height': 900, 'deviceScaleFactor': 1, 'mobile': False})
+        page.refresh()
+        self.assertLessEqual(page.execute_script('return document.documentElement.scrollWidth'), 400)
+        page.execute_cdp_cmd('Emulation.clearDeviceMetricsOverride', {})
+        page.refresh()
 
         # To the step of the first contact: its contacts are those of contacts.csv, and a click says what one is.
         first = data['partners'][0]['first']

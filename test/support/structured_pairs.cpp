@@ -140,6 +140,21 @@ std::vector<StructuredPairs> structuredPairs(int cells) {
   return all;
 }
 
+std::vector<StructuredPairs> structuredSheets(int cells) {
+  std::vector<StructuredPairs> all;
+  for (const Sheets& sheets : families(cells)) {
+    StructuredPairs set;
+    set.family = sheets.family;
+    for (const Place& place : {sheets.first, sheets.second}) {
+      std::vector<std::array<Index, 3>> faces;
+      std::vector<std::array<Index, 2>> edges;
+      addSheet(place, cells, set.vertices, faces, edges);
+    }
+    all.push_back(set);
+  }
+  return all;
+}
+
 StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   StructuredPairs result = pairs;

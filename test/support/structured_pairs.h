@@ -23,7 +23,10 @@ struct StructuredPairs {
 /// All families, vertex-face and edge-edge of each. Two sheets of cells x cells quads each.
 std::vector<StructuredPairs> structuredPairs(int cells);
 
-/// The same with each coordinate that is not 0 moved by up to two units in the last place.
+/// The sheets of each family without pairs, for whole steps: each of cells + 1 points a side, one after the other.
+std::vector<StructuredPairs> structuredSheets(int cells);
+
+/// Pairs with each coordinate that is not 0 moved by up to two units in the last place.
 StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed);
 
 /// Pairs of one kind without common vertices.

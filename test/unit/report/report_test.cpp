@@ -40,22 +40,43 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
   EXPECT_EQ(headlineOf({Outcome{}}), "No answer; not proved: a first frame alone makes no step.");
   EXPECT_EQ(headlineOf({lost, lost}),
             "No answer; not proved: 2 of 2 frames: NO_TRANSFORM: no transform from 'camera' to 'world' (2).");
-  EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps.");
+  EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps; all of it proved.");
   EXPECT_EQ(headlineOf({no_map, no_map, nothingFound(StepStatus::PARTIAL, StartState::CLEAR)}),
             "No contact found in 3 answered steps; not proved: 3 of 3 frames: NO_MAP (2), PARTIAL (1).");
   EXPECT_EQ(headlineOf({clear, no_map, crossing}),
             "No contact found in 3 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
             "not proved: 1 of 3 frames: NO_MAP (1).");
   EXPECT_EQ(headlineOf({clear, crossing}),
-            "No contact found in 2 answered steps; surfaces touched from the start of a step (start INTERSECTING 1).");
-  EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered steps.") << "of a first frame nothing is asked";
+            "No contact found in 2 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
+            "all of it proved.");
+  EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered step; all of it proved.")
+      << "of a first frame nothing is asked";
   EXPECT_EQ(headlineOf({Outcome{}, clear, lost, clear}),
             "No contact found in 2 answered steps; not proved: 1 of 4 frames: NO_TRANSFORM: no transform from 'camera' "
             "to 'world' (1).");
   Outcome doubtful = clear;
   doubtful.unproved = {"1 vertices are not finite", "and more"};
   EXPECT_EQ(headlineOf({doubtful}),
-            "No contact found in 1 answered steps; not proved: 1 of 1 frames: 1 vertices are not finite (1).");
+            "No contact found in 1 answered step; not proved: 1 of 1 frame: 1 vertices are not finite (1).");
+}
+
+TEST(Headline, WhatWasNotLookedAtStandsBesideWhatWasFound) {
+  const std::string folder = ::testing::TempDir() + "report_without_map";
+  Report report(folder);
+  Outcome no_map = nothingFound(StepStatus::NO_MAP, StartState::CLEAR);
+  no_map.step = std::make_shared<Step>();
+  report.add(no_map, {});
+  report.setNotLookedAt({"nothing was checked against a map: the bag has none"});
+  EXPECT_EQ(report.headline(false),
+            "No contact found in 1 answered step; not proved: 1 of 1 frame; nothing was checked against a map: the bag "
+            "has none.");
+  report.finish();
+  const auto proof = nlohmann::json::parse(std::ifstream(folder + "/report.json"))["proof"];
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(proof, nlohmann::json({{"steps", 1},
+                                   {"proved", 0},
+                                   {"unproved", "1 of 1 frame: NO_MAP (1)"},
+                                   {"not_looked_at", {"nothing was checked against a map: the bag has none"}}}));
 }
 
 TEST(Headline, ExpectedContactsAreToldApart) {
@@ -63,7 +84,7 @@ TEST(Headline, ExpectedContactsAreToldApart) {
   quiet.total_contacts = quiet.counts.certain = quiet.counts.expected = 3;
   quiet.touching = Touching::EXPECTED;
   EXPECT_EQ(headlineOf({quiet, nothingFound(StepStatus::OK, StartState::CLEAR)}),
-            "No unexpected contact in 2 answered steps; expected contacts in 1 of them.");
+            "No unexpected contact in 2 answered steps; expected contacts in 1 of them; all of it proved.");
 }
 
 /// The cells of the first row by the names of their columns.
