@@ -11,6 +11,7 @@
 #include "apps/make_scene_bag/monitor_check.h"
 #include "apps/make_scene_bag/physics/scene_file.h"
 #include "apps/make_scene_bag/recorder.h"
+#include "apps/make_scene_bag/scene_robot.h"
 
 int main(int argc, char** argv) {
   CLI::App app(
@@ -38,7 +39,8 @@ int main(int argc, char** argv) {
       std::cout << dccd::recordMap(dccd::scene::readObstacleFile(scene_path), bag_path);
       return 0;
     }
-    const dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    dccd::addRobot(spec, scene_path);
     dccd::checkMonitorBlock(spec, scene_path);
     std::cout << dccd::recordScene(spec, bag_path, options);
   } catch (const std::exception& error) {

@@ -45,6 +45,7 @@ struct MarkerConfig {
   double normal_length_m = 0.05;
   double line_width_m = 0.002;
   int max_contacts = 2000;
+  bool swept = false;     ///< show what is watched of rigid bodies, and their separation
   bool mesh = false;      ///< republish the bodies as markers
   double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
 };
@@ -61,6 +62,7 @@ struct MonitorConfig {
   std::vector<BodyConfig> bodies;  ///< the robot's links come last
   bool bodies_listed = false;      ///< under bodies/, each with its own topic
   Robot robot;
+  RobotConfig robot_asked;                  ///< what it was made of
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
   MonitorOptions monitor;
   EffectSettings effects;
@@ -71,6 +73,7 @@ struct MonitorConfig {
   std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from
   std::vector<std::string> expected_phases;  ///< that entries name, whether their bodies are there or not
   std::string phase;                         ///< of the task, in force; empty: none
+  std::vector<Hold> holds;
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
@@ -97,7 +100,7 @@ struct MonitorConfig {
   std::vector<std::string> phases() const;
   /// "known phases are 'carry' and 'grasp', and '' for none".
   std::string phasesInWords() const;
-  /// What is expected in that phase.
+  /// What is expected in that phase, and of what hands hold now.
   std::vector<Expectation> expectedIn(const std::string& some_phase) const;
   /// The map is made of clouds.
   bool takesClouds() const { return cloud_named; }
@@ -120,6 +123,19 @@ struct MonitorConfig {
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
   std::uint64_t hash() const;
 };
+
+/// What can be changed while the node runs: LIVE(its name in cfg/CollisionMonitor.cfg, where MonitorConfig has it).
+#define DCCD_LIVE_SETTINGS(LIVE)                            \
+  LIVE(accuracy, monitor.detector.accuracy.rung)            \
+  LIVE(step_budget_ms, monitor.detector.step_budget_ms)     \
+  LIVE(max_step_s, monitor.store.max_step_s)                \
+  LIVE(max_vertex_step_m, monitor.store.max_vertex_step_m)  \
+  LIVE(max_contacts, monitor.detector.max_contacts)         \
+  LIVE(suppress_initial, monitor.detector.suppress_initial) \
+  LIVE(marker_point_size_m, markers.point_size_m)           \
+  LIVE(marker_normal_length_m, markers.normal_length_m)     \
+  LIVE(marker_mesh, markers.mesh)                           \
+  LIVE(marker_obstacle_m, markers.obstacle_m)
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~", const RobotLoader& load = {});

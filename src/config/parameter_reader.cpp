@@ -122,6 +122,10 @@ int ParameterReader::integer(const std::string& name, int fallback, int min, int
   return value.isSet() ? integerOf(value, name, min, max) : fallback;
 }
 
+std::size_t ParameterReader::integer(const std::string& name, std::size_t fallback, int min, int max) {
+  return static_cast<std::size_t>(integer(name, static_cast<int>(fallback), min, max));
+}
+
 bool ParameterReader::get(const std::string& name, bool fallback) {
   const ParameterTree& value = raw(name);
   if (!value.isSet()) return fallback;

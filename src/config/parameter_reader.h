@@ -27,6 +27,7 @@ class ParameterReader {
   double number(const std::string& name, double fallback, double min, double max);
   int integer(const std::string& name, int min, int max);
   int integer(const std::string& name, int fallback, int min, int max);
+  std::size_t integer(const std::string& name, std::size_t fallback, int min, int max);
   bool get(const std::string& name, bool fallback);
   std::string get(const std::string& name, const std::string& fallback);
   /// A text that is not empty.

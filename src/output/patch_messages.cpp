@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "dccd/contact_fields.h"
 #include "dccd/new_contacts.h"
 #include "output/output_messages.h"
 #include "report/words.h"
@@ -27,35 +28,24 @@ void fillNames(const std::array<std::uint16_t, 2>& body, const std::vector<Body>
 
 ros::Time knownTime(StampNs stamp_ns) { return stamp_ns == UNKNOWN_NS ? ros::Time() : toRosTime(stamp_ns); }
 
-template <class Message>
-void fill(const Vec3& from, Message& to) {
-  to.x = from.x();
-  to.y = from.y();
-  to.z = from.z();
-}
-
 PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
   PatchMessage out;
-  out.id = patch.id;
-  fillNames(patch.body, bodies, out.bodies);
-  out.is_new = patch.is_new;
-  out.expected = static_cast<std::uint32_t>(patch.expected);
-  out.beginning = static_cast<std::uint8_t>(patch.beginning);
-  out.began_from = knownTime(patch.began_from_ns);
-  out.began_to = knownTime(patch.began_to_ns);
-  out.contacts = static_cast<std::uint32_t>(patch.contacts);
-  out.certain = static_cast<std::uint32_t>(patch.certain);
-  out.initial = static_cast<std::uint32_t>(patch.initial);
-  out.crossings = static_cast<std::uint32_t>(patch.crossings);
-  out.toc_lower = patch.toc_lower;
-  out.toc_upper = patch.toc_upper;
-  out.area = patch.area_m2;
-  fill(patch.centroid, out.centroid);
-  fill(patch.normal, out.normal);
-  if (!patch.box.empty()) {
-    fill(patch.box.min, out.box_min);
-    fill(patch.box.max, out.box_max);
-  }
+  const auto fill = [&](const auto& from, auto& to) {
+    using To = std::decay_t<decltype(to)>;
+    if constexpr (std::is_same_v<To, PatchMessage::_bodies_type>) {
+      fillNames(from, bodies, to);
+    } else if constexpr (std::is_same_v<To, ros::Time>) {
+      to = knownTime(from);
+    } else if constexpr (std::is_same_v<std::decay_t<decltype(from)>, Box>) {
+      if (!from.empty()) put(from.min, to);
+    } else {
+      put(from, to);
+    }
+  };
+#define DCCD_FILL_PATCH(member, published) fill(patch.member, out.published);
+  DCCD_PATCH_FIELDS(DCCD_FILL_PATCH, DCCD_NO_FIELD, DCCD_FILL_PATCH)
+#undef DCCD_FILL_PATCH
+  if (!patch.box.empty()) put(patch.box.max, out.box_max);
   return out;
 }
 

@@ -40,8 +40,12 @@ class HeardErrors : public console_bridge::OutputHandler {
   std::string said_;
 };
 
-/// What is wrong with a collision element's geometry; empty: urdfdom knows it.
+/// What is wrong with a collision element; empty: urdfdom knows it.
 std::string problemOf(const XMLElement& collision) {
+  const XMLElement* origin = collision.FirstChildElement("origin");
+  if (origin && origin->Attribute("quat_xyzw")) {
+    return "has an origin with quat_xyzw, which URDF readers before urdfdom 5.1 pass over; write rpy";
+  }
   const XMLElement* geometry = collision.FirstChildElement("geometry");
   const XMLElement* shape = geometry ? geometry->FirstChildElement() : nullptr;
   if (!shape) return "has no geometry";
@@ -53,6 +57,12 @@ std::string problemOf(const XMLElement& collision) {
     return "is a capsule, which URDF readers before urdfdom 5.1 do not know; write a cylinder and two spheres";
   }
   return "is <" + name + ">, which is no geometry; write box, cylinder, sphere or mesh";
+}
+
+/// Of a link that has no collision element its visuals become that: they have the same origin and geometry.
+void takeVisuals(XMLElement& link) {
+  if (link.FirstChildElement("collision")) return;
+  while (XMLElement* visual = link.FirstChildElement("visual")) visual->SetName("collision");
 }
 
 /// Returns how many collision elements urdfdom is to read.
@@ -90,7 +100,7 @@ void reduceJoint(XMLElement& joint) {
 
 }  // namespace
 
-UrdfText parseUrdf(const std::string& text) {
+UrdfText parseUrdf(const std::string& text, bool visuals) {
   UrdfText urdf;
   tinyxml2::XMLDocument document;
   XMLElement& robot = parseRobotXml(text, document);
@@ -99,6 +109,7 @@ UrdfText parseUrdf(const std::string& text) {
     next = child->NextSiblingElement();
     const std::string tag = child->Name();
     if (tag == "link") {
+      if (visuals) takeVisuals(*child);
       elements[textOf(*child, "name")] = reduceLink(*child, urdf);
     } else if (tag == "joint") {
       reduceJoint(*child);

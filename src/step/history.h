@@ -108,8 +108,7 @@ struct History::Impl {
   /// More was there to be found, by a limit (by_count) or a deadline; nothing of what was left out touches before this.
   void leaveOutAt(double toc, bool by_count);
   void collect(const Step& step, const Deadline& deadline);
-  void writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& contact) const;
-  bool meetAtStart(const Step& step, const Contact& contact) const;
+  void writeContact(PairKind kind, const Hit& hit, Contact& contact) const;
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runMap(const Part& part);
   /// False: its bounds show that it does not come near what is occupied in the part.

@@ -64,6 +64,11 @@ Monitor::Monitor(const MonitorOptions& options, std::vector<Body> bodies) {
   if (bodies[options.clock_body].motion == BodyMotionKind::STATIC) {
     throw std::invalid_argument("clock_body '" + bodies[options.clock_body].name + "' is static and has no clock");
   }
+  for (const Body& body : bodies) {
+    if (body.own_voxels_m == ONE_VOXEL || (body.own_voxels_m >= 0 && std::isfinite(body.own_voxels_m))) continue;
+    throw std::invalid_argument("own_voxels_m of body '" + body.name +
+                                "' must be ONE_VOXEL or finite and 0 or more, is " + std::to_string(body.own_voxels_m));
+  }
   impl_ = std::make_unique<Impl>(options, std::move(bodies));
 }
 
@@ -182,6 +187,34 @@ void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const 
     m.counters.at(body).count(status);
   }
 }
+
+void Monitor::setBody(std::size_t body, Body what) {
+  Impl& m = *impl_;
+  if (body > m.bodies.size()) throw std::invalid_argument("there is no body " + std::to_string(body));
+  if (body == m.options.clock_body) throw std::invalid_argument("clock_body must stay");
+  std::vector<Body> bodies = m.bodies;
+  bodies.resize(std::max(bodies.size(), body + 1));
+  bodies[body] = std::move(what);
+  check(m.options.detector, bodies);
+  if (bodies.size() > m.bodies.size()) {
+    m.stores.emplace_back(m.options.store);
+    m.counters.emplace_back();
+    m.runs.push_back(0);
+    m.told_runs.push_back(0);
+    m.references.frames.emplace_back();
+    m.references.topologies.emplace_back();
+    m.held_seen.emplace(m.held_seen.end() - 1);  // the map's stays the last
+  }
+  m.bodies = std::move(bodies);
+  m.stores[body].clear();
+  m.told_runs[body] = 0;
+  m.references.frames[body] = nullptr;
+  m.references.topologies[body] = nullptr;
+  m.held_seen[body].clear();
+  m.tracker.seam(body);
+}
+
+StampNs Monitor::nextStart() const { return impl_->oldestStart(0); }
 
 void Monitor::withdraw(std::size_t body) {
   Impl& m = *impl_;

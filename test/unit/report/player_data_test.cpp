@@ -97,6 +97,18 @@ TEST(PlayerData, FramesAreWhereTheBodiesWereToAQuantum) {
   }
 }
 
+TEST(PlayerData, AfterASeamTheStartIsAFrameOfItsOwn) {
+  Falling run;
+  PlayerData player;
+  for (int i = 0; i < 4; ++i) {
+    const Outcome o = run.next();
+    if (i != 2) player.add(o, run.bodies, 0, false);
+  }
+  const json frames = json::parse(player.json())["frames"];
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_NEAR(frames[3][1].get<double>(), 0.3, 1e-12) << "the start of the step after the seam";
+}
+
 TEST(PlayerData, AVertexWithoutAPositionIsMarkedAndABodyAtRestCostsAByte) {
   Falling run;
   PlayerData player;
@@ -315,9 +327,10 @@ TEST(ContactLanes, TheFirstNewContactOfAPairInWordsAndToTheNanosecond) {
   Outcome o = run.next();
   o.start_ns += epoch_ns;
   o.stamp_ns += epoch_ns;
-  for (const bool initial : {true, false}) {
-    c.initial = initial;
-    c.toc_lower = initial ? 0 : 0.25;
+  for (const double toc : {0.0, 0.125, 0.25}) {
+    c.initial = toc == 0;
+    c.expected = toc == 0.125;
+    c.toc_lower = toc;
     o.contacts.push_back(c);
   }
   lanes.add(o, run.bodies, epoch_ns);

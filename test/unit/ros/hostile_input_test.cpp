@@ -24,6 +24,7 @@
 #include "node/map_loader.h"
 #include "record/step_recording.h"
 #include "support/folder_test.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -77,7 +78,7 @@ std::string refusal(const std::function<void()>& read) {
   return text;
 }
 
-bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+using test::mentions;
 
 /// A message's front; what follows is missing, or a gigabyte.
 class Front {

@@ -1,4 +1,5 @@
 #include "dccd/mesh_store.h"
+#include "support/said.h"
 
 #include <gtest/gtest.h>
 
@@ -123,12 +124,7 @@ TEST_F(MeshStoreTest, SmallMeshesAreKeptForLongLargeOnesAreNot) {
 
 TEST(MeshStoreOptionsTest, OutOfRangeNamesTheOption) {
   const auto message = [](const MeshStoreOptions& options) -> std::string {
-    try {
-      MeshStore store(options);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+    return test::said<std::invalid_argument>([&] { MeshStore store(options); });
   };
   EXPECT_NE(message({0, 0.5, 4}).find("max_step_s"), std::string::npos);
   EXPECT_NE(message({std::nan(""), 0.5, 4}).find("max_step_s"), std::string::npos);

@@ -145,9 +145,27 @@ TEST_F(RobotModel, WhatOthersWriteBesideSurfacesIsPassedOver) {
   EXPECT_EQ(joinedText(robot.missing), "");
   ASSERT_EQ(robot.parts.size(), 1u);
   EXPECT_EQ(robot.parts[0].name, "base");
-  EXPECT_EQ(joinedText(robot.remarks),
-            "not watched, for they have a visual but no collision element: links 'seen'\n"
-            "without geometry are links 'world'\n");
+  EXPECT_EQ(
+      joinedText(robot.remarks),
+      "not watched, for they have a visual but no collision element (robot/visuals: true takes the visual): links "
+      "'seen'\n"
+      "without geometry are links 'world'\n");
+}
+
+// Where it is asked for, and only of a link that has nothing else.
+TEST_F(RobotModel, AVisualStandsForACollisionElement) {
+  RobotConfig config;
+  config.visuals = true;
+  const std::string visual =
+      "<visual><origin xyz='1 0 0'/><geometry><box size='2 2 2'/></geometry><material name='m'/></visual>";
+  const Robot robot =
+      robotFrom(robotOf(link("seen", visual + visual) + link("both", visual + collision("<box size='1 1 1'/>")) +
+                        joint("seen", "both")),
+                "", config);
+  EXPECT_EQ(joinedText(robot.missing) + joinedText(robot.remarks), "");
+  ASSERT_EQ(robot.parts.size(), 3u);
+  EXPECT_TRUE(hasVertex(partOf(robot, "seen/2"), Vec3(2, 1, 1), 1e-15));
+  EXPECT_TRUE(hasVertex(partOf(robot, "both"), Vec3(0.5, 0.5, 0.5), 0));
 }
 
 TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {
@@ -177,6 +195,31 @@ TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {
     EXPECT_TRUE(says(robot.missing, "link 'bad'")) << robot.missing[0];
     EXPECT_TRUE(says(robot.missing, one.expected)) << robot.missing[0];
   }
+}
+
+// What urdfdom passes over would be where it is not.
+TEST_F(RobotModel, AnOriginByQuaternionIsRefused) {
+  const std::string box = "<box size='1 1 1'/>";
+  const Robot robot =
+      robotFrom(robotOf(link("a", collision(box, "<origin xyz='0 0 1' quat_xyzw='0 0 1 0'/>") + collision(box))));
+  EXPECT_EQ(robot.parts.size(), 1u);
+  EXPECT_TRUE(says(robot.missing,
+                   "link 'a' is not watched: its collision element 1 (line 1) has an origin with quat_xyzw, which URDF "
+                   "readers before urdfdom 5.1 pass over; write rpy"))
+      << joinedText(robot.missing);
+}
+
+// As RViz, which asks for a file's address.
+TEST_F(RobotModel, AnAddressMayHaveEscapes) {
+  tetrahedron("a b.stl");
+  tetrahedron("c%20d.stl");
+  const auto mesh = [&](const std::string& name) {
+    return collision("<mesh filename='file://" + (folder_ / name).string() + "'/>");
+  };
+  const Robot robot = robotFrom(robotOf(link("a", mesh("a%20b.stl") + mesh("a b.stl") + mesh("c%20d.stl"))));
+  EXPECT_EQ(joinedText(robot.missing), "");
+  EXPECT_EQ(robot.parts.size(), 3u);
+  EXPECT_TRUE(says(robotFrom(robotOf(link("a", mesh("no%2")))).missing, "no%2"));
 }
 
 // urdfdom reads no further in a link then, and goes on with the next one.
