@@ -101,28 +101,34 @@ const player = (() => {
   // The faces of voxels that no voxel of the same size hides.
   const SIDES = [0, 1, 2].flatMap(axis => [0, 1].map(up => ({ axis, up, at: [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]].map(([u, v]) => {
     const p = [0, 0, 0]; p[axis] = up; p[(axis + 1) % 3] = up ? u : v; p[(axis + 2) % 3] = up ? v : u; return p; }) })));
+  const OBSTACLE = 0xb0a698, OWN = 0x59a673, DOUBTED = 0xf2bf33;
   const maps = D.maps.map(m => {
-    const key = (x, y, z, size) => ((x * 65536 + y) * 65536 + z) * 20 + Math.log2(size), there = new Set(), points = [], normals = [], lines = [];
-    const r = m.resolution, f = m.matrix, n = m.leaves.length / 4;
+    const r = m.resolution, f = m.matrix, group = new THREE.Group();
     const turn = p => [0, 1, 2].map(i => f[4 * i] * p[0] + f[4 * i + 1] * p[1] + f[4 * i + 2] * p[2]), move = p => turn(p).map((v, i) => v + f[4 * i + 3]);
-    for (let i = 0; i < n; ++i) there.add(key(...m.leaves.slice(4 * i, 4 * i + 4)));
-    for (let i = 0; i < n; ++i) {
-      const leaf = m.leaves.slice(4 * i, 4 * i + 4), size = leaf[3];
-      SIDES.forEach(({ axis, up, at }) => {
-        const next = leaf.slice(); next[axis] += up ? size : -size;
-        if (there.has(key(...next))) return;
-        const normal = [0, 0, 0]; normal[axis] = up ? 1 : -1;
-        const corners = at.map(p => move(p.map((v, k) => (leaf[k] + v * size - 32768) * r)));
-        corners.forEach(c => { points.push(...c); normals.push(...turn(normal)); });
-        lines.push(...corners[0], ...corners[1], ...corners[1], ...corners[2]);
-      });
-    }
-    const g = new THREE.BufferGeometry(), h = new THREE.BufferGeometry(), group = new THREE.Group(), values = list => new THREE.BufferAttribute(new Float32Array(list), 3);
-    g.setAttribute('position', values(points)); g.setAttribute('normal', values(normals)); h.setAttribute('position', values(lines));
-    group.add(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: 0xb0a698, transparent: true, opacity: 0.45, depthWrite: false })));
-    group.add(new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: 0x8f877b, transparent: true, opacity: 0.5, depthWrite: false })));
+    const add = (list, colour, opacity) => {
+      const key = (x, y, z, size) => ((x * 65536 + y) * 65536 + z) * 20 + Math.log2(size), there = new Set(), points = [], normals = [], lines = [];
+      for (let i = 0; i < list.length; i += 4) there.add(key(...list.slice(i, i + 4)));
+      for (let i = 0; i < list.length; i += 4) {
+        const leaf = list.slice(i, i + 4), size = leaf[3];
+        SIDES.forEach(({ axis, up, at }) => {
+          const next = leaf.slice(); next[axis] += up ? size : -size;
+          if (there.has(key(...next))) return;
+          const normal = [0, 0, 0]; normal[axis] = up ? 1 : -1;
+          const corners = at.map(p => move(p.map((v, k) => (leaf[k] + v * size - 32768) * r)));
+          corners.forEach(c => { points.push(...c); normals.push(...turn(normal)); });
+          lines.push(...corners[0], ...corners[1], ...corners[1], ...corners[2]);
+        });
+      }
+      const g = new THREE.BufferGeometry(), h = new THREE.BufferGeometry(), values = list => new THREE.BufferAttribute(new Float32Array(list), 3);
+      g.setAttribute('position', values(points)); g.setAttribute('normal', values(normals)); h.setAttribute('position', values(lines));
+      group.add(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity, depthWrite: false })));
+      const edges = new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: new THREE.Color(colour).multiplyScalar(0.81), transparent: true, opacity: 0.5, depthWrite: false }));
+      group.add(edges);
+      return edges;
+    };
+    const edges = [[m.leaves, OBSTACLE, 0.45], [m.own || [], OWN, 0.25], [m.doubted || [], DOUBTED, 0.4]].filter(([list]) => list.length).map(all => add(...all));
     group.visible = false; scene.add(group);
-    return { from: m.from, cubes: group };
+    return { from: m.from, cubes: group, edges };
   });
 
   // Points on top of everything: discs for contacts, rings for patches.
@@ -228,7 +234,7 @@ const player = (() => {
     if (!on) tell();
     if (!isSoftware) return;
     shown.forEach(s => { if (s.surface) s.lines.visible = !on; });
-    maps.forEach(m => { m.cubes.children[1].visible = !on; });
+    maps.forEach(m => m.edges.forEach(e => { e.visible = !on; }));
     draw();
   };
   const stop = () => setPlaying(false);
@@ -295,8 +301,11 @@ const player = (() => {
   scale('● contact, by its time in the step:', '0', '1');
   scale('○ patch, by when it began:', seconds(SPAN[0]).replace(/0+ s/, '0 s'), SPAN[1].toFixed(2) + ' s');
   legend.appendChild(document.createElement('span')).textContent = 'grey: expected';
-  shown.forEach(s => { const p = legend.appendChild(document.createElement('span')), i = p.appendChild(document.createElement('i'));
-    i.style.background = '#' + s.colour.toString(16).padStart(6, '0'); p.append(s.body.name); });
+  const swatch = (colour, text) => { const p = legend.appendChild(document.createElement('span')), i = p.appendChild(document.createElement('i'));
+    i.style.background = '#' + colour.toString(16).padStart(6, '0'); p.append(text); };
+  shown.forEach(s => swatch(s.colour, s.body.name));
+  if (D.maps.some(m => m.own)) swatch(OWN, "a body's own voxels, no obstacle");
+  if (D.maps.some(m => m.doubted)) swatch(DOUBTED, "voxels in doubt, a body's or an obstacle's");
   note.textContent = (frames.length < D.seen ? `${frames.length} of ${D.seen} recorded frames are kept, those with events of patches first: what is between is not shown. ` :
     `All ${D.seen} recorded frames. `) + 'Nothing is interpolated. Positions are rounded for display, to ' +
     D.bodies.filter(b => b.quantum).map(b => `${b.quantum.toExponential(1)} m (${b.name})`).join(', ') + `. At most ${D.most_contacts} contacts of a frame are drawn, new ones first.` +
