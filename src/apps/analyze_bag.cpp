@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <numeric>
 #include <sstream>
 
 #include "apps/analyze_bag/result_bag.h"
@@ -143,8 +144,12 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
             << "report: " << a.report << "/report.html\n";
   for (const std::string& sentence : summary.not_looked_at) std::cout << "note: " << sentence << '\n';
   const std::string unproved = report.unproved();
+  const std::string said = std::accumulate(summary.not_looked_at.begin(), summary.not_looked_at.end(), unproved);
   for (const std::string& c : summary.complaints) {
-    if (unproved.find(c) == std::string::npos) std::cerr << "analyze_bag: " << c << '\n';
+    const std::string refused = "refused: ";
+    const std::size_t at = c.find(refused);
+    const std::string reason = at == std::string::npos ? c : c.substr(at + refused.size());
+    if (said.find(reason) == std::string::npos) std::cerr << "analyze_bag: " << c << '\n';
   }
   if (unproved.empty()) return 0;
   std::cerr << "analyze_bag: " << (answered ? "not proved: " : "no frame was answered: ") << unproved << '\n';

@@ -324,6 +324,12 @@ void fillState(const Assurance& assurance, const std::string& touches, const std
   message.clear = assurance.clear();
   message.reason = describe(assurance, touches);
   if (!assurance.proved && !remedy.empty()) message.reason += "; " + remedy;
+  // Where it was left out by choice, or is missing, that is said already.
+  const bool is_news = assurance.proved && !message.checked_map && !message.holds_until.isZero();
+  const auto tells = [](const std::string& sentence) { return sentence.find("octomap") != std::string::npos; };
+  if (is_news && std::none_of(assurance.excluded.begin(), assurance.excluded.end(), tells)) {
+    message.reason += "; nothing was checked against a map";
+  }
   message.missing = assurance.missing;
   message.excluded = assurance.excluded;
   message.expected = assurance.expected;

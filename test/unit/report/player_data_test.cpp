@@ -235,6 +235,30 @@ TEST(PlayerData, OnlyVoxelsNearTheBodiesAreTaken) {
   EXPECT_EQ(json::parse(player.json())["maps"].size(), 1u) << "the same map, the same place";
 }
 
+TEST(PlayerData, OwnVoxelsAndThoseInDoubtAreOfTheirMap) {
+  Falling run;
+  PlayerData player;
+  const auto add = [&](std::vector<OccupiedLeaf> leaves, std::vector<OwnVoxel> own) {
+    Outcome o = run.next();
+    auto step = std::make_shared<Step>(*o.step);
+    for (const OwnVoxel& voxel : own) ++(voxel.doubted ? step->map.own.doubted : step->map.own.own);
+    step->map.own.voxels = share(std::move(own));
+    o.step = step;
+    o.obstacle = VoxelSurface::build(0.05, std::move(leaves));
+    player.add(o, run.bodies, 0, false);
+  };
+  add({{{32770, 32768, 32768}, 1}},
+      {{{32768, 32769, 32767}, 0, false}, {{32769, 32768, 32767}, 0, true}, {{40000, 0, 0}, 0, true}});
+  add({}, {{{32768, 32769, 32767}, 0, false}});
+  add({}, {});
+  const json maps = json::parse(player.json())["maps"];
+  ASSERT_EQ(maps.size(), 3u) << "also where nothing is left as an obstacle";
+  EXPECT_EQ(maps[0]["own"], json({32768, 32769, 32767, 1}));
+  EXPECT_EQ(maps[0]["doubted"], json({32769, 32768, 32767, 1})) << "the other one is far away";
+  EXPECT_EQ(maps[1]["own"], maps[0]["own"]);
+  for (const char* name : {"own", "doubted"}) EXPECT_FALSE(maps[2].contains(name));
+}
+
 TEST(ReportPage, TenMinutesOfAClothOf600VerticesFitIn25Megabytes) {
   constexpr std::size_t ROWS = 20, COLUMNS = 30, STEPS = 18000;
   const std::string folder = ::testing::TempDir() + "ten_minutes";

@@ -7,6 +7,8 @@
 #include <limits>
 #include <sstream>
 
+#include "output/patch_messages.h"
+
 namespace dccd {
 namespace {
 
@@ -192,11 +194,48 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_EQ(toTimeToContact(alarm, 2, bodies, "world").seconds, 1);
 
   deformable_ccd::State state = toState(quiet, "world");
-  fillState(assuranceOf(quiet), state);
+  fillState(assuranceOf(quiet), "", "", state);
   EXPECT_TRUE(state.proved);
   EXPECT_FALSE(state.clear);
   EXPECT_EQ(state.touching, deformable_ccd::State::EXPECTED);
   EXPECT_EQ(state.expected, quiet.expected);
+}
+
+TEST(State, ReasonIsEnoughByItself) {
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  const auto step = std::make_shared<Step>();
+  step->bodies.resize(1);
+  step->bodies[0].name = "cloth";
+  step->bodies[0].topology = share(Topology::grid(2, 2));
+  step->bodies[0].t0 = step->bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  outcome.step = step;
+  outcome.start_ns = 4900000000;
+  outcome.stamp_ns = 5000000000;
+  const auto reasonOf = [&](const std::string& remedy) {
+    deformable_ccd::State state = toState(outcome, "world");
+    fillState(assuranceOf(outcome), touchesInWords(outcome), remedy, state);
+    return state.reason;
+  };
+  EXPECT_EQ(reasonOf("not asked for"), "proved, nothing touches; nothing was checked against a map");
+  Patch first, second;
+  first.contacts = 2;
+  first.began_to_ns = 2930000000;
+  second.contacts = 5;
+  second.began_to_ns = 4000000000;
+  second.centroid = {0.3, 0.1, 0.75};
+  outcome.patches = {first, second};
+  outcome.touching = Touching::LASTING;
+  EXPECT_EQ(reasonOf(""),
+            "proved, what touches did so when the step began: cloth and itself for 2.07 s, 2 patches, the largest at "
+            "0.300 0.100 0.750; nothing was checked against a map");
+  outcome.patches = {second};
+  outcome.patches[0].beginning = PatchBeginning::INITIAL;
+  outcome.status = StepStatus::NO_MAP;
+  outcome.unproved = {"no octomap has been received yet; checked without it"};
+  EXPECT_EQ(
+      reasonOf("see rostopic hz /octomap"),
+      "not proved: no octomap has been received yet; checked without it; what touches did so when the step began: "
+      "cloth and itself since the first look, 1 patch at 0.300 0.100 0.750; see rostopic hz /octomap");
 }
 
 /// Bytes as they go over the wire.
