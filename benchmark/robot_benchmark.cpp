@@ -275,9 +275,11 @@ std::string table(const nlohmann::json& rows) {
 int main(int argc, char** argv) {
   std::string out;
   int steps = 1000;
+  std::string only;
   CLI::App app("Times a robot beside a cloth, in turns with the cloth alone, and FCL through the same links.");
   app.add_option("--out", out, "JSON file to write")->required();
   app.add_option("--steps", steps, "of each scene")->check(CLI::Range(20, 1000000));
+  app.add_option("--only", only, "the scene whose name begins so");
   CLI11_PARSE(app, argc, argv);
   try {
     const dccd::test::Panda panda;
@@ -286,6 +288,7 @@ int main(int argc, char** argv) {
          {dccd::benchmarks::Scene{"3 m away", 3, 0.03, 40, false},
           dccd::benchmarks::Scene{"within 10 cm", 0, 0.03, 40, false},
           dccd::benchmarks::Scene{"goes to and fro through a hanging cloth", 0, 0.6, 16, true}}) {
+      if (scene.name.compare(0, only.size(), only) != 0) continue;
       rows.push_back(dccd::benchmarks::measure(panda, scene, steps));
       std::cerr << rows.back().dump() << '\n';
     }
