@@ -116,12 +116,12 @@ TEST(RobotContacts, NoneOfThePandasIsMissedOrInventedAndTimesAreInTheirCells) {
   std::size_t contacts = 0, touching = 0, crossing = 0;
   for (int frame = 0; frame <= steps; ++frame) {
     const double stamp_s = 1 + 0.1 * frame;
-    for (double& joint : joints) joint = std::clamp(joint + 0.03 * unit(random), -2.5, 2.5);
+    for (double& joint : joints) joint = std::clamp(joint + 0.02 * unit(random), -2.5, 2.5);
     const Panda::Placed placed = panda.place(joints, stamp_s);
     driven.feed_tf.add(placed.tf, false);
     // Now and then to another link; from there it drifts and crumples.
     const KDL::Vector link = std::next(placed.from_base.begin(), frame / 10 % placed.from_base.size())->second.p;
-    const Vec3 drift = any(0.02), center = Vec3(link.x(), link.y(), link.z()) + any(0.06);
+    const Vec3 drift = any(0.01), center = Vec3(link.x(), link.y(), link.z()) + any(0.06);
     for (int i = 0; i < SIDE * SIDE; ++i) {
       const Vec3 flat(0.06 * (i % SIDE - SIDE / 2), 0.06 * (i / SIDE - SIDE / 2), 0);
       cloth[static_cast<std::size_t>(i)] = frame % 10 == 0
@@ -156,7 +156,7 @@ TEST(RobotContacts, NoneOfThePandasIsMissedOrInventedAndTimesAreInTheirCells) {
   std::cout << steps << " steps, " << contacts << " contacts, " << touching << " of them with links; " << crossing
             << " steps began crossing\n";
   EXPECT_GT(touching, static_cast<std::size_t>(steps));
-  EXPECT_GT(contacts, touching);
+  EXPECT_LT(crossing, static_cast<std::size_t>(steps));
 }
 
 }  // namespace
