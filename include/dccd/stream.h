@@ -86,6 +86,13 @@ class DCCD_EXPORT Monitor {
   void countDropped(std::size_t body, StepStatus status, std::uint64_t count = 1);
   void countReceived(std::size_t body, std::uint64_t count = 1, std::uint64_t receipt_stamps = 0);
 
+  /// From the next step on the body is another one, with frames of its own: those that it had are forgotten. `body` may
+  /// be bodies().size(), which adds one. All that is known of the other bodies stays. Push what steps to come begin
+  /// with, from nextStart() on, or the next step waits for it. Throws std::invalid_argument; all then stays.
+  void setBody(std::size_t body, Body what);
+  /// Where the next step begins: the oldest one that waits, or that of the clock body's next frame. 0: not known yet.
+  StampNs nextStart() const;
+
   /// A static body's frame is to be placed anew: it is forgotten, and counts as one that waits until it is pushed
   /// again.
   void withdraw(std::size_t body);

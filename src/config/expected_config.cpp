@@ -85,6 +85,9 @@ std::vector<Expectation> MonitorConfig::expectedIn(const std::string& some_phase
   for (const Expectation& one : expected_contacts) {
     if (one.phase.empty() || one.phase == some_phase) expected.push_back(one);
   }
+  for (const Hold& hold : holds) {
+    if (hold.closed) expected.insert(expected.end(), hold.contacts.begin(), hold.contacts.end());
+  }
   return expected;
 }
 

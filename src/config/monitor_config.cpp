@@ -203,6 +203,7 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
   markers.normal_length_m = section.number("normal_length_m", markers.normal_length_m, 1e-6, LARGE);
   markers.line_width_m = section.number("line_width_m", markers.line_width_m, 1e-6, LARGE);
   markers.max_contacts = section.integer("max_contacts", markers.max_contacts, 1, MANY);
+  markers.swept = section.get("swept", markers.swept);
   markers.mesh = section.get("mesh", markers.mesh);
   markers.obstacle_m = section.number("obstacle_m", markers.obstacle_m, 0, LARGE);
   section.finish();
@@ -399,6 +400,7 @@ std::uint64_t MonitorConfig::hash() const {
   }
   text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.detector.max_contacts << ' '
        << monitor.detector.suppress_initial << ' ' << markers.mesh << ' ' << phase;
+  for (const Hold& hold : holds) text << ' ' << hold.closed;
   return hashOf(text.str());
 }
 

@@ -45,6 +45,7 @@ struct MarkerConfig {
   double normal_length_m = 0.05;
   double line_width_m = 0.002;
   int max_contacts = 2000;
+  bool swept = false;     ///< show what is watched of rigid bodies, and their separation
   bool mesh = false;      ///< republish the bodies as markers
   double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
 };
@@ -60,6 +61,7 @@ struct MonitorConfig {
   std::string fixed_frame;         ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;  ///< the robot's links come last
   Robot robot;
+  RobotConfig robot_asked;                  ///< what it was made of
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
   MonitorOptions monitor;
   EffectSettings effects;
@@ -70,6 +72,7 @@ struct MonitorConfig {
   std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from
   std::vector<std::string> expected_phases;  ///< that entries name, whether their bodies are there or not
   std::string phase;                         ///< of the task, in force; empty: none
+  std::vector<Hold> holds;
   UnknownSpace unknown_space = UnknownSpace::FREE;
   Box unknown_box;  ///< [m], map frame: where the unknown is occupied
   std::string octomap_topic = DEFAULT_OCTOMAP_TOPIC, octomap_file, octomap_frame;
@@ -96,7 +99,7 @@ struct MonitorConfig {
   std::vector<std::string> phases() const;
   /// "known phases are 'carry' and 'grasp', and '' for none".
   std::string phasesInWords() const;
-  /// What is expected in that phase.
+  /// What is expected in that phase, and of what hands hold now.
   std::vector<Expectation> expectedIn(const std::string& some_phase) const;
   /// The map is made of clouds.
   bool takesClouds() const { return cloud_named; }

@@ -22,6 +22,17 @@ std::string quoted(const std::vector<std::string>& names) {
   return text;
 }
 
+/// One name or a list of them.
+std::vector<std::string> readNames(ParameterReader& section, const std::string& name) {
+  if (section.raw(name).kind == ParameterTree::Kind::TEXT) return {section.text(name)};
+  std::vector<std::string> names;
+  for (const ParameterTree& one : section.list(name)) {
+    if (one.kind != ParameterTree::Kind::TEXT) section.fail(name, "must name links and groups");
+    names.push_back(one.text);
+  }
+  return names;
+}
+
 LinkSettings readLink(ParameterReader section) {
   LinkSettings link;
   if (section.has("padding_m")) link.padding_m = section.number("padding_m", 0, LARGE);
@@ -40,12 +51,15 @@ RobotConfig readRobotParameters(ParameterReader section) {
   robot.padding_m = section.number("padding_m", robot.padding_m, 0, LARGE);
   robot.own_voxels_m = ownVoxelsOf(section, robot.own_voxels_m);
   robot.scale = section.number("scale", robot.scale, 1e-6, 1e6);
+  robot.visuals = section.get("visuals", robot.visuals);
   robot.against_links = section.get("against_links", robot.against_links);
   robot.against_map = section.get("against_map", robot.against_map);
   for (const ParameterTree& name : section.list("leave_out")) {
     if (name.kind != ParameterTree::Kind::TEXT) section.fail("leave_out", "must list links and groups by name");
     robot.leave_out.push_back(name.text);
   }
+  ParameterReader holds = section.section("holds");
+  for (const std::string& body : holds.names()) robot.holds[body] = readNames(holds, body);
   ParameterReader links = section.section("links");
   for (const std::string& name : links.names()) robot.links[name] = readLink(links.section(name));
   section.finish();
@@ -103,6 +117,40 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
   }
 }
 
+/// robot/holds, once all bodies are there.
+void readHolds(const ParameterReader& reader, const RobotConfig& asked, MonitorConfig& config) {
+  std::vector<std::string> bodies, known = config.robot.links;
+  for (const BodyConfig& body : config.bodies) {
+    if (body.link.empty()) bodies.push_back(body.body.name);
+  }
+  for (const auto& group : config.robot.groups) known.push_back(GROUP + group.first);
+  for (const auto& [body, holders] : asked.holds) {
+    const auto held = std::find(bodies.begin(), bodies.end(), body);
+    if (held == bodies.end()) {
+      reader.fail("robot/holds/" + body, "is no body; nearest is '" + nearestName(body, bodies) + "'");
+    }
+    for (const std::string& by : holders) {
+      const auto found = bodiesNamed(by, config);
+      if (!found) {
+        reader.fail("robot/holds/" + body,
+                    "names '" + by + "', which is no link and no group; nearest is '" + nearestName(by, known) + "'");
+      }
+      Hold hold{body, by, true, {}};
+      for (const std::uint16_t other : *found) {
+        Expectation& one = hold.contacts.emplace_back();
+        one.partners[0].body = static_cast<std::uint16_t>(held - bodies.begin());
+        one.partners[1].body = other;
+      }
+      config.holds.push_back(std::move(hold));
+    }
+  }
+  if (!config.holds.empty() && config.monitor.detector.earliest_only) {
+    reader.fail("robot/holds",
+                "is given beside earliest_only: the first contact may be the hand's, which would hide all others; "
+                "remove one of both");
+  }
+}
+
 }  // namespace
 
 double RobotConfig::scaleOf(const std::string& link) const {
@@ -132,9 +180,11 @@ void readRobot(ParameterReader& reader, const RobotLoader& load, MonitorConfig& 
   if (!load) reader.fail("robot", "has no meaning here; remove it");
   config.robot = load(asked, config.monitor.detector.rigid_tolerance_m);
   config.robot.named = true;
+  config.robot_asked = asked;
   const Robot& robot = config.robot;
   requireNames(reader, asked, robot);
   addBodies(asked, robot, config);
+  readHolds(reader, asked, config);
   if (!robot.left_out.empty()) {
     config.robot_excluded.push_back("of the robot " + quoted(robot.left_out) + " by robot/leave_out");
   }

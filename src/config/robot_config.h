@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dccd/body.h"
+#include "dccd/expectation.h"
 #include "input/mesh_resource.h"
 
 namespace dccd {
@@ -34,7 +35,9 @@ struct RobotConfig {
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link
   std::map<std::string, LinkSettings> links;
   bool against_links = false, against_map = false;
-  std::vector<std::string> leave_out;  ///< links, or "group NAME"
+  bool visuals = false;                                   ///< of links without a collision element
+  std::vector<std::string> leave_out;                     ///< links, or "group NAME"
+  std::map<std::string, std::vector<std::string>> holds;  ///< by body: the links and groups that hold it
 
   double scaleOf(const std::string& link) const;
   double paddingOf(const std::string& link) const;
@@ -60,6 +63,14 @@ struct Robot {
   std::vector<std::string> missing;                             ///< what should be watched and is not: a sentence each
   std::vector<std::string> remarks;                             ///< what its owner should see: a sentence each
   std::string text;                                             ///< of both files
+  std::map<std::string, std::string> parameters;                ///< resolved names: what they held, or nothing
+};
+
+/// A body that a hand holds, by robot/holds: as long as it does, their contacts are expected.
+struct Hold {
+  std::string body, by;               ///< as the parameter has them
+  bool closed = true;                 ///< the hand is
+  std::vector<Expectation> contacts;  ///< one with each body that `by` stands for
 };
 
 /// Makes the robot of its parameters. Primitives are meshed to within the tolerance [m].

@@ -2,6 +2,10 @@
 
 #include <cstdlib>
 
+#include <deformable_ccd/AttachObject.h>
+#include <deformable_ccd/DetachObject.h>
+#include <deformable_ccd/RemoveObject.h>
+#include <deformable_ccd/SetHold.h>
 #include <deformable_ccd/SetPhase.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
@@ -9,6 +13,7 @@
 
 #include "dccd/simd_target.h"
 #include "input/message_bytes.h"
+#include "input/short_text.h"
 #include "node/robot_source.h"
 
 namespace dccd {
@@ -139,7 +144,6 @@ void CollisionMonitor::Impl::subscribe() {
 void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
   using Trigger = std_srvs::Trigger;
   using SetBool = std_srvs::SetBool;
-  using deformable_ccd::SetPhase;
   const auto answer = [this](const std::function<Reply()>& run, auto& response) {
     const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
     response.success = reply.success;
@@ -179,17 +183,74 @@ void CollisionMonitor::Impl::advertiseServices(ros::NodeHandle& service) {
         };
         return answer(run, response);
       }));
+}
+
+/// What is expected, by the phase of the task and by what hands hold.
+void CollisionMonitor::Impl::advertiseExpectations(ros::NodeHandle& service) {
+  using deformable_ccd::SetHold;
+  using deformable_ccd::SetPhase;
+  const auto answer = [this](const std::function<void()>& set, auto& response) {
+    const auto run = [this, set] {
+      try {
+        set();
+      } catch (const ParameterError& error) {
+        return Reply{false, error.what() + std::string("; in force is ") + pipeline.phaseInWords()};
+      }
+      return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
+    };
+    const Reply reply = queue.call(run, SERVICE_TIMEOUT_S);
+    response.success = reply.success;
+    response.message = reply.message;
+    return true;
+  };
   services.push_back(service.advertiseService<SetPhase::Request, SetPhase::Response>(
       "set_phase", [this, answer](SetPhase::Request& request, SetPhase::Response& response) {
-        const auto run = [this, phase = request.phase] {
-          try {
-            pipeline.setPhase(phase);
-          } catch (const ParameterError& error) {
-            return Reply{false, error.what() + std::string("; in force is ") + pipeline.phaseInWords()};
-          }
-          return Reply{true, "from the next step on: " + pipeline.phaseInWords()};
+        return answer([this, phase = request.phase] { pipeline.setPhase(phase); }, response);
+      }));
+  services.push_back(service.advertiseService<SetHold::Request, SetHold::Response>(
+      "set_hold", [this, answer](SetHold::Request& request, SetHold::Response& response) {
+        return answer([this, request] { pipeline.setHold(request.body, request.by, request.holds); }, response);
+      }));
+}
+
+void CollisionMonitor::Impl::advertiseObjects(ros::NodeHandle& service) {
+  using deformable_ccd::AttachObject;
+  using deformable_ccd::DetachObject;
+  using deformable_ccd::RemoveObject;
+  // What is refused is counted, be it on this thread, where meshes are read, or on the worker's.
+  const auto answer = [this](const std::string& done, const std::function<std::function<void()>()>& read,
+                             auto& response) {
+    Reply reply;
+    try {
+      const std::function<void()> change = read();
+      reply = queue.call([change, done] { return change(), Reply{true, done}; }, SERVICE_TIMEOUT_S);
+    } catch (const std::exception& error) {
+      reply.message = error.what();
+    }
+    requests_refused += !reply.success;
+    response.success = reply.success;
+    response.message = shortText(reply.message);
+    return true;
+  };
+  services.push_back(service.advertiseService<AttachObject::Request, AttachObject::Response>(
+      "attach", [this, answer](AttachObject::Request& request, AttachObject::Response& response) {
+        const auto read = [&] {
+          return [this, object = readAttach(request, config)] {
+            pipeline.attach(object);
+            state.takeBack("no step has been answered since '" + object.name + "' was attached");
+          };
         };
-        return answer(run, response);
+        return answer("from the next step on '" + request.name + "' moves with " + request.link, read, response);
+      }));
+  services.push_back(service.advertiseService<DetachObject::Request, DetachObject::Response>(
+      "detach", [this, answer](DetachObject::Request& request, DetachObject::Response& response) {
+        const auto read = [&] { return [this, name = request.name] { pipeline.detach(name); }; };
+        return answer("from the next step on '" + request.name + "' stays where it is", read, response);
+      }));
+  services.push_back(service.advertiseService<RemoveObject::Request, RemoveObject::Response>(
+      "remove", [this, answer](RemoveObject::Request& request, RemoveObject::Response& response) {
+        const auto read = [&] { return [this, name = request.name] { pipeline.remove(name); }; };
+        return answer("'" + request.name + "' is forgotten", read, response);
       }));
 }
 
@@ -214,9 +275,19 @@ void CollisionMonitor::Impl::start() {
   ros::NodeHandle service(private_node);
   service.setCallbackQueue(&service_callbacks);
   advertiseServices(service);
+  advertiseExpectations(service);
+  advertiseObjects(service);
   listenToChanges(service);
   master = std::make_unique<MasterWatch>(
       mesh_subscriptions, map_subscriber, [this] { queue.wake(); }, [this] { map_publisher_seen = true; });
+  master->watchParameters(config.robot.parameters, [this](const std::vector<std::string>& changed) {
+    queue.command([this, changed] {
+      for (const std::string& sentence : pipeline.robotChanged(changed))
+        log.complain(config.monitor.clock_body, "robot", sentence);
+      if (!changed.empty()) state.takeBack("the robot's description has changed");
+    });
+  });
+  master->start();
   worker = std::thread([this] { work(); });
   input_spinner.start();
   service_spinner.start();

@@ -59,7 +59,7 @@ struct CollisionMonitor::Impl {
   std::unique_ptr<Reconfigure> reconfigure;
   bool owns_process = false;
   std::atomic<bool> stopping{false}, enabled{true}, map_publisher_seen{false};
-  std::atomic<std::uint64_t> frames_handed_over{0};
+  std::atomic<std::uint64_t> frames_handed_over{0}, requests_refused{0};
   std::thread worker;
   std::vector<std::atomic<std::uint64_t>> disabled_frames;  // that came while disabled, not yet counted
   bool plan_unsaid = false;                                 // the worker's
@@ -81,6 +81,8 @@ struct CollisionMonitor::Impl {
 
   // Service thread.
   void advertiseServices(ros::NodeHandle& service);
+  void advertiseExpectations(ros::NodeHandle& service);
+  void advertiseObjects(ros::NodeHandle& service);
   void listenToChanges(const ros::NodeHandle& service);  ///< of live parameters
 
   // Worker.

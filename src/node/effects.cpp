@@ -48,6 +48,13 @@ void EffectTracker::hearPredictions(bool heard) {
   if (std::exchange(scene_.predictions_heard, heard) != heard) plan_ = EffectPlan(scene_, settings_);
 }
 
+void EffectTracker::setBody(std::size_t body, const Body& what) {
+  scene_.bodies.resize(std::max(scene_.bodies.size(), body + 1));
+  scene_.noise.resize(scene_.bodies.size());
+  scene_.bodies[body] = what;
+  plan_ = EffectPlan(scene_, settings_);
+}
+
 bool EffectTracker::decide(MonitorOptions& options) const {
   return std::exchange(options.detector.obstacle_expected, mapExpected()) != mapExpected();
 }

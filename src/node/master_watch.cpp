@@ -11,16 +11,23 @@ namespace {
 
 constexpr std::chrono::milliseconds PERIOD{50};
 constexpr double TIMEOUT_S = 0.5;
+constexpr std::chrono::seconds LOOK_AT_PARAMETERS{1};
 
 }  // namespace
 
 MasterWatch::MasterWatch(const std::vector<std::unique_ptr<MeshSubscription>>& meshes, const ros::Subscriber& map,
                          std::function<void()> answered, std::function<void()> map_published)
-    : meshes_(meshes),
-      map_(map),
-      answered_(std::move(answered)),
-      map_published_(std::move(map_published)),
-      thread_([this] { loop(); }) {}
+    : meshes_(meshes), map_(map), answered_(std::move(answered)), map_published_(std::move(map_published)) {}
+
+void MasterWatch::watchParameters(std::map<std::string, std::string> held,
+                                  std::function<void(std::vector<std::string>)> changed) {
+  held_ = std::move(held);
+  changed_ = std::move(changed);
+}
+
+void MasterWatch::start() {
+  thread_ = std::thread([this] { loop(); });
+}
 
 MasterWatch::~MasterWatch() {
   {
@@ -28,7 +35,7 @@ MasterWatch::~MasterWatch() {
     stopping_ = true;
   }
   ended_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void MasterWatch::lookInto(SilenceQuestion question) {
@@ -47,10 +54,26 @@ void MasterWatch::loop() {
     lock.unlock();
     try {
       look();
+      lookAtParameters();
     } catch (const std::bad_alloc&) {  // it looks again
     }
     lock.lock();
   }
+}
+
+/// One that is gone, or a master that is, has not said anything else.
+void MasterWatch::lookAtParameters() {
+  const auto now = std::chrono::steady_clock::now();
+  if (held_.empty() || now - looked_ < LOOK_AT_PARAMETERS) return;
+  looked_ = now;
+  std::vector<std::string> changed;
+  for (const auto& [name, text] : held_) {
+    XmlRpc::XmlRpcValue value;
+    if (!askMaster("getParam", name, TIMEOUT_S, value)) continue;
+    const bool is_text = value.getType() == XmlRpc::XmlRpcValue::TypeString;
+    if (is_text && static_cast<std::string&>(value) != text) changed.push_back(name);
+  }
+  if (changed != std::exchange(told_changed_, changed)) changed_(changed);
 }
 
 void MasterWatch::look() {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -31,6 +33,10 @@ class MasterWatch {
   /// takeHint() has something new, `map_published` when the map's topic has a publisher. All must outlive the watch.
   MasterWatch(const std::vector<std::unique_ptr<MeshSubscription>>& meshes, const ros::Subscriber& map,
               std::function<void()> answered, std::function<void()> map_published);
+  /// Looks once a second whether these parameters, by resolved names, hold what they did. `changed` is called on the
+  /// watch's thread with the names of those that do not, whenever these are others. Before start().
+  void watchParameters(std::map<std::string, std::string> held, std::function<void(std::vector<std::string>)> changed);
+  void start();
   /// Waits for a question that is under way, as long as the master does not hang for no more than half a second.
   ~MasterWatch();
   MasterWatch(const MasterWatch&) = delete;
@@ -44,6 +50,7 @@ class MasterWatch {
  private:
   void loop();
   void look();
+  void lookAtParameters();
 
   const std::vector<std::unique_ptr<MeshSubscription>>& meshes_;
   const ros::Subscriber& map_;
@@ -53,6 +60,10 @@ class MasterWatch {
   bool stopping_ = false;
   std::optional<SilenceQuestion> question_;
   std::optional<std::string> hint_;
+  std::map<std::string, std::string> held_;
+  std::function<void(std::vector<std::string>)> changed_;
+  std::vector<std::string> told_changed_;
+  std::chrono::steady_clock::time_point looked_;
   std::thread thread_;
 };
 

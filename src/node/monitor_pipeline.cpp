@@ -74,6 +74,7 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
   loadFiles();
   findSets();
   config_.monitor.detector.expected = config_.expectedIn(config_.phase);
+  excluded_ = config_.monitor.detector.excluded;
   monitor_ = std::make_unique<Monitor>(config_.monitor, config_.monitorBodies());
   for (const BodyConfig& body : config_.bodies) decoders_.emplace_back(body.input);
   waiting_.resize(config_.bodies.size());
@@ -86,8 +87,6 @@ MonitorPipeline::MonitorPipeline(MonitorConfig config, const TransformFeed& tran
 
 void MonitorPipeline::loadFiles() {
   rigid_.resize(config_.bodies.size());
-  link_poses_.resize(config_.bodies.size());
-  lost_.resize(config_.bodies.size());
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
     BodyConfig& body = config_.bodies[b];
     if (!body.topology_file.empty()) {
@@ -113,14 +112,23 @@ void MonitorPipeline::loadFiles() {
   }
 }
 
+MonitorPipeline::Rigid MonitorPipeline::rigidOf(const MeshResource& mesh) {
+  Rigid rigid;
+  rigid.mesh.topology = mesh.topology;
+  rigid.mesh.positions = mesh.positions;
+  rigid.mesh.dropped_faces = mesh.dropped_faces;
+  rigid.mesh.rigid = true;
+  return rigid;
+}
+
 void MonitorPipeline::setRigid(std::size_t body, const MeshResource& mesh) {
-  MeshFrame& frame = rigid_[body].emplace();
-  frame.topology = mesh.topology;
-  frame.positions = mesh.positions;
-  frame.dropped_faces = mesh.dropped_faces;
-  frame.rigid = true;
-  const double radius_m = config_.bodies[body].input.noise_radius_m;
-  if (radius_m > 0) frame.radius_m.assign(frame.positions.size(), radius_m);
+  const BodyConfig& config = config_.bodies[body];
+  Rigid& rigid = rigid_[body].emplace(rigidOf(mesh));
+  rigid.name = config.body.name;
+  rigid.frame = config.tf_frame;
+  rigid.may_be_lost = !config.link.empty();
+  const double radius_m = config.input.noise_radius_m;
+  if (radius_m > 0) rigid.mesh.radius_m.assign(rigid.mesh.positions.size(), radius_m);
 }
 
 std::string MonitorPipeline::expectedEntry(std::size_t expectation) const {
@@ -155,7 +163,7 @@ void MonitorPipeline::findSets() {
     }
   }
   for (std::size_t b = 0; b < config_.bodies.size(); ++b) {
-    const Topology* known = rigid_[b] ? rigid_[b]->topology.get() : config_.bodies[b].input.file_topology.get();
+    const Topology* known = rigid_[b] ? rigid_[b]->mesh.topology.get() : config_.bodies[b].input.file_topology.get();
     const std::string problem = known ? indexProblem(b, *known) : "";
     if (!problem.empty()) throw ParameterError(problem);
   }
@@ -166,13 +174,36 @@ void MonitorPipeline::setPhase(const std::string& phase) {
   if (!phase.empty() && std::find(known.begin(), known.end(), phase) == known.end()) {
     throw ParameterError("phase '" + phase + "' is unknown; " + config_.phasesInWords());
   }
-  reconfigure([&](MonitorOptions& options, MarkerConfig&) { options.detector.expected = config_.expectedIn(phase); });
+  expectNow(phase);
   config_.phase = phase;
+}
+
+void MonitorPipeline::setHold(const std::string& body, const std::string& by, bool closed) {
+  const std::vector<Hold> before = config_.holds;
+  std::string known;
+  bool any = false;
+  for (Hold& hold : config_.holds) {
+    known += (known.empty() ? "'" : ", '") + hold.body + "' by '" + hold.by + "'";
+    if ((!body.empty() && hold.body != body) || (!by.empty() && hold.by != by)) continue;
+    hold.closed = closed;
+    any = true;
+  }
+  if (!any) {
+    const std::string asked = "'" + body + "'" + (by.empty() ? "" : " by '" + by + "'");
+    throw ParameterError(known.empty() ? "nothing is held; name what holds a body in robot/holds"
+                                       : asked + " is not in robot/holds, which has " + known);
+  }
+  try {
+    expectNow(config_.phase);
+  } catch (...) {
+    config_.holds = before;
+    throw;
+  }
 }
 
 std::string MonitorPipeline::phaseInWords() const {
   std::string text = config_.phase.empty() ? "no phase" : "phase '" + config_.phase + "'";
-  const std::vector<std::string> expected = describe(config_.monitor.detector.expected, config_.monitorBodies());
+  const std::vector<std::string> expected = describe(config_.monitor.detector.expected, monitor_->bodies());
   if (expected.empty()) return text + ", no contact is expected";
   for (std::size_t i = 0; i < expected.size(); ++i) text += (i == 0 ? ", expected: " : "; ") + expected[i];
   return text;
@@ -387,7 +418,18 @@ Outcome MonitorPipeline::checkNow() {
 
 void MonitorPipeline::nameUnwatched(Outcome& outcome) const {
   if (!outcome.answered) return;
-  outcome.unproved.insert(outcome.unproved.end(), config_.robot.missing.begin(), config_.robot.missing.end());
+  for (const auto* sentences : {&config_.robot.missing, &robot_changed_}) {
+    outcome.unproved.insert(outcome.unproved.end(), sentences->begin(), sentences->end());
+  }
+}
+
+const std::vector<std::string>& MonitorPipeline::robotChanged(const std::vector<std::string>& parameters) {
+  robot_changed_.clear();
+  for (const std::string& name : parameters) {
+    robot_changed_.push_back("parameter " + name +
+                             " is another one than at the start; restart the monitor, which watches the robot of then");
+  }
+  return robot_changed_;
 }
 
 std::string MonitorPipeline::takeComplaint(std::size_t body) { return std::exchange(complaints_[body], {}); }

@@ -15,6 +15,7 @@
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
 #include "input/transforms.h"
+#include "node/attach_request.h"
 #include "node/effects.h"
 
 namespace dccd {
@@ -80,6 +81,19 @@ class MonitorPipeline {
   /// The phase of the task that is on from the next step on. Throws ParameterError naming those that there are; all
   /// then stays.
   void setPhase(const std::string& phase);
+  /// Whether what robot/holds names under `by` holds the body from the next step on; an empty name: each. Throws
+  /// ParameterError naming what there is; all then stays.
+  void setHold(const std::string& body, const std::string& by, bool closed);
+  /// From the next step on the object is a body that moves with its link. Throws std::invalid_argument or
+  /// ParameterError naming the object; all then stays. So do the next two.
+  void attach(AttachedObject object);
+  /// It stays where its link's newest transform has it.
+  void detach(const std::string& name);
+  void remove(const std::string& name);
+
+  /// These parameters of the robot's description do not hold any more what they did at the start: as long as that is
+  /// so, nothing is proved. Returns why, a sentence each.
+  const std::vector<std::string>& robotChanged(const std::vector<std::string>& parameters);
   /// Which contacts are expected in the phase that is on, in words.
   std::string phaseInWords() const;
 
@@ -114,6 +128,20 @@ class MonitorPipeline {
     bool told = false;     // the complaint about it has been set
     std::string reason;    // why it has no place yet
   };
+  /// What tf carries.
+  struct Rigid {
+    MeshFrame mesh;  // as its file has it
+    std::string name, frame;
+    Eigen::Isometry3d frame_from_mesh = Eigen::Isometry3d::Identity();
+    bool may_be_lost = false;               // others go on without it
+    bool lost = false;                      // it had no transform at the last frame
+    std::optional<Eigen::Isometry3d> pose;  // the last one
+    bool isNone() const { return mesh.positions.empty(); }
+  };
+  struct Attached {
+    AttachedObject object;
+    bool held = true;
+  };
   MonitorConfig config_;
   EffectTracker effects_;
   const TransformFeed& transforms_;
@@ -121,10 +149,12 @@ class MonitorPipeline {
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
-  std::vector<bool> placed_;                                  // a static body of which the monitor has a frame
-  std::vector<std::optional<MeshFrame>> rigid_;               // as the mesh file has them
-  std::vector<std::optional<Eigen::Isometry3d>> link_poses_;  // the last ones, of rigid bodies
-  std::vector<bool> lost_;                                    // a robot's link without a transform at the last frame
+  std::vector<bool> placed_;  // a static body of which the monitor has a frame
+  // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
+  std::vector<std::optional<Rigid>> rigid_;
+  std::vector<std::optional<Attached>> attached_;
+  std::vector<std::string> excluded_;  // by the configuration
+  std::vector<std::string> robot_changed_;
   std::vector<std::string> complaints_, hints_, remarks_;
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
@@ -144,6 +174,7 @@ class MonitorPipeline {
 
   void loadFiles();
   void setRigid(std::size_t body, const MeshResource& mesh);
+  static Rigid rigidOf(const MeshResource& mesh);
   /// The parameter that one of the expectations is from.
   std::string expectedEntry(std::size_t expectation) const;
   /// Of the body, by expected_contacts.
@@ -181,7 +212,13 @@ class MonitorPipeline {
   bool placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
   /// may_lose_links: those of a robot that have no transform stand in nobody's way any longer.
   bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason);
-  void loseLink(std::size_t body, MeshFrame& frame);
+  /// Where it is at the stamp, and was since another one. False: nobody knows.
+  bool placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame, std::string& reason) const;
+  void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
+  /// A body is another one from the next step on.
+  void setBody(std::size_t body, const Body& what, Rigid rigid);
+  std::size_t attachedNumber(const std::string& name) const;
+  void expectNow(const std::string& phase);
   bool findPlace(const LoadedMap& loaded, ObstacleMap& map, std::string& reason);
   bool placeTrusted(std::int64_t now_ns);
   void placeMap(std::int64_t now_ns);

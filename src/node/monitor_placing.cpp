@@ -36,47 +36,77 @@ std::string MonitorPipeline::unusableTransforms() const {
   return unusable.empty() ? "" : "; " + shortText(unusable);
 }
 
-/// A robot's link that has no place stays where it was, and all of it is unknown there: unchecked.
-void MonitorPipeline::loseLink(std::size_t body, MeshFrame& frame) {
-  frame.pose = link_poses_[body].value_or(Eigen::Isometry3d::Identity());
-  for (Vec3& p : frame.positions) p.setConstant(std::numeric_limits<double>::quiet_NaN());
-  frame.seen = {unknownAt(frame.stamp_ns - 1)};
+bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame,
+                               std::string& reason) const {
+  frame = rigid.mesh;
+  frame.stamp_ns = stamp_ns;
+  if (rigid.isNone()) return true;
+  if (!transforms_.lookup(fixed_frame_, rigid.frame, stamp_ns, frame.pose, reason)) {
+    // It stays where it was, and all of it is unknown there: unchecked.
+    frame.pose = rigid.pose.value_or(Eigen::Isometry3d::Identity());
+    for (Vec3& p : frame.positions) p.setConstant(std::numeric_limits<double>::quiet_NaN());
+    frame.seen = {unknownAt(stamp_ns - 1)};
+    reason = noTransform(rigid.frame, fixed_frame_, reason) + unusableTransforms() + "; body '" + rigid.name +
+             "' is carried by it";
+    return false;
+  }
+  frame.pose = frame.pose * rigid.frame_from_mesh;
+  transform(frame.pose, frame.positions);
+  frame.seen = posesBetween(fixed_frame_, rigid.frame, from_ns, stamp_ns);
+  for (SeenPose& seen : frame.seen) seen.pose = seen.pose * rigid.frame_from_mesh;
+  return true;
+}
+
+/// lost: why it has no place; empty: it has.
+void MonitorPipeline::pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns) {
+  Rigid& rigid = *rigid_[body];
+  if (lost.empty()) {
+    // It was lost at the start of the step that ends here.
+    if (rigid.lost) frame.seen.push_back(unknownAt(frame.stamp_ns - 1));
+    rigid.pose = frame.pose;
+  } else if (!rigid.lost && body < complaints_.size()) {
+    complaints_[body] = "not watched meanwhile: " + lost;
+  }
+  rigid.lost = !lost.empty();
+  monitor_->countReceived(body);
+  monitor_->push(body, std::move(frame), now_ns);
 }
 
 bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason) {
-  std::vector<std::pair<std::size_t, MeshFrame>> frames;
-  std::vector<std::string> lost(rigid_.size());  // why; empty: it is not
+  struct Placed {
+    std::size_t body;
+    MeshFrame frame;
+    std::string lost;
+  };
+  std::vector<Placed> all;
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    MeshFrame frame = *rigid_[b];
-    frame.stamp_ns = stamp_ns;
-    const std::string& carrier = config_.bodies[b].tf_frame;
-    if (transforms_.lookup(fixed_frame_, carrier, stamp_ns, frame.pose, reason)) {
-      transform(frame.pose, frame.positions);
-      frame.seen = posesBetween(fixed_frame_, carrier, clock_ns_, stamp_ns);
-    } else {
-      reason = noTransform(carrier, fixed_frame_, reason) + unusableTransforms() + "; body '" +
-               config_.bodies[b].body.name + "' is carried by it";
-      if (!may_lose_links || config_.bodies[b].link.empty()) return false;
-      loseLink(b, frame);
-      lost[b] = reason;
+    Placed one{b, {}, {}};
+    if (!placeOne(*rigid_[b], clock_ns_, stamp_ns, one.frame, reason)) {
+      if (!may_lose_links || !rigid_[b]->may_be_lost) return false;
+      one.lost = reason;
     }
-    frames.emplace_back(b, std::move(frame));
+    all.push_back(std::move(one));
   }
-  for (auto& frame : frames) {
-    const std::size_t b = frame.first;
-    if (lost[b].empty()) {
-      // It was lost at the start of the step that ends here.
-      if (lost_[b]) frame.second.seen.push_back(unknownAt(stamp_ns - 1));
-      link_poses_[b] = frame.second.pose;
-    } else if (!lost_[b]) {
-      complaints_[b] = "not watched meanwhile: " + lost[b];
-    }
-    lost_[b] = !lost[b].empty();
-    monitor_->countReceived(frame.first);
-    monitor_->push(frame.first, std::move(frame.second), now_ns);
-  }
+  for (Placed& one : all) pushRigid(one.body, std::move(one.frame), one.lost, now_ns);
   return true;
+}
+
+void MonitorPipeline::setBody(std::size_t body, const Body& what, Rigid rigid) {
+  monitor_->setBody(body, what);
+  effects_.setBody(body, what);
+  rigid_.resize(std::max(rigid_.size(), body + 1));
+  rigid_[body] = std::move(rigid);
+  // Where steps to come begin, so that the next one is answered with it.
+  StampNs before_ns = 0;
+  for (const StampNs stamp_ns : {monitor_->nextStart(), clock_ns_}) {
+    if (monitor_->nextStart() == 0 || stamp_ns <= before_ns) continue;
+    MeshFrame frame;
+    std::string reason;
+    const bool placed = placeOne(*rigid_[body], before_ns, stamp_ns, frame, reason);
+    pushRigid(body, std::move(frame), placed ? "" : reason, 0);
+    before_ns = stamp_ns;
+  }
 }
 
 void MonitorPipeline::keep(std::size_t body) {

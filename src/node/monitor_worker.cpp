@@ -122,6 +122,7 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.frames_handed_over = frames_handed_over;
   context.transforms_unusable = pipeline.transformsUnusable();
   context.wrong_row_steps = pipeline.wrongRowSteps();
+  context.requests_refused = requests_refused;
   context.maps_refused = maps ? maps->refused() : 0;
   context.parameter_hash = config.hash();
   return context;

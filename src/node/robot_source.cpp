@@ -44,7 +44,8 @@ class ParameterTexts {
         until_(Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * timeout_s))),
         goes_on_(goes_on) {}
 
-  RobotText read(const std::string& name, const std::string& what) const {
+  /// `held`: of a parameter, under its resolved name, what it holds.
+  RobotText read(const std::string& name, const std::string& what, std::map<std::string, std::string>& held) const {
     if (name.empty() || isFile(name)) return readFile(name, what);
     RobotText read;
     try {
@@ -55,6 +56,7 @@ class ParameterTexts {
         if (!std::exchange(told, true)) ROS_INFO_STREAM("waits for " << read.name << ", " << what);
         ros::WallDuration(LOOK_AGAIN_S).sleep();
       }
+      held[node_.resolveName(name)] = read.text;
     } catch (const ros::Exception& error) {
       read.name = "parameter " + name;
       read.problem = std::string("cannot be asked for: ") + error.what();
@@ -80,8 +82,11 @@ class ParameterTexts {
 RobotLoader robotOfParameters(const ros::NodeHandle& node, std::function<bool()> goes_on) {
   return [node, goes_on = std::move(goes_on)](const RobotConfig& config, double tolerance_m) {
     const ParameterTexts texts(node, config.timeout_s, goes_on);
-    const RobotText description = texts.read(config.description, "a URDF");
-    return makeRobot(description, texts.read(config.semantic, "an SRDF"), config, tolerance_m);
+    std::map<std::string, std::string> held;
+    const RobotText description = texts.read(config.description, "a URDF", held);
+    Robot robot = makeRobot(description, texts.read(config.semantic, "an SRDF", held), config, tolerance_m);
+    robot.parameters = std::move(held);
+    return robot;
   };
 }
 

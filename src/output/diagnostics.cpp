@@ -107,6 +107,7 @@ diagnostic_msgs::DiagnosticArray Diagnostics::take(std::int64_t now_ns, const ro
   put(status, "frames handed over in process", context.frames_handed_over);
   put(status, "unusable transforms", context.transforms_unusable);
   put(status, "wrong row_steps", context.wrong_row_steps);
+  put(status, "refused requests for objects", context.requests_refused);
   put(status, "maps received", context.maps_received);
   put(status, "maps refused", context.maps_refused);
   if (map_present_) put(status, "map age [s]", map_age_s_);

@@ -243,6 +243,57 @@ void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const Ma
   }
 }
 
+/// Each vertex by the separation along the mean of its faces' normals, as far as it takes for each of these faces.
+Positions grown(const Topology& topology, const Positions& at, double by_m) {
+  Positions normals(at.size(), Vec3::Zero()), out = at;
+  double volume = 0;
+  for (const Face& f : topology.faces()) {
+    const Vec3 area = (at[f[1]] - at[f[0]]).cross(at[f[2]] - at[f[0]]);
+    volume += at[f[0]].dot(area);
+    for (const Index v : f) normals[v] += area.normalized();
+  }
+  if (topology.isClosed() && volume < 0) by_m = -by_m;  // its faces look inwards
+  for (std::size_t v = 0; v < at.size(); ++v) out[v] += by_m * normals[v].stableNormalized();
+  return out;
+}
+
+/// Of rigid bodies: what must not come nearer than their separation, roughly, and the box of all that they sweep.
+void addSwept(const Outcome& outcome, const MarkerConfig& config, const std::string& frame, MarkerArray& out) {
+  for (const Body& body : outcome.step->bodies) {
+    Box box;
+    for (const Positions* at : {body.t0.get(), body.t1.get()}) {
+      for (const Vec3& p : *at) {
+        box.min = box.min.cwiseMin(p);
+        box.max = box.max.cwiseMax(p);
+      }
+    }
+    if (!body.rigid || box.empty() || !box.min.allFinite() || !box.max.allFinite()) continue;
+    const double separation_m = body.minimum_separation_m;
+    if (separation_m > 0) {
+      Marker padding = list(outcome, frame, "padding/" + body.name, Marker::TRIANGLE_LIST, 1.0);
+      padding.color = color(1, 0.7, 0.2, 0.25);
+      const Positions at = grown(*body.topology, *body.t1, separation_m);
+      for (const Face& face : body.topology->faces()) {
+        for (const Index v : face) padding.points.push_back(point(at[v]));
+      }
+      out.markers.push_back(std::move(padding));
+    }
+    Marker edges = list(outcome, frame, "swept/" + body.name, Marker::LINE_LIST, config.line_width_m);
+    edges.color = color(0.5, 0.7, 1);
+    const Vec3 min = box.min - Vec3::Constant(separation_m), size = box.max + Vec3::Constant(separation_m) - min;
+    for (int a = 0; a < 3; ++a) {
+      for (int side = 0; side < 4; ++side) {
+        Vec3 from = min;
+        from[(a + 1) % 3] += (side & 1) * size[(a + 1) % 3];
+        from[(a + 2) % 3] += (side >> 1) * size[(a + 2) % 3];
+        edges.points.push_back(point(from));
+        edges.points.push_back(point(from + size[a] * Vec3::Unit(a)));
+      }
+    }
+    out.markers.push_back(std::move(edges));
+  }
+}
+
 /// Beside the bodies, a line in each colour.
 void addLegend(const Outcome& outcome, const std::string& frame, MarkerArray& out) {
   Box box;
@@ -329,6 +380,7 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
   }
   addObstacle(outcome, config.obstacle_m, frame, out);
   addOwn(outcome, frame, out);
+  if (config.swept) addSwept(outcome, config, frame, out);
   if (config.mesh) {
     addMeshes(outcome, bodies, config, frame, out);
     addLegend(outcome, frame, out);

@@ -51,7 +51,7 @@ class RobotMaker {
     robot_.semantic_known = semantic.name.empty();
     UrdfText urdf;
     try {
-      urdf = parseUrdf(given(description));
+      urdf = parseUrdf(given(description), config_.visuals);
     } catch (const RobotTextError& error) {
       miss("nothing of the robot is watched: " + description.name + " " + error.what());
       return std::move(robot_);
@@ -198,7 +198,10 @@ class RobotMaker {
       list = quoted(list, link);
     }
     if (!visual_only.empty()) {
-      remark("not watched, for they have a visual but no collision element: links " + visual_only);
+      remark(
+          "not watched, for they have a visual but no collision element (robot/visuals: true takes the visual): "
+          "links " +
+          visual_only);
     }
     if (!bare.empty()) remark("without geometry are links " + bare);
     if (robot_.parts.empty() && robot_.missing.empty()) miss("the robot has no link with a collision element");

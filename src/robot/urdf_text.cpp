@@ -59,6 +59,12 @@ std::string problemOf(const XMLElement& collision) {
   return "is <" + name + ">, which is no geometry; write box, cylinder, sphere or mesh";
 }
 
+/// Of a link that has no collision element its visuals become that: they have the same origin and geometry.
+void takeVisuals(XMLElement& link) {
+  if (link.FirstChildElement("collision")) return;
+  while (XMLElement* visual = link.FirstChildElement("visual")) visual->SetName("collision");
+}
+
 /// Returns how many collision elements urdfdom is to read.
 std::size_t reduceLink(XMLElement& link, UrdfText& urdf) {
   const std::string name = neededText(link, "name");
@@ -94,7 +100,7 @@ void reduceJoint(XMLElement& joint) {
 
 }  // namespace
 
-UrdfText parseUrdf(const std::string& text) {
+UrdfText parseUrdf(const std::string& text, bool visuals) {
   UrdfText urdf;
   tinyxml2::XMLDocument document;
   XMLElement& robot = parseRobotXml(text, document);
@@ -103,6 +109,7 @@ UrdfText parseUrdf(const std::string& text) {
     next = child->NextSiblingElement();
     const std::string tag = child->Name();
     if (tag == "link") {
+      if (visuals) takeVisuals(*child);
       elements[textOf(*child, "name")] = reduceLink(*child, urdf);
     } else if (tag == "joint") {
       reduceJoint(*child);

@@ -25,7 +25,8 @@ struct UrdfText {
 };
 
 /// Visuals, inertias, materials, transmissions, what is Gazebo's, and how joints move are left out before urdfdom reads
-/// it: where these are wrong, surfaces are still where tf has them. Throws RobotTextError.
-UrdfText parseUrdf(const std::string& text);
+/// it: where these are wrong, surfaces are still where tf has them. visuals: of links without a collision element they
+/// are taken for that. Throws RobotTextError.
+UrdfText parseUrdf(const std::string& text, bool visuals = false);
 
 }  // namespace dccd

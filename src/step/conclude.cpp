@@ -165,7 +165,7 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
     std::string names;
     std::size_t count = 0;
     for (const Body& body : step.bodies) {
-      if (!holds(body)) continue;
+      if (!holds(body) || body.topology->vertexCount() == 0) continue;
       names += (names.empty() ? "'" : ", '") + body.name + "'";
       ++count;
     }

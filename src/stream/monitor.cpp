@@ -183,6 +183,34 @@ void Monitor::skip(std::size_t body, StepStatus status, StampNs stamp_ns, const 
   }
 }
 
+void Monitor::setBody(std::size_t body, Body what) {
+  Impl& m = *impl_;
+  if (body > m.bodies.size()) throw std::invalid_argument("there is no body " + std::to_string(body));
+  if (body == m.options.clock_body) throw std::invalid_argument("clock_body must stay");
+  std::vector<Body> bodies = m.bodies;
+  bodies.resize(std::max(bodies.size(), body + 1));
+  bodies[body] = std::move(what);
+  check(m.options.detector, bodies);
+  if (bodies.size() > m.bodies.size()) {
+    m.stores.emplace_back(m.options.store);
+    m.counters.emplace_back();
+    m.runs.push_back(0);
+    m.told_runs.push_back(0);
+    m.references.frames.emplace_back();
+    m.references.topologies.emplace_back();
+    m.held_seen.emplace(m.held_seen.end() - 1);  // the map's stays the last
+  }
+  m.bodies = std::move(bodies);
+  m.stores[body].clear();
+  m.told_runs[body] = 0;
+  m.references.frames[body] = nullptr;
+  m.references.topologies[body] = nullptr;
+  m.held_seen[body].clear();
+  m.tracker.seam(body);
+}
+
+StampNs Monitor::nextStart() const { return impl_->oldestStart(0); }
+
 void Monitor::withdraw(std::size_t body) {
   Impl& m = *impl_;
   if (m.isStream(body) || m.stores.at(body).empty()) return;

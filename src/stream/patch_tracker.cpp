@@ -89,11 +89,7 @@ void PatchTracker::tell(Outcome& outcome) {
 }
 
 void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcome) {
-  const std::vector<Body>& bodies = outcome.step->bodies;
-  bool same = graph_.bodyCount() == bodies.size();
-  for (std::size_t b = 0; same && b < bodies.size(); ++b) same = graph_.sameMesh(b, bodies[b]);
-  if (!same) seam();
-  graph_.setBodies(bodies);
+  takeBodies(outcome.step->bodies);
   merge(found.spots(), outcome);
   findParts(found, outcome);
   findNewVoxels(found, outcome);
@@ -116,6 +112,27 @@ void PatchTracker::follow(const PatchMaker& found, double gap_s, Outcome& outcom
     at = seen ? cut_off_expected_.erase(at) : std::next(at);
   }
   followed_expectations_ = expectations_;
+}
+
+/// What lives on bodies that came, went or have another mesh ends. The rest stays; its vertices get their new numbers.
+void PatchTracker::takeBodies(const std::vector<Body>& bodies) {
+  std::vector<Index> begin;
+  bool same = graph_.bodyCount() == bodies.size();
+  for (std::size_t b = 0; b < graph_.bodyCount(); ++b) {
+    begin.push_back(graph_.firstVertex(b));
+    if (b < bodies.size() && graph_.sameMesh(b, bodies[b])) continue;
+    same = false;
+    seam(b);
+  }
+  if (same) return;
+  graph_.setBodies(bodies);
+  for (Touch& spot : trace_.spots) {
+    for (std::size_t side = 0; side < 2 && spot.point[side] != NO_INDEX; ++side) {
+      const auto next = std::upper_bound(begin.begin(), begin.end(), spot.point[side]);
+      const auto body = static_cast<std::size_t>(next - begin.begin()) - 1;
+      spot.point[side] += graph_.firstVertex(body) - begin[body];
+    }
+  }
 }
 
 void PatchTracker::recognise(const PatchMaker& found, Outcome& outcome) {

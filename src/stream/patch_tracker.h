@@ -73,6 +73,7 @@ class PatchTracker {
     bool isUnexpected() const { return unexpected_new || unexpected_initial; }
   };
 
+  void takeBodies(const std::vector<Body>& bodies);
   void merge(const std::vector<PatchSpot>& spots, const Outcome& outcome);
   void findParts(const PatchMaker& found, const Outcome& outcome);
   void findNewVoxels(const PatchMaker& found, const Outcome& outcome);

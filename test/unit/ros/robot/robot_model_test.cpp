@@ -145,9 +145,27 @@ TEST_F(RobotModel, WhatOthersWriteBesideSurfacesIsPassedOver) {
   EXPECT_EQ(joinedText(robot.missing), "");
   ASSERT_EQ(robot.parts.size(), 1u);
   EXPECT_EQ(robot.parts[0].name, "base");
-  EXPECT_EQ(joinedText(robot.remarks),
-            "not watched, for they have a visual but no collision element: links 'seen'\n"
-            "without geometry are links 'world'\n");
+  EXPECT_EQ(
+      joinedText(robot.remarks),
+      "not watched, for they have a visual but no collision element (robot/visuals: true takes the visual): links "
+      "'seen'\n"
+      "without geometry are links 'world'\n");
+}
+
+// Where it is asked for, and only of a link that has nothing else.
+TEST_F(RobotModel, AVisualStandsForACollisionElement) {
+  RobotConfig config;
+  config.visuals = true;
+  const std::string visual =
+      "<visual><origin xyz='1 0 0'/><geometry><box size='2 2 2'/></geometry><material name='m'/></visual>";
+  const Robot robot =
+      robotFrom(robotOf(link("seen", visual + visual) + link("both", visual + collision("<box size='1 1 1'/>")) +
+                        joint("seen", "both")),
+                "", config);
+  EXPECT_EQ(joinedText(robot.missing) + joinedText(robot.remarks), "");
+  ASSERT_EQ(robot.parts.size(), 3u);
+  EXPECT_TRUE(hasVertex(partOf(robot, "seen/2"), Vec3(2, 1, 1), 1e-15));
+  EXPECT_TRUE(hasVertex(partOf(robot, "both"), Vec3(0.5, 0.5, 0.5), 0));
 }
 
 TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {

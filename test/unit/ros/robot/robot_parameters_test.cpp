@@ -134,6 +134,21 @@ TEST(RobotParameters, ALinkOfABodysNameIsCalledALink) {
   EXPECT_EQ(config.expected_contacts[0].partners[1].body, 2u);
 }
 
+TEST(RobotParameters, WhatHoldsABodyIsExpectedToTouchItUntilItIsOpen) {
+  MonitorConfig config = read("robot: {description: d, semantic: s, holds: {mesh: [group hand, arm]}}\n");
+  ASSERT_EQ(config.holds.size(), 2u);
+  EXPECT_EQ(config.holds[0].by, "group hand");
+  EXPECT_EQ(config.expectedIn("").size(), 3u) << "palm, palm/2 and arm";
+  const std::uint64_t closed = config.hash();
+  config.holds[0].closed = false;
+  const std::vector<Expectation> expected = config.expectedIn("");
+  ASSERT_EQ(expected.size(), 1u);
+  EXPECT_EQ(expected[0].partners[0].body, 0);
+  EXPECT_EQ(config.bodies[expected[0].partners[1].body].body.name, "arm");
+  EXPECT_NE(config.hash(), closed);
+  EXPECT_TRUE(read("robot: {description: d, holds: {mesh: palm}}\n", "no urdf").expectedIn("").empty());
+}
+
 TEST(RobotParameters, MistakesAreNamed) {
   const std::pair<const char*, const char*> cases[] = {
       {"robot: {padding_m: 1}\n", "robot/description is needed"},
@@ -145,6 +160,11 @@ TEST(RobotParameters, MistakesAreNamed) {
       {"robot: {description: d, leave_out: [group hands]}\n", "robot/leave_out names 'group hands'"},
       {"robot: {description: d, leave_out: [pal]}\n", "nearest is 'palm'"},
       {"robot: {description: d, leave_out: [1]}\n", "must list links and groups by name"},
+      {"robot: {description: d, holds: {mash: palm}}\n", "robot/holds/mash is no body; nearest is 'mesh'"},
+      {"robot: {description: d, holds: {arm: palm}}\n", "robot/holds/arm is no body"},
+      {"robot: {description: d, semantic: s, holds: {mesh: group hnd}}\n", "nearest is 'group hand'"},
+      {"robot: {description: d, holds: {mesh: [palm, 1]}}\n", "robot/holds/mesh must name links and groups"},
+      {"earliest_only: true\nrobot: {description: d, holds: {mesh: palm}}\n", "given beside earliest_only"},
       {"robot: d\nexpected_contacts:\n  - {between: [mesh, group hnd]}\n", "nearest is 'group hand'"},
       {"robot: d\nexpected_contacts:\n  - {between: [mesh, plam]}\n", "nearest is 'palm'"},
       {"robot: d\nminimum_separation_pairs:\n  - {between: [mesh, palm], separation_m: 0}\n"

@@ -86,6 +86,33 @@ TEST_F(RobotPipeline, WhatAGroupMayTouchIsExpected) {
   EXPECT_TRUE(assuranceOf(driven_->outcome).proved);
 }
 
+// As long as the hand is closed; once it is open, what touches is news, though it touched before.
+TEST_F(RobotPipeline, WhatTheHandHoldsIsExpectedUntilItOpens) {
+  XmlRpcValue tree = robotScene();
+  tree["robot"]["holds"]["mesh"] = "palm";
+  start(tree);
+  for (const double at : {1.0, 1.1, 1.2, 1.3}) {
+    put("palm", at, 0.1);
+    put("thumb", at, -1);
+  }
+  feed(1, 0.3f);
+  feed(1.1, 0.05f);
+  EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::EXPECTED);
+  EXPECT_TRUE(says(driven_->outcome.expected, "mesh with palm"));
+  MonitorPipeline& pipeline = driven_->pipeline;
+  EXPECT_THROW(pipeline.setHold("mesh", "thumb", false), ParameterError);
+  EXPECT_THROW(pipeline.setHold("cloth", "", false), ParameterError);
+  pipeline.setPhase("");  // leaves it as it is
+  pipeline.setHold("mesh", "palm", false);
+  feed(1.2, 0.0995f);  // within the plate: it crosses all the time
+  EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::NEW);
+  EXPECT_TRUE(driven_->outcome.expected.empty());
+  pipeline.setHold("", "", true);
+  feed(1.3, 0.05f);
+  EXPECT_EQ(assuranceOf(driven_->outcome).touching, Touching::EXPECTED);
+  EXPECT_NE(pipeline.phaseInWords().find("mesh with palm"), std::string::npos);
+}
+
 // The state is unproved and names it; the other link's contacts are found all the same.
 TEST_F(RobotPipeline, ALinkWithoutTransformIsNamedAndTheRestGoesOn) {
   start(robotScene());

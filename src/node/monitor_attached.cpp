@@ -1,0 +1,123 @@
+// Objects that the robot takes into its hand and lets go of: bodies that come and go while the monitor runs.
+#include <algorithm>
+#include <utility>
+
+#include "node/monitor_pipeline.h"
+
+namespace dccd {
+namespace {
+
+// More than a hand holds and leaves about: each costs a little in every step.
+constexpr std::size_t MOST_ATTACHED = 64;
+
+/// What meets nothing, in the place of an object that is not there.
+Body nobody() {
+  Body body;
+  body.self_collision = body.against_bodies = body.against_obstacle = false;
+  return body;
+}
+
+bool isOff(const MonitorConfig& config, Effect effect) {
+  return settingOf(config.effects, effect) == EffectSetting::OFF;
+}
+
+}  // namespace
+
+std::size_t MonitorPipeline::attachedNumber(const std::string& name) const {
+  const auto has_name = [&](const std::optional<Attached>& one) { return one && one->object.name == name; };
+  return static_cast<std::size_t>(std::find_if(attached_.begin(), attached_.end(), has_name) - attached_.begin());
+}
+
+void MonitorPipeline::attach(AttachedObject object) {
+  const std::size_t first = config_.bodies.size(), count = attached_.size();
+  if (attachedNumber(object.name) < count) {
+    throw ParameterError("object '" + object.name + "' is there already; call ~remove before, or give it another name");
+  }
+  const auto free = std::find(attached_.begin(), attached_.end(), std::nullopt);
+  const auto number = static_cast<std::size_t>(free - attached_.begin());
+  if (number == MOST_ATTACHED) {
+    throw ParameterError("object '" + object.name + "': there are " + std::to_string(MOST_ATTACHED) +
+                         " already, which is the most; call ~remove for some");
+  }
+  const RobotConfig& robot = config_.robot_asked;
+  Body body;
+  body.name = object.name;
+  body.rigid = true;
+  body.self_collision = false;
+  body.against_bodies = !isOff(config_, Effect::BODY_BODY);
+  body.against_obstacle = robot.against_map && !isOff(config_, Effect::OCTOMAP);
+  body.minimum_separation_m = object.padding_m;
+  // Where nobody had own voxels at the start, maps do not tell what is needed for it.
+  if (config_.ownsVoxels()) body.own_voxels_m = config_.robot.named ? robot.own_voxels_m : config_.own_voxels_m;
+  for (std::size_t b = 0; b < first + count && !robot.against_links; ++b) {
+    if (b >= first ? b != first + number : !config_.bodies[b].link.empty()) {
+      body.not_against.push_back(static_cast<std::uint16_t>(b));
+    }
+  }
+  Rigid rigid = rigidOf(*object.mesh);
+  rigid.name = object.name;
+  rigid.frame = object.frame;
+  rigid.may_be_lost = true;
+  setBody(first + number, body, std::move(rigid));
+  attached_.resize(std::max(count, number + 1));
+  attached_[number] = Attached{std::move(object), true};
+  try {
+    expectNow(config_.phase);
+  } catch (...) {
+    remove(body.name);
+    throw;
+  }
+}
+
+void MonitorPipeline::detach(const std::string& name) {
+  const std::size_t number = attachedNumber(name);
+  const bool is_held = number < attached_.size() && attached_[number]->held;
+  if (!is_held) throw ParameterError("object '" + name + "' is not attached");
+  Rigid& rigid = *rigid_[config_.bodies.size() + number];
+  Eigen::Isometry3d pose;
+  std::string reason = "the fixed frame is not known before the clock body's first message";
+  if (fixed_frame_.empty() || !transforms_.lookup(fixed_frame_, rigid.frame, 0, pose, reason)) {
+    throw ParameterError("object '" + name + "' stays attached, for it is not known where it is let go: " + reason);
+  }
+  rigid.frame_from_mesh = pose * rigid.frame_from_mesh;
+  rigid.frame = fixed_frame_;
+  attached_[number]->held = false;
+  expectNow(config_.phase);
+}
+
+void MonitorPipeline::remove(const std::string& name) {
+  const std::size_t number = attachedNumber(name);
+  if (number == attached_.size()) throw ParameterError("object '" + name + "' is not there");
+  static const auto NOTHING = share(Topology::fromTriangles(0, {}));
+  attached_[number].reset();
+  expectNow(config_.phase);  // before the body that is expected is gone
+  Rigid none;
+  none.mesh.topology = NOTHING;
+  setBody(config_.bodies.size() + number, nobody(), std::move(none));
+}
+
+/// What is expected in the phase, of what hands hold, and of what is attached; and what of that is not looked at.
+void MonitorPipeline::expectNow(const std::string& phase) {
+  std::vector<Expectation> expected = config_.expectedIn(phase);
+  std::vector<std::string> excluded = excluded_;
+  bool any = false;
+  for (std::size_t i = 0; i < attached_.size(); ++i) {
+    if (!attached_[i]) continue;
+    any = true;
+    const std::size_t body = config_.bodies.size() + i;
+    for (const std::uint16_t other : attached_[i]->object.expected) {
+      if (!attached_[i]->held || !meet(monitor_->bodies()[body], body, monitor_->bodies()[other], other)) continue;
+      Expectation& one = expected.emplace_back();
+      one.partners[0].body = static_cast<std::uint16_t>(body);
+      one.partners[1].body = other;
+    }
+  }
+  if (any && !config_.robot_asked.against_links)
+    excluded.push_back("what is attached against links and against each other");
+  reconfigure([&](MonitorOptions& options, MarkerConfig&) {
+    options.detector.expected = expected;
+    options.detector.excluded = excluded;
+  });
+}
+
+}  // namespace dccd

@@ -1,0 +1,342 @@
+// What a robot takes into its hand and lets go of: requests and their mistakes, and what becomes of the body.
+#include <tf2_msgs/TFMessage.h>
+
+#include <fstream>
+
+#include "node/attach_request.h"
+#include "record/step_replay.h"
+#include "robot_texts.h"
+#include "support/folder_test.h"
+#include "unit/ros/parameter_support.h"
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+using Request = deformable_ccd::AttachObject::Request;
+
+/// A hand of a palm with a plate 1 m x 1 m x 2 mm, and a frame without geometry.
+RobotLoader hand() {
+  return [](const RobotConfig& config, double tolerance_m) {
+    const std::string plate = collision("<box size='1 1 0.002'/>");
+    return robotFrom(robotOf(link("palm", plate) + link("tool", "") + joint("palm", "tool")), "", config, tolerance_m);
+  };
+}
+
+XmlRpcValue handScene() {
+  XmlRpcValue tree = scene();
+  tree["effects"]["octomap"] = "off";
+  tree["transform_timeout_s"] = 0.0;
+  tree["robot"]["description"] = "robot_description";
+  return tree;
+}
+
+/// 1 m x 1 m x 2 mm, 0.5 m above the frame of the tool.
+Request plate(const std::string& name = "plate") {
+  Request request;
+  request.name = name;
+  request.link = "tool";
+  request.pose.position.z = 0.5;
+  request.pose.orientation.w = 1;
+  request.primitive.type = shape_msgs::SolidPrimitive::BOX;
+  request.primitive.dimensions = {1, 1, 0.002};
+  return request;
+}
+
+class Attached : public FolderTest {
+ protected:
+  void start(const XmlRpcValue& tree = handScene()) { driven_ = std::make_unique<Driven>(tree, hand()); }
+  void attach(const Request& request) { pipeline().attach(readAttach(request, pipeline().config())); }
+  std::string refusal(const Request& request) {
+    try {
+      attach(request);
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
+  }
+  /// The palm far below, the tool at this height; then a frame of the cloth.
+  const Outcome& feed(double stamp_s, double tool_z, float cloth_z) {
+    tf2_msgs::TFMessage message;
+    for (const auto& [child, z] : {std::pair("palm", -9.0), std::pair("tool", tool_z)}) {
+      geometry_msgs::TransformStamped& one = message.transforms.emplace_back();
+      one.header.frame_id = "world";
+      one.header.stamp = ros::Time(stamp_s);
+      one.child_frame_id = child;
+      one.transform.translation.z = z;
+      one.transform.rotation.w = 1;
+    }
+    driven_->feed_tf.add(message, false);
+    return driven_->feed(stamp_s, cloth_z);
+  }
+  Assurance said() const { return assuranceOf(driven_->outcome); }
+  double heightOf(std::size_t body) const { return driven_->outcome.step->bodies.at(body).t1->front().z(); }
+  MonitorPipeline& pipeline() { return driven_->pipeline; }
+
+  std::unique_ptr<Driven> driven_;
+};
+
+TEST_F(Attached, ItMovesWithItsLinkAndStaysWhereItIsLetGo) {
+  XmlRpcValue tree = handScene();
+  tree["patch_gap_s"] = 0.0;  // each touch is news
+  start(tree);
+  feed(1, 0, 0.8f);
+  ASSERT_TRUE((feed(1.1, 0, 0.8f), said().clear())) << said().missing.front();
+  attach(plate());
+  feed(1.2, 0.1, 0.8f);
+  EXPECT_TRUE(said().clear()) << "answered with it: from 0.5 to 0.6";
+  EXPECT_NEAR(heightOf(2), 0.6, 2e-3);
+  EXPECT_NEAR(driven_->outcome.step->bodies[2].t0->front().z(), 0.5, 2e-3) << "where the step begins, too";
+  EXPECT_EQ(driven_->outcome.step->bodies[2].name, "plate");
+  feed(1.3, 0.35, 0.8f);
+  EXPECT_EQ(said().touching, Touching::NEW) << "through the cloth";
+  feed(1.4, 0.2, 0.9f);
+  pipeline().detach("plate");
+  feed(1.5, -0.3, 0.9f);
+  EXPECT_NEAR(heightOf(2), 0.7, 2e-3) << "where the tool's newest transform had it";
+  feed(1.6, -0.3, 0.65f);
+  EXPECT_EQ(said().touching, Touching::NEW) << "an obstacle";
+  pipeline().remove("plate");
+  feed(1.7, -0.3, 0.9f);
+  EXPECT_TRUE(said().clear());
+  EXPECT_EQ(joinedText(driven_->outcome.excluded).find("''"), std::string::npos)
+      << joinedText(driven_->outcome.excluded);
+  attach(plate("another"));
+  feed(1.8, 0, 0.9f);
+  ASSERT_EQ(driven_->outcome.step->bodies.size(), 3u) << "in the place of the first one";
+  EXPECT_EQ(driven_->outcome.step->bodies[2].name, "another");
+  EXPECT_TRUE(said().proved);
+  const FrameCounters total = pipeline().monitor().total();
+  EXPECT_EQ(total.waiting(), 0u) << "every frame is accounted for";
+}
+
+// The step is one of the bodies that it was answered with, in a recording, too.
+TEST_F(Attached, ARecordedStepHasTheBodiesOfThatStep) {
+  start();
+  feed(1, 0, 0.8f);
+  attach(plate());
+  for (const auto& [at, tool_z] : {std::pair(1.1, 0.1), std::pair(1.2, 0.35)}) feed(at, tool_z, 0.8f);
+  const Outcome with = driven_->outcome;
+  ASSERT_FALSE(with.contacts.empty());
+  pipeline().remove("plate");
+  feed(1.3, 0.1, 0.8f);
+  for (const Outcome& outcome : {with, driven_->outcome}) {
+    const std::string path = (folder_ / "a.step").string();
+    writeRecording(path, {"", *outcome.step, pipeline().monitor().options().detector, true, outcome});
+    const StepRecording read = readRecordingFile(path);
+    EXPECT_EQ(joinedText(replayStep(read).differences), "");
+    EXPECT_EQ(read.step.bodies.size(), 3u);
+  }
+}
+
+TEST_F(Attached, ContactWithItsLinkIsExpectedWhereLinksMeet) {
+  XmlRpcValue tree = handScene();
+  tree["robot"]["against_links"] = true;
+  start(tree);
+  Request request = plate();
+  request.link = "palm";
+  request.pose.position.z = 0.3;
+  feed(1, 0, 0.8f);
+  attach(request);
+  feed(1.1, 0, 0.8f);
+  EXPECT_TRUE(says(driven_->outcome.expected, "plate with palm")) << joinedText(driven_->outcome.expected);
+  pipeline().detach("plate");
+  feed(1.2, 0, 0.8f);
+  EXPECT_TRUE(driven_->outcome.expected.empty()) << "let go, it is an obstacle";
+  request.name = "other";
+  request.link = "tool";
+  request.touches = {"palm"};
+  attach(request);
+  feed(1.3, 0, 0.8f);
+  EXPECT_TRUE(says(driven_->outcome.expected, "other with palm"));
+  start();
+  feed(1, 0, 0.8f);
+  attach(plate());
+  feed(1.1, 0, 0.8f);
+  EXPECT_TRUE(driven_->outcome.expected.empty());
+  EXPECT_TRUE(says(driven_->outcome.excluded, "what is attached against links and against each other"));
+}
+
+TEST_F(Attached, PaddingHoldsForItToo) {
+  XmlRpcValue tree = handScene();
+  tree["robot"]["padding_m"] = 0.05;
+  start(tree);
+  feed(1, 0, 0.8f);
+  attach(plate());
+  feed(1.1, 0, 0.552f);
+  EXPECT_TRUE(said().clear()) << "0.051 m above it";
+  feed(1.2, 0, 0.549f);
+  EXPECT_EQ(said().touching, Touching::NEW);
+  start();
+  Request padded = plate();
+  padded.padding_m = 0.1;
+  EXPECT_NE(refusal(padded).find("needs accuracy = conservative"), std::string::npos) << refusal(padded);
+  feed(1, 0, 0.8f);
+  feed(1.1, 0, 0.8f);
+  EXPECT_TRUE(said().clear()) << "nothing has changed";
+}
+
+TEST_F(Attached, WithoutATransformTheStateIsUnprovedAndNamesIt) {
+  start();
+  feed(1, 0, 0.8f);
+  Request request = plate();
+  request.link = "palm";
+  attach(request);
+  driven_->feed(1.1, 0.8f);
+  EXPECT_FALSE(said().proved);
+  EXPECT_TRUE(says(said().missing, "body 'plate'")) << joinedText(said().missing);
+  feed(1.2, 0, 0.8f);
+  EXPECT_FALSE(said().proved) << "it was lost when the step began";
+  feed(1.3, 0, 0.8f);
+  EXPECT_TRUE(said().proved) << joinedText(said().missing);
+}
+
+// What a map first shows where it is, is its own; what was an obstacle before stays one.
+TEST_F(Attached, ItsVoxelsAreItsOwn) {
+  XmlRpcValue tree = handScene();
+  tree["effects"]["octomap"] = "auto";
+  start(tree);
+  const auto giveMap = [&](double stamp_s, bool with_plate) {
+    // Voxels of 0.1 m: far away, at (0.05, 0.05, 0.25), and in the plate's plane.
+    std::vector<OccupiedLeaf> leaves{{{32868, 32868, 32868}, 1}, {{32768, 32768, 32770}, 1}};
+    if (with_plate) leaves.push_back({{32768, 32768, 32771}, 1});
+    LoadedMap loaded;
+    loaded.surface = VoxelSurface::build(0.1, std::move(leaves));
+    loaded.stamp_ns = static_cast<StampNs>(stamp_s * 1e9);
+    pipeline().setMap(std::move(loaded), 0);
+  };
+  giveMap(0.9, false);
+  feed(1, -0.15, 0.8f);
+  feed(1.1, -0.15, 0.8f);
+  attach(plate());
+  for (const double at : {1.2, 1.3, 1.4}) feed(at, -0.15, 0.8f);  // at 0.35
+  giveMap(1.4, true);
+  feed(1.5, -0.15, 0.8f);
+  EXPECT_TRUE(says(driven_->outcome.excluded, "1 voxel of the map as own of body 'plate'"))
+      << joinedText(driven_->outcome.excluded);
+  EXPECT_TRUE(said().clear()) << joinedText(said().missing);
+}
+
+TEST_F(Attached, ItSurvivesAResetAndComesBeforeTheFirstFrame) {
+  start();
+  attach(plate());
+  EXPECT_THROW(pipeline().detach("plate"), ParameterError) << "nobody knows the fixed frame's transforms";
+  feed(1, 0, 0.8f);
+  feed(1.1, 0, 0.8f);
+  EXPECT_TRUE(said().clear()) << joinedText(said().missing);
+  pipeline().reset(StepStatus::RESET);
+  attach(plate("more"));
+  feed(1.2, 0, 0.8f);
+  feed(1.3, 0.35, 0.8f);
+  EXPECT_EQ(said().touching, Touching::NEW);
+  EXPECT_EQ(driven_->outcome.step->bodies.size(), 4u);
+}
+
+TEST_F(Attached, SurfacesOfEachKindAreWhereTheyShouldBe) {
+  std::ofstream(folder_ / "wedge.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  start();
+  Request file = plate();
+  file.primitive = {};
+  file.mesh = (folder_ / "wedge.obj").string();
+  file.scale.x = 2;
+  file.scale.y = -1;  // mirrored
+  file.scale.z = 0.5;
+  file.pose.orientation.w = file.pose.orientation.z = std::sqrt(0.5);  // a quarter turn to the left
+  Request message = file;
+  message.mesh.clear();
+  message.triangles.vertices.resize(4);
+  message.triangles.vertices[1].x = message.triangles.vertices[2].y = message.triangles.vertices[3].z = 1;
+  for (const auto& face : {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}) {
+    std::copy(face.begin(), face.end(), message.triangles.triangles.emplace_back().vertex_indices.begin());
+  }
+  for (const Request& request : {file, message}) {
+    const Positions x = readAttach(request, pipeline().config()).mesh->positions;
+    ASSERT_EQ(x.size(), 4u);
+    EXPECT_LT((x[0] - Vec3(0, 0, 0.5)).norm(), 1e-12);
+    EXPECT_LT((x[1] - Vec3(0, 2, 0.5)).norm(), 1e-12);
+    EXPECT_LT((x[2] - Vec3(1, 0, 0.5)).norm(), 1e-12);
+    EXPECT_LT((x[3] - Vec3(0, 0, 1)).norm(), 1e-12);
+  }
+  Request round = plate();
+  round.primitive.type = shape_msgs::SolidPrimitive::CYLINDER;
+  round.primitive.dimensions = {0.4, 0.1};  // height, radius
+  double lowest = 9, widest = 0;
+  const AttachedObject cylinder = readAttach(round, pipeline().config());
+  for (const Vec3& p : cylinder.mesh->positions) {
+    lowest = std::min(lowest, p.z());
+    widest = std::max(widest, p.head<2>().norm());
+  }
+  EXPECT_NEAR(lowest, 0.3, 1e-9);
+  EXPECT_GE(widest, 0.1);
+  EXPECT_LE(widest, 0.1 + 1.001e-3);
+}
+
+TEST_F(Attached, MistakesAreNamedAndAllStays) {
+  start();
+  feed(1, 0, 0.8f);
+  attach(plate("taken"));
+  std::ofstream(folder_ / "empty.stl") << "solid\nendsolid\n";
+  std::ofstream(folder_ / "huge.stl");
+  std::filesystem::resize_file(folder_ / "huge.stl", std::uintmax_t{1} << 30);  // takes no place
+  const double nan = std::nan("");
+  const auto meshed = [](Request& r, const std::string& mesh) {
+    r.primitive = {};
+    r.mesh = mesh;
+    r.scale.x = r.scale.y = r.scale.z = 1;
+  };
+  const std::pair<std::function<void(Request&)>, std::string> cases[] = {
+      {[](Request& r) { r.name = ""; }, "object '': name is no name: it is empty"},
+      {[](Request& r) { r.name = "taken"; }, "object 'taken' is there already; call ~remove before"},
+      {[](Request& r) { r.name = "palm"; }, "object 'palm': name is that of a body or link"},
+      {[](Request& r) { r.name = "mesh"; }, "name is that of a body or link"},
+      {[](Request& r) { r.name = "octomap"; }, "name is that of a body or link"},
+      {[](Request& r) { r.link = "tol"; },
+       "link is 'tol', which is no link of a robot and no rigid body; nearest is 'tool'"},
+      {[](Request& r) { r.link = "mesh"; }, "link is 'mesh', which is no link"},
+      {[](Request& r) { r.touches = {"plam"}; }, "touches names 'plam', which is no link, group or body"},
+      {[&](Request& r) { r.pose.position.y = nan; }, "pose/position is   0 nan 0.5; it must be finite"},
+      {[&](Request& r) { r.pose.orientation.w = 0; }, "the length of pose/orientation is 0; it must be 1"},
+      {[&](Request& r) { r.pose.orientation.x = nan; }, "the length of pose/orientation is nan"},
+      {[&](Request& r) { r.padding_m = -1; }, "padding_m is -1; it must be 0 or more"},
+      {[&](Request& r) { r.padding_m = nan; }, "padding_m is nan"},
+      {[](Request& r) { r.primitive = {}; }, "it has no surface; give one of mesh, triangles and primitive"},
+      {[](Request& r) { r.mesh = "a.stl"; }, "it has several surfaces"},
+      {[](Request& r) { r.primitive.type = shape_msgs::SolidPrimitive::CONE; }, "primitive/type is 4; known are BOX"},
+      {[](Request& r) {
+         r.primitive.dimensions = {1, 1};
+       },
+       "primitive/dimensions has 2 numbers; write the sides"},
+      {[](Request& r) { r.primitive.dimensions[1] = 0; }, "a number of primitive/dimensions is 0; write the sides"},
+      {[&](Request& r) { r.primitive.dimensions[1] = nan; }, "a number of primitive/dimensions is nan"},
+      {[&](Request& r) { meshed(r, "/no/such.stl"); }, "mesh /no/such.stl"},
+      {[&](Request& r) { meshed(r, "package://no_such/a.stl"); }, "there is no package 'no_such'"},
+      {[&](Request& r) { meshed(r, (folder_ / "empty.stl").string()); }, "empty.stl"},
+      {[&](Request& r) { meshed(r, (folder_ / "huge.stl").string()); }, "huge.stl has 1024 MiB; simplify it to 32"},
+      {[&](Request& r) { (meshed(r, "a.stl"), r.scale.y = 0); }, "scale is 1 0 1; it must be finite and not 0"},
+      {[&](Request& r) { (meshed(r, "a.stl"), r.scale.y = nan); }, "scale is   1 nan   1"},
+      {[&](Request& r) { (meshed(r, ""), r.triangles.triangles.resize(1)); }, "triangles names vertex 0 of 0"},
+      {[&](Request& r) { (meshed(r, ""), r.triangles.vertices.resize(1)); }, "triangles has no triangle"},
+  };
+  for (const auto& [spoil, expected] : cases) {
+    Request request = plate();
+    spoil(request);
+    const std::string said = refusal(request);
+    EXPECT_TRUE(mentions(said, expected)) << said;
+    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+  }
+  for (const char* name : {"plate", ""}) {
+    EXPECT_THROW(pipeline().detach(name), ParameterError);
+    EXPECT_THROW(pipeline().remove(name), ParameterError);
+  }
+  pipeline().detach("taken");
+  EXPECT_THROW(pipeline().detach("taken"), ParameterError) << "twice";
+  for (int i = 0; i < 63; ++i) attach(plate("plate " + std::to_string(i)));
+  EXPECT_TRUE(mentions(refusal(plate()), "there are 64 already, which is the most"));
+  feed(1.1, 0, 0.8f);
+  EXPECT_TRUE(said().clear()) << joinedText(said().missing);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
