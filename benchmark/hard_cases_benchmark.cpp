@@ -25,17 +25,8 @@
 namespace dccd {
 namespace {
 
-using test::StructuredPairs;
+using test::batchOf, test::StructuredPairs;
 using Answer = std::function<void(const PairBatch&, ElementaryResult*)>;
-
-PairBatch batchOf(const StructuredPairs& set) {
-  PairBatch batch;
-  batch.kind = set.kind;
-  batch.vertices = set.vertices.data();
-  batch.pairs = set.pairs.data();
-  batch.count = set.pairs.size();
-  return batch;
-}
 
 void runFcl(const PairBatch& b, ElementaryResult* out) {
   using Intersect = fcl::detail::Intersect<double>;
@@ -138,25 +129,6 @@ nlohmann::json measured(const StructuredPairs& set, std::size_t judged, int repe
           {"fcl_wrong", wrongVerdicts(truth, set, runFcl, stride)}};
 }
 
-StructuredPairs hardPairs(test::Hardness hardness, PairKind kind, std::size_t count) {
-  test::RandomSource random(2017 + 2 * static_cast<std::uint64_t>(hardness) + static_cast<std::uint64_t>(kind));
-  StructuredPairs set;
-  set.family = toString(hardness);
-  set.kind = kind;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Query query = test::hardQuery(random, kind, hardness);
-    const Index base = static_cast<Index>(set.vertices.size());
-    for (int p = 0; p < 4; ++p) {
-      VertexMotion v{};
-      std::copy_n(query.motion.x[0][p], 3, v.t0);
-      std::copy_n(query.motion.x[1][p], 3, v.t1);
-      set.vertices.push_back(v);
-    }
-    set.pairs.push_back({base, base + 1, base + 2, base + 3});
-  }
-  return set;
-}
-
 /// A contact of the family, for its picture: the first one that is not at t = 0, else any pair.
 nlohmann::json exampleOf(const StructuredPairs& set) {
   std::vector<ElementaryResult> answers(set.pairs.size());
@@ -198,7 +170,7 @@ int run(int argc, char** argv) {
   if (hard) {
     for (int h = 0; h < static_cast<int>(test::Hardness::COUNT); ++h) {
       for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
-        const StructuredPairs set = hardPairs(static_cast<test::Hardness>(h), kind, count);
+        const StructuredPairs set = test::hardPairs(static_cast<test::Hardness>(h), kind, count);
         nlohmann::json row = measured(set, judge, repeats);
         row["example"] = exampleOf(set);
         result["hard"].push_back(row);

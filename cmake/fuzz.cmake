@@ -44,7 +44,7 @@ add_library(deformable_ccd_decoders OBJECT ${MESSAGE_TYPES}
   src/apps/make_scene_bag/physics/shapes.cpp src/config/parameter_reader.cpp src/config/parameter_yaml.cpp
   src/input/depth_surface.cpp src/input/known_types.cpp src/input/marker_ropes.cpp src/input/mesh_decoder.cpp
   src/input/mesh_file.cpp src/input/mesh_views.cpp src/input/message_type.cpp src/input/obj_file.cpp src/input/ply_file.cpp
-  src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
+  src/input/ply_header.cpp src/input/polygons.cpp src/input/soup_weld.cpp src/input/stl_file.cpp src/input/text_lines.cpp
   src/node/map_decode.cpp src/node/map_memory.cpp src/octomap/octomap_decode.cpp src/octomap/octomap_header.cpp)
 target_include_directories(deformable_ccd_decoders PUBLIC src)
 target_include_directories(deformable_ccd_decoders SYSTEM PRIVATE ${OWN_MESSAGES} ${ROS_MESSAGES} ${PCL_INCLUDE_DIRS})

@@ -104,6 +104,17 @@ find_library(KDL_LIBRARY orocos-kdl REQUIRED)
 add_gtest_suite(ros_tests SOURCES ${ros_SOURCES}
   LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY} ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
+# scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.
+find_package(fcl QUIET)
+if(fcl_FOUND)
+  #catkin_lint: ignore_once uninstalled_target
+  add_executable(robot_benchmark EXCLUDE_FROM_ALL benchmark/robot_benchmark.cpp benchmark/support/timing.cpp)
+  target_include_directories(robot_benchmark PRIVATE benchmark test)
+  target_include_directories(robot_benchmark SYSTEM PRIVATE
+    ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS} ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
+  target_link_libraries(robot_benchmark PRIVATE deformable_ccd_test_support deformable_ccd_ros fcl GTest::gtest
+    CLI11::CLI11 nlohmann_json::nlohmann_json ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
+endif()
 if(TARGET deformable_ccd_physics)
   add_gtest_suite(physics_tests SOURCES ${physics_SOURCES} LIBRARIES deformable_ccd_physics deformable_ccd)
 endif()

@@ -1,4 +1,4 @@
-// Mesh, Body and Voxels.
+// Body, and bodies by name and number.
 #include <algorithm>
 #include <cmath>
 
@@ -8,35 +8,6 @@ namespace dccd {
 namespace python {
 
 namespace {
-
-using TopologyPtr = std::shared_ptr<const Topology>;
-
-TopologyPtr meshOf(std::size_t vertex_count, py::handle triangles, py::handle edges) {
-  if (triangles.is_none() == edges.is_none()) throw py::type_error("expected either triangles or edges");
-  const std::int64_t most = static_cast<std::int64_t>(std::min<std::size_t>(vertex_count, NO_INDEX)) - 1;
-  const auto rowsOf = [most](py::handle value, const char* name, auto row) {
-    const Integers array = integersOf(value, name, {ANY, static_cast<py::ssize_t>(row.size())}, most);
-    std::vector<decltype(row)> rows(static_cast<std::size_t>(array.size()) / row.size());
-    const std::int64_t* at = array.data();
-    for (auto& indices : rows) {
-      for (Index& index : indices) index = static_cast<Index>(*at++);
-    }
-    return rows;
-  };
-  return share(triangles.is_none() ? Topology::fromEdges(vertex_count, rowsOf(edges, "edges", Edge()))
-                                   : Topology::fromTriangles(vertex_count, rowsOf(triangles, "triangles", Face())));
-}
-
-template <class T>
-py::array indicesOf(const TopologyPtr& mesh, const std::vector<T>& rows) {
-  return sharedArray(std::shared_ptr<const std::vector<T>>(mesh, &rows), py::dtype::of<Index>(),
-                     {static_cast<py::ssize_t>(rows.size()), static_cast<py::ssize_t>(T().size())});
-}
-
-std::string textOf(const Topology& mesh) {
-  return std::to_string(mesh.vertexCount()) + " vertices, " + std::to_string(mesh.faces().size()) + " triangles, " +
-         std::to_string(mesh.edges().size()) + " edges";
-}
 
 void setPositions(Body& body, std::shared_ptr<const Positions> positions, const char* name, bool at_start) {
   if (positions->size() != body.topology->vertexCount()) {
@@ -116,109 +87,6 @@ NamedBody makeBody(py::object t0, py::object t1, py::object triangles, py::objec
   setPoses(body, pose_t0, pose_t1);
   made.separations_m = separations_m;
   return made;
-}
-
-/// The key of the voxel that holds the coordinate; one on a shared plane is in the upper one.
-std::int64_t keyOf(double coordinate_m, double resolution_m) {
-  const double guess = std::floor(coordinate_m / resolution_m) + 32768;
-  if (!(guess >= -1 && guess <= 65537)) return -1;
-  std::int64_t key = static_cast<std::int64_t>(guess);
-  while (voxelPlane(key + 1, resolution_m) <= coordinate_m) ++key;
-  while (voxelPlane(key, resolution_m) > coordinate_m) --key;
-  return key <= 65535 ? key : -1;
-}
-
-std::vector<OccupiedLeaf> leavesAt(py::handle centres, double resolution_m) {
-  const Doubles points = doublesOf(centres, "centres", {ANY, 3});
-  std::vector<VoxelKey> keys;
-  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
-    std::int64_t key[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      key[axis] = keyOf(points.at(i, axis), resolution_m);
-      if (key[axis] >= 0) continue;
-      throw py::value_error("centres[" + std::to_string(i) + ", " + std::to_string(axis) + "] is " +
-                            std::to_string(points.at(i, axis)) +
-                            "; a map reaches 32768 voxels to either side of its origin");
-    }
-    keys.push_back(
-        {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]), static_cast<std::uint16_t>(key[2])});
-  }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  std::vector<OccupiedLeaf> leaves;
-  for (const VoxelKey& key : keys) leaves.push_back({key, 1});
-  return leaves;
-}
-
-std::vector<OccupiedLeaf> leavesOf(py::handle keys, py::handle sizes) {
-  const Integers at = integersOf(keys, "keys", {ANY, 3}, 65535);
-  const py::ssize_t n = at.size() / 3;
-  std::vector<OccupiedLeaf> leaves(static_cast<std::size_t>(n));
-  const Integers wide = sizes.is_none() ? Integers(0) : integersOf(sizes, "sizes", {n}, 65536);
-  for (py::ssize_t i = 0; i < n; ++i) {
-    const std::int64_t* key = at.data() + 3 * i;
-    leaves[static_cast<std::size_t>(i)] = {
-        {static_cast<std::uint16_t>(key[0]), static_cast<std::uint16_t>(key[1]), static_cast<std::uint16_t>(key[2])},
-        sizes.is_none() ? 1 : static_cast<std::uint32_t>(wide.data()[i])};
-  }
-  return leaves;
-}
-
-Voxels makeVoxels(double resolution_m, py::object centres, py::object keys, py::object sizes,
-                  py::object map_from_fixed) {
-  if (centres.is_none() == keys.is_none()) throw py::type_error("expected either centres or keys");
-  if (keys.is_none() && !sizes.is_none()) throw py::type_error("sizes go with keys");
-  VoxelSurface::build(resolution_m, {});  // throws where the resolution is none
-  Voxels voxels;
-  voxels.surface =
-      VoxelSurface::build(resolution_m, keys.is_none() ? leavesAt(centres, resolution_m) : leavesOf(keys, sizes));
-  if (!map_from_fixed.is_none()) voxels.map_from_fixed = poseOf(map_from_fixed, "map_from_fixed");
-  return voxels;
-}
-
-const char* const MESH_DOC = R"(The connectivity of a body: triangles, or the edges of ropes.
-
-Mesh(vertex_count, triangles=None, *, edges=None)
-
-Parameters
-----------
-vertex_count : int
-    How many vertices there are. Those of no triangle and no edge are never in contact.
-triangles : (m, 3) integers
-    Vertex indices from 0. A triangle given twice is kept once.
-edges : (m, 2) integers, in place of triangles
-    Vertex indices from 0. An edge given twice is kept once.
-
-Raises
-------
-ValueError
-    An index is out of range, or a triangle or an edge repeats a vertex.
-
-A mesh never changes. Make it once where the same triangles are used in many steps: finding the edges of 100,000
-triangles takes longer than a step does.)";
-
-void bindMesh(py::module_& m) {
-  bindClass<Topology, std::shared_ptr<Topology>>(m, "Mesh", MESH_DOC)
-      .def(py::init([](std::size_t vertex_count, py::object triangles, py::object edges) {
-             return std::const_pointer_cast<Topology>(meshOf(vertex_count, triangles, edges));
-           }),
-           py::arg("vertex_count"), py::arg("triangles") = py::none(), py::kw_only(), py::arg("edges") = py::none(),
-           "__init__(self, vertex_count, triangles=None, *, edges=None)\n--\n\nSee help(dccd.Mesh).")
-      .def_static(
-          "grid", [](std::size_t rows, std::size_t cols) { return Topology::grid(rows, cols); }, py::arg("rows"),
-          py::arg("cols"), "grid(rows, cols)\n--\n\nA sheet of rows x cols vertices, row by row, two triangles a cell.")
-      .def_static(
-          "polyline", [](std::size_t vertex_count) { return Topology::polyline(vertex_count); },
-          py::arg("vertex_count"), "polyline(vertex_count)\n--\n\nA rope: an edge between each vertex and the next.")
-      .def_property_readonly("vertex_count", &Topology::vertexCount, "int: how many vertices there are")
-      .def_property_readonly(
-          "triangles", [](const std::shared_ptr<Topology>& mesh) { return indicesOf(mesh, mesh->faces()); },
-          "(m, 3) uint32, read-only")
-      .def_property_readonly(
-          "edges", [](const std::shared_ptr<Topology>& mesh) { return indicesOf(mesh, mesh->edges()); },
-          "(m, 2) uint32, read-only: each edge once, of the triangles too")
-      .def_property_readonly("is_closed", &Topology::isClosed, "bool: a surface without a border, which has an inside")
-      .def("__repr__", [](const Topology& mesh) { return "<dccd.Mesh: " + textOf(mesh) + ">"; });
 }
 
 const char* const BODY_DOC = R"(A body: its mesh, how it is tested, and where it is at both ends of a step.
@@ -325,102 +193,6 @@ void bindWhatItIs(Class& c) {
   pose("pose_t1", &Body::pose_t1, "(4, 4) float64: fixed_from_body at the end; None: it does not turn");
 }
 
-void bindBody(py::module_& m) {
-  using namespace py::literals;
-  auto c = bindClass<NamedBody>(m, "Body", BODY_DOC);
-  c.def(py::init(&makeBody), "t0"_a = py::none(), "t1"_a = py::none(), "triangles"_a = py::none(), py::kw_only(),
-        "edges"_a = py::none(), "mesh"_a = py::none(), "name"_a = "", "rigid"_a = false, "static"_a = false,
-        "self_collision"_a = true, "against_bodies"_a = true, "against_obstacle"_a = true, "shell"_a = false,
-        "minimum_separation_m"_a = 0.0, "vertex_mask"_a = py::none(),
-        "separations_m"_a = std::map<std::string, double>(), "reference"_a = py::none(),
-        "reference_radius_m"_a = py::none(), "radius_m"_a = py::none(), "pose_t0"_a = py::none(),
-        "pose_t1"_a = py::none(),
-        "__init__(self, t0=None, t1=None, triangles=None, *, edges=None, mesh=None, name='', rigid=False, "
-        "static=False, self_collision=True, against_bodies=True, against_obstacle=True, shell=False, "
-        "minimum_separation_m=0.0, vertex_mask=None, separations_m={}, reference=None, "
-        "reference_radius_m=None, radius_m=None, "
-        "pose_t0=None, pose_t1=None)\n--\n\nSee help(dccd.Body).");
-  c.def("move_to", &moveTo, "positions"_a,
-        "move_to(self, positions)\n--\n\nThe next step: t0 is what t1 was, and t1 is these positions, (n, 3) float64 "
-        "[m].");
-  c.def_property(
-      "t0", [](const NamedBody& b) { return arrayOf(b.body.t0); }, &setT0,
-      "(n, 3) float64 [m]: positions at the start. Reading gives a read-only view; assign to change them.");
-  c.def_property(
-      "t1", [](const NamedBody& b) { return arrayOf(b.body.t1); }, &setT1,
-      "(n, 3) float64 [m]: positions at the end. Reading gives a read-only view; assign to change them.");
-  c.def_property_readonly(
-      "mesh", [](const NamedBody& b) { return std::const_pointer_cast<Topology>(b.body.topology); },
-      "Mesh: its connectivity");
-  bindWhatItIs(c);
-  c.def("__repr__",
-        [](const NamedBody& b) { return "<dccd.Body '" + b.body.name + "': " + textOf(*b.body.topology) + ">"; });
-}
-
-const char* const VOXELS_DOC =
-    R"(The occupied voxels of a map, as an octomap has them: solid cubes on a grid through the map's origin.
-
-Voxels(resolution_m, centres=None, *, keys=None, sizes=None, map_from_fixed=None)
-
-Parameters
-----------
-resolution_m : float
-    Edge length of the finest voxels [m].
-centres : (m, 3) float64 [m]
-    Points in the map's frame. The voxel of each is occupied; several in one voxel count once.
-keys : (m, 3) integers from 0 to 65535, in place of centres
-    Voxel k spans [(k - 32768) * resolution_m, (k - 32767) * resolution_m] on each axis.
-sizes : (m,) integers
-    Edge length of each cube in finest voxels, a power of two, where keys are the smallest of larger cubes.
-map_from_fixed : (4, 4) float64
-    Pose of the bodies' frame in the map's; identity if it is left out.
-
-Raises
-------
-ValueError
-    The resolution is not above 0, cubes overlap, or a key is not a multiple of its cube's size.
-
-Voxels never change. Make them once where a map is used in many steps.)";
-
-void bindVoxels(py::module_& m) {
-  using namespace py::literals;
-  bindClass<Voxels>(m, "Voxels", VOXELS_DOC)
-      .def(py::init(&makeVoxels), "resolution_m"_a, "centres"_a = py::none(), py::kw_only(), "keys"_a = py::none(),
-           "sizes"_a = py::none(), "map_from_fixed"_a = py::none(),
-           "__init__(self, resolution_m, centres=None, *, keys=None, sizes=None, map_from_fixed=None)\n--\n\n"
-           "See help(dccd.Voxels).")
-      .def_property_readonly(
-          "resolution_m", [](const Voxels& v) { return v.surface->resolution(); },
-          "float: edge length of the finest voxels [m]")
-      .def_property_readonly(
-          "keys",
-          [](const Voxels& v) {
-            const std::vector<OccupiedLeaf>& leaves = v.surface->leaves();
-            py::array_t<std::uint16_t> keys({static_cast<py::ssize_t>(leaves.size()), py::ssize_t{3}});
-            std::uint16_t* at = keys.mutable_data();
-            for (const OccupiedLeaf& leaf : leaves) {
-              for (const std::uint16_t key : {leaf.min.x, leaf.min.y, leaf.min.z}) *at++ = key;
-            }
-            return keys;
-          },
-          "(m, 3) uint16: smallest key of each cube, in the map's own order")
-      .def_property_readonly(
-          "sizes",
-          [](const Voxels& v) {
-            const std::vector<OccupiedLeaf>& leaves = v.surface->leaves();
-            py::array_t<std::uint32_t> sizes(static_cast<py::ssize_t>(leaves.size()));
-            std::transform(leaves.begin(), leaves.end(), sizes.mutable_data(),
-                           [](const OccupiedLeaf& leaf) { return leaf.size; });
-            return sizes;
-          },
-          "(m,) uint32: edge length of each cube in finest voxels")
-      .def_property_readonly(
-          "map_from_fixed", [](const Voxels& v) { return matrixOf(v.map_from_fixed); },
-          "(4, 4) float64: pose of the bodies' frame in the map's")
-      .def("__repr__",
-           [](const Voxels& v) { return "<dccd.Voxels: " + std::to_string(v.surface->leafCount()) + " cubes>"; });
-}
-
 /// SeparationFrom by number.
 std::vector<SeparationFrom> separationsOf(const NamedBody& body, std::uint16_t self, const std::vector<Body>& bodies) {
   std::vector<SeparationFrom> separations;
@@ -505,19 +277,36 @@ NamedBody named(const Body& body, const std::vector<Body>& bodies) {
   return out;
 }
 
-ObstacleMap mapOf(py::handle voxels) {
-  ObstacleMap map;
-  if (voxels.is_none()) return map;
-  if (!py::isinstance<Voxels>(voxels)) throw py::type_error("voxels: expected dccd.Voxels or None");
-  map.surface = voxels.cast<const Voxels&>().surface;
-  map.map_from_fixed = voxels.cast<const Voxels&>().map_from_fixed;
-  return map;
-}
-
-void bindBodies(py::module_& m) {
-  bindMesh(m);
-  bindBody(m);
-  bindVoxels(m);
+void bindBody(py::module_& m) {
+  using namespace py::literals;
+  auto c = bindClass<NamedBody>(m, "Body", BODY_DOC);
+  c.def(py::init(&makeBody), "t0"_a = py::none(), "t1"_a = py::none(), "triangles"_a = py::none(), py::kw_only(),
+        "edges"_a = py::none(), "mesh"_a = py::none(), "name"_a = "", "rigid"_a = false, "static"_a = false,
+        "self_collision"_a = true, "against_bodies"_a = true, "against_obstacle"_a = true, "shell"_a = false,
+        "minimum_separation_m"_a = 0.0, "vertex_mask"_a = py::none(),
+        "separations_m"_a = std::map<std::string, double>(), "reference"_a = py::none(),
+        "reference_radius_m"_a = py::none(), "radius_m"_a = py::none(), "pose_t0"_a = py::none(),
+        "pose_t1"_a = py::none(),
+        "__init__(self, t0=None, t1=None, triangles=None, *, edges=None, mesh=None, name='', rigid=False, "
+        "static=False, self_collision=True, against_bodies=True, against_obstacle=True, shell=False, "
+        "minimum_separation_m=0.0, vertex_mask=None, separations_m={}, reference=None, "
+        "reference_radius_m=None, radius_m=None, "
+        "pose_t0=None, pose_t1=None)\n--\n\nSee help(dccd.Body).");
+  c.def("move_to", &moveTo, "positions"_a,
+        "move_to(self, positions)\n--\n\nThe next step: t0 is what t1 was, and t1 is these positions, (n, 3) float64 "
+        "[m].");
+  c.def_property(
+      "t0", [](const NamedBody& b) { return arrayOf(b.body.t0); }, &setT0,
+      "(n, 3) float64 [m]: positions at the start. Reading gives a read-only view; assign to change them.");
+  c.def_property(
+      "t1", [](const NamedBody& b) { return arrayOf(b.body.t1); }, &setT1,
+      "(n, 3) float64 [m]: positions at the end. Reading gives a read-only view; assign to change them.");
+  c.def_property_readonly(
+      "mesh", [](const NamedBody& b) { return std::const_pointer_cast<Topology>(b.body.topology); },
+      "Mesh: its connectivity");
+  bindWhatItIs(c);
+  c.def("__repr__",
+        [](const NamedBody& b) { return "<dccd.Body '" + b.body.name + "': " + textOf(*b.body.topology) + ">"; });
 }
 
 }  // namespace python

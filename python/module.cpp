@@ -12,7 +12,9 @@ PYBIND11_MODULE(_dccd, m) {
   m.attr("KINDS") = py::tuple(kinds);
   m.attr("NO_INDEX") = dccd::NO_INDEX;
   m.attr("OBSTACLE_BODY") = dccd::OBSTACLE_BODY;
-  dccd::python::bindBodies(m);
+  dccd::python::bindMesh(m);
+  dccd::python::bindBody(m);
+  dccd::python::bindVoxels(m);
   dccd::python::bindOutcome(m);
   dccd::python::bindQuestions(m);
   dccd::python::bindStream(m);

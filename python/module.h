@@ -25,6 +25,11 @@ struct NamedBody {
   std::map<std::string, double> separations_m;
 };
 
+using TopologyPtr = std::shared_ptr<const Topology>;
+/// From just one of both.
+TopologyPtr meshOf(std::size_t vertex_count, py::handle triangles, py::handle edges);
+std::string textOf(const Topology& mesh);
+
 struct Voxels {
   std::shared_ptr<const VoxelSurface> surface;
   Eigen::Isometry3d map_from_fixed = Eigen::Isometry3d::Identity();
@@ -66,7 +71,9 @@ class Answer {
   Outcome outcome_;
 };
 
-void bindBodies(py::module_& m);
+void bindMesh(py::module_& m);
+void bindBody(py::module_& m);
+void bindVoxels(py::module_& m);
 void bindOutcome(py::module_& m);
 void bindQuestions(py::module_& m);
 void bindStream(py::module_& m);

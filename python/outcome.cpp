@@ -1,8 +1,10 @@
 // Outcome: what a step was answered, as numpy arrays that show the core's own memory.
 #include <algorithm>
 #include <cstddef>
+#include <string_view>
 
 #include "dccd/assurance.h"
+#include "dccd/contact_fields.h"
 #include "module.h"
 
 namespace dccd {
@@ -10,21 +12,33 @@ namespace python {
 
 namespace {
 
+// What numpy calls a field's type.
+constexpr const char* typeOf(const double&) { return "f8"; }
+constexpr const char* typeOf(const std::uint32_t&) { return "u4"; }
+constexpr const char* typeOf(const std::uint64_t&) { return "u8"; }
+constexpr const char* typeOf(const StampNs&) { return "i8"; }
+constexpr const char* typeOf(const bool&) { return "?"; }
+constexpr const char* typeOf(const Certainty&) { return "?"; }
+constexpr const char* typeOf(const PairKind&) { return "u1"; }
+constexpr const char* typeOf(const PatchBeginning&) { return "u1"; }
+constexpr const char* typeOf(const std::array<Index, 4>&) { return "(4,)u4"; }
+constexpr const char* typeOf(const std::array<std::uint16_t, 2>&) { return "(2,)u2"; }
+constexpr const char* typeOf(const VoxelKey&) { return "(3,)u2"; }
+const char* typeOf(const Vec3&) { return "(3,)f8"; }
+const char* typeOf(const Box&) { return "(2,3)f8"; }
+
+const char* nameOf(const char* member) {
+  const std::string_view name = member;
+  return name == "body" ? "bodies" : name == "vertex" ? "vertices" : name == "certainty" ? "certain" : member;
+}
+
+#define DCCD_ARRAY_FIELD(member, published) {nameOf(#member), typeOf(Row().member), offsetof(Row, member)},
+
 // The types are never freed: at exit that would come after the interpreter's end.
 const py::dtype& contactType() {
-  static_assert(sizeof(Contact) == 56 && sizeof(Certainty) == 1 && sizeof(PairKind) == 1);
-  static const auto* const TYPE = new py::dtype(structured({{"toc_lower", "f8", offsetof(Contact, toc_lower)},
-                                                            {"toc_upper", "f8", offsetof(Contact, toc_upper)},
-                                                            {"vertices", "(4,)u4", offsetof(Contact, vertex)},
-                                                            {"bodies", "(2,)u2", offsetof(Contact, body)},
-                                                            {"voxel", "(3,)u2", offsetof(Contact, voxel)},
-                                                            {"voxel_size", "u4", offsetof(Contact, voxel_size)},
-                                                            {"kind", "u1", offsetof(Contact, kind)},
-                                                            {"certain", "?", offsetof(Contact, certainty)},
-                                                            {"initial", "?", offsetof(Contact, initial)},
-                                                            {"leaving", "?", offsetof(Contact, leaving)},
-                                                            {"expected", "?", offsetof(Contact, expected)}},
-                                                           sizeof(Contact)));
+  static_assert(sizeof(Certainty) == 1 && sizeof(PairKind) == 1);
+  using Row = Contact;
+  static const auto* const TYPE = new py::dtype(structured({DCCD_CONTACT_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)));
   return *TYPE;
 }
 
@@ -37,21 +51,9 @@ const py::dtype& intersectionType() {
 }
 
 const py::dtype& patchType() {
-  static const auto* const TYPE = new py::dtype(structured({{"bodies", "(2,)u2", offsetof(Patch, body)},
-                                                            {"contacts", "u8", offsetof(Patch, contacts)},
-                                                            {"certain", "u8", offsetof(Patch, certain)},
-                                                            {"initial", "u8", offsetof(Patch, initial)},
-                                                            {"crossings", "u8", offsetof(Patch, crossings)},
-                                                            {"expected", "u8", offsetof(Patch, expected)},
-                                                            {"toc_lower", "f8", offsetof(Patch, toc_lower)},
-                                                            {"toc_upper", "f8", offsetof(Patch, toc_upper)},
-                                                            {"area_m2", "f8", offsetof(Patch, area_m2)},
-                                                            {"centroid", "(3,)f8", offsetof(Patch, centroid)},
-                                                            {"normal", "(3,)f8", offsetof(Patch, normal)},
-                                                            {"box", "(2,3)f8", offsetof(Patch, box)},
-                                                            {"id", "u8", offsetof(Patch, id)},
-                                                            {"is_new", "?", offsetof(Patch, is_new)}},
-                                                           sizeof(Patch)));
+  using Row = Patch;
+  static const auto* const TYPE =
+      new py::dtype(structured({DCCD_PUBLISHED_PATCH_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)));
   return *TYPE;
 }
 
@@ -182,7 +184,9 @@ void bindAnswer(Class& c) {
   array("patches", &patchType, &Outcome::patches,
         "structured array, with the option patches: which contacts belong together, by their first contact. bodies; "
         "how many contacts, certain, initial, expected, crossings; toc_lower, toc_upper of the first touch; area_m2, "
-        "centroid [m], normal, box (min and max [m]); in a Stream id, which lasts from step to step, and is_new");
+        "centroid [m], normal, box (min and max [m]); in a Stream id, which lasts from step to step, is_new, beginning "
+        "(0: NEW, 1: INITIAL, 2: MAP_CHANGED), and began_from_ns and began_to_ns, between which it began; the least "
+        "int64: nobody knows");
   c.def_property_readonly(
       "patch_of",
       [](py::object self) {

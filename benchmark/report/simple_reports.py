@@ -6,13 +6,6 @@ import os
 from .paper_report import table
 
 
-def pair_name(kind, v):
-    """One name for a pair, whatever the order of its vertices."""
-    if kind in ("vf", "vertex_face"):
-        return ("vf", v[0]) + tuple(sorted(v[1:]))
-    return ("ee",) + tuple(sorted([tuple(sorted(v[:2])), tuple(sorted(v[2:]))]))
-
-
 def write_rows(path, header, rows):
     with open(path, "w", newline="") as out:
         writer = csv.writer(out)
@@ -58,22 +51,48 @@ def write_kernels(folder, result):
     return save(folder, "kernels", "# Kernels\n\n" + table(header, rows))
 
 
-def write_step(folder, rows):
-    stages = [s for s in rows[0]["ms"] if s != "total"]
-    header = ["scene", "target", "threads", "contacts", "total best", "total median"] + stages + ["calibration"]
-    lines = []
-    for r in rows:
-        lines.append([r["scene"], str(r["simd_target"]), str(r["threads"]), str(r["contacts"]),
-                      "%.1f" % r["ms"]["total"]["best"], "%.1f" % r["ms"]["total"]["median"]] +
-                     ["%.1f" % r["ms"][s]["median"] for s in stages] + ["%.2f" % r["calibration_ms"]])
+# What of the step's stages is a column: the rest of them have none of their own in a real scene.
+STAGES = ("record", "bounds", "broad_phase", "planar", "elementary")
+# Of which ratios the step's second table tells: setting, which ratio of it, words, at most (of threads: at least).
+STEP_RATIOS = [("contacts alone", "whole_to_it", "whole / contacts alone", {"cloth-ball": "1.25", "n-body": "1.2"}, "1.3"),
+               ("without patches", "to_contacts_alone", "whole without patches / contacts alone", {}, ""),
+               ("without patches", "whole_to_it", "whole / without patches", {}, ""),
+               ("first contact only", "it_to_whole", "first contact only / all", {}, "0.5"),
+               ("on one thread", "it_to_whole", "one thread / two", {}, "at least 1.75")]
+
+
+def write_step(folder, runs, sheets, peer):
+    header = ["scene", "target", "threads", "contacts", "whole: best ms", "median ms", "contacts alone", "start state", "patches",
+              "sort"] + [stage.replace("_", " ") for stage in STAGES] + ["page faults", "calibration"]
+    lines, ratios = [], []
+    for r in runs:
+        whole = r["settings"]["whole"]["ms"]
+        lines.append([r["case"], r["simd_target"], str(r["threads"]), str(r["contacts"]), "%.1f" % whole["total"]["best"],
+                      "%.1f" % whole["total"]["median"], "%.1f" % r["settings"]["contacts alone"]["ms"]["total"]["median"]] +
+                     ["%.1f" % whole[stage]["median"] for stage in ("start_state", "patches", "sort") + STAGES] +
+                     ["%.0f" % r["settings"]["whole"]["page_faults"]["median"], "%.2f" % r["calibration_ms"]])
+        for name, which, words, asked, usual in STEP_RATIOS:
+            if name not in r["settings"]:
+                continue
+            ratio = r["settings"][name][which]
+            ratios.append([r["case"], r["simd_target"], str(r["threads"]), words] +
+                          ["%.3f" % ratio[k] for k in ("median", "low", "high")] + [asked.get(r["case"], usual)])
+    for row in sheets:
+        if row["case"] == "at rest in one plane":
+            ratios.append(["two sheets of 60 x 60", "", str(row["threads"]), "at rest in one plane / crossing at t = 1/2"] +
+                          ["%.3f" % row["to_reference"][k] for k in ("median", "low", "high")] + ["2"])
+    ratios.append(["cloth-ball's first frame, %d pairs of faces cross" % peer["pairs_of_faces"], "", "1",
+                   "start state / CGAL's self_intersections (%.0f ms)" % peer["cgal_ms"]["median"]] +
+                  ["%.3f" % peer["ratio"][k] for k in ("median", "low", "high")] + [""])
     write_rows(os.path.join(folder, "step.csv"), header, lines)
+    write_rows(os.path.join(folder, "ratios.csv"), ["scene", "target", "threads", "ratio", "median", "from", "to", "asked"], ratios)
     plt = pyplot()
-    figure, axis = plt.subplots(figsize=(9, 0.5 * len(rows) + 1.5))
-    left = [0.0] * len(rows)
-    labels = ["%s, %s, %s thread(s)" % (r["scene"], r["simd_target"], r["threads"]) for r in rows]
-    for s in stages:
-        values = [r["ms"][s]["median"] for r in rows]
-        axis.barh(labels, values, left=left, label=s)
+    figure, axis = plt.subplots(figsize=(9, 0.5 * len(lines) + 1.5))
+    left = [0.0] * len(lines)
+    labels = ["%s, %s, %s thread(s)" % tuple(line[:3]) for line in lines]
+    for column in range(7, len(header) - 2):
+        values = [float(line[column]) for line in lines]
+        axis.barh(labels, values, left=left, label=header[column])
         left = [a + b for a, b in zip(left, values)]
     axis.invert_yaxis()
     axis.set_xlabel("ms, summed over the workers")
@@ -81,9 +100,24 @@ def write_step(folder, rows):
     figure.tight_layout()
     figure.savefig(os.path.join(folder, "step.png"), dpi=120)
     plt.close(figure)
-    return save(folder, "step", "# The whole step, exact\n\nAll true contacts found, none false. Milliseconds; stages "
-                "are summed over the workers. Calibration: a fixed scalar kernel on one core, the slower of a run just before and "
-                "one just after.\n\n" + table(header, lines))
+    return save(folder, "step", "# The whole step, exact\n\nContacts, `initial` marks, start state and patches as in the node: every answer "
+                "is proved, its contacts are those of the truth. Milliseconds; stages are medians, summed over the workers. Calibration: a "
+                "fixed scalar kernel on one core.\n\n" + table(header, lines) + "\nRatios of runs in turns, medians with their 95 % "
+                "intervals:\n\n" + table(["scene", "target", "threads", "ratio", "median", "from", "to", "asked: at most"], ratios))
+
+
+def write_sheets(folder, sheets):
+    """Whole steps of two sheets; what has no contact has crossings alone, by rounding."""
+    header = ["two sheets", "contacts", "crossings", "whole step, ms", "ns a contact", "to crossing at t = 1/2", "from", "to"]
+    lines, costs = [], []
+    for row in sheets:
+        ns = 1e6 * row["ms"]["total"]["median"] / row["contacts"] if row["contacts"] else None
+        costs += [(ns, row["case"])] if ns else []
+        lines.append([row["case"], str(row["contacts"]), str(row["crossings"]), "%.2f" % row["ms"]["total"]["median"],
+                      "%.0f" % ns if ns else "–"] + ["%.2f" % row["to_reference"][k] for k in ("median", "low", "high")])
+    write_rows(os.path.join(folder, "sheets.csv"), header, lines)
+    return save(folder, "sheets", "# Ordinary input as whole steps\n\nPer contact the dearest (%s) takes %.1f times what the cheapest (%s) "
+                "takes; at most 4 is asked.\n\n" % (max(costs)[1], max(costs)[0] / min(costs)[0], min(costs)[1]) + table(header, lines))
 
 
 def of_turns(ones, others):
@@ -165,6 +199,35 @@ def write_first(folder, rows):
     return save(folder, "first", "# The first contact only\n\n" + table(header, lines))
 
 
+TIERS = {
+    "coincidence": "vertices of both features in one place at the start: a comparison of bits",
+    "batch": "ordinary pairs: doubles with proved bounds, pairs as lanes",
+    "axis motion": "motion along one axis: integers of one or two words",
+    "simple times": "features at rest, contacts at times such as 1/2 and 1/3, motion along one axis: the same integers",
+    "subdivision": "features that are apart while their polynomials vanish",
+    "double-double": "nearly parallel edges, slivers, grazing features",
+    "fixed integers": "degenerate pairs whose coordinates are of similar size",
+    "lazy integers": "coordinates of all sizes: integers of any width, computed where doubles cannot tell the sign; else all are",
+}
+GROUPS = {"steps": "real steps", "queries": "hard queries", "families": "hard families", "sheets": "sheets"}
+
+
+def write_tiers(folder, result):
+    """Of each tier and group of inputs the input that is slowest without it, as a multiple of the time with it."""
+    header = ["tier", "what it is for"] + list(GROUPS.values()) + ["slower by half"]
+    lines = []
+    for tier, purpose in TIERS.items():
+        cells, slower = [], 0
+        for group in GROUPS:
+            ratios = [(r["seconds"][tier] / r["seconds"][""], r["name"]) for r in result["rows"] if r["group"] == group]
+            worst = max(ratios, default=(0, "not measured"))
+            slower += sum(ratio > 1.5 for ratio, _ in ratios)
+            cells.append("%.3g (%s)" % worst)
+        lines.append([tier, purpose] + cells + [str(slower)])
+    write_rows(os.path.join(folder, "tiers.csv"), header, lines)
+    return save(folder, "tiers", "# The tiers of `exact`, each left out\n\n" + table(header, lines))
+
+
 def write_python(folder, rows):
     header = ["step", "triangles", "contacts", "the core, ms", "Python above it, ms", "least", "share"]
     lines = [[r["step"], str(r["triangles"]), str(r["contacts"]), "%.4g" % r["core_ms"], "%.2g" % r["over_ms"], "%.2g" % r["least_over_ms"],
@@ -211,6 +274,13 @@ def write_effects(folder, result):
              "%.4f to %.4f" % (flag["self_only_ms"]["best"], flag["self_only_ms"]["worst"]), ""],
             ["rope of %d points, %d voxels, ms a step" % (rope["points"], rope["voxels"]), "%.4f" % rope["ms"]["median"],
              "%.4f to %.4f" % (rope["ms"]["best"], rope["ms"]["worst"]), "%g" % rope["required_ms"]]]
+    demo, step = result["patches"]["demo"], result["patches"].get("cloth-ball")
+    rows.append(["the demo's step with patches / without", "%.4f" % demo["ratio"]["median"],
+                 "%(low).4f to %(high).4f (95 %%, %(rounds)d rounds)" % demo["ratio"], "%g" % demo["required_ratio"]])
+    if step:
+        rows.append(["patches of cloth-ball, %d contacts, %d threads, ms" % (step["contacts"], step["threads"]),
+                     "%.2f" % step["effect_ms"]["median"], "%.2f to %.2f" % (step["effect_ms"]["best"], step["effect_ms"]["worst"]),
+                     "%g" % step["required_ms"]])
     write_rows(os.path.join(folder, "effects.csv"), header, rows)
     return save(folder, "effects", "# What effects cost\n\nBoth flag runs take turns in one process; the ratio is the median over "
                 "rounds of the whole recording. The rope had %.1f pairs with itself, %.1f with the map and %.1f contacts a "

@@ -29,6 +29,7 @@ struct Assurance {
 DCCD_EXPORT Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& faults = {});
 
 /// One line for people: "proved, nothing touches", "proved, touches since before the step", "not proved: ...; ...".
-DCCD_EXPORT std::string describe(const Assurance& assurance);
+/// `touches` says, where something does, who whom and where.
+DCCD_EXPORT std::string describe(const Assurance& assurance, const std::string& touches = {});
 
 }  // namespace dccd

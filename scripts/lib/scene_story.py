@@ -60,9 +60,13 @@ def lines(story):
     return ['%7.3f s  %s' % moment for moment in sorted(moments, key=lambda moment: moment[0])]
 
 
+def none_expected(expected):
+    return expected == 'none' or expected['first_contact_s'] == 'none'
+
+
 def broken_contact(name, what, expected, story):
     first = story.first_s.get(what)
-    if expected == 'none':
+    if none_expected(expected):
         return [] if first is None else ['%s: a contact at %.4f s, where none is expected' % (name, first)]
     low, high = expected['first_contact_s']
     if first is None:
@@ -117,7 +121,7 @@ def living_patches(events):
 def broken_patches(name, what, expected, events):
     """Begins with the first contact, and ends, or lasts, as the page says."""
     mine = [event for event in events if event.what == what]
-    if expected == 'none':
+    if none_expected(expected):
         return ['%s: patch %d, where none is expected' % (name, mine[0].patch)] if mine else []
     first = next((event for event in mine if event.kind == 'BEGAN' and event.beginning == 'NEW'), None)
     low, high = expected['first_contact_s']
@@ -149,8 +153,9 @@ def broken_facts(expect, steps, events=None):
         if name == 'clear':
             broken += broken_clear(expected, steps, story)
             continue
-        what = frozenset(expected['names']) if name == 'body' else name
-        broken += broken_contact(name, what, expected, story)
-        if events is not None:
-            broken += broken_patches(name, what, expected, events)
+        for one in expected if isinstance(expected, list) else [expected]:
+            what = frozenset(one['names']) if name == 'body' else name
+            broken += broken_contact(name, what, one, story)
+            if events is not None:
+                broken += broken_patches(name, what, one, events)
     return broken

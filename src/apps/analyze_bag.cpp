@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <numeric>
 #include <sstream>
 
 #include "apps/analyze_bag/result_bag.h"
@@ -98,6 +99,12 @@ std::string commandLine(int argc, char** argv) {
   return line;
 }
 
+/// Where the map came from; that there was none is not to be read as if it had been used.
+std::string mapUsed(const BagReplaySummary& summary) {
+  return summary.map_source == "off" || summary.maps > summary.maps_refused ? summary.map_source
+                                                                            : "none on " + summary.map_source;
+}
+
 /// What the page's head says of the run.
 void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary, Report& report) {
   report.setEffects(summary.effects.decisions());
@@ -115,25 +122,35 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
       {"fixed frame", summary.fixed_frame},
       {"duration", seconds(summary.duration_s)},
       {"mesh messages", std::to_string(summary.mesh_messages)},
-      {"octomap", summary.map_source},
+      {"octomap", mapUsed(summary)},
       {"maps", std::to_string(summary.maps) + " (" + std::to_string(summary.maps_refused) + " refused)"},
       {"accuracy", toString(config.monitor.detector.accuracy.rung)},
       {"threads", std::to_string(config.monitor.detector.num_threads)},
       {"SIMD target", simdTarget()}};
+  for (const std::string& sentence : summary.not_looked_at) facts.push_back({"not looked at", sentence});
   for (const std::string& c : summary.complaints) facts.push_back({"complaint", c});
+  report.setNotLookedAt(summary.not_looked_at);
   report.setFacts(std::move(facts));
 }
 
 /// Says what came of it; the exit status.
 int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& report, bool answered,
              const std::string& of_study = "") {
-  std::cout << report.headline() << '\n'
+  // Why it is not proved is said once: in the last line of the errors.
+  std::cout << report.headline(false) << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
-            << lookAheadLine(summary) << of_study << "octomap: " << summary.map_source << '\n'
+            << lookAheadLine(summary) << of_study << "octomap: " << mapUsed(summary) << '\n'
             << "report: " << a.report << "/report.html\n";
-  for (const std::string& c : summary.complaints) std::cerr << "analyze_bag: " << c << '\n';
+  for (const std::string& sentence : summary.not_looked_at) std::cout << "note: " << sentence << '\n';
   const std::string unproved = report.unproved();
+  const std::string said = std::accumulate(summary.not_looked_at.begin(), summary.not_looked_at.end(), unproved);
+  for (const std::string& c : summary.complaints) {
+    const std::string refused = "refused: ";
+    const std::size_t at = c.find(refused);
+    const std::string reason = at == std::string::npos ? c : c.substr(at + refused.size());
+    if (said.find(reason) == std::string::npos) std::cerr << "analyze_bag: " << c << '\n';
+  }
   if (unproved.empty()) return 0;
   std::cerr << "analyze_bag: " << (answered ? "not proved: " : "no frame was answered: ") << unproved << '\n';
   return NOT_PROVED;
@@ -145,9 +162,9 @@ int analyze(const Arguments& a) {
   BagReplayOptions options;
   options.octomap_file = a.octomap;
   options.show_progress = !a.quiet;
-  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   BagReplay replay(a.bag, config, options);
-  Report report(a.report);
+  Report report(a.report);  // makes the folder, in which the results may lie, too
+  std::unique_ptr<ResultBag> out = a.out.empty() ? nullptr : std::make_unique<ResultBag>(a.out, config);
   bool answered = false;
   const BagReplaySummary summary = replay.run(
       [&](const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far, const ros::Time& at) {

@@ -1,16 +1,32 @@
-// Numbers on the command lines of the tools.
+// What the command lines of the tools have in common: numbers, and what is said of an unknown option.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <string>
+#include <vector>
 
+#include "config/nearest_name.h"
 #include "dccd/decimal.h"
 
 namespace dccd {
 
+/// An unknown option is answered with the nearest one that there is.
+inline std::string nearestOptions(const CLI::App* app, const CLI::Error& error) {
+  std::string text = CLI::FailureMessage::simple(app, error);
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app->get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  for (const std::string& word : app->remaining()) {
+    if (word.rfind("--", 0) == 0) text += word + " is no option; nearest is " + nearestName(word, known) + '\n';
+  }
+  return text;
+}
+
 /// Once all options are there: CLI11 takes `0x10`, `010` (8) and `nan` for numbers, too.
 inline void requireDecimalNumbers(CLI::App& app) {
+  app.failure_message(nearestOptions);
   for (CLI::Option* option : app.get_options()) {
     const std::string type = option->get_type_name();
     const auto is = [&](const char* name) { return type.rfind(name, 0) == 0; };

@@ -1,4 +1,5 @@
 // make_scene_bag SCENE.yaml OUT.bag: records a scene's cloth, octomap and transforms from a physics simulation.
+// make_scene_bag SCENE.yaml OUT.bt: its map alone.
 #include <cstdint>
 #include <exception>
 #include <iostream>
@@ -10,15 +11,16 @@
 #include "apps/make_scene_bag/monitor_check.h"
 #include "apps/make_scene_bag/physics/scene_file.h"
 #include "apps/make_scene_bag/recorder.h"
+#include "apps/make_scene_bag/scene_robot.h"
 
 int main(int argc, char** argv) {
   CLI::App app(
       "Records a scene (config/scenes/*.yaml) as a bag: bodies, octomap, tf, a camera's clouds. The same seed gives "
-      "the same bag.");
+      "the same bag. Into OUT.bt it writes the octomap alone, for which the file needs nothing but its obstacle.");
   std::string scene_path, bag_path;
   dccd::RecorderOptions options;
   app.add_option("scene", scene_path, "Scene file")->required();
-  app.add_option("bag", bag_path, "Bag to write")->required();
+  app.add_option("bag", bag_path, "Bag to write, or a .bt file: the scene's map alone")->required();
   app.add_option("--frames", options.frames, "Frames to record instead of the scene's own number")
       ->check(CLI::Range(2, 1000000));
   app.add_option("--rate", options.rate_hz, "Frames a second instead of the scene's own number, over the same time")
@@ -33,7 +35,12 @@ int main(int argc, char** argv) {
   dccd::requireDecimalNumbers(app);
   CLI11_PARSE(app, argc, argv);
   try {
-    const dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    if (bag_path.size() > 3 && bag_path.compare(bag_path.size() - 3, 3, ".bt") == 0) {
+      std::cout << dccd::recordMap(dccd::scene::readObstacleFile(scene_path), bag_path);
+      return 0;
+    }
+    dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
+    dccd::addRobot(spec, scene_path);
     dccd::checkMonitorBlock(spec, scene_path);
     std::cout << dccd::recordScene(spec, bag_path, options);
   } catch (const std::exception& error) {

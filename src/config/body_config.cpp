@@ -40,9 +40,9 @@ void readDepthImage(ParameterReader& section, MeshInputConfig& input) {
   }
   DepthSurfaceOptions& depth = input.depth;
   depth.max_edge_m = section.number("max_edge_m", depth.max_edge_m, 1e-6, LARGE);
-  depth.stride = static_cast<std::size_t>(section.integer("stride", static_cast<int>(depth.stride), 1, 1000));
+  depth.stride = section.integer("stride", depth.stride, 1, 1000);
   depth.max_range_m = section.number("max_range_m", depth.max_range_m, 0, LARGE);
-  depth.median = static_cast<std::size_t>(section.integer("median", static_cast<int>(depth.median), 1, 15));
+  depth.median = section.integer("median", depth.median, 1, 15);
   if (depth.median % 2 == 0)
     section.fail("median", "must be odd, so that a pixel lies in the middle: 1 (off), 3, 5, …");
   if (is_image && input.rows) section.fail("rows", "has no meaning for a depth image, which brings its own; remove it");
@@ -59,8 +59,8 @@ void readTopology(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
   readSets(section.section("sets"), body);
   input.source = topologySource(section);
-  input.rows = static_cast<std::size_t>(section.integer("rows", 0, 0, 100000));
-  input.cols = static_cast<std::size_t>(section.integer("cols", 0, 0, 100000));
+  input.rows = section.integer("rows", input.rows, 0, 100000);
+  input.cols = section.integer("cols", input.cols, 0, 100000);
   body.topology_file = section.get("file", std::string());
   readDepthImage(section, input);
   section.finish();
@@ -110,8 +110,7 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
   body.input.type = reader.choice("type", "auto", types);
   body.input.frame_id = reader.get("frame_id", std::string());
   body.input.weld = reader.choice("weld", "on", {"on", "off"}) == "on";
-  body.input.max_vertices =
-      static_cast<std::size_t>(reader.integer("max_vertices", static_cast<int>(body.input.max_vertices), 1, MANY));
+  body.input.max_vertices = reader.integer("max_vertices", body.input.max_vertices, 1, MANY);
   readTopology(reader.section("topology"), body);
   if (reader.has("marker")) {
     ParameterReader marker = reader.section("marker");
@@ -236,6 +235,10 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
     readBodyEffects(reader, config, body);
     config.bodies.push_back(std::move(body));
   } else {
+    config.bodies_listed = true;
+    if (reader.has("topic")) {
+      reader.fail("topic", "(mesh:= of the launch files) has no place beside bodies; set bodies/NAME/topic instead");
+    }
     ParameterReader section = reader.section("bodies");
     for (const std::string& name : section.names()) {
       if (name == "octomap" || name == "self") {

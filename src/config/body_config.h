@@ -1,4 +1,5 @@
-// The part of the configuration that is about bodies: what they are, where they come from, what they keep apart from.
+// The parts of the configuration that have files of their own: the map; bodies, where they come from, what they keep
+// apart from.
 #pragma once
 
 #include <array>
@@ -11,6 +12,10 @@ namespace dccd {
 constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
 
+/// The map's parameters.
+void readMap(ParameterReader& reader, MonitorConfig& config);
+/// Refuses own voxels beside an unknown space that is occupied. After the effects.
+void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config);
 /// own_voxels_m of the section [m], or the fallback; `auto`: ONE_VOXEL.
 double ownVoxelsOf(ParameterReader& reader, double fallback);
 /// minimum_separation_m of the section [m], or the fallback.

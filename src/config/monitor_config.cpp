@@ -69,8 +69,7 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   monitor.store.max_vertex_step_m = reader.number("max_vertex_step_m", monitor.store.max_vertex_step_m, 0, LARGE);
   monitor.patch_gap_s = reader.number("patch_gap_s", monitor.patch_gap_s, 0, LARGE);
   monitor.sync_timeout_s = reader.number("sync_timeout_s", monitor.sync_timeout_s, 0, LARGE);
-  monitor.detector.max_contacts = static_cast<std::size_t>(
-      reader.integer("max_contacts", static_cast<int>(monitor.detector.max_contacts), 1, MANY));
+  monitor.detector.max_contacts = reader.integer("max_contacts", monitor.detector.max_contacts, 1, MANY);
   monitor.detector.suppress_initial = reader.choice("initial_contacts", "report", {"report", "suppress"}) == "suppress";
   monitor.detector.earliest_only = reader.get("earliest_only", false);
   if (monitor.detector.earliest_only && reader.has("expected_contacts")) {
@@ -87,18 +86,15 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   }
   monitor.detector.rigid_tolerance_m =
       reader.number("rigid_tolerance_m", monitor.detector.rigid_tolerance_m, 1e-9, LARGE);
-  monitor.detector.max_substeps = static_cast<std::size_t>(
-      reader.integer("max_substeps", static_cast<int>(monitor.detector.max_substeps), 1, 100000));
+  monitor.detector.max_substeps = reader.integer("max_substeps", monitor.detector.max_substeps, 1, 100000);
   monitor.look_ahead_s = reader.number("look_ahead_s", monitor.look_ahead_s, 0, 3600);
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.answer_timeout_s = reader.number("answer_timeout_s", config.answer_timeout_s, 1e-3, LARGE);
-  config.queue_size =
-      static_cast<std::size_t>(reader.integer("queue_size", static_cast<int>(config.queue_size), 1, 100000));
+  config.queue_size = reader.integer("queue_size", config.queue_size, 1, 100000);
   config.queue_policy = reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST
                                                                                                   : QueuePolicy::OLDEST;
   config.simd_target = reader.get("simd_target", config.simd_target);
-  config.record_steps =
-      static_cast<std::size_t>(reader.integer("record_steps", static_cast<int>(config.record_steps), 0, 10000));
+  config.record_steps = reader.integer("record_steps", config.record_steps, 0, 10000);
   config.record_folder = reader.get("record_folder", std::string());
 }
 
@@ -117,74 +113,10 @@ void limitTime(MonitorConfig& config) { config.monitor.detector.max_compute_ms =
 
 /// A tool has the limits that it is given, the node all of them (limitLive).
 void readLimits(ParameterReader& reader, MonitorConfig& config) {
-  config.max_memory_bytes = static_cast<std::size_t>(reader.integer(
-                                "max_memory_mb", static_cast<int>(config.max_memory_bytes >> 20), 16, 1 << 20))
-                            << 20;
+  config.max_memory_bytes = reader.integer("max_memory_mb", config.max_memory_bytes >> 20, 16, 1 << 20) << 20;
   config.max_compute_s = reader.number("max_compute_s", config.max_compute_s, 0, LARGE);
   if (reader.has("max_memory_mb")) limitMemory(config);
   if (reader.has("max_compute_s")) limitTime(config);
-}
-
-void readSensorModel(ParameterReader section, CloudMapOptions& map) {
-  map.hit = section.number("hit", map.hit, 0.5, 0.9999);
-  map.miss = section.number("miss", map.miss, 0.0001, 0.5);
-  map.min = section.number("min", map.min, 0.0001, 0.5);
-  map.max = section.number("max", map.max, 0.5, 0.9999);
-  section.finish();
-}
-
-void readClouds(ParameterReader& reader, MonitorConfig& config) {
-  // What is said of clouds is said by somebody who has them.
-  for (const char* name : {"obstacle_cloud_topic", "obstacle_resolution_m", "obstacle_max_range_m", "sensor_model"}) {
-    config.cloud_named = config.cloud_named || reader.has(name);
-  }
-  config.cloud_topic = reader.get("obstacle_cloud_topic", config.cloud_topic);
-  if (config.cloud_topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
-  CloudMapOptions& map = config.cloud_map;
-  map.resolution_m = reader.number("obstacle_resolution_m", map.resolution_m, 1e-4, 1e3);
-  map.max_range_m = reader.number("obstacle_max_range_m", map.max_range_m, 0, LARGE);
-  if (map.max_range_m > CloudMap::MOST_RAY_VOXELS * map.resolution_m) {
-    std::ostringstream text;
-    text << "is " << map.resolution_m << ", too fine for obstacle_max_range_m " << map.max_range_m << ": a ray has "
-         << CloudMap::MOST_RAY_VOXELS << " voxels at most; write at least "
-         << map.max_range_m / CloudMap::MOST_RAY_VOXELS << ", or a shorter range";
-    reader.fail("obstacle_resolution_m", text.str());
-  }
-  readSensorModel(reader.section("sensor_model"), map);
-}
-
-void readMap(ParameterReader& reader, MonitorConfig& config) {
-  config.octomap_topic_named = reader.has("octomap_topic");
-  config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
-  if (config.octomap_topic.empty()) {
-    reader.fail("octomap_topic", "is empty; remove it, or write effects/octomap: off where there is no map");
-  }
-  config.octomap_file = reader.get("octomap_file", std::string());
-  config.octomap_frame = reader.get("octomap_frame", std::string());
-  config.max_map_bytes =
-      static_cast<std::size_t>(reader.integer("max_map_mb", static_cast<int>(config.max_map_bytes >> 20), 1, 1 << 20))
-      << 20;
-  if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
-  readClouds(reader, config);
-  config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
-  config.own_voxels_m = ownVoxelsOf(reader, 0);
-  config.monitor.own_voxels_lag_s =
-      reader.number("own_voxels_lag_s", config.monitor.own_voxels_lag_s, 0, tolerance::OWN_PATH_S);
-  config.monitor.own_voxels_trust = reader.choice("own_voxels_doubt", "unproved", {"unproved", "trust"}) == "trust";
-  const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
-  config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
-                         : unknown == "occupied" ? UnknownSpace::OCCUPIED
-                                                 : UnknownSpace::REPORT;
-  const ParameterTree& box = reader.raw("unknown_box");
-  if (box.isSet()) {
-    const auto n = reader.numbers(box, "unknown_box", 6);
-    config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
-  }
-  if (config.unknown_space == UnknownSpace::OCCUPIED && config.unknown_box.empty()) {
-    reader.fail("unknown_box",
-                "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
-                "the workspace within which the unknown is an obstacle");
-  }
 }
 
 void readEffects(ParameterReader section, MonitorConfig& config) {
@@ -296,13 +228,6 @@ void applyEffects(MonitorConfig& config) {
   if (off(Effect::UNKNOWN_SPACE)) config.unknown_space = UnknownSpace::FREE;
 }
 
-void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) {
-  if (!config.ownsVoxels() || config.unknown_space != UnknownSpace::OCCUPIED) return;
-  reader.fail("own_voxels_m",
-              "is above 0, but with unknown_space: occupied a body's own voxels cannot be told from what "
-              "is unknown; write unknown_space: report, or own_voxels_m: 0");
-}
-
 /// The same text for the same values, wherever they were read from.
 void write(const ParameterTree& value, std::ostream& text) {
   text << static_cast<int>(value.kind) << ' ' << value.truth << ' ' << value.integer << ' ' << value.number << ' '
@@ -370,22 +295,6 @@ std::vector<Body> MonitorConfig::monitorBodies() const {
   return found;
 }
 
-const std::string& MonitorConfig::liveMapName() const { return cloud_named ? cloud_topic : octomap_topic; }
-
-const std::string& MonitorConfig::mapName() const { return takesMapFileAlone() ? octomap_file : liveMapName(); }
-
-void MonitorConfig::checkMapNames() const {
-  if (!cloud_named || !octomap_topic_named) return;
-  throw ParameterError("the map is to come both from the clouds on obstacle_cloud_topic '" + cloud_topic +
-                       "' and from octomap_topic '" + octomap_topic + "'; remove one of the two");
-}
-
-bool MonitorConfig::namesOctomap() const {
-  const EffectSetting setting = settingOf(effects, Effect::OCTOMAP);
-  if (setting != EffectSetting::AUTO) return setting == EffectSetting::ON;
-  return octomap_topic_named || cloud_named || !octomap_file.empty();
-}
-
 bool MonitorConfig::holdsDistance() const {
   return std::any_of(bodies.begin(), bodies.end(),
                      [](const BodyConfig& body) { return body.isUncertain() || largestSeparation({body.body}) > 0; });
@@ -393,14 +302,11 @@ bool MonitorConfig::holdsDistance() const {
 
 std::uint64_t MonitorConfig::hash() const {
   std::ostringstream text;
-  text << std::setprecision(17) << given_hash;
-  for (const double value : {monitor.detector.step_budget_ms, monitor.store.max_step_s, monitor.store.max_vertex_step_m,
-                             markers.point_size_m, markers.normal_length_m, markers.obstacle_m}) {
-    text << ' ' << value;
-  }
-  text << ' ' << toString(monitor.detector.accuracy.rung) << ' ' << monitor.detector.max_contacts << ' '
-       << monitor.detector.suppress_initial << ' ' << markers.mesh << ' ' << phase;
+  text << std::setprecision(17) << given_hash << ' ' << phase;
   for (const Hold& hold : holds) text << ' ' << hold.closed;
+#define DCCD_HASH_SETTING(name, value) text << ' ' << static_cast<double>(value);
+  DCCD_LIVE_SETTINGS(DCCD_HASH_SETTING)
+#undef DCCD_HASH_SETTING
   return hashOf(text.str());
 }
 

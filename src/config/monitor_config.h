@@ -60,6 +60,7 @@ constexpr const char* DEFAULT_CLOUD_TOPIC = "obstacle_cloud";
 struct MonitorConfig {
   std::string fixed_frame;         ///< empty: the frame of the clock body's first message
   std::vector<BodyConfig> bodies;  ///< the robot's links come last
+  bool bodies_listed = false;      ///< under bodies/, each with its own topic
   Robot robot;
   RobotConfig robot_asked;                  ///< what it was made of
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
@@ -122,6 +123,19 @@ struct MonitorConfig {
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
   std::uint64_t hash() const;
 };
+
+/// What can be changed while the node runs: LIVE(its name in cfg/CollisionMonitor.cfg, where MonitorConfig has it).
+#define DCCD_LIVE_SETTINGS(LIVE)                            \
+  LIVE(accuracy, monitor.detector.accuracy.rung)            \
+  LIVE(step_budget_ms, monitor.detector.step_budget_ms)     \
+  LIVE(max_step_s, monitor.store.max_step_s)                \
+  LIVE(max_vertex_step_m, monitor.store.max_vertex_step_m)  \
+  LIVE(max_contacts, monitor.detector.max_contacts)         \
+  LIVE(suppress_initial, monitor.detector.suppress_initial) \
+  LIVE(marker_point_size_m, markers.point_size_m)           \
+  LIVE(marker_normal_length_m, markers.normal_length_m)     \
+  LIVE(marker_mesh, markers.mesh)                           \
+  LIVE(marker_obstacle_m, markers.obstacle_m)
 
 /// Throws ParameterError naming the parameter. `path` leads the names in messages, "~" for a node.
 MonitorConfig readConfig(const XmlRpc::XmlRpcValue& tree, const std::string& path = "~", const RobotLoader& load = {});

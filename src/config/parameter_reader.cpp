@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -11,21 +10,6 @@ namespace dccd {
 using Kind = ParameterTree::Kind;
 
 namespace {
-
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
 
 std::string shown(double value) {
   std::ostringstream out;
@@ -63,16 +47,6 @@ const char* kindName(const ParameterTree& value) {
       break;
   }
   return "of a type that is not used here";
-}
-
-std::string nearestName(const std::string& name, const std::vector<std::string>& known) {
-  std::string best;
-  std::size_t least = std::numeric_limits<std::size_t>::max();
-  for (const std::string& candidate : known) {
-    const std::size_t distance = editDistance(name, candidate);
-    if (distance < least) least = distance, best = candidate;
-  }
-  return best;
 }
 
 ParameterReader::ParameterReader(ParameterTree tree, std::string path)
@@ -146,6 +120,10 @@ int ParameterReader::integer(const std::string& name, int min, int max) {
 int ParameterReader::integer(const std::string& name, int fallback, int min, int max) {
   const ParameterTree& value = raw(name);
   return value.isSet() ? integerOf(value, name, min, max) : fallback;
+}
+
+std::size_t ParameterReader::integer(const std::string& name, std::size_t fallback, int min, int max) {
+  return static_cast<std::size_t>(integer(name, static_cast<int>(fallback), min, max));
 }
 
 bool ParameterReader::get(const std::string& name, bool fallback) {

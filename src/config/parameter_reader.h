@@ -7,13 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "config/nearest_name.h"
 #include "config/parameter_tree.h"
 #include "dccd/types.h"
 
 namespace dccd {
-
-/// The known name nearest to `name` by edit distance; empty when there is none.
-std::string nearestName(const std::string& name, const std::vector<std::string>& known);
 
 /// One section of the tree. Every get marks its name as known; finish() refuses what nobody asked for. A get with a
 /// fallback gives it where nothing is set; one without refuses that.
@@ -29,6 +27,7 @@ class ParameterReader {
   double number(const std::string& name, double fallback, double min, double max);
   int integer(const std::string& name, int min, int max);
   int integer(const std::string& name, int fallback, int min, int max);
+  std::size_t integer(const std::string& name, std::size_t fallback, int min, int max);
   bool get(const std::string& name, bool fallback);
   std::string get(const std::string& name, const std::string& fallback);
   /// A text that is not empty.

@@ -32,7 +32,7 @@ class AlignedRecords {
 /// Which bounds are tested: those at both ends, the same way round; those at t0 alone; or swept ones.
 enum class Times : std::uint8_t { BOTH, T0, SWEPT };
 
-/// What bounds are about: until when they reach, in the place of t1, and which of them are to be tested.
+/// The time that bounds cover: it ends at `end` in the place of t1. `times`: which of the bounds are tested.
 struct Span {
   double end = 1;
   Times times = Times::BOTH;
@@ -79,13 +79,14 @@ class ClusterTree {
   }
   /// Vertex indices of the feature in a slot; only slots below featureCount() hold one.
   const Index* feature(std::size_t slot) const { return features_.data() + slot * arity_; }
-  /// Once more, GROUP apart, beside those of the group's other slots: where the test of what shares a vertex has just
-  /// read them. ARITY: arity().
+  /// The same vertices in the layout of groups: the next vertex of the feature is GROUP further on. The test for shared
+  /// vertices has just read this copy. ARITY: arity().
   template <std::size_t ARITY>
   const Index* lane(std::size_t slot) const {
     return lanes_.get() + (slot / simd::GROUP * ARITY * simd::GROUP + slot % simd::GROUP);
   }
-  /// Those of a group's 16 slots as the bounds have them: without what is masked, NO_INDEX in empty ones.
+  /// Vertex indices of the features that the bounds of a group's 16 slots hold; NO_INDEX where a slot is masked or
+  /// empty.
   const Index* boundedGroup(std::size_t group) const {
     return (masked_.empty() ? features_ : masked_).data() + group * simd::GROUP * arity_;
   }

@@ -164,7 +164,7 @@ class SceneArrays {
                        [](const SceneBody& body) { return body.setup.topology->hasFaces(); });
   }
   /// Some body is to be tested against the map.
-  bool meetsObstacle() const {
+  bool mayMeetMap() const {
     return std::any_of(bodies_.begin(), bodies_.end(), [](const SceneBody& b) { return meetsMap(b.setup); });
   }
   /// Some vertex of some body has an uncertainty radius in this step.

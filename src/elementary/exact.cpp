@@ -10,6 +10,19 @@
 #include "simd/float_mode.h"
 
 namespace dccd {
+namespace exact {
+
+ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
+  ElementaryResult result = decideByCoincidence(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideAtSimpleTime(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideBySubdivision(kind, pair);
+  if (result.verdict == Verdict::UNDECIDED) result = decideByDoubleDouble(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideByFixedIntegers(kind, pair, toc_bits);
+  return result.verdict == Verdict::UNDECIDED ? decideByBigIntegers(kind, pair, toc_bits) : result;
+}
+
+}  // namespace exact
+
 namespace {
 
 constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched tier lie on the stack at once

@@ -46,14 +46,5 @@ ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int 
   return coincident ? contactInCell(0, toc_bits, Tier::COINCIDENCE) : undecided(Tier::COINCIDENCE);
 }
 
-ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
-  ElementaryResult result = decideByCoincidence(kind, pair, toc_bits);
-  if (result.verdict == Verdict::UNDECIDED) result = decideAtSimpleTime(kind, pair, toc_bits);
-  if (result.verdict == Verdict::UNDECIDED) result = decideBySubdivision(kind, pair);
-  if (result.verdict == Verdict::UNDECIDED) result = decideByDoubleDouble(kind, pair, toc_bits);
-  if (result.verdict == Verdict::UNDECIDED) result = decideByFixedIntegers(kind, pair, toc_bits);
-  return result.verdict == Verdict::UNDECIDED ? decideByBigIntegers(kind, pair, toc_bits) : result;
-}
-
 }  // namespace exact
 }  // namespace dccd

@@ -1,6 +1,8 @@
 #include "input/mesh_resource.h"
 
 #include <algorithm>
+#include <cctype>
+#include <filesystem>
 #include <stdexcept>
 
 #include <ros/package.h>
@@ -10,15 +12,34 @@
 
 namespace dccd {
 
+namespace {
+
+/// %20 as a blank and so on, where there is no file of the name as it stands: RViz takes addresses so.
+std::string unescaped(const std::string& path) {
+  std::error_code ignored;
+  if (path.find('%') == std::string::npos || std::filesystem::exists(path, ignored)) return path;
+  std::string plain;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const bool escaped = path[i] == '%' && i + 2 < path.size() &&
+                         std::isxdigit(static_cast<unsigned char>(path[i + 1])) &&
+                         std::isxdigit(static_cast<unsigned char>(path[i + 2]));
+    plain += escaped ? static_cast<char>(std::stoi(path.substr(i + 1, 2), nullptr, 16)) : path[i];
+    if (escaped) i += 2;
+  }
+  return plain;
+}
+
+}  // namespace
+
 std::string pathOf(const std::string& address) {
   const std::string package = "package://", file = "file://";
-  if (address.compare(0, file.size(), file) == 0) return address.substr(file.size());
+  if (address.compare(0, file.size(), file) == 0) return unescaped(address.substr(file.size()));
   if (address.compare(0, package.size(), package) != 0) return address;
   const std::size_t slash = address.find('/', package.size());
   const std::string name = address.substr(package.size(), slash - package.size());
   const std::string root = ros::package::getPath(name);
   if (root.empty()) throw std::invalid_argument(address + ": there is no package '" + name + "'");
-  return slash == std::string::npos ? root : root + address.substr(slash);
+  return slash == std::string::npos ? root : unescaped(root + address.substr(slash));
 }
 
 namespace {

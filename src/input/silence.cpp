@@ -29,20 +29,19 @@ std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<
     return "/use_sim_time is set, but nobody publishes /clock; play the bag with --clock, or rosparam set use_sim_time "
            "false";
   }
-  std::string text;
-  bool unpublished = false;
+  std::string text, given_by;
   for (const AwaitedTopic& topic : silent) {
     text += text.empty() ? "" : "; ";
     if (topic.publishers == 0) {
-      unpublished = true;
+      given_by += (given_by.empty() ? "" : ", ") + topic.named_by;
       text += "nobody publishes " + topic.name;
     } else {
       text += topic.name + " has a publisher, but no message has come (see rostopic hz)";
     }
   }
-  if (!unpublished) return text;
+  if (given_by.empty()) return text;
   const std::string names = meshTopics(published);
-  return text + "; give the mesh's topic with mesh:=TOPIC; " +
+  return text + "; give the mesh's topic with " + given_by + "; " +
          (names.empty() ? "no topic of a mesh type is published" : "published are " + names);
 }
 

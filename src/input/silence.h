@@ -12,6 +12,7 @@ namespace dccd {
 struct AwaitedTopic {
   std::string name;              ///< resolved
   std::uint32_t publishers = 0;  ///< connected
+  std::string named_by;          ///< the argument or parameter that gives it
 };
 
 /// A sentence about the clock or about topics from which no message has come, with what to do; empty when all is well.

@@ -14,6 +14,7 @@
 #include "dccd/regular_file.h"
 #include "input/known_types.h"
 #include "input/message_bytes.h"
+#include "input/message_type.h"
 #include "input/short_text.h"
 #include "input/transforms.h"
 #include "octomap/coarser.h"
@@ -50,6 +51,7 @@ void openBag(const std::string& path, rosbag::Bag& bag) {
 // Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
 const ros::Duration TF_AHEAD(10.0);
 const ros::Duration TF_KEPT(60.0);
+constexpr std::size_t MOST_NAMES = 6;
 // Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
 const ros::Duration SEAM(1.0);
 
@@ -159,6 +161,7 @@ struct BagReplay::Run {
   std::map<std::string, std::size_t> frames_of_topic;
   BagReplaySummary summary;
   std::set<std::string> complained;
+  bool lacked_transform = false;
 
   Run(const BagReplay& r, const Sink& to, const Sink& predictions_to)
       : sink(to), predictions(predictions_to), variation(r.options_.variation), pipeline(r.config_, feed) {
@@ -229,6 +232,7 @@ struct BagReplay::Run {
     Outcome outcome;
     while (pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       const std::optional<Outcome> prediction = predict(outcome);
+      lacked_transform = lacked_transform || outcome.reason.find("no transform") != std::string::npos;
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
     }
@@ -262,22 +266,23 @@ BagReplay::BagReplay(const std::string& bag, MonitorConfig config, BagReplayOpti
   rosbag::Bag file;
   openBag(path_, file);
   rosbag::View view(file);
-  std::set<std::string> topics;
   for (const rosbag::ConnectionInfo* c : view.getConnections()) {
-    const bool is_new = topics.insert(c->topic).second;
+    const bool is_new = topics_.emplace(c->topic, c->datatype).second;
     if (is_new && mapTypeProblem(c->datatype, c->md5sum).empty()) map_topics_.push_back(c->topic);
   }
   chooseMapTopic();
-  bool found = false;
-  std::vector<std::string> wanted;
+  bool found = false, named = false;
+  std::vector<std::string> wanted, there;
   for (const BodyConfig& body : config_.bodies) {
     if (body.isRigid()) continue;
-    found |= topics.count(absolute(body.topic)) > 0;
+    found |= topics_.count(absolute(body.topic)) > 0;
+    named |= body.topic_named || config_.bodies.size() > 1;
     wanted.push_back(absolute(body.topic));
   }
+  for (const auto& [topic, type] : topics_) there.push_back(topic + " (" + type + ")");
   if (!found) {
-    throw std::runtime_error(path_ + ": no topic " + listOf(wanted) + "; the bag has " +
-                             (topics.empty() ? "no messages" : listOf({topics.begin(), topics.end()})));
+    throw std::runtime_error(path_ + (named ? ": no topic " + listOf(wanted) : ": no topic of a mesh type") +
+                             "; the bag has " + (there.empty() ? "no messages" : listOf(there)));
   }
 }
 
@@ -321,6 +326,30 @@ std::string BagReplay::missingMap(const BagReplaySummary& summary) const {
          (map_topics_.empty() ? "none" : "them on " + listOf(map_topics_));
 }
 
+/// That no step had a map, where that is so.
+std::string BagReplay::unusedMap(const BagReplaySummary& summary, bool may_use_map) const {
+  const std::string nothing = "nothing was checked against a map: ";
+  if (!may_use_map) return nothing + "effects/octomap is off";
+  const std::string missing = missingMap(summary);
+  if (missing.empty()) return "";
+  return nothing + (map_topics_.empty() && !config_.namesOctomap() ? "the bag has none" : missing);
+}
+
+/// Topics that could be bodies and are none.
+std::string BagReplay::unheardMeshes(const BagReplaySummary& summary) const {
+  std::set<std::string> heard(summary.mesh_topics.begin(), summary.mesh_topics.end());
+  heard.insert(config_.liveMapName());
+  std::vector<std::string> unheard;
+  for (const auto& [topic, type] : topics_) {
+    if (heard.count(topic) == 0 && findMeshType(type) && !isMonitorsMarkers(topic, topics_)) unheard.push_back(topic);
+  }
+  if (unheard.empty()) return "";
+  const std::size_t more = unheard.size() - std::min(unheard.size(), MOST_NAMES);
+  unheard.resize(unheard.size() - more);
+  return "nothing was checked against what is on " + listOf(unheard) +
+         (more > 0 ? " and " + std::to_string(more) + " more" : "");
+}
+
 BagReplay::~BagReplay() = default;
 
 std::string BagReplay::firstMeshTopic(const std::string& bag, const std::string& clouds) {
@@ -334,6 +363,24 @@ std::string BagReplay::firstMeshTopic(const std::string& bag, const std::string&
     if (meshTypeProblem(c->datatype, c->md5sum).empty()) return c->topic;
   }
   return "";
+}
+
+/// What the run lacked, and so did not look at.
+void BagReplay::tellMissing(Run& run) const {
+  const bool may_use_map = run.pipeline.effects().mayUseMap();
+  if (may_use_map && !unheardMaps().empty()) run.complain(unheardMaps());
+  if (run.pipeline.effects().mapExpected()) {
+    const std::string missing = missingMap(run.summary);
+    if (!missing.empty()) run.complain(missing);
+  }
+  if (run.lacked_transform && topics_.count("/tf") + topics_.count("/tf_static") == 0) {
+    run.complain(
+        "the bag has neither /tf nor /tf_static; record them with the meshes, or set fixed_frame to the frame "
+        "that the messages name");
+  }
+  for (const std::string& sentence : {unusedMap(run.summary, may_use_map), unheardMeshes(run.summary)}) {
+    if (!sentence.empty()) run.summary.not_looked_at.push_back(sentence);
+  }
 }
 
 BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, const Sink& predictions) {
@@ -384,11 +431,7 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   }
   run.pipeline.finish();
   run.drain(at);
-  if (may_use_map && !unheardMaps().empty()) run.complain(unheardMaps());
-  if (run.pipeline.effects().mapExpected()) {
-    const std::string missing = missingMap(run.summary);
-    if (!missing.empty()) run.complain(missing);
-  }
+  tellMissing(run);
   run.summary.frames = run.pipeline.monitor().total();
   run.summary.fixed_frame = run.pipeline.fixedFrame();
   run.summary.effects = run.pipeline.effects().plan();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct BagReplaySummary {
   std::string fixed_frame;              ///< at the end
   std::string map_source;               ///< its topic or file, and who named it, in words
   std::vector<std::string> complaints;  ///< refused messages, each kind once; maps that are missing or not listened to
+  std::vector<std::string> not_looked_at;  ///< a map that is not there, meshes that nobody listens to: a sentence each
   FrameCounters frames;
   EffectPlan effects;                          ///< at the end
   std::vector<LeftOutPair> left_out;           ///< at the end
@@ -74,12 +76,16 @@ class BagReplay {
   std::string path_;
   MonitorConfig config_;
   BagReplayOptions options_;
-  std::vector<std::string> map_topics_;  // of the bag
+  std::vector<std::string> map_topics_;        // of the bag
+  std::map<std::string, std::string> topics_;  // of the bag, with their types
 
   void chooseMapTopic();
   std::string mapSource() const;
   std::string unheardMaps() const;
   std::string missingMap(const BagReplaySummary& summary) const;
+  std::string unusedMap(const BagReplaySummary& summary, bool may_use_map) const;
+  std::string unheardMeshes(const BagReplaySummary& summary) const;
+  void tellMissing(Run& run) const;
 };
 
 }  // namespace dccd

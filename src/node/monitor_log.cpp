@@ -33,9 +33,13 @@ void MonitorLog::alarm(const std::string& kind, const std::string& text) {
 
 bool MonitorLog::isDue(const std::string& kind) { return !throttle_.line(kind, kind, steadyNs()).empty(); }
 
+std::string MonitorLog::adviceOn(const Outcome& outcome) const {
+  return adviceFor(outcome.status, outcome.reason, mapSource());
+}
+
 void MonitorLog::tell(const Outcome& outcome) {
   if (outcome.status == StepStatus::OK || outcome.status == StepStatus::FIRST_FRAME) return;
-  const std::string advice = adviceFor(outcome.status, outcome.reason, mapSource());
+  const std::string advice = adviceOn(outcome);
   const std::string text = toString(outcome.status) + (outcome.reason.empty() ? "" : ": " + outcome.reason) +
                            (advice.empty() ? "" : "; " + advice);
   if (outcome.status != StepStatus::TIME_JUMP) {

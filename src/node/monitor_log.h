@@ -26,6 +26,8 @@ class MonitorLog {
   void alarm(const std::string& kind, const std::string& text);
   /// Whether lines of this kind, which are not to be lost, may be written now.
   bool isDue(const std::string& kind);
+  /// What to do about an outcome that is not OK; empty: its reason says all.
+  std::string adviceOn(const Outcome& outcome) const;
   /// An outcome that is not OK: status, reason, and what to do.
   void tell(const Outcome& outcome);
   /// Whether it is time to look into silence again: rarely, and not at once.

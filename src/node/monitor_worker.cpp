@@ -101,12 +101,16 @@ void CollisionMonitor::Impl::tellComplaints() {
 }
 
 void CollisionMonitor::Impl::lookIntoSilence() {
-  if (const auto found = master->takeHint()) log.hintAt(*found, pipeline);
+  if (const auto found = master->takeHint()) {
+    log.hintAt(*found, pipeline);
+    state.setHint(log.hint());
+  }
   if (!log.isSilenceDue(steadyNs())) return;
   std::vector<AwaitedTopic> silent;
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
-    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers()});
+    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
+                      config.bodies_listed ? "bodies/" + config.bodies[b].body.name + "/topic" : "mesh:=TOPIC"});
   }
   const bool mapless = pipeline.effects().mayUseMap() && !pipeline.effects().mapSeen();
   master->lookInto({std::move(silent), mapless ? log.mapSource() : ""});
@@ -149,7 +153,7 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   newest_ns = outcome.stamp_ns;
   // Before the contacts, though these then wait some 50 us longer for roscpp: a long list is not to keep a clear state
   // standing that is over.
-  state.tell(outcome, outcome.arrival_ns, frame);
+  state.tell(outcome, outcome.arrival_ns, frame, log.adviceOn(outcome));
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
   outputs.publishMarkers(outcome, bodies, config.markers, frame);

@@ -20,17 +20,10 @@ namespace {
 
 /// Calls set(live value, setting) for each of them.
 template <class Live, class Options, class Markers, class Set>
-void forEachLive(Live& live, Options& options, Markers& markers, const Set& set) {
-  set(live.accuracy, options.detector.accuracy.rung);
-  set(live.step_budget_ms, options.detector.step_budget_ms);
-  set(live.max_step_s, options.store.max_step_s);
-  set(live.max_vertex_step_m, options.store.max_vertex_step_m);
-  set(live.max_contacts, options.detector.max_contacts);
-  set(live.suppress_initial, options.detector.suppress_initial);
-  set(live.marker_point_size_m, markers.point_size_m);
-  set(live.marker_normal_length_m, markers.normal_length_m);
-  set(live.marker_mesh, markers.mesh);
-  set(live.marker_obstacle_m, markers.obstacle_m);
+void forEachLive(Live& live, Options& monitor, Markers& markers, const Set& set) {
+#define DCCD_SET_SETTING(name, value) set(live.name, value);
+  DCCD_LIVE_SETTINGS(DCCD_SET_SETTING)
+#undef DCCD_SET_SETTING
 }
 
 deformable_ccd::CollisionMonitorConfig toLive(const MonitorConfig& config) {

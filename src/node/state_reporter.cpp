@@ -10,6 +10,7 @@
 
 #include "input/steady_clock.h"
 #include "output/output_messages.h"
+#include "output/patch_messages.h"
 
 namespace dccd {
 namespace {
@@ -80,14 +81,23 @@ void StateReporter::staticInUse(std::uint64_t frames) {
   liveness_.staticInUse(frames);
 }
 
-void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame) {
+void StateReporter::setHint(const std::string& hint) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (std::exchange(hint_, hint) != hint) say(true);
+}
+
+void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame,
+                         const std::string& remedy) {
   const std::lock_guard<std::mutex> lock(mutex_);
   answer_ = assuranceOf(outcome);
+  touches_ = touchesInWords(outcome);
+  remedy_ = remedy;
   const ros::Time before = told_.holds_until;
   told_ = toState(outcome, frame);
   // What was answered last stays to be seen; that it is no more proved is said.
   if (!outcome.answered) told_.holds_until = before;
-  liveness_.outcome(arrival_ns, outcome.answered && outcome.obstacle ? told_.map_age : -1, clock_.now());
+  liveness_.outcome(arrival_ns, outcome.answered && outcome.obstacle && !told_.map_stamp.isZero() ? told_.map_age : -1,
+                    clock_.now());
   say(true);
 }
 
@@ -100,6 +110,8 @@ void StateReporter::asked(const std::string& what) {
 void StateReporter::voidAnswer(const std::string& reason) {
   answer_ = Assurance();
   answer_.missing.push_back(reason);
+  touches_.clear();
+  remedy_.clear();
   const std::string frame = std::move(told_.header.frame_id);
   told_ = deformable_ccd::State();
   told_.header.frame_id = frame;
@@ -156,7 +168,7 @@ void StateReporter::say(bool always) {
   Assurance assurance = answer_;
   assurance.hinder(sentences);
   deformable_ccd::State message = told_;
-  fillState(assurance, message);
+  fillState(assurance, touches_, remedy_.empty() || hint_.empty() ? remedy_ + hint_ : remedy_ + "; " + hint_, message);
   message.header.stamp = ros::Time::now();
   std_msgs::Bool clear;
   clear.data = assurance.clear();

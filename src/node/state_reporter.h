@@ -49,8 +49,10 @@ class StateReporter {
   std::uint64_t staticFrames();
   /// So many of them are in use from the next step on.
   void staticInUse(std::uint64_t frames);
-  /// A step's answer, or why there is none.
-  void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame);
+  /// A step's answer, or why there is none and what to do about it.
+  void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame, const std::string& remedy);
+  /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
+  void setHint(const std::string& hint);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.
   void asked(const std::string& what);
   /// What was told last is void.
@@ -72,8 +74,10 @@ class StateReporter {
   ros::Publisher state_, clear_;
   WatchClock clock_;
   Liveness liveness_;
-  Assurance answer_;                  // of the last step or what came instead, without what is wrong besides
-  deformable_ccd::State told_;        // its other fields
+  Assurance answer_;              // of the last step or what came instead, without what is wrong besides
+  deformable_ccd::State told_;    // its other fields
+  std::string touches_, remedy_;  // of the last step
+  std::string hint_;
   std::vector<Fault::Kind> hinders_;  // what was said to stand in its way
   bool stopped_ = false;
   std::thread thread_;

@@ -1,6 +1,7 @@
 // Cubes of voxels as sets: what of some is not in others.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -38,14 +39,86 @@ void visitUncovered(const VoxelTree& tree, const OccupiedLeaf& cube, Visit&& vis
   }
 }
 
-/// What of the leaves no leaf of the tree covers.
-inline std::vector<OccupiedLeaf> leavesWithout(const std::vector<OccupiedLeaf>& leaves, const VoxelTree& tree) {
-  std::vector<OccupiedLeaf> left;
-  left.reserve(leaves.size());
-  for (const OccupiedLeaf& leaf : leaves) {
-    visitUncovered(tree, leaf, [&](const OccupiedLeaf& part) { left.push_back(part); });
+/// What the other tree has where a node of level 1 lies.
+struct Beside {
+  const VoxelTree::Node* node = nullptr;  ///< null: it is covered all alike
+  bool covered = false;
+};
+inline Beside besideNode(const VoxelTree& tree, std::uint32_t index, const VoxelTree& other) {
+  const std::array<std::uint16_t, 3>& at = tree.nodeCell(1, index);
+  const std::uint32_t found = other.find(1, at[0], at[1], at[2]);
+  if (found != VoxelTree::NONE) return {&other.nodes(1)[found], false};
+  return {nullptr, other.coverage(16 * at[0], 16 * at[1], 16 * at[2], 16) == VoxelTree::Coverage::FULL};
+}
+
+/// Calls visit(part) for what of the tree's leaves the other tree does not cover: voxels of small leaves, and of others
+/// parts as large as there are.
+template <class Visit>
+void visitDifference(const VoxelTree& tree, const VoxelTree& other, Visit&& visit) {
+  for (std::uint32_t p = 0; p < tree.nodes(1).size(); ++p) {
+    const VoxelTree::Node& parent = tree.nodes(1)[p];
+    const std::array<std::uint16_t, 3>& at = tree.nodeCell(1, p);
+    const Beside beside = besideNode(tree, p, other);
+    if (beside.covered) continue;
+    for (std::uint64_t children = parent.child; children != 0; children &= children - 1) {
+      const unsigned block = lowestBit(children);
+      std::uint64_t bits = tree.nodes(0)[parent.childAt(block)].full;
+      if (beside.node && (beside.node->full >> block & 1)) continue;
+      if (beside.node && (beside.node->child >> block & 1)) bits &= ~other.nodes(0)[beside.node->childAt(block)].full;
+      for (; bits != 0; bits &= bits - 1) {
+        const auto &of_block = CELL_COORDINATES[block], &of_voxel = CELL_COORDINATES[lowestBit(bits)];
+        const auto key = [&](std::size_t axis) {
+          return static_cast<std::uint16_t>(16 * at[axis] + 4 * of_block[axis] + of_voxel[axis]);
+        };
+        visit(OccupiedLeaf{{key(0), key(1), key(2)}, 1});
+      }
+    }
   }
-  return left;
+  for (std::size_t leaf = tree.firstLeafOfLevel(1); leaf < tree.leaves().size(); ++leaf) {
+    visitUncovered(other, tree.leaves()[leaf], visit);
+  }
+}
+
+/// What of the tree's leaves no leaf of `without` covers, and the leaves of `more`, which have nothing in common with
+/// that; in the order in which nextSurface() takes leaves fast.
+inline std::vector<OccupiedLeaf> leavesWithout(const VoxelTree& tree, const VoxelTree& without,
+                                               const std::vector<OccupiedLeaf>& more) {
+  std::vector<OccupiedLeaf> left, parts = more;
+  left.reserve(tree.leaves().size() + more.size());
+  const auto cut = [&](const OccupiedLeaf& leaf) {
+    visitUncovered(without, leaf, [&](const OccupiedLeaf& part) {
+      (part.size == leaf.size || leaf.size == 2 ? left : parts).push_back(part);
+    });
+  };
+  const auto& nodes = tree.nodes(0);
+  for (std::uint32_t p = 0; p < tree.nodes(1).size(); ++p) {
+    const VoxelTree::Node& parent = tree.nodes(1)[p];
+    const Beside beside = besideNode(tree, p, without);
+    for (std::uint64_t children = beside.covered ? 0 : parent.child; children != 0; children &= children - 1) {
+      const unsigned block = lowestBit(children);
+      const std::uint32_t n = parent.childAt(block);
+      const auto first = tree.leaves().begin() + nodes[n].first_leaf;
+      const auto end =
+          tree.leaves().begin() + (n + 1 < nodes.size() ? nodes[n + 1].first_leaf : tree.firstLeafOfLevel(1));
+      if (beside.node && (beside.node->full >> block & 1)) continue;
+      if (beside.node && (beside.node->child >> block & 1)) {
+        std::for_each(first, end, cut);
+      } else {
+        left.insert(left.end(), first, end);
+      }
+    }
+  }
+  std::for_each(tree.leaves().begin() + tree.firstLeafOfLevel(1), tree.leaves().end(), cut);
+  const auto isBefore = [](const OccupiedLeaf& a, const OccupiedLeaf& b) {
+    const int level = VoxelTree::levelOfSize(a.size), other = VoxelTree::levelOfSize(b.size);
+    if (level != other) return level < other;
+    return mortonCode(a.min.x, a.min.y, a.min.z) < mortonCode(b.min.x, b.min.y, b.min.z);
+  };
+  if (parts.empty()) return left;
+  std::sort(parts.begin(), parts.end(), isBefore);
+  std::vector<OccupiedLeaf> all(left.size() + parts.size());
+  std::merge(left.begin(), left.end(), parts.begin(), parts.end(), all.begin(), isBefore);
+  return all;
 }
 
 }  // namespace dccd

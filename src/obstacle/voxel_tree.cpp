@@ -32,11 +32,32 @@ bool isLeaf(const OccupiedLeaf& leaf) {
          ((leaf.min.x | leaf.min.y | leaf.min.z) & (size - 1)) == 0;
 }
 
-bool areSame(const OccupiedLeaf* a, const OccupiedLeaf* b, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    if (std::memcmp(&a[i].min, &b[i].min, sizeof(VoxelKey)) != 0 || a[i].size != b[i].size) return false;
+/// A leaf of one or two voxels.
+bool isSmallLeaf(const OccupiedLeaf& leaf) {
+  return leaf.size - 1 <= 1 && ((leaf.min.x | leaf.min.y | leaf.min.z) & (leaf.size - 1)) == 0;
+}
+
+/// How many leaves two lists of `most` have in common from their beginnings on.
+std::size_t commonLeaves(const OccupiedLeaf* a, const OccupiedLeaf* b, std::size_t most) {
+  const auto isSame = [](const OccupiedLeaf& p, const OccupiedLeaf& q) {
+    return p.min.x == q.min.x && p.min.y == q.min.y && p.min.z == q.min.z && p.size == q.size;
+  };
+  std::size_t i = 0;
+  // Nearly all are the same: eight at a time as words, without the two bytes behind a key that mean nothing.
+  static_assert(sizeof(OccupiedLeaf) == 12 && sizeof(VoxelKey) == 6 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "");
+  constexpr std::uint64_t MEANT[3] = {0x0000ffffffffffff, 0xffffffffffffffff, 0xffffffff0000ffff};
+  for (; i + 8 <= most; i += 8) {
+    const char *p = reinterpret_cast<const char*>(a + i), *q = reinterpret_cast<const char*>(b + i);
+    std::uint64_t other = 0, words[2];
+    for (int w = 0; w < 12; ++w) {
+      std::memcpy(&words[0], p + 8 * w, 8);
+      std::memcpy(&words[1], q + 8 * w, 8);
+      other |= (words[0] ^ words[1]) & MEANT[w % 3];
+    }
+    if (other != 0) break;
   }
-  return true;
+  while (i < most && isSame(a[i], b[i])) ++i;
+  return i;
 }
 
 struct CodedLeaf {
@@ -97,6 +118,19 @@ std::vector<OccupiedLeaf> sorted(const std::vector<OccupiedLeaf>& leaves) {
   std::vector<OccupiedLeaf> list(leaves.size());
   for (std::size_t i = 0; i < order.size(); ++i) list[i] = leaves[order[i].index];
   return list;
+}
+
+/// Of cells in the order of their codes, most of which follow one of the same node of level 1.
+std::vector<std::uint64_t> codesOf(const std::vector<Cell>& cells) {
+  std::vector<std::uint64_t> codes;
+  codes.reserve(cells.size());
+  Cell last{};
+  for (const Cell& cell : cells) {
+    const bool in_next = codes.empty() || ((cell[0] ^ last[0]) | (cell[1] ^ last[1]) | (cell[2] ^ last[2])) > 3;
+    codes.push_back(in_next ? codeOf(cell) : (codes.back() & ~std::uint64_t{63}) | cellBit(cell[0], cell[1], cell[2]));
+    last = cell;
+  }
+  return codes;
 }
 
 }  // namespace
@@ -264,9 +298,9 @@ void VoxelTree::raiseFeatureCells() {
     for (Node& node : levels_[level].nodes) {
       const Node* child = levels_[level - 1].nodes.data() + node.first_child;
       for (std::uint64_t bits = node.child; bits != 0; bits &= bits - 1, ++child) {
-        const std::uint64_t bit = bits & (~bits + 1);
-        if (child->edges != 0) node.edges |= bit;
-        if (child->corners != 0) node.corners |= bit;
+        const unsigned bit = lowestBit(bits);
+        node.edges |= std::uint64_t{child->edges != 0} << bit;
+        node.corners |= std::uint64_t{child->corners != 0} << bit;
       }
     }
   }
@@ -294,10 +328,10 @@ bool VoxelTree::occupiedKeys(std::array<std::int32_t, 3>& lo, std::array<std::in
 
 // --- a tree that follows another one ---------------------------------------------------------------------------------
 
-/// Sorts them by level, in the order in which they come.
-bool VoxelTree::takeLevels(std::vector<OccupiedLeaf>& leaves) {
+/// Sorts them by level, in the order in which they come. `small`: all are taken for such of level 0.
+bool VoxelTree::takeLevels(std::vector<OccupiedLeaf>& leaves, bool small) {
   std::uint32_t sizes = 0;
-  for (const OccupiedLeaf& leaf : leaves) sizes |= leaf.size;
+  for (std::size_t i = 0; !small && i < leaves.size(); ++i) sizes |= leaves[i].size;
   std::array<std::uint32_t, LEVELS + 1> next{};
   if (sizes < 4) {
     next[1] = static_cast<std::uint32_t>(leaves.size());
@@ -321,70 +355,106 @@ bool VoxelTree::takeLevels(std::vector<OccupiedLeaf>& leaves) {
   return true;
 }
 
+/// How many blocks have the same leaves from `node` of the tree before and from `leaf` on, which passes by them.
+std::uint32_t VoxelTree::commonBlocks(const VoxelTree& before, std::uint32_t node, std::uint32_t& leaf) const {
+  const std::vector<Node>& old = before.levels_[0].nodes;
+  const std::uint32_t end = first_leaf_of_level_[1], old_leaf = old[node].first_leaf, first = node;
+  const std::size_t most = std::min(end - leaf, before.first_leaf_of_level_[1] - old_leaf);
+  const std::size_t same_to = leaf + commonLeaves(&leaves_[leaf], &before.leaves_[old_leaf], most);
+  const std::uint32_t shift = leaf - old_leaf;  // modulo 2^32
+  for (; node < old.size(); ++node) {
+    const std::uint32_t next = before.leafEnd(node) + shift;
+    if (next > same_to || (next == same_to && next < end && shareNode(leaves_[next], leaves_[next - 1], 0))) break;
+    leaf = next;
+  }
+  return node - first;
+}
+
 bool VoxelTree::followBlocks(const VoxelTree& before, Change& change, std::vector<std::uint64_t>& prefixes) {
+  struct Kept {  // nodes that follow each other in both trees: the first one, and how much later its leaves come
+    std::uint32_t node, count, shift;
+  };
   const Level& old = before.levels_[0];
-  std::vector<std::uint32_t> first_leaf;
+  std::vector<Kept> kept;
   std::vector<Node> changed;
-  first_leaf.reserve(old.nodes.size());
-  change.node_before.reserve(old.nodes.size());
-  std::uint32_t node = 0;
-  const auto isAt = [&](const Cell& cell) { return node < old.nodes.size() && old.cells[node] == cell; };
+  std::uint32_t node = 0, made = 0;  // of the tree before, and of this one
+  const auto isAt = [&](const Cell& cell) {
+    return node < old.nodes.size() &&
+           ((cell[0] ^ old.cells[node][0]) | (cell[1] ^ old.cells[node][1]) | (cell[2] ^ old.cells[node][2])) == 0;
+  };
   const auto passUpTo = [&](std::uint64_t code) {  // nodes that are no more
     for (; node < old.nodes.size() && codeOf(old.cells[node]) < code; ++node) {
-      change.blocks.push_back({old.cells[node], old.nodes[node].full});
+      change.blocks.push_back({old.cells[node], old.nodes[node].full, NONE, node, false});
     }
   };
   for (std::uint32_t leaf = 0, end = first_leaf_of_level_[1]; leaf < end;) {
+    if (isAt(cellOf(leaves_[leaf]))) {
+      const std::uint32_t shift = leaf - old.nodes[node].first_leaf, count = commonBlocks(before, node, leaf);
+      if (count > 0) kept.push_back({made, count, shift});
+      made += count;
+      node += count;
+      if (leaf == end) break;
+    }
     const OccupiedLeaf& first = leaves_[leaf];
     const Cell cell = cellOf(first);
-    if (isAt(cell)) {
-      const std::uint32_t next = leaf + before.leafEnd(node) - old.nodes[node].first_leaf;
-      if (next <= end && areSame(&first, &before.leaves_[old.nodes[node].first_leaf], next - leaf) &&
-          (next == end || !shareNode(leaves_[next], first, 0))) {
-        first_leaf.push_back(leaf);
-        change.node_before.push_back(node++);
-        leaf = next;
-        continue;
-      }
+    if (!isAt(cell)) {
+      const std::uint64_t code = codeOf(cell);
+      if (leaf > 0 && code <= codeOf(cellOf(leaves_[leaf - 1]))) return false;
+      passUpTo(code);
+      if (isAt(cell)) continue;
     }
-    const std::uint64_t code = codeOf(cell);
-    if (!first_leaf.empty() && code <= codeOf(cellOf(leaves_[first_leaf.back()]))) return false;
-    passUpTo(code);
-    Node made;
-    made.first_leaf = leaf;
+    Node one;
+    one.first_leaf = leaf;
     for (; leaf < end && shareNode(leaves_[leaf], first, 0); ++leaf) {
-      const OccupiedLeaf& one = leaves_[leaf];
-      const unsigned bit = cellBit(one.min.x, one.min.y, one.min.z);
-      if (!isLeaf(one) || made.full >> bit != 0) return false;
-      made.full |= (one.size == 1 ? std::uint64_t{1} : 0xffu) << bit;
-      made.start |= std::uint64_t{1} << bit;
+      const OccupiedLeaf& its = leaves_[leaf];
+      const unsigned bit = cellBit(its.min.x, its.min.y, its.min.z);
+      if (!isSmallLeaf(its) || one.full >> bit != 0) return false;
+      one.full |= (its.size == 1 ? std::uint64_t{1} : 0xffu) << bit;
+      one.start |= std::uint64_t{1} << bit;
     }
-    const bool was_there = isAt(cell);
-    change.blocks.push_back({cell, made.full ^ (was_there ? old.nodes[node].full : 0)});
-    first_leaf.push_back(made.first_leaf);
-    change.node_before.push_back(NONE);
-    changed.push_back(made);
-    node += was_there;
+    const bool is_new = !isAt(cell);
+    change.blocks.push_back({cell, one.full ^ (is_new ? 0 : old.nodes[node].full), made++, node, is_new});
+    changed.push_back(one);
+    node += !is_new;
   }
   passUpTo(~std::uint64_t{0});
-  placeBlocks(old, first_leaf, changed, change, prefixes);
+  placeBlocks(before, changed, change);
+  Level& level = levels_[0];
+  for (const Kept& run : kept) {
+    for (std::uint32_t n = run.node; n < run.node + run.count; ++n) level.nodes[n].first_leaf += run.shift;
+  }
+  prefixes = codesOf(level.cells);
   return true;
 }
 
-void VoxelTree::placeBlocks(const Level& old, const std::vector<std::uint32_t>& first_leaf,
-                            const std::vector<Node>& changed, const Change& change,
-                            std::vector<std::uint64_t>& prefixes) {
+/// Nodes of level 0: those of the tree before, and in their places the ones that are new or have changed.
+void VoxelTree::placeBlocks(const VoxelTree& before, const std::vector<Node>& changed, const Change& change) {
+  const Level& old = before.levels_[0];
   Level& level = levels_[0];
-  level.nodes.reserve(first_leaf.size());
-  level.cells.reserve(first_leaf.size());
-  prefixes.reserve(first_leaf.size());
-  std::size_t next_changed = 0;
-  for (std::size_t n = 0; n < first_leaf.size(); ++n) {
-    const std::uint32_t same = change.node_before[n];
-    level.nodes.push_back(same == NONE ? changed[next_changed++] : old.nodes[same]);
-    level.nodes.back().first_leaf = first_leaf[n];
-    level.cells.push_back(same == NONE ? cellOf(leaves_[first_leaf[n]]) : old.cells[same]);
-    prefixes.push_back(codeOf(level.cells.back()));
+  std::size_t count = old.nodes.size();
+  for (const Change::Block& block : change.blocks) count = count + block.is_new - (block.node == NONE);
+  level.nodes.reserve(count);
+  level.cells.reserve(count);
+  std::uint32_t from = 0;
+  const auto takeUpTo = [&](std::uint32_t to) {
+    level.nodes.insert(level.nodes.end(), old.nodes.begin() + from, old.nodes.begin() + to);
+    level.cells.insert(level.cells.end(), old.cells.begin() + from, old.cells.begin() + to);
+    from = to;
+  };
+  for (const Change::Block& block : change.blocks) {
+    if (block.node != NONE && !block.is_new) continue;
+    takeUpTo(block.before);
+    if (block.is_new) {
+      level.nodes.emplace_back();
+      level.cells.push_back(block.cell);
+    } else {
+      ++from;
+    }
+  }
+  takeUpTo(static_cast<std::uint32_t>(old.nodes.size()));
+  auto next = changed.begin();
+  for (const Change::Block& block : change.blocks) {
+    if (block.node != NONE) level.nodes[block.node] = *next++;
   }
 }
 
@@ -417,14 +487,18 @@ bool VoxelTree::followLarge(const VoxelTree& before, Change& change) const {
 
 std::optional<VoxelTree> VoxelTree::following(std::vector<OccupiedLeaf>& leaves, const VoxelTree& before,
                                               Change& change) {
-  std::optional<VoxelTree> tree = VoxelTree();
-  std::vector<std::uint64_t> prefixes;
-  if (leaves.empty() || leaves.size() >= NONE || !tree->takeLevels(leaves)) return std::nullopt;
-  bool follows = tree->followBlocks(before, change, prefixes);
-  for (int level = 1; follows && level < LEVELS; ++level) tree->buildLevel(level, prefixes);
-  if (follows && tree->followLarge(before, change)) return tree;
-  if (leaves.empty()) leaves.swap(tree->leaves_);
-  return std::nullopt;
+  if (leaves.empty() || leaves.size() >= NONE) return std::nullopt;
+  // Where there were only small leaves there will be, most of the time: to find out takes as long as to compare them.
+  for (bool small = before.levels_with_leaves_ == 1;; small = false) {
+    std::optional<VoxelTree> tree = VoxelTree();
+    std::vector<std::uint64_t> prefixes;
+    change = Change();
+    bool follows = tree->takeLevels(leaves, small) && tree->followBlocks(before, change, prefixes);
+    for (int level = 1; follows && level < LEVELS; ++level) tree->buildLevel(level, prefixes);
+    if (follows && tree->followLarge(before, change)) return tree;
+    if (leaves.empty()) leaves.swap(tree->leaves_);
+    if (!small) return std::nullopt;
+  }
 }
 
 }  // namespace dccd

@@ -52,10 +52,12 @@ class VoxelTree {
     struct Block {
       std::array<std::uint16_t, 3> cell;  ///< of a node of level 0, in units of the node
       std::uint64_t voxels;               ///< those that are occupied by its small leaves in one of the two trees alone
+      std::uint32_t node;                 ///< in this tree; or NONE
+      std::uint32_t before;               ///< in the tree before: it, or where it is new the node that comes next
+      bool is_new;
     };
-    std::vector<std::uint32_t> node_before;   ///< of each node of level 0, the one with the same leaves; or NONE
-    std::vector<std::uint32_t> large_before;  ///< of each leaf of the levels above, the same leaf; or NONE
     std::vector<Block> blocks;                ///< with other small leaves
+    std::vector<std::uint32_t> large_before;  ///< of each leaf of the levels above, the same leaf; or NONE
     std::vector<OccupiedLeaf> large;          ///< larger leaves that only one of the two has
   };
   /// The same tree, made of the one before it, where the leaves come in Morton order as a decoded map's do: then they
@@ -67,6 +69,8 @@ class VoxelTree {
   const std::vector<Node>& nodes(int level) const { return levels_[level].nodes; }
   /// Where convex edges and corners of the node's own leaves lie, for queries that want nothing else.
   void setFeatureCells(int level, std::uint32_t node, std::uint64_t edges, std::uint64_t corners);
+  /// The same of one cell.
+  void setFeatureCell(std::uint32_t node, unsigned bit, bool edge, bool corner);
   /// Once they are set for all nodes: tells the nodes above.
   void raiseFeatureCells();
   /// Keys of what is occupied, the upper ones exclusive. False: nothing is.
@@ -114,10 +118,10 @@ class VoxelTree {
   std::uint32_t leafEnd(std::uint32_t node) const {
     return node + 1 < levels_[0].nodes.size() ? levels_[0].nodes[node + 1].first_leaf : first_leaf_of_level_[1];
   }
-  bool takeLevels(std::vector<OccupiedLeaf>& leaves);
+  bool takeLevels(std::vector<OccupiedLeaf>& leaves, bool small);
+  std::uint32_t commonBlocks(const VoxelTree& before, std::uint32_t node, std::uint32_t& leaf) const;
   bool followBlocks(const VoxelTree& before, Change& change, std::vector<std::uint64_t>& prefixes);
-  void placeBlocks(const Level& old, const std::vector<std::uint32_t>& first_leaf, const std::vector<Node>& changed,
-                   const Change& change, std::vector<std::uint64_t>& prefixes);
+  void placeBlocks(const VoxelTree& before, const std::vector<Node>& changed, const Change& change);
   bool followLarge(const VoxelTree& before, Change& change) const;
   /// False, and nothing is taken, where leaves do not come in Morton order, as a decoded map's do.
   bool takeSorted(const std::vector<OccupiedLeaf>& leaves);
@@ -153,6 +157,13 @@ class VoxelTree {
   std::uint32_t levels_with_leaves_ = 0;  ///< bit l: some leaf belongs to level l
   std::vector<OccupiedLeaf> leaves_;
 };
+
+inline void VoxelTree::setFeatureCell(std::uint32_t node, unsigned bit, bool edge, bool corner) {
+  Node& n = levels_[0].nodes[node];
+  const std::uint64_t others = ~(std::uint64_t{1} << bit);
+  n.edges = (n.edges & others) | std::uint64_t{edge} << bit;
+  n.corners = (n.corners & others) | std::uint64_t{corner} << bit;
+}
 
 inline std::uint32_t VoxelTree::find(int level, std::int32_t x, std::int32_t y, std::int32_t z) const {
   const Level& l = levels_[level];

@@ -39,7 +39,7 @@ void Diagnostics::add(const Outcome& outcome, double latency_s) {
   if (!outcome.answered) return;
   map_present_ = outcome.obstacle != nullptr;
   map_reason_ = outcome.reason;
-  map_age_s_ = map_present_ ? secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns) : 0;
+  map_age_s_ = map_present_ ? mapAge(outcome) : 0;
 }
 
 void Diagnostics::judge(DiagnosticStatus& status, bool drops, bool enabled, const std::string& map_topic,

@@ -26,9 +26,7 @@ std_msgs::ColorRGBA color(double r, double g, double b, double a = 1) {
 
 geometry_msgs::Point point(const Vec3& p) {
   geometry_msgs::Point out;
-  out.x = p.x();
-  out.y = p.y();
-  out.z = p.z();
+  put(p, out);
   return out;
 }
 
@@ -47,17 +45,11 @@ Marker list(const Outcome& outcome, const std::string& frame, const std::string&
   return marker;
 }
 
-// What means what. The legend shows each in its own colour.
-const std_msgs::ColorRGBA EARLY = color(1, 0.1, 0), LATE = color(1, 1, 0), INITIAL = color(0.75, 0.4, 1),
-                          EXPECTED = color(0.65, 0.65, 0.68), PREDICTED = color(0.2, 0.9, 1),
-                          NORMAL = color(0.2, 0.9, 0.4), VOXEL = color(1, 0.55, 0.15);
-const std::pair<const char*, std_msgs::ColorRGBA> LEGEND[] = {{"contact, early in the step", EARLY},
-                                                              {"contact, late in it", LATE},
-                                                              {"touched before it", INITIAL},
-                                                              {"expected", EXPECTED},
-                                                              {"predicted", PREDICTED},
-                                                              {"normal of a patch", NORMAL},
-                                                              {"voxel that is touched", VOXEL}};
+// What means what: config/rviz/monitor.rviz says it beside the view.
+const std_msgs::ColorRGBA INITIAL = color(0.75, 0.4, 1), EXPECTED = color(0.65, 0.65, 0.68),
+                          PREDICTED = color(0.2, 0.9, 1), NORMAL = color(0.2, 0.9, 0.4), VOXEL = color(1, 0.55, 0.15),
+                          NAME = color(0.75, 0.85, 1);
+constexpr double TEXT = 3;    // letters are this much higher than a point
 constexpr double TOLD_S = 2;  // this long a patch's text says that it began
 
 Marker text(const Outcome& outcome, const std::string& frame, const std::string& ns, int id, const Vec3& at,
@@ -116,16 +108,18 @@ Marker& voxelList(const Outcome& outcome, const std::string& frame, std::uint32_
   return by_size.emplace(size, std::move(marker)).first->second;
 }
 
+/// By a point, if that is finite.
+void widen(Box& box, const Vec3& p) {
+  if (!p.allFinite()) return;
+  box.min = box.min.cwiseMin(p);
+  box.max = box.max.cwiseMax(p);
+}
+
 /// Box around all bodies at the end of the step, in the map's frame.
 Box boundsInMap(const Outcome& outcome) {
   Box box;
   for (const Body& body : outcome.step->bodies) {
-    for (const Vec3& p : *body.t1) {
-      if (!p.allFinite()) continue;
-      const Vec3 in_map = outcome.step->map.map_from_fixed * p;
-      box.min = box.min.cwiseMin(in_map);
-      box.max = box.max.cwiseMax(in_map);
-    }
+    for (const Vec3& p : *body.t1) widen(box, outcome.step->map.map_from_fixed * p);
   }
   return box;
 }
@@ -239,7 +233,13 @@ void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const Ma
       if (topology.hasFaces()) break;
       if (at[e[0]].allFinite() && at[e[1]].allFinite()) addTube(at[e[0]], at[e[1]], 0.4 * config.point_size_m, marker);
     }
-    if (!marker.points.empty()) out.markers.push_back(std::move(marker));
+    if (marker.points.empty()) continue;
+    out.markers.push_back(std::move(marker));
+    Box box;
+    for (const Vec3& p : at) widen(box, p);
+    const double height = TEXT * config.point_size_m;
+    const Vec3 above(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + height);
+    out.markers.push_back(text(outcome, frame, "mesh/" + bodies[b].name, 1, above, height, NAME, bodies[b].name));
   }
 }
 
@@ -294,24 +294,18 @@ void addSwept(const Outcome& outcome, const MarkerConfig& config, const std::str
   }
 }
 
-/// Beside the bodies, a line in each colour.
-void addLegend(const Outcome& outcome, const std::string& frame, MarkerArray& out) {
-  Box box;
-  for (const Body& body : outcome.step->bodies) {
-    for (const Vec3& p : *body.t1) {
-      if (!p.allFinite()) continue;
-      box.min = box.min.cwiseMin(p);
-      box.max = box.max.cwiseMax(p);
-    }
+/// Upwards until it covers none of the texts that stand already: each is some ten letters wide to either side.
+Vec3 clearOf(const MarkerArray& markers, Vec3 at, double height) {
+  const auto covers = [&](const Marker& other) {
+    if (other.type != Marker::TEXT_VIEW_FACING) return false;
+    const Vec3 away = at - Vec3(other.pose.position.x, other.pose.position.y, other.pose.position.z);
+    return std::abs(away.z()) < 1.2 * height && away.head<2>().norm() < 12 * height;
+  };
+  constexpr int MOST = 100;  // far from the origin a height may be too little to change a coordinate
+  for (int i = 0; i < MOST && std::any_of(markers.markers.begin(), markers.markers.end(), covers); ++i) {
+    at.z() += 0.4 * height;
   }
-  if (box.empty()) return;
-  const double height = 0.045 * (box.max - box.min).norm();
-  Vec3 at(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + 12 * height);
-  for (const auto& [words, rgba] : LEGEND) {
-    const int id = static_cast<int>(out.markers.size());
-    out.markers.push_back(text(outcome, frame, "legend", id, at, height, rgba, words));
-    at.z() -= 1.3 * height;
-  }
+  return at;
 }
 
 /// At the patch of each pair of partners that began last, as long as that is news.
@@ -327,7 +321,7 @@ void addBeginnings(const Outcome& outcome, const std::vector<Body>& bodies, doub
   for (const auto& [body, patch] : newest) {
     const double ago_s = secondsBetween(patch->began_to_ns, outcome.stamp_ns);
     if (ago_s > TOLD_S || !patch->centroid.allFinite()) continue;
-    const Vec3 at = patch->centroid + Vec3(0, 0, 2 * height);
+    const Vec3 at = clearOf(out, patch->centroid + Vec3(0, 0, 2 * height), height);
     const std::string words = pairOf(body, bodies) + ", " + inSeconds(ago_s) + " ago";
     out.markers.push_back(text(outcome, frame, "began", id++, at, height, color(1, 1, 1), words));
   }
@@ -381,11 +375,8 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
   addObstacle(outcome, config.obstacle_m, frame, out);
   addOwn(outcome, frame, out);
   if (config.swept) addSwept(outcome, config, frame, out);
-  if (config.mesh) {
-    addMeshes(outcome, bodies, config, frame, out);
-    addLegend(outcome, frame, out);
-  }
-  addBeginnings(outcome, bodies, 2 * config.point_size_m, frame, out);
+  if (config.mesh) addMeshes(outcome, bodies, config, frame, out);
+  addBeginnings(outcome, bodies, TEXT * config.point_size_m, frame, out);
   for (Marker* marker : {&voxels, &faces, &normals, &expected, &initial, &contacts}) {
     if (!marker->points.empty()) out.markers.push_back(std::move(*marker));
   }
@@ -406,11 +397,13 @@ MarkerArray toPredictedMarkers(const Outcome& prediction, double horizon_s, cons
   }
   if (!points.points.empty()) out.markers.push_back(std::move(points));
   for (const NewContact& next : newContacts(prediction)) {
-    const Vec3 at = contactGeometry(prediction, next.contact).point + Vec3(0, 0, 2 * config.point_size_m);
+    // Below its place: what has begun is told above.
+    const double height = TEXT * config.point_size_m;
+    const Vec3 at = clearOf(out, contactGeometry(prediction, next.contact).point - Vec3(0, 0, 3 * height), height);
     const std::string words = pairOf(next.body, bodies) + " in " + inSeconds(next.contact.toc_lower * horizon_s);
     if (!at.allFinite()) continue;
-    out.markers.push_back(text(prediction, frame, "predicted first", static_cast<int>(out.markers.size()), at,
-                               2 * config.point_size_m, PREDICTED, words));
+    out.markers.push_back(
+        text(prediction, frame, "predicted first", static_cast<int>(out.markers.size()), at, height, PREDICTED, words));
   }
   for (Marker& marker : out.markers) marker.header.stamp = toRosTime(prediction.start_ns);
   return out;

@@ -1,10 +1,13 @@
 #include "output/output_messages.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 
+#include "dccd/contact_fields.h"
+#include "dccd/contact_geometries.h"
 #include "dccd/new_contacts.h"
 #include "output/patch_messages.h"
 
@@ -14,6 +17,8 @@ namespace {
 
 using ContactMessage = deformable_ccd::Contact;
 using StatsMessage = deformable_ccd::StepStats;
+
+constexpr std::size_t KEPT_FOR_USE = 4, ALWAYS_KEPT = 1024;  // times what is in use, which counts as so much
 
 static_assert(static_cast<int>(StepStatus::OK) == static_cast<int>(deformable_ccd::ContactArray::OK));
 static_assert(static_cast<int>(StepStatus::GAP) == static_cast<int>(deformable_ccd::ContactArray::GAP));
@@ -97,6 +102,15 @@ std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, 
          nameOf(*first, bodies) + rest;
 }
 
+/// What most messages say first.
+template <class Message>
+void fillHead(const Outcome& outcome, StampNs stamp_ns, const std::string& frame, Message& out) {
+  out.header = headerOf(stamp_ns, frame);
+  put(outcome.status, out.status);
+  put(outcome.start_state, out.start_state);
+  out.answered = outcome.answered;
+}
+
 void fillFrames(const FrameCounters& frames, StatsMessage& out) {
   out.frames_received = frames.received;
   out.frames_processed = frames.processed();
@@ -119,7 +133,7 @@ void fillFrames(const FrameCounters& frames, StatsMessage& out) {
   out.seams_teleport = frames.of(StepStatus::TELEPORT);
 }
 
-void fillContacts(const Outcome& outcome, StatsMessage& out) {
+void fillCounts(const Outcome& outcome, StatsMessage& out) {
   out.contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.contacts_certain = static_cast<std::uint32_t>(outcome.counts.certain);
   out.contacts_undecided = static_cast<std::uint32_t>(outcome.counts.undecided);
@@ -166,6 +180,40 @@ void fillStages(const StepStats& stats, StatsMessage& out) {
   out.tier_big_integer = tier(Tier::BIG_INTEGER);
 }
 
+void fillContact(const Outcome& outcome, const Contact& contact, const ContactGeometry& geometry, std::uint64_t patch,
+                 ContactMessage& out) {
+#define DCCD_PUT_CONTACT(member, published) put(contact.member, out.published);
+  DCCD_CONTACT_FIELDS(DCCD_PUT_CONTACT)
+#undef DCCD_PUT_CONTACT
+  out.patch = patch;
+  out.time_of_contact = toRosTime(outcome.stampBefore(contact.toc_lower));
+  put(geometry.point, out.point);
+  put(geometry.normal, out.normal);
+  put(geometry.weights, out.weights);
+  out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
+}
+
+/// What the last message had room for is kept, but not what a burst made of it.
+template <class T>
+void resizeKept(std::vector<T>& list, std::size_t count) {
+  list.resize(count);
+  if (list.capacity() > KEPT_FOR_USE * std::max(count, ALWAYS_KEPT)) list.shrink_to_fit();
+}
+
+void fillContacts(const Outcome& outcome, std::vector<ContactMessage>& out) {
+  resizeKept(out, outcome.contacts.size());
+  std::array<ContactGeometry, 256> geometry;  // of some at a time, which stay in the first cache
+  for (std::size_t first = 0, last = 0; first < out.size(); first = last) {
+    last = std::min(first + geometry.size(), out.size());
+    contactGeometries(outcome, first, last, geometry.data());
+    for (std::size_t i = first; i < last; ++i) {
+      const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
+      const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
+      fillContact(outcome, outcome.contacts[i], geometry[i - first], patch, out[i]);
+    }
+  }
+}
+
 }  // namespace
 
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
@@ -176,29 +224,8 @@ std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame) {
 }
 
 ContactMessage toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch) {
-  const ContactGeometry geometry = contactGeometry(outcome, contact);
   ContactMessage out;
-  out.kind = static_cast<std::uint8_t>(contact.kind);
-  out.certainty = static_cast<std::uint8_t>(contact.certainty);
-  out.initial = contact.initial;
-  out.leaving = contact.leaving;
-  out.expected = contact.expected;
-  std::copy(contact.body.begin(), contact.body.end(), out.body.begin());
-  std::copy(contact.vertex.begin(), contact.vertex.end(), out.vertex.begin());
-  out.voxel_key = {contact.voxel.x, contact.voxel.y, contact.voxel.z};
-  out.voxel_size = contact.voxel_size;
-  out.patch = patch;
-  out.toc_lower = contact.toc_lower;
-  out.toc_upper = contact.toc_upper;
-  out.time_of_contact = toRosTime(outcome.stampBefore(contact.toc_lower));
-  out.point.x = geometry.point.x();
-  out.point.y = geometry.point.y();
-  out.point.z = geometry.point.z();
-  out.normal.x = geometry.normal.x();
-  out.normal.y = geometry.normal.y();
-  out.normal.z = geometry.normal.z();
-  std::copy(geometry.weights.begin(), geometry.weights.end(), out.weights.begin());
-  out.approach_speed = geometry.approach_speed / std::max(outcome.duration_s(), 1e-9);
+  fillContact(outcome, contact, contactGeometry(outcome, contact), patch, out);
   return out;
 }
 
@@ -213,41 +240,37 @@ ros::Time toRosTime(StampNs stamp_ns) {
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::ContactArray out;
-  out.header = headerOf(outcome.stamp_ns, frame);
+  fillContactArray(outcome, bodies, frame, out);
+  return out;
+}
+
+void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
+                      deformable_ccd::ContactArray& out) {
+  fillHead(outcome, outcome.stamp_ns, frame, out);
   out.start = toRosTime(outcome.start_ns);
-  out.status = static_cast<std::uint8_t>(outcome.status);
   out.reason = outcome.reason;
-  out.answered = outcome.answered;
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
   out.complete = outcome.complete;
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
   out.expected_contacts = static_cast<std::uint32_t>(outcome.counts.expected);
   out.suppressed_contacts = static_cast<std::uint32_t>(outcome.suppressed);
+  out.bodies.clear();
   for (const Body& body : bodies) out.bodies.push_back(body.name);
-  out.contacts.reserve(outcome.contacts.size());
-  for (std::size_t i = 0; i < outcome.contacts.size(); ++i) {
-    const bool in_patch = i < outcome.patch_of.size() && outcome.patch_of[i] != NO_PATCH;
-    const std::uint64_t patch = in_patch ? outcome.patches[outcome.patch_of[i]].id : 0;
-    out.contacts.push_back(toContact(outcome, outcome.contacts[i], patch));
-  }
-  for (const StartIntersection& crossing : outcome.intersections) {
-    deformable_ccd::Intersection message;
-    std::copy(crossing.body.begin(), crossing.body.end(), message.body.begin());
-    std::copy(crossing.vertex.begin(), crossing.vertex.end(), message.vertex.begin());
+  fillContacts(outcome, out.contacts);
+  resizeKept(out.intersections, outcome.intersections.size());
+  for (std::size_t i = 0; i < outcome.intersections.size(); ++i) {
+    const StartIntersection& crossing = outcome.intersections[i];
+    deformable_ccd::Intersection& message = out.intersections[i];
+    put(crossing.body, message.body);
+    put(crossing.vertex, message.vertex);
     message.expected = crossing.expected;
-    out.intersections.push_back(message);
   }
-  return out;
 }
 
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::FirstContact out;
-  out.header = headerOf(outcome.stamp_ns, frame);
-  out.status = static_cast<std::uint8_t>(outcome.status);
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
-  out.answered = outcome.answered;
+  fillHead(outcome, outcome.stamp_ns, frame, out);
   const double toc = earliestNewToc(outcome);
   out.contact = std::isfinite(toc);
   out.pairs = toPairContacts(outcome, bodies);
@@ -282,18 +305,31 @@ deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) 
   }
   if (out.checked_map) {
     out.map_stamp = toRosTime(outcome.step->map.stamp_ns);
-    out.map_age = secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns);
+    out.map_age = mapAge(outcome);
   }
   out.start = toRosTime(outcome.start_ns);
   out.holds_until = toRosTime(outcome.stamp_ns);
   return out;
 }
 
-void fillState(const Assurance& assurance, deformable_ccd::State& message) {
+double mapAge(const Outcome& outcome) {
+  const StampNs stamp_ns = outcome.step->map.stamp_ns;
+  return stamp_ns == 0 ? 0 : secondsBetween(stamp_ns, outcome.stamp_ns);
+}
+
+void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
+               deformable_ccd::State& message) {
   message.proved = assurance.proved;
   message.touching = static_cast<std::uint8_t>(assurance.touching);
   message.clear = assurance.clear();
-  message.reason = describe(assurance);
+  message.reason = describe(assurance, touches);
+  if (!assurance.proved && !remedy.empty()) message.reason += "; " + remedy;
+  // Where it was left out by choice, or is missing, that is said already.
+  const bool is_news = assurance.proved && !message.checked_map && !message.holds_until.isZero();
+  const auto tells = [](const std::string& sentence) { return sentence.find("octomap") != std::string::npos; };
+  if (is_news && std::none_of(assurance.excluded.begin(), assurance.excluded.end(), tells)) {
+    message.reason += "; nothing was checked against a map";
+  }
   message.missing = assurance.missing;
   message.excluded = assurance.excluded;
   message.expected = assurance.expected;
@@ -301,22 +337,19 @@ void fillState(const Assurance& assurance, deformable_ccd::State& message) {
 
 StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
   StatsMessage out;
-  out.header = headerOf(outcome.stamp_ns, frame);
-  out.status = static_cast<std::uint8_t>(outcome.status);
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
-  out.answered = outcome.answered;
+  fillHead(outcome, outcome.stamp_ns, frame, out);
   out.complete = outcome.complete;
   out.step = outcome.duration_s();
   out.latency = context.latency_s;
   out.substeps = static_cast<std::uint32_t>(outcome.substeps);
   fillFrames(context.frames, out);
   out.weld_changes = context.weld_changes;
-  fillContacts(outcome, out);
+  fillCounts(outcome, out);
   fillStages(outcome.stats, out);
   out.map_present = outcome.obstacle != nullptr;
   if (outcome.obstacle) {
     out.map_leaves = outcome.obstacle->leafCount();
-    out.map_age = secondsBetween(outcome.step->map.stamp_ns, outcome.stamp_ns);
+    out.map_age = mapAge(outcome);
   }
   out.excluded_voxels = outcome.excluded_voxels;
   out.unknown_fraction = outcome.unknown_fraction;
@@ -347,10 +380,7 @@ deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pair
 deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
                                               const std::vector<Body>& bodies, const std::string& frame) {
   deformable_ccd::TimeToContact out;
-  out.header = headerOf(prediction.start_ns, frame);
-  out.status = static_cast<std::uint8_t>(prediction.status);
-  out.start_state = static_cast<std::uint8_t>(prediction.start_state);
-  out.answered = prediction.answered;
+  fillHead(prediction, prediction.start_ns, frame, out);
   out.horizon = horizon_s;
   const double toc = earliestNewToc(prediction);
   out.contact = std::isfinite(toc);

@@ -1,6 +1,9 @@
 // An outcome as messages. Used by the node and by analyze_bag, so that both write the same.
 #pragma once
 
+#include <algorithm>
+#include <array>
+
 #include <deformable_ccd/Contact.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/FirstContact.h>
@@ -22,6 +25,23 @@ constexpr std::uint32_t TOPIC_QUEUE = 32;
 
 /// The nearest that a message can hold: 0 to 2^32 s.
 ros::Time toRosTime(StampNs stamp_ns);
+
+/// A value into a message's field, by the types of both.
+template <class From, class To>
+void put(const From& from, To& to) {
+  to = static_cast<To>(from);
+}
+template <class T, std::size_t N>
+void put(const std::array<T, N>& from, boost::array<T, N>& to) {
+  std::copy(from.begin(), from.end(), to.begin());
+}
+inline void put(const VoxelKey& from, deformable_ccd::Contact::_voxel_key_type& to) { to = {from.x, from.y, from.z}; }
+template <class Point>  // or Vector3
+void put(const Vec3& from, Point& to) {
+  to.x = from.x();
+  to.y = from.y();
+  to.z = from.z();
+}
 std_msgs::Header headerOf(StampNs stamp_ns, const std::string& frame);
 /// With its geometry; `patch`: identity of its patch, 0 for none.
 deformable_ccd::Contact toContact(const Outcome& outcome, const Contact& contact, std::uint64_t patch);
@@ -44,11 +64,18 @@ struct StatsContext {
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
+/// Fills the same into a message, which may have been another one before: its memory is used again.
+void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
+                      deformable_ccd::ContactArray& message);
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame);
 /// What was checked and when; what may be said of it comes by fillState().
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame);
-void fillState(const Assurance& assurance, deformable_ccd::State& message);
+/// `touches`: touchesInWords(); `remedy`: what to do about what is not proved. Either may be empty.
+void fillState(const Assurance& assurance, const std::string& touches, const std::string& remedy,
+               deformable_ccd::State& message);
+/// Of the map in use, at the step's end [s]; 0 where it carries no stamp, as one of a file.
+double mapAge(const Outcome& outcome);
 /// The message of the package, not StepStats.
 deformable_ccd::StepStats toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame);
 deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies,

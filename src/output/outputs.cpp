@@ -28,9 +28,16 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
+void Outputs::publishList(const ros::Publisher& topic, const Outcome& outcome, const std::vector<Body>& bodies,
+                          const std::string& frame) {
+  if (topic.getNumSubscribers() == 0) return;
+  fillContactArray(outcome, bodies, frame, list_);
+  topic.publish(list_);
+}
+
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
-  if (contacts_.getNumSubscribers() > 0) contacts_.publish(toContactArray(outcome, bodies, frame));
+  publishList(contacts_, outcome, bodies, frame);
   if (patches_ && patches_.getNumSubscribers() > 0) patches_.publish(toPatchArray(outcome, bodies, frame));
   if (events_ && events_.getNumSubscribers() > 0) {
     for (const auto& event : toPatchEvents(outcome, bodies, frame)) events_.publish(event);
@@ -59,7 +66,7 @@ bool Outputs::wantsPrediction() const {
 
 void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                 const MarkerConfig& markers, const std::string& frame) {
-  if (predicted_.getNumSubscribers() > 0) predicted_.publish(toContactArray(prediction, bodies, frame));
+  publishList(predicted_, prediction, bodies, frame);
   if (time_to_contact_.getNumSubscribers() > 0) {
     time_to_contact_.publish(toTimeToContact(prediction, horizon_s, bodies, frame));
   }

@@ -1,7 +1,11 @@
 #include "output/patch_messages.h"
 
+#include <algorithm>
+#include <cstdio>
+#include <map>
 #include <set>
 
+#include "dccd/contact_fields.h"
 #include "dccd/new_contacts.h"
 #include "output/output_messages.h"
 #include "report/words.h"
@@ -24,35 +28,24 @@ void fillNames(const std::array<std::uint16_t, 2>& body, const std::vector<Body>
 
 ros::Time knownTime(StampNs stamp_ns) { return stamp_ns == UNKNOWN_NS ? ros::Time() : toRosTime(stamp_ns); }
 
-template <class Message>
-void fill(const Vec3& from, Message& to) {
-  to.x = from.x();
-  to.y = from.y();
-  to.z = from.z();
-}
-
 PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
   PatchMessage out;
-  out.id = patch.id;
-  fillNames(patch.body, bodies, out.bodies);
-  out.is_new = patch.is_new;
-  out.expected = static_cast<std::uint32_t>(patch.expected);
-  out.beginning = static_cast<std::uint8_t>(patch.beginning);
-  out.began_from = knownTime(patch.began_from_ns);
-  out.began_to = knownTime(patch.began_to_ns);
-  out.contacts = static_cast<std::uint32_t>(patch.contacts);
-  out.certain = static_cast<std::uint32_t>(patch.certain);
-  out.initial = static_cast<std::uint32_t>(patch.initial);
-  out.crossings = static_cast<std::uint32_t>(patch.crossings);
-  out.toc_lower = patch.toc_lower;
-  out.toc_upper = patch.toc_upper;
-  out.area = patch.area_m2;
-  fill(patch.centroid, out.centroid);
-  fill(patch.normal, out.normal);
-  if (!patch.box.empty()) {
-    fill(patch.box.min, out.box_min);
-    fill(patch.box.max, out.box_max);
-  }
+  const auto fill = [&](const auto& from, auto& to) {
+    using To = std::decay_t<decltype(to)>;
+    if constexpr (std::is_same_v<To, PatchMessage::_bodies_type>) {
+      fillNames(from, bodies, to);
+    } else if constexpr (std::is_same_v<To, ros::Time>) {
+      to = knownTime(from);
+    } else if constexpr (std::is_same_v<std::decay_t<decltype(from)>, Box>) {
+      if (!from.empty()) put(from.min, to);
+    } else {
+      put(from, to);
+    }
+  };
+#define DCCD_FILL_PATCH(member, published) fill(patch.member, out.published);
+  DCCD_PUBLISHED_PATCH_FIELDS(DCCD_FILL_PATCH)
+#undef DCCD_FILL_PATCH
+  if (!patch.box.empty()) put(patch.box.max, out.box_max);
   return out;
 }
 
@@ -129,6 +122,38 @@ std::vector<deformable_ccd::PairContact> toPairContacts(const Outcome& outcome, 
     all.push_back(std::move(out));
   }
   return all;
+}
+
+std::string touchesInWords(const Outcome& outcome) {
+  struct Touch {
+    std::size_t patches = 0, expected = 0;
+    const Patch* largest = nullptr;
+    StampNs since_ns = UNKNOWN_NS;
+    bool since_start = false;
+  };
+  std::map<std::array<std::uint16_t, 2>, Touch> touches;
+  for (const Patch& patch : outcome.patches) {
+    Touch& touch = touches[patch.body];
+    ++touch.patches;
+    touch.expected += patch.isExpected();
+    if (!touch.largest || patch.contacts > touch.largest->contacts) touch.largest = &patch;
+    if (patch.beginning == PatchBeginning::INITIAL || patch.began_to_ns == UNKNOWN_NS) touch.since_start = true;
+    if (touch.since_ns == UNKNOWN_NS || patch.began_to_ns < touch.since_ns) touch.since_ns = patch.began_to_ns;
+  }
+  std::string text;
+  for (const auto& [body, touch] : touches) {
+    char words[120];
+    const double for_s = touch.since_ns == UNKNOWN_NS ? 0 : secondsBetween(touch.since_ns, outcome.stamp_ns);
+    std::snprintf(words, sizeof words, touch.since_start ? " since the first look" : " for %.2f s",
+                  std::max(0.0, for_s));
+    text += (text.empty() ? "" : ", ") + pairOf(body, outcome.step->bodies) + words;
+    const Vec3& at = touch.largest->centroid;
+    std::snprintf(words, sizeof words, ", %zu %s at %.3f %.3f %.3f", touch.patches,
+                  touch.patches == 1 ? "patch" : "patches, the largest", at.x(), at.y(), at.z());
+    text += words;
+    if (touch.expected == touch.patches) text += " (expected)";
+  }
+  return text;
 }
 
 std::size_t lastingPatches(const Outcome& outcome) {

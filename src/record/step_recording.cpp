@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "dccd/accuracy.h"
+#include "dccd/contact_fields.h"
 #include "record/recording_archive.h"
 #include "step/option_rows.h"
 
@@ -57,9 +58,29 @@ void visitRung(Archive& a, Rung& rung) {
   }
 }
 
-/// By its type.
+template <typename T>
+constexpr bool IS_VECTOR = false;
+template <typename T>
+constexpr bool IS_VECTOR<std::vector<T>> = true;
+
+/// What a byte of the file may be at most.
+constexpr BroadPhase lastOf(BroadPhase) { return BroadPhase::BRUTE_FORCE; }
+constexpr PairKind lastOf(PairKind) { return PairKind::FACE_VOXEL_CORNER; }
+constexpr Certainty lastOf(Certainty) { return Certainty::UNDECIDED; }
+constexpr BodyMotionKind lastOf(BodyMotionKind) { return BodyMotionKind::STATIC; }
+constexpr StepStatus lastOf(StepStatus) { return StepStatus::INTERNAL_ERROR; }
+constexpr StartState lastOf(StartState) { return StartState::NOT_CHECKED; }
+constexpr Touching lastOf(Touching) { return Touching::EXPECTED; }
+
+template <typename Archive, typename Contact>
+void visitContact(Archive& a, Contact& c);
+
+/// Each by its type.
+template <typename Archive, typename... Values>
+void visitValues(Archive& a, Values&... values);
+
 template <typename Archive, typename Value>
-void visitOption(Archive& a, Value& value) {
+void visitValue(Archive& a, Value& value) {
   using Type = std::remove_const_t<Value>;
   if constexpr (std::is_same_v<Type, bool>) {
     a.flag(value);
@@ -69,18 +90,35 @@ void visitOption(Archive& a, Value& value) {
     a.number(value);
   } else if constexpr (std::is_same_v<Type, Accuracy>) {
     visitRung(a, value);
-  } else if constexpr (std::is_same_v<Type, BroadPhase>) {
-    a.choice(value, BroadPhase::BRUTE_FORCE);
+  } else if constexpr (std::is_enum_v<Type>) {
+    a.choice(value, lastOf(value));
+  } else if constexpr (std::is_same_v<Type, std::string>) {
+    a.text(value);
+  } else if constexpr (std::is_same_v<Type, VoxelKey>) {
+    visitValues(a, value.x, value.y, value.z);
+  } else if constexpr (std::is_same_v<Type, Vec3>) {
+    visitValues(a, value.x(), value.y(), value.z());
+  } else if constexpr (std::is_same_v<Type, Box>) {
+    visitValues(a, value.min, value.max);
+  } else if constexpr (std::is_same_v<Type, Contact>) {
+    visitContact(a, value);
   } else if constexpr (std::is_same_v<Type, std::vector<Expectation>>) {
     visitExpectations(a, value);
-  } else {
+  } else if constexpr (IS_VECTOR<Type>) {
     a.array(value);
+  } else {
+    for (auto& one : value) visitValue(a, one);
   }
+}
+
+template <typename Archive, typename... Values>
+void visitValues(Archive& a, Values&... values) {
+  (visitValue(a, values), ...);
 }
 
 template <typename Archive, bool RECORDED, typename Value>
 void visitOptionOf(Archive& a, OptionRow<RECORDED, Value>& row) {
-  if constexpr (RECORDED) visitOption(a, row.value);
+  if constexpr (RECORDED) visitValue(a, row.value);
 }
 
 template <typename Archive, typename Options>
@@ -94,21 +132,14 @@ void visitOptions(Archive& a, Options& options) {
 
 template <typename Archive, typename Body>
 void visitBody(Archive& a, Body& body) {
-  a.text(body.name);
-  a.choice(body.motion, BodyMotionKind::STATIC);
-  a.flag(body.rigid);
-  a.flag(body.self_collision);
-  a.flag(body.against_bodies);
-  a.flag(body.against_obstacle);
-  a.number(body.minimum_separation_m);
-  a.array(body.vertex_mask);
+  visitValues(a, body.name, body.motion, body.rigid, body.self_collision, body.against_bodies, body.against_obstacle,
+              body.minimum_separation_m, body.vertex_mask);
   a.shared(body.t0);
   a.shared(body.t1);
   a.flag(body.turns);
   visitPose(a, body.pose_t0);
   visitPose(a, body.pose_t1);
-  a.flag(body.shell);
-  a.number(body.dropped_faces);
+  visitValues(a, body.shell, body.dropped_faces);
 }
 
 /// As Topology::polyline() makes it.
@@ -163,69 +194,32 @@ void visitMap(RecordingReader& a, ObstacleMap& map) {
   if (present) a.map(map.surface);
 }
 
+#define DCCD_VISIT_CONTACT(member, published) visitValue(a, c.member);
 template <typename Archive, typename Contact>
 void visitContact(Archive& a, Contact& c) {
-  a.choice(c.kind, PairKind::FACE_VOXEL_CORNER);
-  a.number(c.toc_lower);
-  a.number(c.toc_upper);
-  for (auto& vertex : c.vertex) a.number(vertex);
-  for (auto& body : c.body) a.number(body);
-  a.number(c.voxel.x);
-  a.number(c.voxel.y);
-  a.number(c.voxel.z);
-  a.number(c.voxel_size);
-  a.choice(c.certainty, Certainty::UNDECIDED);
-  a.flag(c.initial);
-  a.flag(c.leaving);
-  a.flag(c.expected);
-}
-
-template <typename Archive, typename Vector>
-void visitVector(Archive& a, Vector& v) {
-  for (int i = 0; i < 3; ++i) a.number(v[i]);
+  DCCD_CONTACT_FIELDS(DCCD_VISIT_CONTACT)
 }
 
 /// Which patches last is a matter of the stream, not of a step.
+#define DCCD_VISIT_PATCH(member, published) visitValue(a, patch.member);
 template <typename Archive, typename Answer>
 void visitPatches(Archive& a, Answer& answer) {
   a.count(answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
   for (auto& patch : answer.patches) {
-    for (auto& body : patch.body) a.number(body);
-    for (auto* count : {&patch.contacts, &patch.certain, &patch.initial, &patch.crossings, &patch.expected})
-      a.size(*count);
-    a.number(patch.toc_lower);
-    a.number(patch.toc_upper);
-    visitContact(a, patch.earliest);
-    a.number(patch.area_m2);
-    for (auto* vector : {&patch.centroid, &patch.normal, &patch.box.min, &patch.box.max}) visitVector(a, *vector);
+    DCCD_PATCH_FIELDS(DCCD_VISIT_PATCH, DCCD_VISIT_PATCH, DCCD_NO_FIELD)
   }
   a.array(answer.patch_of);
 }
 
 template <typename Archive, typename Answer>
 void visitAnswer(Archive& a, Answer& answer) {
-  a.choice(answer.status, StepStatus::INTERNAL_ERROR);
-  a.text(answer.reason);
-  a.flag(answer.answered);
-  a.flag(answer.complete);
-  a.flag(answer.cut);
-  a.choice(answer.start_state, StartState::NOT_CHECKED);
-  a.choice(answer.touching, Touching::EXPECTED);
-  a.size(answer.total_contacts);
-  a.size(answer.suppressed);
-  a.number(answer.excluded_voxels);
-  a.size(answer.substeps);
-  a.number(answer.unchecked_toc_lower);
-  a.number(answer.earliest_toc);
-  a.number(answer.earliest_unexpected_toc);
+  visitValues(a, answer.status, answer.reason, answer.answered, answer.complete, answer.cut, answer.start_state,
+              answer.touching, answer.total_contacts, answer.suppressed, answer.excluded_voxels, answer.substeps,
+              answer.unchecked_toc_lower, answer.earliest_toc, answer.earliest_unexpected_toc);
   a.count(answer.contacts, CONTACT_BYTES, std::numeric_limits<std::size_t>::max());
   for (auto& contact : answer.contacts) visitContact(a, contact);
   a.count(answer.intersections, INTERSECTION_BYTES, std::numeric_limits<std::size_t>::max());
-  for (auto& crossing : answer.intersections) {
-    for (auto& body : crossing.body) a.number(body);
-    for (auto& vertex : crossing.vertex) a.number(vertex);
-    a.flag(crossing.expected);
-  }
+  for (auto& crossing : answer.intersections) visitValues(a, crossing.body, crossing.vertex, crossing.expected);
   for (auto* sentences : {&answer.unproved, &answer.excluded, &answer.expected}) {
     a.count(*sentences, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
     for (auto& sentence : *sentences) a.text(sentence);
@@ -236,10 +230,7 @@ void visitAnswer(Archive& a, Answer& answer) {
 template <typename Archive, typename Body>
 void visitSeparations(Archive& a, Body& body) {
   a.count(body.separations, SEPARATION_BYTES, MAX_BODIES);
-  for (auto& from : body.separations) {
-    a.number(from.body);
-    a.number(from.separation_m);
-  }
+  for (auto& from : body.separations) visitValues(a, from.body, from.separation_m);
   a.array(body.not_against);
   a.shared(body.radius_m);
 }
@@ -275,11 +266,7 @@ void visitReference(RecordingReader& a, Body& body) {
 /// The file's fields in their order, for both directions.
 template <typename Archive, typename Recording>
 void visit(Archive& a, Recording& r) {
-  a.text(r.note);
-  a.number(r.step.sequence);
-  a.number(r.step.start_ns);
-  a.number(r.step.stamp_ns);
-  a.text(r.step.off_path);
+  visitValues(a, r.note, r.step.sequence, r.step.start_ns, r.step.stamp_ns, r.step.off_path);
   if constexpr (Archive::READS) {
     if (r.step.start_ns < 0 || r.step.stamp_ns <= r.step.start_ns) {
       a.fail("the step lasts from " + std::to_string(r.step.start_ns) + " ns to " + std::to_string(r.step.stamp_ns) +
@@ -297,13 +284,8 @@ void visit(Archive& a, Recording& r) {
   visitMap(a, r.step.map);
   a.number(r.step.map.stamp_ns);
   visitPose(a, r.step.map.map_from_fixed);
-  a.text(r.step.map.problem);
-  a.number(r.step.map.own.looked_at);
-  a.number(r.step.map.own.own);
-  a.number(r.step.map.own.doubted);
-  a.text(r.step.map.own.excluded);
-  a.text(r.step.map.own.doubt);
-  a.flag(r.has_answer);
+  auto& own = r.step.map.own;
+  visitValues(a, r.step.map.problem, own.looked_at, own.own, own.doubted, own.excluded, own.doubt, r.has_answer);
   visitAnswer(a, r.answer);
 }
 

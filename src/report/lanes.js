@@ -1,8 +1,8 @@
 // Who with whom: a lane for each two partners, and the first new contact of each.
 const SPAN = (() => { const t = R.steps.map(s => s.t), low = Math.min(0, ...t.slice(0, 1)), high = t.length ? t[t.length - 1] : 1;
   return [low, Math.max(high, low + 1e-9)]; })();
-// When something began, over the whole run: early pale, late red.
-const byTime = t => colour(Math.min(1, Math.max(0, (t - SPAN[0]) / (SPAN[1] - SPAN[0]))));
+// When something began, over the whole run.
+const byTime = t => early(Math.min(1, Math.max(0, (t - SPAN[0]) / (SPAN[1] - SPAN[0]))));
 const partners = p => p.names[0] === p.names[1] ? p.names[0] + ' with itself' : p.names.join(' with ');
 const EVENT_COLOUR = { BEGAN: '#1b7f5c', ENDED: '#5b6b7d', SPLIT: '#7a4fb5', MERGED: '#7a4fb5', UNEXPECTED: '#d0021b' };
 const EVENT_WORD = { BEGAN: 'began', ENDED: 'ended', SPLIT: 'split', MERGED: 'merged', UNEXPECTED: 'is no longer expected' };
@@ -10,7 +10,7 @@ const lanes = { seek: () => {}, cursor: () => {} };
 if (!R.partners.length) {
   document.getElementById('lanes').textContent = 'Nothing touched in an answered step.';
 } else {
-  const ROWS = 4, ROW = 7, LANE = 20 + ROWS * ROW + 12, height = TOP + R.partners.length * LANE + 26;
+  const names = [], ROWS = 4, ROW = 7, LANE = 20 + ROWS * ROW + 12, height = TOP + R.partners.length * LANE + 26;
   const svg = el('svg', { viewBox: `0 0 ${W} ${height}` }, document.getElementById('lanes'));
   const x = t => LEFT + (W - LEFT - RIGHT) * (t - SPAN[0]) / (SPAN[1] - SPAN[0]);
   R.steps.forEach((s, i) => { if (s.answered || s.status === 'FIRST_FRAME') return;
@@ -20,7 +20,7 @@ if (!R.partners.length) {
   R.partners.forEach((p, k) => {
     const y = TOP + k * LANE, floor = y + 20 + ROWS * ROW;
     el('line', { x1: LEFT, x2: W - RIGHT, y1: floor + 5, y2: floor + 5, stroke: '#e3e8ee' }, svg);
-    el('text', { x: LEFT, y: y + 14, 'font-size': 13, fill: '#1c2430' }, svg, partners(p) + (p.left_out ? ` (${p.left_out} more in patches.csv and events.csv)` : ''));
+    names.push([LEFT, y + 14, partners(p) + (p.left_out ? ` (${p.left_out} more in patches.csv and events.csv)` : '')]);
     const ends = new Array(ROWS).fill(-Infinity);
     p.bars.forEach(([id, from, to, expected]) => {
       let row = ends.findIndex(end => end <= from + 1e-9);
@@ -36,6 +36,7 @@ if (!R.partners.length) {
   ticks(SPAN[1] - SPAN[0]).forEach(t => el('text', { x: x(SPAN[0] + t), y: height - 8, 'text-anchor': 'middle', 'font-size': 12, fill: '#556' }, svg,
     +(SPAN[0] + t).toPrecision(6) + ' s'));
   const cursor = el('line', { id: 'cursor', y1: TOP, y2: height - 24, stroke: '#2a6fb0', 'stroke-width': 1.5, visibility: 'hidden' }, svg);
+  names.forEach(([x, y, text]) => el('text', { class: 'lane', x, y, 'font-size': 13, fill: '#1c2430' }, svg, text));  // over the cursor
   lanes.cursor = t => { cursor.setAttribute('x1', x(t)); cursor.setAttribute('x2', x(t)); cursor.setAttribute('visibility', 'visible'); };
   svg.style.cursor = 'pointer';
   svg.addEventListener('click', e => {  // on a bar or a tick: to its own time

@@ -1,4 +1,6 @@
-const NS = 'http://www.w3.org/2000/svg', W = 1040, LEFT = 62, RIGHT = 14, BOTTOM = 34, TOP = 10;
+// Plots are as wide as the page, so that their words stay as large as the others.
+const NS = 'http://www.w3.org/2000/svg', W = Math.max(300, document.getElementById('lanes').clientWidth || 1040), LEFT = W < 600 ? 48 : 62,
+  RIGHT = 14, BOTTOM = 34, TOP = 10;
 const el = (name, attributes, parent, text) => {
   const e = document.createElementNS(NS, name);
   for (const k in attributes) e.setAttribute(k, attributes[k]);
@@ -42,17 +44,18 @@ function ticks(max, whole) {
   for (let v = 0; v <= max * (1 + 1e-9); v += step) out.push(+v.toPrecision(10));
   return out;
 }
-function axes(id, height, ymax, ylabel, whole) {
+// `rise`: how high a value stands, 0 to 1 at ymax; without it evenly.
+function axes(id, height, ymax, ylabel, whole, rise = v => v / ymax, marks = ticks(ymax, whole)) {
   const steps = R.steps, t0 = steps.length ? steps[0].t : 0;
   const span = Math.max((steps.length > 1 ? steps[steps.length - 1].t : t0 + 1) - t0, 1e-9);
   const svg = el('svg', { viewBox: `0 0 ${W} ${height}` }, document.getElementById(id));
   const slot = (W - LEFT - RIGHT) / Math.max(steps.length, 1), inner = W - LEFT - RIGHT - slot;
-  const x = t => LEFT + slot / 2 + inner * (t - t0) / span, y = v => height - BOTTOM - (height - BOTTOM - TOP) * v / ymax;
+  const x = t => LEFT + slot / 2 + inner * (t - t0) / span, y = v => height - BOTTOM - (height - BOTTOM - TOP) * rise(v);
   steps.forEach(s => { if (s.answered) return;
     const w = Math.max(2, slot);
     el('title', {}, el('rect', { x: x(s.t) - w / 2, y: TOP, width: w, height: height - BOTTOM - TOP, fill: '#f6c9c5' }, svg),
       s.status + (s.reason ? ': ' + s.reason : '')); });
-  ticks(ymax, whole).forEach(v => {
+  marks.forEach(v => {
     el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
     el('text', { x: LEFT - 6, y: y(v) + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
   ticks(span).forEach(t => x(t0 + t) <= W - RIGHT && el('text', { x: x(t0 + t), y: height - BOTTOM + 18, 'text-anchor': 'middle', 'font-size': 12,
@@ -62,12 +65,32 @@ function axes(id, height, ymax, ylabel, whole) {
   return { svg, x, y, bar: Math.max(1.5, 0.8 * slot) };
 }
 document.getElementById('headline').textContent = R.headline;
+// What a reader is to know first: what is proved, what was looked at, what touched when. firsts: click to go there.
+{ const card = (kind, title, ...lines) => { const d = document.getElementById('verdict').appendChild(document.createElement('div'));
+    d.className = kind; d.appendChild(document.createElement('strong')).textContent = title;
+    lines.forEach(([text, t]) => { const p = d.appendChild(document.createElement('p')); p.textContent = text; p.title = text;
+      if (text.length > 260) p.textContent = text.slice(0, 250) + '…';
+      if (t !== undefined) { p.dataset.t = t; p.addEventListener('click', () => lanes.seek(t)); } }); };
+  const P = R.proof, steps = n => n + (n === 1 ? ' step' : ' steps'), fact = (R.facts.find(([name]) => name === 'octomap') || ['', ''])[1];
+  if (!P.unproved) card('good', P.steps === 1 ? 'The only step is proved' : `All ${steps(P.steps)} are proved`, ['What does not touch is known not to.']);
+  else card('doubt', P.proved ? `${P.steps - P.proved} of ${steps(P.steps)} are not proved` : 'Nothing is proved', [P.unproved]);
+  const unseen = P.not_looked_at.map(text => [text[0].toUpperCase() + text.slice(1) + '.']), mapless = /^(none|off)/.test(fact);
+  if (fact) card(mapless || unseen.length ? 'doubt' : 'good', mapless ? 'No map was used' : 'The map was used', ...(mapless ? [] : [[fact]]), ...unseen);
+  const firsts = R.partners.filter(p => p.first).sort((p, q) => p.first.t - q.first.t), who = p => p.names[0] === p.names[1] ? p.names[0] + ' with itself' : p.names.join(' with ');
+  const lasting = R.partners.filter(p => !p.first && p.bars.length).map(p => [who(p) + (p.bars.every(b => b[3]) ? ': as expected' : ': since before it was looked at'), p.bars[0][1]]);
+  const answered = R.steps.some(s => s.answered), lines = firsts.map(p => [`${who(p)}: ${p.first.t.toFixed(3)} s after the start`, p.first.t]).concat(lasting);
+  card(lines.length ? '' : answered && !P.unproved ? 'good' : 'doubt', firsts.length ? 'First new contact' : lines.length ? 'No new contact' : answered ? 'Nothing was found to touch' : 'No answer',
+    ...lines.slice(0, 6), ...(lines.length > 6 ? [[`${lines.length - 6} more pairs below`]] : [])); }
 { const t = table('facts', null, R.facts);  // what has many lines is folded under the first
   R.facts.forEach(([, value], i) => { const end = value.indexOf('\n'), cell = t.rows[i].cells[1]; if (end < 0) return;
     const fold = document.createElement('details'); cell.textContent = ''; cell.appendChild(fold);
     fold.appendChild(document.createElement('summary')).textContent = value.slice(0, end);
     fold.appendChild(document.createElement('pre')).textContent = value.slice(end + 1); }); }
-{ const a = axes('contacts', 240, Math.max(1, ...R.steps.map(s => s.contacts)), 'contacts', true);
+{ const most = Math.max(1, ...R.steps.map(s => s.contacts)), some = R.steps.map(s => s.contacts).filter(n => n).sort((p, q) => p - q);
+  // One step with thousands is not to flatten all others.
+  const steep = some.length && most > 20 * some[some.length >> 1], power = n => Math.log10(1 + n) / Math.log10(1 + most);
+  const a = steep ? axes('contacts', 240, most, 'contacts (logarithmic)', true, power, [0, ...[1, 10, 100, 1e3, 1e4, 1e5, 1e6].filter(n => n <= most)])
+    : axes('contacts', 240, most, 'contacts', true);
   R.steps.forEach(s => [[s.contacts, '#2a6fb0'], [s.undecided + s.initial, '#f0a030'], [s.initial, '#9aa4b0']].forEach(([n, fill]) => {
     const top = a.y(Math.min(n, s.contacts));
     if (n && s.contacts) el('title', {}, el('rect', { x: a.x(s.t) - a.bar / 2, y: top, width: a.bar, height: a.y(0) - top, fill }, a.svg),
@@ -134,31 +157,34 @@ function frontPlot(id, all, xlabel, ylabel, least) {
 const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];
 const colour = f => { const i = Math.min(1, Math.floor(f * 2)), w = f * 2 - i;
   return 'rgb(' + STOPS[i].map((c, k) => Math.round(c + w * (STOPS[i + 1][k] - c))).join(',') + ')'; };
-const GRADIENT = 'linear-gradient(to right,' + STOPS.map(s => `rgb(${s.join(',')})`).join(',') + ')';
+// Of times: early red, late pale, as in RViz. Of numbers: few pale, many blue.
+const early = f => colour(1 - f), EARLY_TO_LATE = 'linear-gradient(to right,' + [1, .5, 0].map(colour).join(',') + ')';
+const many = f => `rgb(${[222, 235, 247].map((c, k) => Math.round(c + f * ([8, 69, 148][k] - c))).join(',')})`;
+const FEW_TO_MANY = `linear-gradient(to right,${many(0)},${many(.5)},${many(1)})`;
 // Whether faces look both ways when the body is laid flat, as of a closed one or a tube: then each side gets a picture.
 const turnsOver = b => { let up = 0, down = 0;
   b.faces.forEach(f => { const [p, q, r] = f.map(v => b.flat[v]), area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
     if (area > 0) up += area; else down -= area; });
   return Math.min(up, down) > 0.1 * (up + down); };
 // values: per vertex 0 to 1, or null for never. From below it is turned about the upright axis.
-function map(parent, b, values, caption, low, high, below) {
+function map(parent, b, values, ramp, gradient, caption, low, high, below) {
   const xs = b.flat.map(p => below ? -p[0] : p[0]), ys = b.flat.map(p => p[1]), depth = f => f.reduce((sum, v) => sum + (below ? -1 : 1) * b.flat[v][2], 0) / f.length;
   const faces = b.faces.map(f => [depth(f), f]).sort((p, q) => p[0] - q[0]);  // what is nearer is painted later
   const range = v => v.reduce((r, x) => [Math.min(r[0], x), Math.max(r[1], x)], [Infinity, -Infinity]);
-  const [x0, x1] = range(xs), [y0, y1] = range(ys), width = 510, s = Math.min((width - 20) / Math.max(x1 - x0, 1e-9), 490 / Math.max(y1 - y0, 1e-9));
+  const [x0, x1] = range(xs), [y0, y1] = range(ys), width = Math.min(510, W), s = Math.min((width - 20) / Math.max(x1 - x0, 1e-9), 490 / Math.max(y1 - y0, 1e-9));
   const figure = parent.appendChild(document.createElement('figure')), c = figure.appendChild(document.createElement('canvas'));
   const H = Math.max(30, s * (y1 - y0) + 20), scale = Math.max(2, window.devicePixelRatio || 1);
   c.width = width * scale; c.height = H * scale; c.style.width = width + 'px'; c.style.height = H + 'px';
   const g = c.getContext('2d'); g.scale(scale, scale);
   const px = i => width / 2 + s * (xs[i] - (x0 + x1) / 2), py = i => H / 2 - s * (ys[i] - (y0 + y1) / 2);
   const shade = vertices => { const known = vertices.map(v => values[v]).filter(v => v !== null);
-    return known.length ? colour(known.reduce((a, v) => a + v, 0) / known.length) : '#e4e8ec'; };
+    return known.length ? ramp(known.reduce((a, v) => a + v, 0) / known.length) : 'rgba(128,140,150,.22)'; };
   faces.forEach(([, f]) => { g.beginPath(); f.forEach((v, k) => k ? g.lineTo(px(v), py(v)) : g.moveTo(px(v), py(v))); g.closePath();
     g.fillStyle = shade(f); g.fill(); g.strokeStyle = 'rgba(90,100,110,.25)'; g.lineWidth = .5; g.stroke(); });
   (b.edges || []).forEach(e => { g.beginPath(); g.moveTo(px(e[0]), py(e[0])); g.lineTo(px(e[1]), py(e[1]));
     g.strokeStyle = shade(e); g.lineWidth = 4; g.stroke(); });
   const text = figure.appendChild(document.createElement('figcaption')), bar = document.createElement('span');
-  bar.className = 'scale'; bar.style.background = low === high ? colour(1) : GRADIENT;
+  bar.className = 'scale'; bar.style.background = low === high ? ramp(ramp === early ? 0 : 1) : gradient;
   text.append(caption + (below === undefined ? '' : below ? ', seen from below' : ', seen from above') + ': ');
   text.append(...low === high ? [bar, low] : [low, bar, high]);  // one value alone has no scale
 }
@@ -167,10 +193,10 @@ R.bodies.forEach(b => {
   box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.flat.length} vertices, ` +
     `${b.count.filter(c => c).length} of them in contact at some time`;
   const row = box.appendChild(document.createElement('div')), sides = turnsOver(b) ? [false, true] : [undefined]; row.className = 'maps';
-  sides.forEach(below => map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), 'contacts of a vertex (logarithmic)', '1', String(most), below));
+  sides.forEach(below => map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), many, FEW_TO_MANY, 'contacts of a vertex (logarithmic)', '1', String(most), below));
   if (!times.length) return;
   const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
-  sides.forEach(below => map(row, b, b.first.map(t => t === null ? null : t1 > t0 ? 1 - (t - t0) / (t1 - t0) : 1), 'first contact, late to early', number(t1) + ' s', number(t0) + ' s', below));
+  sides.forEach(below => map(row, b, b.first.map(t => t === null ? null : t1 > t0 ? (t - t0) / (t1 - t0) : 0), early, EARLY_TO_LATE, 'first contact, early to late', number(t0) + ' s', number(t1) + ' s', below));
 });
 const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'vertices could not be checked, or left the path',
   DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
@@ -196,9 +222,12 @@ document.getElementById('effects_note').textContent =
   (R.unknown_fraction.max ? ` Of the swept space the map does not know ${number(100 * R.unknown_fraction.median)} % (median), at most ${number(100 * R.unknown_fraction.max)} %.` : '');
 { const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
   [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);
-  else document.getElementById('look_ahead').textContent = 'Off: look_ahead_s is 0.'; }
-{ const rows = R.study ? R.study.rows : [], percent = v => `${(100 * v).toFixed(v < 0.0995 ? 1 : 0)} %`;
-  document.getElementById('study_sentence').textContent = R.study ? R.study.sentence : 'Not asked for: --accuracy-study runs it.';
+  else document.getElementById('look_ahead_part').remove(); }
+if (!R.study) document.getElementById('study_part').remove();
+else { const rows = R.study.rows, percent = v => `${(100 * v).toFixed(v < 0.0995 ? 1 : 0)} %`;
+  document.getElementById('study_part').open = true;
+  const again = rows.find(r => r.setting === 'the same again');
+  document.getElementById('study_sentence').textContent = R.study.sentence + (again ? ` The same run twice differs in time by ${percent(Math.abs(again.share_of_time - 1))}: settings that differ less do not differ.` : '');
   frontPlot('study_plot', rows.map(r => ({ x: r.ms_per_s, y: r.patches_missed < r.patches_touched ? r.patches_p95_ms : null, name: r.setting, group: r.varied, missed: r.patches_missed, invented: r.patches_invented })),
     'milliseconds of computing a second of recording', 'first contact of a patch, 95 % within [ms]', 1e-6);
   table('study', ['varied', '', 'ms a second', 'time', 'patches', 'missed', 'invented', 'median ms', '95 %', 'early', 'late', 'vertices', 'missed', 'invented', 'median ms', '95 %', 'early', 'late',

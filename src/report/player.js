@@ -101,28 +101,36 @@ const player = (() => {
   // The faces of voxels that no voxel of the same size hides.
   const SIDES = [0, 1, 2].flatMap(axis => [0, 1].map(up => ({ axis, up, at: [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]].map(([u, v]) => {
     const p = [0, 0, 0]; p[axis] = up; p[(axis + 1) % 3] = up ? u : v; p[(axis + 2) % 3] = up ? v : u; return p; }) })));
+  const OBSTACLE = 0xb0a698, OWN = 0x59a673, DOUBTED = 0xf2bf33;
   const maps = D.maps.map(m => {
-    const key = (x, y, z, size) => ((x * 65536 + y) * 65536 + z) * 20 + Math.log2(size), there = new Set(), points = [], normals = [], lines = [];
-    const r = m.resolution, f = m.matrix, n = m.leaves.length / 4;
+    const r = m.resolution, f = m.matrix, group = new THREE.Group();
     const turn = p => [0, 1, 2].map(i => f[4 * i] * p[0] + f[4 * i + 1] * p[1] + f[4 * i + 2] * p[2]), move = p => turn(p).map((v, i) => v + f[4 * i + 3]);
-    for (let i = 0; i < n; ++i) there.add(key(...m.leaves.slice(4 * i, 4 * i + 4)));
-    for (let i = 0; i < n; ++i) {
-      const leaf = m.leaves.slice(4 * i, 4 * i + 4), size = leaf[3];
-      SIDES.forEach(({ axis, up, at }) => {
-        const next = leaf.slice(); next[axis] += up ? size : -size;
-        if (there.has(key(...next))) return;
-        const normal = [0, 0, 0]; normal[axis] = up ? 1 : -1;
-        const corners = at.map(p => move(p.map((v, k) => (leaf[k] + v * size - 32768) * r)));
-        corners.forEach(c => { points.push(...c); normals.push(...turn(normal)); });
-        lines.push(...corners[0], ...corners[1], ...corners[1], ...corners[2]);
-      });
-    }
-    const g = new THREE.BufferGeometry(), h = new THREE.BufferGeometry(), group = new THREE.Group(), values = list => new THREE.BufferAttribute(new Float32Array(list), 3);
-    g.setAttribute('position', values(points)); g.setAttribute('normal', values(normals)); h.setAttribute('position', values(lines));
-    group.add(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: 0xb0a698, transparent: true, opacity: 0.45, depthWrite: false })));
-    group.add(new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: 0x8f877b, transparent: true, opacity: 0.5, depthWrite: false })));
+    const add = (list, colour, opacity, solid) => {
+      const key = (x, y, z, size) => ((x * 65536 + y) * 65536 + z) * 20 + Math.log2(size), there = new Set(), points = [], normals = [], lines = [];
+      for (let i = 0; i < list.length; i += 4) there.add(key(...list.slice(i, i + 4)));
+      for (let i = 0; i < list.length; i += 4) {
+        const leaf = list.slice(i, i + 4), size = leaf[3];
+        SIDES.forEach(({ axis, up, at }) => {
+          const next = leaf.slice(); next[axis] += up ? size : -size;
+          if (there.has(key(...next))) return;
+          const normal = [0, 0, 0]; normal[axis] = up ? 1 : -1;
+          const corners = at.map(p => move(p.map((v, k) => (leaf[k] + v * size - 32768) * r)));
+          corners.forEach(c => { points.push(...c); normals.push(...turn(normal)); });
+          lines.push(...corners[0], ...corners[1], ...corners[1], ...corners[2]);
+        });
+      }
+      const g = new THREE.BufferGeometry(), h = new THREE.BufferGeometry(), values = list => new THREE.BufferAttribute(new Float32Array(list), 3);
+      g.setAttribute('position', values(points)); g.setAttribute('normal', values(normals)); h.setAttribute('position', values(lines));
+      // First the depth of what is nearest, then that alone in colour: a solid, and not all its walls behind each other. Bodies are
+      // drawn before it, so that one in a crack or below a table shines through.
+      const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }, part = (object, order) => { object.renderOrder = order; group.add(object); return object; };
+      if (solid) part(new THREE.Mesh(g, new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true, ...behind })), 0);
+      part(new THREE.Mesh(g, new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity, depthWrite: false, ...behind })), 1);
+      return part(new THREE.LineSegments(h, new THREE.LineBasicMaterial({ color: new THREE.Color(colour).multiplyScalar(0.7), transparent: true, opacity: solid ? 0.6 : 0.5, depthWrite: false })), 2);
+    };
+    const edges = [[m.leaves, OBSTACLE, 0.8, true], [m.own || [], OWN, 0.25], [m.doubted || [], DOUBTED, 0.4]].filter(([list]) => list.length).map(all => add(...all));
     group.visible = false; scene.add(group);
-    return { from: m.from, cubes: group };
+    return { from: m.from, cubes: group, edges };
   });
 
   // Points on top of everything: discs for contacts, rings for patches.
@@ -132,7 +140,7 @@ const player = (() => {
     return new THREE.CanvasTexture(c); };
   const dots = (ring, size) => { const p = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size, sizeAttenuation: false,
     map: sprite(ring), vertexColors: THREE.VertexColors || true, transparent: true, depthTest: false, depthWrite: false }));
-    p.frustumCulled = false; p.renderOrder = ring ? 2 : 1; scene.add(p); return p; };
+    p.frustumCulled = false; p.renderOrder = ring ? 4 : 3; scene.add(p); return p; };
   const contactDots = dots(false, 11 * ratio), patchDots = dots(true, 22 * ratio), pickedDot = dots(true, 34 * ratio);
   const rgb = text => text.match(/\d+/g).map(v => v / 255);
   function fill(points, list) {
@@ -156,7 +164,7 @@ const player = (() => {
     const contacts = f.details.c.map(([kind, b0, b1, v, flags, low, high, at, patch, voxel]) => {
       const is = bit => (flags & bit) !== 0;
       const states = [is(1) ? 'certain' : 'undecided', is(2) ? 'there when the step began' : 'new', is(4) && 'leaving', is(8) && 'expected'].filter(Boolean);
-      return { kind: 'contact', at, rgb: is(8) ? MUTED : rgb(colour(low)), title: features(kind, v, b0, b1, voxel) + (is(2) ? ', there when the step began' : ''),
+      return { kind: 'contact', at, rgb: is(8) ? MUTED : rgb(early(low)), title: features(kind, v, b0, b1, voxel) + (is(2) ? ', there when the step began' : ''),
         text: `Contact, ${KIND[kind]}: ${features(kind, v, b0, b1, voxel)}; ${states.join(', ')}. Time of contact ${interval(f, low, high)}.` + (patch ? ` Part of patch ${patch}.` : '') };
     });
     const patches = f.details.p.map(([id, b0, b1, beginning, n, crossings, expected, low, high, area, at, normal, from, to]) => {
@@ -228,7 +236,7 @@ const player = (() => {
     if (!on) tell();
     if (!isSoftware) return;
     shown.forEach(s => { if (s.surface) s.lines.visible = !on; });
-    maps.forEach(m => { m.cubes.children[1].visible = !on; });
+    maps.forEach(m => m.edges.forEach(e => { e.visible = !on; }));
     draw();
   };
   const stop = () => setPlaying(false);
@@ -263,9 +271,10 @@ const player = (() => {
     listed.forEach(x => { const [px, py] = screenOf(x), d = Math.hypot(px - e.clientX, py - e.clientY); if (d < best) { best = d; item = x; } });
     choose(item); });
 
-  function fit() {  // where the bodies that move mostly are; only still ones: those
+  function fit() {  // where the bodies that move are while something touches; only still ones: those
+    const touching = frames.filter(f => f.details && f.details.n), taken = touching.length ? touching : frames;
     const sample = all => shown.flatMap((s, b) => {
-      const places = frames.map(f => f.places[b]).filter(Boolean), points = [];
+      const places = taken.map(f => f.places[b]).filter(Boolean), points = [];
       if (!places.length || (!all && places.every(p => p === places[0]))) return points;
       const every = Math.max(1, Math.floor(places.length / 50));
       places.filter((_, i) => i % every === 0).forEach(q => { const skip = 3 * Math.max(1, Math.floor(q.length / 900));
@@ -274,11 +283,15 @@ const player = (() => {
       return points; });
     let points = sample(false); if (!points.length) points = sample(true);
     const centre = points.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(Math.max(points.length, 1));
-    const distances = points.map(p => p.distanceTo(centre)).sort((a, b) => a - b);
-    const radius = Math.max(distances[Math.floor(0.98 * (distances.length - 1))] || 0, 1e-6);
-    const narrow = Math.min(1, camera.aspect), away = 0.85 * radius / Math.sin(camera.fov * Math.PI / 360) / narrow;
+    // So near that nearly all of it is seen, with a margin: each point asks for a distance.
+    const back = new THREE.Vector3(-0.55, -0.75, 0.45).normalize(), right = new THREE.Vector3(0, 0, 1).cross(back).normalize(), up = back.clone().cross(right);
+    const along = axis => { const v = points.map(p => p.clone().sub(centre).dot(axis)).sort((a, b) => a - b); return (v[0] + v[v.length - 1]) / 2 || 0; };
+    const aside = [right, up].map(axis => [axis, along(axis)]); aside.forEach(([axis, by]) => centre.addScaledVector(axis, by));
+    const tall = 0.88 * Math.tan(camera.fov * Math.PI / 360), wide = tall * camera.aspect;
+    const asked = points.map(p => { const q = p.clone().sub(centre); return q.dot(back) + Math.max(Math.abs(q.dot(right)) / wide, Math.abs(q.dot(up)) / tall); }).sort((a, b) => a - b);
+    const away = Math.max(asked[Math.floor(0.995 * (asked.length - 1))] || 0, 1e-5);
     camera.near = away / 200; camera.far = away * 50; camera.updateProjectionMatrix();
-    camera.position.copy(centre).add(new THREE.Vector3(-0.55, -0.75, 0.45).normalize().multiplyScalar(away));
+    camera.position.copy(centre).addScaledVector(back, away);
     controls.target.copy(centre); controls.update();
   }
   get('fit').addEventListener('click', fit);
@@ -290,18 +303,22 @@ const player = (() => {
   window.addEventListener('resize', resize);
   resize(); fit();
   const legend = get('legend');
-  const scale = (text, low, high) => { const p = legend.appendChild(document.createElement('span')), bar = document.createElement('span');
-    bar.className = 'scale'; bar.style.background = GRADIENT; p.append(text + ' ' + low, bar, high); };
-  scale('● contact, by its time in the step:', '0', '1');
-  scale('○ patch, by when it began:', seconds(SPAN[0]).replace(/0+ s/, '0 s'), SPAN[1].toFixed(2) + ' s');
+  { const p = legend.appendChild(document.createElement('span')), bar = document.createElement('span');
+    bar.className = 'scale'; bar.style.background = EARLY_TO_LATE; p.append('early', bar, 'late: ● a contact within its step, ○ a patch within the run'); }
   legend.appendChild(document.createElement('span')).textContent = 'grey: expected';
-  shown.forEach(s => { const p = legend.appendChild(document.createElement('span')), i = p.appendChild(document.createElement('i'));
-    i.style.background = '#' + s.colour.toString(16).padStart(6, '0'); p.append(s.body.name); });
+  const swatch = (colour, text) => { const p = legend.appendChild(document.createElement('span')), i = p.appendChild(document.createElement('i'));
+    i.style.background = '#' + colour.toString(16).padStart(6, '0'); p.append(text); };
+  const NAMED = 8;  // a robot has many links
+  shown.slice(0, NAMED).forEach(s => swatch(s.colour, s.body.name));
+  if (shown.length > NAMED) legend.appendChild(document.createElement('span')).textContent = `and ${shown.length - NAMED} more bodies`;
+  if (D.maps.some(m => m.own)) swatch(OWN, "a body's own voxels, no obstacle");
+  if (D.maps.some(m => m.doubted)) swatch(DOUBTED, "voxels in doubt, a body's or an obstacle's");
   note.textContent = (frames.length < D.seen ? `${frames.length} of ${D.seen} recorded frames are kept, those with events of patches first: what is between is not shown. ` :
     `All ${D.seen} recorded frames. `) + 'Nothing is interpolated. Positions are rounded for display, to ' +
     D.bodies.filter(b => b.quantum).map(b => `${b.quantum.toExponential(1)} m (${b.name})`).join(', ') + `. At most ${D.most_contacts} contacts of a frame are drawn, new ones first.` +
     (D.maps.some(m => !m.all) ? ' Of the map the voxels next to the bodies are drawn.' : D.maps.length ? ' Of the map the voxels near the bodies are drawn.' : '') +
     (D.maps_left_out ? ` ${D.maps_left_out} later changes of the map are not drawn.` : '') + ' Drag to turn, wheel to zoom, right button to move.';
-  seek(START);
+  const firsts = R.partners.filter(p => p.first).map(p => p.first.t);
+  seek(firsts.length ? Math.min(...firsts) : START);
   return { seek, paint, frames, items: () => listed, screenOf: i => screenOf(listed[i]), drawn: () => drawn, time: () => clock };
 })();

@@ -190,10 +190,62 @@ void PlayerData::thin() {
   for (const Frame& f : frames_) bytes_ += f.bytes;
 }
 
+namespace {
+
+/// Of the leaves that meet `around`, those that are nearest to `bodies`. False: there are more.
+bool takeNearest(const std::vector<OccupiedLeaf>& leaves, double resolution_m, const Box& bodies, const Box& around,
+                 std::vector<OccupiedLeaf>& taken) {
+  std::vector<std::pair<double, OccupiedLeaf>> near;  // by how far it is from the bodies' box
+  for (const OccupiedLeaf& leaf : leaves) {
+    const Vec3 low(voxelPlane(leaf.min.x, resolution_m), voxelPlane(leaf.min.y, resolution_m),
+                   voxelPlane(leaf.min.z, resolution_m));
+    const Vec3 high = low.array() + leaf.size * resolution_m;
+    if ((high.array() < around.min.array()).any() || (low.array() > around.max.array()).any()) continue;
+    const Vec3 away = (low - bodies.max).cwiseMax(bodies.min - high).cwiseMax(0);
+    near.emplace_back(away.norm(), leaf);
+  }
+  const auto nearer = [](const auto& a, const auto& b) {
+    return std::tie(a.first, a.second.min) < std::tie(b.first, b.second.min);
+  };
+  const bool all = near.size() <= PlayerData::MOST_VOXELS;
+  if (!all) {
+    std::nth_element(near.begin(), near.begin() + PlayerData::MOST_VOXELS, near.end(), nearer);
+    near.resize(PlayerData::MOST_VOXELS);
+  }
+  std::sort(near.begin(), near.end(), nearer);
+  for (const auto& [away, leaf] : near) taken.push_back(leaf);
+  return all;
+}
+
+std::vector<OccupiedLeaf> leavesOf(const OwnVoxels& own, bool doubted) {
+  std::vector<OccupiedLeaf> leaves;
+  if (!own.voxels) return leaves;
+  for (const OwnVoxel& voxel : *own.voxels) {
+    if (voxel.doubted == doubted) leaves.push_back({voxel.key, 1});
+  }
+  return leaves;
+}
+
+nlohmann::json listOf(const std::vector<OccupiedLeaf>& leaves) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const OccupiedLeaf& leaf : leaves) {
+    for (const std::uint32_t x :
+         {std::uint32_t{leaf.min.x}, std::uint32_t{leaf.min.y}, std::uint32_t{leaf.min.z}, leaf.size}) {
+      list.push_back(x);
+    }
+  }
+  return list;
+}
+
+}  // namespace
+
 // The leaves near the bodies. All leaves are looked through when the map changes, and when the bodies leave the box
 // that was looked at, which reaches half of their size beyond them.
 void PlayerData::addVoxels(const Outcome& o, double from_s) {
-  if (!o.obstacle || o.obstacle->leafCount() == 0) return;
+  if (!o.obstacle) return;
+  const OwnVoxels& own = o.step->map.own;
+  const bool is_empty = o.obstacle->leafCount() == 0 && own.own + own.doubted == 0;
+  if (is_empty && voxels_.empty()) return;
   Box bodies;
   for (const Body& body : o.step->bodies) {
     if (!body.t1 || !meetsMap(body)) continue;
@@ -210,36 +262,21 @@ void PlayerData::addVoxels(const Outcome& o, double from_s) {
   if (bodies.empty()) return;
   const bool is_inside = !looked_at_.empty() && (looked_at_.min.array() <= bodies.min.array()).all() &&
                          (bodies.max.array() <= looked_at_.max.array()).all();
-  if (o.obstacle == surface_ && is_inside) return;
+  if (o.obstacle == surface_ && own.voxels == own_ && is_inside) return;
   const double resolution_m = o.obstacle->resolution();
   const double beyond_m = 0.5 * (bodies.max - bodies.min).norm() + 4 * resolution_m;
   looked_at_ = {bodies.min.array() - beyond_m, bodies.max.array() + beyond_m};
   surface_ = o.obstacle;
+  own_ = own.voxels;
   if (voxels_kept_ >= 10 * MOST_VOXELS) {
     ++maps_left_out_;
     return;
   }
-  std::vector<std::pair<double, OccupiedLeaf>> near;  // by how far it is from the bodies' box
-  for (const OccupiedLeaf& leaf : o.obstacle->leaves()) {
-    const Vec3 low(voxelPlane(leaf.min.x, resolution_m), voxelPlane(leaf.min.y, resolution_m),
-                   voxelPlane(leaf.min.z, resolution_m));
-    const Vec3 high = low.array() + leaf.size * resolution_m;
-    if ((high.array() < looked_at_.min.array()).any() || (low.array() > looked_at_.max.array()).any()) continue;
-    const Vec3 away = (low - bodies.max).cwiseMax(bodies.min - high).cwiseMax(0);
-    near.emplace_back(away.norm(), leaf);
-  }
-  const auto nearer = [](const auto& a, const auto& b) {
-    return std::tie(a.first, a.second.min) < std::tie(b.first, b.second.min);
-  };
-  const bool all = near.size() <= MOST_VOXELS;
-  if (!all) {
-    std::nth_element(near.begin(), near.begin() + MOST_VOXELS, near.end(), nearer);
-    near.resize(MOST_VOXELS);
-  }
-  std::sort(near.begin(), near.end(), nearer);
-  Voxels voxels{from_s, resolution_m, o.step->map.map_from_fixed.inverse(), {}, all};
-  for (const auto& [away, leaf] : near) voxels.leaves.push_back(leaf);
-  voxels_kept_ += voxels.leaves.size();
+  Voxels voxels{from_s, resolution_m, o.step->map.map_from_fixed.inverse(), {}, {}, {}, true};
+  voxels.all &= takeNearest(o.obstacle->leaves(), resolution_m, bodies, looked_at_, voxels.leaves);
+  voxels.all &= takeNearest(leavesOf(own, false), resolution_m, bodies, looked_at_, voxels.own);
+  voxels.all &= takeNearest(leavesOf(own, true), resolution_m, bodies, looked_at_, voxels.doubted);
+  voxels_kept_ += voxels.leaves.size() + voxels.own.size() + voxels.doubted.size();
   voxels_.push_back(std::move(voxels));
 }
 
@@ -283,19 +320,17 @@ std::string PlayerData::json() {
   }
   nlohmann::json maps = nlohmann::json::array();
   for (const Voxels& v : voxels_) {
-    nlohmann::json leaves = nlohmann::json::array();
-    for (const OccupiedLeaf& leaf : v.leaves) {
-      for (const std::uint32_t x :
-           {std::uint32_t{leaf.min.x}, std::uint32_t{leaf.min.y}, std::uint32_t{leaf.min.z}, leaf.size}) {
-        leaves.push_back(x);
-      }
-    }
     nlohmann::json matrix = nlohmann::json::array();
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 4; ++column) matrix.push_back(v.fixed_from_map.matrix()(row, column));
     }
-    maps.push_back(
-        {{"from", v.from_s}, {"resolution", v.resolution_m}, {"matrix", matrix}, {"leaves", leaves}, {"all", v.all}});
+    maps.push_back({{"from", v.from_s},
+                    {"resolution", v.resolution_m},
+                    {"matrix", matrix},
+                    {"leaves", listOf(v.leaves)},
+                    {"all", v.all}});
+    if (!v.own.empty()) maps.back()["own"] = listOf(v.own);
+    if (!v.doubted.empty()) maps.back()["doubted"] = listOf(v.doubted);
   }
   // In the order of the frames: of each body its shape, or -1; then its positions in `bytes`.
   std::string text =

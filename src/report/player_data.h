@@ -63,7 +63,7 @@ class PlayerData {
     double from_s;
     double resolution_m;
     Eigen::Isometry3d fixed_from_map;
-    std::vector<OccupiedLeaf> leaves;
+    std::vector<OccupiedLeaf> leaves, own, doubted;
     bool all;
   };
 
@@ -89,7 +89,8 @@ class PlayerData {
   std::vector<Voxels> voxels_;
   std::size_t voxels_kept_ = 0, maps_left_out_ = 0;
   std::shared_ptr<const VoxelSurface> surface_;
-  Box looked_at_;  // of the surface, map frame
+  std::shared_ptr<const std::vector<OwnVoxel>> own_;  // of the same map
+  Box looked_at_;                                     // of the surface, map frame
 };
 
 /// Differences of one body's coordinates to those before (null: to 0), zigzag, in groups of 7 bits, low ones first; a

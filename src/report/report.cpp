@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "dccd/assurance.h"
+#include "dccd/contact_fields.h"
 #include "report/contact_vertices.h"
 #include "report/flat_layout.h"
 #include "report/words.h"
@@ -22,6 +23,59 @@ std::string csvField(const std::string& text) {
   for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
   return quoted + '"';
 }
+
+/// What follows a field's name in the names of its columns, by its type.
+template <class T>
+std::vector<const char*> endsOf(const T&) {
+  return {""};
+}
+std::vector<const char*> endsOf(const std::array<Index, 4>&) { return {"0", "1", "2", "3"}; }
+std::vector<const char*> endsOf(const std::array<std::uint16_t, 2>&) { return {"_0", "_1"}; }
+std::vector<const char*> endsOf(const VoxelKey&) { return {"_x", "_y", "_z"}; }
+std::vector<const char*> endsOf(const Vec3&) { return {"_x", "_y", "_z"}; }
+std::vector<const char*> endsOf(const Box&) { return {"_min_x", "_min_y", "_min_z", "_max_x", "_max_y", "_max_z"}; }
+
+template <class T>
+void writeNames(std::ostream& out, const std::string& member, const T& value) {
+  const std::string name = member == "vertex" ? "v" : member == "id" ? "patch" : member;
+  for (const char* end : endsOf(value)) out << ',' << name << end;
+}
+
+/// The cells of a row's fields, by their types.
+struct Cells {
+  std::ostream& out;
+  const std::vector<Body>& bodies;
+  bool on_map = false;  // else a voxel's cells stay empty
+
+  template <class T>
+  void operator()(const T& value) const {
+    out << ',' << value;
+  }
+  void operator()(PairKind kind) const { out << ',' << factsOf(kind).short_name; }
+  void operator()(Certainty certainty) const { out << (certainty == Certainty::CERTAIN ? ",certain" : ",undecided"); }
+  void operator()(PatchBeginning beginning) const { out << ',' << toString(beginning); }
+  void operator()(const std::array<std::uint16_t, 2>& partners) const {
+    for (const std::uint16_t body : partners) out << ',' << csvField(bodyName(body, bodies));
+  }
+  void operator()(const std::array<Index, 4>& vertices) const {
+    for (const Index v : vertices) writeIf(v != NO_INDEX, v);
+  }
+  void operator()(std::uint32_t voxel_size) const { writeIf(on_map, voxel_size); }
+  void operator()(const VoxelKey& key) const {
+    for (const std::uint16_t k : {key.x, key.y, key.z}) writeIf(on_map, k);
+  }
+  void operator()(const Vec3& v) const { out << ',' << v.x() << ',' << v.y() << ',' << v.z(); }
+  void operator()(const Box& box) const {
+    (*this)(box.min);
+    (*this)(box.max);
+  }
+  void operator()(StampNs stamp_ns) const { writeIf(stamp_ns != UNKNOWN_NS, stamp_ns); }
+  template <class T>
+  void writeIf(bool is_there, const T& value) const {
+    out << ',';
+    if (is_there) out << value;
+  }
+};
 
 }  // namespace
 
@@ -38,17 +92,20 @@ Report::Report(const std::string& folder) : folder_(folder) {
   open(timing_, "timing.csv");
   open(patches_, "patches.csv");
   open(events_, "events.csv");
-  contacts_
-      << "step,stamp_ns,kind,body_0,body_1,v0,v1,v2,v3,voxel_x,voxel_y,voxel_z,voxel_size,certainty,initial,leaving,"
-         "toc_lower,toc_upper,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_s,"
-         "expected\n";
+#define DCCD_NAME_COLUMNS(member, published) writeNames(contacts_, #member, Contact().member);
+  contacts_ << "step,stamp_ns";
+  DCCD_CONTACT_FIELDS(DCCD_NAME_COLUMNS)
+#undef DCCD_NAME_COLUMNS
+  contacts_ << ",time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,approach_speed_m_per_s\n";
   steps_
       << "step,start_ns,stamp_ns,status,reason,answered,start_state,clear,complete,contacts,undecided,initial,leaving,"
          "intersections,unchecked_vertices,unchecked_faces,earliest_toc,broad_phase_pairs,planar_pairs,"
          "elementary_pairs,obstacle_pairs\n";
-  patches_
-      << "step,stamp_ns,patch,body_0,body_1,beginning,is_new,contacts,certain,initial,crossings,expected,toc_lower,"
-         "toc_upper,area_m2,centroid_x,centroid_y,centroid_z,normal_x,normal_y,normal_z\n";
+#define DCCD_NAME_COLUMNS(member, published) writeNames(patches_, #member, Patch().member);
+  patches_ << "step,stamp_ns";
+  DCCD_PUBLISHED_PATCH_FIELDS(DCCD_NAME_COLUMNS)
+#undef DCCD_NAME_COLUMNS
+  patches_ << '\n';
   events_ << "step,stamp_ns,event,patch,others,body_0,body_1,beginning,expected,earliest_s,latest_s\n";
   timing_ << "step,total_ms";
   for (std::size_t s = 0; s < stage_ms_.size(); ++s) timing_ << ',' << toString(static_cast<Stage>(s)) << "_ms";
@@ -58,35 +115,26 @@ Report::Report(const std::string& folder) : folder_(folder) {
 void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodies) {
   for (const Contact& c : outcome.contacts) {
     const ContactGeometry g = contactGeometry(outcome, c);
-    contacts_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << factsOf(c.kind).short_name << ','
-              << csvField(bodyName(c.body[0], bodies)) << ',' << csvField(bodyName(c.body[1], bodies));
-    for (Index v : c.vertex) {
-      contacts_ << ',';
-      if (v != NO_INDEX) contacts_ << v;
-    }
-    if (c.body[1] == OBSTACLE_BODY) {
-      contacts_ << ',' << c.voxel.x << ',' << c.voxel.y << ',' << c.voxel.z << ',' << c.voxel_size;
-    } else {
-      contacts_ << ",,,,";
-    }
-    contacts_ << ',' << (c.certainty == Certainty::CERTAIN ? "certain" : "undecided") << ',' << c.initial << ','
-              << c.leaving << ',' << c.toc_lower << ',' << c.toc_upper << ','
-              << secondsBetween(origin_ns_, outcome.start_ns) + c.toc_lower * outcome.duration_s() << ',' << g.point.x()
-              << ',' << g.point.y() << ',' << g.point.z() << ',' << g.normal.x() << ',' << g.normal.y() << ','
-              << g.normal.z() << ',' << g.approach_speed / std::max(outcome.duration_s(), 1e-9) << ',' << c.expected
-              << '\n';
+    const Cells cells{contacts_, bodies, c.body[1] == OBSTACLE_BODY};
+    contacts_ << outcome.sequence << ',' << outcome.stamp_ns;
+#define DCCD_WRITE_CELLS(member, published) cells(c.member);
+    DCCD_CONTACT_FIELDS(DCCD_WRITE_CELLS)
+#undef DCCD_WRITE_CELLS
+    cells(secondsBetween(origin_ns_, outcome.start_ns) + c.toc_lower * outcome.duration_s());
+    cells(g.point);
+    cells(g.normal);
+    cells(g.approach_speed / std::max(outcome.duration_s(), 1e-9));
+    contacts_ << '\n';
   }
 }
 
 void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodies) {
-  const auto place = [](std::ofstream& file, const Vec3& v) { file << ',' << v.x() << ',' << v.y() << ',' << v.z(); };
+  const Cells cells{patches_, bodies};
   for (const Patch& p : outcome.patches) {
-    patches_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << p.id << ','
-             << csvField(bodyName(p.body[0], bodies)) << ',' << csvField(bodyName(p.body[1], bodies)) << ','
-             << toString(p.beginning) << ',' << p.is_new << ',' << p.contacts << ',' << p.certain << ',' << p.initial
-             << ',' << p.crossings << ',' << p.expected << ',' << p.toc_lower << ',' << p.toc_upper << ',' << p.area_m2;
-    place(patches_, p.centroid);
-    place(patches_, p.normal);
+    patches_ << outcome.sequence << ',' << outcome.stamp_ns;
+#define DCCD_WRITE_CELLS(member, published) cells(p.member);
+    DCCD_PUBLISHED_PATCH_FIELDS(DCCD_WRITE_CELLS)
+#undef DCCD_WRITE_CELLS
     patches_ << '\n';
   }
   for (const PatchEvent& e : outcome.patch_events) {
@@ -187,6 +235,7 @@ void Report::addProof(const Outcome& o) {
     ++lasting_[o.suppressed > 0 ? "initial contacts suppressed" : std::string("start ") + toString(o.start_state)];
   }
   const Assurance assurance = assuranceOf(o);
+  first_frames_ += o.status == StepStatus::FIRST_FRAME;
   if (assurance.proved || o.status == StepStatus::FIRST_FRAME) return;
   const bool is_ok = o.status == StepStatus::OK;
   const std::string kind = is_ok ? assurance.missing.front() : toString(o.status);

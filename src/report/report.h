@@ -38,13 +38,15 @@ class Report {
   /// Facts for the head of the page: name -> value, in the order given.
   void setFacts(std::vector<std::pair<std::string, std::string>> facts) { facts_ = std::move(facts); }
   void setCounters(const FrameCounters& counters) { counters_ = counters; }
+  /// What the run did not look at, a sentence each: it stands beside what was found.
+  void setNotLookedAt(std::vector<std::string> sentences) { not_looked_at_ = std::move(sentences); }
 
   /// Writes the page and report.json, closes the files. Again with what was set since then. Throws std::runtime_error
   /// naming the file.
   void finish();
-  /// One sentence: the first contact, or that there was none, or that there was no answer; and what is not proved of
-  /// it.
-  std::string headline() const;
+  /// One sentence: the first contact, or that there was none, or that there was no answer; whether all of it is proved,
+  /// with `reasons` also why not; and what was not looked at.
+  std::string headline(bool reasons = true) const;
   /// What stands in the way of a proof: "3 of 40 frames: NO_MAP: no octomap has been received yet (3)". Empty: every
   /// frame but a first one, of which there is nothing to say, has an answer that is proved, and there is one.
   std::string unproved() const;
@@ -56,6 +58,7 @@ class Report {
     std::vector<double> first_s;          // per vertex, first contact since the start; infinity
   };
   void addProof(const Outcome& outcome);
+  std::size_t unprovedFrames() const;
   void addHeat(const Outcome& outcome, const std::vector<Body>& bodies);
   void addRow(const Outcome& outcome);
   void addFirstContact(const Outcome& outcome, const std::vector<Body>& bodies);
@@ -77,7 +80,7 @@ class Report {
   /// Frames that are not proved, by status, or by the first sentence of what an OK one lacks: the reason of the first
   /// of them, and how many.
   std::map<std::string, std::pair<std::string, std::size_t>> unproved_;
-  std::size_t frames_ = 0, answered_ = 0;
+  std::size_t frames_ = 0, first_frames_ = 0, answered_ = 0;
   std::size_t with_contact_ = 0,
               with_expected_ = 0;  // steps; with contacts that are not expected, and with such that are
   double first_contact_s_ = 0;
@@ -97,6 +100,7 @@ class Report {
   PlayerData player_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;
+  std::vector<std::string> not_looked_at_;
   FrameCounters counters_;
 };
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
+#include <numeric>
 #include <sstream>
 
 #include "dccd/assurance.h"
@@ -14,6 +15,12 @@ namespace {
 // A name out of a message need not be UTF-8.
 std::string toText(const nlohmann::json& json, int indent) {
   return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+const char* answeredSteps(std::size_t count) { return count == 1 ? " answered step" : " answered steps"; }
+
+std::string ofFrames(std::size_t some, std::size_t all) {
+  return std::to_string(some) + " of " + std::to_string(all) + (all == 1 ? " frame" : " frames");
 }
 
 nlohmann::json finiteOrNull(double x) { return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(); }
@@ -43,30 +50,32 @@ void Report::addRow(const Outcome& o) {
   rows_ += toText(row, -1);
 }
 
+std::size_t Report::unprovedFrames() const {
+  return std::accumulate(unproved_.begin(), unproved_.end(), std::size_t{0},
+                         [](std::size_t sum, const auto& kind) { return sum + kind.second.second; });
+}
+
 std::string Report::unproved() const {
-  std::size_t frames = 0;
   std::string reasons;
   for (const auto& [kind, found] : unproved_) {
-    frames += found.second;
     reasons += (reasons.empty() ? "" : ", ") + found.first + " (" + std::to_string(found.second) + ")";
   }
-  if (frames > 0) reasons = std::to_string(frames) + " of " + std::to_string(frames_) + " frames: " + reasons;
-  if (!reasons.empty()) return reasons;
+  if (!reasons.empty()) return ofFrames(unprovedFrames(), frames_) + ": " + reasons;
   return answered_ > 0 ? "" : frames_ > 0 ? "a first frame alone makes no step" : "no frame came";
 }
 
-std::string Report::headline() const {
+std::string Report::headline(bool reasons) const {
   std::ostringstream text;
   text << std::fixed << std::setprecision(4);
   const bool proved = unproved().empty();
   if (!first_contact_.empty()) {
     text << "First contact " << first_contact_s_ << " s after the start: " << first_contact_ << "; contacts in "
-         << with_contact_ << " of " << answered_ << " answered steps";
+         << with_contact_ << " of " << answered_ << answeredSteps(answered_);
   } else if (answered_ == 0) {
     text << "No answer";
   } else {
     text << (with_expected_ > 0 ? "No unexpected contact " : "No contact ")
-         << (proved && lasting_.empty() ? "in " : "found in ") << answered_ << " answered steps";
+         << (proved && lasting_.empty() ? "in " : "found in ") << answered_ << answeredSteps(answered_);
   }
   if (with_expected_ > 0) text << "; expected contacts in " << with_expected_ << " of them";
   const char* separator = "; surfaces touched from the start of a step (";
@@ -75,7 +84,12 @@ std::string Report::headline() const {
     separator = ", ";
   }
   if (!lasting_.empty()) text << ')';
-  if (!proved) text << "; not proved: " << unproved();
+  if (proved) {
+    text << "; all of it proved";
+  } else {
+    text << "; not proved: " << (reasons || unproved_.empty() ? unproved() : ofFrames(unprovedFrames(), frames_));
+  }
+  for (const std::string& sentence : not_looked_at_) text << "; " << sentence;
   text << '.';
   return text.str();
 }
@@ -122,6 +136,10 @@ nlohmann::json Report::lookAheadJson() const {
 nlohmann::json Report::json() const {
   nlohmann::json j;
   j["headline"] = headline();
+  j["proof"] = {{"steps", frames_ - first_frames_},
+                {"proved", frames_ - first_frames_ - unprovedFrames()},
+                {"unproved", unproved()},
+                {"not_looked_at", not_looked_at_}};
   j["facts"] = nlohmann::json::array();
   for (const auto& [name, value] : facts_) j["facts"].push_back(nlohmann::json::array({name, value}));
   j["counters"] = {{"received", counters_.received},

@@ -27,10 +27,7 @@ class SrdfReader {
       const std::string name = neededText(end, "name");
       srdf_.groups.emplace(name, linksOf(neededText(end, "group"), end));
     });
-    forEach(robot_, "disable_collisions", [&](const XMLElement& pair) {
-      const std::string first = neededText(pair, "link1"), second = neededText(pair, "link2");
-      if (isLink(first, pair) && isLink(second, pair)) srdf_.never_meet.emplace_back(first, second);
-    });
+    readCollisions();
     return std::move(srdf_);
   }
 
@@ -44,6 +41,27 @@ class SrdfReader {
   template <typename Take>
   static void forEach(const XMLElement& parent, const char* tag, Take take) {
     for (const XMLElement* one = parent.FirstChildElement(tag); one; one = one->NextSiblingElement(tag)) take(*one);
+  }
+
+  /// As MoveIt takes them: defaults of links, then pairs that meet all the same, and then those that never do.
+  void readCollisions() {
+    std::set<std::pair<std::string, std::string>> never;
+    forEach(robot_, "disable_default_collisions", [&](const XMLElement& one) {
+      const std::string name = neededText(one, "link");
+      if (!isLink(name, one)) return;
+      for (const auto& other : model_.links_) {
+        if (other.first != name) never.insert(std::minmax(name, other.first));
+      }
+    });
+    for (const char* tag : {"enable_collisions", "disable_collisions"}) {
+      forEach(robot_, tag, [&](const XMLElement& pair) {
+        const std::string first = neededText(pair, "link1"), second = neededText(pair, "link2");
+        if (!isLink(first, pair) || !isLink(second, pair)) return;
+        if (*tag == 'd') never.insert(std::minmax(first, second));
+        if (*tag == 'e') never.erase(std::minmax(first, second));
+      });
+    }
+    srdf_.never_meet.assign(never.begin(), never.end());
   }
 
   void leaveOut(const XMLElement& element, const std::string& what, const std::string& name) {
@@ -97,17 +115,24 @@ class SrdfReader {
     return found;
   }
 
-  /// From the base to the tip.
+  /// From the base to the tip; where that does not hang from the base, over the nearest link from which both hang.
   std::vector<std::string> chain(const XMLElement& element) {
     const std::string base = neededText(element, "base_link"), tip = neededText(element, "tip_link");
     if (!isLink(base, element) || !isLink(tip, element)) return {};
-    std::vector<std::string> links{tip};
-    while (links.back() != base) {
-      const urdf::JointSharedPtr joint = model_.getLink(links.back())->parent_joint;
-      if (!joint) throw RobotTextError(placeOf(element) + ": no joints lead from '" + base + "' to '" + tip + "'");
+    std::vector<std::string> links = upToRoot(base), other = upToRoot(tip);
+    while (links.size() > 1 && other.size() > 1 && links[links.size() - 2] == other[other.size() - 2]) {
+      links.pop_back();
+      other.pop_back();
+    }
+    links.insert(links.end(), other.rbegin() + 1, other.rend());  // both end with the same
+    return links;
+  }
+
+  std::vector<std::string> upToRoot(const std::string& link) const {
+    std::vector<std::string> links{link};
+    while (const urdf::JointSharedPtr joint = model_.getLink(links.back())->parent_joint) {
       links.push_back(joint->parent_link_name);
     }
-    std::reverse(links.begin(), links.end());
     return links;
   }
 };

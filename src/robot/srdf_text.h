@@ -13,13 +13,15 @@ namespace dccd {
 struct SrdfText {
   /// Links by group, each once. An end effector's name is one for the links of its group, unless a group has that name.
   std::map<std::string, std::vector<std::string>> groups;
-  std::vector<std::pair<std::string, std::string>> never_meet;  ///< by disable_collisions
+  /// By disable_collisions and disable_default_collisions, without those of enable_collisions; each once, in order.
+  std::vector<std::pair<std::string, std::string>> never_meet;
   std::vector<std::string> remarks;  ///< on what names a link or joint that the robot has not, and is left out
 };
 
-/// A group holds the links that it names, those of its chains from base to tip, the child of each of its joints, and
-/// those of the groups that it names. States, virtual and passive joints and what else there is are not read. Throws
-/// RobotTextError: no XML, an attribute is missing, a group that is unknown, named twice, or holds itself.
+/// A group holds the links that it names, those of its chains from base to tip (which may lead over a link from which
+/// both hang), the child of each of its joints, and those of the groups that it names. States, virtual and passive
+/// joints and what else there is are not read. Throws RobotTextError: no XML, an attribute is missing, a group that is
+/// unknown, named twice, or holds itself.
 SrdfText parseSrdf(const std::string& text, const urdf::ModelInterface& model);
 
 }  // namespace dccd

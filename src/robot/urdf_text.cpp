@@ -40,8 +40,12 @@ class HeardErrors : public console_bridge::OutputHandler {
   std::string said_;
 };
 
-/// What is wrong with a collision element's geometry; empty: urdfdom knows it.
+/// What is wrong with a collision element; empty: urdfdom knows it.
 std::string problemOf(const XMLElement& collision) {
+  const XMLElement* origin = collision.FirstChildElement("origin");
+  if (origin && origin->Attribute("quat_xyzw")) {
+    return "has an origin with quat_xyzw, which URDF readers before urdfdom 5.1 pass over; write rpy";
+  }
   const XMLElement* geometry = collision.FirstChildElement("geometry");
   const XMLElement* shape = geometry ? geometry->FirstChildElement() : nullptr;
   if (!shape) return "has no geometry";

@@ -43,12 +43,13 @@ Assurance assuranceOf(const Outcome& outcome, const std::vector<std::string>& fa
   return assurance;
 }
 
-std::string describe(const Assurance& assurance) {
+std::string describe(const Assurance& assurance, const std::string& touches) {
   static const char* const TOUCHING[] = {"nothing touches", "what touches did so when the step began",
                                          "something touches anew", "what touches is expected"};
   std::string text = assurance.proved ? "proved, " : "not proved: " + joined(assurance.missing);
   if (assurance.proved || assurance.touching != Touching::NONE) {
     text += (assurance.proved ? "" : "; ") + std::string(TOUCHING[static_cast<std::size_t>(assurance.touching)]);
+    if (!touches.empty()) text += ": " + touches;
   }
   if (!assurance.expected.empty()) text += " (expected: " + joined(assurance.expected) + ")";
   if (!assurance.excluded.empty()) text += " (left out by choice: " + joined(assurance.excluded) + ")";

@@ -10,7 +10,6 @@
 
 #include "dccd/accuracy.h"
 #include "dccd/tolerances.h"
-#include "obstacle/burst.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/conclude.h"
 #include "step/history.h"
@@ -23,8 +22,8 @@ using Clock = Deadline::Clock;
 
 constexpr double MOST_NS_PER_HIT = 2000;         // more is what the operating system took
 constexpr std::size_t FEWEST_TO_MEASURE = 1000;  // hits of a step that tell what one takes
-constexpr std::size_t PIECE = 256;             // groups or vertices in a unit of refitting, before a look at the clock
-constexpr std::size_t PIECES_IN_ANY_CASE = 8;  // so that a budget too small for anything still bounds a small mesh
+constexpr std::size_t PIECE = 256;               // groups or vertices that are refitted between two looks at the clock
+constexpr std::size_t FEWEST_PIECES = 8;         // done without a look, so that any budget bounds a small mesh
 
 /// Erases what cannot be the first contact: it begins after another one has certainly happened. How wide a bracket is
 /// says nothing: the first contact may begin in a wide one, and a later one in a narrow bracket.
@@ -257,11 +256,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const Clock::time_point begin = Clock::now();
   for (PairWorker& w : workers) w.beginStep();
   for (HitOrder& kind : order) kind.beginStep();
-  std::vector<StartIntersection> room = std::move(result.intersections);
-  releaseBurst(room);
-  room.clear();
   result = Findings();
-  result.intersections = std::move(room);
   if (!fill(part)) {
     leaveOutPart(part);
     addPart(part.index, part.count, result, outcome);
@@ -290,7 +285,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   collect(part.step, part.deadline);
   const bool all_pairs = result.complete;
   if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
-  if (map_reduced && scene.meetsObstacle()) runMap(part);
+  if (map_reduced && scene.mayMeetMap()) runMap(part);
   rememberApart(all_pairs && !options->earliest_only);
   if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
   runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
@@ -325,7 +320,7 @@ bool History::Impl::fill(const Part& part) {
   const auto inPieces = [&](std::size_t n, const auto& refit) {
     parallel(n, PIECE, [&](std::size_t first, std::size_t last) {
       for (; first < last; first += PIECE) {
-        if (++done > PIECES_IN_ANY_CASE && (late || (late = part.deadline.isOver()))) return;
+        if (++done > FEWEST_PIECES && (late || (late = part.deadline.isOver()))) return;
         refit(first, std::min(first + PIECE, last));
       }
     });

@@ -108,8 +108,7 @@ struct History::Impl {
   /// More was there to be found, by a limit (by_count) or a deadline; nothing of what was left out touches before this.
   void leaveOutAt(double toc, bool by_count);
   void collect(const Step& step, const Deadline& deadline);
-  void writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& contact) const;
-  bool meetAtStart(const Step& step, const Contact& contact) const;
+  void writeContact(PairKind kind, const Hit& hit, Contact& contact) const;
   /// Sets complete to false, and the bound on what was left out to 0, where the deadline cut it.
   void runMap(const Part& part);
   /// False: its bounds show that it does not come near what is occupied in the part.
@@ -130,7 +129,7 @@ struct History::Impl {
   Carried carried;
   StepObserver* observer = nullptr;
   Impl* begins_at = nullptr;  // the next step begins where this one's ended
-  bool aside = false;         // so did the step that is being run
+  bool aside = false;         // the step that is being run began so
 
   // Made from options, bodies and map, again when these change.
   std::optional<Options> options;

@@ -36,25 +36,6 @@ double fraction(StampNs a, StampNs b, StampNs at) { return static_cast<double>(a
 
 }  // namespace
 
-const char* toString(StepStatus status) {
-  static constexpr const char* NAMES[] = {
-      "OK",          "FIRST_FRAME", "TOPOLOGY_CHANGED", "GAP",       "TIME_JUMP",     "NO_TRANSFORM", "NO_MAP",
-      "NO_BODY",     "PARTIAL",     "DEADLINE",         "TRUNCATED", "DUPLICATE",     "TELEPORT",     "VERTEX_COUNT",
-      "BAD_MESSAGE", "QUEUE_FULL",  "DISABLED",         "RESET",     "INTERNAL_ERROR"};
-  static_assert(sizeof(NAMES) / sizeof(NAMES[0]) == static_cast<std::size_t>(StepStatus::COUNT));
-  return status < StepStatus::COUNT ? NAMES[static_cast<std::size_t>(status)] : "?";
-}
-
-bool isAnswered(StepStatus status) {
-  return status == StepStatus::OK || status == StepStatus::NO_MAP || status == StepStatus::PARTIAL ||
-         status == StepStatus::DEADLINE || status == StepStatus::TRUNCATED;
-}
-
-bool isSeam(StepStatus status) {
-  return status == StepStatus::FIRST_FRAME || status == StepStatus::TOPOLOGY_CHANGED || status == StepStatus::GAP ||
-         status == StepStatus::TIME_JUMP || status == StepStatus::TELEPORT;
-}
-
 void interpolate(const Positions& a, const Positions& b, double u, Positions& out) {
   out.resize(a.size());
   if (u <= 0 || u >= 1) {

@@ -64,6 +64,11 @@ Monitor::Monitor(const MonitorOptions& options, std::vector<Body> bodies) {
   if (bodies[options.clock_body].motion == BodyMotionKind::STATIC) {
     throw std::invalid_argument("clock_body '" + bodies[options.clock_body].name + "' is static and has no clock");
   }
+  for (const Body& body : bodies) {
+    if (body.own_voxels_m == ONE_VOXEL || (body.own_voxels_m >= 0 && std::isfinite(body.own_voxels_m))) continue;
+    throw std::invalid_argument("own_voxels_m of body '" + body.name +
+                                "' must be ONE_VOXEL or finite and 0 or more, is " + std::to_string(body.own_voxels_m));
+  }
   impl_ = std::make_unique<Impl>(options, std::move(bodies));
 }
 

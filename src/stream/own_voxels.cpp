@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "dccd/next_surface.h"
 #include "dccd/tolerances.h"
 #include "obstacle/leaf_sets.h"
 #include "obstacle/voxel_surface_impl.h"
@@ -31,13 +32,18 @@ VoxelTree treeOf(const std::unordered_map<std::uint64_t, OwnVoxel>& voxels) {
   return VoxelTree(leaves);
 }
 
+bool meets(const OccupiedLeaf& cube, const KeyBox& box) {
+  const std::array<std::int32_t, 3> lo{cube.min.x, cube.min.y, cube.min.z};
+  for (int a = 0; a < 3; ++a) {
+    if (lo[a] > box.hi[a] || lo[a] + static_cast<std::int32_t>(cube.size) <= box.lo[a]) return false;
+  }
+  return true;
+}
+
 /// Calls visit(voxel) for the finest voxels of a cube within the box.
 template <class Visit>
 void visitVoxels(const OccupiedLeaf& cube, const KeyBox& box, Visit& visit) {
-  const std::array<std::int32_t, 3> lo{cube.min.x, cube.min.y, cube.min.z};
-  for (int a = 0; a < 3; ++a) {
-    if (lo[a] > box.hi[a] || lo[a] + static_cast<std::int32_t>(cube.size) <= box.lo[a]) return;
-  }
+  if (!meets(cube, box)) return;
   if (cube.size == 1) return visit(cube);
   for (const OccupiedLeaf& part : eighthsOf(cube)) visitVoxels(part, box, visit);
 }
@@ -140,19 +146,15 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface,
   auto appeared = [&](const OccupiedLeaf& voxel) {
     if (cubes.size() < tolerance::MOST_OWN_ASKED) ask(voxel, ReachedCube::Why::APPEARED);
   };
-  now.visitLeaves(region, [&](std::uint32_t index) {
-    visitUncovered(before, now.leaves()[index], [&](const OccupiedLeaf& fresh) {
-      visitUncovered(sure, fresh, [&](const OccupiedLeaf& unsure) {
-        visitUncovered(remembered, unsure, [&](const OccupiedLeaf& part) { visitVoxels(part, region, appeared); });
-      });
+  visitDifference(now, before, [&](const OccupiedLeaf& fresh) {
+    if (!meets(fresh, region)) return;
+    visitUncovered(sure, fresh, [&](const OccupiedLeaf& unsure) {
+      visitUncovered(remembered, unsure, [&](const OccupiedLeaf& part) { visitVoxels(part, region, appeared); });
     });
-    return true;
   });
-  for (const OccupiedLeaf& leaf : before.leaves()) {
-    visitUncovered(now, leaf, [&](const OccupiedLeaf& gone) {
-      visitUncovered(own, gone, [&](const OccupiedLeaf& part) { ask(part, ReachedCube::Why::VANISHED); });
-    });
-  }
+  visitDifference(before, now, [&](const OccupiedLeaf& gone) {
+    visitUncovered(own, gone, [&](const OccupiedLeaf& part) { ask(part, ReachedCube::Why::VANISHED); });
+  });
   for (const OccupiedLeaf& leaf : remembered_) {
     visitUncovered(now, leaf, [&](const OccupiedLeaf& part) { ask(part, ReachedCube::Why::REMEMBERED); });
   }
@@ -226,10 +228,15 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   reduced.own.voxels = share(std::move(voxels));
   describe(bodies, trust_first, reduced.own);
   if (!own_.empty() || trusted) {
-    std::vector<OccupiedLeaf> leaves = leavesWithout(leavesWithout(now.leaves(), treeOf(own_)), sure);
-    leaves.insert(leaves.end(), sure.leaves().begin(), sure.leaves().end());
-    reduced.surface = VoxelSurface::build(resolution_m, std::move(leaves));
+    std::vector<OccupiedLeaf> without = sure.leaves();
+    for (const auto& one : own_) {
+      visitUncovered(sure, {one.second.key, 1}, [&](const OccupiedLeaf& voxel) { without.push_back(voxel); });
+    }
+    const auto last = reduced_.lock();
+    reduced.surface =
+        nextSurface(resolution_m, leavesWithout(now, VoxelTree(without), sure.leaves()), last ? *last : *map.surface);
   }
+  reduced_ = reduced.surface;
   return reduced;
 }
 

@@ -50,6 +50,7 @@ class OwnVoxelFinder {
   std::string frame_id_;
   std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
   std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
+  std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
 };
 
 }  // namespace dccd

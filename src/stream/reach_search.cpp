@@ -60,7 +60,7 @@ class ReachSearch {
   Positions at_;
 
   std::int64_t cellOf(double x, int a) const {
-    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor((x - lo_[a]) / cell_m_)), 0, cells_[a] - 1);
+    return static_cast<std::int64_t>(std::clamp((x - lo_[a]) / cell_m_, 0.0, static_cast<double>(cells_[a] - 1)));
   }
   template <class Visit>
   void visitCells(const double* lo, const double* hi, Visit visit) const {

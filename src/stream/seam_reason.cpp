@@ -3,6 +3,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "dccd/tolerances.h"
+
 namespace dccd {
 
 namespace {
@@ -15,6 +17,18 @@ void addFarthest(const Positions& before, const Positions& after, std::ostringst
     if (moved_sq > most_sq) most_sq = moved_sq, farthest = v;
   }
   text << "vertex " << farthest << " moved " << std::sqrt(most_sq) << " m";
+}
+
+/// In millimetres everything moves too far.
+void addSize(const Positions& positions, std::ostringstream& text) {
+  Box box;
+  for (const Vec3& p : positions) {
+    if (!p.allFinite()) continue;
+    box.min = box.min.cwiseMin(p);
+    box.max = box.max.cwiseMax(p);
+  }
+  if (box.empty() || (box.max - box.min).maxCoeff() <= tolerance::LARGEST_PLAUSIBLE_M) return;
+  text << "; the mesh is " << (box.max - box.min).maxCoeff() << " m across: are its coordinates in millimetres?";
 }
 
 std::string sizeOf(const Topology& topology) {
@@ -38,6 +52,7 @@ std::string seamReason(StepStatus status, const MeshFrame& before, const MeshFra
     case StepStatus::TELEPORT:
       addFarthest(before.positions, after.positions, text);
       text << " in " << elapsed_s << " s, max_vertex_step_m is " << options.max_vertex_step_m;
+      addSize(after.positions, text);
       break;
     case StepStatus::TOPOLOGY_CHANGED:
       text << "the mesh has " << sizeOf(*after.topology) << ", the last one had " << sizeOf(*before.topology);

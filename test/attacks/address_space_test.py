@@ -4,13 +4,11 @@ import struct
 import time
 import unittest
 
-import rospy
 from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, wait_for
-from deformable_ccd.msg import ContactArray, MeshStamped
+from deformable_ccd.msg import MeshStamped
+from live_node import bytes_of, raw
 from octomap_msgs.msg import Octomap
 from pcl_msgs.msg import PolygonMesh
-
-from live_fuzz_test import bytes_of, raw
 
 SPACE = 1 << 30
 
@@ -30,14 +28,6 @@ class AddressSpaceTest(AttackTest):
         outcomes = self.outcomes_of(publisher, [flat_cloud(first + i) for i in range(3)])
         self.assertTrue(outcomes[1].answered and outcomes[2].answered, [(o.status, o.reason) for o in outcomes])
         self.assertIsNone(self.node.poll())
-
-    def retype(self, name, kind):
-        self.publisher.unregister()
-        publisher = rospy.Publisher('/%s/mesh' % name, kind, queue_size=None)
-        self.addCleanup(publisher.unregister)
-        wait_for(lambda: publisher.get_num_connections() == 1, 20, 'the node to take another type')
-        self.publisher = publisher
-        return publisher
 
     def is_refused(self, publisher, message):
         """By the node with a status, or by roscpp, which then says so in the log and hands nothing over."""
@@ -83,9 +73,7 @@ class AddressSpaceTest(AttackTest):
     def test_a_checkerboard(self):
         name = 'space_board'
         self.start(name, **{'effects/octomap': 'on', 'octomap_topic': '/%s/map' % name, 'unknown_space': 'report'})
-        maps = rospy.Publisher('/%s/map' % name, Octomap, queue_size=None)
-        self.addCleanup(maps.unregister)
-        wait_for(lambda: maps.get_num_connections() == 1, 20, 'the node to want a map')
+        maps = self.advertise('/%s/map' % name, Octomap)
         whole = Octomap(binary=True, id='OcTree', resolution=0.01)
         whole.header.frame_id = 'world'
         data = checkerboard(7)

@@ -7,12 +7,13 @@ import time
 import rospy
 from geometry_msgs.msg import Point
 from deformable_ccd.msg import MeshStamped
+from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import MeshTriangle
 
 sys.path += [str(pathlib.Path(__file__).resolve().parents[1] / 'faults'),
              str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib')]
-from live_node import Cloud, LiveNodeTest, resident_kb  # noqa: F401
+from live_node import Cloud, LiveNodeTest, grid_faces, resident_kb  # noqa: F401
 from ros_process import SLOW, wait_for  # noqa: F401
 
 ROWS, COLS = 20, 30
@@ -20,10 +21,7 @@ ROWS, COLS = 20, 30
 
 def peak_kb(pid):
     """The largest resident size that the process ever had."""
-    for line in pathlib.Path('/proc/%d/status' % pid).read_text().splitlines():
-        if line.startswith('VmHWM:'):
-            return int(line.split()[1])
-    raise AssertionError('no VmHWM')
+    return resident_kb(pid, 'VmHWM:')
 
 
 class AttackTest(LiveNodeTest):
@@ -43,16 +41,6 @@ class AttackTest(LiveNodeTest):
         self.assertLessEqual(len(lines), kinds * (2 + seconds / 5), '\n'.join(line[:200] for line in lines[-20:]))
         self.assertLess(max([len(line) for line in lines] or [0]), 2000)
 
-    def outcomes_of(self, publisher, messages):
-        """Publishes each after the one before has its outcome; the outcomes."""
-        outcomes = []
-        for message in messages:
-            seen = len(self.contacts)
-            publisher.publish(message)
-            wait_for(lambda: len(self.contacts) > seen, 20, 'an outcome')
-            outcomes.append(self.contacts[seen])
-        return outcomes
-
 
 def stamped(index):
     return rospy.Time.from_sec(1000 + 0.03 * index)
@@ -64,10 +52,7 @@ def sheet_mesh(index, rows=ROWS, cols=COLS):
     message.header.frame_id = 'world'
     message.header.stamp = stamped(index)
     message.vertices = [Point(0.01 * c, 0.01 * r, 0) for r in range(rows) for c in range(cols)]
-    for r in range(rows - 1):
-        for c in range(cols - 1):
-            a = r * cols + c
-            message.triangles += [MeshTriangle((a, a + 1, a + cols)), MeshTriangle((a + 1, a + cols + 1, a + cols))]
+    message.triangles = [MeshTriangle(face) for face in grid_faces(rows, cols)]
     return message
 
 
@@ -91,6 +76,12 @@ def checkerboard(depth):
         data = struct.pack('<H', 0xffff) + 8 * data
     # From the root down to the cube one child each: the tree is 16 levels deep.
     return (15 - depth) * struct.pack('<H', 0b11) + data
+
+
+def octomap(data, stamp=rospy.Time(), frame='world', resolution=0.01):
+    message = Octomap(binary=True, id='OcTree', resolution=resolution, data=struct.unpack('<%db' % len(data), data))
+    message.header.frame_id, message.header.stamp = frame, stamp
+    return message
 
 
 def checkerboard_file(path, depth):

@@ -5,7 +5,7 @@ import time
 import unittest
 
 import rospy
-from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, wait_for
+from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, octomap, wait_for
 from deformable_ccd.msg import ContactArray
 from octomap_msgs.msg import Octomap
 
@@ -62,14 +62,7 @@ class BudgetTest(AttackTest):
 
     def test_unknown_space_that_a_large_cloth_sweeps(self):
         self.start_node('unknown', step_budget_ms=5, unknown_space='report', **{'effects/octomap': 'on', 'octomap_topic': '/unknown/map'})
-        maps = rospy.Publisher('/unknown/map', Octomap, queue_size=1, latch=True)
-        self.addCleanup(maps.unregister)
-        wait_for(lambda: maps.get_num_connections() == 1, 20, 'the node to want a map')
-        data = checkerboard(2)
-        message = Octomap(binary=True, id='OcTree', resolution=0.01, data=struct.unpack('<%db' % len(data), data))
-        message.header.frame_id = 'world'
-        message.header.stamp = rospy.Time(1000)
-        maps.publish(message)
+        self.advertise('/unknown/map', Octomap, latch=True).publish(octomap(checkerboard(2), rospy.Time(1000)))
         rows, cols = 20, 30
         sheet = lambda z: [(3.0 / cols * c - 1.5, 3.0 / rows * r - 1.5, z) for r in range(rows) for c in range(cols)]
         self.outcomes_of(self.publisher, [cloud_of(0, sheet(2.0), rows, cols)])

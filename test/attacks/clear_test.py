@@ -1,5 +1,4 @@
 """What once left `clear` standing without proof, each on a live node, at stamps of today."""
-import io
 import math
 import os
 import pathlib
@@ -11,10 +10,10 @@ import unittest
 
 import rosbag
 import rospy
-from attack import AttackTest, checkerboard, wait_for
+from attack import AttackTest, checkerboard, octomap, wait_for
 from deformable_ccd.msg import ContactArray
 from geometry_msgs.msg import TransformStamped
-from live_node import Cloud
+from live_node import Cloud, bytes_of
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
@@ -50,22 +49,16 @@ class ClearTest(AttackTest):
         for key, value in bodies.items():
             rospy.set_param('/%s/bodies/%s' % (name, key), value)
         self.start_node(name, publishes=False, clock_body='cloth', **parameters)
-        self.to = {topic: self.connected('/%s/%s' % (name, topic), PointCloud2) for topic in topics}
-        self.tf = self.connected('/tf', TFMessage)
-
-    def connected(self, topic, kind):
-        publisher = rospy.Publisher(topic, kind, queue_size=100)
-        self.addCleanup(publisher.unregister)
-        wait_for(lambda: publisher.get_num_connections() >= 1, 20, 'the node to listen to ' + topic)
-        return publisher
+        self.to = {topic: self.advertise('/%s/%s' % (name, topic), PointCloud2, 100) for topic in topics}
+        self.tf = self.advertise('/tf', TFMessage, 100)
 
     def test_a_frame_waits_for_the_map_that_came_before_it(self):
         self.start_with_map('ordered', max_map_mb=2048, transform_timeout_s=20.0, answer_timeout_s=20.0)
-        self.maps.publish(self.map_message(at(0), 'world'))
+        self.maps.publish(octomap(checkerboard(1), at(0)))
         time.sleep(0.5)
         for t in (0.0, 0.03):
             self.step_of(at(t), 5)
-        message = self.map_message(at(0.04), 'world', 6)
+        message = octomap(checkerboard(6), at(0.04))
         self.maps.publish(message)
         time.sleep(0.1)
         _, state = self.step_of(at(0.06), 5)
@@ -130,23 +123,17 @@ class ClearTest(AttackTest):
         _, state = self.step_of(at(0.15))
         self.assertTrue(state.clear, state.reason)
 
-    def map_message(self, stamp, frame, depth=1):
-        data = checkerboard(depth)
-        message = Octomap(binary=True, id='OcTree', resolution=0.01, data=struct.unpack('<%db' % len(data), data))
-        message.header.frame_id, message.header.stamp = frame, stamp
-        return message
-
     def start_with_map(self, name, **parameters):
         self.start_bodies(name, {'cloth/topic': '/%s/cloth' % name}, ['cloth'],
                           **{'effects/octomap': 'on', 'octomap_topic': '/%s/map' % name, **parameters})
-        self.maps = self.connected('/%s/map' % name, Octomap)
+        self.maps = self.advertise('/%s/map' % name, Octomap, 100)
 
     def test_a_map_whose_frame_moves(self):
         """It lies half a metre below the sheet, and its frame is raised through the sheet."""
         self.start_with_map('lifts')
         for k in range(11):
             self.tf.publish(transform(at(0.01 * k), 'odom', -0.5))
-        self.maps.publish(self.map_message(at(0), 'odom'))
+        self.maps.publish(octomap(checkerboard(1), at(0), 'odom'))
         time.sleep(0.5)
         for t in (0.0, 0.05, 0.1):
             _, state = self.step_of(at(t))
@@ -161,7 +148,7 @@ class ClearTest(AttackTest):
 
     def test_a_latched_map_that_is_older_than_tf(self):
         self.start_with_map('latched')
-        self.maps.publish(self.map_message(at(-60), 'odom'))
+        self.maps.publish(octomap(checkerboard(1), at(-60), 'odom'))
         time.sleep(0.3)
         for k in range(11):
             self.tf.publish(transform(at(0.01 * k), 'odom', -0.5))
@@ -176,12 +163,12 @@ class ClearTest(AttackTest):
     def test_a_newer_map_that_waits(self):
         """Half a megabyte, of which a million leaves become: no step is clear that was answered without it."""
         self.start_with_map('waits', max_map_mb=2048, transform_timeout_s=0.0)
-        self.maps.publish(self.map_message(at(0), 'world'))
+        self.maps.publish(octomap(checkerboard(1), at(0)))
         time.sleep(0.5)
         for t in (0.0, 0.03, 0.06):
             _, state = self.step_of(at(t), 5)
         self.assertTrue(state.clear, state.reason)
-        message = self.map_message(at(0.07), 'world', 6)
+        message = octomap(checkerboard(6), at(0.07))
         self.maps.publish(message)
         time.sleep(0.02)  # on its way
         t, passed_over = 0.06, 0
@@ -251,13 +238,7 @@ class ClearTest(AttackTest):
         for one, other in zip(live, replayed):
             self.assertEqual(one.header.stamp, other.header.stamp)
             self.assertEqual(one.status, other.status)
-            self.assertEqual([self.bytes_of(c) for c in one.contacts], [self.bytes_of(c) for c in other.contacts])
-
-    @staticmethod
-    def bytes_of(message):
-        buffer = io.BytesIO()
-        message.serialize(buffer)
-        return buffer.getvalue()
+            self.assertEqual([bytes_of(c) for c in one.contacts], [bytes_of(c) for c in other.contacts])
 
 
 if __name__ == '__main__':

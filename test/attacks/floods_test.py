@@ -2,12 +2,11 @@
 good afterwards is answered."""
 import math
 import os
-import struct
 import time
 import unittest
 
 import rospy
-from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, peak_kb, resident_kb, wait_for
+from attack import SLOW, AttackTest, checkerboard, cloud_of, flat_cloud, octomap, peak_kb, resident_kb
 from deformable_ccd.msg import ContactArray, MeshStamped
 from geometry_msgs.msg import TransformStamped
 from octomap_msgs.msg import Octomap
@@ -51,9 +50,7 @@ class FloodsTest(AttackTest):
     def test_names_of_frames(self):
         """Names that tf2 never forgets."""
         self.start('frame_names')
-        tf = rospy.Publisher('/tf', TFMessage, queue_size=None)
-        self.addCleanup(tf.unregister)
-        wait_for(lambda: tf.get_num_connections() == 1, 20, 'the node to listen')
+        tf = self.advertise('/tf', TFMessage)
         one = TransformStamped()
         one.header.frame_id, one.transform.rotation.w = 'world', 1.0
         for i in range(100 if LONG else 20):  # 16,384 are taken
@@ -68,9 +65,7 @@ class FloodsTest(AttackTest):
     def test_stamps_of_transforms(self):
         """With --long 300,000 of them, a nanosecond apart."""
         self.start('tf_stamps')
-        tf = rospy.Publisher('/tf', TFMessage, queue_size=None)
-        self.addCleanup(tf.unregister)
-        wait_for(lambda: tf.get_num_connections() == 1, 20, 'the node to listen')
+        tf = self.advertise('/tf', TFMessage)
         for i in range(100 if LONG else 10):  # of 262,144 all are forgotten
             batch = []
             for k in range(3000):
@@ -100,12 +95,8 @@ class FloodsTest(AttackTest):
     def test_maps_one_after_the_other(self):
         """Of those that wait only the newest is decoded; each is counted."""
         self.start('maps', **{'effects/octomap': 'on', 'octomap_topic': '/maps/map'})
-        maps = rospy.Publisher('/maps/map', Octomap, queue_size=None)
-        self.addCleanup(maps.unregister)
-        wait_for(lambda: maps.get_num_connections() == 1, 20, 'the node to want a map')
-        data = checkerboard(4)
-        message = Octomap(binary=True, id='OcTree', resolution=0.01, data=list(struct.unpack('<%db' % len(data), data)))
-        message.header.frame_id = 'world'
+        maps = self.advertise('/maps/map', Octomap)
+        message = octomap(checkerboard(4))
         for _ in range(100):
             maps.publish(message)
         index = 2

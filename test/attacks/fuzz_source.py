@@ -1,5 +1,4 @@
 """What the live fuzzer sends: messages of all types, whole and damaged, maps and transforms, all of it from one random generator."""
-import io
 import random
 import struct
 
@@ -7,6 +6,7 @@ import rospy
 from attack import checkerboard, cloud_of
 from deformable_ccd.msg import MeshStamped
 from geometry_msgs.msg import Point, TransformStamped
+from live_node import bytes_of, raw
 from octomap_msgs.msg import Octomap
 from pcl_msgs.msg import PolygonMesh, Vertices
 from sensor_msgs.msg import PointCloud2
@@ -18,23 +18,6 @@ ROWS, COLS = 8, 10
 ODD = [0.0, -0.0, 1.0, 1e-320, 1e-30, 1e-9, 1e9, 1e30, 1e150, 1e300, float('inf'), float('-inf'), float('nan')]
 NAMES = ['world', 'world', 'world', 'world', 'camera', 'nowhere', '', '/', '//cam', 'a b\n', '\x01', 'y' * 3000]
 MESHES = [PointCloud2, MeshStamped, PolygonMesh, Mesh, Marker, MarkerArray]
-
-
-def bytes_of(message):
-    buff = io.BytesIO()
-    message.serialize(buff)
-    return buff.getvalue()
-
-
-def raw(kind, data):
-    """A message of a type whose bytes are these."""
-    class Raw(kind):
-        def serialize(self, buff):
-            buff.write(data)
-
-        def _check_types(self, exc=None):
-            pass
-    return Raw()
 
 
 class Source:

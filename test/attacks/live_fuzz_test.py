@@ -19,7 +19,8 @@ import rosgraph
 import rospy
 from attack import SLOW, AttackTest, cloud_of, peak_kb, resident_kb, wait_for
 from deformable_ccd.msg import ContactArray, State, StepStats
-from fuzz_source import COLS, MESHES, ODD, ROWS, Source, bytes_of, raw
+from fuzz_source import COLS, MESHES, ODD, ROWS, Source
+from live_node import bytes_of, raw
 from node_watch import NodeWatch
 from octomap_msgs.msg import Octomap
 from sensor_msgs.msg import PointCloud2

@@ -4,7 +4,7 @@ import time
 import unittest
 
 import rospy
-from attack import SLOW, AttackTest, checkerboard, flat_cloud, peak_kb, resident_kb, wait_for
+from attack import SLOW, AttackTest, checkerboard, flat_cloud, octomap, peak_kb, resident_kb, wait_for
 from deformable_ccd.msg import ContactArray
 from octomap_msgs.msg import Octomap
 
@@ -16,9 +16,7 @@ class MapsTest(AttackTest):
         """A node with a topic for its map."""
         limits = {'max_map_mb': MAP_MB, 'max_memory_mb': MEMORY_MB, 'effects/octomap': 'on', 'octomap_topic': '/%s/map' % name}
         self.node = self.start_node(name, **{**limits, **parameters})
-        self.maps = rospy.Publisher('/%s/map' % name, Octomap, queue_size=10)
-        self.addCleanup(self.maps.unregister)
-        wait_for(lambda: self.maps.get_num_connections() == 1, 20, 'the node to want a map')
+        self.maps = self.advertise('/%s/map' % name, Octomap, 10)
         self.index = self.given = 0
         self.started_kb = resident_kb(self.node.pid)
 
@@ -33,9 +31,7 @@ class MapsTest(AttackTest):
         """Publishes a map and steps on until it is in use or refused; the last outcome."""
         refused = self.stats[-1].maps_refused if self.stats else 0
         self.given += 1
-        message = Octomap(binary=True, id='OcTree', resolution=resolution, data=struct.unpack('<%db' % len(data), data))
-        message.header.frame_id = 'world'
-        message.header.stamp = rospy.Time(1000 + self.given)
+        message = octomap(data, rospy.Time(1000 + self.given), resolution=resolution)
         self.maps.publish(message)
         end = time.monotonic() + 60 * SLOW
         while time.monotonic() < end:

@@ -114,9 +114,7 @@ class MessagesTest(AttackTest):
         """tf2 writes a line for each on the console."""
         begin = time.monotonic()
         self.start_node('transforms')
-        tf = rospy.Publisher('/tf', TFMessage, queue_size=100)
-        self.addCleanup(tf.unregister)
-        wait_for(lambda: tf.get_num_connections() == 1, 20, 'the node to listen')
+        tf = self.advertise('/tf', TFMessage, 100)
         nan = float('nan')
         for i in range(300):
             for child, parent, x, w in (('a', 'world', nan, 1.0), ('a', 'a', 0.0, 1.0), ('', 'world', 0.0, 1.0), ('a', '', 0.0, 1.0),
@@ -127,9 +125,7 @@ class MessagesTest(AttackTest):
                 tf.publish(TFMessage([transform]))
         good = TransformStamped(child_frame_id='camera')
         good.header.frame_id, good.transform.rotation.w = 'world', 1.0
-        static = rospy.Publisher('/tf_static', TFMessage, queue_size=100)
-        self.addCleanup(static.unregister)
-        wait_for(lambda: static.get_num_connections() == 1, 20, 'the node to listen')
+        static = self.advertise('/tf_static', TFMessage, 100)
         for i in range(3):
             good.header.stamp = stamped(i)
             tf.publish(TFMessage([good] * 200))  # the same stamp again and again

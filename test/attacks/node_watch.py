@@ -2,6 +2,8 @@
 import collections
 import time
 
+from live_node import wrong_sums
+
 
 class NodeWatch:
     """What the node says, judged as it comes."""
@@ -21,13 +23,7 @@ class NodeWatch:
             self.wrong.append('a reason of %d characters' % len(message.reason))
 
     def counts(self, s):
-        # What waits is reckoned as what is left: no more can wait than 64 steps and a frame of each body.
-        if s.frames_waiting > 80 or s.frames_received != s.frames_processed + s.frames_started + s.frames_skipped + s.frames_waiting:
-            self.wrong.append('%d received, %d processed, %d started, %d skipped, %d waiting' % (
-                s.frames_received, s.frames_processed, s.frames_started, s.frames_skipped, s.frames_waiting))
-        if s.frames_skipped != (s.skipped_duplicate + s.skipped_vertex_count + s.skipped_bad_message + s.skipped_no_transform +
-                                s.skipped_no_body + s.skipped_queue_full + s.skipped_disabled + s.skipped_reset + s.skipped_error):
-            self.wrong.append('skipped frames do not add up')
+        self.wrong += wrong_sums(s)
         if s.skipped_error:
             self.wrong.append('%d frames were lost to an error of the monitor' % s.skipped_error)
 

@@ -1,5 +1,4 @@
 """max_memory_mb against messages that are large, or small and make much: resident size of the node, asserted."""
-import io
 import pathlib
 import sys
 import time
@@ -13,7 +12,7 @@ from shape_msgs.msg import MeshTriangle
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
 from ros_process import SLOW, wait_for
-from live_node import Cloud, LiveNodeTest, resident_kb
+from live_node import Cloud, LiveNodeTest, bytes_of, raw, resident_kb
 
 LIMIT_MB = 64
 
@@ -64,30 +63,22 @@ class MemoryTest(LiveNodeTest):
 
     def test_polygons_without_corners(self):
         node = self.start('empty')
-        self.retype()
-        publisher = rospy.Publisher('/empty/mesh', PolygonMesh, queue_size=2)
-        wait_for(lambda: publisher.get_num_connections() == 1, 20, 'the node to take another type')
+        publisher = self.retype('empty', PolygonMesh)
         message = PolygonMesh(cloud=Cloud(10, 12).message(100))
         message.header = message.cloud.header
-
-        buff = io.BytesIO()
-        message.serialize(buff)
         for count, words in ((3000000, 'polygons has 3000000 entries'), (6000000, 'a message of 240')):
             seen = len(self.contacts)
-            data = buff.getvalue()[:-4] + count.to_bytes(4, 'little') + bytes(4 * count)  # as objects it would take minutes
-            publisher.publish(whole_of(PolygonMesh, data))
+            data = bytes_of(message)[:-4] + count.to_bytes(4, 'little') + bytes(4 * count)  # as objects it would take minutes
+            publisher.publish(raw(PolygonMesh, data))
             grown = self.watch(node, 20, lambda: len(self.contacts) > seen)
             self.assertEqual(self.contacts[-1].status, ContactArray.BAD_MESSAGE)
             self.assertIn(words, self.contacts[-1].reason)
             self.assertIn('max_memory_mb', self.contacts[-1].reason)
             self.assert_bounded(grown, 24)
-        publisher.unregister()
 
     def test_more_triangles_than_there_is_room_for(self):
         node = self.start('triangles')
-        self.retype()
-        publisher = rospy.Publisher('/triangles/mesh', MeshStamped, queue_size=2)
-        wait_for(lambda: publisher.get_num_connections() == 1, 20, 'the node to take another type')
+        publisher = self.retype('triangles', MeshStamped)
         mesh = MeshStamped(vertices=[Point(0.01 * (i % 20), 0.01 * (i // 20), 0) for i in range(300)])
         mesh.header.frame_id = 'world'
         mesh.header.stamp = rospy.Time(100)
@@ -97,22 +88,6 @@ class MemoryTest(LiveNodeTest):
         self.assertEqual(self.contacts[-1].status, ContactArray.BAD_MESSAGE, self.contacts[-1].reason)
         self.assertIn('200000 triangles', self.contacts[-1].reason)
         self.assert_bounded(grown, 3)
-        publisher.unregister()
-
-    def retype(self):
-        time.sleep(0.3)
-        self.publisher.unregister()
-
-
-def whole_of(kind, data):
-    """A message whose bytes are these."""
-    class Whole(kind):
-        def serialize(self, buff):
-            buff.write(data)
-
-        def _check_types(self, exc=None):
-            pass
-    return Whole()
 
 
 if __name__ == '__main__':

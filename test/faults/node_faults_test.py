@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
 from ros_process import SLOW, wait_for
-from live_node import Cloud, LiveNodeTest, resident_kb
+from live_node import Cloud, LiveNodeTest, resident_kb, simulated_time
 
 
 class NodeFaultsTest(LiveNodeTest):
@@ -28,9 +28,7 @@ class NodeFaultsTest(LiveNodeTest):
         node = self.start_node(name, queue_size=size, queue_policy=policy)
         cloud = Cloud(24, 24, padding=152)  # 101 kB a frame
         for _ in range(6):
-            seen = len(self.stats)
-            self.publisher.publish(cloud.message())
-            wait_for(lambda: len(self.stats) > seen, 20, 'a step')
+            self.step(cloud.message())
         step_s = max(s.total_ms for s in self.stats[2:]) * 1e-3
         sent, pause_s = cloud.count, step_s / factor
         memory_kb = []
@@ -87,9 +85,7 @@ class NodeFaultsTest(LiveNodeTest):
         cloud = Cloud(10, 10)
         memory_kb = []
         for i in range(1500):
-            seen = len(self.stats)
-            self.publisher.publish(cloud.message())
-            wait_for(lambda: len(self.stats) > seen, 20, 'a step while others do not read')
+            self.step(cloud.message())
             if i % 500 == 499:
                 memory_kb.append(resident_kb(node.pid))
         # Queues towards subscribers have a length; the first third fills them and the socket's buffers. Under sanitizers
@@ -104,9 +100,7 @@ class NodeFaultsTest(LiveNodeTest):
         node = self.start_node('ended', queue_size=100)
         cloud = Cloud(60, 60)
         for _ in range(2):
-            seen = len(self.stats)
-            self.publisher.publish(cloud.message())
-            wait_for(lambda: len(self.stats) > seen, 60, 'a step')
+            self.step(cloud.message())
         step_s = self.stats[-1].total_ms * 1e-3
         for _ in range(20):  # far more than it does before the signal
             self.publisher.publish(cloud.message())
@@ -141,14 +135,9 @@ class NodeFaultsTest(LiveNodeTest):
 
     def test_the_clock_jumps_both_ways(self):
         """Frames without a stamp, so that they are taken at the time that /clock says."""
-        rospy.set_param('/use_sim_time', True)
-        try:
+        with simulated_time():
             self.start_node('clocked')
-        finally:
-            rospy.delete_param('/use_sim_time')
-        clock = rospy.Publisher('/clock', Clock, queue_size=10, latch=True)
-        self.addCleanup(clock.unregister)
-        wait_for(lambda: clock.get_num_connections() == 1, 20, 'the node to listen to the clock')
+        clock = self.advertise('/clock', Clock, 10, latch=True)
         cloud = Cloud(4, 4)
 
         def step_at(now_s):
@@ -202,9 +191,7 @@ class NodeFaultsTest(LiveNodeTest):
         cloud = Cloud(5, 5)
 
         def step():
-            seen = len(self.stats)
-            self.publisher.publish(cloud.message())
-            wait_for(lambda: len(self.stats) > seen, 20, 'a step')
+            self.step(cloud.message())
             return self.stats[-1]
 
         step()

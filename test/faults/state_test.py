@@ -6,7 +6,6 @@ import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
@@ -24,7 +23,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
 from ros_process import SLOW, wait_for
-from live_node import Cloud, LiveNodeTest
+from live_node import Cloud, LiveNodeTest, grid_faces, simulated_time
 
 ROWS, COLS = 30, 40  # 1,200 vertices
 
@@ -201,9 +200,7 @@ class StateTest(LiveNodeTest):
         bodies = {'bodies/cloth/topic': '/held/mesh', 'bodies/table/topic': '/held/table', 'bodies/table/motion': 'static',
                   'clock_body': 'cloth'}
         self.start_node('held', max_step_s=30.0, **bodies)
-        table = rospy.Publisher('/held/table', PointCloud2, queue_size=None)
-        self.addCleanup(table.unregister)
-        wait_for(lambda: table.get_num_connections() == 1, 20, 'the node to listen')
+        table = self.advertise('/held/table', PointCloud2)
         cloth, below, through = Sheet(), Sheet(), Sheet()
         below.variants = [b''.join(struct.pack('<3d', 0.01 * c, 0.01 * r, -1.0) for r in range(ROWS) for c in range(COLS))]
         through.variants = [b''.join(struct.pack('<3d', 0.1 * c, 0.003 * r, 0.01 * (c % 2) - 0.004) for r in range(ROWS) for c in range(COLS))]
@@ -224,14 +221,9 @@ class StateTest(LiveNodeTest):
         self.assert_consistent()
 
     def test_a_clock_that_runs_backwards(self):
-        rospy.set_param('/use_sim_time', True)
-        try:
+        with simulated_time():
             self.start_node('backwards')
-        finally:
-            rospy.delete_param('/use_sim_time')
-        clock = rospy.Publisher('/clock', Clock, queue_size=10)
-        self.addCleanup(clock.unregister)
-        wait_for(lambda: clock.get_num_connections() == 1, 20, 'the node to listen to the clock')
+        clock = self.advertise('/clock', Clock, 10)
         cloth, now_s = Sheet(), 1000.0
         for k in range(4):
             now_s += 0.05
@@ -263,16 +255,13 @@ class StateTest(LiveNodeTest):
     def test_a_mesh_that_is_not_wholly_used(self):
         """Faces that name a vertex twice, none at all, and a second list of triangles."""
         self.start_node('dropped')
-        self.publisher.unregister()
-        mesh = rospy.Publisher('/dropped/mesh', MeshStamped, queue_size=5)
-        self.addCleanup(mesh.unregister)
-        wait_for(lambda: mesh.get_num_connections() == 1, 20, 'the node to take another type')
-        whole = grid_faces()
+        self.retype('dropped', MeshStamped)
+        whole = grid_faces(ROWS, COLS)
         stamp = [100.0]
 
         def send(faces):
             stamp[0] += 0.03
-            return self.send(mesh, mesh_of(Sheet(), faces, stamp[0]))
+            return self.send(mesh_of(Sheet(), faces, stamp[0]))
 
         none = send([])
         self.assertEqual(none.status, ContactArray.BAD_MESSAGE)
@@ -296,14 +285,10 @@ class StateTest(LiveNodeTest):
 
     def test_a_second_list_of_triangles(self):
         self.start_node('lists')
-        self.publisher.unregister()
-        markers = rospy.Publisher('/lists/mesh', MarkerArray, queue_size=5)
-        self.addCleanup(markers.unregister)
-        wait_for(lambda: markers.get_num_connections() == 1, 20, 'the node to take another type')
+        self.retype('lists', MarkerArray)
 
         def send(count, stamp_s):
-            message = MarkerArray([soup(Sheet(), stamp_s, i) for i in range(count)])
-            return self.send(markers, message)
+            return self.send(MarkerArray([soup(Sheet(), stamp_s, i) for i in range(count)]))
 
         send(1, 100)
         self.assertEqual(send(1, 100.03).status, ContactArray.OK)
@@ -312,11 +297,8 @@ class StateTest(LiveNodeTest):
         self.assertEqual(two.status, ContactArray.PARTIAL, two.reason)
         self.wait_missing('%d faces' % (2 * (ROWS - 1) * (COLS - 1)))
 
-    def send(self, publisher, message):
-        seen = len(self.contacts)
-        publisher.publish(message)
-        wait_for(lambda: len(self.contacts) > seen, 20, 'an outcome')
-        return self.contacts[-1]
+    def send(self, message):
+        return self.outcomes_of(self.publisher, [message])[0]
 
     # rosbag play, at several rates and paused: the watchdog lives in the bag's time.
 
@@ -327,24 +309,23 @@ class StateTest(LiveNodeTest):
             os.killpg(player.pid, signal.SIGKILL)
         player.wait()
 
-    def play(self, name, frames, rate, *flags):
-        folder = tempfile.mkdtemp(dir=self.folder)
-        path = os.path.join(folder, 'sheet.bag')
+    def play(self, name, frames, rate, lasts_s=0, until=lambda state: state.proved):
+        """Frames, then a clock that runs on; until a state says so."""
+        path = os.path.join(self.folder, name + '.bag')
         cloud = Sheet()
         with rosbag.Bag(path, 'w') as bag:
             for i in range(frames):
                 message = cloud.message(1000 + i / 30)
                 bag.write('/%s/mesh' % name, message, message.header.stamp)
-        rospy.set_param('/use_sim_time', True)
-        try:
+            if lasts_s:
+                bag.write('/other', Bool(), rospy.Time.from_sec(1000 + lasts_s))
+        with simulated_time():
             self.start_node(name)
             self.publisher.unregister()
-            player = subprocess.Popen(['rosbag', 'play', '--clock', '-q', '-d', '1', '-r', str(rate), '--hz', '100', *flags,
+            player = subprocess.Popen(['rosbag', 'play', '--clock', '-q', '-d', '1', '-r', str(rate), '--hz', '100',
                                        '__name:=player_' + name, path], stdin=subprocess.DEVNULL, start_new_session=True)
             self.addCleanup(self.end_session, player)
-            wait_for(lambda: self.states and self.states[-1].proved, 30, 'a proof')
-        finally:
-            rospy.delete_param('/use_sim_time')
+            wait_for(lambda: self.states and until(self.states[-1]), 30, 'what the bag is to lead to')
         return player
 
     def unproved_since_first(self):
@@ -365,25 +346,8 @@ class StateTest(LiveNodeTest):
 
     def test_a_bag_that_stops_bringing_frames(self):
         """The clock runs on ten times as fast, so half a second without a frame is over in 50 ms."""
-        folder = tempfile.mkdtemp(dir=self.folder)
-        path = os.path.join(folder, 'ends.bag')
-        cloud = Sheet()
-        with rosbag.Bag(path, 'w') as bag:
-            for i in range(30):
-                message = cloud.message(1000 + i / 30)
-                bag.write('/ending/mesh', message, message.header.stamp)
-            bag.write('/other', Bool(), rospy.Time.from_sec(1020))
-        rospy.set_param('/use_sim_time', True)
-        try:
-            self.start_node('ending')
-            self.publisher.unregister()
-            player = subprocess.Popen(['rosbag', 'play', '--clock', '-q', '-d', '1', '-r', '10', path], stdin=subprocess.DEVNULL,
-                                      start_new_session=True)
-            self.addCleanup(self.end_session, player)
-            wait_for(lambda: self.states and 'no frame has come' in self.states[-1].reason, 30, 'silence to be told')
-            self.assertIsNone(player.poll(), 'while the bag still plays')
-        finally:
-            rospy.delete_param('/use_sim_time')
+        player = self.play('ending', 30, 10, 20, lambda state: 'no frame has come' in state.reason)
+        self.assertIsNone(player.poll(), 'while the bag still plays')
 
     def test_a_paused_bag(self):
         self.play('paused', 300, 1)
@@ -397,15 +361,6 @@ class StateTest(LiveNodeTest):
         pause(False)
         wait_for(lambda: len(self.states) > said + 20, 20, 'steps')
         self.assertEqual(self.unproved_since_first(), [])
-
-
-def grid_faces(rows=ROWS, cols=COLS):
-    faces = []
-    for r in range(rows - 1):
-        for c in range(cols - 1):
-            a = r * cols + c
-            faces += [(a, a + 1, a + cols), (a + 1, a + cols + 1, a + cols)]
-    return faces
 
 
 def points_of(cloud):
@@ -428,7 +383,7 @@ def soup(cloud, stamp_s, number):
     marker.header.frame_id = 'world'
     marker.header.stamp = rospy.Time.from_sec(stamp_s)
     marker.pose.orientation.w = 1
-    marker.points = [points[v] for face in grid_faces() for v in face]
+    marker.points = [points[v] for face in grid_faces(ROWS, COLS) for v in face]
     return marker
 
 

@@ -7,6 +7,7 @@ import unittest
 
 import genpy
 import rosbag
+from geometry_msgs.msg import Pose, PoseArray
 from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import MarkerArray
 
@@ -74,13 +75,13 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
             self.assertIn('octomap', {row['body_1'] for row in csv.DictReader(file)})
         status, _, complaints, statuses = self.analyzed('cloudless', self.bag, *words)
         self.assertEqual((status, set(statuses)), (3, {'FIRST_FRAME', 'NO_MAP'}))
-        self.assertIn('the bag has no cloud on /points, which is to make the map', complaints)
+        self.assertIn('the bag has no cloud on /points, which is to make the map', self.said)
         cloud.fields.pop()
         with rosbag.Bag(str(clouded), 'a') as bag:
             bag.write('/points', cloud, self.messages[-1][2] - genpy.Duration.from_sec(0.0001))
         status, _, complaints, statuses = self.analyzed('refused', clouded, *words)
         self.assertEqual((status, statuses['NO_MAP']), (3, 1))
-        self.assertIn("cloud refused: there is no field 'z'", complaints)
+        self.assertIn("the cloud was refused: there is no field 'z'", complaints)
 
     def test_a_named_map_that_the_bag_does_not_have(self):
         for words in (self.params('octomap_topic: /octomap_binray\n'), self.params('octomap_topic: octomap\n')):
@@ -88,11 +89,28 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
             status, _, said, steps = self.analyzed('misspelt', self.bag, *words)
             self.assertEqual(status, 3, said)
             self.assertIn('the bag has no octomap on %s, which octomap_topic names; it has them on /octomap_binary' % topic,
-                          said)
+                          self.said)
             self.assertEqual(set(steps), {'FIRST_FRAME', 'NO_MAP'})
             status, _, said, steps = self.analyzed('without', self.bag, *words, '--without-map')
             self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), said)
             self.assertNotIn('octomap', said)
+            self.expect_mapless('without', 'nothing was checked against a map: effects/octomap is off')
+
+    def expect_mapless(self, name, sentence):
+        """In the headline, the facts and the last line: nobody shall take the run for one with a map."""
+        report = json.loads((self.folder / name / 'report.json').read_text())
+        self.assertIn('; %s' % sentence, report['headline'])
+        self.assertIn(['not looked at', sentence], report['facts'])
+        self.assertRegex(dict(report['facts'])['octomap'], '^(none on |off)')
+        self.assertEqual(report['proof']['not_looked_at'], [sentence])
+        self.assertIn(sentence, self.said.splitlines()[0])
+        self.assertEqual(self.said.splitlines()[-1], 'note: ' + sentence)
+
+    def test_what_else_the_bag_has_is_named(self):
+        rope = PoseArray(poses=[Pose(), Pose()])
+        status, said, _, _ = self.analyzed('rope', self.bag_with('rope.bag', ('/octomap_binary', self.octomap()), ('/rope', rope)), '--mesh', '/cloth')
+        self.assertEqual(status, 0)
+        self.assertEqual(said.splitlines()[-1], 'note: nothing was checked against what is on /rope')
 
     def test_a_named_map_of_which_nothing_is_usable(self):
         broken = copy.deepcopy(self.octomap())
@@ -100,14 +118,15 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         bag = self.bag_with('broken.bag', ('/table', broken))
         status, _, said, steps = self.analyzed('broken', bag, *self.params('octomap_topic: /table\n'))
         self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'NO_MAP'}), said)
-        self.assertIn('octomap refused', said)
-        self.assertIn('no octomap on /table could be used', said)
+        self.assertRegex(said, 'octomap (was )?refused')
+        self.assertIn('no octomap on /table could be used', self.said)
         nothing = self.bag_with('nothing.bag')
         status, _, said, steps = self.analyzed('nothing', nothing, *self.params('effects: {octomap: "on"}\n'))
         self.assertEqual((status, set(steps)), (3, {'FIRST_FRAME', 'NO_MAP'}), said)
-        self.assertIn('the bag has no octomap on /octomap_binary, which effects/octomap calls for; it has none', said)
+        self.assertIn('the bag has no octomap on /octomap_binary, which effects/octomap calls for; it has none', self.said)
         status, _, said, steps = self.analyzed('nothing', nothing)
         self.assertEqual((status, set(steps)), (0, {'FIRST_FRAME', 'OK'}), 'nobody called for one: ' + said)
+        self.expect_mapless('nothing', 'nothing was checked against a map: the bag has none')
 
     def test_a_refused_map_makes_the_one_before_void(self):
         start = self.messages[0][2]
@@ -123,7 +142,7 @@ class AnalyzeBagMapTest(AnalyzeBagTestCase):
         self.assertEqual(status, 3)
         self.assertGreater(steps['OK'], 10)
         self.assertGreater(steps['NO_MAP'], 10, 'no map is better than an old one')
-        self.assertIn('octomap refused', said)
+        self.assertRegex(said, 'octomap (was )?refused')
 
     def test_the_map_that_nobody_named(self):
         """The default's topic where the bag has it, else the bag's first one; what else there is is not passed over."""

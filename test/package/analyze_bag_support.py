@@ -38,6 +38,7 @@ class AnalyzeBagTestCase(FolderTestCase):
         command = [TOOLS / 'analyze_bag', bag, '--report', report, '--quiet', *words]
         ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
         self.assertIn(ran.returncode, (0, 3), ran.stderr)
+        self.said = ran.stdout
         return ran.returncode, ran.stdout, ran.stderr, self.statuses_of(report)
 
     def params(self, text):

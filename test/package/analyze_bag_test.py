@@ -1,6 +1,7 @@
 """analyze_bag as people use it: the same output for any number of threads, exit statuses, phases, the report at once."""
 import csv
 import io
+import json
 import subprocess
 import unittest
 
@@ -41,6 +42,37 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
         status, _, said, steps = self.analyzed('lost', lost, *params)
         self.assertEqual((status, set(steps)), (3, {'NO_TRANSFORM'}))
         self.assertRegex(said, r'no frame was answered: (\d+) of \1 frames: NO_TRANSFORM: no transform .*moon.*\(\1\)\n')
+        self.assertEqual((said + self.said).count('no transform'), 1, 'the reason is said once')
+        self.assertIn('the bag has neither /tf nor /tf_static', said)
+
+    def refused(self, bag, *words):
+        ran = subprocess.run([str(TOOLS / 'analyze_bag'), str(bag), '--report', str(self.folder / 'no'), '--quiet', *words],
+                             capture_output=True, text=True, check=False)
+        self.assertEqual(ran.returncode, 1, ran.stdout)
+        return ran.stderr
+
+    def test_what_is_missing_or_misspelt_is_named_as_the_user_knows_it(self):
+        alone = self.folder / 'map_alone.bag'
+        with rosbag.Bag(str(alone), 'w') as bag:
+            bag.write('/octomap_binary', next(m for t, m, _ in self.messages if t == '/octomap_binary'), self.messages[0][2])
+        self.assertIn('no topic of a mesh type; the bag has /octomap_binary (octomap_msgs/Octomap)', self.refused(alone))
+        self.assertIn('no topic /clth; the bag has /cloth (', self.refused(self.bag, '--mesh', '/clth'))
+        self.assertIn('--acuracy is no option; nearest is --accuracy', self.refused(self.bag, '--acuracy', 'exact'))
+
+    def test_millimetres_are_named_in_the_headline(self):
+        large = self.folder / 'large.bag'
+        with rosbag.Bag(str(large), 'w') as bag:
+            for topic, message, at in self.messages:
+                if topic != '/cloth':
+                    continue
+                for v in message.vertices:
+                    v.x, v.y, v.z = 1000 * v.x, 1000 * v.y, 1000 * v.z
+                bag.write(topic, message, at)
+                for v in message.vertices:
+                    v.x, v.y, v.z = v.x / 1000, v.y / 1000, v.z / 1000
+        self.analyzed('large', large)
+        headline = json.loads((self.folder / 'large/report.json').read_text())['headline']
+        self.assertRegex(headline, r'TELEPORT: .* m across: are its coordinates in millimetres\?')
 
     def test_the_help_lists_the_exit_statuses(self):
         said = self.tool('analyze_bag', '--help').stdout

@@ -11,7 +11,7 @@ from checkout import CHECKOUT, TOOLS, FolderTestCase
 HAS_NUMPY = importlib.util.find_spec('numpy') is not None
 if HAS_NUMPY:
     sys.path.append(str(CHECKOUT / 'benchmark'))
-    from cell import CELLS, SETTINGS, Contact, Run, Step, blind_percent, derived_page, judge, occupied_voxels, table_line
+    from cell import CELLS, SETTINGS, Contact, Run, Step, blind_percent, derived_page, judge, occupied_voxels, required, table_line
 
 RESOLUTION_M = 0.02
 
@@ -58,6 +58,20 @@ class JudgeTest(FolderTestCase):
         self.expect(self.judged((0.15, 0.0, 1), (0.95, 1.0, 2)), true=1, false=1, missed=1, in_time=1)
         # A patch that begins earlier and still touches there is found, but not in time.
         self.expect(self.judged((0.15, 0.0, 1), (0.25, 0.0, 1), (0.35, 0.0, 1), (0.85, 1.0, 2)), true=2, false=0, missed=0, in_time=1)
+
+    def test_where_the_truth_touches_already_it_is_in_time_to_go_on(self):
+        """A second patch of the truth begins where a first one touches; in the run that one goes on."""
+        row = judge(run_of((0.35, 0.0, 1), (0.45, 0.0, 1), (0.55, 0.0, 2)), run_of((0.35, 0.0, 1), (0.45, 0.0, 1), (0.55, 0.0, 1)),
+                    set(), RESOLUTION_M)
+        self.expect(row, true=1, false=0, missed=0, true_alarms=2, in_time=2)
+
+    def test_what_is_required_is_said_of_the_settings_that_it_is_required_of(self):
+        row = {'scene': 's', 'noise_m': 0.003, 'lag_s': 0.1, 'rate_hz': 5.0, 'own': 'with', 'clear': 19, 'clear_of': 20, 'false_before': 0,
+               'missed': 0, 'true_alarms': 6, 'in_time': 5}
+        rows = [row, {**row, 'lag_s': 0.3}, {**row, 'own': 'without'}, {**row, 'noise_m': 0.01}, {**row, 'rate_hz': 10.0},
+                {**row, 'lag_s': 0.0, 'clear': 18, 'false_before': 2}]
+        self.assertEqual(required(rows).splitlines()[2:], ['| s | 0.1 | yes | yes | yes | no, 5 of 6 |',
+                                                            '| s | 0 | no, 18 of 20 | no, 2 | yes | no, 5 of 6 |'])
 
     def test_what_is_no_alarm_finds_nothing(self):
         run = run_of(*self.TRUTH)

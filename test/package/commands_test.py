@@ -310,6 +310,13 @@ class CommandsTest(unittest.TestCase):
             finally:
                 stop(client)
                 self.gone('/stop_the_arm/stop')
+        if words[:3] == ['rosrun', 'deformable_ccd', 'publish_cloth.py']:
+            tracker = self.start(command)
+            try:
+                return self.assertIn('600', self.runs('timeout 40 rostopic echo -n 1 /tracker/cloth/width', 60))
+            finally:
+                stop(tracker)
+                self.gone('/tracker/cloth')
         if words[:3] == ['rosrun', 'deformable_ccd', 'watch']:
             self.with_a_monitor()
             view = self.start(command)

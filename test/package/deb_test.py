@@ -154,10 +154,20 @@ class ControlTest(unittest.TestCase):
         self.assertIn('deformable_ccd', started)
         self.assertEqual({serves.get(name, name) for name in started} - depends, set())
         self.assertIn('rviz', names(own['Suggests']))
-        imported = set(re.findall(r'^(?:import|from) (\w+)', (CHECKOUT / 'examples/stop_the_arm.py').read_text(), re.M))
-        modules = {'python3-' + name.replace('_', '-') for name in imported - {'deformable_ccd', 'time'}}
+        clients = ''.join((CHECKOUT / 'examples' / name).read_text() for name in ('stop_the_arm.py', 'publish_cloth.py'))
+        imported = set(re.findall(r'^(?:import|from) (\w+)', clients, re.M))
+        modules = {'python3-' + name.replace('_', '-') for name in imported - {'deformable_ccd', 'math', 'struct', 'time'}}
         self.assertIn('python3-rospy', modules)
         self.assertEqual(modules - depends, set())
+
+    def test_the_image_has_the_packages_and_what_they_recommend_for_a_terminal(self):
+        """docker/Dockerfile installs without recommended packages what the story installs with them."""
+        text = (CHECKOUT / 'docker/Dockerfile').read_text()
+        self.assertIn('RUN scripts/package\n', text)
+        self.assertRegex(text, r'COPY --from=build /source/build/packages/\*\.deb /packages/\n')
+        added = set(re.findall(r'python3-\w+', text))
+        recommended = {n for n in names(control()['deformable-ccd']['Recommends']) if n.startswith('python3-')}
+        self.assertEqual(added, recommended)
 
     def test_every_command_of_the_page_is_in_the_story(self):
         page = (CHECKOUT / 'doc/development.md').read_text()

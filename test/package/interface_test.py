@@ -1,6 +1,7 @@
 """doc/interface.md against the code: parameters, topics, services and live parameters are the same on both sides."""
 import re
 import unittest
+import xml.etree.ElementTree as ElementTree
 
 from checkout import CHECKOUT
 
@@ -111,6 +112,22 @@ class InterfaceTest(unittest.TestCase):
         table = PAGE[PAGE.index('## What comes out'):PAGE.index('**How to read a contact.**')]
         rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
         self.assertEqual(code, {name for row in rows for name in re.findall(r'`~(\w+)`', row)})
+
+    def test_curves_of_the_layout(self):
+        """What config/plotjuggler.xml plots is a number of a message that is published under that topic."""
+        types = {topic: name for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
+                 for name, topic in re.findall(r'advertise<(?:\w+::)*(\w+)>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
+        curves = [curve.get('name') for curve in ElementTree.parse(CHECKOUT / 'config/plotjuggler.xml').iter('curve')]
+        self.assertGreater(len(curves), 10)
+        for curve in curves:
+            _, node, topic, field = curve.split('/')
+            with self.subTest(curve):
+                self.assertEqual(node, 'collision_monitor')
+                if types[topic] == 'Bool':
+                    self.assertEqual(field, 'data')
+                else:
+                    message = (CHECKOUT / 'msg' / (types[topic] + '.msg')).read_text()
+                    self.assertRegex(message, r'(?m)^(u?int|float)\d+ %s\b' % field)
 
     def test_services(self):
         source = (CHECKOUT / 'src/node/collision_monitor.cpp').read_text()

@@ -115,6 +115,13 @@ class LaunchTest(unittest.TestCase):
                              {**defaults, 'obstacle_resolution_m': 0.02, 'obstacle_cloud_topic': 'obstacle_cloud'})
             self.assertIn('obstacle_cloud:=/my_cloud', self.words(launch, *arguments))
 
+    def test_no_argument_is_called_required(self):
+        for path in LAUNCH_FILES:
+            with self.subTest(path.name):
+                ran = subprocess.run(['roslaunch', '--ros-args', str(path)], env=self.environment, capture_output=True, text=True, check=False)
+                self.assertIn('Optional Arguments:\n', ran.stdout, ran.stderr)
+                self.assertNotIn('Required', ran.stdout)
+
     def test_neither(self):
         for launch, defaults in DEFAULTS.items():
             found = self.parameters(launch)

@@ -8,6 +8,8 @@ import subprocess
 import tempfile
 import unittest
 
+import yaml
+
 from checkout import CHECKOUT, TOOLS
 
 try:
@@ -17,6 +19,7 @@ try:
 except ImportError:  # as chromium-driver, only where somebody installed it
     webdriver = None
 
+SCENES = CHECKOUT / 'config/scenes'
 BROWSER = next((b for b in ('chromium', 'chromium-browser', 'google-chrome') if shutil.which(b)), None)
 
 
@@ -25,15 +28,15 @@ class ReportPageTest(unittest.TestCase):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder, True)
         self.page = self.folder / 'report.html'
-        self.report('table_edge', 80, '--accuracy-study')
+        self.report(SCENES / 'table_edge.yaml', 80, '--accuracy-study')
 
     def report(self, scene, frames, *words):
         bag, params = self.folder / 'scene.bag', self.folder / 'scene.yaml'
-        for command in ([TOOLS / 'make_scene_bag', CHECKOUT / 'config/scenes' / (scene + '.yaml'), bag, '--frames', frames,
+        for command in ([TOOLS / 'make_scene_bag', scene, bag, '--frames', frames,
                          '--monitor-config', params, '--quiet'],
                         [TOOLS / 'analyze_bag', bag, '--params', params, '--report', self.folder, '--quiet', *words]):
             ran = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
-            self.assertEqual(ran.returncode, 0, ran.stderr)
+            self.assertIn(ran.returncode, (0, 3), ran.stderr)  # 3: not all of it is proved
 
     def dom(self):
         """The page as a browser leaves it, and what its console said."""
@@ -65,11 +68,13 @@ class ReportPageTest(unittest.TestCase):
             rows = body[body.index('id="%s"' % name):].split('</table>')[0].count('<tr')
             self.assertGreater(rows, 1, name)
         self.assertRegex(body, r'FIRST_FRAME')
+        verdict = body[body.index('id="verdict"'):body.index('id="player"')]
+        self.assertRegex(verdict, r'All 79 steps are proved.*The map was used.*First new contact.*cloth with octomap: 0\.\d{3} s after')
         self.assertRegex(body, r'id="study_sentence">[^<]*(?:missed or invented|nothing to compare)')
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_what_made_it_and_both_sides_of_what_is_round(self):
-        self.report('felt_and_finger', 40)
+        self.report(SCENES / 'felt_and_finger.yaml', 40)
         body, console = self.dom()
         self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
         heat = body[body.index('id="heat"'):].split('<h2')[0]
@@ -80,6 +85,14 @@ class ReportPageTest(unittest.TestCase):
         self.assertRegex(facts, r'deformable_ccd \d+\.\d+\.\d+, compiled by ')
         self.assertRegex(facts, r'<summary>\S*scene\.yaml</summary><pre>[^<]*minimum_separation_m: 0\.012')
         self.assertRegex(facts, r'\d+ CLEAR, \d+ INTERSECTING, \d+ NOT_CHECKED; frames without an answer: 1')
+
+    @unittest.skipUnless(BROWSER, 'no Chromium is installed')
+    def test_a_run_without_a_map_says_so_on_top(self):
+        self.report('table_edge', 40, '--without-map')
+        body, _ = self.dom()
+        verdict = body[body.index('id="verdict"'):body.index('id="player"')]
+        self.assertRegex(verdict, r'No map was used.*Nothing was checked against a map: effects/octomap is off\..*Nothing was found to touch')
+        self.assertNotIn('id="study"', body, 'what was not asked for takes no place')
 
     def browser(self):
         """A page of 1280 x 1000 pixels, drawn by software; its console is empty at the end."""
@@ -106,6 +119,15 @@ class ReportPageTest(unittest.TestCase):
         def seek(seconds):
             page.execute_script("const s = document.getElementById('seek'); s.value = arguments[0];"
                                 "s.dispatchEvent(new Event('input'))", seconds)
+
+        # It opens at the first new contact, and fits a narrow window.
+        first = min((pair['first'] for pair in data['partners'] if pair['first']), key=lambda one: one['t'])
+        self.assertAlmostEqual(page.execute_script('return player.time()'), first['t'], 6)
+        page.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {'width': 400, 'height': 900, 'deviceScaleFactor': 1, 'mobile': False})
+        page.refresh()
+        self.assertLessEqual(page.execute_script('return document.documentElement.scrollWidth'), 400)
+        page.execute_cdp_cmd('Emulation.clearDeviceMetricsOverride', {})
+        page.refresh()
 
         # To the step of the first contact: its contacts are those of contacts.csv, and a click says what one is.
         first = data['partners'][0]['first']
@@ -170,6 +192,24 @@ class ReportPageTest(unittest.TestCase):
         self.assertIn(first['stamp'], text('firsts'))
         self.assertEqual(page.execute_script("return performance.getEntriesByType('resource').length"), 0)
         self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
+
+    @unittest.skipUnless(BROWSER, 'no Chromium is installed')
+    def test_own_voxels(self):
+        """Of a camera's map the player's legend names the voxels that are the cloth's own, and those in doubt: the first map has the cloth."""
+        page = yaml.safe_load((SCENES / 'table_edge.yaml').read_text())
+        page['camera'] = {'position_m': [0.9, 0.3, 1.35], 'looks_at_m': [-0.1, 0, 0.85], 'field_of_view_rad': 1.0,
+                          'width': 120, 'height': 90, 'rate_hz': 5}
+        page['monitor']['own_voxels_m'] = 'auto'
+        scene = self.folder / 'seen.yaml'
+        scene.write_text(yaml.safe_dump(page))
+        self.report(scene, 40)
+        maps = json.loads(re.search(r'id="player_data">(.*?)</script>', self.page.read_text(), re.S)[1])['maps']
+        self.assertTrue(any('own' in m for m in maps) and any('doubted' in m for m in maps))
+        body, console = self.dom()
+        self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
+        if 'without three.js' not in body:
+            self.assertIn("a body's own voxels", body)
+            self.assertIn('voxels in doubt', body)
 
     @unittest.skipUnless(webdriver and shutil.which('chromedriver'), 'no chromium-driver or python3-selenium is installed')
     def test_without_the_library_the_page_says_so_and_has_the_rest(self):

@@ -90,13 +90,13 @@ class SceneFactsTest(unittest.TestCase):
             self.assertLess(score['median_error_s'], monitor['look_ahead_s'] / 2)
         else:
             self.assertIsNone(report['look_ahead'])
-        if 'minimum_separation' in monitor['effects']:
+        if 'minimum_separation_m' in monitor:
             self.assertGreater(report['left_out']['pairs'], 100)
             self.assertIn('%d pairs' % report['left_out']['pairs'], effects['minimum_separation']['reason'])
 
     def test_the_facts_that_each_scene_states(self):
         scenes = sorted((CHECKOUT / 'config/scenes').glob('*.yaml'))
-        self.assertGreaterEqual(len(scenes), 6)
+        self.assertGreaterEqual(len(scenes), 7)
         for scene in scenes:
             with self.subTest(scene=scene.stem):
                 steps, events, report = analyse(scene, self.folder)
@@ -223,6 +223,71 @@ class MakeSceneBagTest(unittest.TestCase):
         result = run(TOOLS / 'make_scene_bag', self.scene, self.folder / 'no' / 'such' / 'f.bag', '--frames', '2')
         self.assertEqual(result.returncode, 1)
         self.assertIn('f.bag', result.stderr)
+
+
+class RobotTest(FolderTestCase):
+    """A scene with a robot: what a bag holds of it, by the page's timetable and the URDF."""
+
+    SCENE = CHECKOUT / 'config/scenes/grasp_and_lay.yaml'
+
+    def record(self, name, frames=46, scene=None):
+        recorded = run(TOOLS / 'make_scene_bag', scene or self.SCENE, self.folder / name, '--frames', frames, '--quiet')
+        self.assertEqual(recorded.returncode, 0, recorded.stderr)
+        return self.folder / name
+
+    def test_joints_links_and_camera(self):
+        with rosbag.Bag(str(self.record('robot.bag'))) as bag:
+            messages = [(topic, message, at.to_sec() - 1000) for topic, message, at in bag.read_messages()]
+        states = {round(30 * at): dict(zip(m.name, m.position)) for topic, m, at in messages if topic == '/joint_states'}
+        moved = {round(30 * at): {(t.header.frame_id, t.child_frame_id): t.transform for t in m.transforms}
+                 for topic, m, at in messages if topic == '/tf'}
+        self.assertEqual(sorted(states), list(range(46)))
+        self.assertEqual(set(states[0]), {'lift', 'slide', 'wrist', 'finger', 'other_finger'})
+        for frame, lift, finger in ((0, 1.36, 0.03), (12, 1.32025, 0.03), (24, 1.2805, 0.03), (33, 1.2805, 0.0155), (45, 1.2805, 0.001)):
+            self.assertAlmostEqual(states[frame]['lift'], lift, places=9)
+            self.assertAlmostEqual(states[frame]['finger'], finger, places=9)
+            self.assertAlmostEqual(states[frame]['other_finger'], finger, places=9, msg='it mimics the other')
+            self.assertAlmostEqual(moved[frame]['arm_base', 'rail'].translation.z, lift, places=9)
+            self.assertAlmostEqual(moved[frame]['hand', 'back_finger'].translation.x, -finger, places=9)
+        (static,) = (m for topic, m, _ in messages if topic == '/tf_static')
+        base, = (t.transform.translation for t in static.transforms if t.child_frame_id == 'arm_base')
+        self.assertEqual((base.x, base.y, base.z), (0.45, 0.6, 0))
+        # Higher than the towel and the table there is the arm alone, which the camera's map shows.
+        maps = [occupied_leaves(m.data) for topic, m, _ in messages if topic == '/octomap_binary']
+        high = [sum(key[2] - CENTER >= 1.3 / RESOLUTION_M for key in leaves) for leaves in maps]
+        self.assertEqual(high[:2], [0, 0], 'the cell was mapped before')
+        self.assertGreater(min(high[2:]), 20)
+
+    def test_the_same_seed_gives_the_same_bag(self):
+        self.assertEqual(self.record('a.bag', 7).read_bytes(), self.record('b.bag', 7).read_bytes())
+
+    def test_without_own_voxels_the_arm_and_the_towel_are_obstacles(self):
+        """So that the page's fact of the map says something: the towel touches the table first, at 3.25 s or later."""
+        bag = self.record('all.bag', 90)
+        config = yaml.safe_load(self.SCENE.read_text())['monitor']
+        config['effects']['own_voxels'] = 'off'
+        del config['own_voxels_m']
+        (self.folder / 'all.yaml').write_text(yaml.safe_dump(config))
+        run(TOOLS / 'analyze_bag', bag, '--report', self.folder / 'all', '--params', self.folder / 'all.yaml', '--quiet')
+        story = tell(steps_of(self.folder / 'all'))
+        self.assertLess(story.first_s['octomap'], 1)
+
+    def test_what_the_urdf_does_not_have_is_refused(self):
+        urdf = 'package://deformable_ccd/config/scenes/robots/cloth_arm.urdf'
+        for old, new, told in (
+                ('    slide: ', '    sledge: ', "bad.yaml: robot/joints names 'sledge', and %s has no joint of that name that moves" % urdf),
+                ('link: hand', 'link: paw', "bad.yaml: 'paw' is no body of the scene, and no link of %s" % urdf),
+                ('[towel, hand]', '[towel, paw]', "bad.yaml: 'paw' is no body of the scene"),
+                ('description: package://deformable_ccd/config/scenes/robots/cloth_arm.urdf', 'description: none.urdf', 'none.urdf'),
+                ('group fingers', 'group thumbs', 'group thumbs')):
+            text = self.SCENE.read_text()
+            self.assertIn(old, text)
+            (self.folder / 'bad.yaml').write_text(text.replace(old, new, 1))
+            refused = run(TOOLS / 'make_scene_bag', self.folder / 'bad.yaml', self.folder / 'bad.bag')
+            with self.subTest(new=new):
+                self.assertEqual(refused.returncode, 1)
+                self.assertIn(told, refused.stderr)
+                self.assertFalse((self.folder / 'bad.bag').exists())
 
 
 RESOLUTION_M, CENTER = 0.02, 1 << 15  # of the demo's map; the key of the coordinate 0

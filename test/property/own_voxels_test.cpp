@@ -3,12 +3,15 @@
 // the oracle. DEFORMABLE_CCD_LONG=1 runs many more worlds.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <random>
 #include <set>
 
+#include "obstacle/voxel_surface_impl.h"
 #include "stream/own_voxels.h"
 #include "support/box_oracle.h"
 
@@ -18,7 +21,7 @@ namespace {
 
 constexpr double VOXEL_M = 0.1;
 constexpr StampNs MS = 1000000;
-constexpr int SIDE = 10;  // voxels of the world, each way
+constexpr int SIDE = 12;  // voxels of the world, each way
 // What the finder may miss: half of the way between two places at which it asks for a body.
 constexpr double RIM_M = 0.5 * tolerance::OWN_PLACES * VOXEL_M + 1e-9;
 
@@ -64,7 +67,7 @@ double distance(const Cell& cell, const Topology& topology, const Positions& a, 
 class Model {
  public:
   enum class State { OBSTACLE, OWN, DOUBTED };
-  explicit Model(const Topology& topology) : topology_(topology) {}
+  Model(const Topology& topology, std::set<Cell> trusted) : topology_(topology), trusted_(std::move(trusted)) {}
 
   double nearest(const Cell& cell, const std::vector<Seen>& frames, StampNs since_ns, StampNs until_ns) const {
     double least = 1e300;
@@ -105,7 +108,7 @@ class Model {
       if (was != states_.end()) {
         state = was->second;
         if (state == State::DOUBTED && !reached(cell, said_doubted)) state = State::OBSTACLE;
-      } else if (remembered_.count(cell) == 0 && reached(cell, said_own)) {
+      } else if (remembered_.count(cell) + trusted_.count(cell) == 0 && reached(cell, said_own)) {
         state = is_first || is_older ? State::DOUBTED : State::OWN;
       }
       now[cell] = state;
@@ -138,12 +141,13 @@ class Model {
 
  private:
   const Topology& topology_;
+  const std::set<Cell> trusted_;
   std::map<Cell, State> states_;
   std::set<Cell> remembered_;  // obstacles that the last map did not show
   std::optional<StampNs> before_ns_;
 };
 
-/// Random voxels near the body and elsewhere, among them whole blocks of 2 x 2 x 2 as one leaf.
+/// Random voxels near the body and elsewhere, among them whole blocks of 2^3 and 4^3 as one leaf.
 std::set<Cell> randomCells(std::mt19937_64& random, const Positions& body, std::set<Cell> kept) {
   const auto any = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   for (auto it = kept.begin(); it != kept.end();) it = any(4) == 0 ? kept.erase(it) : std::next(it);
@@ -162,30 +166,36 @@ std::set<Cell> randomCells(std::mt19937_64& random, const Positions& body, std::
   }
   for (int i = any(3); i > 0; --i) add({any(SIDE), any(SIDE), any(SIDE)});
   if (any(3) == 0) {
-    const Cell corner{2 * any(SIDE / 2), 2 * any(SIDE / 2), 2 * any(SIDE / 2)};
-    for (int k = 0; k < 8; ++k) add({corner[0] + (k & 1), corner[1] + (k >> 1 & 1), corner[2] + (k >> 2)});
+    const int size = any(2) == 0 ? 2 : 4, blocks = SIDE / size;
+    const Cell corner{size * any(blocks), size * any(blocks), size * any(blocks)};
+    for (int i = 0; i < size * size * size; ++i) {
+      add({corner[0] + i % size, corner[1] + i / size % size, corner[2] + i / size / size});
+    }
   }
   return kept;
 }
 
-/// As an octree has them: where all eight of a block are occupied they are one leaf.
-std::vector<OccupiedLeaf> pruned(std::set<Cell> cells) {
+/// As an octree has them: where all eight of a block are occupied they are one leaf, up to 4 voxels a side.
+std::vector<OccupiedLeaf> pruned(const std::set<Cell>& cells) {
   std::vector<OccupiedLeaf> leaves;
-  for (int x = 0; x < SIDE; x += 2) {
-    for (int y = 0; y < SIDE; y += 2) {
-      for (int z = 0; z < SIDE; z += 2) {
-        std::vector<Cell> block;
-        for (int k = 0; k < 8; ++k) {
-          const Cell cell{x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)};
-          if (cells.count(cell) > 0) block.push_back(cell);
-        }
-        if (block.size() == 8) {
-          leaves.push_back(leafOf({x, y, z}, 2));
-        } else {
-          for (const Cell& cell : block) leaves.push_back(leafOf(cell));
-        }
-      }
+  const std::function<int(const Cell&, int)> occupied = [&](const Cell& at, int size) {
+    int count = 0;
+    for (int i = 0; i < size * size * size; ++i) {
+      count += static_cast<int>(cells.count({at[0] + i % size, at[1] + i / size % size, at[2] + i / size / size}));
     }
+    return count;
+  };
+  const std::function<void(const Cell&, int)> add = [&](const Cell& at, int size) {
+    const int count = occupied(at, size);
+    if (count == size * size * size) return leaves.push_back(leafOf(at, static_cast<std::uint32_t>(size)));
+    for (int k = 0; count > 0 && k < 8; ++k) {
+      const int half = size / 2;
+      add({at[0] + half * (k & 1), at[1] + half * (k >> 1 & 1), at[2] + half * (k >> 2)}, half);
+    }
+  };
+  for (int i = 0; i < SIDE * SIDE * SIDE / 64; ++i) {
+    constexpr int BLOCKS = SIDE / 4;
+    add({4 * (i % BLOCKS), 4 * (i / BLOCKS % BLOCKS), 4 * (i / BLOCKS / BLOCKS)}, 4);
   }
   return leaves;
 }
@@ -201,11 +211,14 @@ TEST(OwnVoxelsProperty, WhatIsOwnIsWhatTheRuleNames) {
     const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(4, {{0, 1, 2}, {1, 3, 2}}));
     MeshStore store{MeshStoreOptions()};
     OwnVoxelFinder finder;
-    Model model(*topology);
+    std::set<Cell> trusted;
     const double reach_m = chance(2) ? VOXEL_M : real(0.01, 0.25), lag_s = chance(2) ? 0 : real(0, 0.3);
     const bool tells_free = chance(2);
     Positions at;
     for (int v = 0; v < 4; ++v) at.push_back({real(0.2, 0.8), real(0.2, 0.8), real(0.2, 0.8)});
+    if (chance(3)) trusted = randomCells(random, at, randomCells(random, at, {}));
+    const auto beside = trusted.empty() ? nullptr : VoxelSurface::build(VOXEL_M, pruned(trusted));
+    Model model(*topology, trusted);
     std::vector<Seen> frames;
     std::set<Cell> cells;
     StampNs now_ns = 1000 * MS, map_ns = 0;
@@ -233,7 +246,8 @@ TEST(OwnVoxelsProperty, WhatIsOwnIsWhatTheRuleNames) {
         }
         map.known = KnownSpace::build(VOXEL_M, known);
       }
-      const ObstacleMap reduced = finder.reduce(map, nullptr, {{0, "cloth", reach_m, &store, false}}, lag_s, false);
+      const ObstacleMap reduced =
+          finder.reduce(map, beside.get(), {{0, "cloth", reach_m, &store, false}}, lag_s, false);
       std::map<Cell, bool> found;
       for (const OwnVoxel& voxel : *reduced.own.voxels) {
         found[{voxel.key.x - 32768, voxel.key.y - 32768, voxel.key.z - 32768}] = voxel.doubted;
@@ -241,7 +255,12 @@ TEST(OwnVoxelsProperty, WhatIsOwnIsWhatTheRuleNames) {
       model.judge(cells, tells_free ? &free : nullptr, frames, map_ns, lag_s, reach_m, found);
       std::size_t left = 0;
       for (const OccupiedLeaf& leaf : reduced.surface->leaves()) left += leaf.size * leaf.size * leaf.size;
-      EXPECT_EQ(left, cells.size() - found.size());
+      EXPECT_EQ(left, cells.size() - found.size() +
+                          std::count_if(trusted.begin(), trusted.end(),
+                                        [&](const Cell& cell) { return cells.count(cell) == 0; }));
+      // However it was made: as from the beginning.
+      const auto whole = VoxelSurface::build(VOXEL_M, reduced.surface->leaves());
+      EXPECT_EQ(reduced.surface->impl().features, whole->impl().features);
       remembered += model.remembers();
     }
     own += model.own;

@@ -10,6 +10,7 @@
 #include "dccd/stream.h"
 #include "oracle/exact_distance.h"
 #include "support/query_property.h"
+#include "support/said.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -281,12 +282,7 @@ TEST(StepSeparation, BadRadiiAndRungsAreRefused) {
     Detector detector(options);
     Step motion = step.motion();
     motion.bodies[0].radius_m = share(radius);
-    try {
-      detector.run(motion);
-    } catch (const std::invalid_argument& e) {
-      return e.what();
-    }
-    return "";
+    return said<std::invalid_argument>([&] { detector.run(motion); });
   };
   const std::size_t n = step.bodies[0].t0.size();
   const auto names = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };

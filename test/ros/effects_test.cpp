@@ -1,4 +1,4 @@
-// Effects through the live node: what is left out of the map, unknown space, separations of bodies and of pairs, ropes,
+// Effects through the live node: what is left out of the map, separations of bodies and of pairs, ropes,
 // and rigid bodies that turn.
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
@@ -17,7 +17,7 @@ namespace dccd {
 namespace test {
 namespace {
 
-constexpr std::size_t MONITORS = 4;  // in effects.test; each listens to /tf
+constexpr std::size_t MONITORS = 3;  // in effects.test; each listens to /tf
 
 using ContactMessage = deformable_ccd::ContactArray::_contacts_type::value_type;
 
@@ -29,11 +29,10 @@ double earliest(const deformable_ccd::ContactArray& outcome) {
 
 // --- a grid above a block of voxels ----------------------------------------------------------------------------------
 
-struct OverMap : MonitorTest {
-  explicit OverMap(const std::string& name)
-      : MonitorTest(name),
-        mesh(advertiseAndWait<sensor_msgs::PointCloud2>(node, name + "/mesh")),
-        map(advertiseAndWait<octomap_msgs::Octomap>(node, name + "/octomap", true)) {}
+struct Filtered : MonitorTest {
+  Filtered() : MonitorTest("/filtered") {}
+  ros::Publisher mesh = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/filtered/mesh");
+  ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/filtered/octomap", true);
 
   /// A step between two heights that has seen the map, with the stamp of its end.
   deformable_ccd::ContactArray step(double from_z, double to_z, double end_s) {
@@ -48,11 +47,6 @@ struct OverMap : MonitorTest {
     EXPECT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(end_s); }));
     return outcome;
   }
-  ros::Publisher mesh, map;
-};
-
-struct Filtered : OverMap {
-  Filtered() : OverMap("/filtered") {}
 };
 
 TEST_F(Filtered, MaskedVerticesAndExcludedBoxesMeetNothing) {
@@ -75,26 +69,6 @@ TEST_F(Filtered, InitialContactsAreSuppressedByChoiceAndCounted) {
   EXPECT_TRUE(outcome.contacts.empty()) << "all of it has been inside from the start";
   EXPECT_GT(stats.last().suppressed, 0u);
   EXPECT_FALSE(clear.last().data) << "suppressed is not clear";
-}
-
-struct Occupied : OverMap {
-  Occupied() : OverMap("/occupied") {}
-};
-
-TEST_F(Occupied, TheUnknownIsAnObstacleWithinItsBox) {
-  const deformable_ccd::ContactArray outcome = step(0.8, 0.4, 50);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  EXPECT_NEAR(earliest(outcome), 0.5, 1e-6) << "the box ends at 0.6 m";
-  EXPECT_NEAR(stats.last().map_age, 49, 1e-6);
-}
-
-TEST_F(Occupied, AnOldMapIsNoMap) {
-  step(0.8, 0.7, 50);
-  trigger("reset");
-  send(mesh, cloud(gridAt(3, 4, 0.8), 101.5));
-  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 0.7), 101.6));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP);
-  EXPECT_NE(outcome.reason.find("octomap_timeout_s"), std::string::npos) << outcome.reason;
 }
 
 // --- separations -----------------------------------------------------------------------------------------------------

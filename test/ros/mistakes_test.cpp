@@ -1,7 +1,11 @@
 // What people get wrong when they plug their tracker in, and that they are told what to do about it: in the log and in
-// /diagnostics. doc/troubleshooting.md lists the same messages.
+// /diagnostics, and in ~state/reason where nothing is proved. doc/troubleshooting.md lists the same messages.
+#include <deformable_ccd/State.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+
 #include <octomap_msgs/Octomap.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Log.h>
@@ -23,21 +27,28 @@ class Mistake : public ::testing::Test {
   Probe<diagnostic_msgs::DiagnosticArray> diagnostics{node, "/diagnostics"};
 
   /// Publishes again and again, as a tracker does, until the monitor has said `what` and `advice` in one line of the
-  /// log and in its diagnostics.
+  /// log, in its diagnostics and, unless its steps are proved, in its state.
   void expectTold(const std::string& name, const std::string& what, const std::string& advice,
                   const std::function<void()>& publish) {
     std::string logged, diagnosed;
+    const Probe<deformable_ccd::State> states(node, name + "/state");
+    const auto stated = [&] {
+      const auto all = states.all();
+      return std::any_of(all.begin(), all.end(),
+                         [&](const auto& state) { return state.proved || holds(state.reason, what, advice); });
+    };
     const bool told = waitUntil(
         [&] {
           publish();
           ros::WallDuration(0.03).sleep();
           logged = logLine(name, what, advice);
           if (diagnosed.empty()) diagnosed = diagnosis(name, what, advice);
-          return !logged.empty() && !diagnosed.empty();
+          return !logged.empty() && !diagnosed.empty() && stated();
         },
         15);
     EXPECT_TRUE(told) << "log: '" << logged << "', diagnostics: '" << diagnosed << "', newest diagnosis: '"
-                      << diagnosis(name, "", "") << "'";
+                      << diagnosis(name, "", "") << "', newest state: '"
+                      << (states.all().empty() ? "" : states.all().back().reason) << "'";
   }
 
  private:

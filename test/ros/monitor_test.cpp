@@ -114,30 +114,6 @@ TEST_F(Plain, SeamsAreNeverStepped) {
   expectAddsUp();
 }
 
-TEST_F(Plain, LoopingReplay) {
-  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
-  for (int loop = 0; loop < 3; ++loop) {
-    const deformable_ccd::ContactArray start = send(publisher, meshStamped(tipAbove(1), 5));
-    EXPECT_EQ(start.status,
-              loop == 0 ? deformable_ccd::ContactArray::FIRST_FRAME : deformable_ccd::ContactArray::TIME_JUMP);
-    expectQuarter(send(publisher, meshStamped(tipAbove(-3), 5.1)));
-  }
-}
-
-TEST_F(Plain, VerticesThatAreNotFinite) {
-  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
-  Mesh lost = tipAbove(0.9);
-  lost.positions[4].y() = std::numeric_limits<double>::quiet_NaN();
-  lost.positions[5].x() = std::numeric_limits<double>::infinity();
-  send(publisher, meshStamped(tipAbove(1), 10));
-  const deformable_ccd::ContactArray outcome = send(publisher, meshStamped(lost, 10.1));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::PARTIAL);
-  EXPECT_TRUE(outcome.answered);
-  EXPECT_FALSE(clear.last().data);
-  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
-  EXPECT_EQ(stats.last().unchecked_vertices, 2u);
-}
-
 TEST_F(Plain, ClearIsTrueOnlyForACheckedStep) {
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
   send(publisher, meshStamped(tipAbove(1), 10));
@@ -147,14 +123,6 @@ TEST_F(Plain, ClearIsTrueOnlyForACheckedStep) {
   EXPECT_TRUE(waitUntil([&] { return clear.last().data; }));
   EXPECT_TRUE(trigger("reset").success);
   EXPECT_TRUE(waitUntil([&] { return !clear.last().data; })) << "a reset is not clear";
-}
-
-TEST_F(Plain, ZeroStampsTakeTheReceiptTime) {
-  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/plain/mesh");
-  const std::uint64_t before = stats.last().receipt_stamps;
-  send(publisher, meshStamped(tipAbove(1), 0));
-  EXPECT_GT(contacts.last().header.stamp, ros::Time(1e9));
-  ASSERT_TRUE(waitUntil([&] { return stats.last().receipt_stamps > before; }));
 }
 
 TEST_F(Plain, HostileMessagesAreRefused) {

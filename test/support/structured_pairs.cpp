@@ -140,6 +140,21 @@ std::vector<StructuredPairs> structuredPairs(int cells) {
   return all;
 }
 
+std::vector<StructuredPairs> structuredSheets(int cells) {
+  std::vector<StructuredPairs> all;
+  for (const Sheets& sheets : families(cells)) {
+    StructuredPairs set;
+    set.family = sheets.family;
+    for (const Place& place : {sheets.first, sheets.second}) {
+      std::vector<std::array<Index, 3>> faces;
+      std::vector<std::array<Index, 2>> edges;
+      addSheet(place, cells, set.vertices, faces, edges);
+    }
+    all.push_back(set);
+  }
+  return all;
+}
+
 StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   StructuredPairs result = pairs;
@@ -155,6 +170,39 @@ StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed) {
     }
   }
   return result;
+}
+
+StructuredPairs pairsOf(const std::string& family, PairKind kind, const std::vector<Query>& queries) {
+  StructuredPairs set;
+  set.family = family;
+  set.kind = kind;
+  for (const Query& query : queries) {
+    const Index base = static_cast<Index>(set.vertices.size());
+    for (int p = 0; p < 4; ++p) {
+      VertexMotion v{};
+      std::copy_n(query.motion.x[0][p], 3, v.t0);
+      std::copy_n(query.motion.x[1][p], 3, v.t1);
+      set.vertices.push_back(v);
+    }
+    set.pairs.push_back({base, base + 1, base + 2, base + 3});
+  }
+  return set;
+}
+
+StructuredPairs hardPairs(Hardness hardness, PairKind kind, std::size_t count) {
+  RandomSource random(2017 + 2 * static_cast<std::uint64_t>(hardness) + static_cast<std::uint64_t>(kind));
+  std::vector<Query> queries;
+  for (std::size_t i = 0; i < count; ++i) queries.push_back(hardQuery(random, kind, hardness));
+  return pairsOf(toString(hardness), kind, queries);
+}
+
+PairBatch batchOf(const StructuredPairs& pairs) {
+  PairBatch batch;
+  batch.kind = pairs.kind;
+  batch.vertices = pairs.vertices.data();
+  batch.pairs = pairs.pairs.data();
+  batch.count = pairs.pairs.size();
+  return batch;
 }
 
 PairMotion motionOf(const StructuredPairs& pairs, std::size_t i) {

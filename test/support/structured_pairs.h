@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dccd/elementary.h"
+#include "support/generators.h"
 
 namespace dccd {
 namespace test {
@@ -22,9 +23,19 @@ struct StructuredPairs {
 /// All families, vertex-face and edge-edge of each. Two sheets of cells x cells quads each.
 std::vector<StructuredPairs> structuredPairs(int cells);
 
-/// The same with each coordinate that is not 0 moved by up to two units in the last place.
+/// The sheets of each family without pairs, for whole steps: each of cells + 1 points a side, one after the other.
+std::vector<StructuredPairs> structuredSheets(int cells);
+
+/// Pairs with each coordinate that is not 0 moved by up to two units in the last place.
 StructuredPairs perturbed(const StructuredPairs& pairs, std::uint64_t seed);
 
+/// Pairs of one kind without common vertices.
+StructuredPairs pairsOf(const std::string& family, PairKind kind, const std::vector<Query>& queries);
+/// Random pairs of a family, the same in each run.
+StructuredPairs hardPairs(Hardness hardness, PairKind kind, std::size_t count);
+
+/// All of them. Shows the set's own memory.
+PairBatch batchOf(const StructuredPairs& pairs);
 /// One of its pairs.
 PairMotion motionOf(const StructuredPairs& pairs, std::size_t i);
 

@@ -8,6 +8,7 @@
 #include <std_msgs/Bool.h>
 
 #include "input/known_types.h"
+#include "output/advice.h"
 #include "output/markers.h"
 
 namespace dccd {
@@ -97,7 +98,8 @@ void ResultBag::addPatches(const Outcome& outcome, const MonitorPipeline& pipeli
 void ResultBag::addState(const Outcome& outcome, const std::string& frame, const ros::Time& at) {
   deformable_ccd::State state = toState(outcome, frame);
   state.header.stamp = at;
-  fillState(assuranceOf(outcome), state);
+  fillState(assuranceOf(outcome), touchesInWords(outcome), adviceFor(outcome.status, outcome.reason, map_source_),
+            state);
   write("state", at, state);
   std_msgs::Bool clear;
   clear.data = state.clear;

@@ -6,12 +6,13 @@
 
 #include "config/monitor_config.h"
 #include "node/monitor_pipeline.h"
+#include "node/robot_source.h"
 
 namespace dccd {
 
 void checkMonitorBlock(const scene::SceneSpec& spec, const std::string& scene_path) {
   if (!spec.monitor.isSet()) return;
-  const MonitorConfig config = readConfig(spec.monitor, "monitor/");
+  const MonitorConfig config = readConfig(spec.monitor, "monitor/", robotOfFiles());
   try {
     tf2::BufferCore transforms;
     const TransformFeed feed(transforms);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include <rosbag/bag.h>
+#include <sensor_msgs/JointState.h>
 #include <boost/make_shared.hpp>
 
 #include "apps/make_scene_bag/messages.h"
@@ -60,6 +61,18 @@ std_msgs::Header header(const std::string& frame, const ros::Time& stamp, std::u
   return result;
 }
 
+/// As robot_state_publisher has them: of the links that joints move, or of all others.
+void addLinks(const scene::Robot& robot, const std::string& fixed_frame, double time_s, bool moved, std_msgs::Header at,
+              tf2_msgs::TFMessage& message) {
+  const std::vector<Eigen::Isometry3d> poses = scene::posesInParents(robot, time_s);
+  for (std::size_t l = 0; l < poses.size(); ++l) {
+    const scene::Link& link = robot.links[l];
+    if ((link.joint != scene::Link::Joint::FIXED) != moved) continue;
+    at.frame_id = link.parent < 0 ? fixed_frame : robot.links[static_cast<std::size_t>(link.parent)].name;
+    message.transforms.push_back(toTransform(at, link.name, poses[l]));
+  }
+}
+
 /// Frames that the scene names beside the fixed one rest at its origin; rigid bodies' frames move.
 void writeStaticTransforms(SceneBag& bag, const scene::SceneSpec& spec, const ros::Time& stamp) {
   std::set<std::string> frames;
@@ -74,7 +87,20 @@ void writeStaticTransforms(SceneBag& bag, const scene::SceneSpec& spec, const ro
     message.transforms.push_back(
         toTransform(header(spec.fixed_frame, stamp, 0), spec.camera->frame, spec.camera->pose));
   }
+  if (spec.robot) addLinks(*spec.robot, spec.fixed_frame, 0.0, false, header("", stamp, 0), message);
   if (!message.transforms.empty()) bag.write("/tf_static", stamp, message, true);
+}
+
+/// As joint_state_publisher has it.
+void writeJointStates(SceneBag& bag, const scene::Robot& robot, double time_s, const std_msgs::Header& at) {
+  sensor_msgs::JointState message;
+  message.header = at;
+  for (const scene::Link& link : robot.links) {
+    if (link.joint == scene::Link::Joint::FIXED) continue;
+    message.name.push_back(link.joint_name);
+    message.position.push_back(scene::jointAt(link.keys, time_s));
+  }
+  bag.write("/joint_states", at.stamp, message);
 }
 
 void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& at, const Positions& positions,
@@ -115,6 +141,7 @@ class CameraRecorder {
     scene::SceneState state;
     for (std::size_t b = 0; b < spec_.bodies.size(); ++b) state.bodies.push_back(simulation.positions(b));
     for (std::size_t r = 0; r < spec_.rigid_bodies.size(); ++r) state.rigid_bodies.push_back(simulation.rigidPose(r));
+    if (spec_.robot) state.links = scene::linkPoses(*spec_.robot, simulation.time_s());
     take(state, stamp);
     next_ = static_cast<int>(std::floor(due)) + 1;
   }
@@ -218,6 +245,11 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
       transforms.transforms.push_back(
           toTransform(header(spec.fixed_frame, stamp, frame), spec.rigid_bodies[r].frame, simulation.rigidPose(r)));
     }
+    if (spec.robot) {
+      const std_msgs::Header at = header("", stamp, frame);
+      writeJointStates(bag, *spec.robot, simulation.time_s(), at);
+      addLinks(*spec.robot, spec.fixed_frame, simulation.time_s(), true, at, transforms);
+    }
     if (!transforms.transforms.empty()) bag.write("/tf", stamp, transforms);
     for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
       writeBody(bag, spec.bodies[b], header(spec.bodies[b].frame, stamp, frame), simulation.observe(b), faces[b]);
@@ -232,6 +264,21 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
     if (!config) throw std::runtime_error(options.monitor_config_path + ": cannot be written");
   }
   return summary(spec, simulation, bag_path);
+}
+
+std::string recordMap(const scene::Obstacle& obstacle, const std::string& path) {
+  const octomap_msgs::Octomap map = toOctomap({}, obstacle, true);
+  std::size_t nodes = 1;  // the root, and two bits for each child of a node that has children; 0: there is none
+  for (const std::int8_t byte : map.data) {
+    for (int shift = 0; shift < 8; shift += 2) nodes += ((byte >> shift) & 3) != 0;
+  }
+  std::ofstream file(path, std::ios::binary);
+  file << "# Octomap OcTree binary file\nid " << map.id << "\nsize " << nodes << "\nres " << map.resolution
+       << "\ndata\n";
+  file.write(reinterpret_cast<const char*>(map.data.data()), static_cast<std::streamsize>(map.data.size()));
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+  return path + ": a map of " + std::to_string(nodes) + " nodes, voxels of " + std::to_string(map.resolution) + " m\n";
 }
 
 }  // namespace dccd

@@ -22,4 +22,8 @@ struct RecorderOptions {
 /// Throws rosbag::BagException when the bag cannot be written, std::runtime_error on a scene that cannot be published.
 std::string recordScene(const scene::SceneSpec& spec, const std::string& bag_path, const RecorderOptions& options);
 
+/// Writes the obstacle as a map file (.bt), for `octomap_file`; returns a line that says what was written. Throws
+/// std::runtime_error naming the file.
+std::string recordMap(const scene::Obstacle& obstacle, const std::string& path);
+
 }  // namespace dccd

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "step/history.h"
+#include "step/start/segment_triangle.h"
 
 namespace dccd {
 namespace {
@@ -14,19 +15,46 @@ constexpr std::size_t HITS_TO_SHARE = 4096;   // from here on the kinds are sort
 constexpr std::size_t CONTACTS_PER_LOOK_AT_THE_CLOCK = 256;
 constexpr std::size_t HITS_AHEAD = 48, FEATURES_AHEAD = 16;  // that are fetched from memory
 
+/// Marks the contacts that meet at t=0 already, many at a time.
+class InitialMarks {
+ public:
+  explicit InitialMarks(const Step& step) : step_(step) {}
+  ~InitialMarks() { flush(); }
+
+  void ask(Contact& contact) {
+    const auto base = static_cast<std::uint32_t>(4 * count_);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vec3& x = (*step_.bodies[contact.bodyOf(i)].t0)[contact.vertex[i]];
+      std::copy_n(x.data(), 3, positions_[base + i]);
+    }
+    // A vertex is a segment without length, an edge a triangle without area.
+    corners_[count_] = contact.kind == PairKind::VERTEX_FACE
+                           ? std::array<std::uint32_t, 5>{base, base, base + 1, base + 2, base + 3}
+                           : std::array<std::uint32_t, 5>{base, base + 1, base + 2, base + 3, base + 3};
+    contacts_[count_] = &contact;
+    if (++count_ == CAPACITY) flush();
+  }
+
+ private:
+  static constexpr std::size_t CAPACITY = 32;
+
+  void flush() {
+    std::array<std::uint8_t, CAPACITY> meet;
+    segmentsMeetTriangles(positions_[0], corners_.data(), count_, meet.data());
+    for (std::size_t i = 0; i < count_; ++i) contacts_[i]->initial = meet[i] != 0;
+    count_ = 0;
+  }
+
+  const Step& step_;
+  std::size_t count_ = 0;
+  std::array<Contact*, CAPACITY> contacts_;
+  std::array<std::array<std::uint32_t, 5>, CAPACITY> corners_;
+  alignas(64) double positions_[4 * CAPACITY][8] = {};
+};
+
 }  // namespace
 
-/// Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
-bool History::Impl::meetAtStart(const Step& step, const Contact& c) const {
-  if (c.toc_lower > 0) return false;
-  if (scene.separation(c.body[0], c.body[1]) > 0 || scene.uncertain()) return true;
-  const bool face = c.kind == PairKind::VERTEX_FACE;
-  const auto x = [&](std::size_t i) { return (*step.bodies[c.bodyOf(i)].t0)[c.vertex[i]].data(); };
-  // A vertex is a segment without length, an edge a triangle without area.
-  return face ? segmentMeetsTriangle(x(0), x(0), x(1), x(2), x(3)) : segmentMeetsTriangle(x(0), x(1), x(2), x(3), x(3));
-}
-
-void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step, bool late, Contact& c) const {
+void History::Impl::writeContact(PairKind kind, const Hit& hit, Contact& c) const {
   c.kind = kind;
   c.toc_lower = hit.toc_lower;
   c.toc_upper = hit.toc_upper;
@@ -35,7 +63,6 @@ void History::Impl::writeContact(PairKind kind, const Hit& hit, const Step& step
   const std::size_t first_size = factsOf(kind).vertices[0];
   scene.featureVertices(firstKind(kind), c.body[0], static_cast<Index>(hit.key >> 32), c.vertex.data());
   scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
-  c.initial = !(late && hit.certainty == Certainty::UNDECIDED) && meetAtStart(step, c);
 }
 
 /// What is undecided when the deadline is over may be new: nothing is computed for it any more.
@@ -63,6 +90,7 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
     const PairKind kind = KINDS[k];
     const HitOrder& sorted = order[k];
     parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
+      InitialMarks marks(step);
       bool late = false;
       for (std::size_t i = first; i < last; ++i) {
         if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
@@ -76,7 +104,12 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
           const Hit& later = sorted[i + FEATURES_AHEAD];
           scene.prefetchFeature(secondKind(kind), later.bodies & 0xffff, static_cast<Index>(later.key));
         }
-        writeContact(kind, sorted[i], step, late, result.contacts[base + i]);
+        Contact& contact = result.contacts[base + i];
+        writeContact(kind, sorted[i], contact);
+        if (contact.toc_lower > 0 || (late && contact.certainty == Certainty::UNDECIDED)) continue;
+        // Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
+        contact.initial = scene.separation(contact.body[0], contact.body[1]) > 0 || scene.uncertain();
+        if (!contact.initial) marks.ask(contact);
       }
     });
     base += sorted.size();

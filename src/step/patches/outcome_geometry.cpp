@@ -4,9 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "dccd/outcome.h"
+#include "dccd/contact_geometries.h"
 #include "step/pairs/closest_points.h"
 #include "step/parts.h"
+#include "step/patches/touch_lanes.h"
 
 namespace dccd {
 
@@ -136,6 +137,18 @@ ContactGeometry contactGeometry(const Outcome& outcome, const Contact& contact) 
   ContactGeometry geometry = contactGeometry(contact.kind, pair, part.toc);
   geometry.approach_speed *= static_cast<double>(part.parts);
   return geometry;
+}
+
+void contactGeometries(const Outcome& outcome, std::size_t first, std::size_t last, ContactGeometry* out) {
+  const auto use = [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
+    ContactGeometry& one = out[c - first];
+    one.point = laneOf(block.point, lane);
+    one.normal = laneOf(block.normal, lane);
+    for (std::size_t k = 0; k < one.weights.size(); ++k) one.weights[k] = block.weights[k][lane];
+    one.approach_speed = block.approach_speed[lane];
+  };
+  const auto other = [&](std::size_t c) { out[c - first] = contactGeometry(outcome, outcome.contacts[c]); };
+  inLanes(outcome, first, last, simd::touchGeometry, use, other);
 }
 
 Vec3 vertexAtContact(const Outcome& outcome, const Contact& contact, int i) {

@@ -5,6 +5,7 @@
 
 #include "obstacle/burst.h"
 #include "step/pairs/closest_points.h"
+#include "step/patches/touch_lanes.h"
 
 namespace dccd {
 namespace {
@@ -12,12 +13,6 @@ namespace {
 Vec3 along(const Body& body, Index v, double toc) {
   const Vec3 &from = (*body.t0)[v], &to = (*body.t1)[v];
   return toc == 0 ? from : Vec3(from + toc * (to - from));
-}
-
-/// Towards the side of `from_second`, which leads from the second feature to the first.
-Vec3 towards(const Vec3& cross, const Vec3& from_second) {
-  const Vec3 normal = unitOr(cross, Vec3::Zero());
-  return normal.dot(from_second) < 0 ? Vec3(-normal) : normal;
 }
 
 /// The point of the segment that is in the triangle's plane.
@@ -52,15 +47,17 @@ void PatchMaker::begin(const Outcome& outcome) {
   unexpected_.clear();
   graph_.setBodies(outcome.step->bodies);
   contacts_ = outcome.contacts.size();
-  touches_.reserve(contacts_ + outcome.intersections.size());
+  releaseBurst(places_);
   touches_.resize(contacts_);
-}
-
-void PatchMaker::connect(const Outcome& outcome) {
+  places_.resize(contacts_);
+  touches_.reserve(contacts_ + outcome.intersections.size());
   for (const StartIntersection& crossing : outcome.intersections) {
     // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
     if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
   }
+}
+
+void PatchMaker::connect() {
   patch_of_ = &graph_.components(touches_);
   const std::size_t count = graph_.componentCount();
   begin_.assign(count + 2, 0);
@@ -71,34 +68,26 @@ void PatchMaker::connect(const Outcome& outcome) {
   parts_.assign(count + pieces(), Part());
 }
 
-PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, std::size_t t) const {
-  const std::vector<Body>& bodies = outcome.step->bodies;
-  const Touch& touch = touches_[t];
-  const Body& a = bodies[touch.body[0]];
-  const auto local = [&](int i, int side) { return touch.point[i] - graph_.firstVertex(touch.body[side]); };
-  if (touch.kind == Touch::CROSSING) {
-    const Body& b = bodies[touch.body[1]];
-    const Vec3 &f0 = (*b.t0)[local(2, 1)], &f1 = (*b.t0)[local(3, 1)], &f2 = (*b.t0)[local(4, 1)];
-    return {throughPlane((*a.t0)[local(0, 0)], (*a.t0)[local(1, 0)], f0, (f1 - f0).cross(f2 - f0)), Vec3::Zero()};
-  }
-  const Contact& contact = outcome.contacts[t];
-  if (touch.onMap() && outcome.substeps == 1) return placeOnMap(outcome, contact);
-  if (outcome.substeps > 1) {
-    const ContactGeometry geometry = contactGeometry(outcome, contact);
-    return {geometry.point, geometry.normal};
-  }
-  const Body& b = bodies[touch.body[1]];
-  const double toc = contact.toc_lower;
-  if (contact.kind == PairKind::VERTEX_FACE) {
-    const Vec3 &f0 = (*b.t0)[contact.vertex[1]], &f1 = (*b.t0)[contact.vertex[2]], &f2 = (*b.t0)[contact.vertex[3]];
-    const Vec3& v = (*a.t0)[contact.vertex[0]];
-    return {along(a, contact.vertex[0], toc), towards((f1 - f0).cross(f2 - f0), v - f0)};
-  }
-  const Vec3 &a0 = (*a.t0)[contact.vertex[0]], &a1 = (*a.t0)[contact.vertex[1]];
-  const Vec3 &b0 = (*b.t0)[contact.vertex[2]], &b1 = (*b.t0)[contact.vertex[3]];
-  const Closest closest = closestOnSegments(along(a, contact.vertex[0], toc), along(a, contact.vertex[1], toc),
-                                            along(b, contact.vertex[2], toc), along(b, contact.vertex[3], toc));
-  return {0.5 * (closest.on_first + closest.on_second), towards((a1 - a0).cross(b1 - b0), a0 - b0)};
+PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, const Contact& contact) const {
+  if (outcome.substeps == 1) return placeOnMap(outcome, contact);
+  const ContactGeometry geometry = contactGeometry(outcome, contact);
+  return {geometry.point, geometry.normal};
+}
+
+PatchMaker::Place PatchMaker::placeOfCrossing(const Outcome& outcome, const Touch& touch) const {
+  const auto at = [&](int i, int side) -> const Vec3& {
+    return (*outcome.step->bodies[touch.body[side]].t0)[touch.point[i] - graph_.firstVertex(touch.body[side])];
+  };
+  const Vec3 &f0 = at(2, 1), &f1 = at(3, 1), &f2 = at(4, 1);
+  return {throughPlane(at(0, 0), at(1, 0), f0, (f1 - f0).cross(f2 - f0)), Vec3::Zero()};
+}
+
+void PatchMaker::findPlaces(const Outcome& outcome, std::size_t piece) {
+  const auto use = [&](std::size_t c, const simd::TouchBlock& block, std::size_t lane) {
+    places_[c] = {laneOf(block.point, lane), laneOf(block.normal, lane)};
+  };
+  const auto other = [&](std::size_t c) { places_[c] = placeOf(outcome, outcome.contacts[c]); };
+  inLanes(outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces, use, other);
 }
 
 /// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.
@@ -134,13 +123,16 @@ PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& 
 void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
   const std::size_t end = std::min(touches_.size(), (piece + 1) * PIECE);
   std::uint32_t p = NO_PATCH;
+  bool crosses_alone = false;  // only then do crossings say where the patch is
   Vec3 first_normal = Vec3::Zero();
   for (std::size_t i = piece * PIECE; i < end; ++i) {
     const std::uint32_t t = order_[i];
     const Touch& touch = touches_[t];
     if ((*patch_of_)[t] != p) {
       p = (*patch_of_)[t];
-      first_normal = placeOf(outcome, order_[begin_[p]]).normal;
+      const std::uint32_t first = order_[begin_[p]];
+      crosses_alone = first >= contacts_;
+      if (!crosses_alone) first_normal = places_[first].normal;
     }
     Part& part = parts_[piece + p];
     part.expected += touch.expected;
@@ -148,9 +140,9 @@ void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
     if (touch.kind == Touch::CROSSING) {
       ++part.crossings;
       part.toc_lower = part.toc_upper = 0;
-      if (touches_[order_[begin_[p]]].kind != Touch::CROSSING) continue;  // the contacts say where the patch is
+      if (!crosses_alone) continue;
     }
-    const Place at = placeOf(outcome, t);
+    const Place at = t < contacts_ ? places_[t] : placeOfCrossing(outcome, touch);
     part.centroid += at.point;
     part.box.min = part.box.min.cwiseMin(at.point);
     part.box.max = part.box.max.cwiseMax(at.point);

@@ -34,10 +34,13 @@ class PatchMaker {
     parallel(contacts_, PIECE, [&](std::size_t first, std::size_t last) {
       for (std::size_t c = first; c < last; ++c) touches_[c] = graph_.touchOf(outcome.contacts[c]);
     });
-    connect(outcome);
+    // The first piece of work is of another kind, and as long as several of the others. Few are not worth a thread.
+    const std::size_t grain = touches_.size() < PIECE ? 2 : 1;
+    parallel(piecesOf(contacts_) + 1, grain, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) i == 0 ? connect() : findPlaces(outcome, i - 1);
+    });
     if (touches_.empty()) return;
-    // The first piece of work is of another kind, and as long as several of the others.
-    parallel(pieces() + 1, 1, [&](std::size_t first, std::size_t last) {
+    parallel(pieces() + 1, grain, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) i == 0 ? findAreas(outcome) : measure(outcome, i - 1);
     });
     make(outcome);
@@ -60,9 +63,12 @@ class PatchMaker {
   };
 
   void begin(const Outcome& outcome);
-  void connect(const Outcome& outcome);
-  std::size_t pieces() const { return (touches_.size() + PIECE - 1) / PIECE; }
-  Place placeOf(const Outcome& outcome, std::size_t touch) const;
+  void connect();
+  static std::size_t piecesOf(std::size_t count) { return (count + PIECE - 1) / PIECE; }
+  std::size_t pieces() const { return piecesOf(touches_.size()); }
+  void findPlaces(const Outcome& outcome, std::size_t piece);
+  Place placeOf(const Outcome& outcome, const Contact& contact) const;
+  Place placeOfCrossing(const Outcome& outcome, const Touch& touch) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void measure(const Outcome& outcome, std::size_t piece);
   void findAreas(const Outcome& outcome);
@@ -72,7 +78,8 @@ class PatchMaker {
   void make(Outcome& outcome);
 
   TouchGraph graph_;
-  std::vector<Touch> touches_;
+  std::vector<Touch> touches_;  // of the contacts, then of the crossings
+  std::vector<Place> places_;   // of the contacts
   const std::vector<std::uint32_t>* patch_of_ = nullptr;
   std::vector<std::uint32_t> order_;  // the touches, patch by patch, each patch's ascending
   std::vector<std::uint32_t> begin_;  // per patch, in order_

@@ -8,6 +8,8 @@
 namespace dccd {
 namespace {
 
+constexpr std::uint32_t AHEAD = 8;  // vertices whose neighbours are fetched from memory
+
 constexpr std::uint8_t kindOf(PairKind kind) { return static_cast<std::uint8_t>(kind); }
 
 }  // namespace
@@ -96,25 +98,37 @@ std::uint32_t TouchGraph::areaRoot(std::uint32_t place) {
 /// The vertices that touch the partner, joined where an edge of the mesh joins them.
 void TouchGraph::findAreas(const std::vector<Touch>& touches, const Group* first, const Group* last) {
   for (const Group* group = first; group != last; ++group) {
-    const int size = touches[group->first].firstSize() + touches[group->first].secondSize();
+    const int first_size = touches[group->first].firstSize();
+    const int size = first_size + touches[group->first].secondSize();
     for (std::uint32_t t = group->first; t < group->last; ++t) {
-      for (int i = 0; i < size; ++i) {
-        std::uint32_t& place = place_[touches[t].point[i]];
+      // In their order most have the first feature of the one before.
+      const auto& point = touches[t].point;
+      const bool same_first =
+          t > group->first && std::equal(point.begin(), point.begin() + first_size, touches[t - 1].point.begin());
+      for (int i = same_first ? first_size : 0; i < size; ++i) {
+        std::uint32_t& place = place_[point[i]];
         if (place != NO_INDEX) continue;
         place = static_cast<std::uint32_t>(touched_.size());
-        touched_.push_back(touches[t].point[i]);
+        touched_.push_back(point[i]);
         area_.push_back(place);
       }
     }
   }
   for (std::uint32_t i = 0; i < touched_.size(); ++i) {
     const Index vertex = touched_[i];
+    // They lie anywhere in memory, which the rest of the step has taken out of the caches.
+    if (i + AHEAD < touched_.size()) {
+      __builtin_prefetch(&neighbours_[neighbours_begin_[touched_[i + AHEAD]]]);
+      __builtin_prefetch(&neighbours_begin_[touched_[std::min<std::size_t>(i + 2 * AHEAD, touched_.size() - 1)]]);
+    }
+    std::uint32_t root = areaRoot(i);
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
       if (other > vertex) break;  // that one comes to this
       if (place_[other] == NO_INDEX) continue;
-      const std::uint32_t a = areaRoot(i), b = areaRoot(place_[other]);
-      area_[std::max(a, b)] = std::min(a, b);
+      const std::uint32_t other_root = areaRoot(place_[other]);
+      area_[std::max(root, other_root)] = std::min(root, other_root);
+      root = std::min(root, other_root);
     }
   }
   // No place is before the first one of its area.
@@ -133,7 +147,7 @@ void TouchGraph::nameComponents(const std::vector<Touch>& touches, const Group* 
       const auto [low, high] = std::minmax(area_[place_[touches[t].point[0]]], area_[place_[touches[t].point[second]]]);
       const std::uint64_t areas = std::uint64_t{low} << 32 | high;
       if (by_areas_.empty() || areas != last_areas) {
-        const auto [at, is_new] = by_areas_.emplace(areas, component_count_);
+        const auto [at, is_new] = by_areas_.try_emplace(areas, component_count_);
         component_count_ += is_new;
         component = at->second;
         last_areas = areas;

@@ -1,143 +1,131 @@
+#include "step/start/segment_triangle.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
-#include "dccd/tolerances.h"
 #include "elementary/exact_integer.h"
-#include "step/start/start_state.h"
+#include "elementary/exact_short_integer.h"
+#include "simd/segment_filter.h"
 
 namespace dccd {
 namespace {
 
-enum class Answer : std::uint8_t { APART, MEET, UNKNOWN };
-
-// --- Floating-point filter -------------------------------------------------------------------------------------------
-// With p as the origin, let a, b, c, q be differences to it. Their cross products bc = b x c, ca, ab give every sign:
-//   the face's plane has p on the side of -a.bc and q on that of q.(bc + ca + ab) - a.bc (up to one common sign);
-//   where the line pq meets the face at u a + v b + w c (u + v + w = 1, none negative), with some K
-//   (q.bc, q.ca, q.ab) = K (u, v, w), so two of these with opposite strict signs show the line to miss the face,
-//   degenerate or not.
-// Rounding, u = 2^-53, M = largest |difference|, differences rounded once: a component of a cross product errs by
-// 2 * 3u M^2 + 2u M^2 = 8u M^2 and is at most 2 M^2; a dot product with one by 3 (8 + 2 + 2)u M^3 + (4 + 6)u M^3 =
-// 46u M^3 and is at most 6 M^3; the sum of three of these and a fourth by 4 * 46u M^3 + (12 + 18 + 24)u M^3 = 238u M^3.
-// The margins 47u M^3 and 240u M^3 cover the terms in u^2 and their own rounding. Underflow: fewer than 100 operations
-// lose at most 2^-1075 each, times factors of at most M^2 <= 2^60: below 2^-1000.
-using tolerance::SEGMENT_LARGEST_M, tolerance::SEGMENT_UNDERFLOW;
-
-struct V {
-  double x, y, z;
-};
-inline V difference(const double* a, const double* b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline V operator+(const V& a, const V& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline V cross(const V& a, const V& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-inline double dot(const V& a, const V& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline double largest(const V& a) { return std::max(std::max(std::abs(a.x), std::abs(a.y)), std::abs(a.z)); }
-
-// In the projection onto a coordinate plane: is the triangle strictly on one side of the line pq, or the segment
-// strictly beyond the line of one of the triangle's edges? The 2D cross products are components of the 3D ones. The
-// longest sums have three terms, such as (b - q) x (c - q) = bc + (qb - qc), and err by at most (3 * 8 + 4 + 6)u M^2;
-// 35u M^2 is used.
-inline bool apartInPlane(double bc, double ca, double ab, double qa, double qb, double qc, double margin) {
-  const auto beyond = [margin](double x) { return x > margin; };
-  if (beyond(std::min(std::min(qa, qb), qc)) || beyond(-std::max(std::max(qa, qb), qc))) return true;
-  const double area = bc + ca + ab;
-  if (!(std::abs(area) > margin)) return false;
-  const double s = area > 0 ? 1 : -1;
-  // On which side of an edge's line p is, then q.
-  return (beyond(-s * bc) && beyond(-s * (bc + (qb - qc)))) || (beyond(-s * ca) && beyond(-s * (ca + (qc - qa)))) ||
-         (beyond(-s * ab) && beyond(-s * (ab + (qa - qb))));
-}
-
-inline bool apartOnAxis(const double* p, const double* q, const double* a, const double* b, const double* c) {
-  for (int k = 0; k < 3; ++k) {
-    const double lo = std::min(p[k], q[k]), hi = std::max(p[k], q[k]);
-    if (lo > std::max(std::max(a[k], b[k]), c[k]) || hi < std::min(std::min(a[k], b[k]), c[k])) return true;
-  }
-  return false;
-}
-
-Answer filter(const double* p, const double* q, const double* a, const double* b, const double* c) {
-  const V pa = difference(a, p), pb = difference(b, p), pc = difference(c, p), pq = difference(q, p);
-  const double M = std::max(std::max(largest(pa), largest(pb)), std::max(largest(pc), largest(pq)));
-  if (!(M <= SEGMENT_LARGEST_M)) return apartOnAxis(p, q, a, b, c) ? Answer::APART : Answer::UNKNOWN;
-  const double cubed = M * M * M;
-  const double line_margin = tolerance::SEGMENT_LINE * cubed + SEGMENT_UNDERFLOW;
-  const double plane_margin = tolerance::SEGMENT_PLANE * cubed + SEGMENT_UNDERFLOW;
-  const V bc = cross(pb, pc);
-  const double side_p = -dot(pa, bc);
-  const V ca = cross(pc, pa), ab = cross(pa, pb);
-  const double u = dot(pq, bc), v = dot(pq, ca), w = dot(pq, ab);
-  const double side_q = ((u + v) + w) + side_p;
-  if (std::min(side_p, side_q) > plane_margin || std::max(side_p, side_q) < -plane_margin) return Answer::APART;
-  const double lo = std::min(std::min(u, v), w), hi = std::max(std::max(u, v), w);
-  if (lo < -line_margin && hi > line_margin) return Answer::APART;
-  if (std::min(side_p, side_q) < -plane_margin && std::max(side_p, side_q) > plane_margin &&
-      (lo > line_margin || hi < -line_margin)) {
-    return Answer::MEET;
-  }
-  if (apartOnAxis(p, q, a, b, c)) return Answer::APART;
-  const double margin = tolerance::SEGMENT_PROJECTED * (M * M) + SEGMENT_UNDERFLOW;
-  const V qa = cross(pq, pa), qb = cross(pq, pb), qc = cross(pq, pc);
-  const bool apart = apartInPlane(bc.x, ca.x, ab.x, qa.x, qb.x, qc.x, margin) ||
-                     apartInPlane(bc.y, ca.y, ab.y, qa.y, qb.y, qc.y, margin) ||
-                     apartInPlane(bc.z, ca.z, ab.z, qa.z, qb.z, qc.z, margin);
-  return apart ? Answer::APART : Answer::UNKNOWN;
-}
-
-// --- Exact decision --------------------------------------------------------------------------------------------------
+/// What is asked for are signs of terms with one factor of each axis, or of each of two, and which of two points is
+/// further along an axis: each axis may have a scale of its own.
+template <class Z>
+using Point = std::array<Z, 3>;
 
 template <class Z>
-struct Exact {
-  using Point = std::array<Z, 3>;
+Point<Z> minus(const Point<Z>& a, const Point<Z>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+/// Component k of a cross product.
+template <class Z>
+auto minor(const Point<Z>& a, const Point<Z>& b, int k) {
+  const int i = k == 2 ? 0 : k + 1, j = k == 0 ? 2 : k - 1;
+  return a[i] * b[j] - a[j] * b[i];
+}
+template <class Z>
+auto cross(const Point<Z>& a, const Point<Z>& b) {
+  return Point<decltype(minor(a, b, 0))>{minor(a, b, 0), minor(a, b, 1), minor(a, b, 2)};
+}
+template <class Z>
+bool isZero(const Point<Z>& a) {
+  return a[0].sign() == 0 && a[1].sign() == 0 && a[2].sign() == 0;
+}
+/// On which side of the plane abc d is.
+template <class Z>
+int orientation(const Point<Z>& a, const Point<Z>& b, const Point<Z>& c, const Point<Z>& d) {
+  const Point<Z> x = minus(a, d);
+  const auto n = cross(minus(b, d), minus(c, d));
+  return (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]).sign();
+}
+/// The turn abc as it is seen along an axis.
+template <class Z>
+int orientation(const Point<Z>& a, const Point<Z>& b, const Point<Z>& c, int axis) {
+  return minor(minus(b, a), minus(c, a), axis).sign();
+}
+template <class Z>
+int axisOf(const Point<Z>& normal) {
+  return normal[0].sign() != 0 ? 0 : normal[1].sign() != 0 ? 1 : 2;
+}
 
-  static Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-  static Point cross(const Point& a, const Point& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+template <class Z>
+bool onSegment(const Point<Z>& x, const Point<Z>& p, const Point<Z>& q) {
+  for (int k = 0; k < 3; ++k) {
+    if ((x[k] - p[k]).sign() * (x[k] - q[k]).sign() > 0) return false;
   }
-  static Z dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-  static bool isZero(const Point& a) { return a[0].sign() == 0 && a[1].sign() == 0 && a[2].sign() == 0; }
-  static int orientation(const Point& a, const Point& b, const Point& c, const Point& d) {
-    return dot(minus(a, d), cross(minus(b, d), minus(c, d))).sign();
-  }
-  /// Component `axis` of (b - a) x (c - a): the orientation of the projections along the axis.
-  static int orientation(const Point& a, const Point& b, const Point& c, int axis) {
-    return cross(minus(b, a), minus(c, a))[axis].sign();
-  }
-  static int axisOf(const Point& normal) { return normal[0].sign() != 0 ? 0 : normal[1].sign() != 0 ? 1 : 2; }
+  return isZero(cross(minus(q, p), minus(x, p)));
+}
 
-  static bool onSegment(const Point& x, const Point& p, const Point& q) {
-    return isZero(cross(minus(q, p), minus(x, p))) && dot(minus(x, p), minus(x, q)).sign() <= 0;
+template <class Z>
+bool segmentsMeet(const Point<Z>& p, const Point<Z>& q, const Point<Z>& a, const Point<Z>& b) {
+  if (orientation(p, q, a, b) != 0) return false;
+  const auto normal = cross(minus(q, p), minus(b, a));
+  if (isZero(normal)) {  // parallel, or one is a point: they meet only where one has an end on the other
+    return onSegment(a, p, q) || onSegment(b, p, q) || onSegment(p, a, b) || onSegment(q, a, b);
   }
+  // In one plane, and not parallel. A projection along an axis that the normal is not orthogonal to loses nothing.
+  const int axis = axisOf(normal);
+  return orientation(p, q, a, axis) * orientation(p, q, b, axis) <= 0 &&
+         orientation(a, b, p, axis) * orientation(a, b, q, axis) <= 0;
+}
 
-  static bool segmentsMeet(const Point& p, const Point& q, const Point& a, const Point& b) {
-    if (orientation(p, q, a, b) != 0) return false;
-    const Point normal = cross(minus(q, p), minus(b, a));
-    if (isZero(normal)) {  // parallel, or one is a point: they meet only where one has an end on the other
-      return onSegment(a, p, q) || onSegment(b, p, q) || onSegment(p, a, b) || onSegment(q, a, b);
+/// All in one plane, in which the triangle has an area, as they are seen along an axis. They are apart where a line of
+/// one of their sides is strictly between them: what separates them by most is a side of their Minkowski difference.
+template <class Z>
+bool meetInPlane(const Point<Z>& p, const Point<Z>& q, const Point<Z>& a, const Point<Z>& b, const Point<Z>& c,
+                 int axis) {
+  const int turn = orientation(a, b, c, axis);
+  const auto isBeyond = [&](const Point<Z>& from, const Point<Z>& to) {
+    return orientation(from, to, p, axis) == -turn && orientation(from, to, q, axis) == -turn;
+  };
+  if (isBeyond(a, b) || isBeyond(b, c) || isBeyond(c, a)) return false;
+  const int side = orientation(p, q, a, axis);
+  return side == 0 || orientation(p, q, b, axis) != side || orientation(p, q, c, axis) != side;
+}
+
+template <class Z>
+bool meet(const std::array<Point<Z>, 5>& x) {
+  const auto& [p, q, a, b, c] = x;
+  const auto normal = cross(minus(b, a), minus(c, a));
+  if (isZero(normal)) {  // all of it is on its edges; an edge that stands for a triangle has the last corner twice
+    if (segmentsMeet(p, q, a, b)) return true;
+    return !isZero(minus(b, c)) && (segmentsMeet(p, q, b, c) || segmentsMeet(p, q, c, a));
+  }
+  const int side_p = orientation(a, b, c, p), side_q = orientation(a, b, c, q);
+  if (side_p * side_q > 0) return false;
+  if (side_p == 0 && side_q == 0) return meetInPlane(p, q, a, b, c, axisOf(normal));
+  // The line crosses the plane in a point of the segment.
+  const int u = orientation(p, q, b, c), v = orientation(p, q, c, a), w = orientation(p, q, a, b);
+  return std::min(std::min(u, v), w) >= 0 || std::max(std::max(u, v), w) <= 0;
+}
+
+using Points = std::array<const double*, 5>;
+
+/// Coordinates below 2^(64 N - 3) in magnitude: differences are below 2^(64 N - 2), their minors below 2^(128 N - 3),
+/// and sums of three of these times a difference below 2^(192 N - 3). False where they are no such integers on any
+/// common scale.
+template <int N>
+bool takeShort(const Points& points, std::array<Point<exact::ShortInteger<N>>, 5>& x) {
+  for (int k = 0; k < 3; ++k) {
+    double largest = 0;
+    for (const double* point : points) largest = std::max(largest, std::fabs(point[k]));
+    const int exponent = largest > 0 ? 64 * N - 4 - std::ilogb(largest) : 0;
+    if (exponent > 1000 || exponent < -1000) return false;
+    const double scale = std::ldexp(1.0, exponent);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double value = points[i][k] * scale;
+      // What vanishes in the product is no integer, and neither is what has a fraction.
+      if (value != std::floor(value) || (value == 0) != (points[i][k] == 0)) return false;
+      x[i][k] = exact::shortInteger<N>(value);
     }
-    // In one plane, and not parallel. A projection along an axis that the normal is not orthogonal to loses nothing.
-    const int axis = axisOf(normal);
-    return orientation(p, q, a, axis) * orientation(p, q, b, axis) <= 0 &&
-           orientation(a, b, p, axis) * orientation(a, b, q, axis) <= 0;
   }
-
-  static bool meet(const Point& p, const Point& q, const Point& a, const Point& b, const Point& c) {
-    const int side_p = orientation(a, b, c, p), side_q = orientation(a, b, c, q);
-    if (side_p * side_q > 0) return false;
-    if (side_p != 0 || side_q != 0) {  // the line crosses the plane in a point of the segment
-      const int u = orientation(p, q, b, c), v = orientation(p, q, c, a), w = orientation(p, q, a, b);
-      return std::min(std::min(u, v), w) >= 0 || std::max(std::max(u, v), w) <= 0;
-    }
-    if (segmentsMeet(p, q, a, b) || segmentsMeet(p, q, b, c) || segmentsMeet(p, q, c, a)) return true;
-    // Without touching the boundary: in the plane and inside altogether.
-    const Point normal = cross(minus(b, a), minus(c, a));
-    if (isZero(normal)) return false;
-    const int axis = axisOf(normal), turn = normal[axis].sign();
-    return orientation(a, b, p, axis) == turn && orientation(b, c, p, axis) == turn &&
-           orientation(c, a, p, axis) == turn;
-  }
-};
+  return true;
+}
 
 /// The coordinates as integers, multiplied by one common power of two.
 struct Scaled {
@@ -177,30 +165,52 @@ Scaled scale(const std::array<const double*, 5>& points) {
 }
 
 template <class Z>
-bool decide(const Scaled& s) {
-  std::array<typename Exact<Z>::Point, 5> x;
+bool decideLong(const Scaled& s) {
+  std::array<Point<Z>, 5> x;
   for (int i = 0; i < 5; ++i) {
     for (int k = 0; k < 3; ++k) x[i][k] = Z::shifted(s.mantissa[i][k], s.shift[i][k]);
   }
-  return Exact<Z>::meet(x[0], x[1], x[2], x[3], x[4]);
+  return meet(x);
 }
 
-inline bool same(const double* a, const double* b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
+bool same(const double* a, const double* b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
+
+bool decide(const Points& x) {
+  // Coincident vertices are the most frequent contact of meshes that are not welded.
+  for (std::size_t i = 2; i < x.size(); ++i) {
+    if (same(x[0], x[i]) || same(x[1], x[i])) return true;
+  }
+  if (std::array<Point<exact::ShortInteger<1>>, 5> one_word; takeShort(x, one_word)) return meet(one_word);
+  if (std::array<Point<exact::ShortInteger<2>>, 5> two_words; takeShort(x, two_words)) return meet(two_words);
+  const Scaled scaled = scale(x);
+  // A difference has a bit more than a coordinate, a determinant is a sum of six products of three; a product is formed
+  // in whole limbs of both factors.
+  using Stack = StackInteger<10>;
+  return 3 * (scaled.bits + 2) + 3 * 64 <= Stack::CAPACITY_BITS ? decideLong<Stack>(scaled)
+                                                                : decideLong<BigInteger>(scaled);
+}
 
 }  // namespace
 
-bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c) {
-  const Answer answer = filter(p, q, a, b, c);
-  if (answer != Answer::UNKNOWN) return answer == Answer::MEET;
-  // Coincident vertices are the most frequent contact of meshes that are not welded.
-  for (const double* x : {a, b, c}) {
-    if (same(p, x) || same(q, x)) return true;
+void segmentsMeetTriangles(const double* positions, const std::array<std::uint32_t, 5>* pairs, std::size_t count,
+                           std::uint8_t* meet) {
+  simd::segmentFilter(positions, pairs->data(), count, meet);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (meet[i] != simd::SEGMENT_UNDECIDED) continue;
+    Points x;
+    for (std::size_t k = 0; k < x.size(); ++k) x[k] = positions + std::size_t{pairs[i][k]} * 8;
+    meet[i] = decide(x);
   }
-  const Scaled scaled = scale({p, q, a, b, c});
-  // A difference has a bit more than a coordinate, a determinant is a sum of six products of three; a product is formed
-  // in whole limbs of both factors.
-  using Short = StackInteger<10>;
-  return 3 * (scaled.bits + 2) + 3 * 64 <= Short::CAPACITY_BITS ? decide<Short>(scaled) : decide<BigInteger>(scaled);
+}
+
+bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c) {
+  static constexpr std::array<std::uint32_t, 5> PAIR = {0, 1, 2, 3, 4};
+  alignas(64) double positions[5][8] = {};
+  const Points x = {p, q, a, b, c};
+  for (std::size_t i = 0; i < x.size(); ++i) std::copy_n(x[i], 3, positions[i]);
+  std::uint8_t meet;
+  segmentsMeetTriangles(positions[0], &PAIR, 1, &meet);
+  return meet != 0;
 }
 
 }  // namespace dccd

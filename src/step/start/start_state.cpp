@@ -4,6 +4,7 @@
 
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
+#include "step/radix_sort.h"
 
 namespace dccd {
 namespace {
@@ -50,6 +51,8 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
   releaseBurst(groups_);
   releaseBurst(scratch_, groups_.size());
   releaseBurst(by_group_);
+  releaseBurst(keys_);
+  releaseBurst(other_keys_, keys_.size());
   tested_ = 0;
   cut_ = false;
   most_found_ = most_found;
@@ -64,9 +67,9 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
 
   list(scene, found_, intersections_);
   stats[Stage::START_STATE].in += tested_;
-  stats[Stage::START_STATE].out += found_.size();
+  stats[Stage::START_STATE].out += intersections_.size();
   stats[Effect::START_STATE].in += tested_;
-  stats[Effect::START_STATE].out += found_.size();
+  stats[Effect::START_STATE].out += intersections_.size();
   return intersections_;
 }
 
@@ -74,22 +77,32 @@ Deadline StartStateSearch::beforeListing(const std::vector<EdgeFace>& found, con
   return deadline.movedBy(-LISTING_AN_INTERSECTION * static_cast<std::int64_t>(found.size()));
 }
 
-void StartStateSearch::list(const SceneArrays& scene, std::vector<EdgeFace>& pairs,
+void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs,
                             std::vector<StartIntersection>& out) {
-  const auto order = [&](const EdgeFace& x) {
-    return std::make_tuple(x.edge_body, scene.bodies()[x.edge_body].rank(FeatureKind::EDGE)[x.edge], x.face_body,
-                           scene.bodies()[x.face_body].rank(FeatureKind::FACE)[x.face]);
+  const std::vector<SceneBody>& bodies = scene.bodies();
+  // Ranks ascend from body to body.
+  const auto rank = [&](FeatureKind kind, std::uint32_t body, std::uint32_t slot) -> std::uint64_t {
+    return bodies[body].rank(kind)[slot];
   };
-  std::sort(pairs.begin(), pairs.end(), [&](const EdgeFace& x, const EdgeFace& y) { return order(x) < order(y); });
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());  // a candidate that the search came to as well
-  out.clear();
+  const auto bodyOf = [&](Index SceneBody::*begin, Index rank) {
+    const auto next = std::upper_bound(bodies.begin(), bodies.end(), rank,
+                                       [begin](Index r, const SceneBody& body) { return r < body.*begin; });
+    return static_cast<std::uint16_t>(next - bodies.begin() - 1);
+  };
+  keys_.clear();
   for (const EdgeFace& pair : pairs) {
-    const SceneBody &a = scene.bodies()[pair.edge_body], &b = scene.bodies()[pair.face_body];
+    keys_.push_back(rank(FeatureKind::EDGE, pair.edge_body, pair.edge) << 32 |
+                    rank(FeatureKind::FACE, pair.face_body, pair.face));
+  }
+  radixSort(keys_, other_keys_);
+  keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());  // a candidate that the search came to as well
+  out.clear();
+  for (const std::uint64_t key : keys_) {
+    const Index edge = static_cast<Index>(key >> 32), face = static_cast<Index>(key);
     StartIntersection found;
-    found.body = {static_cast<std::uint16_t>(pair.edge_body), static_cast<std::uint16_t>(pair.face_body)};
-    scene.featureVertices(FeatureKind::EDGE, pair.edge_body, a.rank(FeatureKind::EDGE)[pair.edge], found.vertex.data());
-    scene.featureVertices(FeatureKind::FACE, pair.face_body, b.rank(FeatureKind::FACE)[pair.face],
-                          found.vertex.data() + 2);
+    found.body = {bodyOf(&SceneBody::edge_begin, edge), bodyOf(&SceneBody::face_begin, face)};
+    scene.featureVertices(FeatureKind::EDGE, found.body[0], edge, found.vertex.data());
+    scene.featureVertices(FeatureKind::FACE, found.body[1], face, found.vertex.data() + 2);
     out.push_back(found);
   }
 }
@@ -102,8 +115,8 @@ bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadlin
   const bool whole = inBlocks(
       pairs, met, deadline, [&] { return expanded < touched_.size(); },
       [&] { addCandidates(scene, touched_[expanded++], pairs); },
-      [&](const EdgeFace& pair) {
-        if (isChecked(scene, pair) && meet(scene, pair, 1)) met.push_back(pair);
+      [&](const EdgeFace* first, std::size_t count) {
+        addMeeting(scene, first, count, 1, met);
         return true;
       });
   list(scene, met, out);
@@ -115,9 +128,9 @@ bool StartStateSearch::isChecked(const SceneArrays& scene, const EdgeFace& pair)
          scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face);
 }
 
-/// Takes the pairs from the back, a block at a time, and calls test with each: sorted, many are the same and those that
-/// follow each other lie together. expand() adds pairs as long as hasMore(). False: the deadline before the listing of
-/// what is found, or a test that returned false, ended it.
+/// Takes the pairs from the back, a block at a time, and calls test(pairs, count) with it: sorted, many are the same
+/// and those that follow each other lie together. expand() adds pairs as long as hasMore(). False: the deadline before
+/// the listing of what is found, or a test that returned false, ended it.
 template <class HasMore, class Expand, class Test>
 bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const std::vector<EdgeFace>& found,
                                 const Deadline& deadline, const HasMore& hasMore, const Expand& expand,
@@ -129,7 +142,8 @@ bool StartStateSearch::inBlocks(std::vector<EdgeFace>& pairs, const std::vector<
     while (pairs.size() < block && hasMore()) expand();
     const auto first = pairs.end() - static_cast<std::ptrdiff_t>(std::min(block, pairs.size()));
     std::sort(first, pairs.end());
-    const bool goes_on = std::all_of(first, std::unique(first, pairs.end()), test);
+    const auto last = std::unique(first, pairs.end());
+    const bool goes_on = test(&*first, static_cast<std::size_t>(last - first));
     pairs.erase(first, pairs.end());
     if (!goes_on) return false;
   }
@@ -144,8 +158,8 @@ void StartStateSearch::testCandidates(const SceneArrays& scene, const Deadline& 
         addCandidates(scene, touched_.back(), candidates_);
         touched_.pop_back();
       },
-      [&](const EdgeFace& pair) {
-        if (isChecked(scene, pair)) test(scene, pair);
+      [&](const EdgeFace* first, std::size_t count) {
+        tested_ += addMeeting(scene, first, count, 0, found_);
         return !hasEnough();
       });
 }
@@ -196,11 +210,12 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
     const std::uint64_t tested_before = tested_;
     bool late = false;
     stream_.run(trees, by_group_[first].data(), last - first, [&](const std::uint32_t* slots, std::size_t count) {
-      for (std::size_t i = 0; i < count; ++i) {
-        test(scene, {edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
-        const std::uint64_t tested = tested_ - tested_before;
-        if (tested < TESTS_IN_ANY_CASE || tested % TESTS_PER_LOOK_AT_THE_CLOCK != 0) continue;
-        if ((late = beforeListing(deadline).isOver())) break;
+      pairs_.clear();
+      for (std::size_t i = 0; i < count; ++i) pairs_.push_back({edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
+      const std::size_t piece = has_deadline_ ? TESTS_PER_LOOK_AT_THE_CLOCK : count;
+      for (std::size_t i = 0; i < count && !late; i += piece) {
+        tested_ += addMeeting(scene, pairs_.data() + i, std::min(piece, count - i), 0, found_);
+        late = tested_ - tested_before >= TESTS_IN_ANY_CASE && beforeListing(deadline).isOver();
       }
       return !late && !hasEnough();
     });
@@ -209,16 +224,30 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   return true;
 }
 
-bool StartStateSearch::meet(const SceneArrays& scene, const EdgeFace& pair, int at) {
-  const Index* e = scene.bodies()[pair.edge_body].tree(FeatureKind::EDGE).feature(pair.edge);
-  const Index* f = scene.bodies()[pair.face_body].tree(FeatureKind::FACE).feature(pair.face);
-  const auto x = [&](Index v) { return at == 0 ? scene.vertices()[v].t0 : scene.vertices()[v].t1; };
-  return segmentMeetsTriangle(x(e[0]), x(e[1]), x(f[0]), x(f[1]), x(f[2]));
-}
-
-void StartStateSearch::test(const SceneArrays& scene, const EdgeFace& pair) {
-  ++tested_;
-  if (meet(scene, pair, 0)) found_.push_back(pair);
+/// Returns how many were tested: those that are checked.
+std::size_t StartStateSearch::addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
+                                         std::vector<EdgeFace>& found) {
+  constexpr std::size_t NEXT = simd::GROUP, CHUNK = 1024;  // vertex of a lane; pairs that stay in the first-level cache
+  const double* positions = at == 0 ? scene.vertices()->t0 : scene.vertices()->t1;
+  std::size_t tested = 0;
+  for (const EdgeFace *end = pairs + count, *first = pairs; first != end;) {
+    corners_.clear();
+    tested_pairs_.clear();
+    for (; first != end && corners_.size() < CHUNK; ++first) {
+      if (!isChecked(scene, *first)) continue;
+      const Index* e = scene.bodies()[first->edge_body].tree(FeatureKind::EDGE).lane<2>(first->edge);
+      const Index* f = scene.bodies()[first->face_body].tree(FeatureKind::FACE).lane<3>(first->face);
+      corners_.push_back({e[0], e[NEXT], f[0], f[NEXT], f[2 * NEXT]});
+      tested_pairs_.push_back(first);
+    }
+    meet_.resize(corners_.size());
+    if (!corners_.empty()) segmentsMeetTriangles(positions, corners_.data(), corners_.size(), meet_.data());
+    for (std::size_t i = 0; i < meet_.size(); ++i) {
+      if (meet_[i]) found.push_back(*tested_pairs_[i]);
+    }
+    tested += corners_.size();
+  }
+  return tested;
 }
 
 void StartStateSearch::remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete) {

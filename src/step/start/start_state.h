@@ -11,12 +11,9 @@
 #include "culling/scene_arrays.h"
 #include "dccd/deadline.h"
 #include "step/pairs/found_limit.h"
+#include "step/start/segment_triangle.h"
 
 namespace dccd {
-
-/// Exact: do the closed segment pq and the closed triangle abc meet? Any finite doubles, degenerate ones included.
-/// Each argument: x, y, z.
-bool segmentMeetsTriangle(const double* p, const double* q, const double* a, const double* b, const double* c);
 
 /// Goes on with a search that a deadline cut: through the pairs of bodies in ascending order from `next` on, of which
 /// the first one begins at `place`, all later ones at 0. search() says whether it came to its pair's end. False: to the
@@ -118,11 +115,12 @@ class StartStateSearch {
   void testCandidates(const SceneArrays& scene, const Deadline& deadline);
   void search(const SceneArrays& scene, const Deadline& deadline);
   bool searchBodies(const SceneArrays& scene, const Deadline& deadline);
-  void test(const SceneArrays& scene, const EdgeFace& pair);
-  static bool meet(const SceneArrays& scene, const EdgeFace& pair, int at);  ///< at: 0 or 1, of the step's ends
+  /// Appends those pairs to found that are checked and meet at one of the step's ends (0 or 1).
+  std::size_t addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
+                         std::vector<EdgeFace>& found);
   /// What was checked in the step before need not be in this one.
   static bool isChecked(const SceneArrays& scene, const EdgeFace& pair);
-  static void list(const SceneArrays& scene, std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
+  void list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
   void addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
                       const Index* other_edge, std::vector<EdgeFace>& out);
@@ -144,7 +142,12 @@ class StartStateSearch {
   std::vector<BodyPair> body_pairs_;
   std::vector<std::array<std::uint32_t, 2>> by_group_;
   ClusterPairStream stream_;
-  std::vector<Neighbourhood> neighbourhoods_;  // one a body; empty until a step has contacts
+  std::vector<EdgeFace> pairs_;
+  std::vector<const EdgeFace*> tested_pairs_;          // that are tested together,
+  std::vector<std::array<std::uint32_t, 5>> corners_;  // the vertices of each,
+  std::vector<std::uint8_t> meet_;                     // and whether it meets
+  std::vector<std::uint64_t> keys_, other_keys_;       // of what is listed
+  std::vector<Neighbourhood> neighbourhoods_;          // one a body; empty until a step has contacts
   std::uint64_t tested_ = 0;
 };
 

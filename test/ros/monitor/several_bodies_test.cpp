@@ -70,21 +70,6 @@ TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
   expectAddsUp();
 }
 
-TEST_F(Pair, RigidBodiesMoveByTf) {
-  finger(400, 2);
-  finger(400.2, -2);
-  gripper.publish(meshStamped(tipAt(50), 400));
-  gripper.publish(meshStamped(tipAt(50), 400.3));
-  ros::Duration(0.1).sleep();
-  send(cloth, meshStamped(floorAt(0), 400));
-  const deformable_ccd::ContactArray outcome = send(cloth, meshStamped(floorAt(0), 400.2));
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  ASSERT_FALSE(outcome.contacts.empty());
-  double earliest = 1;
-  for (const auto& contact : outcome.contacts) earliest = std::min(earliest, contact.toc_lower);
-  EXPECT_NEAR(earliest, 0.5, 1e-6);
-}
-
 struct Tabled : MonitorTest {
   Tabled() : MonitorTest("/tabled") {}
   ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/cloth");

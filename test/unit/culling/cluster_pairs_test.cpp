@@ -273,6 +273,26 @@ TEST(ClusterPairs, BoundsOfGroupsAreNeverLate) {
   EXPECT_GT(shortened_positive, 20u);
 }
 
+// Where faces that are parallel meet, the bound is sharp but for what records are truncated by.
+TEST(ClusterPairs, BoundsOfParallelFacesAreSharpAndNeverLate) {
+  const Draw draw = drawFrom(77);
+  const Topology triangle = Topology::fromTriangles(3, {{0, 1, 2}});
+  for (int i = 0; i < 200; ++i) {
+    const double above = draw(1, 1000) / 700.0, below = draw(1, 1000) / 900.0;
+    TestStep step;
+    step.bodies = {
+        {triangle, {{0, 0, above}, {1, 0, above}, {0, 1, above}}, {{0, 0, -below}, {1, 0, -below}, {0, 1, -below}}},
+        {triangle, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
+    const Scene scene(step);
+    TreePair trees;
+    trees.a = &scene.arrays.bodies()[0].tree(FeatureKind::VERTEX);
+    trees.b = &scene.arrays.bodies()[1].tree(FeatureKind::FACE);
+    const double bound = superclusterTocBound(trees, 0, 0), toc = above / (above + below);
+    EXPECT_LE(bound, toc) << above << ", " << below;
+    EXPECT_GT(bound, toc - 1e-3) << above << ", " << below;
+  }
+}
+
 }  // namespace
 }  // namespace test
 }  // namespace dccd

@@ -10,17 +10,13 @@
 
 #include "dccd/elementary.h"
 #include "support/generators.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
 
 std::string refusal(const AccuracyOptions& options) {
-  try {
-    makeRung(options);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return test::said<std::invalid_argument>([&] { makeRung(options); });
 }
 
 TEST(ExactRung, FactoryRefusesOptionsOutOfRangeByNameAndValue) {
@@ -116,12 +112,8 @@ TEST(ExactRung, RefusesAMinimumSeparationAndNamesTheRungThatHasIt) {
   batch.minimum_separation_m = &separation;
   ElementaryResult result;
   TierCounters counters;
-  try {
-    makeRung({})->run(batch, &result, counters);
-    FAIL() << "accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("conservative"), std::string::npos);
-  }
+  const std::string text = test::said<std::invalid_argument>([&] { makeRung({})->run(batch, &result, counters); });
+  EXPECT_NE(text.find("conservative"), std::string::npos);
 }
 
 TEST(ExactRung, ManyPairsAtOnceAreTheSameAsOneByOne) {

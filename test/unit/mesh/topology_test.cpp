@@ -1,4 +1,5 @@
 #include "dccd/topology.h"
+#include "support/said.h"
 
 #include <gtest/gtest.h>
 
@@ -39,13 +40,9 @@ TEST(Topology, ClosedIsWhatHasNoBorder) {
 }
 
 TEST(Topology, RefusesWhatIsNoMeshAndNamesIt) {
-  try {
-    Topology::fromTriangles(3, {{0, 1, 2}, {0, 1, 7}});
-    FAIL() << "an index out of range was accepted";
-  } catch (const TopologyError& e) {
-    EXPECT_NE(std::string(e.what()).find("face 1 (0, 1, 7)"), std::string::npos) << e.what();
-    EXPECT_NE(std::string(e.what()).find("index 7"), std::string::npos) << e.what();
-  }
+  const std::string text = test::said<TopologyError>([&] { Topology::fromTriangles(3, {{0, 1, 2}, {0, 1, 7}}); });
+  EXPECT_NE(text.find("face 1 (0, 1, 7)"), std::string::npos) << text;
+  EXPECT_NE(text.find("index 7"), std::string::npos) << text;
   EXPECT_THROW(Topology::fromTriangles(3, {{0, 1, 1}}), TopologyError);
   EXPECT_THROW(Topology::grid(1, 5), TopologyError);
   EXPECT_THROW(Topology::grid(70000, 70000), TopologyError);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "obstacle/voxel_surface_impl.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -46,6 +47,7 @@ TEST(KnownSpace, ARegionIsKnownWhenEveryClosedVoxelItMeetsIs) {
   EXPECT_FALSE(space->isKnown(box(0.2, 0.2, 0.2, 0.81, 0.7, 0.7))) << "reaches beyond";
   EXPECT_FALSE(space->isKnown(box(0, 0.2, 0.2, 0.1, 0.3, 0.3))) << "touches the voxel below zero";
   EXPECT_FALSE(space->isKnown(box(0.15000000000000002, 0.11, 0.11, 0.2, 0.12, 0.12))) << "touches the hole's plane";
+  EXPECT_FALSE(space->isKnown(box(0.06, 0.11, 0.11, 0.1, 0.12, 0.12))) << "and from the other side";
   EXPECT_TRUE(space->isKnown(box(0.16, 0.11, 0.11, 0.2, 0.12, 0.12)));
   EXPECT_FALSE(space->isKnown(box(-1e9, 0, 0, 1e9, 1, 1)));
   EXPECT_TRUE(space->isKnown(Box()));
@@ -82,12 +84,8 @@ TEST(KnownSpace, UnknownLeavesAreBounded) {
 }
 
 TEST(KnownSpace, AResolutionThatIsNoneIsNamed) {
-  try {
-    KnownSpace::build(-0.5, {});
-    ADD_FAILURE();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "resolution_m is -0.5, which is not a length from 1e-290 to 1e290 m");
-  }
+  const std::string text = test::said<std::invalid_argument>([&] { KnownSpace::build(-0.5, {}); });
+  EXPECT_EQ(text, "resolution_m is -0.5, which is not a length from 1e-290 to 1e290 m");
 }
 
 TEST(KnownSpace, SweptSpaceCountsVoxelsOnce) {

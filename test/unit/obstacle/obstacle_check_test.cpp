@@ -131,6 +131,26 @@ TEST(ObstacleCheck, WhatPiercesAVoxelAtTheStartIsInitial) {
   EXPECT_TRUE(face.contacts[0].initial);
 }
 
+TEST(ObstacleCheck, WhatTouchesAnEdgeOfTheBoxAtOnePointIsMet) {
+  const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
+  const Vec3 below(-0.5, 0.5, 0.5), above(0.5, 0.5, 1.5), away(-3, 0.5, 5);
+  const Answer grazing = run(*surface, ROPE, {below, away}, {above, away});
+  ASSERT_FALSE(grazing.contacts.empty());
+  EXPECT_EQ(grazing.contacts[0].kind, PairKind::VERTEX_VOXEL_FACE);
+  EXPECT_EQ(grazing.contacts[0].toc_lower, 0.5);
+  const Answer resting = run(*surface, ROPE, {below, above}, {below, above});
+  ASSERT_EQ(resting.contacts.size(), 1u);
+  EXPECT_EQ(resting.contacts[0].kind, PairKind::EDGE_VOXEL_EDGE);
+  EXPECT_TRUE(resting.contacts[0].initial);
+}
+
+TEST(ObstacleCheck, WhatPassesThroughIsNotLeavingWhatItWasNotIn) {
+  const auto surface = unitVoxels({leafAt(32768, 32768, 32768), leafAt(32769, 32768, 32768)});
+  const Answer through = run(*surface, ROPE, {{-1, 0.5, 0.5}, {-1, 0.5, 5}}, {{3, 0.5, 0.5}, {-1, 0.5, 5}});
+  ASSERT_GE(through.contacts.size(), 2u);
+  for (const Contact& contact : through.contacts) EXPECT_FALSE(contact.leaving) << contact.voxel.x;
+}
+
 TEST(ObstacleCheck, InteriorLeavesHoldWhatStartsInThem) {
   std::vector<OccupiedLeaf> leaves;
   for (int i = 0; i < 27; ++i) leaves.push_back(leafAt(32768 + i % 3, 32768 + i / 3 % 3, 32768 + i / 9));

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "obstacle/voxel_surface_impl.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -201,12 +202,7 @@ TEST(VoxelSurface, LeafAtTakesClosedVoxelsAndTheSmallestKey) {
 }
 
 std::string refusal(double resolution_m, const std::vector<OccupiedLeaf>& leaves) {
-  try {
-    VoxelSurface::build(resolution_m, leaves);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return test::said<std::invalid_argument>([&] { VoxelSurface::build(resolution_m, leaves); });
 }
 
 TEST(VoxelSurface, RefusesWhatIsNoMapAndNamesIt) {

@@ -1,4 +1,5 @@
 #include "oracle/query_file.h"
+#include "support/said.h"
 
 #include <gtest/gtest.h>
 
@@ -28,12 +29,7 @@ std::vector<Query> parse(const std::string& text) {
 
 /// The message of the error that reading `text` ends in; empty where there is none.
 std::string errorOf(const std::string& text) {
-  try {
-    parse(text);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return {};
+  return test::said<std::runtime_error>([&] { parse(text); });
 }
 
 double randomFiniteDouble(std::mt19937_64& random) {
@@ -150,12 +146,9 @@ TEST(QueryFile, ErrorsNameInputLineAndValue) {
 }
 
 TEST(QueryFile, MissingFileAndFolderAreNamed) {
-  try {
-    readQueryFile("no/such/file.csv", PairKind::EDGE_EDGE);
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("no/such/file.csv"), std::string::npos);
-  }
+  const std::string text =
+      test::said<std::runtime_error>([&] { readQueryFile("no/such/file.csv", PairKind::EDGE_EDGE); });
+  EXPECT_NE(text.find("no/such/file.csv"), std::string::npos);
   EXPECT_THROW(findQueryFiles("no/such/folder"), std::runtime_error);
 }
 

@@ -136,6 +136,21 @@ TEST(DepthCamera, ARigidBodyIsSeenWhereItIs) {
   });
 }
 
+TEST(DepthCamera, ALinkIsSeenWhereItIs) {
+  SceneSpec spec = sceneOf(FAR_BOX);
+  spec.robot.emplace();
+  // A tetrahedron: the origin, and 0.4 m along each axis.
+  const Positions corners{{0, 0, 0}, {0.4, 0, 0}, {0, 0.4, 0}, {0, 0, 0.4}};
+  spec.robot->links.emplace_back().surfaces.push_back({corners, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}});
+  SceneState state = startOf(spec);
+  state.links.emplace_back(Eigen::Translation3d(0.1, 0, -0.1));
+  state.links[0].rotate(Eigen::AngleAxisd(0.7, Vec3(1, 1, 0).normalized()));
+  expectFirstInside(spec, DepthCamera(spec).look(state), [&](const Vec3& p) {
+    const Vec3 local = state.links[0].inverse() * p;
+    return local.minCoeff() >= 0 && local.sum() <= 0.4;
+  });
+}
+
 TEST(DepthCamera, NothingIsSeenBehindACloth) {
   // The cloth hangs across the way to the box, and hides the middle of it.
   const SceneSpec spec = sceneOf(

@@ -1,5 +1,6 @@
 // Scene files: what is read, and what is refused with file, line, key and what to write instead.
 #include "apps/make_scene_bag/physics/scene_file.h"
+#include "support/said.h"
 
 #include <filesystem>
 #include <string>
@@ -24,12 +25,7 @@ std::string errorOf(std::string text, const std::string& from, const std::string
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
-  try {
-    parseScene(text, "s.yaml");
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return test::said<ParameterError>([&] { parseScene(text, "s.yaml"); }, "accepted");
 }
 
 TEST(SceneFile, ReadsWhatItSays) {
@@ -241,6 +237,37 @@ TEST(SceneFile, ACameraLooksUprightAtItsPlace) {
   EXPECT_LT((turned.linear() * Vec3::UnitZ() + Vec3::UnitZ()).norm(), 1e-12) << "half a turn about x looks down";
 }
 
+TEST(SceneFile, ARobotsJointsAndWhatItsLinksHoldAreRead) {
+  const std::string held = "[0, 0, 1]}\n    grippers: [{vertices: [1], link: hand, grasp_s: 0.05, release_s: 0.1}]\n";
+  const std::string good = std::string(GOOD).replace(std::string(GOOD).find("[0, 0, 1]}"), 11, held) +
+                           "robot:\n  description: arm.urdf\n  base_m: [1, 2, 3]\n"
+                           "  joints: {lift: [{time_s: 0, position: 1}, {time_s: 0.1, position: -2}]}\n"
+                           "expect: {body: [{names: [sheet, finger], first_contact_s: [0, 0.1]},\n"
+                           "                {names: [sheet, hand], first_contact_s: none}]}\n";
+  const SceneSpec spec = parseScene(good, "s.yaml");
+  ASSERT_TRUE(spec.robot.has_value());
+  EXPECT_EQ(spec.robot->description, "arm.urdf");
+  EXPECT_EQ(spec.robot->base_m, Vec3(1, 2, 3));
+  ASSERT_EQ(spec.robot->joints.at("lift").size(), 2u);
+  EXPECT_EQ(spec.robot->joints.at("lift")[1].position, -2);
+  EXPECT_EQ(spec.robot->named_links, (std::vector<std::string>{"hand", "finger", "hand"}));
+  const Gripper& gripper = spec.bodies[0].grippers.at(0);
+  EXPECT_EQ(gripper.link, "hand");
+  EXPECT_EQ(gripper.grasp_s, 0.05);
+  const auto expectTold = [&](const std::string& from, const std::string& to, const std::string& told) {
+    const std::string error = errorOf(good, from, to);
+    EXPECT_NE(error.find(told), std::string::npos) << error;
+  };
+  expectTold("time_s: 0.1, p", "time_s: 0, p", "joints/lift[1]/time_s must be later");
+  expectTold("  description: arm.urdf\n", "", "robot/description is needed");
+  expectTold("link: hand", "link: hand, motion: [{time_s: 0}]", "grippers[0]/motion contradicts link");
+  expectTold("[sheet, finger], first", "[sheet, sheet], first", "expect/body[0]/names has one name twice");
+  expectTold("first_contact_s: none", "first_contact_s: none, lasts: true", "expect/body[1]/lasts is not known");
+  const std::string alone = good.substr(0, good.find("robot:"));
+  const std::string error = errorOf(alone, "frames: 5", "frames: 6");
+  EXPECT_NE(error.find("grippers[0]/link has no meaning without a robot"), std::string::npos) << error;
+}
+
 TEST(SceneFile, WhatIsNoYamlOrNoFileSaysSo) {
   EXPECT_NE(errorOf(GOOD, "frames: 5", "frames: [5").find("not YAML"), std::string::npos);
   EXPECT_THROW(readSceneFile("no/such/scene.yaml"), ParameterError);
@@ -259,7 +286,7 @@ TEST(SceneFile, EverySceneOfTheProjectIsReadAndNamedAsItsFile) {
     EXPECT_FALSE(spec.monitor_yaml.empty()) << spec.name;
     ++scenes;
   }
-  EXPECT_GE(scenes, 6);
+  EXPECT_GE(scenes, 7);
 }
 
 }  // namespace

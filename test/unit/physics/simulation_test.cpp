@@ -148,6 +148,61 @@ TEST(Simulation, RigidBodiesMoveAlongTheirKeys) {
   EXPECT_NEAR(Eigen::AngleAxisd(simulation.rigidPose(0).linear()).angle(), 0.5, 1e-9);
 }
 
+/// A slide along z at (2, 0, 1), and on it a joint that turns about y, 0.5 m to the side.
+Robot armOf(const std::vector<JointKey>& slide, const std::vector<JointKey>& turn) {
+  Robot robot;
+  robot.base_m = Vec3(2, 0, 0);
+  robot.links.resize(3);
+  for (int i = 0; i < 3; ++i) {
+    robot.links[i].name = std::string("abc").substr(i, 1);
+    robot.links[i].parent = i - 1;
+  }
+  robot.links[1].joint = Link::Joint::SLIDES;
+  robot.links[1].origin.translate(Vec3(0, 0, 1));
+  robot.links[1].axis = Vec3::UnitZ();
+  robot.links[1].keys = slide;
+  robot.links[2].joint = Link::Joint::TURNS;
+  robot.links[2].origin.translate(Vec3(0.5, 0, 0));
+  robot.links[2].axis = Vec3::UnitY();
+  robot.links[2].keys = turn;
+  return robot;
+}
+
+TEST(Simulation, JointsMoveSmoothlyBetweenTheirKeysAndCarryTheirLinks) {
+  const std::vector<JointKey> keys{{1, 0.25}, {2, 1.25}};
+  EXPECT_EQ(jointAt({}, 5), 0);
+  EXPECT_EQ(jointAt(keys, 0), 0.25);
+  EXPECT_EQ(jointAt(keys, 1.25), 0.25 + 0.15625) << "a quarter of the time: u^2 (3 - 2 u)";
+  EXPECT_EQ(jointAt(keys, 2), 1.25);
+  EXPECT_EQ(jointAt(keys, 9), 1.25);
+  const std::vector<Eigen::Isometry3d> poses = linkPoses(armOf(keys, {{0, 0}, {2, M_PI / 2}}), 2);
+  EXPECT_TRUE(poses[0].translation().isApprox(Vec3(2, 0, 0)));
+  EXPECT_TRUE(poses[1].translation().isApprox(Vec3(2, 0, 2.25)));
+  EXPECT_TRUE((poses[2] * Vec3(0, 0, 0.1)).isApprox(Vec3(2.6, 0, 2.25)));
+}
+
+// Physics has the vertices until they are grasped where they are, and again when they are released.
+TEST(Simulation, WhatALinkGraspsGoesWithIt) {
+  SceneSpec spec = bareScene();
+  spec.gravity_m_s2 = Vec3(0, 0, -9.81);
+  spec.robot = armOf({{0.2, 0}, {0.6, 0.4}}, {{0.2, 0}, {0.6, 0.3}});
+  spec.bodies[0].grippers.push_back({{0, 4}, {}, 0.8, "c", 0.1});
+  Simulation simulation(spec, 1);
+  EXPECT_EQ(simulation.effects(), (std::vector<std::string>{"gravity", "sheet: gripper"}));
+  const Positions start = simulation.observe(0);
+  for (int i = 0; i < 3; ++i) simulation.step();
+  const Positions grasped = simulation.observe(0);
+  EXPECT_LT(grasped[0][2], start[0][2] - 0.02) << "it fell for 0.1 s";
+  const Eigen::Isometry3d before = linkPoses(*spec.robot, 0.1)[2];
+  for (int i = 3; i < 21; ++i) simulation.step();
+  const Positions carried = simulation.observe(0);
+  const Eigen::Isometry3d moved = linkPoses(*spec.robot, simulation.time_s())[2] * before.inverse();
+  for (const int v : {0, 4}) EXPECT_LT((carried[v] - moved * grasped[v]).norm(), 1e-9);
+  EXPECT_GT(carried[0][2], grasped[0][2] + 0.3);
+  for (int i = 21; i < 30; ++i) simulation.step();
+  EXPECT_LT(simulation.observe(0)[0][2], carried[0][2] - 0.1) << "released at 0.8 s";
+}
+
 TEST(Simulation, TheDemosClothStartsAboveTheTableLiesOnItFoldedAndEndsLiftedOff) {
   const SceneSpec spec = readSceneFile(std::string(DEFORMABLE_CCD_SOURCE_DIR) + "/config/scenes/table_edge.yaml");
   ASSERT_TRUE(spec.obstacle.has_value());

@@ -10,6 +10,7 @@
 #include "record/step_recording.h"
 #include "support/folder_test.h"
 #include "support/recordings.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace test {
@@ -49,12 +50,8 @@ TEST_F(RecordingFile, AFullDiskIsNamedAndNothingIsLeftBehind) {
 
 TEST_F(RecordingFile, ADeviceWithoutSpaceIsNamedAndNothingIsLeftBehind) {
   fs::create_symlink("/dev/full", folder_ / "a.step.part");
-  try {
-    writeRecording(folder_ / "a.step", recordScene());
-    FAIL() << "/dev/full took it";
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
-  }
+  const std::string text = said<std::runtime_error>([&] { writeRecording(folder_ / "a.step", recordScene()); });
+  EXPECT_NE(text.find("No space left"), std::string::npos) << text;
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 

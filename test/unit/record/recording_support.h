@@ -7,17 +7,13 @@
 
 #include "dccd/stream.h"
 #include "record/step_recording.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace test {
 
 inline std::string errorOf(const std::vector<std::uint8_t>& bytes) {
-  try {
-    readRecording(bytes.data(), bytes.size(), "FILE");
-  } catch (const RecordingError& error) {
-    return error.what();
-  }
-  return {};
+  return said<RecordingError>([&] { readRecording(bytes.data(), bytes.size(), "FILE"); });
 }
 
 inline MonitorOptions with(Accuracy rung) {

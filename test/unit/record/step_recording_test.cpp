@@ -6,6 +6,7 @@
 
 #include "record/step_replay.h"
 #include "support/recordings.h"
+#include "support/said.h"
 #include "unit/record/recording_support.h"
 
 namespace dccd {
@@ -50,12 +51,8 @@ TEST(Recording, OfARungThatIsNoneSaysSo) {
   StepRecording r = recordScene();
   r.options.accuracy.rung = static_cast<Accuracy>(0);
   const std::vector<std::uint8_t> bytes = recordingBytes(r);
-  try {
-    readRecording(bytes.data(), bytes.size(), "FILE");
-    FAIL() << "it was read";
-  } catch (const RecordingError& error) {
-    EXPECT_NE(std::string(error.what()).find("rung 0 does not exist"), std::string::npos) << error.what();
-  }
+  const std::string text = said<RecordingError>([&] { readRecording(bytes.data(), bytes.size(), "FILE"); });
+  EXPECT_NE(text.find("rung 0 does not exist"), std::string::npos) << text;
 }
 
 TEST(StepRecording, EveryTruncationIsRefused) {

@@ -42,5 +42,16 @@ TEST(LatencyHistogram, EdgesAndExtremes) {
   EXPECT_EQ(histogram.worst(), std::numeric_limits<double>::infinity());
 }
 
+TEST(LatencyHistogram, AnEdgeItselfBelongsBelowIt) {
+  LatencyHistogram all;
+  for (const double s : {LatencyHistogram::LEAST_S, 1e3}) all.add(s);
+  ASSERT_EQ(all.bins().size(), LatencyHistogram::BINS);
+  for (const LatencyHistogram::Bin& bin : all.bins()) {
+    LatencyHistogram one;
+    one.add(bin.upper_s);
+    EXPECT_EQ(one.bins().at(0).upper_s, bin.upper_s);
+  }
+}
+
 }  // namespace
 }  // namespace dccd

@@ -97,6 +97,18 @@ TEST(PlayerData, FramesAreWhereTheBodiesWereToAQuantum) {
   }
 }
 
+TEST(PlayerData, AfterASeamTheStartIsAFrameOfItsOwn) {
+  Falling run;
+  PlayerData player;
+  for (int i = 0; i < 4; ++i) {
+    const Outcome o = run.next();
+    if (i != 2) player.add(o, run.bodies, 0, false);
+  }
+  const json frames = json::parse(player.json())["frames"];
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_NEAR(frames[3][1].get<double>(), 0.3, 1e-12) << "the start of the step after the seam";
+}
+
 TEST(PlayerData, AVertexWithoutAPositionIsMarkedAndABodyAtRestCostsAByte) {
   Falling run;
   PlayerData player;
@@ -223,6 +235,30 @@ TEST(PlayerData, OnlyVoxelsNearTheBodiesAreTaken) {
   EXPECT_EQ(json::parse(player.json())["maps"].size(), 1u) << "the same map, the same place";
 }
 
+TEST(PlayerData, OwnVoxelsAndThoseInDoubtAreOfTheirMap) {
+  Falling run;
+  PlayerData player;
+  const auto add = [&](std::vector<OccupiedLeaf> leaves, std::vector<OwnVoxel> own) {
+    Outcome o = run.next();
+    auto step = std::make_shared<Step>(*o.step);
+    for (const OwnVoxel& voxel : own) ++(voxel.doubted ? step->map.own.doubted : step->map.own.own);
+    step->map.own.voxels = share(std::move(own));
+    o.step = step;
+    o.obstacle = VoxelSurface::build(0.05, std::move(leaves));
+    player.add(o, run.bodies, 0, false);
+  };
+  add({{{32770, 32768, 32768}, 1}},
+      {{{32768, 32769, 32767}, 0, false}, {{32769, 32768, 32767}, 0, true}, {{40000, 0, 0}, 0, true}});
+  add({}, {{{32768, 32769, 32767}, 0, false}});
+  add({}, {});
+  const json maps = json::parse(player.json())["maps"];
+  ASSERT_EQ(maps.size(), 3u) << "also where nothing is left as an obstacle";
+  EXPECT_EQ(maps[0]["own"], json({32768, 32769, 32767, 1}));
+  EXPECT_EQ(maps[0]["doubted"], json({32769, 32768, 32767, 1})) << "the other one is far away";
+  EXPECT_EQ(maps[1]["own"], maps[0]["own"]);
+  for (const char* name : {"own", "doubted"}) EXPECT_FALSE(maps[2].contains(name));
+}
+
 TEST(ReportPage, TenMinutesOfAClothOf600VerticesFitIn25Megabytes) {
   constexpr std::size_t ROWS = 20, COLUMNS = 30, STEPS = 18000;
   const std::string folder = ::testing::TempDir() + "ten_minutes";
@@ -315,9 +351,10 @@ TEST(ContactLanes, TheFirstNewContactOfAPairInWordsAndToTheNanosecond) {
   Outcome o = run.next();
   o.start_ns += epoch_ns;
   o.stamp_ns += epoch_ns;
-  for (const bool initial : {true, false}) {
-    c.initial = initial;
-    c.toc_lower = initial ? 0 : 0.25;
+  for (const double toc : {0.0, 0.125, 0.25}) {
+    c.initial = toc == 0;
+    c.expected = toc == 0.125;
+    c.toc_lower = toc;
     o.contacts.push_back(c);
   }
   lanes.add(o, run.bodies, epoch_ns);

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <sstream>
 
 namespace dccd {
 namespace {
@@ -38,22 +40,43 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
   EXPECT_EQ(headlineOf({Outcome{}}), "No answer; not proved: a first frame alone makes no step.");
   EXPECT_EQ(headlineOf({lost, lost}),
             "No answer; not proved: 2 of 2 frames: NO_TRANSFORM: no transform from 'camera' to 'world' (2).");
-  EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps.");
+  EXPECT_EQ(headlineOf({clear, clear}), "No contact in 2 answered steps; all of it proved.");
   EXPECT_EQ(headlineOf({no_map, no_map, nothingFound(StepStatus::PARTIAL, StartState::CLEAR)}),
             "No contact found in 3 answered steps; not proved: 3 of 3 frames: NO_MAP (2), PARTIAL (1).");
   EXPECT_EQ(headlineOf({clear, no_map, crossing}),
             "No contact found in 3 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
             "not proved: 1 of 3 frames: NO_MAP (1).");
   EXPECT_EQ(headlineOf({clear, crossing}),
-            "No contact found in 2 answered steps; surfaces touched from the start of a step (start INTERSECTING 1).");
-  EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered steps.") << "of a first frame nothing is asked";
+            "No contact found in 2 answered steps; surfaces touched from the start of a step (start INTERSECTING 1); "
+            "all of it proved.");
+  EXPECT_EQ(headlineOf({Outcome{}, clear}), "No contact in 1 answered step; all of it proved.")
+      << "of a first frame nothing is asked";
   EXPECT_EQ(headlineOf({Outcome{}, clear, lost, clear}),
             "No contact found in 2 answered steps; not proved: 1 of 4 frames: NO_TRANSFORM: no transform from 'camera' "
             "to 'world' (1).");
   Outcome doubtful = clear;
   doubtful.unproved = {"1 vertices are not finite", "and more"};
   EXPECT_EQ(headlineOf({doubtful}),
-            "No contact found in 1 answered steps; not proved: 1 of 1 frames: 1 vertices are not finite (1).");
+            "No contact found in 1 answered step; not proved: 1 of 1 frame: 1 vertices are not finite (1).");
+}
+
+TEST(Headline, WhatWasNotLookedAtStandsBesideWhatWasFound) {
+  const std::string folder = ::testing::TempDir() + "report_without_map";
+  Report report(folder);
+  Outcome no_map = nothingFound(StepStatus::NO_MAP, StartState::CLEAR);
+  no_map.step = std::make_shared<Step>();
+  report.add(no_map, {});
+  report.setNotLookedAt({"nothing was checked against a map: the bag has none"});
+  EXPECT_EQ(report.headline(false),
+            "No contact found in 1 answered step; not proved: 1 of 1 frame; nothing was checked against a map: the bag "
+            "has none.");
+  report.finish();
+  const auto proof = nlohmann::json::parse(std::ifstream(folder + "/report.json"))["proof"];
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(proof, nlohmann::json({{"steps", 1},
+                                   {"proved", 0},
+                                   {"unproved", "1 of 1 frame: NO_MAP (1)"},
+                                   {"not_looked_at", {"nothing was checked against a map: the bag has none"}}}));
 }
 
 TEST(Headline, ExpectedContactsAreToldApart) {
@@ -61,7 +84,81 @@ TEST(Headline, ExpectedContactsAreToldApart) {
   quiet.total_contacts = quiet.counts.certain = quiet.counts.expected = 3;
   quiet.touching = Touching::EXPECTED;
   EXPECT_EQ(headlineOf({quiet, nothingFound(StepStatus::OK, StartState::CLEAR)}),
-            "No unexpected contact in 2 answered steps; expected contacts in 1 of them.");
+            "No unexpected contact in 2 answered steps; expected contacts in 1 of them; all of it proved.");
+}
+
+/// The cells of the first row by the names of their columns.
+std::map<std::string, std::string> firstRowOf(const std::string& csv) {
+  std::ifstream file(csv);
+  std::string names, cells;
+  std::getline(file, names);
+  std::getline(file, cells);
+  std::istringstream name_words(names), cell_words(cells);
+  std::map<std::string, std::string> row;
+  for (std::string name, cell; std::getline(name_words, name, ',');) {
+    std::getline(cell_words, cell, ',');
+    EXPECT_TRUE(row.emplace(name, cell).second) << name << " is there twice";
+    cell.clear();
+  }
+  return row;
+}
+
+TEST(ReportTables, APatchHasAColumnForEachOfItsFields) {
+  const std::string folder = ::testing::TempDir() + "report_of_patches";
+  Outcome outcome;
+  outcome.sequence = 3;
+  outcome.stamp_ns = 40;
+  Patch patch;
+  patch.id = 7;
+  patch.body = {0, OBSTACLE_BODY};
+  patch.contacts = 6, patch.certain = 5, patch.initial = 4, patch.crossings = 2, patch.expected = 1;
+  patch.toc_lower = 0.25, patch.toc_upper = 0.5, patch.area_m2 = 0.125;
+  patch.centroid = Vec3(1, 2, 3), patch.normal = Vec3(0, 0, -1), patch.box = {Vec3(4, 5, 6), Vec3(7, 8, 9)};
+  patch.beginning = PatchBeginning::MAP_CHANGED, patch.began_to_ns = 20, patch.is_new = true;
+  outcome.patches = {patch};
+  std::vector<Body> bodies(1);
+  bodies[0].name = "cloth";
+  Report report(folder);
+  report.add(outcome, bodies);
+  report.finish();
+  const std::map<std::string, std::string> expected{{"step", "3"},
+                                                    {"stamp_ns", "40"},
+                                                    {"patch", "7"},
+                                                    {"body_0", "cloth"},
+                                                    {"body_1", "octomap"},
+                                                    {"contacts", "6"},
+                                                    {"certain", "5"},
+                                                    {"initial", "4"},
+                                                    {"crossings", "2"},
+                                                    {"expected", "1"},
+                                                    {"toc_lower", "0.25"},
+                                                    {"toc_upper", "0.5"},
+                                                    {"area_m2", "0.125"},
+                                                    {"centroid_x", "1"},
+                                                    {"centroid_y", "2"},
+                                                    {"centroid_z", "3"},
+                                                    {"normal_x", "0"},
+                                                    {"normal_y", "0"},
+                                                    {"normal_z", "-1"},
+                                                    {"box_min_x", "4"},
+                                                    {"box_min_y", "5"},
+                                                    {"box_min_z", "6"},
+                                                    {"box_max_x", "7"},
+                                                    {"box_max_y", "8"},
+                                                    {"box_max_z", "9"},
+                                                    {"began_from_ns", ""},
+                                                    {"began_to_ns", "20"},
+                                                    {"is_new", "1"},
+                                                    {"beginning", "MAP_CHANGED"}};
+  EXPECT_EQ(firstRowOf(folder + "/patches.csv"), expected);
+  std::ifstream contacts(folder + "/contacts.csv");
+  std::string names;
+  std::getline(contacts, names);
+  EXPECT_EQ(names,
+            "step,stamp_ns,kind,toc_lower,toc_upper,v0,v1,v2,v3,body_0,body_1,voxel_x,voxel_y,voxel_z,voxel_size,"
+            "certainty,initial,leaving,expected,time_s,point_x,point_y,point_z,normal_x,normal_y,normal_z,"
+            "approach_speed_m_per_s");
+  std::filesystem::remove_all(folder);
 }
 
 TEST(ReportJson, HoldsEachCounterOfTheSteps) {

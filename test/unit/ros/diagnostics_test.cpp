@@ -50,6 +50,19 @@ TEST(Diagnostics, AMapThatIsNotThereHasNoAge) {
   EXPECT_EQ(valueOf(diagnostics.take(2 * SECOND_NS, ros::Time(2), {}, true, "", ""), "map age [s]"), "3");
 }
 
+TEST(Diagnostics, RatesAreThoseOfThePeriod) {
+  Diagnostics diagnostics("/monitor");
+  Outcome answer, none;
+  answer.answered = true;
+  answer.step = share(Step());
+  for (const Outcome& outcome : {answer, answer, none}) diagnostics.add(outcome, 0);
+  const auto busy = diagnostics.take(SECOND_NS, ros::Time(1), {}, true, "", "");
+  EXPECT_EQ(valueOf(busy, "outcomes [Hz]") + " " + valueOf(busy, "answers [Hz]"), "3 2");
+  diagnostics.add(answer, 0);
+  const auto quiet = diagnostics.take(3 * SECOND_NS, ros::Time(3), {}, true, "", "");
+  EXPECT_EQ(valueOf(quiet, "outcomes [Hz]") + " " + valueOf(quiet, "answers [Hz]"), "0.5 0.5");
+}
+
 TEST(Diagnostics, FramesThatAreDroppedDoArrive) {
   Diagnostics diagnostics("/monitor");
   StatsContext context;

@@ -1,5 +1,5 @@
-// doc/interface.md: its example of several bodies is accepted as it stands, and the defaults of a body are the code's.
-// (Those of the node itself: page_defaults_test.cpp.)
+// doc/interface.md: its example of several bodies is accepted as it stands, and the defaults of the node and of a body
+// are the code's.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +7,8 @@
 #include <iomanip>
 #include <iterator>
 #include <map>
+#include <regex>
+#include <set>
 #include <sstream>
 
 #include "input/mesh_resource.h"
@@ -53,6 +55,8 @@ TEST(InterfacePage, TheExampleOfClothAndFingerIsAcceptedAsItStands) {
   EXPECT_GE(mesh.topology->faces().size(), 12u);
 }
 
+using Defaults = std::map<std::string, std::string>;
+
 /// A default as the page writes it: none for what is empty.
 std::string shown(const std::string& text) { return text.empty() ? "none" : "`" + text + "`"; }
 std::string shown(bool value) { return value ? "true" : "false"; }
@@ -65,7 +69,7 @@ std::string shown(std::size_t value) { return std::to_string(value); }
 
 /// The defaults that the code gives a body of a list with nothing set. Of rigid/mesh and rigid/frame there is none:
 /// they are needed, as the test below sees.
-std::map<std::string, std::string> defaultsInTheCode() {
+Defaults defaultsInTheCode() {
   XmlRpcValue tree;
   tree["bodies"]["NAME"]["weld"] = "on";  // XML-RPC has no empty section; the default is that of `single`
   tree["bodies"]["pad"]["rigid"]["mesh"] = "pad.stl";
@@ -119,10 +123,11 @@ std::vector<std::string> split(const std::string& text, const std::string& separ
   return parts;
 }
 
-/// The table of per-body parameters: name to default. In a row of several the second has the first one's section.
-std::map<std::string, std::string> defaultsOnThePage() {
-  std::map<std::string, std::string> defaults;
-  for (const std::string& line : split(between(interfacePage(), "\nPer body", "**A whole example"), "\n")) {
+/// Of the table between two headings: name to default. In a row of several, the following have the section of the
+/// first.
+Defaults defaultsOnThePage(const std::string& from, const std::string& to) {
+  Defaults defaults;
+  for (const std::string& line : split(between(interfacePage(), from, to), "\n")) {
     if (line.rfind("| `", 0) != 0) continue;
     const std::vector<std::string> cells = split(line, " | ");
     const std::vector<std::string> names = split(cells.at(0).substr(2), ", "), values = split(cells.at(1), ", ");
@@ -142,7 +147,7 @@ std::map<std::string, std::string> defaultsOnThePage() {
 }
 
 TEST(InterfacePage, DefaultsOfABodyAreTheCodes) {
-  EXPECT_EQ(defaultsOnThePage(), defaultsInTheCode());
+  EXPECT_EQ(defaultsOnThePage("\nPer body", "**A whole example"), defaultsInTheCode());
   XmlRpcValue rigid;
   rigid["bodies"]["cloth"]["topic"] = "cloth";
   rigid["bodies"]["pad"]["rigid"]["frame"] = "pad";
@@ -150,6 +155,111 @@ TEST(InterfacePage, DefaultsOfABodyAreTheCodes) {
   rigid["bodies"]["pad"]["rigid"] = XmlRpcValue();
   rigid["bodies"]["pad"]["rigid"]["mesh"] = "pad.stl";
   EXPECT_TRUE(mentions(errorOf(rigid), "rigid/frame is needed")) << errorOf(rigid);
+}
+
+template <class T>
+std::string plain(const T& value) {
+  std::ostringstream text;
+  text << std::boolalpha << value;
+  return text.str();
+}
+
+/// The same number in two notations, or the same word.
+bool same(const std::string& page, const std::string& code) {
+  const std::regex number("[-+0-9.e]*[0-9]");
+  if (!std::regex_match(page, number) || !std::regex_match(code, number)) return page == code;
+  return std::stod(page) == std::stod(code);
+}
+
+Defaults inForceOfTheNode() {
+  MonitorConfig config = readConfig(XmlRpcValue());
+  limitLive(config);
+  const MonitorOptions& monitor = config.monitor;
+  const Options& detector = monitor.detector;
+  const RobotConfig robot;
+  constexpr std::size_t MB = std::size_t{1} << 20;
+  return {{"accuracy", toString(detector.accuracy.rung)},
+          {"tolerance_m", plain(detector.accuracy.tolerance_m)},
+          {"toc_bits", plain(detector.accuracy.toc_bits)},
+          {"max_subdivisions", plain(detector.accuracy.max_subdivisions)},
+          {"num_threads", plain(detector.num_threads)},
+          {"record_steps", plain(config.record_steps)},
+          {"simd_target", config.simd_target},
+          {"step_budget_ms", plain(detector.step_budget_ms)},
+          {"minimum_separation_m", plain(config.minimum_separation_m)},
+          {"max_step_s", plain(monitor.store.max_step_s)},
+          {"max_vertex_step_m", plain(monitor.store.max_vertex_step_m)},
+          {"look_ahead_s", plain(monitor.look_ahead_s)},
+          {"max_contacts", plain(detector.max_contacts)},
+          {"earliest_only", plain(detector.earliest_only)},
+          {"max_memory_mb", plain(config.max_memory_bytes / MB)},
+          {"max_compute_s", plain(detector.max_compute_ms / 1e3)},
+          {"initial_contacts", detector.suppress_initial ? "suppress" : "report"},
+          {"octomap_topic", config.octomap_topic},
+          {"obstacle_cloud_topic", config.cloud_topic},
+          {"obstacle_resolution_m", plain(config.cloud_map.resolution_m)},
+          {"obstacle_max_range_m", plain(config.cloud_map.max_range_m)},
+          {"sensor_model/hit", plain(config.cloud_map.hit)},
+          {"sensor_model/miss", plain(config.cloud_map.miss)},
+          {"sensor_model/min", plain(config.cloud_map.min)},
+          {"sensor_model/max", plain(config.cloud_map.max)},
+          {"own_voxels_m", plain(config.own_voxels_m)},
+          {"own_voxels_lag_s", plain(monitor.own_voxels_lag_s)},
+          {"own_voxels_doubt", monitor.own_voxels_trust ? "trust" : "unproved"},
+          {"octomap_timeout_s", plain(monitor.octomap_timeout_s)},
+          {"max_map_mb", plain(config.max_map_bytes / MB)},
+          {"unknown_space", config.unknown_space == UnknownSpace::FREE ? "free" : "another"},
+          {"answer_timeout_s", plain(config.answer_timeout_s)},
+          {"transform_timeout_s", plain(config.transform_timeout_s)},
+          {"patch_gap_s", plain(monitor.patch_gap_s)},
+          {"sync_timeout_s", plain(monitor.sync_timeout_s)},
+          {"queue_size", plain(config.queue_size)},
+          {"queue_policy", config.queue_policy == QueuePolicy::NEWEST ? "newest" : "oldest"},
+          {"rigid_tolerance_m", plain(detector.rigid_tolerance_m)},
+          {"max_substeps", plain(detector.max_substeps)},
+          {"effects/NAME", toString(config.effects.at(Effect::SELF_COLLISION))},
+          {"markers/point_size_m", plain(config.markers.point_size_m)},
+          {"markers/normal_length_m", plain(config.markers.normal_length_m)},
+          {"markers/line_width_m", plain(config.markers.line_width_m)},
+          {"markers/max_contacts", plain(config.markers.max_contacts)},
+          {"markers/mesh", plain(config.markers.mesh)},
+          {"markers/obstacle_m", plain(config.markers.obstacle_m)},
+          {"robot/timeout_s", plain(robot.timeout_s)},
+          {"robot/padding_m", plain(robot.padding_m)},
+          {"robot/own_voxels_m", robot.own_voxels_m == ONE_VOXEL ? "auto" : plain(robot.own_voxels_m)},
+          {"robot/scale", plain(robot.scale)},
+          {"robot/against_links", plain(robot.against_links)},
+          {"robot/against_map", plain(robot.against_map)},
+          {"default_topic", config.bodies.at(0).topic}};
+}
+
+TEST(InterfacePage, DefaultsOfTheNodeAreThoseInForceWhereNoneIsGiven) {
+  Defaults page;
+  for (const auto& [name, value] : defaultsOnThePage("\n## Parameters", "\nPer body")) {
+    page[name] = std::regex_replace(value, std::regex("`| \\(.*\\)"), "");
+  }
+  for (const auto& [name, value] : inForceOfTheNode()) {
+    ASSERT_TRUE(page.count(name)) << name << " is not on the page";
+    EXPECT_TRUE(same(page[name], value)) << name << ": the page says " << page[name] << ", in force is " << value;
+    page.erase(name);
+  }
+  // These have a sentence or nothing in place of a value.
+  std::set<std::string> others;
+  for (const auto& row : page) others.insert(row.first);
+  const std::set<std::string> without{"clock_body",
+                                      "exclude_boxes",
+                                      "expected_contacts",
+                                      "fixed_frame",
+                                      "minimum_separation_pairs",
+                                      "octomap_file",
+                                      "octomap_frame",
+                                      "phase",
+                                      "record_folder",
+                                      "robot/description",
+                                      "robot/leave_out",
+                                      "robot/links",
+                                      "robot/semantic"};
+  EXPECT_EQ(others, without);
 }
 
 }  // namespace

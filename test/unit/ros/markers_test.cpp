@@ -108,6 +108,18 @@ TEST(Markers, NoMoreContactsAreDrawnThanAreAskedFor) {
   EXPECT_EQ(pointsIn(toMarkers(overABlock(1, 5000), twoBodies(), config, "world"), "contacts"), 7u);
 }
 
+TEST(Markers, TheFaceThatIsTouchedIsThatOfItsBody) {
+  Outcome outcome = overABlock(1, 1);
+  Step step = *outcome.step;
+  step.bodies[1].t0 = step.bodies[1].t1 = share(Positions{{7, 0, 1}, {8, 0, 1}, {7, 1, 1}});
+  outcome.step = share(step);
+  const visualization_msgs::MarkerArray drawn = toMarkers(outcome, twoBodies(), MarkerConfig(), "world");
+  ASSERT_EQ(pointsIn(drawn, "faces"), 3u);
+  for (const Marker& marker : drawn.markers) {
+    if (marker.ns == "faces") EXPECT_EQ(marker.points[0].x, 7);
+  }
+}
+
 /// So that nothing stays when the node is gone, and nothing goes while it lives.
 TEST(Markers, AllLiveForASecondAndTwoSteps) {
   MarkerConfig config;

@@ -13,11 +13,12 @@
 
 #include "input/mesh_formats.h"
 #include "support/folder_test.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
 
-bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+using test::mentions;
 
 class Grammar : public test::FolderTest {
  protected:
@@ -446,9 +447,11 @@ class PlyGrammar : public Grammar {
     out.append(bytes, sizeof value);
   }
   /// With an element with a list before the faces, and lists and scalars beside their corners.
+  template <typename Real = float>
   static std::string binary(bool big, const std::string& end = "\n") {
+    const std::string real = sizeof(Real) == 4 ? "float" : "float64";
     std::string text =
-        head("element material 1\nproperty list ushort double weights\nproperty short id\n" + xyz(4, "float") +
+        head("element material 1\nproperty list ushort double weights\nproperty short id\n" + xyz(4, real) +
                  "property list uchar uchar tags\nelement face 2\nproperty uchar flags\nproperty list uchar int "
                  "vertex_indices\n"
                  "property list uchar float texcoord\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n",
@@ -458,7 +461,7 @@ class PlyGrammar : public Grammar {
     for (const double weight : {0.5, 2.0}) put(text, weight, big);
     put(text, std::int16_t{-7}, big);
     for (const Vec3& p : SQUARE) {
-      for (const double x : p) put(text, static_cast<float>(x), big);
+      for (const double x : p) put(text, static_cast<Real>(x), big);
       text += std::string("\3abc");
     }
     for (const Face& face : TWO) {
@@ -475,7 +478,13 @@ class PlyGrammar : public Grammar {
 
 TEST_F(PlyGrammar, Encodings) {
   expectTwo(read("a.ply", whole()), "ascii");
-  for (const bool big : {false, true}) expectTwo(read("a.ply", binary(big)), big ? "big" : "little");
+  for (const bool big : {false, true}) {
+    expectTwo(read("a.ply", binary(big)), big ? "big" : "little");
+    expectTwo(read("a.ply", binary<double>(big)), "doubles");
+    for (const std::size_t cut : {1u, 20u, 60u, 120u}) {
+      EXPECT_NE(error("a.ply", binary(big).substr(0, binary(big).size() - cut)), "") << "cut by " << cut;
+    }
+  }
 }
 
 TEST_F(PlyGrammar, EndsOfLines) {

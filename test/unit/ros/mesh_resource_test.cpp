@@ -16,6 +16,7 @@
 
 #include "support/data.h"
 #include "support/folder_test.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -32,19 +33,10 @@ Eigen::AlignedBox3d boundsOf(const Positions& positions) {
   return box;
 }
 
-template <typename Load>
-std::string errorOf(Load load) {
-  try {
-    load();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::mentions;
 std::string errorOf(const std::string& path) {
-  return errorOf([&] { loadMeshResource(path, 1); });
+  return test::said<std::invalid_argument>([&] { loadMeshResource(path, 1); });
 }
-bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// Counted by a script of a few lines that reads the 50 bytes of a triangle, and by geometric_shapes' reader, which
 /// agrees.
@@ -154,7 +146,9 @@ TEST_F(OddFiles, DamagedDaesAreRefusedByName) {
 }
 
 TEST_F(OddFiles, ADaeIsNoTopologyOfATracker) {
-  const auto load = [](const std::string& path) { return errorOf([&] { loadTopologyFile(path); }); };
+  const auto load = [](const std::string& path) {
+    return test::said<std::invalid_argument>([&] { loadTopologyFile(path); });
+  };
   EXPECT_TRUE(mentions(load(ours("pyramid_mm.dae")), "does not number its vertices"));
   EXPECT_EQ(load(ours("pyramid.obj")), "");
 }

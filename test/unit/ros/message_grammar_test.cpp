@@ -14,6 +14,7 @@
 
 #include "deformable_ccd/MeshStamped.h"
 #include "input/mesh_decoder.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -21,7 +22,7 @@ namespace {
 const Positions SQUARE = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0.1}};
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+using test::mentions;
 
 /// A decoder, and what it makes of messages as bytes.
 class MessageGrammar : public ::testing::Test {
@@ -46,7 +47,7 @@ class MessageGrammar : public ::testing::Test {
       EXPECT_EQ(mesh.row_step_remark, same.row_step_remark);
       return mesh;
     } catch (const MeshError& error) {
-      EXPECT_EQ(error.what(), errorOf([&] { of_objects_->decode(object); }));
+      EXPECT_EQ(error.what(), test::said<MeshError>([&] { of_objects_->decode(object); }));
       throw;
     }
   }
@@ -63,16 +64,6 @@ class MessageGrammar : public ::testing::Test {
 
  private:
   std::optional<MeshDecoder> decoder_, of_objects_;
-
-  template <typename Decode>
-  static std::string errorOf(Decode decode) {
-    try {
-      decode();
-    } catch (const MeshError& error) {
-      return error.what();
-    }
-    return "was read";
-  }
 };
 
 template <typename Point = geometry_msgs::Point>
@@ -124,6 +115,10 @@ TEST_F(CloudGrammar, Fields) {
   EXPECT_EQ(read(cloud()).positions, SQUARE);
   anew();
   EXPECT_EQ(read(cloud(sensor_msgs::PointField::FLOAT32)).positions[3].z(), static_cast<double>(0.1f));
+  sensor_msgs::PointCloud2 backwards = cloud();
+  backwards.fields[3].offset = 8;  // right after z, and x right after it
+  anew();
+  EXPECT_EQ(read(backwards).positions.size(), 4u);
 }
 
 TEST_F(CloudGrammar, OtherTypes) {
@@ -362,6 +357,7 @@ TEST_F(PolygonMeshGrammar, WhatIsNoPolygon) {
   pcl_msgs::PolygonMesh bad = mesh({{0, 1, 2}, {0, 2, 1, 3}, {1, 3}, {3}, {}});
   bad.cloud = CloudGrammar::cloud(sensor_msgs::PointField::FLOAT64, flat);
   EXPECT_EQ(read(bad).dropped_faces, 3u) << "a bow tie, an edge and a vertex of no face; nothing is nothing";
+  EXPECT_TRUE(mentions(refusalOf(mesh({{0, 2, 1, 3}})), "nothing to check"));
   EXPECT_EQ(read(mesh({{0, 1, 2}, {1, 2}, {0}})).dropped_faces, 0u) << "of a face";
 }
 
@@ -404,8 +400,11 @@ TEST_F(MarkerGrammar, Poses) {
 
 TEST_F(MarkerGrammar, Scales) {
   visualization_msgs::Marker scaled = marker();
+  scaled.scale.y = -0.0;
   EXPECT_EQ(read(scaled).positions[1], SQUARE[1]) << "all 0: not set";
-  scaled.scale.x = scaled.scale.y = 2;
+  scaled.scale.x = 2;
+  EXPECT_TRUE(mentions(refusalOf(scaled), "scale is (2, -0, 0)"));
+  scaled.scale.y = 2;
   EXPECT_TRUE(mentions(refusalOf(scaled), "scale is (2, 2, 0)"));
   scaled.scale.z = -1;
   EXPECT_EQ(read(scaled).positions[2], Vec3(2, 2, 0)) << "mirrored";

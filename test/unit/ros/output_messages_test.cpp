@@ -7,6 +7,8 @@
 #include <limits>
 #include <sstream>
 
+#include "output/patch_messages.h"
+
 namespace dccd {
 namespace {
 
@@ -66,6 +68,32 @@ TEST(Stats, EachCounterOfAStepHasAFieldOfItsName) {
   for (const StepCounter& counter : STEP_COUNTERS) {
     const std::string line = counter.name + (": " + std::to_string(outcome.stats.*counter.value)) + '\n';
     EXPECT_NE(('\n' + text.str()).find('\n' + line), std::string::npos) << line;
+  }
+}
+
+TEST(Stats, FramesAreCountedByWhatBecameOfThem) {
+  const std::pair<StepStatus, const char*> fields[] = {{StepStatus::DUPLICATE, "skipped_duplicate"},
+                                                       {StepStatus::VERTEX_COUNT, "skipped_vertex_count"},
+                                                       {StepStatus::BAD_MESSAGE, "skipped_bad_message"},
+                                                       {StepStatus::NO_TRANSFORM, "skipped_no_transform"},
+                                                       {StepStatus::NO_BODY, "skipped_no_body"},
+                                                       {StepStatus::QUEUE_FULL, "skipped_queue_full"},
+                                                       {StepStatus::DISABLED, "skipped_disabled"},
+                                                       {StepStatus::RESET, "skipped_reset"},
+                                                       {StepStatus::INTERNAL_ERROR, "skipped_error"},
+                                                       {StepStatus::TOPOLOGY_CHANGED, "seams_topology"},
+                                                       {StepStatus::GAP, "seams_gap"},
+                                                       {StepStatus::TIME_JUMP, "seams_time_jump"},
+                                                       {StepStatus::TELEPORT, "seams_teleport"}};
+  StatsContext context;
+  std::uint64_t count = 0;
+  for (const auto& field : fields) context.frames.by_status.at(static_cast<std::size_t>(field.first)) = ++count;
+  std::ostringstream text;
+  text << toStepStats(nothingFound(StepStatus::OK, StartState::CLEAR), context, "world");
+  count = 0;
+  for (const auto& field : fields) {
+    const std::string line = '\n' + std::string(field.second) + ": " + std::to_string(++count) + '\n';
+    EXPECT_NE(text.str().find(line), std::string::npos) << line;
   }
 }
 
@@ -166,11 +194,92 @@ TEST(Expected, ContactsAreMarkedAndCountedAndNoAlarm) {
   EXPECT_EQ(toTimeToContact(alarm, 2, bodies, "world").seconds, 1);
 
   deformable_ccd::State state = toState(quiet, "world");
-  fillState(assuranceOf(quiet), state);
+  fillState(assuranceOf(quiet), "", "", state);
   EXPECT_TRUE(state.proved);
   EXPECT_FALSE(state.clear);
   EXPECT_EQ(state.touching, deformable_ccd::State::EXPECTED);
   EXPECT_EQ(state.expected, quiet.expected);
+}
+
+TEST(State, ReasonIsEnoughByItself) {
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  const auto step = std::make_shared<Step>();
+  step->bodies.resize(1);
+  step->bodies[0].name = "cloth";
+  step->bodies[0].topology = share(Topology::grid(2, 2));
+  step->bodies[0].t0 = step->bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  outcome.step = step;
+  outcome.start_ns = 4900000000;
+  outcome.stamp_ns = 5000000000;
+  const auto reasonOf = [&](const std::string& remedy) {
+    deformable_ccd::State state = toState(outcome, "world");
+    fillState(assuranceOf(outcome), touchesInWords(outcome), remedy, state);
+    return state.reason;
+  };
+  EXPECT_EQ(reasonOf("not asked for"), "proved, nothing touches; nothing was checked against a map");
+  Patch first, second;
+  first.contacts = 2;
+  first.began_to_ns = 2930000000;
+  second.contacts = 5;
+  second.began_to_ns = 4000000000;
+  second.centroid = {0.3, 0.1, 0.75};
+  outcome.patches = {first, second};
+  outcome.touching = Touching::LASTING;
+  EXPECT_EQ(reasonOf(""),
+            "proved, what touches did so when the step began: cloth and itself for 2.07 s, 2 patches, the largest at "
+            "0.300 0.100 0.750; nothing was checked against a map");
+  outcome.patches = {second};
+  outcome.patches[0].beginning = PatchBeginning::INITIAL;
+  outcome.status = StepStatus::NO_MAP;
+  outcome.unproved = {"no octomap has been received yet; checked without it"};
+  EXPECT_EQ(
+      reasonOf("see rostopic hz /octomap"),
+      "not proved: no octomap has been received yet; checked without it; what touches did so when the step began: "
+      "cloth and itself since the first look, 1 patch at 0.300 0.100 0.750; see rostopic hz /octomap");
+}
+
+/// Bytes as they go over the wire.
+template <class Message>
+std::string wireOf(const Message& message) {
+  const ros::SerializedMessage bytes = ros::serialization::serializeMessage(message);
+  return {reinterpret_cast<const char*>(bytes.buf.get()), bytes.num_bytes};
+}
+
+TEST(Lists, AMessageThatWasOneBeforeSaysTheSameAsANewOne) {
+  const Outcome alarm = resting(true), none = nothingFound(StepStatus::OK, StartState::CLEAR);
+  Outcome crossing = alarm;
+  crossing.intersections.resize(3);
+  const std::vector<Body>& bodies = alarm.step->bodies;
+  ASSERT_GT(alarm.contacts.size(), 0u);
+  deformable_ccd::ContactArray kept;
+  for (const Outcome* outcome : std::initializer_list<const Outcome*>{&crossing, &none, &alarm, &crossing}) {
+    fillContactArray(*outcome, bodies, "world", kept);
+    EXPECT_EQ(wireOf(kept), wireOf(toContactArray(*outcome, bodies, "world")));
+  }
+}
+
+// A list is made with the geometry of many contacts at once, a first contact with that of one.
+TEST(Lists, EachContactIsWhatItIsByItself) {
+  const Outcome alarm = resting(true);
+  const auto list = toContactArray(alarm, alarm.step->bodies, "world");
+  ASSERT_EQ(list.contacts.size(), alarm.contacts.size());
+  for (std::size_t i = 0; i < alarm.contacts.size(); ++i) {
+    EXPECT_EQ(wireOf(list.contacts[i]), wireOf(toContact(alarm, alarm.contacts[i], list.contacts[i].patch))) << i;
+  }
+}
+
+TEST(Summary, PatchesThatLastAreThoseThatAreNeitherNewNorExpected) {
+  Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);
+  outcome.tracked = true;
+  outcome.touching = Touching::LASTING;
+  outcome.patches.resize(4);
+  for (std::size_t p = 0; p < 4; ++p) {
+    outcome.patches[p].id = p < 2 ? 1 : p;  // two that came apart are one
+    outcome.patches[p].contacts = 1;
+  }
+  outcome.patches[2].is_new = true;
+  outcome.patches[3].expected = 1;
+  EXPECT_EQ(toFirstContact(outcome, std::vector<Body>(1), "world").lasting_patches, 1u);
 }
 
 TEST(Times, WhatRosCannotHoldIsTheNearestThatItCan) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "config/monitor_config.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace test {
@@ -11,15 +12,8 @@ namespace test {
 using XmlRpc::XmlRpcValue;
 
 inline std::string errorOf(XmlRpcValue tree) {
-  try {
-    readConfig(tree);
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "";
+  return said<ParameterError>([&] { readConfig(tree); });
 }
-
-inline bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 inline XmlRpcValue separationPair(const std::string& a, const std::string& b, double separation_m) {
   XmlRpcValue pair;

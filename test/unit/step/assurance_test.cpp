@@ -183,6 +183,14 @@ TEST(Assurance, TouchingTellsWhatLastsFromWhatIsNew) {
   assurance = assuranceOf(asked.answer());
   EXPECT_TRUE(assurance.proved);
   EXPECT_EQ(assurance.touching, Touching::LASTING);
+  // Beside patches that last, a further contact is nothing new; a new patch is.
+  Outcome tracked;
+  tracked.touching = Touching::NEW;
+  tracked.tracked = true;
+  tracked.patches.resize(2);
+  EXPECT_EQ(assuranceOf(tracked).touching, Touching::LASTING);
+  tracked.patches[1].is_new = true;
+  EXPECT_EQ(assuranceOf(tracked).touching, Touching::NEW);
   // Crossing at the start leaves the proof, and counts as touching.
   Positions tilted = sheetAt(0);
   for (Vec3& x : tilted) x.z() += 0.2 * (x.x() - 0.15);

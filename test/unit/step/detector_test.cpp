@@ -9,6 +9,7 @@
 #include <set>
 
 #include "support/heap.h"
+#include "support/said.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -271,12 +272,7 @@ TEST(Detector, InactiveVerticesAreLeftOutWithTheirFeatures) {
 
 template <class Call>
 std::string refusal(const Call& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& e) {
-    return e.what();
-  }
-  return "accepted";
+  return said<std::invalid_argument>(call, "accepted");
 }
 
 void expectContains(const std::string& text, const std::vector<std::string>& parts) {

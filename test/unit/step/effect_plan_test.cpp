@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "dccd/detect.h"
+#include "support/said.h"
 
 namespace dccd {
 namespace {
@@ -122,13 +123,6 @@ TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
   ahead.predictions_heard = true;
   EXPECT_EQ(reason(EffectPlan(ahead, {}), "look_ahead"), "predictions reach 0.5 s ahead");
   EXPECT_TRUE(EffectPlan(ahead, {}).running(Effect::LOOK_AHEAD));
-
-  EffectScene alone = cloth();
-  alone.bodies.push_back(body("table"));
-  for (Body& one : alone.bodies) one.against_bodies = one.against_obstacle = one.self_collision = false;
-  for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP}) {
-    EXPECT_FALSE(on(alone, effect).running(effect)) << toString(effect);
-  }
 }
 
 TEST(EffectPlan, RigidBodiesMeetOthersOnly) {
@@ -153,13 +147,10 @@ TEST(EffectPlan, OffIsOffAndOnNeedsItsReason) {
       << "so a missing map is told";
   for (const Effect effect : {Effect::BODY_BODY, Effect::RIGID_BODIES, Effect::UNKNOWN_SPACE,
                               Effect::MINIMUM_SEPARATION, Effect::LOOK_AHEAD}) {
-    try {
+    const std::string text = test::said<std::invalid_argument>([&] {
       EffectPlan impossible(scene, {{effect, EffectSetting::ON}});
-      ADD_FAILURE() << toString(effect);
-    } catch (const std::invalid_argument& error) {
-      EXPECT_NE(std::string(error.what()).find(std::string("effects/") + toString(effect)), std::string::npos)
-          << error.what();
-    }
+    });
+    EXPECT_NE(text.find(std::string("effects/") + toString(effect)), std::string::npos) << text;
   }
 }
 
@@ -172,6 +163,7 @@ TEST(EffectPlan, BodiesThatMeetNothingRunNothing) {
   const EffectPlan none(scene, {});
   for (const Effect effect : {Effect::SELF_COLLISION, Effect::BODY_BODY, Effect::OCTOMAP}) {
     EXPECT_FALSE(none.running(effect)) << toString(effect);
+    EXPECT_FALSE(EffectPlan(scene, {{effect, EffectSetting::ON}}).running(effect)) << toString(effect);
   }
   EXPECT_EQ(reason(none, "octomap"), "against_obstacle is false for every body");
   scene.bodies[0].against_bodies = true;

@@ -7,6 +7,7 @@
 
 #include "dccd/assurance.h"
 #include "support/detector.h"
+#include "support/said.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -48,12 +49,7 @@ ExpectedPartner all(std::uint16_t body) { return {body, {}, ""}; }
 ExpectedPartner only(std::uint16_t body, const std::vector<Index>& vertices) { return {body, vertices, ""}; }
 
 std::string messageOf(const Falling& falling) {
-  try {
-    falling.answer();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "nothing was refused";
+  return said<std::invalid_argument>([&] { falling.answer(); }, "nothing was refused");
 }
 
 /// The vertices of one side of a contact between meshes.

@@ -56,22 +56,31 @@ TEST_F(OneBody, OldMapIsNoMap) {
   feed(pair(1900 * MS, 1));
   EXPECT_EQ(feed(pair(1950 * MS, 1)).status, StepStatus::OK);
   EXPECT_EQ(feed(pair(2001 * MS, 1)).status, StepStatus::NO_MAP);
+  // One from the future would be fresh for ever; a little ahead is as good as a little behind.
+  monitor.setMap({VoxelSurface::build(0.1, {}), 3150 * MS, Eigen::Isometry3d::Identity(), {}});
+  const Outcome ahead = feed(pair(2100 * MS, 1));
+  EXPECT_EQ(ahead.status, StepStatus::NO_MAP);
+  EXPECT_NE(ahead.reason.find("after the end of the step, more than octomap_timeout_s"), std::string::npos)
+      << ahead.reason;
+  EXPECT_EQ(feed(pair(2200 * MS, 1)).status, StepStatus::OK);
+}
+
+/// A triangle over the map's first voxel, its lowest corner at the height z.
+MeshFrame overTheVoxel(StampNs stamp_ns, double z) {
+  return {stamp_ns,
+          oneTriangle(),
+          {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}},
+          false,
+          Eigen::Isometry3d::Identity()};
 }
 
 TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   // The map's frame stands 10 m above the fixed frame's: voxel [0, 1]^3 there is [0, 1]^2 x [10, 11] here.
   ObstacleMap map{VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 1}}), 0, Eigen::Isometry3d::Identity(), {}};
   map.map_from_fixed.translation() = Vec3(0, 0, -10);
-  monitor.setMap(std::move(map));
-  const auto at = [](StampNs stamp_ns, double z) {
-    return MeshFrame{stamp_ns,
-                     oneTriangle(),
-                     {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}},
-                     false,
-                     Eigen::Isometry3d::Identity()};
-  };
-  feed(at(0, 12));
-  const Outcome outcome = feed(at(100 * MS, 10));
+  monitor.setMap(map);
+  feed(overTheVoxel(0, 12));
+  const Outcome outcome = feed(overTheVoxel(100 * MS, 10));
   ASSERT_FALSE(outcome.contacts.empty());
   EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-9);
   const Contact& contact = outcome.contacts.front();
@@ -84,11 +93,15 @@ TEST_F(OneBody, VoxelContactInTheMapsFrame) {
   MonitorOptions options = loose();
   options.detector.exclude_boxes = {{{0, 0, 10}, {1, 1, 11}}};
   monitor.setOptions(options);
-  feed(at(200 * MS, 12));
-  const Outcome excluded = feed(at(300 * MS, 10));
+  feed(overTheVoxel(200 * MS, 12));
+  const Outcome excluded = feed(overTheVoxel(300 * MS, 10));
   EXPECT_TRUE(excluded.contacts.empty());
   EXPECT_EQ(excluded.excluded_voxels, 1u);
   EXPECT_TRUE(assuranceOf(excluded).clear()) << "what is excluded is not looked at";
+  map.map_from_fixed.setIdentity();
+  monitor.setMap(map);
+  feed(overTheVoxel(400 * MS, 2));
+  EXPECT_NEAR(feed(overTheVoxel(500 * MS, 0)).earliest_toc, 0.5, 1e-9) << "the same map, moved out of the box";
 }
 
 // An excluded voxel is free space, so what lies behind it is exposed.
@@ -97,21 +110,14 @@ TEST_F(OneBody, WhatLiesBehindAnExcludedVoxelIsTouched) {
   options.detector.exclude_boxes = {{{0, 0, 1}, {2, 2, 2}}};
   monitor.setOptions(options);
   monitor.setMap({VoxelSurface::build(1.0, {{{32768, 32768, 32768}, 2}}), 0, Eigen::Isometry3d::Identity(), {}});
-  const auto at = [](StampNs stamp_ns, double z) {
-    return MeshFrame{stamp_ns,
-                     oneTriangle(),
-                     {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}},
-                     false,
-                     Eigen::Isometry3d::Identity()};
-  };
-  feed(at(0, 3));
-  const Outcome outcome = feed(at(100 * MS, 0.5));
+  feed(overTheVoxel(0, 3));
+  const Outcome outcome = feed(overTheVoxel(100 * MS, 0.5));
   EXPECT_EQ(outcome.excluded_voxels, 4u);
   ASSERT_FALSE(outcome.contacts.empty());
   EXPECT_NEAR(outcome.earliest_toc, 0.8, 1e-9) << "from 3 m to the upper face of what is left, at 1 m";
   monitor.setOptions(loose());
-  feed(at(200 * MS, 3));
-  EXPECT_NEAR(feed(at(300 * MS, 0.5)).earliest_toc, 0.4, 1e-9) << "nothing is excluded any more";
+  feed(overTheVoxel(200 * MS, 3));
+  EXPECT_NEAR(feed(overTheVoxel(300 * MS, 0.5)).earliest_toc, 0.4, 1e-9) << "nothing is excluded any more";
 }
 
 }  // namespace

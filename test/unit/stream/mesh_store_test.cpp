@@ -1,4 +1,5 @@
 #include "dccd/mesh_store.h"
+#include "support/said.h"
 
 #include <gtest/gtest.h>
 
@@ -96,6 +97,8 @@ TEST_F(MeshStoreTest, KeepsNoMoreThanItsCapacity) {
   store.forgetBefore(985 * MS);
   EXPECT_EQ(store.size(), 2u);
   EXPECT_EQ(store.lookup(985 * MS), Lookup::READY);
+  store.forgetBefore(2000 * MS);
+  EXPECT_NE(store.previous(), nullptr) << "a prediction needs two";
 }
 
 // A gripper at 240 Hz beside a tracker that comes 0.4 s late must still be known where the tracker's step begins.
@@ -123,12 +126,7 @@ TEST_F(MeshStoreTest, SmallMeshesAreKeptForLongLargeOnesAreNot) {
 
 TEST(MeshStoreOptionsTest, OutOfRangeNamesTheOption) {
   const auto message = [](const MeshStoreOptions& options) -> std::string {
-    try {
-      MeshStore store(options);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+    return test::said<std::invalid_argument>([&] { MeshStore store(options); });
   };
   EXPECT_NE(message({0, 0.5, 4}).find("max_step_s"), std::string::npos);
   EXPECT_NE(message({std::nan(""), 0.5, 4}).find("max_step_s"), std::string::npos);

@@ -92,6 +92,7 @@ TEST_F(OneBody, TooManyContactsKeepTheEarliest) {
   EXPECT_EQ(outcome.counts.certain + outcome.counts.undecided, outcome.total_contacts) << "counted before the cut";
   EXPECT_EQ(outcome.counts.mesh, outcome.total_contacts);
   EXPECT_EQ(outcome.counts.obstacle, 0u);
+  EXPECT_TRUE(outcome.unproved.empty()) << "only the list is cut";
 }
 
 TEST_F(OneBody, MaskedVerticesMeetNothing) {

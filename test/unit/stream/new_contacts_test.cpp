@@ -36,6 +36,18 @@ TEST(NewContacts, APatchIsNewsOnceAndThenLasts) {
   for (int k = 2; k < 8; ++k) EXPECT_EQ(said[static_cast<std::size_t>(k)], Touching::LASTING) << k;
 }
 
+TEST(NewContacts, OfAPatchThatIsNewByEdgesThatCrossAnExpectedContactIsNone) {
+  Outcome outcome;
+  outcome.tracked = true;
+  outcome.patches.resize(1);
+  Patch& patch = outcome.patches[0];
+  patch.is_new = true;
+  patch.contacts = patch.crossings = patch.expected = 1;
+  EXPECT_EQ(newContacts(outcome).size(), 1u);
+  patch.earliest.expected = true;
+  EXPECT_TRUE(newContacts(outcome).empty());
+}
+
 TEST(NewContacts, TheEarliestOfEachPairOfPartners) {
   Stream stream({grid(5, 5), grid(5, 5)});
   stream.setMap(table(0.05));
@@ -115,8 +127,7 @@ TEST(NewContacts, WhatIsNoLongerExpectedButLastsIsOneOnce) {
   const Positions resting = strip(5, 5, 0.02, [](std::size_t) { return 0.0; });
   stream.feed({above});
   for (int k = 0; k < 3; ++k) EXPECT_TRUE(newContacts(stream.feed({resting})).empty());
-  stream.options().detector.expected.clear();  // the next phase of the task
-  stream.monitor().setOptions(stream.options());
+  stream.expect({});  // the next phase of the task
   const Outcome outcome = stream.feed({resting});
   EXPECT_EQ(newContacts(outcome).size(), 1u);
   EXPECT_EQ(earliestNewToc(outcome), 0) << "it touched when the step began";
@@ -149,10 +160,7 @@ struct PhasesOfCrossing : ::testing::Test {
   }
   Stream stream{{oneTriangle(), oneTriangle()}, carrying()};
 
-  void expectMeeting(bool they_meet) {
-    stream.options().detector.expected = expecting(they_meet).detector.expected;
-    stream.monitor().setOptions(stream.options());
-  }
+  void expectMeeting(bool they_meet) { stream.expect(expecting(they_meet).detector.expected); }
   /// The step that ends with the tip at this height; whether it is an alarm.
   bool isAlarm(double z) {
     const Outcome outcome = stream.feed({sheet(), tipAt(z)});
@@ -314,14 +322,10 @@ TEST(NewContacts, WhatSplitsOrMergesAtTheSwitchIsTold) {
       return std::any_of(columns.begin(), columns.end(), holds) ? 0.0 : 0.01;
     })});
   };
-  const auto expectNothing = [&] {
-    stream.options().detector.expected.clear();
-    stream.monitor().setOptions(stream.options());
-  };
   down({});
   EXPECT_TRUE(newContacts(down({{0, 5}})).empty());
   EXPECT_EQ(newContacts(down({{0, 5}, {12, 20}})).size(), 1u) << "that side is not expected";
-  expectNothing();
+  stream.expect({});
   EXPECT_EQ(newContacts(down({{0, 20}})).size(), 1u) << "both are one now: " << stream.text();
   EXPECT_NE(stream.text().find("MERGED 1+2"), std::string::npos) << stream.text();
   EXPECT_NE(stream.text().find("UNEXPECTED 1"), std::string::npos) << stream.text();
@@ -335,7 +339,7 @@ TEST(NewContacts, WhatSplitsOrMergesAtTheSwitchIsTold) {
   down({});
   EXPECT_TRUE(newContacts(down({{0, 20}})).empty());
   for (int k = 0; k < 2; ++k) EXPECT_TRUE(newContacts(down({{0, 5}, {12, 20}})).empty());
-  expectNothing();
+  stream.expect({});
   const Outcome outcome = down({{0, 5}, {12, 20}});
   EXPECT_NE(stream.text().find("SPLIT"), std::string::npos) << stream.text();
   EXPECT_EQ(std::count_if(outcome.patches.begin(), outcome.patches.end(), [](const Patch& p) { return p.is_new; }), 2);
@@ -355,8 +359,7 @@ TEST(NewContacts, WhatABurstLeavesAtTheSwitchIsTold) {
   resting(0);
   resting(300);
   EXPECT_TRUE(newContacts(resting(4)).empty());
-  stream.options().detector.expected.clear();
-  stream.monitor().setOptions(stream.options());
+  stream.expect({});
   EXPECT_EQ(newContacts(resting(4)).size(), 1u) << stream.text();
 }
 

@@ -309,6 +309,28 @@ TEST_F(OwnVoxels, AnotherFrameOrResolutionIsAFirstMap) {
   EXPECT_EQ(doubted(feed(300 * MS, 0.55)), 1u);
 }
 
+TEST_F(OwnVoxels, HugeReachesAndPlacesAndWhatIsNoReach) {
+  for (const double reach_m : {1e9, 1e300}) {
+    start(reach_m);
+    hoverAboveFloor();
+    EXPECT_EQ(own(feed(110 * MS, 0.55)), 0u) << "the floor is older";
+    map(150 * MS, slab(1) + voxelsOf(0.55) + Cells{{-32768, 0, 32767}});
+    EXPECT_EQ(own(feed(200 * MS, 0.55)), 26u) << "all that appears";
+  }
+  for (const double far : {1e9, 1e300}) {
+    start(0.05);
+    MonitorOptions options = monitor_->options();
+    options.store.max_vertex_step_m = 0;
+    monitor_->setOptions(options);
+    hoverAboveFloor();
+    feed(200 * MS, far);
+    map(200 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(2.05));
+    EXPECT_EQ(own(feed(300 * MS, 0.55)), 25u) << "at most places on a way that long are not asked: obstacles";
+  }
+  for (const double wrong : {-0.01, -2.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW(start(wrong), std::invalid_argument) << wrong;
+}
+
 TEST_F(OwnVoxels, OverATeleportWhatIsOwnStaysOwn) {
   MonitorOptions options = monitor_->options();
   options.store.max_vertex_step_m = 0.3;

@@ -55,6 +55,11 @@ class Stream {
     monitor_->setMap({std::move(surface), 1, Eigen::Isometry3d::Identity(), {}});
   }
   StampNs now() const { return stamp_ns_; }
+  /// From the next step on.
+  void expect(const std::vector<Expectation>& expected) {
+    options_.detector.expected = expected;
+    monitor_->setOptions(options_);
+  }
   void wait(StampNs ns) { stamp_ns_ += ns; }
 
   /// The next frame of each body, and what comes of it.

@@ -74,6 +74,7 @@ Positions corners(const Vec3& min, const Vec3& max, const Eigen::Isometry3d& pos
 DepthCamera::DepthCamera(const SceneSpec& spec)
     : bodies_(spec.bodies),
       rigid_bodies_(spec.rigid_bodies),
+      links_(spec.robot ? spec.robot->links : std::vector<Link>()),
       camera_(*spec.camera),
       from_fixed_(spec.camera->pose.inverse()),
       focal_px_(0.5 * spec.camera->width / std::tan(0.5 * spec.camera->field_of_view_rad)),
@@ -181,6 +182,13 @@ std::vector<Eigen::Vector3f> DepthCamera::look(const SceneState& state) {
   }
   for (std::size_t r = 0; r < state.rigid_bodies.size(); ++r) {
     drawBox(ranges, state.rigid_bodies[r], 0.5 * rigid_bodies_[r].size_m);
+  }
+  for (std::size_t l = 0; l < state.links.size(); ++l) {
+    for (const Surface& surface : links_[l].surfaces) {
+      Positions in_camera;
+      for (const Vec3& p : surface.vertices) in_camera.push_back(from_fixed_ * (state.links[l] * p));
+      drawFaces(ranges, in_camera, surface.faces);
+    }
   }
   std::vector<Eigen::Vector3f> cloud;
   cloud.reserve(ranges.size());

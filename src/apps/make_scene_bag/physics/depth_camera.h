@@ -12,6 +12,7 @@ namespace dccd::scene {
 struct SceneState {
   std::vector<Positions> bodies;                ///< one for each of the scene's; none: its solids are alone
   std::vector<Eigen::Isometry3d> rigid_bodies;  ///< poses of their frames, likewise
+  std::vector<Eigen::Isometry3d> links;         ///< of the robot, likewise
 };
 
 class DepthCamera {
@@ -39,6 +40,7 @@ class DepthCamera {
 
   std::vector<Body> bodies_;
   std::vector<RigidBody> rigid_bodies_;
+  std::vector<Link> links_;
   Camera camera_;
   Eigen::Isometry3d from_fixed_;  // to the optical frame
   double focal_px_;

@@ -28,28 +28,45 @@ void readEnd(ParameterReader& map, const Window& begin, const SceneSpec& spec) {
   if (readWindow(map, "ends_s", spec).high_s < begin.low_s) map.fail("ends_s", "is before first_contact_s");
 }
 
-void checkNames(ParameterReader& map, const SceneSpec& spec) {
+void checkNames(ParameterReader& map, SceneSpec& spec) {
   const std::vector<std::string> names = map.texts("names", 2);
   for (const std::string& name : names) {
     const auto same = [&name](const auto& body) { return body.name == name; };
     if (std::any_of(spec.bodies.begin(), spec.bodies.end(), same)) continue;
     if (std::any_of(spec.rigid_bodies.begin(), spec.rigid_bodies.end(), same)) continue;
+    if (spec.robot) {
+      spec.robot->named_links.push_back(name);
+      continue;
+    }
     map.fail("names", "has '" + name + "', which is no body of the scene; write two names of bodies or rigid_bodies");
   }
   if (names[0] == names[1]) map.fail("names", "has one name twice; a body's contact with itself is `self`");
 }
 
-/// The expected first contact with one thing; nothing where none is expected.
-std::optional<Window> readContact(ParameterReader& expect, const std::string& what, const SceneSpec& spec) {
-  if (!expect.has(what) || expect.raw(what).text == "none") return std::nullopt;
-  ParameterReader map = expect.section(what);
-  if (what == "octomap" && !spec.obstacle) expect.fail(what, "has no meaning without an obstacle; remove this line");
-  if (what == "body") checkNames(map, spec);
+/// The expected first contact of one kind; nothing where none is expected.
+std::optional<Window> readContact(ParameterReader map, const SceneSpec& spec) {
+  if (map.has("first_contact_s") && map.raw("first_contact_s").text == "none") {
+    map.finish();
+    return std::nullopt;
+  }
   const Window window = readWindow(map, "first_contact_s", spec);
   readEnd(map, window, spec);
   map.integer("contacts_at_least", 1, 1, 1000000000);
   map.finish();
   return window;
+}
+
+/// Those with one thing, or of `body` of each pair of names.
+std::vector<Window> readContacts(ParameterReader& expect, const std::string& what, SceneSpec& spec) {
+  if (!expect.has(what) || expect.raw(what).text == "none") return {};
+  if (what == "octomap" && !spec.obstacle) expect.fail(what, "has no meaning without an obstacle; remove this line");
+  const bool several = what == "body" && expect.raw(what).kind == ParameterTree::Kind::LIST;
+  std::vector<Window> contacts;
+  for (ParameterReader& map : several ? expect.sections(what) : std::vector{expect.section(what)}) {
+    if (what == "body") checkNames(map, spec);
+    if (const std::optional<Window> window = readContact(map, spec)) contacts.push_back(*window);
+  }
+  return contacts;
 }
 
 void checkClear(ParameterReader map, const std::vector<Window>& contacts, const SceneSpec& spec) {
@@ -69,10 +86,10 @@ void checkClear(ParameterReader map, const std::vector<Window>& contacts, const 
 
 }  // namespace
 
-void checkExpectations(ParameterReader map, const SceneSpec& spec) {
+void checkExpectations(ParameterReader map, SceneSpec& spec) {
   std::vector<Window> contacts;
   for (const char* what : {"octomap", "self", "body"}) {
-    if (const std::optional<Window> window = readContact(map, what, spec)) contacts.push_back(*window);
+    for (const Window& window : readContacts(map, what, spec)) contacts.push_back(window);
   }
   if (map.has("clear")) checkClear(map.section("clear"), contacts, spec);
   map.finish();

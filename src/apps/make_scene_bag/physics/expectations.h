@@ -9,6 +9,7 @@ namespace dccd::scene {
 
 /// Throws ParameterError on what it does not understand, and on facts that contradict the scene (a contact after its
 /// end, with a body that is not there) or each other (a contact while all is clear).
-void checkExpectations(ParameterReader map, const SceneSpec& spec);
+/// A name of `body` that is no body's must be a link's: it becomes one of the robot's named_links.
+void checkExpectations(ParameterReader map, SceneSpec& spec);
 
 }  // namespace dccd::scene

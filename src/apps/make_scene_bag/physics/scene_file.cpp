@@ -61,7 +61,7 @@ Motion readMotion(ParameterReader& parent) {
   return motion;
 }
 
-Gripper readGripper(ParameterReader map, const Shape& shape) {
+Gripper readGripper(ParameterReader map, const Shape& shape, std::optional<Robot>& robot) {
   Gripper gripper;
   const bool by_row = map.has("row"), by_col = map.has("col"), by_vertex = map.has("vertices");
   if (by_row + by_col + by_vertex != 1) map.fail("", "needs just one of row, col, vertices: what the gripper holds");
@@ -76,12 +76,19 @@ Gripper readGripper(ParameterReader map, const Shape& shape) {
     gripper.vertices = map.integers("vertices", 0, shape.rows * shape.cols - 1);
   }
   gripper.motion = readMotion(map);
+  if (map.has("link")) {
+    gripper.link = map.text("link");
+    if (!robot) map.fail("link", "has no meaning without a robot; write one, or a motion");
+    if (!gripper.motion.empty()) map.fail("motion", "contradicts link; remove one of the two");
+    robot->named_links.push_back(gripper.link);
+    gripper.grasp_s = map.number("grasp_s", 0.0, 0.0, LARGE);
+  }
   if (map.has("release_s")) gripper.release_s = map.number("release_s", 0.0, LARGE);
   map.finish();
   return gripper;
 }
 
-Body readBody(ParameterReader map, const std::string& fixed_frame) {
+Body readBody(ParameterReader map, const std::string& fixed_frame, std::optional<Robot>& robot) {
   Body body;
   body.name = map.text("name");
   body.topic = map.text("topic", "/" + body.name);
@@ -114,7 +121,8 @@ Body readBody(ParameterReader map, const std::string& fixed_frame) {
     self_collision.finish();
   }
   if (map.has("friction")) body.friction = map.number("friction", 0.0, 1.0);
-  for (ParameterReader& gripper : map.sections("grippers")) body.grippers.push_back(readGripper(gripper, body.shape));
+  for (ParameterReader& gripper : map.sections("grippers"))
+    body.grippers.push_back(readGripper(gripper, body.shape, robot));
   map.finish();
   return body;
 }
@@ -171,6 +179,24 @@ RigidBody readRigidBody(ParameterReader map) {
   body.motion = readMotion(map);
   map.finish();
   return body;
+}
+
+Robot readRobot(ParameterReader map) {
+  Robot robot;
+  robot.description = map.text("description");
+  robot.base_m = map.vector("base_m", Vec3::Zero());
+  ParameterReader joints = map.section("joints");
+  for (const std::string& name : joints.names()) {
+    for (ParameterReader& key : joints.sections(name)) {
+      std::vector<JointKey>& keys = robot.joints[name];
+      keys.push_back({key.number("time_s", 0.0, LARGE), key.number("position", -LARGE, LARGE)});
+      if (keys.size() > 1 && keys.back().time_s <= keys[keys.size() - 2].time_s)
+        key.fail("time_s", "must be later than that of the key before");
+      key.finish();
+    }
+  }
+  map.finish();
+  return robot;
 }
 
 Eigen::Isometry3d readCameraPose(ParameterReader& map) {
@@ -295,8 +321,9 @@ SceneSpec readScene(const ParameterTree& tree) {
   if (physics.has("gravity_m_s2")) spec.gravity_m_s2 = physics.vector("gravity_m_s2");
   if (physics.has("wind")) spec.wind = readWind(physics.section("wind"));
   physics.finish();
+  if (map.has("robot")) spec.robot = readRobot(map.section("robot"));
   for (ParameterReader& body : map.sections("bodies")) {
-    spec.bodies.push_back(readBody(body, spec.fixed_frame));
+    spec.bodies.push_back(readBody(body, spec.fixed_frame, spec.robot));
     for (std::size_t i = 0; i + 1 < spec.bodies.size(); ++i) {
       if (spec.bodies[i].topic == spec.bodies.back().topic)
         body.fail("topic", "is another body's, too; write a topic of its own");
@@ -320,6 +347,19 @@ SceneSpec parseScene(const std::string& text, const std::string& name) {
   SceneSpec spec = readScene(parseYaml(text, name));
   spec.monitor_yaml = yamlBelow(text, "monitor");
   return spec;
+}
+
+Obstacle readObstacleFile(const std::string& path) {
+  ParameterReader map(parseYaml(yamlText(path, "a file with an obstacle, such as examples/box.yaml"), path), "");
+  if (map.has("bodies")) {
+    const SceneSpec spec = readSceneFile(path);
+    if (!spec.obstacle) map.fail("obstacle", "is missing: the scene has no map");
+    return *spec.obstacle;
+  }
+  const std::string fixed_frame = map.text("fixed_frame", "world");
+  const Obstacle obstacle = readObstacle(map.neededSection("obstacle"), fixed_frame);
+  map.finish();
+  return obstacle;
 }
 
 SceneSpec readSceneFile(const std::string& path) {

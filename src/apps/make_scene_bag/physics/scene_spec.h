@@ -2,6 +2,7 @@
 // An effect that a scene does not name is an empty optional here, and is not constructed (see simulation.h).
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,11 +31,13 @@ struct MotionKey {
 };
 using Motion = std::vector<MotionKey>;
 
-/// Vertices that follow a motion instead of the physics, until they are released.
+/// Vertices that follow a motion, or a link of the robot, instead of the physics, until they are released.
 struct Gripper {
   std::vector<int> vertices;
   Motion motion;
   std::optional<double> release_s;
+  std::string link{};    ///< holds them where they are at grasp_s; empty: the motion does, from the start
+  double grasp_s = 0.0;  ///< with a link: physics has them until then
 };
 
 struct Bending {
@@ -96,6 +99,39 @@ struct RigidBody {
   Motion motion;
 };
 
+/// Where a joint is [m or rad]: at rest before the first key and after the last, smoothly between two.
+struct JointKey {
+  double time_s = 0.0;
+  double position = 0.0;
+};
+
+struct Surface {
+  Positions vertices;  ///< [m]
+  std::vector<Face> faces;
+};
+
+/// A link of the robot, and the joint that carries it.
+struct Link {
+  enum class Joint { FIXED, TURNS, SLIDES };
+  std::string name;
+  int parent = -1;  ///< which comes before it; -1: it is the root, and has no joint
+  std::string joint_name;
+  Joint joint = Joint::FIXED;
+  Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< of the joint in the parent's frame
+  Vec3 axis = Vec3::UnitX();                                 ///< of unit length
+  std::vector<JointKey> keys;                                ///< none: it stays at 0
+  std::vector<Surface> surfaces;                             ///< in its frame
+};
+
+/// Published as tf and joint states, seen by the camera. Physics knows it by what its grippers hold.
+struct Robot {
+  std::string description;  ///< file of its URDF
+  Vec3 base_m = Vec3::Zero();
+  std::map<std::string, std::vector<JointKey>> joints;
+  std::vector<std::string> named_links;  ///< by other parts of the scene
+  std::vector<Link> links;               ///< what the URDF says: addRobot()
+};
+
 /// A depth camera that looks on. Its frame is an optical one: x to the right, y down, z forward.
 struct Camera {
   std::string topic;        ///< of its clouds; its map comes on the obstacle's topic
@@ -134,6 +170,7 @@ struct SceneSpec {
   std::vector<Body> bodies;
   std::optional<Obstacle> obstacle;
   std::vector<RigidBody> rigid_bodies;
+  std::optional<Robot> robot;
   std::optional<Camera> camera;  ///< where there is one, there is an obstacle
   ParameterTree monitor;         ///< the scene's `monitor` block, as the node reads it
   std::string monitor_yaml;      ///< the same as text, passed on as written

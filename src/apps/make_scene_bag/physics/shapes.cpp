@@ -28,6 +28,10 @@ Vec3 localVertex(const Shape& shape, int row, int col) {
   return Vec3(across * shape.size_m[0], along * shape.size_m[1], 0.0);
 }
 
+/// The share of the way between two keys after a share of the time. The velocity is zero at both: a gripper that starts
+/// with a jerk tears at the cloth.
+double smooth(double share) { return share * share * (3.0 - 2.0 * share); }
+
 }  // namespace
 
 Positions startPositions(const Shape& shape) {
@@ -71,16 +75,46 @@ Eigen::Isometry3d motionAt(const Motion& motion, const Vec3& centroid_m, double 
     if (!motion.empty()) now = motion.back();
   } else {
     const MotionKey before = after == motion.begin() ? MotionKey{} : *(after - 1);
-    const double share = std::clamp((time_s - before.time_s) / (after->time_s - before.time_s), 0.0, 1.0);
-    // Velocity is zero at both keys: a gripper that starts with a jerk tears at the cloth.
-    const double smooth = share * share * (3.0 - 2.0 * share);
-    now.offset_m = before.offset_m + smooth * (after->offset_m - before.offset_m);
-    now.rotation_rad = before.rotation_rad + smooth * (after->rotation_rad - before.rotation_rad);
+    const double way = smooth(std::clamp((time_s - before.time_s) / (after->time_s - before.time_s), 0.0, 1.0));
+    now.offset_m = before.offset_m + way * (after->offset_m - before.offset_m);
+    now.rotation_rad = before.rotation_rad + way * (after->rotation_rad - before.rotation_rad);
   }
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = rotation(now.rotation_rad).toRotationMatrix();
   pose.translation() = centroid_m + now.offset_m - pose.linear() * centroid_m;
   return pose;
+}
+
+double jointAt(const std::vector<JointKey>& keys, double time_s) {
+  if (keys.empty()) return 0.0;
+  const auto after = std::upper_bound(keys.begin(), keys.end(), time_s,
+                                      [](double time, const JointKey& key) { return time < key.time_s; });
+  if (after == keys.begin()) return keys.front().position;
+  if (after == keys.end()) return keys.back().position;
+  const JointKey& before = *(after - 1);
+  const double way = smooth((time_s - before.time_s) / (after->time_s - before.time_s));
+  return before.position + way * (after->position - before.position);
+}
+
+std::vector<Eigen::Isometry3d> posesInParents(const Robot& robot, double time_s) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Link& link : robot.links) {
+    poses.push_back(link.origin);
+    if (link.parent < 0) poses.back().translation() += robot.base_m;
+    const double position = jointAt(link.keys, time_s);
+    if (link.joint == Link::Joint::SLIDES) poses.back().translate(position * link.axis);
+    if (link.joint == Link::Joint::TURNS) poses.back().rotate(Eigen::AngleAxisd(position, link.axis));
+  }
+  return poses;
+}
+
+std::vector<Eigen::Isometry3d> linkPoses(const Robot& robot, double time_s) {
+  std::vector<Eigen::Isometry3d> poses = posesInParents(robot, time_s);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const int parent = robot.links[i].parent;
+    if (parent >= 0) poses[i] = poses[static_cast<std::size_t>(parent)] * poses[i];
+  }
+  return poses;
 }
 
 bool contains(const Solid& solid, const Vec3& point_m) {

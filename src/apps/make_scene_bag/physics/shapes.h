@@ -16,6 +16,15 @@ std::vector<Face> shapeFaces(const Shape& shape);
 /// The pose of a motion at a time: offset and rotation about the start's centroid.
 Eigen::Isometry3d motionAt(const Motion& motion, const Vec3& centroid_m, double time_s);
 
+/// Where a joint is that these keys move.
+double jointAt(const std::vector<JointKey>& keys, double time_s);
+
+/// The pose of each link in the frame of its parent, of the root in the fixed frame.
+std::vector<Eigen::Isometry3d> posesInParents(const Robot& robot, double time_s);
+
+/// The same of each link in the fixed frame.
+std::vector<Eigen::Isometry3d> linkPoses(const Robot& robot, double time_s);
+
 /// True if the point lies in the solid, its surface included.
 bool contains(const Solid& solid, const Vec3& point_m);
 

@@ -48,7 +48,8 @@ struct HeldVertices {
   Positions start;
   Vec3 centroid;
   std::vector<btScalar> inverse_mass;  // given back on release
-  bool released = false;
+  bool taken = false, released = false;
+  std::size_t link = 0;  // where the gripper names one
 };
 
 }  // namespace
@@ -66,6 +67,7 @@ struct Simulation::Impl {
   void addObstacle(const Obstacle& obstacle);
   void addRing(const Solid& solid, double inset_m);
   btRigidBody* addRigid(std::unique_ptr<btCollisionShape> shape, const btTransform& pose, bool kinematic);
+  static void take(HeldVertices& hand, const Eigen::Isometry3d& pose);
   void hold(double time);
 
   SceneSpec spec;
@@ -122,16 +124,25 @@ void Simulation::Impl::addBody(const Body& body) {
   result.setTotalMass(body.mass_kg);
   for (const Gripper& gripper : body.grippers) {
     effects.push_back(body.name + ": gripper");
-    HeldVertices hand{&gripper, &result, {}, Vec3::Zero(), {}};
-    for (const int v : gripper.vertices) {
-      hand.start.push_back(fromBullet(result.m_nodes[v].m_x));
-      hand.centroid += hand.start.back() / static_cast<double>(gripper.vertices.size());
-      hand.inverse_mass.push_back(result.m_nodes[v].m_im);
-      result.setMass(v, 0.0);
+    held.push_back({&gripper, &result, {}, Vec3::Zero(), {}});
+    if (gripper.link.empty()) {
+      take(held.back(), Eigen::Isometry3d::Identity());
+      continue;
     }
-    held.push_back(hand);
+    while (spec.robot->links.at(held.back().link).name != gripper.link) ++held.back().link;
   }
   world.addSoftBody(&result);
+}
+
+/// From now on its vertices stay where they are in the frame at `pose`.
+void Simulation::Impl::take(HeldVertices& hand, const Eigen::Isometry3d& pose) {
+  hand.taken = true;
+  for (const int v : hand.gripper->vertices) {
+    hand.start.push_back(pose.inverse() * fromBullet(hand.body->m_nodes[v].m_x));
+    hand.centroid += hand.start.back() / static_cast<double>(hand.gripper->vertices.size());
+    hand.inverse_mass.push_back(hand.body->m_nodes[v].m_im);
+    hand.body->setMass(v, 0.0);
+  }
 }
 
 void Simulation::Impl::addEffects(const Body& body, btSoftBody& result) {
@@ -202,6 +213,8 @@ void Simulation::Impl::addObstacle(const Obstacle& obstacle) {
 }
 
 void Simulation::Impl::hold(double now) {
+  const std::vector<Eigen::Isometry3d> links =
+      spec.robot ? linkPoses(*spec.robot, now) : std::vector<Eigen::Isometry3d>();
   for (HeldVertices& hand : held) {
     if (hand.released) continue;
     const std::vector<int>& vertices = hand.gripper->vertices;
@@ -210,7 +223,14 @@ void Simulation::Impl::hold(double now) {
       hand.released = true;
       continue;
     }
-    const Eigen::Isometry3d pose = motionAt(hand.gripper->motion, hand.centroid, now);
+    Eigen::Isometry3d pose;
+    if (hand.gripper->link.empty()) {
+      pose = motionAt(hand.gripper->motion, hand.centroid, now);
+    } else {
+      if (now < hand.gripper->grasp_s) continue;
+      pose = links[hand.link];
+      if (!hand.taken) take(hand, pose);
+    }
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       btSoftBody::Node& node = hand.body->m_nodes[vertices[i]];
       node.m_x = toBullet(pose * hand.start[i]);

@@ -32,14 +32,7 @@ sensor_msgs::PointCloud2 cloudOf(double stamp_s, const std::vector<std::array<fl
   out.header.frame_id = frame;
   out.height = 1;
   out.width = static_cast<std::uint32_t>(points.size());
-  for (const char* name : {"x", "y", "z"}) {
-    sensor_msgs::PointField field;
-    field.name = name;
-    field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
-    field.datatype = sensor_msgs::PointField::FLOAT32;
-    field.count = 1;
-    out.fields.push_back(field);
-  }
+  addFields({"x", "y", "z"}, out);
   out.point_step = 12;
   out.row_step = 12 * out.width;
   out.data.resize(out.row_step);

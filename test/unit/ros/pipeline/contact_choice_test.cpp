@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "dccd/assurance.h"
+#include "support/said.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -31,12 +32,7 @@ XmlRpcValue expecting(const std::string& phase = "") {
 }
 
 std::string refusalOf(const XmlRpcValue& tree) {
-  try {
-    Driven refused(tree);
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "nothing was refused";
+  return said<std::exception>([&] { Driven refused(tree); }, "nothing was refused");
 }
 
 TEST(ExpectedContacts, BeyondTheMeshAreNoStepAtAll) {
@@ -82,12 +78,8 @@ TEST(ExpectedContacts, APhaseIsOnFromTheNextStepAndStaysOverAReset) {
   driven.feed(1, 0.35f);
   EXPECT_EQ(driven.feed(1.1, -0.05f).touching, Touching::NEW);
   EXPECT_EQ(driven.pipeline.phaseInWords(), "no phase, no contact is expected");
-  try {
-    driven.pipeline.setPhase("fold");
-    ADD_FAILURE() << "unknown";
-  } catch (const ParameterError& error) {
-    EXPECT_EQ(std::string(error.what()), "phase 'fold' is unknown; known phases are 'carry', and '' for none");
-  }
+  const std::string text = said<ParameterError>([&] { driven.pipeline.setPhase("fold"); });
+  EXPECT_EQ(text, "phase 'fold' is unknown; known phases are 'carry', and '' for none");
   driven.pipeline.setPhase("carry");
   EXPECT_EQ(driven.pipeline.phaseInWords(), "phase 'carry', expected: mesh with the map in phase 'carry'");
   EXPECT_EQ(driven.feed(1.2, -0.15f).touching, Touching::EXPECTED);

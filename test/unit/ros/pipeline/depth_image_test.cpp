@@ -33,14 +33,7 @@ struct Seen : Driven {
     out.header.stamp = ros::Time(stamp_s);
     out.header.frame_id = "world";
     out.height = out.width = 8;
-    for (const char* name : {"x", "y", "z", "rgb"}) {
-      sensor_msgs::PointField field;
-      field.name = name;
-      field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
-      field.datatype = sensor_msgs::PointField::FLOAT32;
-      field.count = 1;
-      out.fields.push_back(field);
-    }
+    addFields({"x", "y", "z", "rgb"}, out);
     out.point_step = 16;
     out.row_step = 128;
     out.data.resize(1024);

@@ -26,6 +26,18 @@ std::vector<std::uint8_t> bytesOf(const Message& message) {
   return bytes;
 }
 
+/// Numbers of 4 bytes each, one behind the other.
+inline void addFields(const std::vector<std::string>& names, sensor_msgs::PointCloud2& cloud) {
+  for (const std::string& name : names) {
+    sensor_msgs::PointField field;
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(4 * cloud.fields.size());
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    cloud.fields.push_back(field);
+  }
+}
+
 /// 2 x 2 points, 0.1 m apart, first corner at (0.15, 0.15, z), each point `tilt` above the one before; the field sigma
 /// where wanted.
 inline std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vector<float>& sigma = {},
@@ -34,15 +46,8 @@ inline std::vector<std::uint8_t> cloud(double stamp_s, float z, const std::vecto
   out.header.stamp = ros::Time(stamp_s);
   out.header.frame_id = frame;
   out.height = out.width = 2;
-  for (const char* name : {"x", "y", "z", "sigma"}) {
-    if (sigma.empty() && std::string(name) == "sigma") continue;
-    sensor_msgs::PointField field;
-    field.name = name;
-    field.offset = static_cast<std::uint32_t>(4 * out.fields.size());
-    field.datatype = sensor_msgs::PointField::FLOAT32;
-    field.count = 1;
-    out.fields.push_back(field);
-  }
+  addFields({"x", "y", "z"}, out);
+  if (!sigma.empty()) addFields({"sigma"}, out);
   out.point_step = 16;
   out.row_step = 32;
   out.data.resize(64);

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "dccd/assurance.h"
+#include "support/said.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -144,12 +145,7 @@ TEST(Inside, AMeshFileInMillimetresIsHintedAt) {
 std::string errorOf(const XmlRpcValue& tree) {
   tf2::BufferCore transforms;
   const TransformFeed feed(transforms);
-  try {
-    MonitorPipeline pipeline(readConfig(tree), feed);
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "";
+  return said<ParameterError>([&] { MonitorPipeline pipeline(readConfig(tree), feed); });
 }
 
 TEST(Files, WhatIsMissingOrNoMeshIsRefusedAtStart) {

@@ -197,6 +197,31 @@ TEST_F(RobotModel, WhatCannotBeReadIsNamedAndTheRestHolds) {
   }
 }
 
+// What urdfdom passes over would be where it is not.
+TEST_F(RobotModel, AnOriginByQuaternionIsRefused) {
+  const std::string box = "<box size='1 1 1'/>";
+  const Robot robot =
+      robotFrom(robotOf(link("a", collision(box, "<origin xyz='0 0 1' quat_xyzw='0 0 1 0'/>") + collision(box))));
+  EXPECT_EQ(robot.parts.size(), 1u);
+  EXPECT_TRUE(says(robot.missing,
+                   "link 'a' is not watched: its collision element 1 (line 1) has an origin with quat_xyzw, which URDF "
+                   "readers before urdfdom 5.1 pass over; write rpy"))
+      << joinedText(robot.missing);
+}
+
+// As RViz, which asks for a file's address.
+TEST_F(RobotModel, AnAddressMayHaveEscapes) {
+  tetrahedron("a b.stl");
+  tetrahedron("c%20d.stl");
+  const auto mesh = [&](const std::string& name) {
+    return collision("<mesh filename='file://" + (folder_ / name).string() + "'/>");
+  };
+  const Robot robot = robotFrom(robotOf(link("a", mesh("a%20b.stl") + mesh("a b.stl") + mesh("c%20d.stl"))));
+  EXPECT_EQ(joinedText(robot.missing), "");
+  EXPECT_EQ(robot.parts.size(), 3u);
+  EXPECT_TRUE(says(robotFrom(robotOf(link("a", mesh("no%2")))).missing, "no%2"));
+}
+
 // urdfdom reads no further in a link then, and goes on with the next one.
 TEST_F(RobotModel, AnElementThatTheReaderRefusesIsNamed) {
   const std::string good = collision("<box size='1 1 1'/>");

@@ -4,6 +4,7 @@
 #include "node/robot_source.h"
 #include "robot_texts.h"
 #include "support/folder_test.h"
+#include "support/said.h"
 #include "unit/ros/parameter_support.h"
 
 namespace dccd {
@@ -30,12 +31,7 @@ MonitorConfig read(const std::string& yaml, const std::string& urdf = armAndHand
 }
 
 std::string errorOf(const std::string& yaml) {
-  try {
-    read(yaml);
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "";
+  return said<ParameterError>([&] { read(yaml); });
 }
 
 using Numbers = std::vector<std::uint16_t>;
@@ -216,12 +212,8 @@ TEST_F(RobotFiles, AreReadWhereThereIsNoParameterServer) {
   EXPECT_EQ(config.bodies.size(), 4u);
   EXPECT_EQ(config.robot.groups.size(), 2u);
   EXPECT_TRUE(says(with("robot: " + (folder_ / "no.urdf").string() + "\n").robot.missing, "cannot be read"));
-  try {
-    with("robot: robot_description\n");
-    FAIL();
-  } catch (const ParameterError& error) {
-    EXPECT_TRUE(mentions(error.what(), "there is no parameter server: write the path of a file")) << error.what();
-  }
+  const std::string text = said<ParameterError>([&] { with("robot: robot_description\n"); });
+  EXPECT_TRUE(mentions(text, "there is no parameter server: write the path of a file")) << text;
 }
 
 }  // namespace

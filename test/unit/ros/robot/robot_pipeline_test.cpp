@@ -1,14 +1,10 @@
 // A robot's links beside a cloth: placed by tf, against independent kinematics, with links that are missing or lost.
 #include <tf2_msgs/TFMessage.h>
 
-#include <fstream>
-#include <iterator>
-#include <kdl/frames_io.hpp>
-#include <kdl_parser/kdl_parser.hpp>
 #include <random>
 
+#include "panda.h"
 #include "robot_texts.h"
-#include "support/data.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -205,63 +201,41 @@ TEST_F(RobotPipeline, PaddingIsADistanceThatIsHeldExactly) {
 // it.
 TEST_F(RobotPipeline, ThePandasLinksAreWhereKdlHasThem) {
   DEFORMABLE_CCD_REQUIRE_DATA();
-  const std::string folder = dataDir() + "/robots/panda";
-  std::ifstream file(folder + "/panda.urdf"), semantic(folder + "/panda.srdf");
-  if (!file) GTEST_SKIP() << "no panda in " << folder;
-  std::string urdf{std::istreambuf_iterator<char>(file), {}}, srdf{std::istreambuf_iterator<char>(semantic), {}};
-  const std::string package = "package://moveit_resources_panda_description";
-  for (std::size_t at = 0; (at = urdf.find(package, at)) != std::string::npos;) {
-    urdf.replace(at, package.size(), "file://" + folder);
-  }
-  KDL::Tree tree;
-  ASSERT_TRUE(kdl_parser::treeFromString(urdf, tree));
+  if (!Panda::isThere()) GTEST_SKIP() << "no panda in " << dataDir();
+  const Panda panda;
   XmlRpcValue parameters = robotScene();
   parameters["fixed_frame"] = "panda_link0";
   parameters["robot"]["semantic"] = "robot_description_semantic";
   parameters["rigid_tolerance_m"] = 0.01;
-  start(parameters, urdf, srdf);
+  start(parameters, panda.urdf(), panda.srdf());
   const Robot& robot = driven_->config.robot;
   EXPECT_EQ(joinedText(robot.missing), "");
   EXPECT_EQ(robot.parts.size(), 11u);
   EXPECT_EQ(robot.groups.at("panda_arm").size(), 9u);
   std::mt19937 random(7);
   std::uniform_real_distribution<double> angle(-2.5, 2.5);
+  std::map<std::string, KDL::Frame> before;
   double furthest_m = 0;
   for (int frame = 0; frame < 20; ++frame) {
     const double stamp_s = 1 + 0.1 * frame;
-    std::map<std::string, KDL::Frame> from_base{{"panda_link0", KDL::Frame::Identity()}};
-    tf2_msgs::TFMessage message;
-    const std::function<void(const KDL::TreeElement&)> go = [&](const KDL::TreeElement& parent) {
-      for (const auto& child : parent.children) {
-        const KDL::Segment& segment = child->second.segment;
-        const KDL::Frame pose = segment.pose(angle(random));
-        from_base[segment.getName()] = from_base[parent.segment.getName()] * pose;
-        geometry_msgs::TransformStamped& one = message.transforms.emplace_back();
-        one.header.frame_id = parent.segment.getName();
-        one.header.stamp = ros::Time(stamp_s);
-        one.child_frame_id = segment.getName();
-        one.transform.translation.x = pose.p.x();
-        one.transform.translation.y = pose.p.y();
-        one.transform.translation.z = pose.p.z();
-        auto& q = one.transform.rotation;
-        pose.M.GetQuaternion(q.x, q.y, q.z, q.w);
-        go(child->second);
-      }
-    };
-    go(tree.getRootSegment()->second);
-    driven_->feed_tf.add(message, false);
+    std::vector<double> positions(panda.joints());
+    for (double& position : positions) position = angle(random);
+    const Panda::Placed placed = panda.place(positions, stamp_s);
+    driven_->feed_tf.add(placed.tf, false);
     const Outcome& outcome = driven_->feed(stamp_s, 5, {}, "panda_link0");
-    if (frame == 0) continue;
-    ASSERT_TRUE(outcome.answered) << outcome.reason;
-    for (std::size_t p = 0; p < robot.parts.size(); ++p) {
-      const KDL::Frame& at = from_base.at(robot.parts[p].link);
-      const Positions &placed = *outcome.step->bodies[1 + p].t1, &own = robot.parts[p].mesh->positions;
-      ASSERT_EQ(placed.size(), own.size());
-      for (std::size_t v = 0; v < own.size(); ++v) {
-        const KDL::Vector expected = at * KDL::Vector(own[v].x(), own[v].y(), own[v].z());
-        furthest_m = std::max(furthest_m, (placed[v] - Vec3(expected.x(), expected.y(), expected.z())).norm());
+    if (frame > 0) ASSERT_TRUE(outcome.answered) << outcome.reason;
+    for (std::size_t p = 0; p < robot.parts.size() && frame > 0; ++p) {
+      const Body& body = outcome.step->bodies[1 + p];
+      const Positions& own = robot.parts[p].mesh->positions;
+      for (const auto& [at, ends] : {std::pair(before, body.t0), std::pair(placed.from_base, body.t1)}) {
+        ASSERT_EQ(ends->size(), own.size());
+        for (std::size_t v = 0; v < own.size(); ++v) {
+          const KDL::Vector expected = at.at(robot.parts[p].link) * KDL::Vector(own[v].x(), own[v].y(), own[v].z());
+          furthest_m = std::max(furthest_m, ((*ends)[v] - Vec3(expected.x(), expected.y(), expected.z())).norm());
+        }
       }
     }
+    before = placed.from_base;
   }
   EXPECT_LT(furthest_m, 1e-12);
   EXPECT_GT(furthest_m, 0) << "two computations";

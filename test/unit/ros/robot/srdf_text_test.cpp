@@ -33,7 +33,29 @@ TEST(Srdf, GroupsAreLinksChainsJointsAndGroups) {
   EXPECT_EQ(robot.groups.at("all"), (Names{"palm", "finger", "base", "arm", "wrist"}));
   EXPECT_EQ(robot.groups.at("gripper"), robot.groups.at("hand"));
   ASSERT_EQ(robot.never_meet.size(), 1u);
-  EXPECT_EQ(robot.never_meet[0], (std::pair<std::string, std::string>{"base", "arm"}));
+  EXPECT_EQ(robot.never_meet[0], (std::pair<std::string, std::string>{"arm", "base"}));
+}
+
+// As MoveIt has it: from one tip to another, and from a tip to the base.
+TEST(Srdf, AChainMayLeadOverALinkFromWhichBothEndsHang) {
+  const Robot robot = robotFrom(hand(), robotOf("<group name='a'><chain base_link='thumb' tip_link='finger'/></group>"
+                                                "<group name='b'><chain base_link='palm' tip_link='arm'/></group>"
+                                                "<group name='c'><chain base_link='arm' tip_link='arm'/></group>"));
+  EXPECT_EQ(robot.groups.at("a"), (Names{"thumb", "palm", "finger"}));
+  EXPECT_EQ(robot.groups.at("b"), (Names{"palm", "wrist", "arm"}));
+  EXPECT_EQ(robot.groups.at("c"), Names{"arm"});
+}
+
+TEST(Srdf, DefaultsOfALinkGiveWayToPairs) {
+  const Robot robot = robotFrom(hand(), robotOf("<disable_collisions link1='thumb' link2='finger'/>"
+                                                "<enable_collisions link1='palm' link2='thumb'/>"
+                                                "<enable_collisions link1='arm' link2='palm'/>"
+                                                "<disable_collisions link1='palm' link2='arm'/>"
+                                                "<disable_default_collisions link='palm'/>"));
+  using Pair = std::pair<std::string, std::string>;
+  EXPECT_EQ(robot.never_meet,
+            (std::vector<Pair>{
+                {"arm", "palm"}, {"base", "palm"}, {"finger", "palm"}, {"finger", "thumb"}, {"palm", "wrist"}}));
 }
 
 // It is left out and named; the rest holds.
@@ -52,6 +74,22 @@ TEST(Srdf, UnknownLinksAndJointsAreNamed) {
   }
 }
 
+TEST(Srdf, GroupsBesideEachOtherAreNotNested) {
+  const auto groups = [](int count, bool nested) {
+    std::string text;
+    for (int i = 0; i < count; ++i) {
+      const std::string next =
+          nested && i > 0 ? "<group name='g" + std::to_string(i - 1) + "'/>" : "<link name='palm'/>";
+      text = "<group name='g" + std::to_string(i) + "'>" + next + "</group>" + text;
+    }
+    return robotFrom(hand(),
+                     robotOf("<group name='all'><group name='g" + std::to_string(count - 1) + "'/></group>" + text));
+  };
+  EXPECT_EQ(groups(200, false).groups.size(), 201u);
+  EXPECT_EQ(groups(60, true).groups.at("all"), Names{"palm"});
+  EXPECT_TRUE(says(groups(200, true).missing, "nested too deeply"));
+}
+
 TEST(Srdf, WhatIsNoneIsRefusedWithItsPlace) {
   const std::pair<std::string, const char*> cases[] = {
       {"<robot>", "is no XML"},
@@ -60,8 +98,6 @@ TEST(Srdf, WhatIsNoneIsRefusedWithItsPlace) {
       {robotOf("<group name='a'/><group name='a'/>"), "is named 'a', as one before it is"},
       {robotOf("<group name='a'><group name='b'/></group><group name='b'><group name='a'/></group>"), "holds itself"},
       {robotOf("<group name='a'><group name='b'/></group>"), "names the group 'b', which is none"},
-      {robotOf("<group name='a'><chain base_link='arm' tip_link='base'/></group>"),
-       "no joints lead from 'arm' to 'base'"},
       {robotOf("<end_effector name='a' group='b'/>"), "names the group 'b', which is none"},
       {robotOf("<disable_collisions link1='palm'/>"), "needs the attribute link2"},
   };

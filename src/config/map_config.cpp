@@ -1,0 +1,94 @@
+// The parameters of the map: where it comes from, what it may cost, and what of it is a body's own or not known.
+#include <sstream>
+
+#include "config/body_config.h"
+
+namespace dccd {
+namespace {
+
+void readSensorModel(ParameterReader section, CloudMapOptions& map) {
+  map.hit = section.number("hit", map.hit, 0.5, 0.9999);
+  map.miss = section.number("miss", map.miss, 0.0001, 0.5);
+  map.min = section.number("min", map.min, 0.0001, 0.5);
+  map.max = section.number("max", map.max, 0.5, 0.9999);
+  section.finish();
+}
+
+void readClouds(ParameterReader& reader, MonitorConfig& config) {
+  // What is said of clouds is said by somebody who has them.
+  for (const char* name : {"obstacle_cloud_topic", "obstacle_resolution_m", "obstacle_max_range_m", "sensor_model"}) {
+    config.cloud_named = config.cloud_named || reader.has(name);
+  }
+  config.cloud_topic = reader.get("obstacle_cloud_topic", config.cloud_topic);
+  if (config.cloud_topic.empty()) reader.fail("obstacle_cloud_topic", "is empty; remove it, or name the clouds' topic");
+  CloudMapOptions& map = config.cloud_map;
+  map.resolution_m = reader.number("obstacle_resolution_m", map.resolution_m, 1e-4, 1e3);
+  map.max_range_m = reader.number("obstacle_max_range_m", map.max_range_m, 0, LARGE);
+  if (map.max_range_m > CloudMap::MOST_RAY_VOXELS * map.resolution_m) {
+    std::ostringstream text;
+    text << "is " << map.resolution_m << ", too fine for obstacle_max_range_m " << map.max_range_m << ": a ray has "
+         << CloudMap::MOST_RAY_VOXELS << " voxels at most; write at least "
+         << map.max_range_m / CloudMap::MOST_RAY_VOXELS << ", or a shorter range";
+    reader.fail("obstacle_resolution_m", text.str());
+  }
+  readSensorModel(reader.section("sensor_model"), map);
+}
+
+}  // namespace
+
+void readMap(ParameterReader& reader, MonitorConfig& config) {
+  config.octomap_topic_named = reader.has("octomap_topic");
+  config.octomap_topic = reader.get("octomap_topic", config.octomap_topic);
+  if (config.octomap_topic.empty()) {
+    reader.fail("octomap_topic", "is empty; remove it, or write effects/octomap: off where there is no map");
+  }
+  config.octomap_file = reader.get("octomap_file", std::string());
+  config.octomap_frame = reader.get("octomap_frame", std::string());
+  config.max_map_bytes = reader.integer("max_map_mb", config.max_map_bytes >> 20, 1, 1 << 20) << 20;
+  if (!reader.has("max_map_mb")) config.max_map_bytes = NO_MAP_LIMIT;
+  readClouds(reader, config);
+  config.monitor.octomap_timeout_s = reader.number("octomap_timeout_s", 0.0, 0, LARGE);
+  config.own_voxels_m = ownVoxelsOf(reader, 0);
+  config.monitor.own_voxels_lag_s =
+      reader.number("own_voxels_lag_s", config.monitor.own_voxels_lag_s, 0, tolerance::OWN_PATH_S);
+  config.monitor.own_voxels_trust = reader.choice("own_voxels_doubt", "unproved", {"unproved", "trust"}) == "trust";
+  const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
+  config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
+                         : unknown == "occupied" ? UnknownSpace::OCCUPIED
+                                                 : UnknownSpace::REPORT;
+  const ParameterTree& box = reader.raw("unknown_box");
+  if (box.isSet()) {
+    const auto n = reader.numbers(box, "unknown_box", 6);
+    config.unknown_box = Box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+  }
+  if (config.unknown_space == UnknownSpace::OCCUPIED && config.unknown_box.empty()) {
+    reader.fail("unknown_box",
+                "is needed for unknown_space 'occupied': [x0, y0, z0, x1, y1, z1] in the map's frame, "
+                "the workspace within which the unknown is an obstacle");
+  }
+}
+
+void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config) {
+  if (!config.ownsVoxels() || config.unknown_space != UnknownSpace::OCCUPIED) return;
+  reader.fail("own_voxels_m",
+              "is above 0, but with unknown_space: occupied a body's own voxels cannot be told from what "
+              "is unknown; write unknown_space: report, or own_voxels_m: 0");
+}
+
+const std::string& MonitorConfig::liveMapName() const { return cloud_named ? cloud_topic : octomap_topic; }
+
+const std::string& MonitorConfig::mapName() const { return takesMapFileAlone() ? octomap_file : liveMapName(); }
+
+void MonitorConfig::checkMapNames() const {
+  if (!cloud_named || !octomap_topic_named) return;
+  throw ParameterError("the map is to come both from the clouds on obstacle_cloud_topic '" + cloud_topic +
+                       "' and from octomap_topic '" + octomap_topic + "'; remove one of the two");
+}
+
+bool MonitorConfig::namesOctomap() const {
+  const EffectSetting setting = settingOf(effects, Effect::OCTOMAP);
+  if (setting != EffectSetting::AUTO) return setting == EffectSetting::ON;
+  return octomap_topic_named || cloud_named || !octomap_file.empty();
+}
+
+}  // namespace dccd
