@@ -46,7 +46,7 @@ COLUMNS = ("scene", "noise mm", "lag s", "maps/s", "own", "clear", "of true", "a
 MEANING = """Of contacts with the map. *clear, of true*: share of the steps that are clear with the true map, and how many those are.
 *alarms true, false*: alarms of the run that touch where and when the truth does, and the others. *false before*: of these, those before
 the first true one. *missed*: alarms of the truth that no alarm of the run matches. *in time*: share of them whose place is touched first
-within a voxel's travel of the true time. *first*: by how much the first contact is late, in time and as the way closed in that time.
+within a voxel's travel of the time at which the truth touches it first. *first*: by how much the first contact is late, in time and as the way closed in that time.
 *blind*: share of the voxels shown as own or in doubt that the true map has. Two match if they are of one body, within two voxels of each
 other, and their times overlap within a voxel's travel: a voxel's length by the speed at which the two close, at most 0.5 s.
 """

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "dccd/export.h"
 #include "dccd/octomap_decode.h"
@@ -37,6 +39,8 @@ class DCCD_EXPORT CloudMap {
   void insert(const Vec3& sensor, const Positions& points, std::size_t max_bytes);
   /// As decodeOctomap() would find them in the map's message. Throws OctomapError for limits exceeded.
   DecodedOctomap leaves(const OctomapLimits& limits = {}) const;
+  /// The data of its Octomap message: OctoMap's binary stream, or the full one with log-odds.
+  std::vector<std::int8_t> serialized(bool binary) const;
   /// [bytes] At most.
   std::size_t memoryBytes() const;
 

@@ -8,6 +8,7 @@
 #include <octomap/OcTree.h>
 
 #include "octomap/leaf_lists.h"
+#include "octomap/map_builder.h"
 
 namespace dccd {
 namespace {
@@ -98,6 +99,8 @@ CloudMap::CloudMap(const CloudMapOptions& options) : impl_(std::make_unique<Impl
 CloudMap::~CloudMap() = default;
 
 std::size_t CloudMap::memoryBytes() const { return impl_->tree.size() * NODE_BYTES; }
+
+std::vector<std::int8_t> CloudMap::serialized(bool binary) const { return dccd::serialized(impl_->tree, binary); }
 
 void CloudMap::insert(const Vec3& sensor, const Positions& points, std::size_t max_bytes) {
   octomap::OcTree& tree = impl_->tree;

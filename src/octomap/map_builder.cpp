@@ -8,9 +8,8 @@
 #include <octomap/OcTree.h>
 
 namespace dccd {
-namespace {
 
-std::vector<std::int8_t> streamOf(const octomap::OcTree& tree, bool binary) {
+std::vector<std::int8_t> serialized(const octomap::OcTree& tree, bool binary) {
   std::ostringstream stream;
   const bool written =
       binary ? static_cast<bool>(tree.writeBinaryData(stream)) : static_cast<bool>(tree.writeData(stream));
@@ -18,8 +17,6 @@ std::vector<std::int8_t> streamOf(const octomap::OcTree& tree, bool binary) {
   const std::string bytes = stream.str();
   return std::vector<std::int8_t>(bytes.begin(), bytes.end());
 }
-
-}  // namespace
 
 std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
                                       const std::function<bool(const Vec3& center_m)>& occupied, bool binary) {
@@ -51,26 +48,7 @@ std::vector<std::int8_t> buildOctomap(double resolution_m, const Box& bounds,
     tree.toMaxLikelihood();
     tree.prune();
   }
-  return streamOf(tree, binary);
+  return serialized(tree, binary);
 }
-
-MapOfClouds::MapOfClouds(double resolution_m) : tree_(std::make_unique<octomap::OcTree>(resolution_m)) {
-  tree_->setProbHit(0.7);
-  tree_->setProbMiss(0.4);
-  tree_->setClampingThresMin(0.12);
-  tree_->setClampingThresMax(0.97);
-}
-
-MapOfClouds::~MapOfClouds() = default;
-
-void MapOfClouds::insert(const Vec3& camera_m, const std::vector<Eigen::Vector3f>& points_m) {
-  octomap::Pointcloud cloud;
-  for (const Eigen::Vector3f& p : points_m) {
-    if (p.allFinite()) cloud.push_back(p[0], p[1], p[2]);
-  }
-  tree_->insertPointCloud(cloud, octomap::point3d(camera_m[0], camera_m[1], camera_m[2]));
-}
-
-std::vector<std::int8_t> MapOfClouds::serialized(bool binary) const { return streamOf(*tree_, binary); }
 
 }  // namespace dccd

@@ -6,27 +6,11 @@
 
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
+#include "ros/support/rate.h"
 
 namespace dccd {
 namespace test {
 namespace {
-
-/// Calls `tick` at that rate until it ends.
-class Rate {
- public:
-  Rate(double hz, std::function<void()> tick)
-      : thread_([this, hz, tick = std::move(tick)] {
-          for (ros::WallRate rate(hz); !ended_; rate.sleep()) tick();
-        }) {}
-  ~Rate() {
-    ended_ = true;
-    thread_.join();
-  }
-
- private:
-  std::atomic<bool> ended_{false};
-  std::thread thread_;
-};
 
 struct Seeing : MonitorTest {
   Probe<deformable_ccd::State> state{node, "/seeing/state"};

@@ -26,7 +26,7 @@ pcl_msgs::PolygonMesh toPolygonMesh(const std_msgs::Header& header, const Positi
 /// A triangle soup: three points per face, in the order of the faces.
 visualization_msgs::MarkerArray toMarkers(const std_msgs::Header& header, const Positions& positions,
                                           const std::vector<Face>& faces);
-/// `data`: a tree as MapOfClouds and buildOctomap() serialize it.
+/// `data`: a tree as CloudMap and buildOctomap() serialize it.
 octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, double resolution_m, std::vector<std::int8_t> data,
                                 bool binary);
 /// The map of the obstacle's solids.

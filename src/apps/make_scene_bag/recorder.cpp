@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -15,7 +16,7 @@
 #include "apps/make_scene_bag/physics/depth_camera.h"
 #include "apps/make_scene_bag/physics/shapes.h"
 #include "apps/make_scene_bag/physics/simulation.h"
-#include "octomap/map_builder.h"
+#include "dccd/cloud_map.h"
 #include "report/progress_bar.h"
 
 namespace dccd {
@@ -125,7 +126,7 @@ void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& a
 class CameraRecorder {
  public:
   CameraRecorder(SceneBag& bag, const scene::SceneSpec& spec, bool binary)
-      : bag_(bag), spec_(spec), binary_(binary), camera_(spec), map_(spec.obstacle->resolution_m) {}
+      : bag_(bag), spec_(spec), binary_(binary), camera_(spec), map_(optionsOf(spec)) {}
 
   /// Takes the clouds of the solids alone.
   void seeSolids(const ros::Time& start) {
@@ -147,14 +148,22 @@ class CameraRecorder {
   }
 
  private:
+  static CloudMapOptions optionsOf(const scene::SceneSpec& spec) {
+    CloudMapOptions options;  // octomap_server's
+    options.resolution_m = spec.obstacle->resolution_m;
+    return options;
+  }
   void take(const scene::SceneState& state, const ros::Time& stamp) {
     const scene::Camera& camera = *spec_.camera;
-    std::vector<Eigen::Vector3f> points = camera_.look(state);
+    const std::vector<Eigen::Vector3f> points = camera_.look(state);
     const ros::Time told = stamp + ros::Duration(camera.lag_s);
     const auto seq = static_cast<std::uint32_t>(clouds_++);
     bag_.write(camera.topic, told, toImageCloud(header(camera.frame, stamp, seq), points, camera.width));
-    for (Eigen::Vector3f& p : points) p = (camera.pose * p.cast<double>()).cast<float>();
-    map_.insert(camera.pose.translation(), points);
+    Positions seen;
+    for (const Eigen::Vector3f& p : points) {
+      if (p.allFinite()) seen.push_back(camera.pose * p.cast<double>());
+    }
+    map_.insert(camera.pose.translation(), seen, std::numeric_limits<std::size_t>::max());
     bag_.write(spec_.obstacle->topic, told,
                toOctomap(header(spec_.obstacle->frame, stamp, seq), spec_.obstacle->resolution_m,
                          map_.serialized(binary_), binary_));
@@ -164,7 +173,7 @@ class CameraRecorder {
   const scene::SceneSpec& spec_;
   bool binary_;
   scene::DepthCamera camera_;
-  MapOfClouds map_;
+  CloudMap map_;
   int next_ = 0;    // cloud of the scene, counted at the camera's rate
   int clouds_ = 0;  // taken
 };

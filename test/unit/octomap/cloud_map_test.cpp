@@ -81,6 +81,12 @@ TEST(CloudMap, IsWhatLiboctomapMakesOfTheSameClouds) {
       ASSERT_TRUE(same(found.free, expected.free)) << "cloud " << i << ", range " << range_m;
       ASSERT_GT(found.occupied.size(), 100u);
       ASSERT_GE(map.memoryBytes(), tree.memoryUsage());
+      for (const bool binary : {true, false}) {
+        std::ostringstream stream;
+        ASSERT_TRUE(static_cast<bool>(binary ? tree.writeBinaryData(stream) : tree.writeData(stream)));
+        const std::vector<std::int8_t> bytes = map.serialized(binary);
+        ASSERT_EQ(std::string(bytes.begin(), bytes.end()), stream.str()) << "cloud " << i << ", range " << range_m;
+      }
     }
   }
 }
