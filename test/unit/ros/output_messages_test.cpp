@@ -252,7 +252,7 @@ TEST(Lists, AMessageThatWasOneBeforeSaysTheSameAsANewOne) {
   const std::vector<Body>& bodies = alarm.step->bodies;
   ASSERT_GT(alarm.contacts.size(), 0u);
   deformable_ccd::ContactArray kept;
-  for (const Outcome* outcome : {&crossing, &none, &alarm, &crossing}) {
+  for (const Outcome* outcome : std::initializer_list<const Outcome*>{&crossing, &none, &alarm, &crossing}) {
     fillContactArray(*outcome, bodies, "world", kept);
     EXPECT_EQ(wireOf(kept), wireOf(toContactArray(*outcome, bodies, "world")));
   }
