@@ -176,7 +176,7 @@ nlohmann::json measurePatchesOfScene(const std::string& scene_file, int rounds) 
           {"on_ms", spread(on_ms)},
           {"off_ms", spread(off_ms)},
           {"effect_ms", spread(effect_ms)},
-          {"required_ratio", 1.1}};
+          {"required_ratio", 1.06}};
 }
 
 /// The same for the one step of a real scene.
@@ -223,7 +223,7 @@ nlohmann::json measurePatchesOfStep(const std::string& name, int rounds) {
           {"contacts", contacts},
           {"patches", patches},
           {"threads", 2},
-          {"required_ms", 8}};
+          {"required_ms", 5}};
 }
 
 /// A rope in a figure of eight over an uneven floor, dragged a little in each step; it lies on itself where it crosses.

@@ -1,6 +1,8 @@
 // step_benchmark: what a whole, proved answer costs, with start state and patches as in the node, against its parts and
 // on one thread against two. The settings of a step run in turns, until the ratios are known; no time is written of a
 // step whose contacts are not those of the truth, or that is not proved.
+#include <sys/resource.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
@@ -28,6 +30,13 @@ constexpr int CELLS = 59;        // quads along a side of the sheets
 constexpr const char *WHOLE = "whole", *WITHOUT_PATCHES = "without patches";
 constexpr const char* REFERENCE = "crossing at t = 1/2";  // of the sheets
 
+/// Of this process until now, without those that read a file.
+double pageFaults() {
+  rusage use{};
+  getrusage(RUSAGE_SELF, &use);
+  return static_cast<double>(use.ru_minflt);
+}
+
 /// One step, or two to and fro that take turns, each beginning where the other ends.
 struct Case {
   std::string name;
@@ -42,13 +51,16 @@ struct Setting {
   History history;
   Outcome outcome;
   std::map<std::string, std::vector<double>> ms;  // by stage, a value a round
+  std::vector<double> faults;                     // of pages, a value a round
 
   /// Every setting sees the same steps, and one step alone knows nothing of the one before.
   void run(const Case& of, std::size_t round) {
     if (!of.stream()) history.clear();
+    const double faults_before = pageFaults();
     const Stopwatch watch;
     outcome = detect(of.steps[round % of.steps.size()], options, history);
     const double total_ms = watch.milliseconds();
+    faults.push_back(pageFaults() - faults_before);
     for (std::size_t s = 0; s < outcome.stats.stages.size(); ++s) {
       ms[toString(static_cast<Stage>(s))].push_back(outcome.stats.stages[s].ms);
     }
@@ -71,7 +83,10 @@ std::vector<Setting> settingsFor(const Case& of, int threads) {
   add(WHOLE, [](Options&) {});
   add("contacts alone", [](Options& o) { o.patches = o.check_start_state = false; });
   add(WITHOUT_PATCHES, [](Options& o) { o.patches = false; });
-  add("first contact only", [](Options& o) { o.earliest_only = true; });
+  add("first contact only", [](Options& o) {
+    o.earliest_only = true;
+    o.patches = false;  // as in the node
+  });
   if (threads > 1) add("on one thread", [](Options& o) { o.num_threads = 1; });
   return settings;
 }
@@ -113,7 +128,7 @@ nlohmann::json measure(const Case& of, int threads, std::size_t most) {
       for (const Setting& setting : settings) check(of, setting, whole);
     }
     if (round == 1) {  // what is made once for the mesh is in neither
-      for (Setting& setting : settings) setting.ms.clear();
+      for (Setting& setting : settings) setting.ms.clear(), setting.faults.clear();
     }
     if (round < LEAST_ROUNDS + 1) continue;
     const bool narrow = std::all_of(settings.begin() + 1, settings.end(), [&](const Setting& setting) {
@@ -133,6 +148,7 @@ nlohmann::json measure(const Case& of, int threads, std::size_t most) {
     nlohmann::json& row = j["settings"][setting.name];
     for (const auto& [stage, ms] : setting.ms) row["ms"][stage] = spread(ms);
     row["contacts"] = setting.outcome.contacts.size();
+    row["page_faults"] = spread(setting.faults);
     if (&setting != &whole) row["whole_to_it"] = toJson(ratioOf(whole, setting));
     if (&setting != &whole) row["it_to_whole"] = toJson(ratioOf(setting, whole));
     if (setting.name == WITHOUT_PATCHES) row["to_contacts_alone"] = toJson(ratioOf(setting, settings[1]));

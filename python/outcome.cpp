@@ -53,7 +53,7 @@ const py::dtype& intersectionType() {
 const py::dtype& patchType() {
   using Row = Patch;
   static const auto* const TYPE =
-      new py::dtype(structured({DCCD_PATCH_FIELDS(DCCD_ARRAY_FIELD, DCCD_NO_FIELD, DCCD_ARRAY_FIELD)}, sizeof(Row)));
+      new py::dtype(structured({DCCD_PUBLISHED_PATCH_FIELDS(DCCD_ARRAY_FIELD)}, sizeof(Row)));
   return *TYPE;
 }
 

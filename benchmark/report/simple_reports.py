@@ -63,14 +63,14 @@ STEP_RATIOS = [("contacts alone", "whole_to_it", "whole / contacts alone", {"clo
 
 def write_step(folder, runs, sheets, peer):
     header = ["scene", "target", "threads", "contacts", "whole: best ms", "median ms", "contacts alone", "start state", "patches",
-              "sort"] + [stage.replace("_", " ") for stage in STAGES] + ["calibration"]
+              "sort"] + [stage.replace("_", " ") for stage in STAGES] + ["page faults", "calibration"]
     lines, ratios = [], []
     for r in runs:
         whole = r["settings"]["whole"]["ms"]
         lines.append([r["case"], r["simd_target"], str(r["threads"]), str(r["contacts"]), "%.1f" % whole["total"]["best"],
                       "%.1f" % whole["total"]["median"], "%.1f" % r["settings"]["contacts alone"]["ms"]["total"]["median"]] +
                      ["%.1f" % whole[stage]["median"] for stage in ("start_state", "patches", "sort") + STAGES] +
-                     ["%.2f" % r["calibration_ms"]])
+                     ["%.0f" % r["settings"]["whole"]["page_faults"]["median"], "%.2f" % r["calibration_ms"]])
         for name, which, words, asked, usual in STEP_RATIOS:
             if name not in r["settings"]:
                 continue
@@ -90,7 +90,7 @@ def write_step(folder, runs, sheets, peer):
     figure, axis = plt.subplots(figsize=(9, 0.5 * len(lines) + 1.5))
     left = [0.0] * len(lines)
     labels = ["%s, %s, %s thread(s)" % tuple(line[:3]) for line in lines]
-    for column in range(7, len(header) - 1):
+    for column in range(7, len(header) - 2):
         values = [float(line[column]) for line in lines]
         axis.barh(labels, values, left=left, label=header[column])
         left = [a + b for a, b in zip(left, values)]
@@ -274,6 +274,13 @@ def write_effects(folder, result):
              "%.4f to %.4f" % (flag["self_only_ms"]["best"], flag["self_only_ms"]["worst"]), ""],
             ["rope of %d points, %d voxels, ms a step" % (rope["points"], rope["voxels"]), "%.4f" % rope["ms"]["median"],
              "%.4f to %.4f" % (rope["ms"]["best"], rope["ms"]["worst"]), "%g" % rope["required_ms"]]]
+    demo, step = result["patches"]["demo"], result["patches"].get("cloth-ball")
+    rows.append(["the demo's step with patches / without", "%.4f" % demo["ratio"]["median"],
+                 "%(low).4f to %(high).4f (95 %%, %(rounds)d rounds)" % demo["ratio"], "%g" % demo["required_ratio"]])
+    if step:
+        rows.append(["patches of cloth-ball, %d contacts, %d threads, ms" % (step["contacts"], step["threads"]),
+                     "%.2f" % step["effect_ms"]["median"], "%.2f to %.2f" % (step["effect_ms"]["best"], step["effect_ms"]["worst"]),
+                     "%g" % step["required_ms"]])
     write_rows(os.path.join(folder, "effects.csv"), header, rows)
     return save(folder, "effects", "# What effects cost\n\nBoth flag runs take turns in one process; the ratio is the median over "
                 "rounds of the whole recording. The rope had %.1f pairs with itself, %.1f with the map and %.1f contacts a "

@@ -47,6 +47,8 @@ namespace dccd {
   STREAM(is_new, is_new)
 
 #define DCCD_NO_FIELD(member, published)
+/// Those that tables, messages and arrays have.
+#define DCCD_PUBLISHED_PATCH_FIELDS(FIELD) DCCD_PATCH_FIELDS(FIELD, DCCD_NO_FIELD, FIELD)
 
 namespace fields {
 

@@ -70,14 +70,15 @@ def links_of(robot):
 
 
 def frames_of(bag, params):
-    """Frames that the monitor gets: the mesh messages, and one of each rigid body with each of those."""
-    with rosbag.Bag(str(bag)) as opened:
-        topics = opened.get_type_and_topic_info().topics
+    """Frames that the monitor gets: the mesh messages, and one of each rigid body with each of those. And when the first one comes:
+    a camera may have been there before."""
     parameters = yaml.safe_load(params.read_text()) or {}
     bodies = parameters.get('bodies', {})
     rigid = sum('rigid' in (body or {}) for body in bodies.values()) + links_of(parameters.get('robot'))
     meshes = {(body or {}).get('topic', '/' + name) for name, body in bodies.items() if 'rigid' not in (body or {})}
-    return sum(topics[name].message_count for name in meshes if name in topics) * (1 + rigid)
+    with rosbag.Bag(str(bag)) as opened:
+        at_s = [at.to_sec() for _, _, at in opened.read_messages(topics=sorted(meshes), raw=True)]
+    return len(at_s) * (1 + rigid), min(at_s)
 
 
 def story_steps(arrays, start):
@@ -221,9 +222,9 @@ def main():
     parser.add_argument('--rviz', action='store_true')
     arguments = parser.parse_args()
     arguments.port = free_port()
-    arguments.frames = frames_of(arguments.bag, arguments.params)
+    arguments.frames, start = frames_of(arguments.bag, arguments.params)
     with rosbag.Bag(str(arguments.bag)) as opened:
-        start, arguments.duration_s = opened.get_start_time(), opened.get_end_time() - opened.get_start_time()
+        arguments.duration_s = opened.get_end_time() - opened.get_start_time()
     environment = dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % arguments.port, ROS_HOSTNAME='localhost',
                        ROS_HOME=str(arguments.folder / 'ros_home'), ROS_LOG_DIR=str(arguments.folder / 'ros_log'))
     os.environ.update(environment)

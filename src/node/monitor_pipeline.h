@@ -195,8 +195,8 @@ class MonitorPipeline {
   void keep(std::size_t body);
   /// The end has come for what still waits.
   void giveUp();
-  /// The static body that the monitor has where it is no more, since its newer frame waits or was refused; none:
-  /// bodies' number.
+  /// A static body whose place in the monitor is out of date: its newer frame waits or was refused. None: the number of
+  /// bodies.
   std::size_t misplaced() const;
   /// There is no use in waiting for such a body's place: its frame was refused or has waited in vain itself.
   bool isHopeless(std::size_t body) const { return !refused_[body].empty() || waiting_[body]->kept; }

@@ -120,6 +120,19 @@ std::vector<OccupiedLeaf> sorted(const std::vector<OccupiedLeaf>& leaves) {
   return list;
 }
 
+/// Of cells in the order of their codes, most of which follow one of the same node of level 1.
+std::vector<std::uint64_t> codesOf(const std::vector<Cell>& cells) {
+  std::vector<std::uint64_t> codes;
+  codes.reserve(cells.size());
+  Cell last{};
+  for (const Cell& cell : cells) {
+    const bool in_next = codes.empty() || ((cell[0] ^ last[0]) | (cell[1] ^ last[1]) | (cell[2] ^ last[2])) > 3;
+    codes.push_back(in_next ? codeOf(cell) : (codes.back() & ~std::uint64_t{63}) | cellBit(cell[0], cell[1], cell[2]));
+    last = cell;
+  }
+  return codes;
+}
+
 }  // namespace
 
 VoxelTree::VoxelTree(const std::vector<OccupiedLeaf>& leaves) {
@@ -410,14 +423,7 @@ bool VoxelTree::followBlocks(const VoxelTree& before, Change& change, std::vecto
   for (const Kept& run : kept) {
     for (std::uint32_t n = run.node; n < run.node + run.count; ++n) level.nodes[n].first_leaf += run.shift;
   }
-  prefixes.reserve(level.cells.size());
-  Cell last{};
-  for (const Cell& cell : level.cells) {
-    const bool in_next = prefixes.empty() || ((cell[0] ^ last[0]) | (cell[1] ^ last[1]) | (cell[2] ^ last[2])) > 3;
-    prefixes.push_back(in_next ? codeOf(cell)
-                               : (prefixes.back() & ~std::uint64_t{63}) | cellBit(cell[0], cell[1], cell[2]));
-    last = cell;
-  }
+  prefixes = codesOf(level.cells);
   return true;
 }
 

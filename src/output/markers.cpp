@@ -26,9 +26,7 @@ std_msgs::ColorRGBA color(double r, double g, double b, double a = 1) {
 
 geometry_msgs::Point point(const Vec3& p) {
   geometry_msgs::Point out;
-  out.x = p.x();
-  out.y = p.y();
-  out.z = p.z();
+  put(p, out);
   return out;
 }
 
@@ -110,16 +108,18 @@ Marker& voxelList(const Outcome& outcome, const std::string& frame, std::uint32_
   return by_size.emplace(size, std::move(marker)).first->second;
 }
 
+/// By a point, if that is finite.
+void widen(Box& box, const Vec3& p) {
+  if (!p.allFinite()) return;
+  box.min = box.min.cwiseMin(p);
+  box.max = box.max.cwiseMax(p);
+}
+
 /// Box around all bodies at the end of the step, in the map's frame.
 Box boundsInMap(const Outcome& outcome) {
   Box box;
   for (const Body& body : outcome.step->bodies) {
-    for (const Vec3& p : *body.t1) {
-      if (!p.allFinite()) continue;
-      const Vec3 in_map = outcome.step->map.map_from_fixed * p;
-      box.min = box.min.cwiseMin(in_map);
-      box.max = box.max.cwiseMax(in_map);
-    }
+    for (const Vec3& p : *body.t1) widen(box, outcome.step->map.map_from_fixed * p);
   }
   return box;
 }
@@ -236,11 +236,7 @@ void addMeshes(const Outcome& outcome, const std::vector<Body>& bodies, const Ma
     if (marker.points.empty()) continue;
     out.markers.push_back(std::move(marker));
     Box box;
-    for (const Vec3& p : at) {
-      if (!p.allFinite()) continue;
-      box.min = box.min.cwiseMin(p);
-      box.max = box.max.cwiseMax(p);
-    }
+    for (const Vec3& p : at) widen(box, p);
     const double height = TEXT * config.point_size_m;
     const Vec3 above(0.5 * (box.min.x() + box.max.x()), 0.5 * (box.min.y() + box.max.y()), box.max.z() + height);
     out.markers.push_back(text(outcome, frame, "mesh/" + bodies[b].name, 1, above, height, NAME, bodies[b].name));

@@ -102,6 +102,15 @@ std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, 
          nameOf(*first, bodies) + rest;
 }
 
+/// What most messages say first.
+template <class Message>
+void fillHead(const Outcome& outcome, StampNs stamp_ns, const std::string& frame, Message& out) {
+  out.header = headerOf(stamp_ns, frame);
+  put(outcome.status, out.status);
+  put(outcome.start_state, out.start_state);
+  out.answered = outcome.answered;
+}
+
 void fillFrames(const FrameCounters& frames, StatsMessage& out) {
   out.frames_received = frames.received;
   out.frames_processed = frames.processed();
@@ -237,12 +246,9 @@ deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::v
 
 void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame,
                       deformable_ccd::ContactArray& out) {
-  out.header = headerOf(outcome.stamp_ns, frame);
+  fillHead(outcome, outcome.stamp_ns, frame, out);
   out.start = toRosTime(outcome.start_ns);
-  out.status = static_cast<std::uint8_t>(outcome.status);
   out.reason = outcome.reason;
-  out.answered = outcome.answered;
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
   out.complete = outcome.complete;
   out.unchecked_toc_lower = outcome.unchecked_toc_lower;
   out.total_contacts = static_cast<std::uint32_t>(outcome.total_contacts);
@@ -264,10 +270,7 @@ void fillContactArray(const Outcome& outcome, const std::vector<Body>& bodies, c
 deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::vector<Body>& bodies,
                                             const std::string& frame) {
   deformable_ccd::FirstContact out;
-  out.header = headerOf(outcome.stamp_ns, frame);
-  out.status = static_cast<std::uint8_t>(outcome.status);
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
-  out.answered = outcome.answered;
+  fillHead(outcome, outcome.stamp_ns, frame, out);
   const double toc = earliestNewToc(outcome);
   out.contact = std::isfinite(toc);
   out.pairs = toPairContacts(outcome, bodies);
@@ -334,10 +337,7 @@ void fillState(const Assurance& assurance, const std::string& touches, const std
 
 StatsMessage toStepStats(const Outcome& outcome, const StatsContext& context, const std::string& frame) {
   StatsMessage out;
-  out.header = headerOf(outcome.stamp_ns, frame);
-  out.status = static_cast<std::uint8_t>(outcome.status);
-  out.start_state = static_cast<std::uint8_t>(outcome.start_state);
-  out.answered = outcome.answered;
+  fillHead(outcome, outcome.stamp_ns, frame, out);
   out.complete = outcome.complete;
   out.step = outcome.duration_s();
   out.latency = context.latency_s;
@@ -380,10 +380,7 @@ deformable_ccd::LeftOutPairs toLeftOutPairs(const std::vector<LeftOutPair>& pair
 deformable_ccd::TimeToContact toTimeToContact(const Outcome& prediction, double horizon_s,
                                               const std::vector<Body>& bodies, const std::string& frame) {
   deformable_ccd::TimeToContact out;
-  out.header = headerOf(prediction.start_ns, frame);
-  out.status = static_cast<std::uint8_t>(prediction.status);
-  out.start_state = static_cast<std::uint8_t>(prediction.start_state);
-  out.answered = prediction.answered;
+  fillHead(prediction, prediction.start_ns, frame, out);
   out.horizon = horizon_s;
   const double toc = earliestNewToc(prediction);
   out.contact = std::isfinite(toc);

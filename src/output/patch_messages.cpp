@@ -43,7 +43,7 @@ PatchMessage toMessage(const Patch& patch, const std::vector<Body>& bodies) {
     }
   };
 #define DCCD_FILL_PATCH(member, published) fill(patch.member, out.published);
-  DCCD_PATCH_FIELDS(DCCD_FILL_PATCH, DCCD_NO_FIELD, DCCD_FILL_PATCH)
+  DCCD_PUBLISHED_PATCH_FIELDS(DCCD_FILL_PATCH)
 #undef DCCD_FILL_PATCH
   if (!patch.box.empty()) put(patch.box.max, out.box_max);
   return out;

@@ -103,7 +103,7 @@ Report::Report(const std::string& folder) : folder_(folder) {
          "elementary_pairs,obstacle_pairs\n";
 #define DCCD_NAME_COLUMNS(member, published) writeNames(patches_, #member, Patch().member);
   patches_ << "step,stamp_ns";
-  DCCD_PATCH_FIELDS(DCCD_NAME_COLUMNS, DCCD_NO_FIELD, DCCD_NAME_COLUMNS)
+  DCCD_PUBLISHED_PATCH_FIELDS(DCCD_NAME_COLUMNS)
 #undef DCCD_NAME_COLUMNS
   patches_ << '\n';
   events_ << "step,stamp_ns,event,patch,others,body_0,body_1,beginning,expected,earliest_s,latest_s\n";
@@ -133,7 +133,7 @@ void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodie
   for (const Patch& p : outcome.patches) {
     patches_ << outcome.sequence << ',' << outcome.stamp_ns;
 #define DCCD_WRITE_CELLS(member, published) cells(p.member);
-    DCCD_PATCH_FIELDS(DCCD_WRITE_CELLS, DCCD_NO_FIELD, DCCD_WRITE_CELLS)
+    DCCD_PUBLISHED_PATCH_FIELDS(DCCD_WRITE_CELLS)
 #undef DCCD_WRITE_CELLS
     patches_ << '\n';
   }

@@ -18,7 +18,6 @@ namespace simd {
 namespace HWY_NAMESPACE {
 
 void exactBatchOn(const BatchInput& in, const BatchOutput& out) { runBatch<true>(in, out); }
-const char* targetName() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
@@ -30,13 +29,10 @@ namespace dccd {
 namespace simd {
 
 HWY_EXPORT(exactBatchOn);
-HWY_EXPORT(targetName);
 
 void exactBatch(const BatchInput& input, const BatchOutput& output) {
   HWY_DYNAMIC_DISPATCH(exactBatchOn)(input, output);
 }
-
-const char* batchTargetName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
 
 }  // namespace simd
 }  // namespace dccd

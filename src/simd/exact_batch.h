@@ -44,8 +44,5 @@ struct BatchOutput {
 /// The certified double tier. Allocates nothing; safe from several threads. Rounding must be to nearest.
 void exactBatch(const BatchInput& input, const BatchOutput& output);
 
-/// Name of the SIMD target in use, e.g. "AVX2".
-const char* batchTargetName();
-
 }  // namespace simd
 }  // namespace dccd

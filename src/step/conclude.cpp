@@ -229,7 +229,7 @@ void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& out
     outcome.start_state = result.start_state;
     outcome.start_state_complete = result.start_state_complete;
     outcome.complete = outcome.complete && result.start_state_complete;
-    outcome.intersections = result.intersections;
+    outcome.intersections = std::move(result.intersections);
   }
   if (parts == 1) {
     outcome.contacts = std::move(result.contacts);

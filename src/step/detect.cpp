@@ -10,7 +10,6 @@
 
 #include "dccd/accuracy.h"
 #include "dccd/tolerances.h"
-#include "obstacle/burst.h"
 #include "obstacle/excluded_leaves.h"
 #include "step/conclude.h"
 #include "step/history.h"
@@ -257,11 +256,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const Clock::time_point begin = Clock::now();
   for (PairWorker& w : workers) w.beginStep();
   for (HitOrder& kind : order) kind.beginStep();
-  std::vector<StartIntersection> room = std::move(result.intersections);
-  releaseBurst(room);
-  room.clear();
   result = Findings();
-  result.intersections = std::move(room);
   if (!fill(part)) {
     leaveOutPart(part);
     addPart(part.index, part.count, result, outcome);

@@ -129,7 +129,7 @@ struct History::Impl {
   Carried carried;
   StepObserver* observer = nullptr;
   Impl* begins_at = nullptr;  // the next step begins where this one's ended
-  bool aside = false;         // so did the step that is being run
+  bool aside = false;         // the step that is being run began so
 
   // Made from options, bodies and map, again when these change.
   std::optional<Options> options;

@@ -8,6 +8,7 @@ import os
 import pathlib
 import pickle
 import pydoc
+import re
 import signal
 import subprocess
 import sys
@@ -415,6 +416,12 @@ class ArraysTest(PythonTestCase):
                 np.testing.assert_array_equal(again[name], rows[name])
         self.assertEqual(np.sort(outcome.contacts, order='vertices').dtype, outcome.contacts.dtype)
         self.assertEqual(pickle.loads(pickle.dumps(outcome.contacts)).tolist()[0][0], .5)
+
+    def test_each_field_has_its_words(self):
+        outcome = dccd.detect(dccd.Body(self.t0, self.t1, FACES), patches=True)
+        for rows, words in ((outcome.contacts, dccd.Outcome.__doc__), (outcome.patches, dccd.Outcome.patches.__doc__)):
+            self.assertEqual(set(rows.dtype.names) - set(re.findall(r'\w+', words)), set())
+        self.assertEqual(outcome.patches.dtype['began_from_ns'], np.int64)
 
     def test_what_is_not_finite_is_unchecked_and_said(self):
         for value in (math.nan, math.inf):

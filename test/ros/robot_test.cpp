@@ -1,7 +1,16 @@
 // A robot's links through the live node: joint states become tf by robot_state_publisher, and tf carries the links.
+#include <deformable_ccd/AttachObject.h>
+#include <deformable_ccd/DetachObject.h>
 #include <deformable_ccd/FirstContact.h>
+#include <deformable_ccd/RemoveObject.h>
+#include <deformable_ccd/SetHold.h>
 #include <deformable_ccd/State.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <sensor_msgs/JointState.h>
+
+#include <cstdlib>
+#include <deque>
+#include <set>
 
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
@@ -80,6 +89,180 @@ TEST_F(Held, WithoutJointStatesTheLinkIsNamed) {
   EXPECT_NE(said.reason.find("'plate'"), std::string::npos) << said.reason;
 }
 
+/// What a service says.
+template <class Call>
+typename Call::Response called(const std::string& service, const Call& asked) {
+  Call call = asked;
+  EXPECT_TRUE(ros::service::call(service, call)) << service;
+  return call.response;
+}
+
+deformable_ccd::AttachObject rod() {
+  deformable_ccd::AttachObject call;
+  call.request.name = "rod";
+  call.request.link = "plate";
+  call.request.pose.position.z = 0.2;
+  call.request.pose.orientation.w = 1;
+  call.request.primitive.type = shape_msgs::SolidPrimitive::CYLINDER;
+  call.request.primitive.dimensions = {0.01, 0.5};
+  return call;
+}
+
+// A disc above the plate goes with it, stays where it is let go, and is gone when it is removed.
+TEST_F(Held, WhatIsAttachedGoesWithTheLinkUntilItIsLetGo) {
+  for (int i = 0; i < 5; ++i) lift(130 + 0.1 * i, 0.1);
+  send(mesh, meshStamped(tipAbove(0.5), 130));
+  EXPECT_TRUE(moveTo(0.5, 130.1).clear);
+  ASSERT_TRUE(called("/held/attach", rod()).success);
+  EXPECT_TRUE(waitUntil([&] { return !state.last().proved; })) << "no step was answered with it";
+  EXPECT_NE(state.last().reason.find("'rod' was attached"), std::string::npos) << state.last().reason;
+  const State met = moveTo(0.29, 130.2);
+  EXPECT_EQ(met.touching, State::NEW) << met.reason;
+  EXPECT_TRUE(met.proved) << met.reason;
+  EXPECT_TRUE(waitUntil([&] { return first.count() > 0 && first.last().summary.find("rod") != std::string::npos; }));
+  // Its recording gives the same bits.
+  const std::string files = trigger("record_step").message,
+                    file = files.substr(files.find('/'), files.find(".step") + 5 - files.find('/'));
+  EXPECT_EQ(std::system(("rosrun deformable_ccd replay_step " + file).c_str()), 0) << files;
+  EXPECT_FALSE(moveTo(0.5, 130.3).clear) << "on its way back through it";
+  deformable_ccd::DetachObject let_go;
+  let_go.request.name = "rod";
+  ASSERT_TRUE(called("/held/detach", let_go).success);
+  EXPECT_TRUE(moveTo(0.5, 130.4).clear);
+  lift(130.5, 0.3);
+  lift(130.6, 0.3);
+  EXPECT_TRUE(moveTo(0.5, 130.5).clear) << "the plate rises to 0.3, the disc stays at 0.3, and would be at 0.5";
+  EXPECT_TRUE(moveTo(0.31, 130.6).clear) << "just above the disc";
+  deformable_ccd::RemoveObject remove;
+  remove.request.name = "rod";
+  ASSERT_TRUE(called("/held/remove", remove).success);
+  lift(130.7, 0.1);
+  lift(130.8, 0.1);
+  EXPECT_TRUE(moveTo(0.31, 130.7).clear);
+  EXPECT_TRUE(moveTo(0.2, 130.8).clear) << "through where the disc was";
+}
+
+TEST_F(Held, WhatIsRefusedIsAnsweredInALineAndCounted) {
+  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
+  const auto refused = [&] {
+    std::string count;
+    for (const auto& array : diagnostics.all()) {
+      for (const auto& status : array.status) {
+        for (const auto& value : status.values) {
+          if (status.name.find("held") != std::string::npos && value.key == "refused requests for objects")
+            count = value.value;
+        }
+      }
+    }
+    return count;
+  };
+  ASSERT_TRUE(waitUntil([&] { return !refused().empty(); }));
+  const int before = std::stoi(refused());
+  deformable_ccd::AttachObject call = rod();
+  call.request.link = "plat";
+  const auto unknown = called("/held/attach", call);
+  EXPECT_FALSE(unknown.success);
+  EXPECT_EQ(unknown.message,
+            "object 'rod': link is 'plat', which is no link of a robot and no rigid body; nearest is 'plate'");
+  deformable_ccd::DetachObject let_go;
+  let_go.request.name = "rod";
+  EXPECT_FALSE(called("/held/detach", let_go).success);
+  deformable_ccd::RemoveObject remove;
+  EXPECT_FALSE(called("/held/remove", remove).success);
+  EXPECT_TRUE(waitUntil([&] { return std::stoi(refused()) == before + 3; })) << refused();
+}
+
+// Joint states at 100 Hz that come 30 ms late beside a mesh of 33 Hz: each frame waits for its link, none is lost.
+TEST_F(Held, TransformsThatAreLateAreWaitedFor) {
+  constexpr int FRAMES = 60;
+  const ros::Time begin = ros::Time::now();
+  std::deque<ros::Time> late;  // stamps, from 135 s on: robot_state_publisher takes none that go back
+  int sent = 0, ticks = 0;
+  for (ros::Rate rate(100); ticks < 3 * FRAMES + 20; ++ticks, rate.sleep()) {
+    const ros::Time now = ros::Time(135) + (ros::Time::now() - begin);
+    late.push_back(now);
+    while (now - late.front() > ros::Duration(0.03)) {
+      sensor_msgs::JointState message;
+      message.header.stamp = late.front();
+      message.name = {"lift"};
+      message.position = {0.1 + 0.05 * std::sin(5 * late.front().toSec())};
+      joints.publish(message);
+      late.pop_front();
+    }
+    if (ticks % 3 == 2 && ticks > 10 && sent < FRAMES) {
+      mesh.publish(meshStamped(tipAbove(0.4), now.toSec()));
+      ++sent;
+    }
+  }
+  const auto answers = [&] {
+    std::set<ros::Time> ends;
+    for (const State& one : state.all()) {
+      if (one.clear && one.holds_until > ros::Time(135)) ends.insert(one.holds_until);
+    }
+    return static_cast<int>(ends.size());
+  };
+  EXPECT_TRUE(waitUntil([&] { return answers() == FRAMES - 1; })) << answers() << " of " << FRAMES - 1;
+}
+
+// Nobody saw how it came there: the step is not answered. A smaller jump is a path like any other.
+TEST_F(Held, AJointThatJumpsIsASeamAndNeverClear) {
+  lift(140, 0.1);
+  lift(140.1, 0.1);
+  lift(140.2, 0.9);
+  lift(140.3, 0.9);
+  lift(140.4, 0.6);
+  send(mesh, meshStamped(tipAbove(0.5), 140));
+  EXPECT_TRUE(moveTo(0.5, 140.1).clear);
+  const ContactArray jumped = send(mesh, meshStamped(tipAbove(0.5), 140.2));
+  EXPECT_EQ(jumped.status, ContactArray::TELEPORT) << jumped.reason;
+  EXPECT_NE(jumped.reason.find("'plate'"), std::string::npos) << jumped.reason;
+  EXPECT_TRUE(waitUntil([&] { return !state.last().clear; }));
+  EXPECT_TRUE(moveTo(0.5, 140.3).proved);
+  EXPECT_TRUE(moveTo(0.5, 140.4).proved) << "by 0.3 m";
+}
+
+struct Changing : WithRobot {
+  Changing() : WithRobot("/changing") {}
+  void SetUp() override {
+    static double next_s = 150;
+    begin_s = next_s++;
+    for (int i = 0; i < 5; ++i) lift(begin_s + 0.1 * i, 0.1);
+    send(mesh, meshStamped(tipAbove(0.3), begin_s));
+  }
+  double begin_s = 0;
+};
+
+TEST_F(Changing, WhatTheHandHoldsIsExpectedUntilItIsSaidToBeOpen) {
+  EXPECT_EQ(moveTo(0.05, begin_s + 0.1).touching, State::EXPECTED);
+  deformable_ccd::SetHold open;
+  const auto said = called("/changing/set_hold", open);
+  EXPECT_TRUE(said.success) << said.message;
+  EXPECT_EQ(moveTo(0.06, begin_s + 0.2).touching, State::NEW) << "what touches since before";
+  open.request.body = "cloth";
+  EXPECT_FALSE(called("/changing/set_hold", open).success);
+  open.request.body = "mesh";
+  open.request.holds = true;
+  EXPECT_NE(called("/changing/set_hold", open).message.find("mesh with plate"), std::string::npos);
+  EXPECT_EQ(moveTo(0.05, begin_s + 0.3).touching, State::EXPECTED);
+}
+
+TEST_F(Changing, ADescriptionThatChangesIsNotVouchedForUntilItIsBack) {
+  EXPECT_TRUE(moveTo(0.3, begin_s + 0.1).clear);
+  std::string urdf;
+  ASSERT_TRUE(node.getParam("changing_description", urdf));
+  node.setParam("changing_description", urdf + " ");
+  EXPECT_TRUE(waitUntil([&] { return !state.last().proved; }));
+  const State changed = moveTo(0.3, begin_s + 0.2);
+  EXPECT_FALSE(changed.proved);
+  EXPECT_NE(
+      changed.reason.find("parameter /changing_description is another one than at the start; restart the monitor"),
+      std::string::npos)
+      << changed.reason;
+  node.setParam("changing_description", urdf);
+  ros::Duration(2.5).sleep();
+  EXPECT_TRUE(moveTo(0.3, begin_s + 0.3).clear);
+}
+
 struct Late : WithRobot {
   Late() : WithRobot("/late") {}
   static void SetUpTestSuite() {
@@ -110,6 +293,24 @@ TEST_F(Alone, WithoutARobotTheMonitorGoesOnAndDoesNotVouchForIt) {
   EXPECT_NE(said.reason.find("nothing of the robot is watched: parameter /nobodys_description was set by nobody"),
             std::string::npos)
       << said.reason;
+}
+
+struct Orphan : WithRobot {
+  Orphan() : WithRobot("/held") {}
+};
+
+// The last case: without robot_state_publisher there is no tf any more.
+TEST_F(Orphan, WhenTheStatePublisherIsKilledTheLinkIsNamed) {
+  lift(500, 0.1);
+  lift(500.1, 0.1);
+  send(mesh, meshStamped(tipAbove(0.3), 500));
+  EXPECT_TRUE(moveTo(0.3, 500.1).clear);
+  ASSERT_EQ(std::system("rosnode kill /robot_state_publisher"), 0);
+  for (const double stamp_s : {500.2, 500.3}) {
+    const State said = moveTo(0.3, stamp_s);
+    EXPECT_FALSE(said.proved);
+    EXPECT_NE(said.reason.find("'plate'"), std::string::npos) << said.reason;
+  }
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ struct PairTask {
   bool self;
   std::uint32_t first, last;  ///< supercluster pairs in the step's list
   bool by_bound;              ///< which are in the order in which they can touch, from task to task
-  /// The other is the task before it, and nothing here can touch before what is there.
+  /// `other`, the task before it, is of the same trees, and no bound on the TOC here is earlier than one there.
   bool follows(const PairTask& other) const {
     return by_bound && kind == other.kind && body_a == other.body_a && body_b == other.body_b;
   }
@@ -62,8 +62,8 @@ struct StepContext {
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   FoundLimit* found = nullptr;            ///< null: no limit
-  double not_after = 2;                   ///< earliest_only: and contacts that begin later are not listed
-  bool bounds_late = false;               ///< earliest_only: pairs are bounded before they are tested
+  double not_after = 2;                   ///< earliest_only: contacts that begin after this are not listed
+  bool bounds_late = false;               ///< earliest_only: a pair's TOC is bounded before its elementary test
   Span span;                              ///< of the bounds
   /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
   std::chrono::nanoseconds per_hit{0};

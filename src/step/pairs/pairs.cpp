@@ -122,8 +122,11 @@ void History::Impl::rememberApart(bool certain) {
     // With radii that change, what is apart now may be too close without having moved.
     apart[b] = certain && tested && !scene.bodies()[b].masked && !scene.bodies()[b].uncertain;
   }
-  for (const Contact& c : result.contacts) {
-    if (c.body[0] == c.body[1]) apart[c.body[0]] = 0;
+  std::size_t left = static_cast<std::size_t>(std::count(apart.begin(), apart.end(), 1));
+  for (auto c = result.contacts.begin(); left > 0 && c != result.contacts.end(); ++c) {
+    if (c->body[0] != c->body[1]) continue;
+    left -= apart[c->body[0]];
+    apart[c->body[0]] = 0;
   }
 }
 

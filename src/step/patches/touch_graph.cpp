@@ -8,6 +8,8 @@
 namespace dccd {
 namespace {
 
+constexpr std::uint32_t AHEAD = 8;  // vertices whose neighbours are fetched from memory
+
 constexpr std::uint8_t kindOf(PairKind kind) { return static_cast<std::uint8_t>(kind); }
 
 }  // namespace
@@ -114,12 +116,19 @@ void TouchGraph::findAreas(const std::vector<Touch>& touches, const Group* first
   }
   for (std::uint32_t i = 0; i < touched_.size(); ++i) {
     const Index vertex = touched_[i];
+    // They lie anywhere in memory, which the rest of the step has taken out of the caches.
+    if (i + AHEAD < touched_.size()) {
+      __builtin_prefetch(&neighbours_[neighbours_begin_[touched_[i + AHEAD]]]);
+      __builtin_prefetch(&neighbours_begin_[touched_[std::min<std::size_t>(i + 2 * AHEAD, touched_.size() - 1)]]);
+    }
+    std::uint32_t root = areaRoot(i);
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
       if (other > vertex) break;  // that one comes to this
       if (place_[other] == NO_INDEX) continue;
-      const std::uint32_t a = areaRoot(i), b = areaRoot(place_[other]);
-      area_[std::max(a, b)] = std::min(a, b);
+      const std::uint32_t other_root = areaRoot(place_[other]);
+      area_[std::max(root, other_root)] = std::min(root, other_root);
+      root = std::min(root, other_root);
     }
   }
   // No place is before the first one of its area.

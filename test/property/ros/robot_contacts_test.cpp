@@ -16,7 +16,7 @@ namespace dccd {
 namespace test {
 namespace {
 
-constexpr int SIDE = 5;  // vertices of the cloth, each way
+constexpr int SIDE = 4;  // vertices of the cloth, each way
 
 /// A grid of SIDE x SIDE points in float64.
 std::vector<std::uint8_t> gridAt(double stamp_s, const Positions& positions) {
@@ -39,21 +39,27 @@ std::vector<std::uint8_t> gridAt(double stamp_s, const Positions& positions) {
   return bytesOf(out);
 }
 
-StepBody bodyOf(const Body& body, bool self_collision) {
+Eigen::AlignedBox3d boundsOf(const Body& body, const std::vector<Index>& vertices) {
+  Eigen::AlignedBox3d bounds;
+  for (const Index v : vertices) {
+    bounds.extend((*body.t0)[v]);
+    bounds.extend((*body.t1)[v]);
+  }
+  return bounds;
+}
+
+/// With the faces alone that may meet what is in the box: a feature in it is one of these faces', or on one of them.
+StepBody bodyOf(const Body& body, bool self_collision, const Eigen::AlignedBox3d& box) {
+  std::vector<Face> faces;
+  for (const Face& f : body.topology->faces()) {
+    if (boundsOf(body, {f[0], f[1], f[2]}).intersects(box)) faces.push_back(f);
+  }
   StepBody out;
-  out.topology = *body.topology;
+  out.topology = Topology::fromTriangles(body.t0->size(), faces);
   out.t0 = *body.t0;
   out.t1 = *body.t1;
   out.self_collision = self_collision;
   return out;
-}
-
-Eigen::AlignedBox3d boundsOf(const Body& body) {
-  Eigen::AlignedBox3d bounds;
-  for (const Positions* ends : {body.t0.get(), body.t1.get()}) {
-    for (const Vec3& p : *ends) bounds.extend(p);
-  }
-  return bounds;
 }
 
 struct Truth {
@@ -61,21 +67,26 @@ struct Truth {
   std::size_t start = 0;              // pairs that meet at the start
 };
 
-/// Of the cloth with itself and with each link; links do not meet each other. Boxes that are apart hold no contact.
+/// Of the cloth with itself and with each link; links do not meet each other.
 Truth truthOf(const Step& step) {
   Truth truth;
-  const auto add = [&](const TestStep& one, std::uint16_t link) {
-    for (TrueContact& contact : trueContacts(one)) {
+  const Eigen::AlignedBox3d all(Vec3::Constant(-1e9), Vec3::Constant(1e9));
+  const auto boxOf = [&](std::size_t b) { return boundsOf(step.bodies[b], step.bodies[b].topology->usedVertices()); };
+  const auto add = [&](const TestStep& near, const TestStep& whole, std::uint16_t link) {
+    for (TrueContact& contact : trueContacts(near)) {
       for (std::uint16_t& body : contact.contact.body) body = body == 0 ? 0 : link;
       truth.contacts.push_back(contact);
     }
-    truth.start += trueStart(one).size();
+    truth.start += trueIntersections(near).size() + trueInsides(whole).size();
   };
-  const Body& cloth = step.bodies[0];
-  add({{bodyOf(cloth, true)}}, 0);
+  const TestStep cloth{{bodyOf(step.bodies[0], true, all)}};
+  add(cloth, cloth, 0);
   for (std::size_t b = 1; b < step.bodies.size(); ++b) {
-    if (!boundsOf(cloth).intersects(boundsOf(step.bodies[b]))) continue;
-    add({{bodyOf(cloth, false), bodyOf(step.bodies[b], false)}}, static_cast<std::uint16_t>(b));
+    if (!boxOf(0).intersects(boxOf(b))) continue;
+    const auto pair = [&](const Eigen::AlignedBox3d& of_link, const Eigen::AlignedBox3d& of_cloth) {
+      return TestStep{{bodyOf(step.bodies[0], false, of_link), bodyOf(step.bodies[b], false, of_cloth)}};
+    };
+    add(pair(boxOf(b), boxOf(0)), pair(all, all), static_cast<std::uint16_t>(b));
   }
   std::sort(truth.contacts.begin(), truth.contacts.end(),
             [](const TrueContact& a, const TrueContact& b) { return canonicalLess(a.contact, b.contact); });
@@ -101,21 +112,21 @@ TEST(RobotContacts, NoneOfThePandasIsMissedOrInventedAndTimesAreInTheirCells) {
   const auto any = [&](double size) { return Vec3(size * unit(random), size * unit(random), size * unit(random)); };
   std::vector<double> joints(panda.joints());
   Positions cloth(SIDE * SIDE);
-  const int steps = longRun() ? 20000 : 300;
+  const int steps = longRun() ? 10000 : 200;
   std::size_t contacts = 0, touching = 0, crossing = 0;
   for (int frame = 0; frame <= steps; ++frame) {
     const double stamp_s = 1 + 0.1 * frame;
-    for (double& joint : joints) joint = std::clamp(joint + 0.3 * unit(random), -2.5, 2.5);
+    for (double& joint : joints) joint = std::clamp(joint + 0.02 * unit(random), -2.5, 2.5);
     const Panda::Placed placed = panda.place(joints, stamp_s);
     driven.feed_tf.add(placed.tf, false);
     // Now and then to another link; from there it drifts and crumples.
     const KDL::Vector link = std::next(placed.from_base.begin(), frame / 10 % placed.from_base.size())->second.p;
-    const Vec3 drift = any(0.1), center = Vec3(link.x(), link.y(), link.z()) + any(0.1);
+    const Vec3 drift = any(0.01), center = Vec3(link.x(), link.y(), link.z()) + any(0.06);
     for (int i = 0; i < SIDE * SIDE; ++i) {
       const Vec3 flat(0.06 * (i % SIDE - SIDE / 2), 0.06 * (i / SIDE - SIDE / 2), 0);
       cloth[static_cast<std::size_t>(i)] = frame % 10 == 0
-                                               ? Vec3(center + flat + any(0.03))
-                                               : Vec3(cloth[static_cast<std::size_t>(i)] + drift + any(0.02));
+                                               ? Vec3(center + flat + any(0.01))
+                                               : Vec3(cloth[static_cast<std::size_t>(i)] + drift + any(0.005));
     }
     driven.pipeline.take(0, {"sensor_msgs/PointCloud2", gridAt(stamp_s, cloth), 0, 0});
     Outcome& outcome = driven.outcome;
@@ -145,7 +156,7 @@ TEST(RobotContacts, NoneOfThePandasIsMissedOrInventedAndTimesAreInTheirCells) {
   std::cout << steps << " steps, " << contacts << " contacts, " << touching << " of them with links; " << crossing
             << " steps began crossing\n";
   EXPECT_GT(touching, static_cast<std::size_t>(steps));
-  EXPECT_GT(contacts, touching);
+  EXPECT_LT(crossing, static_cast<std::size_t>(steps));
 }
 
 }  // namespace

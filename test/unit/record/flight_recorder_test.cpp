@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
@@ -37,6 +38,8 @@ TEST_F(FlightRecorderTest, KeepsTheLastSteps) {
     EXPECT_TRUE(replayStep(r).differences.empty());
   }
   EXPECT_TRUE(recorder.takeSurprise().empty());
+  recorder.onStep(readRecordingFile(files[0]).step, scene.monitor().options().detector);
+  EXPECT_FALSE(readRecordingFile(recorder.writeAll("ended").at(0)).has_answer) << "in the place of one with an answer";
 }
 
 TEST_F(FlightRecorderTest, TwoInOneFolderOverwriteNothing) {
@@ -126,6 +129,9 @@ TEST(Surprise, OnlyWhatContradictsThePromises) {
   Contact contact;
   contact.toc_lower = std::numeric_limits<double>::quiet_NaN();
   outcome.contacts.push_back(contact);
+  EXPECT_NE(surpriseIn(outcome, options).find("outside of the step"), std::string::npos);
+  outcome.contacts[0].toc_lower = 1;
+  outcome.contacts[0].toc_upper = std::nextafter(1.0, 2.0);
   EXPECT_NE(surpriseIn(outcome, options).find("outside of the step"), std::string::npos);
 }
 

@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "dccd/octomap_decode.h"
+#include "dccd/regular_file.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_formats.h"
 #include "input/stl_file.h"
@@ -244,6 +245,8 @@ TEST_F(HostileFile, MapFilesOfAGigabyte) {
   const std::string path = write("a.bt", "# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0.1\ndata\n", GIGABYTE);
   const std::string text = refusal([&] { readOctomapFile(path); });
   EXPECT_TRUE(mentions(text, "a.bt") && mentions(text, "10737418")) << text;
+  EXPECT_EQ(regularFileProblem(path, GIGABYTE), "") << "so many may be";
+  EXPECT_EQ(regularFileProblem(path, GIGABYTE - 1), "has 1073741824 bytes, at most 1073741823 are read");
 }
 
 }  // namespace

@@ -61,6 +61,17 @@ TEST(MapMemory, WhatIsHeldHasNoRoomTwice) {
   EXPECT_NO_THROW(memory.accept(map.counts));
 }
 
+TEST(MapMemory, WhatHasRoomAtFirstHasItBesideTwoLikeIt) {
+  MonitorConfig config;
+  config.max_map_bytes = std::size_t{1} << 20;
+  const MapMemory memory(config);
+  const auto data = sparse(0.1, 4);
+  const Decoded map = decoded(data);
+  while (!test::said<OctomapError>([&] { memory.accept(map.counts); }).empty()) config.max_map_bytes += 1 << 14;
+  const auto in_use = memory.counted(decoded(data).surface), waits = memory.counted(decoded(data).surface);
+  EXPECT_NO_THROW(memory.accept(map.counts));
+}
+
 TEST(MapMemory, LeavesThatNeedMoreThanThereIsAreRefused) {
   MonitorConfig config;
   const MapMemory memory(config);

@@ -115,6 +115,10 @@ TEST_F(CloudGrammar, Fields) {
   EXPECT_EQ(read(cloud()).positions, SQUARE);
   anew();
   EXPECT_EQ(read(cloud(sensor_msgs::PointField::FLOAT32)).positions[3].z(), static_cast<double>(0.1f));
+  sensor_msgs::PointCloud2 backwards = cloud();
+  backwards.fields[3].offset = 8;  // right after z, and x right after it
+  anew();
+  EXPECT_EQ(read(backwards).positions.size(), 4u);
 }
 
 TEST_F(CloudGrammar, OtherTypes) {

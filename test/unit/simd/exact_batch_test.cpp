@@ -14,6 +14,7 @@
 
 #include "oracle/oracle.h"
 #include "oracle/query_file.h"
+#include "simd/targets.h"
 #include "support/data.h"
 #include "support/generators.h"
 #include "support/scene_data.h"
@@ -103,7 +104,7 @@ TEST(ExactBatch, EveryTargetComputesTheSameBits) {
       ASSERT_GT(std::count(exact.verdict.begin(), exact.verdict.end(), bits == 52 ? 3 : 1), 100);
       forEachTarget([&](const std::string& target) {
         ++targets;
-        ASSERT_EQ(target, simd::batchTargetName());
+        ASSERT_EQ(target, simd::activeTarget());
         expectSame(exact, answersOf(simd::exactBatch, batch, bits, 2000), target);
       });
     }

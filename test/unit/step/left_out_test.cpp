@@ -12,6 +12,7 @@
 #include "dccd/assurance.h"
 #include "dccd/stream.h"
 #include "oracle/exact_distance.h"
+#include "step/pairs/left_out.h"
 #include "support/step_support.h"
 
 namespace dccd {
@@ -132,6 +133,18 @@ TEST(LeftOut, IsExactlyWhatIsCloserInTheReferenceFrame) {
   Felt without(felt(layers, nullptr), apart);
   EXPECT_EQ(without.run(apart, apart).contacts.size(), listed.size()) << "else they would all be contacts";
   EXPECT_TRUE(without.leftOut().empty());
+}
+
+TEST(LeftOut, ADistanceInTheReferenceFrameIsThatToTheNearestSide) {
+  std::array<Vec3, 4> x;
+  const auto around = [](int sixths) { return Vec3(std::cos(sixths * M_PI / 3), std::sin(sixths * M_PI / 3), 0); };
+  for (int k = 0; k < 3; ++k) x[k + 1] = around(2 * k);
+  for (int k = 0; k < 3; ++k) {
+    x[0] = around(2 * k + 1);  // beyond the middle of a side
+    EXPECT_NEAR(restDistance(PairKind::VERTEX_FACE, x), 0.5, 1e-12) << k;
+  }
+  x[0] = {0, 0, 0.25};
+  EXPECT_EQ(restDistance(PairKind::VERTEX_FACE, x), 0.25);
 }
 
 TEST(LeftOut, LayersThatComeNearAreFoundAllTheSame) {

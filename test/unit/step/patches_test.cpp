@@ -339,6 +339,21 @@ TEST(Patches, WhatTouchesAtTheStartIsInitial) {
   EXPECT_GT(at_zero, 0u) << "a cell that begins at 0, but no touch there";
 }
 
+TEST(Patches, OfABodyWithItselfHasTheAreaOfOneSideAndOneNormal) {
+  StepBody body;
+  body.topology = Topology::fromTriangles(6, {{0, 1, 2}, {3, 4, 5}});
+  body.t0 = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {1, 1, 1}, {-3, 1, 1}, {1, -3, 1}};
+  body.t1 = body.t0;
+  for (Index v = 3; v < 6; ++v) body.t1[v].z() = -1;
+  TestStep step;
+  step.bodies = {body};
+  const Outcome outcome = runOnce(step, withPatches());
+  ASSERT_EQ(outcome.patches.size(), 1u);
+  EXPECT_GT(outcome.patches[0].contacts, 1u) << "a corner of either triangle meets the other one";
+  EXPECT_NEAR(outcome.patches[0].area_m2, 8, 1e-12);
+  EXPECT_NEAR(std::abs(outcome.patches[0].normal.z()), 1, 1e-12);
+}
+
 TEST(Patches, AreNotMadeUnlessAskedFor) {
   const Outcome outcome = runOnce(crumpled(3, 2, 8), Options());
   EXPECT_GT(outcome.contacts.size(), 0u);

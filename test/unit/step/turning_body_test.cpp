@@ -117,6 +117,13 @@ TEST(TurningBody, ThatComesNearNothingIsNotCut) {
   EXPECT_TRUE(unseen.contacts.empty());
 }
 
+TEST(TurningBody, MeetsWhatOfTheMapOnlyTheArcPasses) {
+  Monitor monitor(loose(), clockAndBar());
+  monitor.setMap({VoxelSurface::build(0.1, {{{32768, 32768, 32758}, 1}}), 0, Eigen::Isometry3d::Identity(), {}});
+  step(monitor, tip(0, -1.2), 0);
+  EXPECT_NEAR(step(monitor, tip(100 * MS, -1.2), 3.1).earliest_toc, std::atan2(0.9, 0.1) / 3.1, 0.01);
+}
+
 // The point that is shown lies on the arc, where the part's straight paths meet, not half way of the whole step's
 // chord.
 TEST(TurningBody, TheGeometryIsThatOfThePart) {

@@ -97,6 +97,8 @@ TEST_F(MeshStoreTest, KeepsNoMoreThanItsCapacity) {
   store.forgetBefore(985 * MS);
   EXPECT_EQ(store.size(), 2u);
   EXPECT_EQ(store.lookup(985 * MS), Lookup::READY);
+  store.forgetBefore(2000 * MS);
+  EXPECT_NE(store.previous(), nullptr) << "a prediction needs two";
 }
 
 // A gripper at 240 Hz beside a tracker that comes 0.4 s late must still be known where the tracker's step begins.

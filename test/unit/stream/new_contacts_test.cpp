@@ -36,6 +36,18 @@ TEST(NewContacts, APatchIsNewsOnceAndThenLasts) {
   for (int k = 2; k < 8; ++k) EXPECT_EQ(said[static_cast<std::size_t>(k)], Touching::LASTING) << k;
 }
 
+TEST(NewContacts, OfAPatchThatIsNewByEdgesThatCrossAnExpectedContactIsNone) {
+  Outcome outcome;
+  outcome.tracked = true;
+  outcome.patches.resize(1);
+  Patch& patch = outcome.patches[0];
+  patch.is_new = true;
+  patch.contacts = patch.crossings = patch.expected = 1;
+  EXPECT_EQ(newContacts(outcome).size(), 1u);
+  patch.earliest.expected = true;
+  EXPECT_TRUE(newContacts(outcome).empty());
+}
+
 TEST(NewContacts, TheEarliestOfEachPairOfPartners) {
   Stream stream({grid(5, 5), grid(5, 5)});
   stream.setMap(table(0.05));

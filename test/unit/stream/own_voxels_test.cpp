@@ -327,7 +327,8 @@ TEST_F(OwnVoxels, HugeReachesAndPlacesAndWhatIsNoReach) {
     map(200 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(2.05));
     EXPECT_EQ(own(feed(300 * MS, 0.55)), 25u) << "at most places on a way that long are not asked: obstacles";
   }
-  for (const double wrong : {-0.01, -2.0, std::nan(""), HUGE_VAL}) EXPECT_THROW(start(wrong), std::invalid_argument) << wrong;
+  for (const double wrong : {-0.01, -2.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW(start(wrong), std::invalid_argument) << wrong;
 }
 
 TEST_F(OwnVoxels, OverATeleportWhatIsOwnStaysOwn) {

@@ -82,6 +82,21 @@ TEST(UnknownSpace, MaskedVerticesSweepNothing) {
   EXPECT_EQ(all.outcome.unknown_fraction, 0);
 }
 
+TEST(UnknownSpace, TheShareIsThatOfAllBodies) {
+  XmlRpcValue tree = scene();
+  tree["unknown_space"] = "report";
+  tree["bodies"]["cloth"]["topic"] = "cloth";
+  tree["bodies"]["table"]["topic"] = "table";
+  tree["bodies"]["table"]["motion"] = "static";
+  Driven two(tree);
+  two.giveMap(1);
+  two.pipeline.take(1, {"sensor_msgs/PointCloud2", cloud(1, 0.05f), 0, 0});  // in voxels that are known
+  two.feed(1, 0.35f);
+  const Outcome& outcome = two.feed(1.1, 0.15f);
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].in, 12u + 4u) << outcome.reason;
+  EXPECT_EQ(outcome.stats[Effect::UNKNOWN_SPACE].out, 8u);
+}
+
 TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
   XmlRpcValue tree = scene();
   tree["unknown_space"] = "occupied";

@@ -74,6 +74,22 @@ TEST(Srdf, UnknownLinksAndJointsAreNamed) {
   }
 }
 
+TEST(Srdf, GroupsBesideEachOtherAreNotNested) {
+  const auto groups = [](int count, bool nested) {
+    std::string text;
+    for (int i = 0; i < count; ++i) {
+      const std::string next =
+          nested && i > 0 ? "<group name='g" + std::to_string(i - 1) + "'/>" : "<link name='palm'/>";
+      text = "<group name='g" + std::to_string(i) + "'>" + next + "</group>" + text;
+    }
+    return robotFrom(hand(),
+                     robotOf("<group name='all'><group name='g" + std::to_string(count - 1) + "'/></group>" + text));
+  };
+  EXPECT_EQ(groups(200, false).groups.size(), 201u);
+  EXPECT_EQ(groups(60, true).groups.at("all"), Names{"palm"});
+  EXPECT_TRUE(says(groups(200, true).missing, "nested too deeply"));
+}
+
 TEST(Srdf, WhatIsNoneIsRefusedWithItsPlace) {
   const std::pair<std::string, const char*> cases[] = {
       {"<robot>", "is no XML"},
