@@ -88,7 +88,7 @@ class ReportPageTest(unittest.TestCase):
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_a_run_without_a_map_says_so_on_top(self):
-        self.report('table_edge', 40, '--without-map')
+        self.report(SCENES / 'table_edge.yaml', 40, '--without-map')
         body, _ = self.dom()
         verdict = body[body.index('id="verdict"'):body.index('id="player"')]
         self.assertRegex(verdict, r'No map was used.*Nothing was checked against a map: effects/octomap is off\..*Nothing was found to touch')
