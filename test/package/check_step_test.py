@@ -82,6 +82,15 @@ class CheckStepTest(unittest.TestCase):
         lost[700] = (float('nan'), 0.0, 0.0)
         self.refused('1 vertices are not finite', sheet(0) + sheet(0.1), lost)
 
+    def test_what_is_not_proved_stays_so_in_later_steps(self):
+        lost = sheet(0) + sheet(0.1)
+        lost[700] = (float('nan'), 0.0, 0.0)
+        with tempfile.TemporaryDirectory() as folder:
+            files = [pathlib.Path(folder) / ('%d.ply' % k) for k in range(3)]
+            for file, points in zip(files, (lost, *2 * [sheet(0) + sheet(0.1)])):
+                write(file, points, self.FACES)
+            self.assertEqual(subprocess.run([tool(), *map(str, files)], capture_output=True, text=True).returncode, NOT_PROVED)
+
     def test_an_edge_through_a_face_at_the_start(self):
         through = [(x, y, 0.3 * (x - 0.111)) for x, y, _ in sheet(0)]
         self.assertEqual(self.check(sheet(0) + through, sheet(0) + through), 0)

@@ -464,6 +464,7 @@ class ArraysTest(PythonTestCase):
                 ({'reference': t0, 'reference_radius_m': [0.] * 5}, ValueError, 'no or as many radii in its reference frame'),
                 ({'pose_t0': np.eye(4)}, TypeError, 'pose_t0 and pose_t1 go together'),
                 ({'pose_t0': np.eye(4), 'pose_t1': turned}, ValueError, 'pose_t1 is no pose'),
+                ({'pose_t0': np.diag([1., 1, -1, 1]), 'pose_t1': np.eye(4)}, ValueError, 'pose_t0 is no pose'),
                 ({'pose_t0': np.eye(4), 'pose_t1': np.eye(3)}, ValueError, r'pose_t1 has shape \(3, 3\), expected \(4, 4\)'),
                 ({'mesh': dccd.Mesh(6, FACES)}, TypeError, 'expected a mesh, or triangles, or edges'),
                 ({'colour': 1}, TypeError, 'incompatible constructor arguments')]:

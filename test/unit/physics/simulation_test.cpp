@@ -240,6 +240,18 @@ TEST(Shapes, FacesCoverTheGridOnce) {
   }
 }
 
+TEST(Shapes, AMotionBeginsAndEndsAtRest) {
+  MotionKey up;
+  up.time_s = 2;
+  up.offset_m = Vec3(0, 0, 1);
+  const auto height = [&](double time_s) { return motionAt({up}, Vec3::Zero(), time_s).translation().z(); };
+  EXPECT_EQ(height(0), 0);
+  EXPECT_LT(height(0.02), 0.0004);
+  EXPECT_EQ(height(1), 0.5);
+  EXPECT_GT(height(1.98), 0.9996);
+  EXPECT_EQ(height(3), 1);
+}
+
 TEST(Shapes, ATorusHasAHole) {
   Solid ring;
   ring.kind = Solid::Kind::RING;
