@@ -44,19 +44,23 @@ class ParameterTexts {
         until_(Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * timeout_s))),
         goes_on_(goes_on) {}
 
+  /// The parameter as robot_state_publisher and RViz find it: in the node's namespace, or in one around that.
   /// `held`: of a parameter, under its resolved name, what it holds.
   RobotText read(const std::string& name, const std::string& what, std::map<std::string, std::string>& held) const {
     if (name.empty() || isFile(name)) return readFile(name, what);
     RobotText read;
+    std::string found;
     try {
-      read.name = "parameter " + node_.resolveName(name);
+      std::string resolved = node_.resolveName(name);
       bool told = false;
-      while (!node_.getParam(name, read.text) && goes_on_() && Clock::now() < until_) {
-        if (node_.hasParam(name)) break;  // it is there, and no text
-        if (!std::exchange(told, true)) ROS_INFO_STREAM("waits for " << read.name << ", " << what);
+      while (!node_.searchParam(name, found) && goes_on_() && Clock::now() < until_) {
+        if (!std::exchange(told, true)) ROS_INFO_STREAM("waits for parameter " << resolved << ", " << what);
         ros::WallDuration(LOOK_AGAIN_S).sleep();
       }
-      held[node_.resolveName(name)] = read.text;
+      if (!found.empty()) resolved = found;
+      node_.getParam(resolved, read.text);
+      read.name = "parameter " + resolved;
+      held[resolved] = read.text;
     } catch (const ros::Exception& error) {
       read.name = "parameter " + name;
       read.problem = std::string("cannot be asked for: ") + error.what();
@@ -65,7 +69,7 @@ class ParameterTexts {
     if (!read.text.empty()) return read;
     std::ostringstream waited;
     waited << "was set by nobody for " << timeout_s_ << " s (robot/timeout_s); publish it before, or correct robot";
-    read.problem = node_.hasParam(name) ? "is empty or no text; " + what + " is needed" : waited.str();
+    read.problem = !found.empty() ? "is empty or no text; " + what + " is needed" : waited.str();
     return read;
   }
 

@@ -264,10 +264,10 @@ TEST_F(Changing, ADescriptionThatChangesIsNotVouchedForUntilItIsBack) {
 }
 
 struct Late : WithRobot {
-  Late() : WithRobot("/late") {}
+  Late() : WithRobot("/cell/late") {}
   static void SetUpTestSuite() {
     ros::NodeHandle node;
-    EXPECT_FALSE(ros::service::exists("/late/reset", false)) << "it waits for its robot";
+    EXPECT_FALSE(ros::service::exists("/cell/late/reset", false)) << "it waits for its robot";
     std::string urdf;
     ASSERT_TRUE(node.getParam("robot_description", urdf));
     node.setParam("late_description", urdf);
