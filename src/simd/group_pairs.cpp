@@ -185,6 +185,7 @@ HWY_INLINE size_t testUnsharedPairsOf(const GroupsView& a, const GroupsView& b, 
 size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
                          bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
   if (a.arity == 1) return testUnsharedPairsOf<1, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+  if (a.arity == 3) return testUnsharedPairsOf<3, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
   if (b.arity == 3) return testUnsharedPairsOf<2, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
   return testUnsharedPairsOf<2, 2>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
 }

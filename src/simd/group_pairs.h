@@ -27,7 +27,7 @@ std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::
                            std::size_t capacity, std::size_t* consumed);
 
 /// testGroupPairs() for leaves with vertices, STRICT_UPPER, without the pairs that share one; both trees are of the
-/// same body, and their features have 1 and 3, 2 and 2, or 2 and 3 vertices.
+/// same body, and their features have 1 and 3, 2 and 2, 2 and 3, or 3 and 3 vertices.
 std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                               std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
                               std::size_t* consumed);

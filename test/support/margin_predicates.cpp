@@ -9,7 +9,8 @@
 #include "obstacle/static_filters.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "oracle/oracle.h"
-#include "step/start/start_state.h"
+#include "simd/face_filter.h"
+#include "step/start/segment_triangle.h"
 #include "support/margin_numbers.h"
 #include "support/margin_pairs.h"
 
@@ -77,7 +78,15 @@ IsWrong judgeSegment(const MarginInput& input) {
   const bool meets = firstContact(PairKind::VERTEX_FACE, motion).has_value();
   const std::vector<double> x = input.x;
   return [x, meets] {
-    return segmentMeetsTriangle(x.data(), x.data() + 3, x.data() + 6, x.data() + 9, x.data() + 12) != meets;
+    if (segmentMeetsTriangle(x.data(), x.data() + 3, x.data() + 6, x.data() + 9, x.data() + 12) != meets) return true;
+    // The segment as an edge of a face, of which the filter of faces keeps what meets the other.
+    alignas(64) double points[6][8] = {};
+    for (int i = 0; i < 5; ++i) std::copy_n(x.data() + 3 * i, 3, points[i < 2 ? i : i + 1]);
+    for (int k = 0; k < 3; ++k) points[2][k] = x[k] + x[3 + k] - x[6 + k];
+    static constexpr std::uint32_t FACES[6] = {0, 1, 2, 3, 4, 5};
+    std::uint8_t edges;
+    simd::facePairFilter(points[0], FACES, 1, &edges);
+    return meets && (edges & 1) == 0;
   };
 }
 

@@ -1,6 +1,7 @@
 #include "step/start/start_state.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
@@ -9,17 +10,16 @@
 namespace dccd {
 namespace {
 
-// More candidates than this many an edge, and the full test is no dearer; but with a deadline it may not come to its
-// end.
-constexpr std::size_t CANDIDATES_PER_EDGE = 2, CANDIDATES_PER_EDGE_WITH_DEADLINE = 8;
+// More candidates than this many for a hundred edges, and the full test is no dearer (a candidate takes twice as long
+// as an edge's share of that), unless they are few; but with a deadline it may not come to its end.
+constexpr std::size_t CANDIDATES_PER_100_EDGES = 40, CANDIDATES_PER_100_EDGES_WITH_DEADLINE = 100;
+constexpr std::size_t FEW_CANDIDATES = 4096;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
-// A group that is begun may go on for this many tests, so that a search comes to its end in the end.
-constexpr std::uint64_t TESTS_PER_LOOK_AT_THE_CLOCK = 64, TESTS_IN_ANY_CASE = 1024;
+constexpr std::size_t FAN_UNIT = 1024;             // vertices of a unit
+constexpr std::size_t UNITS_A_THREAD = 4;          // between two looks at the clock
+constexpr std::size_t PIECE = 4;                   // units that a thread takes at once
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
-
-bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
-bool shareVertex(const Index* edge, const Index* face) { return contains(face, edge[0]) | contains(face, edge[1]); }
 
 std::size_t edgeCount(const SceneArrays& scene) {
   std::size_t n = 0;
@@ -29,21 +29,10 @@ std::size_t edgeCount(const SceneArrays& scene) {
 
 }  // namespace
 
-void StartStateSearch::SlotsAtVertex::build(const SceneBody& body, FeatureKind kind) {
-  const ClusterTree& tree = body.tree(kind);
-  begin.assign(body.usedCount() + 1, 0);
-  slots.resize(tree.featureCount() * tree.arity());
-  for (std::size_t i = 0; i < slots.size(); ++i) ++begin[tree.feature(0)[i] - body.internal_begin];
-  std::uint32_t sum = 0;
-  for (std::uint32_t& n : begin) n = sum += n;  // ends, moved down to begins below
-  for (std::size_t i = slots.size(); i-- > 0;) {
-    slots[--begin[tree.feature(0)[i] - body.internal_begin]] = static_cast<std::uint32_t>(i / tree.arity());
-  }
-}
-
 const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& scene, bool continues,
                                                             const Deadline& deadline, StepStats& stats,
-                                                            std::size_t most_found) {
+                                                            std::size_t most_found, std::size_t threads,
+                                                            const Parallel& parallel) {
   releaseBurst(found_);
   releaseBurst(candidates_);
   releaseBurst(touched_);
@@ -53,13 +42,17 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
   releaseBurst(by_group_);
   releaseBurst(keys_);
   releaseBurst(other_keys_, keys_.size());
+  for (std::vector<EdgeFace>& unit : unit_found_) {
+    releaseBurst(unit);
+    unit.clear();
+  }
   tested_ = 0;
   cut_ = false;
   most_found_ = most_found;
   has_deadline_ = deadline.canEnd();
   if (!(continues && known_)) clear();
   testCandidates(scene, deadline);
-  if (!searched_ && !hasEnough()) search(scene, deadline);
+  if (!searched_ && !hasEnough()) search(scene, deadline, threads, parallel);
   cut_ = cut_ || hasEnough();
   if (hasEnough()) found_.resize(most_found_);
   whole_ = searched_ && !cut_ && candidates_.empty() && touched_.empty();
@@ -116,16 +109,11 @@ bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadlin
       pairs, met, deadline, [&] { return expanded < touched_.size(); },
       [&] { addCandidates(scene, touched_[expanded++], pairs); },
       [&](const EdgeFace* first, std::size_t count) {
-        addMeeting(scene, first, count, 1, met);
+        finders_.local().addMeeting(scene, first, count, 1, met);
         return true;
       });
   list(scene, met, out);
   return whole;
-}
-
-bool StartStateSearch::isChecked(const SceneArrays& scene, const EdgeFace& pair) {
-  return scene.bodies()[pair.edge_body].holds(FeatureKind::EDGE, pair.edge) &&
-         scene.bodies()[pair.face_body].holds(FeatureKind::FACE, pair.face);
 }
 
 /// Takes the pairs from the back, a block at a time, and calls test(pairs, count) with it: sorted, many are the same
@@ -159,13 +147,19 @@ void StartStateSearch::testCandidates(const SceneArrays& scene, const Deadline& 
         touched_.pop_back();
       },
       [&](const EdgeFace* first, std::size_t count) {
-        tested_ += addMeeting(scene, first, count, 0, found_);
+        tested_ += finders_.local().addMeeting(scene, first, count, 0, found_);
         return !hasEnough();
       });
 }
 
-void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline) {
+void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline, std::size_t threads,
+                              const Parallel& parallel) {
   const std::vector<SceneBody>& bodies = scene.bodies();
+  std::vector<std::uint8_t> by_faces;
+  for (const SceneBody& body : bodies)
+    by_faces.push_back(body.tree(FeatureKind::FACE).featureCount() > 0 && !body.masked);
+  if (by_faces != by_faces_) next_bodies_ = {}, next_unit_ = 0;  // what a unit is has changed
+  by_faces_ = std::move(by_faces);
   body_pairs_.clear();
   for (std::uint32_t b = 0; b < bodies.size(); ++b) {
     if (meetsItself(bodies[b].setup)) body_pairs_.push_back({b, b});
@@ -176,85 +170,101 @@ void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline
     const std::uint32_t a = overlapping_[p], b = overlapping_[p + 1];
     if (!dccd::meet(bodies[a].setup, a, bodies[b].setup, b)) continue;
     body_pairs_.push_back({a, b});
-    body_pairs_.push_back({b, a});
+    if (!by_faces_[a] || !by_faces_[b]) body_pairs_.push_back({b, a});  // else {a, b} is both
   }
-  searched_ = goOn(body_pairs_, next_bodies_, next_group_, [&] { return searchBodies(scene, deadline); });
+  searched_ =
+      goOn(body_pairs_, next_bodies_, next_unit_, [&] { return searchBodies(scene, deadline, threads, parallel); });
 }
 
-/// Goes on at next_group_ of the edges' tree, by one group at the least; false: it was ended, and next_group_ says
-/// where.
-bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& deadline) {
-  const std::uint32_t edge_body = next_bodies_[0], face_body = next_bodies_[1];
-  const ClusterTree& edges = scene.bodies()[edge_body].tree(FeatureKind::EDGE);
-  const ClusterTree& faces = scene.bodies()[face_body].tree(FeatureKind::FACE);
-  if (edges.featureCount() == 0 || faces.featureCount() == 0) return true;
-  if (beforeListing(deadline).isOver()) return false;
-  TreePair trees;
-  trees.a = &edges;
-  trees.b = &faces;
-  trees.span.times = Times::T0;
-  trees.adjacent = edge_body == face_body;
-  const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : tolerance::MAX_SUPERCLUSTER_PAIRS;
-  cut_ = superclusterPairs(trees, groups_, scratch_, room).toc <= 1 || cut_;
-  // By group of edges, so that all before the one that comes next are done.
+/// From next_unit_ on.
+void StartStateSearch::setUnits(std::size_t fans) {
+  fans_ = static_cast<std::uint32_t>(fans);
   by_group_.clear();
   for (std::size_t p = 0; p < groups_.size(); p += 2) {
-    if (groups_[p] >= next_group_) by_group_.push_back({groups_[p], groups_[p + 1]});
+    if (fans_ + groups_[p] >= next_unit_) by_group_.push_back({groups_[p], groups_[p + 1]});
   }
   std::sort(by_group_.begin(), by_group_.end());
-  stream_.clearCounters();
-  for (std::size_t first = 0, last = 0; first < by_group_.size(); first = last) {
-    next_group_ = by_group_[first][0];
-    if (first > 0 && beforeListing(deadline).isOver()) return false;
-    while (last < by_group_.size() && by_group_[last][0] == next_group_) ++last;
-    const std::uint64_t tested_before = tested_;
-    bool late = false;
-    stream_.run(trees, by_group_[first].data(), last - first, [&](const std::uint32_t* slots, std::size_t count) {
-      pairs_.clear();
-      for (std::size_t i = 0; i < count; ++i) pairs_.push_back({edge_body, slots[2 * i], face_body, slots[2 * i + 1]});
-      const std::size_t piece = has_deadline_ ? TESTS_PER_LOOK_AT_THE_CLOCK : count;
-      for (std::size_t i = 0; i < count && !late; i += piece) {
-        tested_ += addMeeting(scene, pairs_.data() + i, std::min(piece, count - i), 0, found_);
-        late = tested_ - tested_before >= TESTS_IN_ANY_CASE && beforeListing(deadline).isOver();
-      }
-      return !late && !hasEnough();
-    });
-    if (late || hasEnough()) return false;
+  unit_number_.clear();
+  unit_begin_.clear();
+  for (std::uint32_t fan = next_unit_; fan < fans_; ++fan) {
+    unit_number_.push_back(fan);
+    unit_begin_.push_back(0);
   }
-  return true;
+  for (std::size_t p = 0; p < by_group_.size(); ++p) {
+    if (p > 0 && by_group_[p][0] == by_group_[p - 1][0]) continue;
+    unit_number_.push_back(fans_ + by_group_[p][0]);
+    unit_begin_.push_back(p);
+  }
+  unit_begin_.push_back(by_group_.size());
 }
 
-/// Returns how many were tested: those that are checked.
-std::size_t StartStateSearch::addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
-                                         std::vector<EdgeFace>& found) {
-  constexpr std::size_t NEXT = simd::GROUP, CHUNK = 1024;  // vertex of a lane; pairs that stay in the first-level cache
-  const double* positions = at == 0 ? scene.vertices()->t0 : scene.vertices()->t1;
-  std::size_t tested = 0;
-  for (const EdgeFace *end = pairs + count, *first = pairs; first != end;) {
-    corners_.clear();
-    tested_pairs_.clear();
-    for (; first != end && corners_.size() < CHUNK; ++first) {
-      if (!isChecked(scene, *first)) continue;
-      const Index* e = scene.bodies()[first->edge_body].tree(FeatureKind::EDGE).lane<2>(first->edge);
-      const Index* f = scene.bodies()[first->face_body].tree(FeatureKind::FACE).lane<3>(first->face);
-      corners_.push_back({e[0], e[NEXT], f[0], f[NEXT], f[2 * NEXT]});
-      tested_pairs_.push_back(first);
-    }
-    meet_.resize(corners_.size());
-    if (!corners_.empty()) segmentsMeetTriangles(positions, corners_.data(), corners_.size(), meet_.data());
-    for (std::size_t i = 0; i < meet_.size(); ++i) {
-      if (meet_[i]) found.push_back(*tested_pairs_[i]);
-    }
-    tested += corners_.size();
+bool StartStateSearch::searchUnit(CrossingFinder& finder, const TreePair& trees, std::size_t unit,
+                                  std::vector<EdgeFace>& found) const {
+  const std::uint32_t a = next_bodies_[0], b = next_bodies_[1], number = unit_number_[unit];
+  if (number < fans_) {
+    const std::size_t first = number * FAN_UNIT, end = neighbourhoods_[a].closed.size();
+    return finder.searchFans(a, first, std::min(first + FAN_UNIT, end), found);
   }
-  return tested;
+  const std::uint32_t* groups = by_group_[unit_begin_[unit]].data();
+  const std::size_t count = unit_begin_[unit + 1] - unit_begin_[unit];
+  return by_faces_[a] && by_faces_[b] ? finder.searchFaces(a, b, trees, groups, count, found)
+                                      : finder.searchEdges(a, b, trees, groups, count, found);
+}
+
+/// Goes on at next_unit_, by one unit at the least; false: it was ended, and next_unit_ says where. A unit is some of a
+/// body's fans, or a group of the first one's features with all groups of the other's that it may meet.
+bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& deadline, std::size_t threads,
+                                    const Parallel& parallel) {
+  const std::uint32_t a = next_bodies_[0], b = next_bodies_[1];
+  const bool by_faces = by_faces_[a] && by_faces_[b];
+  TreePair trees;
+  trees.a = &scene.bodies()[a].tree(by_faces ? FeatureKind::FACE : FeatureKind::EDGE);
+  trees.b = &scene.bodies()[b].tree(FeatureKind::FACE);
+  trees.span.times = Times::T0;
+  trees.adjacent = a == b;
+  trees.self = by_faces && a == b;
+  if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
+  if (beforeListing(deadline).isOver()) return false;
+  learnNeighbourhoods(scene);
+  const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : tolerance::MAX_SUPERCLUSTER_PAIRS;
+  cut_ = superclusterPairs(trees, groups_, scratch_, room).toc <= 1 || cut_;
+  setUnits(trees.self ? (scene.bodies()[a].usedCount() + FAN_UNIT - 1) / FAN_UNIT : 0);
+  const bool limited = deadline.canEnd() || most_found_ != FoundLimit::NONE;
+  const std::size_t count = unit_number_.size(), block = !limited ? count : threads == 1 ? 1 : UNITS_A_THREAD * threads;
+  for (std::size_t first = 0; first < count; first += block) {
+    next_unit_ = unit_number_[first];
+    // The first group goes with the last fans: of a small body both are one unit.
+    if (first > 0 && next_unit_ != fans_ && beforeListing(deadline).isOver()) return false;
+    const std::size_t n = std::min(block, count - first);
+    if (unit_found_.size() < n) unit_found_.resize(n);
+    unit_whole_.assign(n, 0);
+    std::atomic<std::uint64_t> tested{0};
+    parallel(n, limited ? 1 : PIECE, [&](std::size_t from, std::size_t to) {
+      CrossingFinder& finder = finders_.local();
+      finder.begin({&scene, &neighbourhoods_, beforeListing(deadline), most_found_ - found_.size()});
+      for (std::size_t i = from; i < to; ++i) {
+        unit_found_[i].clear();
+        unit_whole_[i] = searchUnit(finder, trees, first + i, unit_found_[i]);
+      }
+      tested += finder.tested();
+    });
+    tested_ += tested;
+    for (std::size_t i = 0; i < n; ++i) {
+      found_.insert(found_.end(), unit_found_[i].begin(), unit_found_[i].end());
+      if (unit_whole_[i] && !hasEnough()) continue;
+      next_unit_ = unit_number_[first + i];
+      return false;
+    }
+  }
+  return true;
 }
 
 void StartStateSearch::remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete) {
   known_ = false;
   if (!complete || cut_) return;
-  const std::size_t limit =
-      edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_EDGE_WITH_DEADLINE : CANDIDATES_PER_EDGE);
+  const std::size_t limit = std::max(
+      FEW_CANDIDATES,
+      edgeCount(scene) * (has_deadline_ ? CANDIDATES_PER_100_EDGES_WITH_DEADLINE : CANDIDATES_PER_100_EDGES) / 100);
   for (const Contact& contact : contacts) {
     if (factsOf(contact.kind).isOnMap()) continue;
     touched_.push_back({contact.kind, contact.body[0], contact.body[1], contact.vertex});
@@ -310,23 +320,14 @@ void StartStateSearch::addFacesAtEdge(const SceneArrays& scene, std::uint32_t ed
 void StartStateSearch::learnNeighbourhoods(const SceneArrays& scene) {
   if (!neighbourhoods_.empty()) return;
   neighbourhoods_.resize(scene.bodies().size());
-  for (std::size_t b = 0; b < neighbourhoods_.size(); ++b) {
-    const SceneBody& body = scene.bodies()[b];
-    Neighbourhood& n = neighbourhoods_[b];
-    n.internal_of_local.assign(body.setup.topology->vertexCount(), NO_INDEX);
-    for (std::size_t i = 0; i < body.usedCount(); ++i) {
-      n.internal_of_local[body.slot_vertex[i]] = body.internal_begin + static_cast<Index>(i);
-    }
-    n.edges.build(body, FeatureKind::EDGE);
-    n.faces.build(body, FeatureKind::FACE);
-  }
+  for (std::size_t b = 0; b < neighbourhoods_.size(); ++b) neighbourhoods_[b].learn(scene.bodies()[b]);
 }
 
 void StartStateSearch::clear() {
   known_ = false;
   searched_ = false;
   next_bodies_ = {};
-  next_group_ = 0;
+  next_unit_ = 0;
   found_.clear();
   candidates_.clear();
   touched_.clear();

@@ -1,16 +1,19 @@
 // The start state of a step (doc/algorithm.md): do an edge and a face already meet at t=0?
 #pragma once
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <tuple>
+#include <functional>
 #include <vector>
 
-#include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
 #include "dccd/deadline.h"
 #include "step/pairs/found_limit.h"
+#include "step/start/crossing_finder.h"
+#include "step/start/neighbourhood.h"
 #include "step/start/segment_triangle.h"
 
 namespace dccd {
@@ -47,15 +50,28 @@ bool goOn(std::vector<std::array<std::uint32_t, 2>>& pairs, std::array<std::uint
 ///   and the pairs that met already at the step's start.
 /// The same holds for any part of the pairs. So a search that a deadline cuts goes on in the next step where it ended:
 /// what it was past is carried over, what it had not come to is looked at then.
+///
+/// The search. Where a body has faces, each of its edges has one that stands for it, and an edge that meets a face of
+/// another body, or one with which it shares no vertex, does so with the face that stands for it. So pairs of faces are
+/// looked for (half as many as of edges and faces), and of these the edges that may pass through (simd/face_filter.h).
+/// Within a body there are those besides of which the two faces share the vertex opposite the edge. None of them meet
+/// where the faces at that vertex are seen side by side along some axis. A body with faces that are left out, or with
+/// none, is searched by its edges.
 class StartStateSearch {
  public:
+  /// Calls f(first, last) over [0, n), in pieces of about a size, side by side or not.
+  using Parallel =
+      std::function<void(std::size_t n, std::size_t piece, const std::function<void(std::size_t, std::size_t)>& f)>;
+  static void oneByOne(std::size_t n, std::size_t, const std::function<void(std::size_t, std::size_t)>& f) { f(0, n); }
+
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
   /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
   /// effect START_STATE. Nothing more is tested once the deadline is over, but for what it takes to list what is
   /// found; isWhole() is false then. Of more than most_found the first ones to be found are listed; isCut() is true
-  /// then, and the next run() begins anew.
+  /// then, and the next run() begins anew. threads: that parallel has, more than one if it is worth while.
   const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const Deadline& deadline,
-                                            StepStats& stats, std::size_t most_found = FoundLimit::NONE);
+                                            StepStats& stats, std::size_t most_found = FoundLimit::NONE,
+                                            std::size_t threads = 1, const Parallel& parallel = oneByOne);
 
   /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
   bool isWhole() const { return whole_; }
@@ -81,25 +97,6 @@ class StartStateSearch {
   void forgetBodies() { neighbourhoods_.clear(); }
 
  private:
-  /// By slot in the bodies' trees, so that sorted candidates are also near each other in memory.
-  struct EdgeFace {
-    std::uint32_t edge_body, edge, face_body, face;
-    std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t> key() const {
-      return {edge_body, edge, face_body, face};
-    }
-    friend bool operator<(const EdgeFace& x, const EdgeFace& y) { return x.key() < y.key(); }
-    friend bool operator==(const EdgeFace& x, const EdgeFace& y) { return x.key() == y.key(); }
-  };
-  /// Slots of the features at each used vertex of a body: those of vertex i are slots[begin[i]] to slots[begin[i + 1]].
-  struct SlotsAtVertex {
-    std::vector<std::uint32_t> begin, slots;
-    void build(const SceneBody& body, FeatureKind kind);
-  };
-  struct Neighbourhood {
-    std::vector<Index> internal_of_local;
-    SlotsAtVertex edges, faces;
-  };
-
   /// The features of a contact: what crosses after it lies around them.
   struct Touched {
     PairKind kind;
@@ -113,13 +110,10 @@ class StartStateSearch {
   static bool inBlocks(std::vector<EdgeFace>& pairs, const std::vector<EdgeFace>& found, const Deadline& deadline,
                        const HasMore& hasMore, const Expand& expand, const Test& test);
   void testCandidates(const SceneArrays& scene, const Deadline& deadline);
-  void search(const SceneArrays& scene, const Deadline& deadline);
-  bool searchBodies(const SceneArrays& scene, const Deadline& deadline);
-  /// Appends those pairs to found that are checked and meet at one of the step's ends (0 or 1).
-  std::size_t addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
-                         std::vector<EdgeFace>& found);
-  /// What was checked in the step before need not be in this one.
-  static bool isChecked(const SceneArrays& scene, const EdgeFace& pair);
+  void search(const SceneArrays& scene, const Deadline& deadline, std::size_t threads, const Parallel& parallel);
+  bool searchBodies(const SceneArrays& scene, const Deadline& deadline, std::size_t threads, const Parallel& parallel);
+  void setUnits(std::size_t fans);
+  bool searchUnit(CrossingFinder& finder, const TreePair& trees, std::size_t unit, std::vector<EdgeFace>& found) const;
   void list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
   void addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
@@ -132,22 +126,24 @@ class StartStateSearch {
   std::size_t most_found_ = FoundLimit::NONE;
   bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
   bool searched_ = false;   // the search has come to its end
-  BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the groups of edges
-  std::uint32_t next_group_ = 0;
-  std::vector<Touched> touched_;      // of the last step; after run() those that the deadline left
-  std::vector<EdgeFace> candidates_;  // to be looked at; after run() those that the deadline left
+  BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the units,
+  std::uint32_t next_unit_ = 0;
+  std::vector<std::uint8_t> by_faces_;  // per body, by which it is searched
+  std::vector<Touched> touched_;        // of the last step; after run() those that the deadline left
+  std::vector<EdgeFace> candidates_;    // to be looked at; after run() those that the deadline left
   std::vector<EdgeFace> found_;
   std::vector<StartIntersection> intersections_;
   std::vector<std::uint32_t> groups_, scratch_, overlapping_;
   std::vector<BodyPair> body_pairs_;
   std::vector<std::array<std::uint32_t, 2>> by_group_;
-  ClusterPairStream stream_;
-  std::vector<EdgeFace> pairs_;
-  std::vector<const EdgeFace*> tested_pairs_;          // that are tested together,
-  std::vector<std::array<std::uint32_t, 5>> corners_;  // the vertices of each,
-  std::vector<std::uint8_t> meet_;                     // and whether it meets
-  std::vector<std::uint64_t> keys_, other_keys_;       // of what is listed
-  std::vector<Neighbourhood> neighbourhoods_;          // one a body; empty until a step has contacts
+  std::uint32_t fans_ = 0;                  // units of a body's fans, which come before those of groups
+  std::vector<std::size_t> unit_begin_;     // of its pairs of groups, in by_group_, and where the last one's end
+  std::vector<std::uint32_t> unit_number_;  // of those that are left
+  std::vector<std::vector<EdgeFace>> unit_found_;
+  std::vector<std::uint8_t> unit_whole_;
+  tbb::enumerable_thread_specific<CrossingFinder> finders_;
+  std::vector<std::uint64_t> keys_, other_keys_;  // of what is listed
+  std::vector<Neighbourhood> neighbourhoods_;     // one a body; empty until they are asked for
   std::uint64_t tested_ = 0;
 };
 

@@ -73,8 +73,9 @@ void forRandomGroups(const Test& test) {
       std::fill_n(margin, RECORD, static_cast<std::int16_t>(random() % 20));
       const std::int16_t* widened = round % 2 ? margin : nullptr;
       const bool self = round % 4 < 2;
-      const LeafGroups a(random, vertices, self || round % 8 == 3 ? 2 : 1, widened, records);
-      const LeafGroups b(random, vertices, self ? 2 : 3, widened, records);
+      const std::size_t own = round % 8 < 4 ? 2 : 3;
+      const LeafGroups a(random, vertices, self ? own : round % 8 == 3 ? 2 : 1, widened, records);
+      const LeafGroups b(random, vertices, self ? own : 3, widened, records);
       test(a, self ? a : b, self);
     }
   });
@@ -102,7 +103,7 @@ TEST(UnsharedPairs, AreThoseOfTheGeneralTestThatShareNoVertex) {
       dropped[a.arity + b.arity - 3] += n - m;
     }
   });
-  for (const std::size_t vertices : {4, 5}) {
+  for (const std::size_t vertices : {4, 5, 6}) {
     EXPECT_GT(kept[vertices - 3], 1000u) << vertices;
     EXPECT_GT(dropped[vertices - 3], 100u) << vertices;
   }

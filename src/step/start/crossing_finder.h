@@ -1,0 +1,86 @@
+// Which edges meet faces, of those near each other: the work of one thread in a search of the start state.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+#include "culling/cluster_pairs.h"
+#include "culling/scene_arrays.h"
+#include "dccd/deadline.h"
+#include "step/start/neighbourhood.h"
+
+namespace dccd {
+
+/// By slot in the bodies' trees, so that sorted pairs are also near each other in memory.
+struct EdgeFace {
+  std::uint32_t edge_body, edge, face_body, face;
+  std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t> key() const {
+    return {edge_body, edge, face_body, face};
+  }
+  friend bool operator<(const EdgeFace& x, const EdgeFace& y) { return x.key() < y.key(); }
+  friend bool operator==(const EdgeFace& x, const EdgeFace& y) { return x.key() == y.key(); }
+};
+
+/// Keeps its buffers. Each call looks at the clock from time to time, after so much work that a search comes to its end
+/// in the end, and returns false where the deadline ended it, or where it has found more than is wanted.
+class CrossingFinder {
+ public:
+  /// What is asked for in a search. begin() begins one.
+  struct Search {
+    const SceneArrays* scene = nullptr;
+    const std::vector<Neighbourhood>* neighbourhoods = nullptr;
+    Deadline deadline;
+    std::size_t most_found = 0;
+  };
+  void begin(const Search& search);
+
+  /// Appends those pairs to found that are checked and meet at one of the step's ends (0 or 1). Returns how many were
+  /// tested.
+  std::size_t addMeeting(const SceneArrays& scene, const EdgeFace* pairs, std::size_t count, int at,
+                         std::vector<EdgeFace>& found);
+
+  /// Edges against faces of pairs of groups of the trees of edges and of faces.
+  bool searchEdges(std::uint32_t edge_body, std::uint32_t face_body, const TreePair& trees,
+                   const std::uint32_t* group_pairs, std::size_t count, std::vector<EdgeFace>& found);
+  /// Edges of either body against faces of the other, or of one body: those of faces that share no vertex, of pairs of
+  /// groups of the trees of faces. An edge is looked at with the face that stands for it.
+  bool searchFaces(std::uint32_t a, std::uint32_t b, const TreePair& trees, const std::uint32_t* group_pairs,
+                   std::size_t count, std::vector<EdgeFace>& found);
+  /// What that leaves out within a body: edges of faces that share one vertex with the other face. first, last: of the
+  /// body's used vertices.
+  bool searchFans(std::uint32_t body, std::size_t first, std::size_t last, std::vector<EdgeFace>& found);
+
+  /// Pairs of an edge and a face that were looked at since begin().
+  std::uint64_t tested() const { return tested_; }
+
+ private:
+  bool goesOn(const std::vector<EdgeFace>& found);
+  void add(const EdgeFace& pair, const std::array<std::uint32_t, 5>& corners) {
+    pairs_.push_back(pair);
+    corners_.push_back(corners);
+  }
+  void add(const SceneArrays& scene, const EdgeFace& pair);
+  void test(const double* positions, std::size_t first, std::size_t last, std::vector<EdgeFace>& found);
+  bool flush(std::vector<EdgeFace>& found);
+  bool isOneTurn(std::uint32_t body, const Neighbourhood& around, std::size_t vertex);
+  void addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex);
+  std::uint16_t viewOf(std::uint32_t body, std::uint32_t face);
+
+  Search search_;
+  std::uint64_t tested_ = 0;
+  std::size_t work_ = 0;  // of a unit, in tests
+  ClusterPairStream stream_;
+  std::vector<EdgeFace> pairs_;                        // to be tested together,
+  std::vector<std::array<std::uint32_t, 5>> corners_;  // the vertices of each,
+  std::vector<std::uint8_t> meet_;                     // and whether it meets
+  std::vector<std::array<std::uint32_t, 6>> faces_;    // pairs of faces,
+  std::vector<std::uint8_t> edges_;                    // which of their edges may meet the other,
+  std::vector<std::uint32_t> crossing_;                // and those pairs with any
+  std::uint32_t viewed_body_ = 0;
+  std::vector<std::uint16_t> views_;  // of its faces,
+  std::vector<std::uint8_t> viewed_;  // of those groups that were looked at
+};
+
+}  // namespace dccd

@@ -1,0 +1,57 @@
+#include "step/start/neighbourhood.h"
+
+#include <algorithm>
+
+namespace dccd {
+
+void SlotsAtVertex::build(const SceneBody& body, FeatureKind kind) {
+  const ClusterTree& tree = body.tree(kind);
+  begin.assign(body.usedCount() + 1, 0);
+  slots.resize(tree.featureCount() * tree.arity());
+  for (std::size_t i = 0; i < slots.size(); ++i) ++begin[tree.feature(0)[i] - body.internal_begin];
+  std::uint32_t sum = 0;
+  for (std::uint32_t& n : begin) n = sum += n;  // ends, moved down to begins below
+  for (std::size_t i = slots.size(); i-- > 0;) {
+    slots[--begin[tree.feature(0)[i] - body.internal_begin]] = static_cast<std::uint32_t>(i / tree.arity());
+  }
+}
+
+void Neighbourhood::learn(const SceneBody& body) {
+  internal_of_local.assign(body.setup.topology->vertexCount(), NO_INDEX);
+  for (std::size_t i = 0; i < body.usedCount(); ++i) {
+    internal_of_local[body.slot_vertex[i]] = body.internal_begin + static_cast<Index>(i);
+  }
+  edges.build(body, FeatureKind::EDGE);
+  faces.build(body, FeatureKind::FACE);
+  const ClusterTree &edge_tree = body.tree(FeatureKind::EDGE), &face_tree = body.tree(FeatureKind::FACE);
+  corner.resize(faces.slots.size());
+  for (std::size_t v = 0; v < body.usedCount(); ++v) {
+    for (std::uint32_t i = faces.begin[v]; i < faces.begin[v + 1]; ++i) {
+      const Index *f = face_tree.feature(faces.slots[i]), at = body.internal_begin + static_cast<Index>(v);
+      corner[i] = static_cast<std::uint8_t>(f[0] == at ? 0 : f[1] == at ? 1 : 2);
+    }
+  }
+  own_edges.assign(face_tree.featureCount(), {NO_INDEX, NO_INDEX, NO_INDEX});
+  closed.assign(body.usedCount(), 1);
+  for (std::uint32_t slot = 0; slot < edge_tree.featureCount(); ++slot) {
+    const Index* e = edge_tree.feature(slot);
+    const Index at = e[0] - body.internal_begin;
+    std::size_t along = 0, against = 0;
+    std::uint32_t* own = nullptr;
+    Index own_rank = NO_INDEX;
+    for (std::uint32_t i = faces.begin[at]; i < faces.begin[at + 1]; ++i) {
+      const Index* f = face_tree.feature(faces.slots[i]);
+      if (!contains(f, e[1])) continue;
+      const std::size_t c = corner[i];
+      const bool is_along = f[(c + 1) % 3] == e[1];
+      const Index rank = body.rank(FeatureKind::FACE)[faces.slots[i]];
+      if (rank < own_rank) own = &own_edges[faces.slots[i]][is_along ? c : (c + 2) % 3];
+      own_rank = std::min(own_rank, rank);
+      ++(is_along ? along : against);
+    }
+    if (own) *own = slot;
+    if (along != 1 || against != 1) closed[at] = closed[e[1] - body.internal_begin] = 0;
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,37 @@
+// What lies around a vertex of a body: its edges and faces, by their slots in the body's trees.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "culling/scene_arrays.h"
+
+namespace dccd {
+
+/// Slots of the features at each used vertex of a body: those of vertex i are slots[begin[i]] to slots[begin[i + 1]].
+struct SlotsAtVertex {
+  std::vector<std::uint32_t> begin, slots;
+  void build(const SceneBody& body, FeatureKind kind);
+};
+
+struct Neighbourhood {
+  std::vector<Index> internal_of_local;
+  SlotsAtVertex edges, faces;
+  /// By slots of faces: the slot of the edge from each corner to the next, if this face stands for that edge, else
+  /// NO_INDEX. Of an edge's faces the one of the lowest rank stands for it.
+  std::vector<std::array<std::uint32_t, 3>> own_edges;
+  /// Of each of faces.slots, which of the face's corners the vertex is.
+  std::vector<std::uint8_t> corner;
+  /// Per used vertex: each edge at it is on two faces, which pass along it in opposite directions.
+  std::vector<std::uint8_t> closed;
+
+  void learn(const SceneBody& body);
+};
+
+inline bool contains(const Index* face, Index v) { return (face[0] == v) | (face[1] == v) | (face[2] == v); }
+inline bool shareVertex(const Index* edge, const Index* face) {
+  return contains(face, edge[0]) | contains(face, edge[1]);
+}
+
+}  // namespace dccd
