@@ -25,7 +25,7 @@ Sight sightOf(const double* point, const double* a, const double* b, const doubl
 /// the one with the smallest number: where it is only partly inside, one of its edges meets a face, which
 /// StartStateSearch lists. A body is not asked about itself. Pairs are those that meet() (body.h).
 ///
-/// A body whose corners are doubled is closed while these are at one place throughout the step (mesh/seams.h): it is
+/// A body whose corners are doubled is closed while these are at one place throughout the step (culling/seams.h): it is
 /// the same cycle then. When its seams come apart or close, all is asked anew.
 ///
 /// What is known at the start of one step is carried over to the next, so that only the first frame, frames after a
