@@ -278,6 +278,7 @@ TEST(Summary, PatchesThatLastAreThoseThatAreNeitherNewNorExpected) {
     outcome.patches[p].contacts = 1;
   }
   outcome.patches[2].is_new = true;
+  std::swap(outcome.patches[2].contacts, outcome.patches[2].crossings);
   outcome.patches[3].expected = 1;
   EXPECT_EQ(toFirstContact(outcome, std::vector<Body>(1), "world").lasting_patches, 1u);
 }
