@@ -224,12 +224,15 @@ Defaults inForceOfTheNode() {
           {"markers/max_contacts", plain(config.markers.max_contacts)},
           {"markers/mesh", plain(config.markers.mesh)},
           {"markers/obstacle_m", plain(config.markers.obstacle_m)},
+          {"markers/swept", plain(config.markers.swept)},
           {"robot/timeout_s", plain(robot.timeout_s)},
           {"robot/padding_m", plain(robot.padding_m)},
           {"robot/own_voxels_m", robot.own_voxels_m == ONE_VOXEL ? "auto" : plain(robot.own_voxels_m)},
           {"robot/scale", plain(robot.scale)},
           {"robot/against_links", plain(robot.against_links)},
           {"robot/against_map", plain(robot.against_map)},
+          {"robot/visuals", plain(robot.visuals)},
+          {"robot/holds", robot.holds.empty() ? "{}" : "set"},
           {"default_topic", config.bodies.at(0).topic}};
 }
 
