@@ -107,7 +107,7 @@ target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} $
 # scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.
 find_package(fcl QUIET)
 if(fcl_FOUND)
-  #catkin_lint: ignore_once uninstalled_target
+  #catkin_lint: ignore uninstalled_target
   add_executable(robot_benchmark EXCLUDE_FROM_ALL benchmark/robot_benchmark.cpp benchmark/support/timing.cpp)
   target_include_directories(robot_benchmark PRIVATE benchmark test)
   target_include_directories(robot_benchmark SYSTEM PRIVATE

@@ -40,7 +40,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
         steps = [array for array in by_topic[OWN + 'markers'] if array.markers[:1] and array.markers[0].action == Marker.DELETEALL]
         self.assertEqual(len(steps), frames)
         drawn = {marker.ns: marker for marker in steps[both[-1]].markers[1:]}
-        self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels', 'legend', 'began'}, set(drawn))
+        self.assertLessEqual({'mesh/mesh', 'obstacle', 'contacts', 'initial', 'normals', 'voxels', 'began'}, set(drawn))
         patches = by_topic[OWN + 'patches'][both[-1]].patches
         self.assertEqual(len(drawn['normals'].points), 2 * len(patches), 'one of each patch')
         self.assertEqual(len(drawn['voxels'].points) % 24, 0, 'the twelve edges of each, which hide nothing')
@@ -65,9 +65,11 @@ class ResultsBagTest(AnalyzeBagTestCase):
         self.tool('make_scene_bag', CHECKOUT / 'config/scenes/rope_through_ring.yaml', rope, '--monitor-config', params, '--quiet')
         params.write_text(params.read_text() + '\nmarkers: {mesh: true}\nexpected_contacts:\n  - {between: [rope, octomap]}\n')
         self.analyze('rope', rope, '--params', params, '-o', out)
-        drawn = [{m.ns: m for m in message.markers} for topic, message, _ in messages_of(out) if topic == OWN + 'markers']
-        meshes = [markers['mesh/rope'] for markers in drawn if 'mesh/rope' in markers]
+        lists = [message.markers for topic, message, _ in messages_of(out) if topic == OWN + 'markers']
+        drawn = [{m.ns: m for m in markers} for markers in lists]
+        meshes = [m for markers in lists for m in markers if m.ns == 'mesh/rope' and m.id == 0]
         self.assertEqual({m.type for m in meshes}, {Marker.TRIANGLE_LIST})
+        self.assertEqual({m.text for markers in lists for m in markers if m.ns == 'mesh/rope' and m.id == 1}, {'rope'})
         self.assertEqual({len(m.points) % 36 for m in meshes}, {0}, 'six sides of two triangles an edge')
         self.assertTrue(any('expected' in markers for markers in drawn))
         self.assertFalse(any('contacts' in markers or 'initial' in markers for markers in drawn))
