@@ -137,7 +137,7 @@ class AttachReader {
     }
   }
 
-  MeshResource meshOf(const shape_msgs::Mesh& message) const {
+  MeshResource meshOf(const Request::_triangles_type& message) const {
     MeshResource mesh;
     for (const auto& p : message.vertices) mesh.positions.emplace_back(p.x, p.y, p.z);
     std::vector<Face> faces;

@@ -296,7 +296,7 @@ class ArgumentsTest(unittest.TestCase):
             with self.subTest(path.name):
                 self.assertLessEqual(differing, own)
                 self.assertEqual(given.get('octomap'),
-                                 '/octomap_binary' if path.name == 'octomap_server.launch' else '')
+                                 '/octomap_binary' if path.name == 'octomap_server.launch' else '-')
 
 
 if __name__ == '__main__':
