@@ -191,7 +191,8 @@ function map(parent, b, values, ramp, gradient, caption, low, high, below) {
 R.bodies.forEach(b => {
   const box = document.getElementById('heat'), most = Math.max(0, ...b.count), times = b.first.filter(t => t !== null);
   box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.flat.length} vertices, ` +
-    `${b.count.filter(c => c).length} of them in contact at some time`;
+    (most ? `${b.count.filter(c => c).length} of them in contact at some time` : 'never in contact');
+  if (!most) return;
   const row = box.appendChild(document.createElement('div')), sides = turnsOver(b) ? [false, true] : [undefined]; row.className = 'maps';
   sides.forEach(below => map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), many, FEW_TO_MANY, 'contacts of a vertex (logarithmic)', '1', String(most), below));
   if (!times.length) return;
