@@ -1,4 +1,4 @@
-// Objects that the robot takes into its hand and lets go of: bodies that come and go while the monitor runs.
+// What the robot's hand holds: bodies whose contacts with it are expected, and objects that come and go as bodies.
 #include <algorithm>
 #include <utility>
 
@@ -94,6 +94,29 @@ void MonitorPipeline::remove(const std::string& name) {
   Rigid none;
   none.mesh.topology = NOTHING;
   setBody(config_.bodies.size() + number, nobody(), std::move(none));
+}
+
+void MonitorPipeline::setHold(const std::string& body, const std::string& by, bool closed) {
+  const std::vector<Hold> before = config_.holds;
+  std::string known;
+  bool any = false;
+  for (Hold& hold : config_.holds) {
+    known += (known.empty() ? "'" : ", '") + hold.body + "' by '" + hold.by + "'";
+    if ((!body.empty() && hold.body != body) || (!by.empty() && hold.by != by)) continue;
+    hold.closed = closed;
+    any = true;
+  }
+  if (!any) {
+    const std::string asked = "'" + body + "'" + (by.empty() ? "" : " by '" + by + "'");
+    throw ParameterError(known.empty() ? "nothing is held; name what holds a body in robot/holds"
+                                       : asked + " is not in robot/holds, which has " + known);
+  }
+  try {
+    expectNow(config_.phase);
+  } catch (...) {
+    config_.holds = before;
+    throw;
+  }
 }
 
 /// What is expected in the phase, of what hands hold, and of what is attached; and what of that is not looked at.

@@ -178,29 +178,6 @@ void MonitorPipeline::setPhase(const std::string& phase) {
   config_.phase = phase;
 }
 
-void MonitorPipeline::setHold(const std::string& body, const std::string& by, bool closed) {
-  const std::vector<Hold> before = config_.holds;
-  std::string known;
-  bool any = false;
-  for (Hold& hold : config_.holds) {
-    known += (known.empty() ? "'" : ", '") + hold.body + "' by '" + hold.by + "'";
-    if ((!body.empty() && hold.body != body) || (!by.empty() && hold.by != by)) continue;
-    hold.closed = closed;
-    any = true;
-  }
-  if (!any) {
-    const std::string asked = "'" + body + "'" + (by.empty() ? "" : " by '" + by + "'");
-    throw ParameterError(known.empty() ? "nothing is held; name what holds a body in robot/holds"
-                                       : asked + " is not in robot/holds, which has " + known);
-  }
-  try {
-    expectNow(config_.phase);
-  } catch (...) {
-    config_.holds = before;
-    throw;
-  }
-}
-
 std::string MonitorPipeline::phaseInWords() const {
   std::string text = config_.phase.empty() ? "no phase" : "phase '" + config_.phase + "'";
   const std::vector<std::string> expected = describe(config_.monitor.detector.expected, monitor_->bodies());

@@ -5,6 +5,7 @@
 #include <atomic>
 
 #include "ros/support/live_tests.h"
+#include "ros/support/missing.h"
 #include "ros/support/monitor_fixture.h"
 #include "ros/support/rate.h"
 
@@ -29,17 +30,7 @@ struct Seeing : MonitorTest {
   bool becomesProved() {
     return waitUntil([&] { return state.count() > 0 && state.last().proved && state.last().clear; }, 15);
   }
-  bool misses(const std::string& words) {
-    return waitUntil(
-        [&] {
-          const deformable_ccd::State last = state.last();
-          for (const std::string& missing : last.missing) {
-            if (missing.find(words) != std::string::npos) return !last.proved && !clear.last().data;
-          }
-          return false;
-        },
-        15);
-  }
+  bool misses(const std::string& words) { return becomesMissing(state, clear, words); }
 };
 
 TEST_F(Seeing, SaysWhatOfTheCameraIsMissing) {

@@ -15,6 +15,7 @@
 
 #include "dccd/cloud_map.h"
 #include "ros/support/live_tests.h"
+#include "ros/support/missing.h"
 #include "ros/support/monitor_fixture.h"
 #include "ros/support/rate.h"
 
@@ -111,17 +112,7 @@ struct Served : MonitorTest {
         },
         15);
   }
-  bool misses(const std::string& words) {
-    return waitUntil(
-        [&] {
-          const deformable_ccd::State last = state.last();
-          for (const std::string& missing : last.missing) {
-            if (missing.find(words) != std::string::npos) return !last.proved && !clear.last().data;
-          }
-          return false;
-        },
-        15);
-  }
+  bool misses(const std::string& words) { return becomesMissing(state, clear, words); }
 };
 
 TEST_F(Served, SaysWhatOfTheServersMapIsMissing) {
