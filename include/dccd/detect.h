@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dccd/assurance.h"
+#include "dccd/clearance.h"
 #include "dccd/deadline.h"
 #include "dccd/elementary.h"
 #include "dccd/expectation.h"
@@ -50,6 +51,7 @@ struct Options {
   bool obstacle_expected = false;     ///< without a map the status is NO_MAP
   std::vector<Expectation> expected;  ///< in force for this step; not with earliest_only, which may find nothing else
   bool patches = false;               ///< say which contacts belong together: Outcome::patches
+  ClearanceOptions clearance;         ///< how far apart things are: Outcome::clearances
   /// What was left out by choice before the step was made, a sentence each: goes into Outcome::excluded, changes no
   /// answer.
   std::vector<std::string> excluded;

@@ -34,6 +34,7 @@ struct EffectScene {
   bool predictions_heard = false;               ///< somebody subscribes to them
   std::size_t left_out_pairs = 0;               ///< closer than the minimum separation in the reference frame
   double look_ahead_s = 0;
+  bool clearance_wanted = false;      ///< by a parameter, or a subscriber to distances
   bool unknown_space_counts = false;  ///< unknown_space is not `free`
   bool earliest_only = false;         ///< later contacts than the first are not looked for
 };

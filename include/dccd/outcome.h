@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "dccd/clearance.h"
 #include "dccd/contact.h"
 #include "dccd/elementary.h"
 #include "dccd/export.h"
@@ -57,7 +58,8 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
 /// - tracker_noise: pairs whose vertices bring an uncertainty radius;
 /// - look_ahead: of the last prediction, pairs past the filters, and contacts;
 /// - patches: contacts and edges through faces at the start, and patches;
-/// - own_voxels: voxels of the map near to bodies that were asked for, and those that are own or in doubt.
+/// - own_voxels: voxels of the map near to bodies that were asked for, and those that are own or in doubt;
+/// - clearance: pairs of partners that were asked for, and those whose distance was measured.
 #define DCCD_EFFECTS(ROW)                     \
   ROW(SELF_COLLISION, self_collision)         \
   ROW(BODY_BODY, body_body)                   \
@@ -69,7 +71,8 @@ enum class Stage : std::uint8_t { RECORD, BOUNDS, BROAD_PHASE, PLANAR, ELEMENTAR
   ROW(TRACKER_NOISE, tracker_noise)           \
   ROW(LOOK_AHEAD, look_ahead)                 \
   ROW(PATCHES, patches)                       \
-  ROW(OWN_VOXELS, own_voxels)
+  ROW(OWN_VOXELS, own_voxels)                 \
+  ROW(CLEARANCE, clearance)
 #define DCCD_EFFECT_ENUMERATOR(EFFECT, name) EFFECT,
 enum class Effect : std::uint8_t { DCCD_EFFECTS(DCCD_EFFECT_ENUMERATOR) COUNT };
 #undef DCCD_EFFECT_ENUMERATOR
@@ -98,6 +101,8 @@ struct StepStats {
   std::uint64_t undecided = 0, initial = 0, leaving = 0;
   std::uint64_t unchecked_vertices = 0, unchecked_faces = 0;
   std::uint64_t unfolded_bodies = 0;  ///< whose self-collision was left out: no fold, contour apart from itself
+  std::uint64_t unfolded_parts = 0;   ///< parts of surfaces that certainly do not fold within themselves
+  std::uint64_t unfolded_pairs = 0;   ///< pairs of clusters that were not looked at for that
   std::uint64_t bodies_refitted = 0, bodies_kept = 0;  ///< bounds computed; still those of the step before
   std::uint64_t body_pairs = 0;                        ///< pairs of different bodies whose swept bounds overlap
   std::uint64_t bodies_far = 0;        ///< near nothing that they are tested against; no bounds are computed
@@ -123,6 +128,8 @@ struct StepStats {
   COUNTER(unchecked_vertices, true) \
   COUNTER(unchecked_faces, true)    \
   COUNTER(unfolded_bodies, false)   \
+  COUNTER(unfolded_parts, false)    \
+  COUNTER(unfolded_pairs, false)    \
   COUNTER(bodies_refitted, false)   \
   COUNTER(bodies_kept, false)       \
   COUNTER(body_pairs, false)        \
@@ -216,6 +223,7 @@ struct Outcome : Findings {
   std::vector<std::uint32_t> patch_of;   ///< per listed contact its patch; empty without Options::patches
   bool tracked = false;                  ///< patches have identities: it is of a stream, or a prediction of one
   std::vector<PatchEvent> patch_events;  ///< in a stream, in order; also of an outcome without a result, at a seam
+  std::vector<Clearance> clearances;     ///< with Options::clearance, in the order of distance()
   std::size_t suppressed = 0;            ///< initial contacts left out by choice
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out

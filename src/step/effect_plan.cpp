@@ -214,10 +214,14 @@ Finding ownVoxels(const EffectScene& scene) {
   return wanted("what the map first shows where a body is, is no obstacle: " + bodies);
 }
 
+Finding clearance(const EffectScene& scene) {
+  return scene.clearance_wanted ? wanted("distances are asked for") : idle("nobody asks for distances");
+}
+
 /// By Effect: what a scene says of it.
 constexpr Finding (*FIND[])(const EffectScene&) = {
     selfCollision,     bodyBody,     octomap,   startState, rigidBodies, unknownSpace,
-    minimumSeparation, trackerNoise, lookAhead, patches,    ownVoxels,
+    minimumSeparation, trackerNoise, lookAhead, patches,    ownVoxels,   clearance,
 };
 static_assert(std::size(FIND) == static_cast<std::size_t>(Effect::COUNT), "one for each effect");
 

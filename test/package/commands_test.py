@@ -94,7 +94,7 @@ def excuse(command):
 
 def synopsis(command):
     """Whether it shows what can be given instead of being something to type."""
-    return bool(re.search(r'\[--?\w|\bDIR\b|…|\b(IN|OUT|SCENE|FRAME_0)\b', command))
+    return bool(re.search(r'\[--?\w|\bDIR\b|…|\b(IN|OUT|SCENE|FRAME_0|FRAMES)\b', command))
 
 
 class CommandsTest(unittest.TestCase):

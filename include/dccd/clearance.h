@@ -1,0 +1,64 @@
+// How far apart the partners of a step are: bodies and the map, two bodies, a body and itself. The effect `clearance`.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "dccd/contact.h"
+#include "dccd/export.h"
+#include "dccd/types.h"
+
+namespace dccd {
+
+struct ClearanceOptions {
+  bool wanted = false;        ///< nothing is asked, and nothing costs time, while this is false
+  double tolerance_m = 1e-4;  ///< upper_m - lower_m is at most this, or 1e-9 of the distance [m]; above 0
+  double max_m = 0.5;         ///< what is farther apart is FARTHER, and no minimum is looked for [m]; above 0
+  /// A body against itself: features that are closer than this along the surface of its reference frame are
+  /// neighbours, and are not asked for [m]; above 0.
+  double self_m = 0.1;
+};
+
+enum class ClearanceStatus : std::uint8_t {
+  MEASURED = 0,  ///< the interval is as narrow as was asked for
+  FARTHER = 1,   ///< than max_m: lower_m is max_m or more, upper_m is infinite
+  TOUCHING = 2,  ///< both bounds are 0; exactly where the step has a contact of the two, or they cross at its start
+  LOWER = 3,     ///< the budget ran out: lower_m holds, upper_m is what was found until then or infinite
+  UNKNOWN = 4,   ///< nothing is known: something of the two is unchecked or undecided, or the map is missing
+};
+DCCD_EXPORT const char* toString(ClearanceStatus status);
+
+/// The distance of two partners [m], unsigned: what is inside of a closed body has a distance from its surface.
+/// lower_m <= truth <= upper_m for every finite input.
+struct ClearanceDistance {
+  ClearanceStatus status = ClearanceStatus::UNKNOWN;
+  double lower_m = 0;
+  double upper_m = std::numeric_limits<double>::infinity();
+  double t = 1;  ///< [0, 1] of the step: where upper_m was taken
+  /// Where upper_m was taken: a point of either [m], fixed frame; not finite without one.
+  std::array<Vec3, 2> point{Vec3::Constant(std::numeric_limits<double>::quiet_NaN()),
+                            Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+  /// The features that the points are on: one vertex, two of an edge, three of a face; the rest NO_INDEX, as is all
+  /// of the map's.
+  std::array<std::array<Index, 3>, 2> vertex{{{NO_INDEX, NO_INDEX, NO_INDEX}, {NO_INDEX, NO_INDEX, NO_INDEX}}};
+  VoxelKey voxel;                ///< with the map: the occupied leaf of point[1] (its smallest key)
+  std::uint32_t voxel_size = 0;  ///< edge length of that leaf in finest voxels; 0: none
+};
+
+/// Of a pair of partners that the step looks at, whether or not they are expected to touch.
+struct Clearance {
+  std::array<std::uint16_t, 2> body{0, 0};  ///< the smaller first; the same twice: itself; OBSTACLE_BODY: the map
+  bool expected = false;                    ///< Options::expected says so of every contact of the two
+  ClearanceDistance at_end;                 ///< at the step's end
+  ClearanceDistance over_step;              ///< the smallest over the whole step
+};
+
+struct Options;
+struct Step;
+/// The distances of one step, whatever Options::clearance.wanted says, without its contacts; see detect() for what is
+/// thrown. Pairs of partners by body[0], then body[1].
+DCCD_EXPORT std::vector<Clearance> distance(const Step& step, const Options& options);
+
+}  // namespace dccd
