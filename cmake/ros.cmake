@@ -20,8 +20,7 @@ if(ROS_SOURCES)
   target_include_directories(deformable_ccd_ros PUBLIC include PRIVATE src)
   target_include_directories(deformable_ccd_ros SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OCTOMAP_INCLUDE_DIRS}
     ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
-  # The headers that nearly every file of this library reads, compiled once.
-  target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> <map> <string> <vector>)
+  target_precompile_headers(deformable_ccd_ros PRIVATE <ros/ros.h> ${COMMON_HEADERS})
   target_link_libraries(deformable_ccd_ros PUBLIC ${ROS_LINK_LIBRARIES} TBB::tbb PRIVATE deformable_ccd_report)
   # PCL's headers are the slowest to read: only for the files that use them. The compiler's own folders must not come
   # with them, since their order matters to it.

@@ -40,14 +40,16 @@ if(rapidcheck_FOUND)
 endif()
 
 # Adds the gtest binary NAME from the given files, linked with LIBRARIES: the core's archive, or a library on the core.
+# HEADERS are those that most of its files read.
 function(add_gtest_suite name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES;HEADERS" ${ARGN})
   if(NOT arg_SOURCES)
     return()
   endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE deformable_ccd_test_support ${arg_LIBRARIES} GTest::gtest_main)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/gtest)
+  target_precompile_headers(${name} PRIVATE ${arg_HEADERS} <gtest/gtest.h> ${COMMON_HEADERS})
   file(APPEND ${CMAKE_CURRENT_BINARY_DIR}/gtest_suites.txt "${name}\n")
   add_test(NAME ${name} COMMAND ${name})
   if(NOT DEFORMABLE_CCD_CORE_ONLY)
@@ -87,7 +89,7 @@ endforeach()
 file(GLOB PAPER_TESTS CONFIGURE_DEPENDS paper/test/*.cpp)
 add_gtest_suite(paper_tests SOURCES ${PAPER_TESTS} LIBRARIES deformable_ccd_paper deformable_ccd_archive)
 if(TARGET deformable_ccd_report)
-  add_gtest_suite(report_tests SOURCES ${report_SOURCES} LIBRARIES deformable_ccd_report deformable_ccd)
+  add_gtest_suite(report_tests HEADERS <nlohmann/json.hpp> SOURCES ${report_SOURCES} LIBRARIES deformable_ccd_report deformable_ccd)
 endif()
 
 if(DEFORMABLE_CCD_CORE_ONLY)
@@ -101,7 +103,7 @@ set_source_files_properties(test/unit/ros/mesh_file_differential_test.cpp PROPER
 # Another one holds a robot's links beside KDL.
 find_library(KDL_PARSER_LIBRARY kdl_parser REQUIRED)
 find_library(KDL_LIBRARY orocos-kdl REQUIRED)
-add_gtest_suite(ros_tests SOURCES ${ros_SOURCES}
+add_gtest_suite(ros_tests HEADERS <ros/ros.h> SOURCES ${ros_SOURCES}
   LIBRARIES deformable_ccd_ros ${ASSIMP_LIBRARY} ${PCL_IO_PLY_LIBRARY} ${KDL_PARSER_LIBRARY} ${KDL_LIBRARY})
 target_include_directories(ros_tests SYSTEM PRIVATE ${URDF_PARSER_INCLUDE_DIR} ${URDF_MODEL_INCLUDE_DIR})
 # scripts/benchmark robot: it needs the node's rooms, which the benchmarks' own tree has not. With FCL beside them.

@@ -38,6 +38,7 @@ if(nlohmann_json_FOUND)
   #catkin_lint: ignore_once missing_directory
   target_include_directories(deformable_ccd_report PUBLIC src PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/report)
   target_link_libraries(deformable_ccd_report PUBLIC deformable_ccd_headers nlohmann_json::nlohmann_json)
+  target_precompile_headers(deformable_ccd_report PRIVATE <nlohmann/json.hpp> ${COMMON_HEADERS})
 endif()
 
 set(CORE_TOOLS replay_step)

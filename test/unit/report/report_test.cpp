@@ -87,6 +87,31 @@ TEST(Headline, ExpectedContactsAreToldApart) {
             "No unexpected contact in 2 answered steps; expected contacts in 1 of them; all of it proved.");
 }
 
+TEST(Headline, ContactsAreCountedInStepsWithAnUnexpectedOne) {
+  auto step = std::make_shared<Step>();
+  step->bodies.resize(1);
+  step->bodies[0].name = "cloth";
+  step->bodies[0].topology = share(Topology::grid(2, 2));
+  step->bodies[0].t0 = step->bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  Outcome touching = nothingFound(StepStatus::OK, StartState::CLEAR);
+  touching.step = step;
+  touching.contacts.resize(1);
+  touching.contacts[0].vertex = {0, 1, 2, 3};
+  touching.total_contacts = touching.counts.certain = 1;
+  touching.touching = Touching::NEW;
+  Outcome expected = touching;
+  expected.contacts[0].expected = true;
+  expected.counts.expected = 1;
+  expected.touching = Touching::EXPECTED;
+  const std::string folder = ::testing::TempDir() + "report_of_contacts";
+  Report report(folder);
+  for (const Outcome& outcome : {touching, expected, touching}) report.add(outcome, step->bodies);
+  const std::string headline = report.headline();
+  std::filesystem::remove_all(folder);
+  EXPECT_NE(headline.find("; contacts in 2 of 3 answered steps; expected contacts in 1 of them"), std::string::npos)
+      << headline;
+}
+
 /// The cells of the first row by the names of their columns.
 std::map<std::string, std::string> firstRowOf(const std::string& csv) {
   std::ifstream file(csv);
