@@ -76,6 +76,22 @@ void MasterWatch::lookAtParameters() {
   if (changed != std::exchange(told_changed_, changed)) changed_(changed);
 }
 
+bool MasterWatch::isStopping() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return stopping_;
+}
+
+/// A publisher that was killed stays connected, as it were, and registered.
+void MasterWatch::findDead(AwaitedTopic& topic) {
+  if (topic.publishers == 0 || isStopping()) return;
+  std::string dead;
+  for (const std::string& name : registeredPublishers(topic.name, TIMEOUT_S).value_or(std::vector<std::string>())) {
+    if (isStopping() || answers(name, TIMEOUT_S)) return;
+    dead += (dead.empty() ? "" : ", ") + name;
+  }
+  topic.dead = dead;
+}
+
 void MasterWatch::look() {
   if (map_ && map_.getNumPublishers() > 0) map_published_();
   std::vector<MeshSubscription*> wanting;
@@ -94,6 +110,7 @@ void MasterWatch::look() {
     for (MeshSubscription* mesh : wanting) mesh->renew(*published);
   }
   if (!question) return;
+  for (AwaitedTopic& topic : question->silent) findDead(topic);
   const auto topics = published.value_or(std::map<std::string, std::string>());
   std::string hint = silenceHint(question->silent, topics);
   const std::string maps = question->map_topic.empty() ? "" : unheardMapsHint(question->map_topic, topics);
