@@ -85,7 +85,7 @@ def analyse(tools, bag, monitor, folder, name, shows_own=False):
     params, results, report = (os.path.join(folder, name + ending) for ending in (".yaml", "_results.bag", "_report"))
     with open(params, "w") as stream:
         yaml.safe_dump(monitor, stream)
-    run_tool(tools, "analyze_bag", bag, "--params", params, "--output", results, "--report", report, "--no-accuracy-table", "--quiet")
+    run_tool(tools, "analyze_bag", bag, "--params", params, "--output", results, "--report", report, "--quiet")
     with open(os.path.join(report, "steps.csv"), newline="") as stream:
         clear = {int(row["stamp_ns"]): row["clear"] == "1" for row in csv.DictReader(stream) if row["answered"] == "1"}
     steps, alarms, own = [], set(), []

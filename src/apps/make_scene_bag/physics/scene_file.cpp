@@ -311,6 +311,8 @@ void checkMonitor(ParameterReader& scene, const SceneSpec& spec) {
 SceneSpec readScene(const ParameterTree& tree) {
   ParameterReader map(tree, "");
   SceneSpec spec;
+  if (!map.has("bodies"))
+    map.fail("bodies", "is needed: what moves in this scene; without it there is a map alone, OUT.bt");
   spec.name = map.text("name");
   spec.description = map.text("description");
   spec.fixed_frame = map.text("fixed_frame", "world");
