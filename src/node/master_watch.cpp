@@ -1,5 +1,6 @@
 #include "node/master_watch.h"
 
+#include <algorithm>
 #include <chrono>
 #include <new>
 #include <utility>
@@ -108,9 +109,10 @@ void MasterWatch::look() {
   // Without an answer nothing is renewed: roscpp's call would hang with the master.
   if (published) {
     for (MeshSubscription* mesh : wanting) mesh->renew(*published);
+    if (question)
+      std::for_each(question->silent.begin(), question->silent.end(), [this](auto& topic) { findDead(topic); });
   }
   if (!question) return;
-  for (AwaitedTopic& topic : question->silent) findDead(topic);
   const auto topics = published.value_or(std::map<std::string, std::string>());
   std::string hint = silenceHint(question->silent, topics);
   const std::string maps = question->map_topic.empty() ? "" : unheardMapsHint(question->map_topic, topics);
