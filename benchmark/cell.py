@@ -46,7 +46,7 @@ COLUMNS = ("scene", "noise mm", "lag s", "maps/s", "own", "clear", "of true", "a
 MEANING = """The columns are of contacts with the map:
 - *clear, of true*: share of the steps that are clear with the true map; how many those are.
 - *alarms true, false*: alarms that match one of the truth; the others. *False before* are those before the first true one. Two alarms match if they
-  are of one body, within two voxels of each other, and their times overlap within a voxel's travel, at most 0.5 s.
+  are of one body, within two voxels of each other, and their times overlap within a voxel's travel: its edge by the speed at which the two close, at most 0.5 s.
 - *missed*: alarms of the truth that no alarm of the run matches.
 - *in time*: share of the truth's alarms whose place the run first touches within a voxel's travel of the true time.
 - *first*: how late the first contact is, in time and as the way closed in that time.
