@@ -161,16 +161,18 @@ def short_names(settings):
     return "; ".join((rung + " " + ", ".join(more)).strip() for rung, more in rungs.items())
 
 
-def label(axes, rows):
-    """A name beside each mark, one for those that are nearer to each other than a name is high."""
+def label(axes, rows, line):
+    """A name beside each mark, below the front's line where that goes on beside it; one name for marks that are nearer to each other
+    than a name is high."""
     groups = []
     for r in sorted(rows, key=lambda r: r["median_ms"]):
         near = [g for g in groups if abs(math.log10(g[0]["toc_error"] / r["toc_error"])) < 0.8
                 and r["median_ms"] < 1.25 * g[0]["median_ms"]]
         near[0].append(r) if near else groups.append([r])
     for group in groups:
+        goes_on = any(a is group[0] and b["median_ms"] > 1.25 * a["median_ms"] for a, b in zip(line, line[1:]))
         axes.annotate(short_names(r["setting"] for r in rows if r in group), (max(r["median_ms"] for r in group), group[0]["toc_error"]),
-                      xytext=(10, -3), textcoords="offset points", fontsize=7)
+                      xytext=(10, -11 if goes_on else -3), textcoords="offset points", fontsize=7)
 
 
 def plot_errors(axes, scene, steps, others, colour):
@@ -185,7 +187,7 @@ def plot_errors(axes, scene, steps, others, colour):
             axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="x", markersize=13, markeredgewidth=1.5)
         if r["false"]:
             axes.plot(r["median_ms"], r["toc_error"], color="firebrick", marker="o", markersize=15, fillstyle="none")
-    label(axes, mine + rivals)
+    label(axes, mine + rivals, line)
     times = [r["median_ms"] for r in mine + rivals]
     axes.set(yscale="log", xscale="log", xlim=(0.85 * min(times), 2.2 * max(times)), title=scene, xlabel="whole step, one thread, median [ms]")
 
@@ -256,7 +258,7 @@ def plot(steps, rivals, pairs, folder):
     plot_wrong(lower, steps, rivals)
     plot_hard(hard, pairs)
     for axes in (*upper, lower, hard):
-        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1, 2, 5)))
+        axes.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 1.5, 2, 3, 5, 6, 8) if axes in upper else (1, 5) if axes is hard else (1, 2, 5)))
         axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: "%g" % value))
         axes.grid(True, linewidth=0.3)

@@ -43,12 +43,14 @@ LONGEST_TRAVEL_S = 0.5  # what barely moves may be as late as this
 GAP_S = 0.25            # what comes back within this had not gone: patch_gap_s
 COLUMNS = ("scene", "noise mm", "lag s", "maps/s", "own", "clear", "of true", "alarms true", "false", "false before", "missed",
            "in time", "first ms", "voxels", "blind %")
-MEANING = """Of contacts with the map. *clear, of true*: share of the steps that are clear with the true map, and how many those are.
-*alarms true, false*: alarms of the run that touch where and when the truth does, and the others. *false before*: of these, those before
-the first true one. *missed*: alarms of the truth that no alarm of the run matches. *in time*: share of them whose place is touched first
-within a voxel's travel of the time at which the truth touches it first. *first*: by how much the first contact is late, in time and as the way closed in that time.
-*blind*: share of the voxels shown as own or in doubt that the true map has. Two match if they are of one body, within two voxels of each
-other, and their times overlap within a voxel's travel: a voxel's length by the speed at which the two close, at most 0.5 s.
+MEANING = """The columns are of contacts with the map:
+- *clear, of true*: share of the steps that are clear with the true map; how many those are.
+- *alarms true, false*: alarms that match one of the truth; the others. *False before* are those before the first true one. Two alarms match if they
+  are of one body, within two voxels of each other, and their times overlap within a voxel's travel: its edge by the speed at which the two close, at most 0.5 s.
+- *missed*: alarms of the truth that no alarm of the run matches.
+- *in time*: share of the truth's alarms whose place the run first touches within a voxel's travel of the true time.
+- *first*: how late the first contact is, in time and as the way closed in that time.
+- *blind*: share of the voxels shown as own or in doubt that the true map has.
 """
 
 Contact = collections.namedtuple("Contact", "time_s point patch speed_m_per_s body")
@@ -85,7 +87,7 @@ def analyse(tools, bag, monitor, folder, name, shows_own=False):
     params, results, report = (os.path.join(folder, name + ending) for ending in (".yaml", "_results.bag", "_report"))
     with open(params, "w") as stream:
         yaml.safe_dump(monitor, stream)
-    run_tool(tools, "analyze_bag", bag, "--params", params, "--output", results, "--report", report, "--no-accuracy-table", "--quiet")
+    run_tool(tools, "analyze_bag", bag, "--params", params, "--output", results, "--report", report, "--quiet")
     with open(os.path.join(report, "steps.csv"), newline="") as stream:
         clear = {int(row["stamp_ns"]): row["clear"] == "1" for row in csv.DictReader(stream) if row["answered"] == "1"}
     steps, alarms, own = [], set(), []

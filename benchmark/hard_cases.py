@@ -41,7 +41,7 @@ def picture(row):
 
     def scale(v):
         if not wide:
-            return v
+            return v / values[-1] if values else v  # what is next to the largest double, or the least, has a sum, too
         import math
         return math.copysign(1 + math.log10(abs(v) / values[0]), v) if v else 0.0
     frames = [(x[0], "#999", 1.2), (x[1], "#000", 1.2)]

@@ -244,8 +244,13 @@ def write_budget(folder, result):
         rows.append([r["input"], "%.0f" % r["whole_ms"], "%g" % r["budget_ms"], "%d of %d" % (r["cut"], r["steps"])] +
                     ["%.2f" % over[q] for q in ("p50", "p95", "p99", "max")] + ["%g" % max(1, 0.1 * r["budget_ms"])])
     write_rows(os.path.join(folder, "budget.csv"), header, rows)
+    budgets = sorted({r["budget_ms"] for r in result["runs"]})
+    lines = {}
+    for r in result["runs"]:
+        line = lines.setdefault(r["input"], [r["input"], "%.0f" % r["whole_ms"]] + [""] * len(budgets))
+        line[2 + budgets.index(r["budget_ms"])] = "%.2f, %.2f" % (r["over_ms"]["p99"], r["over_ms"]["max"])
     return save(folder, "budget", "# How far a step runs over its budget\n\nProcessor time of the step's thread after the end of its "
-                "budget [ms].\n\n" + table(header, rows))
+                "budget [ms].\n\n" + table(["input", "without, ms"] + ["%g ms: 99 %%, max" % b for b in budgets], list(lines.values())))
 
 
 def write_culling(folder, result):

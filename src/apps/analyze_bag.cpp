@@ -32,16 +32,21 @@ struct Arguments {
   std::string bag, out, report, params, octomap, accuracy, mesh, robot, command;
   double look_ahead_s = 0;
   int threads = 0;
-  bool without_map = false, no_table = false, study = false, quiet = false;
+  bool without_map = false, study = false, quiet = false;
 };
 
 MonitorConfig configure(const Arguments& a) {
   ParameterTree tree;
   if (!a.params.empty()) tree = readYaml(a.params);
-  if (!tree.has("bodies")) {
+  if (!a.mesh.empty()) {
+    if (tree.has("bodies")) {
+      throw ParameterError("--mesh has no place beside the bodies of " + a.params + "; set bodies/NAME/topic there");
+    }
+    tree.put("topic", a.mesh);
+  } else if (!tree.has("bodies") && !tree.has("topic")) {
     const std::string clouds = tree.has("obstacle_cloud_topic") ? tree.members["obstacle_cloud_topic"].text : "";
-    const std::string topic = a.mesh.empty() ? BagReplay::firstMeshTopic(a.bag, clouds) : a.mesh;
-    if (!topic.empty() && !tree.has("topic")) tree.put("topic", topic);
+    const std::string topic = BagReplay::firstMeshTopic(a.bag, clouds);
+    if (!topic.empty()) tree.put("topic", topic);
   }
   if (a.without_map) {
     ParameterTree effects = tree.has("effects") ? tree.members["effects"] : ParameterTree();
@@ -201,7 +206,8 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", a.out, "write a bag with the input and the results");
   app.add_option("--report", a.report, "folder for the report")->required();
   app.add_option("--params", a.params, "YAML file with the node's parameters")->check(CLI::ExistingFile);
-  app.add_option("--mesh", a.mesh, "mesh topic; without parameters the first one of the bag is taken");
+  app.add_option("--mesh", a.mesh,
+                 "mesh topic, in place of the parameters'; the first one of the bag if neither names one");
   app.add_option("--robot", a.robot, "URDF file of a robot, whose links tf carries")->check(CLI::ExistingFile);
   auto* octomap =
       app.add_option("--octomap", a.octomap, ".bt or .ot file instead of the bag's maps")->check(CLI::ExistingFile);
@@ -211,7 +217,6 @@ int main(int argc, char** argv) {
   app.add_option("--threads", a.threads, "worker threads of a step")->check(CLI::PositiveNumber);
   app.add_option("--look-ahead", a.look_ahead_s, "horizon of predictions [s], compared with what is observed later")
       ->check(CLI::PositiveNumber);
-  app.add_flag("--no-accuracy-table", a.no_table)->group("");  // there is none any more; taken, so that old calls run
   app.add_flag("--accuracy-study", a.study,
                "run the bag with fewer frames, vertices and voxels, other rungs, noise and budgets, and say what each "
                "does to first contacts");

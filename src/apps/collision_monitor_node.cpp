@@ -7,6 +7,7 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 
+#include "config/parameter_reader.h"
 #include "node/collision_monitor.h"
 
 namespace {
@@ -27,6 +28,11 @@ int main(int argc, char** argv) {
     dccd::CollisionMonitor monitor{node, ros::NodeHandle("~"), [] { return ros::ok() && !ended; }};
     monitor.takeProcess();
     while (ros::ok() && !ended) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+  } catch (const dccd::ParameterError& error) {
+    ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what()
+                                                        << " (an earlier start may have left it: rosparam delete "
+                                                        << ros::this_node::getName() << ")");
+    return 1;
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM("collision_monitor cannot start: " << error.what());
     return 1;

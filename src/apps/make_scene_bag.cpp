@@ -33,8 +33,8 @@ int main(int argc, char** argv) {
                  "Also write the scene's parameters for the monitor here");
   app.add_flag("--quiet", options.quiet, "No progress bar");
   dccd::requireDecimalNumbers(app);
-  CLI11_PARSE(app, argc, argv);
   try {
+    app.parse(argc, argv);
     if (bag_path.size() > 3 && bag_path.compare(bag_path.size() - 3, 3, ".bt") == 0) {
       std::cout << dccd::recordMap(dccd::scene::readObstacleFile(scene_path), bag_path);
       return 0;
@@ -43,6 +43,8 @@ int main(int argc, char** argv) {
     dccd::addRobot(spec, scene_path);
     dccd::checkMonitorBlock(spec, scene_path);
     std::cout << dccd::recordScene(spec, bag_path, options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
   } catch (const std::exception& error) {
     std::cerr << "make_scene_bag: " << error.what() << "\n";
     return 1;

@@ -158,7 +158,7 @@ int main(int argc, char** argv) {
   try {
     return replay(parse(argc, argv, app));
   } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
     std::cerr << "replay_step: " << error.what() << '\n';
     return 2;

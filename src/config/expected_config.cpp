@@ -18,7 +18,7 @@ void readVertices(ParameterReader& section, const std::string& name, ExpectedPar
 }
 
 /// `vertices` of an entry: {cloth: hem, finger: [3, 4]}. Of a body with itself the body's own name stands for both
-/// sides, unless `self` names the other one. A link's are those of each of its bodies that the entry stands for.
+/// sides, unless `self` names the other one. Where a link has several bodies, the vertices are meant of each.
 void readVerticesOf(ParameterReader& vertices, const MonitorConfig& config, Expectation& one) {
   const bool itself = one.partners[0].body == one.partners[1].body;
   for (std::size_t side = 0; side < 2; ++side) {
@@ -47,7 +47,7 @@ void readExpectation(ParameterReader entry, std::size_t number, MonitorConfig& c
     config.expected_contacts.push_back(std::move(one));
     config.expected_entry.push_back(number);
   }
-  // Where nobody is there, nothing can be told of the vertices either.
+  // An entry of links that are not there has no names to hold the vertices against.
   if (!pairs.empty()) vertices.finish();
   entry.finish();
 }

@@ -57,7 +57,7 @@ Ropes ropesOf(std::vector<const MarkerView*> markers) {
   Ropes ropes;
   for (const MarkerView* one : markers) {
     requirePoints(*one);
-    // Of a name as long as a message no more is kept than tells ropes apart.
+    // A name may be as long as a message; its beginning tells ropes apart.
     ropes.names.push_back({std::string(one->ns.substr(0, MAX_NAME)), one->id, one->type, one->points.size});
     add(*one, ropes);
   }
@@ -84,7 +84,7 @@ std::size_t joinEnds(bool joins, SoupWeld& weld, Ropes& ropes) {
   if (!joins) {
     weld.keepApart(ends.size());
   } else if (apart = weld.weld(ends); apart > 0) {
-    weld.forget();  // what goes on where is another matter now
+    weld.forget();  // an end that came apart may go on in another rope: all are joined anew
     weld.weld(ends);
   }
   std::vector<Index> vertex(ropes.points.size(), NO_INDEX);

@@ -1,17 +1,23 @@
 #include "input/master_question.h"
 
+#include <cstdint>
+
 #include <ros/master.h>
+#include <ros/network.h>
 #include <ros/this_node.h>
 #include <xmlrpcpp/XmlRpcClient.h>
 #include <xmlrpcpp/XmlRpcException.h>
 
 namespace dccd {
 
-bool askMaster(const char* method, const std::string& argument, double timeout_s, XmlRpc::XmlRpcValue& answer) {
+namespace {
+
+bool ask(const std::string& host, std::uint32_t port, const char* method, const std::string& argument, double timeout_s,
+         XmlRpc::XmlRpcValue& answer) {
   XmlRpc::XmlRpcValue request, response;
   request[0] = ros::this_node::getName();
   if (!argument.empty()) request[1] = argument;
-  XmlRpc::XmlRpcClient client(ros::master::getHost().c_str(), static_cast<int>(ros::master::getPort()), "/");
+  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
   if (!client.executeNonBlock(method, request)) return false;
   client._disp.work(timeout_s * 1e3);
   const bool done = client.executeCheckDone(response) && !client.isFault();
@@ -21,6 +27,12 @@ bool askMaster(const char* method, const std::string& argument, double timeout_s
   if (response[0].getType() != XmlRpc::XmlRpcValue::TypeInt || static_cast<int>(response[0]) != 1) return false;
   answer = response[2];
   return true;
+}
+
+}  // namespace
+
+bool askMaster(const char* method, const std::string& argument, double timeout_s, XmlRpc::XmlRpcValue& answer) {
+  return ask(ros::master::getHost(), ros::master::getPort(), method, argument, timeout_s, answer);
 }
 
 std::optional<std::map<std::string, std::string>> publishedTopics(double timeout_s) {
@@ -36,18 +48,33 @@ std::optional<std::map<std::string, std::string>> publishedTopics(double timeout
   return types;
 }
 
-std::optional<std::size_t> registeredPublishers(const std::string& topic, double timeout_s) {
+std::optional<std::vector<std::string>> registeredPublishers(const std::string& topic, double timeout_s) {
   XmlRpc::XmlRpcValue state;
+  std::vector<std::string> nodes;
   try {
     if (!askMaster("getSystemState", "", timeout_s, state)) return {};
     XmlRpc::XmlRpcValue& published = state[0];  // before subscribers and services
     for (int i = 0; i < published.size(); ++i) {
-      if (static_cast<std::string>(published[i][0]) == topic) return static_cast<std::size_t>(published[i][1].size());
+      if (static_cast<std::string>(published[i][0]) != topic) continue;
+      for (int n = 0; n < published[i][1].size(); ++n) nodes.push_back(published[i][1][n]);
     }
   } catch (const XmlRpc::XmlRpcException&) {
     return {};
   }
-  return 0;
+  return nodes;
+}
+
+bool answers(const std::string& node, double timeout_s) {
+  XmlRpc::XmlRpcValue address, process;
+  std::string host;
+  std::uint32_t port = 0;
+  try {
+    return askMaster("lookupNode", node, timeout_s, address) &&
+           ros::network::splitURI(static_cast<std::string&>(address), host, port) &&
+           ask(host, port, "getPid", "", timeout_s, process);
+  } catch (const XmlRpc::XmlRpcException&) {
+    return false;
+  }
 }
 
 }  // namespace dccd

@@ -1,10 +1,10 @@
 // Questions to the master that come back: roscpp's own calls wait for a master that hangs as long as it does.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <xmlrpcpp/XmlRpcValue.h>
 
@@ -14,8 +14,11 @@ namespace dccd {
 /// with different types on one topic the one that registered last. Nothing: the master did not answer in time.
 std::optional<std::map<std::string, std::string>> publishedTopics(double timeout_s);
 
-/// How many nodes are registered as publishers of the topic, those that were killed included. Nothing: as above.
-std::optional<std::size_t> registeredPublishers(const std::string& topic, double timeout_s);
+/// The nodes that are registered as publishers of the topic, those that were killed included. Nothing: as above.
+std::optional<std::vector<std::string>> registeredPublishers(const std::string& topic, double timeout_s);
+
+/// Whether the node answers within the time, and the master about it: one that was killed or hangs does not.
+bool answers(const std::string& node, double timeout_s);
 
 /// The master's answer to one of its methods, called with this node's name and `argument`. False: none in time, or one
 /// that reports a failure.

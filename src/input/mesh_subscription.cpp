@@ -230,7 +230,8 @@ void MeshSubscription::attempt(const std::string& published_type) {
     next_attempt_ns_ = steadyNs() + LOOK_NS;  // a publisher that has just come may be about to be connected
   }
   if (published_type.empty() || steadyNs() < next_attempt_ns_) return;
-  if (registeredPublishers(topic_, MASTER_TIMEOUT_S).value_or(0) <= publishers_) return;
+  const auto registered = registeredPublishers(topic_, MASTER_TIMEOUT_S);
+  if (!registered || registered->size() <= publishers_) return;
   // The master's type, any, then each that can be a mesh.
   const auto& types = meshTypes();
   const std::size_t round = attempts_ / (types.size() + 2), at = attempts_ % (types.size() + 2);

@@ -22,6 +22,18 @@ std::string meshTopics(const std::map<std::string, std::string>& types) {
   return names;
 }
 
+/// Empty: its publisher lives, and need not say anything.
+std::string whySilent(const AwaitedTopic& topic) {
+  const std::string nobody = "nobody publishes " + topic.name + (topic.heard ? " any more" : "");
+  if (!topic.dead.empty()) return nobody + ": " + topic.dead + " does not answer; start it again";
+  if (topic.publishers == 0) return nobody + (topic.heard ? "; start its publisher again" : "");
+  if (topic.named_by.empty()) return "";
+  return topic.name +
+         (topic.heard ? " has fallen silent, though its publisher lives"
+                      : " has a publisher, but no message has come") +
+         " (see rostopic hz)";
+}
+
 }  // namespace
 
 std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<std::string, std::string>& published) {
@@ -31,13 +43,10 @@ std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<
   }
   std::string text, given_by;
   for (const AwaitedTopic& topic : silent) {
-    text += text.empty() ? "" : "; ";
-    if (topic.publishers == 0) {
-      given_by += (given_by.empty() ? "" : ", ") + topic.named_by;
-      text += "nobody publishes " + topic.name;
-    } else {
-      text += topic.name + " has a publisher, but no message has come (see rostopic hz)";
-    }
+    const std::string why = whySilent(topic);
+    text += (text.empty() || why.empty() ? "" : "; ") + why;
+    if (topic.publishers > 0 || topic.heard || topic.named_by.empty()) continue;
+    given_by += (given_by.empty() ? "" : ", ") + topic.named_by;
   }
   if (given_by.empty()) return text;
   const std::string names = meshTopics(published);

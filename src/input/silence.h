@@ -12,10 +12,12 @@ namespace dccd {
 struct AwaitedTopic {
   std::string name;              ///< resolved
   std::uint32_t publishers = 0;  ///< connected
-  std::string named_by;          ///< the argument or parameter that gives it
+  std::string named_by;          ///< the argument or parameter that gives it; empty: a map's
+  bool heard = false;            ///< messages have come before
+  std::string dead;              ///< the publishers, where there are some and none of them answers
 };
 
-/// A sentence about the clock or about topics from which no message has come, with what to do; empty when all is well.
+/// A sentence about the clock or about topics from which nothing comes, with what to do; empty when all is well.
 /// `published`: what there is, datatypes by topic; empty where the master does not answer.
 std::string silenceHint(const std::vector<AwaitedTopic>& silent, const std::map<std::string, std::string>& published);
 

@@ -66,6 +66,15 @@ struct CollisionMonitor::Impl {
   StampNs newest_ns = 0;                                    // stamp of the last outcome; the worker's
   std::uint64_t steps_unpublished = 0;                      // the worker's, too
 
+  /// What came of a body's topic by when; the worker's, as what follows.
+  struct Heard {
+    std::uint64_t frames = 0;
+    std::int64_t at_ns = 0;
+  };
+  std::vector<Heard> heard;
+  WatchClock silence_clock;
+  std::size_t fallen_silent = 0;  // topics that were heard before
+
   Impl(const ros::NodeHandle& node_handle, const ros::NodeHandle& private_handle, MonitorConfig given);
 
   void start();
@@ -101,6 +110,7 @@ struct CollisionMonitor::Impl {
   void publishPrediction(const Outcome& prediction);
   void publishEffects(const ros::Time& stamp);
   void accountDropped();
+  std::vector<AwaitedTopic> silentTopics();
   void lookIntoSilence();
   void resetNow(StepStatus status);
   StatsContext statsContext() const;

@@ -11,7 +11,7 @@ namespace {
 
 using namespace tolerance;
 
-/// [bytes] At its most, and from then on.
+/// [bytes] While it is built at most, and once it is.
 struct Need {
   std::size_t most = 0, kept = 0;
 };
@@ -38,7 +38,7 @@ std::size_t MapMemory::accept(const OctomapCounts& counts) const {
   const bool clouds = config_.takesClouds();
   const std::size_t room = config_.max_map_bytes / 8 * (clouds ? 3 : 5), held = *held_;
   const Need need = needOf(counts, config_.needsKnownSpace());
-  // One that is in use, one that follows, and while steps are without some voxels what is left of both.
+  // The map in use and the one that follows. Where steps leave voxels out, also what remains of each of them.
   std::size_t least = need.most + 2 * need.kept;
   const bool excludes = !config_.monitor.detector.exclude_boxes.empty();
   for (int copies = excludes + config_.ownsVoxels(); copies > 0; --copies) {

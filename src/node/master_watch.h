@@ -50,6 +50,8 @@ class MasterWatch {
  private:
   void loop();
   void look();
+  bool isStopping();
+  void findDead(AwaitedTopic& topic);
   void lookAtParameters();
 
   const std::vector<std::unique_ptr<MeshSubscription>>& meshes_;

@@ -1,6 +1,9 @@
 // The worker's thread: messages into the pipeline, outcomes out of it.
 #include "node/collision_monitor_impl.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "output/advice.h"
 
 namespace dccd {
@@ -11,6 +14,9 @@ using std::chrono::microseconds;
 // While something waits for tf or another body the worker looks again this often; else it sleeps until it is woken, and
 // this long at most, for diagnostics.
 constexpr microseconds POLL{2000}, SLEEP{100000};
+
+// A topic that was heard is looked into when it stays away for longer than max_step_s, and than this.
+constexpr double LEAST_SILENCE_S = 1;
 
 }  // namespace
 
@@ -100,18 +106,39 @@ void CollisionMonitor::Impl::tellComplaints() {
   if (!note.empty()) log.complain(config.bodies.size(), "map", note);
 }
 
+/// Topics that should have said something. What holds at all times, a static body's or a map's, may be silent once it
+/// has come, but for a map that is to be young.
+std::vector<AwaitedTopic> CollisionMonitor::Impl::silentTopics() {
+  std::vector<AwaitedTopic> silent;
+  const std::int64_t now_ns = silence_clock.now();
+  const double patience_s = std::max(config.monitor.store.max_step_s, LEAST_SILENCE_S);
+  heard.resize(config.bodies.size());
+  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
+    if (!mesh_subscriptions[b]) continue;
+    const std::uint64_t frames = pipeline.monitor().counters(b).received + queue.size(b);
+    if (frames != heard[b].frames) heard[b] = {frames, now_ns};
+    if (frames > 0 && (pipeline.isStatic(b) || secondsBetween(heard[b].at_ns, now_ns) < patience_s)) continue;
+    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
+                      config.bodies_listed ? "bodies/" + config.bodies[b].body.name + "/topic" : "mesh:=TOPIC",
+                      frames > 0, ""});
+  }
+  const bool may_rest = pipeline.effects().mapSeen() && config.monitor.octomap_timeout_s == 0;
+  if (map_subscriber && pipeline.effects().mapExpected() && !may_rest) {
+    silent.push_back({log.mapSource(), map_subscriber.getNumPublishers(), "", map_publisher_seen, ""});
+  }
+  return silent;
+}
+
 void CollisionMonitor::Impl::lookIntoSilence() {
   if (const auto found = master->takeHint()) {
     log.hintAt(*found, pipeline);
     state.setHint(log.hint());
   }
-  if (!log.isSilenceDue(steadyNs())) return;
-  std::vector<AwaitedTopic> silent;
-  for (std::size_t b = 0; b < config.bodies.size(); ++b) {
-    if (!mesh_subscriptions[b] || pipeline.monitor().counters(b).received > 0) continue;
-    silent.push_back({log.topicOf(b), mesh_subscriptions[b]->getNumPublishers(),
-                      config.bodies_listed ? "bodies/" + config.bodies[b].body.name + "/topic" : "mesh:=TOPIC"});
-  }
+  std::vector<AwaitedTopic> silent = silentTopics();
+  const auto fell = [](const AwaitedTopic& topic) { return topic.heard && !topic.named_by.empty(); };
+  const auto fallen = static_cast<std::size_t>(std::count_if(silent.begin(), silent.end(), fell));
+  const bool news = std::exchange(fallen_silent, fallen) != fallen;
+  if (!news && !log.isSilenceDue(steadyNs())) return;
   const bool mapless = pipeline.effects().mayUseMap() && !pipeline.effects().mapSeen();
   master->lookInto({std::move(silent), mapless ? log.mapSource() : ""});
 }

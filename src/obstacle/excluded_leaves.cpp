@@ -12,27 +12,28 @@ class Splitter {
   Splitter(double resolution_m, const Eigen::Isometry3d& fixed_from_map, const std::vector<Box>& boxes)
       : resolution_m_(resolution_m),
         fixed_from_map_(fixed_from_map),
-        reach_(fixed_from_map.linear().cwiseAbs() * Vec3::Ones()),
+        extent_(fixed_from_map.linear().cwiseAbs() * Vec3::Ones()),
         boxes_(boxes) {}
 
   void add(const OccupiedLeaf& leaf) {
     const double half = 0.5 * leaf.size * resolution_m_;
     const Vec3 corner(voxelPlane(leaf.min.x, resolution_m_), voxelPlane(leaf.min.y, resolution_m_),
                       voxelPlane(leaf.min.z, resolution_m_));
-    const Vec3 centre = fixed_from_map_ * Vec3(corner + Vec3::Constant(half)), reach = half * reach_;
+    const Vec3 centre = fixed_from_map_ * Vec3(corner + Vec3::Constant(half)), extent = half * extent_;
     const auto any = [this](const auto& condition) { return std::any_of(boxes_.begin(), boxes_.end(), condition); };
     const bool near = any([&](const Box& box) {
-      return ((centre + reach).array() >= box.min.array()).all() && ((centre - reach).array() <= box.max.array()).all();
+      return ((centre + extent).array() >= box.min.array()).all() &&
+             ((centre - extent).array() <= box.max.array()).all();
     });
     if (!near) {
       remaining_.leaves.push_back(leaf);
       return;
     }
     // The whole cube, or for a finest voxel its centre.
-    const Vec3 within = leaf.size == 1 ? Vec3(Vec3::Zero()) : reach;
+    const Vec3 decisive = leaf.size == 1 ? Vec3(Vec3::Zero()) : extent;
     const bool inside = any([&](const Box& box) {
-      return ((centre - within).array() >= box.min.array()).all() &&
-             ((centre + within).array() <= box.max.array()).all();
+      return ((centre - decisive).array() >= box.min.array()).all() &&
+             ((centre + decisive).array() <= box.max.array()).all();
     });
     if (inside) {
       remaining_.excluded_voxels += std::uint64_t{leaf.size} * leaf.size * leaf.size;
@@ -59,7 +60,7 @@ class Splitter {
 
   double resolution_m_;
   Eigen::Isometry3d fixed_from_map_;
-  Vec3 reach_;  // of a cube's half edge along the fixed frame's axes
+  Vec3 extent_;  // half of the box around a turned cube, whose own half edge is 1
   const std::vector<Box>& boxes_;
   RemainingLeaves remaining_;
   std::size_t parts_ = 0;

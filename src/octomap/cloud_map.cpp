@@ -47,7 +47,7 @@ class VoxelSet {
   std::size_t memoryBytes() const { return blocks_.size() * BLOCK_BYTES; }
 
  private:
-  /// Found without a search; what the map holds stays where it is.
+  /// A block that was used lately, found without a search: the elements of an unordered_map do not move.
   struct Recent {
     std::uint64_t block = ~std::uint64_t{0};
     std::uint64_t* bits = nullptr;
@@ -85,7 +85,8 @@ struct CloudMap::Impl {
     tree.setClampingThresMax(options.max);
   }
 
-  /// Without OctoMap's complaint on the console, and without its cast of what no int can hold.
+  /// False where the point lies outside of what a map can span. OctoMap's own call prints that, and casts doubles that
+  /// no int can hold.
   bool keyOf(const point3d& point, OcTreeKey& key) const {
     const double half_span_m = 32769 * tree.getResolution();
     for (unsigned axis = 0; axis < 3; ++axis) {

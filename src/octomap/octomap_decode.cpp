@@ -6,8 +6,10 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <system_error>
 
 #include "dccd/regular_file.h"
 #include "dccd/tolerances.h"
@@ -202,7 +204,9 @@ DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& lim
     return decodeWithHeader(header, reinterpret_cast<const unsigned char*>(data.data()), data.size(), header.resolution,
                             limits);
   } catch (const OctomapError& error) {
-    throw OctomapError(path + ": " + error.what());
+    // Whole: what is relative begins in the folder that roslaunch starts nodes in, which is not the reader's.
+    std::error_code ignored;
+    throw OctomapError(std::filesystem::absolute(path, ignored).string() + ": " + error.what());
   }
 }
 

@@ -124,6 +124,11 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     case StepStatus::VERTEX_COUNT:
       if (reason.compare(0, 10, "parameter ") == 0) return "the vertices are numbered from 0";
       return "correct topology/rows and topology/cols or the file, and publish NaN for points that were lost";
+    case StepStatus::PARTIAL:
+      if (reason.find("(no transform") == std::string::npos) return {};
+      return "see whether its tf comes (rosrun tf tf_echo; for a robot robot_state_publisher and its joint states); "
+             "one "
+             "that comes late needs a larger transform_timeout_s";
     case StepStatus::DEADLINE:
       return "raise step_budget_ms or num_threads, or send fewer vertices";
     case StepStatus::TRUNCATED:

@@ -100,7 +100,7 @@ void FlightRecorder::onOutcome(const Outcome& outcome) {
 
 std::string FlightRecorder::write(StepRecording& recording, const std::string& kind, const std::string& note) {
   const FileUnderWay under_way;
-  std::error_code ignored;  // the file says so, too
+  std::error_code ignored;  // the file that cannot be opened says why
   std::filesystem::create_directories(folder_, ignored);
   recording.note = note;
   return writeNewRecording(folder_ + "/" + kind + "_" + (owner_.empty() ? "" : owner_ + "_") +

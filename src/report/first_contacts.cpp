@@ -27,7 +27,7 @@ double meanEdge(const Body& body) {
   return count > 0 ? sum_m / static_cast<double>(count) : 0;
 }
 
-/// Of either end the one that is further off, with its sign.
+/// The error of the end that is further off, with its sign.
 double errorMs(const TimeSpan& found, const TimeSpan& truth) {
   const double from_ns = static_cast<double>(found.from_ns - truth.from_ns);
   const double to_ns = static_cast<double>(found.to_ns - truth.to_ns);

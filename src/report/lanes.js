@@ -45,7 +45,7 @@ if (!R.partners.length) {
     lanes.seek(Math.min(SPAN[1], Math.max(SPAN[0], t))); });
 }
 const calendar = stamp => +stamp > 1e8 ? new Date(+stamp * 1000).toISOString().replace('T', ' ').replace('Z', ' UTC') : '';
-{ const firsts = R.partners.filter(p => p.first);
+{ const firsts = R.partners.filter(p => p.first).sort((p, q) => p.first.t - q.first.t);
   const t = table('firsts', ['first new contact', 'after the start [s]', 'stamp [s]', 'where x, y, z [m]'], firsts.map(p =>
     [p.first.text, p.first.t.toFixed(4), p.first.stamp + (calendar(p.first.stamp) ? ` (${calendar(p.first.stamp)})` : ''), p.first.where.map(v => v.toFixed(3)).join(', ')]));
   if (t) firsts.forEach((p, i) => { t.rows[i + 1].style.cursor = 'pointer'; t.rows[i + 1].addEventListener('click', () => lanes.seek(p.first.t)); });

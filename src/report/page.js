@@ -1,5 +1,5 @@
 // Plots are as wide as the page, so that their words stay as large as the others.
-const NS = 'http://www.w3.org/2000/svg', W = Math.max(300, document.getElementById('lanes').clientWidth || 1040), LEFT = W < 600 ? 48 : 62,
+const NS = 'http://www.w3.org/2000/svg', W = Math.max(300, document.getElementById('lanes').clientWidth || 1040), LEFT = W < 600 ? 54 : 62,
   RIGHT = 14, BOTTOM = 34, TOP = 10;
 const el = (name, attributes, parent, text) => {
   const e = document.createElementNS(NS, name);
@@ -106,7 +106,7 @@ document.getElementById('headline').textContent = R.headline;
   document.getElementById('latency_note').textContent = `Median ${number(R.total.median_ms)} ms (orange line), 95 % below ` +
     `${number(R.total.p95_ms)} ms, 99 % below ${number(R.total.p99_ms)} ms, longest ${number(R.total.max_ms)} ms.`; }
 { const H = 160, floor = H - 34, bins = R.histogram, most = Math.max(1, ...bins.map(b => b.steps));
-  const w = (W - LEFT - RIGHT) / Math.max(bins.length, 1), every = Math.ceil(bins.length / 10);
+  const w = (W - LEFT - RIGHT) / Math.max(bins.length, 1), every = Math.ceil(bins.length / Math.min(10, W / 80));
   const svg = el('svg', { viewBox: `0 0 ${W} ${H}` }, document.getElementById('histogram'));
   ticks(most, true).forEach(v => { const y = floor - (floor - 10) * v / most;
     el('line', { x1: LEFT, x2: W - RIGHT, y1: y, y2: y, stroke: '#e3e8ee' }, svg);
@@ -126,16 +126,16 @@ function frontPlot(id, all, xlabel, ylabel, least) {
   const range = (values, room) => { const low = Math.log10(Math.min(...values)), high = Math.log10(Math.max(...values)), pad = room * Math.max(high - low, 0.3);
     return [low - pad, high + pad]; };
   const [x0, x1] = range(points.map(p => p.x), 0.12), [y0, y1] = range(points.map(p => p.y), 0.08);
-  const x = v => LEFT + 20 + (W - LEFT - RIGHT - 150) * (Math.log10(v) - x0) / (x1 - x0), y = v => floor - (floor - TOP - 24) * (Math.log10(v) - y0) / (y1 - y0);
+  const x = v => LEFT + 20 + (W - LEFT - RIGHT - 30) * (Math.log10(v) - x0) / (x1 - x0), y = v => floor - (floor - TOP - 24) * (Math.log10(v) - y0) / (y1 - y0);
   const svg = el('svg', { viewBox: `0 0 ${W} ${H}` }, box);
   const label = (x, y, text, more) => el('text', { x, y, 'font-size': 12, fill: '#556', ...more }, svg, text);
   const logTicks = (low, high, steps) => { const out = [];
     for (let d = Math.floor(low); d <= high; ++d) for (const k of steps) if (d + Math.log10(k) >= low && d + Math.log10(k) <= high) out.push(k * 10 ** d);
     return out; };
   logTicks(x0, x1, x1 - x0 < 2 ? [1, 2, 5] : [1]).forEach(v => {
-    el('line', { x1: x(v), x2: x(v), y1: TOP, y2: floor, stroke: '#eef1f5' }, svg); label(x(v), floor + 18, short(v), { 'text-anchor': 'middle' }); });
+    el('line', { x1: x(v), x2: x(v), y1: TOP, y2: floor, stroke: '#e3e8ee' }, svg); label(x(v), floor + 18, short(v), { 'text-anchor': 'middle' }); });
   logTicks(y0, y1, y1 - y0 < 2 ? [1, 2, 5] : [1]).forEach(v => {
-    el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#eef1f5' }, svg);
+    el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
     label(LEFT - 6, y(v) + 4, v <= least ? '0' : v < 1e-2 ? v.toExponential(0) : +v.toPrecision(2), { 'text-anchor': 'end' }); });
   label((W + LEFT) / 2, H - 8, xlabel, { 'text-anchor': 'middle' });
   label(14, H / 2, ylabel, { transform: `rotate(-90 14 ${H / 2})`, 'text-anchor': 'middle' });
@@ -143,15 +143,18 @@ function frontPlot(id, all, xlabel, ylabel, least) {
   const front = points.filter(p => !p.missed && !p.invented).sort((a, b) => a.x - b.x || a.y - b.y).filter(p => p.y < best && (best = p.y, true));
   el('polyline', { points: front.map((p, i) => (i ? `${x(p.x)},${y(front[i - 1].y)} ` : '') + `${x(p.x)},${y(p.y)}`).join(' '), fill: 'none', stroke: '#9aa4b0' }, svg);
   const groups = [...new Set(points.map(p => p.group))], taken = [];
-  if (groups.length > 1) groups.forEach((g, k) => { el('circle', { cx: W - 120, cy: 20 + 16 * k, r: 5, fill: COLOURS[k % COLOURS.length] }, svg); label(W - 110, 24 + 16 * k, g); });
+  const legend = box.appendChild(document.createElement('p')); legend.className = 'note';
+  groups.forEach((g, k) => { const key = legend.appendChild(document.createElement('span'));
+    key.appendChild(document.createElement('i')).style.background = COLOURS[k % COLOURS.length]; key.append(g); legend.append(' '); });
   [...front, ...points.filter(p => !front.includes(p))].forEach(p => {
     const cx = x(p.x), cy = y(p.y), mark = el('circle', { cx, cy, r: 5, fill: COLOURS[groups.indexOf(p.group) % COLOURS.length] }, svg);
     el('title', {}, mark, `${p.group} ${p.name}: ${short(p.x)}, ${+p.y.toPrecision(3)}; ${p.missed} missed, ${p.invented} invented`);
     if (p.missed) el('path', { d: `M${cx - 8},${cy - 8}l16,16m-16,0l16,-16`, stroke: '#b71c1c', 'stroke-width': 2 }, svg);
     if (p.invented) el('circle', { cx, cy, r: 10, fill: 'none', stroke: '#b71c1c', 'stroke-width': 2 }, svg);
-    const end = cx + 15 + 6.5 * p.name.length, covers = (a, b) => a > cx && a < end && Math.abs(b - cy) < 13;
-    if (taken.some(([a, b, to]) => a < end && to > cx && Math.abs(b - cy) < 13) || points.some(q => q !== p && covers(x(q.x) + 5, y(q.y)))) return;
-    taken.push([cx, cy, end]); label(cx + 13, cy - (front.includes(p) ? 4 : -4), p.name); });
+    const width = 15 + 6.5 * p.name.length, left = cx + width > W, from = left ? cx - width : cx, end = from + width;  // no room on the right
+    const covers = (a, b) => a + 5 > from && a - 10 < end && Math.abs(b - cy) < 13;
+    if (taken.some(([a, b, to]) => a < end && to > from && Math.abs(b - cy) < 13) || points.some(q => q !== p && covers(x(q.x), y(q.y)))) return;
+    taken.push([from, cy, end]); label(cx + (left ? -13 : 13), cy - (front.includes(p) ? 4 : -4), p.name, left ? { 'text-anchor': 'end' } : {}); });
 }
 
 const STOPS = [[255, 236, 179], [251, 140, 60], [183, 28, 28]];

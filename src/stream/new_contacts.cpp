@@ -10,7 +10,7 @@ bool isBefore(const NewContact& a, const NewContact& b) {
                                                     : canonicalLess(a.contact, b.contact);
 }
 
-/// One for each pair of partners.
+/// Keeps the earliest of each pair of partners.
 void take(const NewContact& one, std::vector<NewContact>& earliest) {
   const auto same =
       std::find_if(earliest.begin(), earliest.end(), [&](const NewContact& other) { return other.body == one.body; });

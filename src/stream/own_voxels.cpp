@@ -77,7 +77,7 @@ KeyBox reachedKeys(const ObstacleMap& map, const std::vector<TrackedBody>& bodie
 
 std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
 
-/// Both in words, by body.
+/// Sets the counts of what is own and what is in doubt, and a sentence of each, by body.
 void describe(const std::vector<TrackedBody>& bodies, bool trust_first, OwnVoxels& own) {
   for (const TrackedBody& body : bodies) {
     std::uint64_t its = 0, doubted = 0;
@@ -134,7 +134,7 @@ std::vector<BodyWay> OwnVoxelFinder::waysOf(const std::vector<TrackedBody>& bodi
   return ways;
 }
 
-/// What the bodies may have reached and of which that matters. Forgets what is own and not shown any more.
+/// The cubes of which it matters whether a body reached them. Forgets own voxels that the map shows no more.
 std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface, const VoxelTree& sure,
                                                     const KeyBox& region) {
   std::vector<ReachedCube> cubes;
@@ -167,7 +167,7 @@ std::vector<ReachedCube> OwnVoxelFinder::cubesToAsk(const VoxelSurface& surface,
   return cubes;
 }
 
-/// The rule.
+/// Says of each cube, by whether a body reached it, what it is from now on: own, in doubt, remembered or none of these.
 void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSpace* known, bool trust_first,
                             const std::set<int>& unknown_yet) {
   remembered_.clear();

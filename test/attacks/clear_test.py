@@ -228,8 +228,8 @@ class ClearTest(AttackTest):
         pathlib.Path(params).write_text(
             'fixed_frame: world\nmax_vertex_step_m: 0.0\neffects: {octomap: "off"}\nmax_contacts: 10000\n'
             'bodies: {cloth: {topic: /both/cloth, topology: {rows: 12, cols: 12}}}\n')
-        run = subprocess.run([str(self.tool('analyze_bag')), bag, '-o', out, '--report', os.path.join(folder, 'report'), '--params', params,
-                              '--no-accuracy-table'], capture_output=True, text=True, timeout=120)
+        run = subprocess.run([str(self.tool('analyze_bag')), bag, '-o', out, '--report', os.path.join(folder, 'report'), '--params', params],
+                             capture_output=True, text=True, timeout=120)
         self.assertTrue(os.path.exists(out), run.stderr)
         with rosbag.Bag(out) as file:
             replayed = [m for topic, m, _ in file.read_messages() if topic.endswith('/contacts')]

@@ -70,6 +70,9 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.states[-1].clear)
         wait_for(lambda: not self.clear[-1].data, 5, '~clear to be false')
 
+    def wait_reason(self, words):
+        wait_for(lambda: words in self.states[-1].reason, 20, words)
+
     def late_subscriber(self, name):
         """What somebody hears who comes only now."""
         heard = rospy.wait_for_message('/%s/state' % name, State, 10)
@@ -94,11 +97,16 @@ class StateTest(LiveNodeTest):
         stream.end()
         last = 100 + stream.cloud.count / stream.rate
         self.wait_missing('no frame has come')
+        self.wait_reason('/silent/mesh has fallen silent, though its publisher lives (see rostopic hz)')
         late = self.late_subscriber('silent')
         self.assertFalse(late.proved)
         self.assertAlmostEqual(late.holds_until.to_sec(), last, 6)
+        self.publisher.unregister()
+        self.wait_reason('nobody publishes /silent/mesh any more; start its publisher again')
+        self.publisher = self.advertise('/silent/mesh', PointCloud2)
         self.stream(stream.cloud)
         self.wait_proved()
+        self.assertNotIn('nobody publishes', self.states[-1].reason)
         self.assert_consistent()
 
     def test_a_tracker_that_is_killed_and_replaced_by_another_type(self):
@@ -111,6 +119,7 @@ class StateTest(LiveNodeTest):
         tracker.kill()
         tracker.wait()
         self.wait_missing('no frame has come')
+        self.wait_reason('nobody publishes /replaced/mesh any more')
         said = len(self.states)
         successor = rospy.Publisher('/replaced/mesh', MeshStamped, queue_size=5)
         self.addCleanup(successor.unregister)

@@ -33,7 +33,7 @@ class AnalyzeBagRobotTest(FolderTestCase):
         return path
 
     def analyze(self, bag, *words):
-        command = [TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--no-accuracy-table', '--quiet', *words]
+        command = [TOOLS / 'analyze_bag', bag, '--report', self.folder / 'report', '--quiet', *words]
         return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
 
     def test_the_links_are_bodies(self):

@@ -57,6 +57,9 @@ class AnalyzeBagTest(AnalyzeBagTestCase):
             bag.write('/octomap_binary', next(m for t, m, _ in self.messages if t == '/octomap_binary'), self.messages[0][2])
         self.assertIn('no topic of a mesh type; the bag has /octomap_binary (octomap_msgs/Octomap)', self.refused(alone))
         self.assertIn('no topic /clth; the bag has /cloth (', self.refused(self.bag, '--mesh', '/clth'))
+        bodies = map(str, self.params('bodies: {cloth: {topic: /cloth}}\n'))
+        self.assertRegex(self.refused(self.bag, *bodies, '--mesh', '/clth'), '--mesh has no place beside the bodies of .*given.yaml')
+        self.analyze('named', self.bag, *self.params('topic: /clth\n'), '--mesh', '/cloth')
         self.assertIn('--acuracy is no option; nearest is --accuracy', self.refused(self.bag, '--acuracy', 'exact'))
 
     def test_millimetres_are_named_in_the_headline(self):

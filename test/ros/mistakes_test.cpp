@@ -140,6 +140,13 @@ TEST_F(Mistake, MeshTopicNeverPublished) {
              "/tracker/points (sensor_msgs/PointCloud2)", [] {});
 }
 
+TEST_F(Mistake, NamedMapNeverPublished) {
+  Tracker tracker;
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/no_map/mesh");
+  expectTold("/no_map", "nobody publishes /no_map/octomap", "",
+             [&] { publisher.publish(meshStamped(tipAbove(1), tracker.next())); });
+}
+
 TEST_F(Mistake, StampsOfZero) {
   const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/no_stamp/mesh");
   expectTold("/no_stamp", "messages carry no stamp", "set header.stamp in the publisher",

@@ -311,6 +311,8 @@ void checkMonitor(ParameterReader& scene, const SceneSpec& spec) {
 SceneSpec readScene(const ParameterTree& tree) {
   ParameterReader map(tree, "");
   SceneSpec spec;
+  if (!map.has("bodies"))
+    map.fail("bodies", "is needed: what moves in this scene; for the map alone let the output end in .bt");
   spec.name = map.text("name");
   spec.description = map.text("description");
   spec.fixed_frame = map.text("fixed_frame", "world");

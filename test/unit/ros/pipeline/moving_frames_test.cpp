@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "dccd/assurance.h"
+#include "output/advice.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
 
 namespace dccd {
@@ -112,6 +113,8 @@ TEST(RigidBodies, AFloodOfTransformsWithinAStepIsNotLookedAtAndProvesNothing) {
   EXPECT_FALSE(assuranceOf(scene.outcome).proved);
   EXPECT_NE(scene.outcome.reason.find("where body 'tip' was is not known for all of this step"), std::string::npos)
       << scene.outcome.reason;
+  EXPECT_NE(adviceFor(scene.outcome.status, scene.outcome.reason, "").find("larger transform_timeout_s"),
+            std::string::npos);
   scene.offer(0.15, 0);
   EXPECT_TRUE(assuranceOf(scene.outcome).clear()) << scene.outcome.reason;
 }
