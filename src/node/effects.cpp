@@ -48,6 +48,10 @@ void EffectTracker::hearPredictions(bool heard) {
   if (std::exchange(scene_.predictions_heard, heard) != heard) plan_ = EffectPlan(scene_, settings_);
 }
 
+void EffectTracker::hearDistances(bool heard) {
+  if (std::exchange(scene_.clearance_wanted, heard) != heard) plan_ = EffectPlan(scene_, settings_);
+}
+
 void EffectTracker::setBody(std::size_t body, const Body& what) {
   scene_.bodies.resize(std::max(scene_.bodies.size(), body + 1));
   scene_.noise.resize(scene_.bodies.size());
@@ -56,7 +60,9 @@ void EffectTracker::setBody(std::size_t body, const Body& what) {
 }
 
 bool EffectTracker::decide(MonitorOptions& options) const {
-  return std::exchange(options.detector.obstacle_expected, mapExpected()) != mapExpected();
+  const bool map = mapExpected(), distances = plan_.running(Effect::CLEARANCE);
+  const bool other_map = std::exchange(options.detector.obstacle_expected, map) != map;
+  return std::exchange(options.detector.clearance.wanted, distances) != distances || other_map;
 }
 
 void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {

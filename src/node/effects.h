@@ -25,6 +25,8 @@ class EffectTracker {
   void expectMap();
   /// Whether anybody subscribes to predictions, or they are asked for otherwise.
   void hearPredictions(bool heard);
+  /// Whether anybody subscribes to distances.
+  void hearDistances(bool heard);
   /// A body has come, or is another one.
   void setBody(std::size_t body, const Body& what);
   /// Sets what the plan decides of a monitor's options. False: they are so already.

@@ -112,9 +112,7 @@ void StateReporter::voidAnswer(const std::string& reason) {
   answer_.missing.push_back(reason);
   touches_.clear();
   remedy_.clear();
-  const std::string frame = std::move(told_.header.frame_id);
-  told_ = deformable_ccd::State();
-  told_.header.frame_id = frame;
+  told_ = toState(Outcome(), std::move(told_.header.frame_id));
 }
 
 void StateReporter::takeBack(const std::string& reason) {

@@ -9,6 +9,7 @@
 
 #include "input/known_types.h"
 #include "output/advice.h"
+#include "output/clearance_messages.h"
 #include "output/markers.h"
 
 namespace dccd {
@@ -116,6 +117,9 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
   write("stats", at, toStepStats(outcome, context, frame));
   write("first_contact", at, toFirstContact(outcome, bodies, frame));
   addPatches(outcome, pipeline, at);
+  if (pipeline.monitor().options().detector.clearance.wanted) {
+    write("clearance", at, toClearanceArray(outcome, bodies, frame));
+  }
   addState(outcome, frame, at);
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
   diagnostics_.add(outcome, context.latency_s);
