@@ -56,16 +56,6 @@ void keepEarliest(std::size_t count, std::vector<Contact>& contacts) {
   contacts.shrink_to_fit();
 }
 
-/// Vertices that were sent but belong to no face and no edge, except masked ones. A mesh file's do not matter.
-std::uint64_t looseVertices(const Body& body) {
-  const Topology& topology = *body.topology;
-  if (body.rigid || topology.usedVertices().size() == topology.vertexCount()) return 0;
-  std::vector<bool> accounted(topology.vertexCount());
-  for (const Index v : topology.usedVertices()) accounted[v] = true;
-  for (const Index v : body.vertex_mask) accounted.at(v) = true;
-  return static_cast<std::uint64_t>(std::count(accounted.begin(), accounted.end(), false));
-}
-
 /// Is every vertex on an edge or a face left out? Then nothing of the body was looked at.
 bool isMaskedWhole(const Body& body) {
   const std::vector<Index>& used = body.topology->usedVertices();
@@ -215,6 +205,15 @@ double scale(double toc, std::size_t i, std::size_t n, double towards) {
 }
 
 }  // namespace
+
+std::uint64_t looseVertices(const Body& body) {
+  const Topology& topology = *body.topology;
+  if (body.rigid || topology.usedVertices().size() == topology.vertexCount()) return 0;
+  std::vector<bool> accounted(topology.vertexCount());
+  for (const Index v : topology.usedVertices()) accounted[v] = true;
+  for (const Index v : body.vertex_mask) accounted.at(v) = true;
+  return static_cast<std::uint64_t>(std::count(accounted.begin(), accounted.end(), false));
+}
 
 double scaleDown(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 0.0); }
 double scaleUp(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 2.0); }

@@ -133,7 +133,9 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.sequence = step.sequence;
   outcome.substeps = parts;
   outcome.excluded_voxels = excluded_voxels;
+  if (options->clearance.wanted) clearance.begin(step, *options);
   if (!runParts(step, continues, parts, deadline, outcome)) carried.clear();
+  if (options->clearance.wanted) clearance.finish(parts, outcome);
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
@@ -144,7 +146,8 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (options->patches) patches.list(outcome);
   outcome.stats.total_ms = msSince(begun);
   if (parts == 1 && hits >= FEWEST_TO_MEASURE) {
-    const double others_ms = outcome.stats[Stage::OBSTACLE].ms + outcome.stats[Stage::START_STATE].ms;
+    const double others_ms =
+        outcome.stats[Stage::OBSTACLE].ms + outcome.stats[Stage::START_STATE].ms + outcome.stats[Effect::CLEARANCE].ms;
     const double after_ms = std::max(0.0, msSince(hits_done) - others_ms);
     const double measured_ns = std::min(MOST_NS_PER_HIT, 1.5e6 * after_ms / static_cast<double>(hits));
     per_hit = std::max(per_hit * 7 / 8, std::chrono::nanoseconds(static_cast<std::int64_t>(measured_ns)));
@@ -159,6 +162,19 @@ void History::Impl::findPatches(Outcome& outcome) {
   StageStats& stats = outcome.stats[Effect::PATCHES];
   patches_took = Clock::now() - start;
   stats = {patches.touches().size(), outcome.patches.size(), msSince(start)};
+}
+
+/// How far apart things are in a part, after its contacts: of a budget too small for both these come first.
+void History::Impl::findClearance(const Part& part, Clock::time_point begin) {
+  const Clock::time_point start = Clock::now();
+  Deadline deadline = part.deadline;
+  if (!deadline.isNever()) {
+    // Later parts need as much time for their contacts; what is over that is shared.
+    const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
+    deadline = deadline.movedTo(start + (deadline.at() - start - later * (start - begin)) / (later + 1));
+  }
+  clearance.addPart({part.step, part.index, part.count, scene, map_reduced.get(), result, deadline});
+  result.stats[Effect::CLEARANCE].ms = msSince(start);
 }
 
 void History::Impl::setOptions(const Options& wanted) {
@@ -179,6 +195,7 @@ void History::Impl::setBodies(const Step& step) {
   check(*options, step.bodies);
   if (bodies_made && scene.holds(step.bodies)) return;
   bodies_made = false;
+  clearance.forgetBodies();
   carried.clear();
   carried.start_state.forgetBodies();
   carried.inside.forgetBodies();
@@ -289,6 +306,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   rememberApart(all_pairs && !options->earliest_only);
   if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
   runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
+  if (options->clearance.wanted) findClearance(part, begin);
   addPart(part.index, part.count, result, outcome);
 }
 

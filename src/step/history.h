@@ -18,6 +18,7 @@
 #include "culling/unfolded.h"
 #include "dccd/detect.h"
 #include "simd/float_mode.h"
+#include "step/clearance/clearance_finder.h"
 #include "step/expected_contacts.h"
 #include "step/fork_join.h"
 #include "step/pairs/hit_order.h"
@@ -123,6 +124,7 @@ struct History::Impl {
   void runStartState(const Part& part, Deadline::Clock::time_point begin, bool all_pairs);
   bool listStart(const Part& part, const Deadline& deadline, std::vector<StartIntersection>& met);
   void findPatches(Outcome& outcome);
+  void findClearance(const Part& part, Deadline::Clock::time_point begin);
   template <class Function>
   void parallel(std::size_t n, std::size_t piece, const Function& function);
 
@@ -164,6 +166,7 @@ struct History::Impl {
   Positions map_t0, map_t1;
   std::array<HitOrder, 2> order;  // by PairKind
   Findings result;                // of the part; whether it is complete is said of its pairs alone
+  ClearanceFinder clearance;      // of the bodies, their trees and neighbours; no answer depends on the step before
   PatchMaker patches;
   Deadline::Clock::duration patches_took{0};  // in the last step
 };

@@ -9,16 +9,6 @@
 namespace dccd {
 namespace {
 
-/// `fixed` itself where the frames are the same, else `moved`, filled with the positions in the map's frame [m].
-const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved) {
-  if (map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix()) return fixed;
-  moved.resize(fixed.size());
-  const Eigen::Matrix3d rotation = map_from_fixed.linear();
-  const Vec3 translation = map_from_fixed.translation();
-  for (std::size_t i = 0; i < fixed.size(); ++i) moved[i] = rotation * fixed[i] + translation;
-  return moved;
-}
-
 /// Whether the body comes so near to what is occupied that their bounds, in the map's frame, tell nothing. Those of its
 /// records along x, y and z, over the whole step, are placed as inMapFrame() places a vertex. Either is off by some ten
 /// half ulps of the size of its terms, of which the slack is thousands.
@@ -39,6 +29,15 @@ bool boundsReach(const SceneBody& body, const ObstacleMap& map, const Box& occup
 }
 
 }  // namespace
+
+const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved) {
+  if (map_from_fixed.matrix() == Eigen::Isometry3d::Identity().matrix()) return fixed;
+  moved.resize(fixed.size());
+  const Eigen::Matrix3d rotation = map_from_fixed.linear();
+  const Vec3 translation = map_from_fixed.translation();
+  for (std::size_t i = 0; i < fixed.size(); ++i) moved[i] = rotation * fixed[i] + translation;
+  return moved;
+}
 
 bool History::Impl::takeMapAnswer(std::size_t b, const Part& part, std::size_t room, ObstacleStats& total) {
   if (b >= carried.map.size() || !options->keep_bounds) return false;

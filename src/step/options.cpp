@@ -1,6 +1,7 @@
 // What options may be, and when two are the same.
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "dccd/accuracy.h"
 #include "step/conclude.h"
@@ -28,6 +29,12 @@ void check(const Options& options, const std::vector<Body>& bodies) {
   }
   if (!(options.rigid_tolerance_m > 0)) refuse("rigid_tolerance_m must be above 0");
   if (options.max_substeps < 1) refuse("max_substeps must be 1 or more");
+  for (const auto& [name, value_m] :
+       {std::make_pair("tolerance_m", options.clearance.tolerance_m), std::make_pair("max_m", options.clearance.max_m),
+        std::make_pair("self_m", options.clearance.self_m)}) {
+    if (value_m > 0 && value_m <= 1e9) continue;
+    refuse(std::string("clearance.") + name + " = " + std::to_string(value_m) + " is out of range; above 0, to 1e9");
+  }
   for (const Box& box : options.exclude_boxes) {
     if (box.empty()) refuse("exclude_boxes: a box's min exceeds its max");
   }

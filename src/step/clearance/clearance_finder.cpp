@@ -1,0 +1,397 @@
+#include "step/clearance/clearance_finder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "obstacle/start_contact.h"
+#include "step/clearance/map_boxes.h"
+#include "step/conclude.h"
+#include "step/start/segment_triangle.h"
+
+namespace dccd {
+namespace {
+
+using Feature = FeatureTree::Feature;
+
+bool isIdentity(const Eigen::Isometry3d& pose) { return pose.matrix() == Eigen::Isometry3d::Identity().matrix(); }
+
+/// Of the whole part. Empty bodies: nothing is in it.
+StepBox boxOf(const SceneBody& body) {
+  StepBox box;
+  for (int end = 0; end < 2; ++end) {
+    std::copy(body.bounds_min, body.bounds_min + 3, box.lo[end]);
+    std::copy(body.bounds_max, body.bounds_max + 3, box.hi[end]);
+  }
+  return box;
+}
+
+StepBox boxOf(const Box& still) {
+  StepBox box = StepBox::none();
+  for (int end = 0; end < 2; ++end) {
+    box.add(end, still.min);
+    box.add(end, still.max);
+  }
+  return box;
+}
+
+/// It holds something, and squares of distances stay finite.
+bool isUsable(const StepBox& box) {
+  for (int end = 0; end < 2; ++end) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lo = box.lo[end][axis], hi = box.hi[end][axis];
+      if (!(lo > -tolerance::CLEARANCE_LARGEST_M && lo <= hi && hi < tolerance::CLEARANCE_LARGEST_M)) return false;
+    }
+  }
+  return true;
+}
+
+bool shareVertex(const Feature& a, const Feature& b) {
+  return std::any_of(a.begin(), a.end(),
+                     [&](Index v) { return v != NO_INDEX && std::find(b.begin(), b.end(), v) != b.end(); });
+}
+
+/// Exact, at t1: the hulls of 1 to 3 corners.
+bool meetAtEnd(const MovingHull& a, const MovingHull& b) {
+  const auto at = [](const MovingHull& hull, std::size_t i) { return hull.t1[std::min(i, hull.count - 1)].data(); };
+  const auto edgeMeets = [&](const MovingHull& edge, std::size_t from, std::size_t to, const MovingHull& face) {
+    return segmentMeetsTriangle(at(edge, from), at(edge, to), at(face, 0), at(face, 1), at(face, 2));
+  };
+  if (a.count < 3) return edgeMeets(a, 0, 1, b);
+  if (b.count < 3) return edgeMeets(b, 0, 1, a);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (edgeMeets(a, i, (i + 1) % 3, b) || edgeMeets(b, i, (i + 1) % 3, a)) return true;
+  }
+  return false;
+}
+
+bool meetAtEnd(const MovingHull& a, const LeafBox& box) {
+  const auto at = [&](std::size_t i) { return a.t1[i].data(); };
+  if (a.count == 1) return pointInBox(at(0), box);
+  if (a.count == 2) return segmentMeetsBox(at(0), at(1), box);
+  return triangleMeetsBox(at(0), at(1), at(2), box) != TriangleStart::APART;
+}
+
+/// All contacts of the two are expected.
+bool expectsAll(const std::vector<Expectation>& expected, std::uint16_t a, std::uint16_t b) {
+  return std::any_of(expected.begin(), expected.end(), [&](const Expectation& one) {
+    const ExpectedPartner &x = one.partners[0], &y = one.partners[1];
+    return x.vertices.empty() && y.vertices.empty() && std::minmax(x.body, y.body) == std::minmax(a, b);
+  });
+}
+
+}  // namespace
+
+void ClearanceFinder::begin(const Step& step, const Options& options) {
+  options_ = options.clearance;
+  exact_ = options.accuracy.rung == Accuracy::EXACT;
+  const std::size_t n = step.bodies.size();
+  bodies_.resize(n);
+  rows_.clear();
+  row_of_.assign(n * (n + 1), -1);
+  const auto add = [&](std::size_t a, std::size_t b, bool unknown) {
+    row_of_[a * (n + 1) + b] = static_cast<std::int32_t>(rows_.size());
+    Row row;
+    row.answer.body = {static_cast<std::uint16_t>(a), b == n ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
+    row.answer.expected = expectsAll(options.expected, row.answer.body[0], row.answer.body[1]);
+    row.unknown = unknown;
+    rows_.push_back(row);
+  };
+  const auto lost = [&](std::size_t b) {
+    return step.bodies[b].dropped_faces > 0 || looseVertices(step.bodies[b]) > 0;
+  };
+  for (std::size_t a = 0; a < n; ++a) {
+    if (meetsItself(step.bodies[a])) add(a, a, lost(a));
+    for (std::size_t b = a + 1; b < n; ++b) {
+      if (meet(step.bodies[a], a, step.bodies[b], b)) add(a, b, lost(a) || lost(b));
+    }
+    if (meetsMap(step.bodies[a]) && (step.map.surface || options.obstacle_expected)) {
+      add(a, n, lost(a) || !step.map.surface);
+    }
+  }
+}
+
+ClearanceFinder::Row* ClearanceFinder::rowOf(std::size_t a, std::size_t b) {
+  const std::size_t n = bodies_.size();
+  if (a > b) std::swap(a, b);
+  const std::int32_t row = row_of_[a * (n + 1) + (b == OBSTACLE_BODY ? n : b)];
+  return row < 0 ? nullptr : &rows_[static_cast<std::size_t>(row)];
+}
+
+double ClearanceFinder::limitOf(const Row& row) const {
+  const bool itself = row.answer.body[0] == row.answer.body[1];
+  return itself ? std::min(options_.max_m, options_.self_m / 2) : options_.max_m;
+}
+
+/// How much nearer the two may be than where they were seen.
+double ClearanceFinder::radiusOf(const Row& row) const {
+  const auto [a, b] = row.answer.body;
+  return bodies_[a].radius_m + (b == OBSTACLE_BODY ? 0 : bodies_[b].radius_m);
+}
+
+void ClearanceFinder::learnBodies(const ClearancePart& part) {
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    BodyState& state = bodies_[b];
+    const SceneBody& body = part.scene.bodies()[b];
+    const Body& motion = part.step.bodies[b];
+    if (!state.first_t0) state.first_t0 = motion.t0;
+    state.fitted = state.fitted_to_map = false;
+    state.known = body.usedCount() > 0 && isUsable(boxOf(body));
+    for (std::size_t i = 0; body.masked && i < body.usedCount(); ++i) {
+      state.known = state.known && (body.active[i] || !(body.asked.empty() || body.asked[body.slot_vertex[i]]));
+    }
+    state.radius_m = body.uncertain ? *std::max_element(motion.radius_m->begin(), motion.radius_m->end()) : 0;
+  }
+}
+
+/// The tree's boxes of this part. False: of such a size that nothing is computed with them.
+bool ClearanceFinder::fit(std::size_t b, const ClearancePart& part, bool to_map) {
+  BodyState& state = bodies_[b];
+  const Body& motion = part.step.bodies[b];
+  if (!state.tree.isBuilt()) state.tree.build(part.scene.bodies()[b], *motion.t0);
+  if (state.tree.empty()) return false;
+  if (to_map ? !state.fitted_to_map : !state.fitted) {
+    state.fitted = !to_map;
+    state.fitted_to_map = to_map;
+    if (to_map) {
+      state.tree.refit(inMapFrame(part.step.map.map_from_fixed, *motion.t0, state.map_t0),
+                       inMapFrame(part.step.map.map_from_fixed, *motion.t1, state.map_t1));
+    } else {
+      state.tree.refit(*motion.t0, *motion.t1);
+    }
+  }
+  return isUsable(state.tree.box(state.tree.root()));
+}
+
+void ClearanceFinder::addPart(const ClearancePart& part) {
+  learnBodies(part);
+  takeContacts(part);
+  // The map's rows last: they may want the boxes of another frame.
+  for (const bool maps : {false, true}) {
+    for (Row& row : rows_) {
+      if ((row.answer.body[1] == OBSTACLE_BODY) == maps) search(row, part);
+    }
+  }
+}
+
+/// What of it lies in the whole step.
+double ClearancePart::ofStep(double t) const { return (static_cast<double>(index) + t) / static_cast<double>(count); }
+
+void ClearanceFinder::takeContacts(const ClearancePart& part) {
+  for (const StartIntersection& s : part.found.intersections) {
+    // What is inside of another one is apart from its surface; what is inside of the map is a contact as well.
+    if (s.body[1] == OBSTACLE_BODY || s.vertex[2] == NO_INDEX) continue;
+    touchAt(part, 0, s.body, {{{s.vertex[0], s.vertex[1], NO_INDEX}, {s.vertex[2], s.vertex[3], s.vertex[4]}}},
+            nullptr);
+  }
+  std::vector<const Contact*> first(rows_.size(), nullptr);
+  for (const Contact& c : part.found.contacts) {
+    Row* row = rowOf(c.body[0], c.body[1]);
+    if (!row) continue;
+    if (c.certainty != Certainty::CERTAIN) {
+      row->undecided = true;
+      continue;
+    }
+    const Contact*& earliest = first[static_cast<std::size_t>(row - rows_.data())];
+    if (!earliest || c.toc_lower < earliest->toc_lower) earliest = &c;
+  }
+  for (const Contact* c : first) {
+    if (!c) continue;
+    std::array<Feature, 2> vertex{{{NO_INDEX, NO_INDEX, NO_INDEX}, {NO_INDEX, NO_INDEX, NO_INDEX}}};
+    const auto [of_first, of_second] = factsOf(c->kind).vertices;
+    std::copy_n(c->vertex.begin(), of_first, vertex[0].begin());
+    std::copy_n(c->vertex.begin() + of_first, of_second, vertex[1].begin());
+    const OccupiedLeaf leaf{c->voxel, c->voxel_size};
+    touchAt(part, c->toc_lower, c->body, vertex, factsOf(c->kind).isOnMap() ? &leaf : nullptr);
+  }
+}
+
+/// Where two features that the step reports touch. The first of the step's is kept.
+void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<std::uint16_t, 2> body,
+                              std::array<Feature, 2> vertex, const OccupiedLeaf* leaf) {
+  Row* row = rowOf(body[0], body[1]);
+  if (!row || row->touches) return;
+  row->touches = true;
+  if (!leaf && body[0] > body[1]) {
+    std::swap(body[0], body[1]);
+    std::swap(vertex[0], vertex[1]);
+  }
+  ClearanceDistance& distance = row->answer.over_step;
+  distance.t = part.ofStep(t);
+  distance.vertex = vertex;
+  std::array<MovingHull, 2> hull;
+  for (std::size_t side = 0; side < (leaf ? 1 : 2); ++side) {
+    const Body& moving = part.step.bodies[body[side]];
+    for (const Index v : vertex[side]) {
+      if (v != NO_INDEX) hull[side].addCorner((*moving.t0)[v], (*moving.t1)[v]);
+    }
+  }
+  const Eigen::Isometry3d& pose = part.step.map.map_from_fixed;
+  if (leaf) {
+    distance.voxel = leaf->min;
+    distance.voxel_size = leaf->size;
+    const LeafBox cube = leafBox(*leaf, part.map->resolution());
+    hull[1] = MovingHull::box(cube.lo, cube.hi);
+    for (std::size_t i = 0; i < hull[0].count; ++i) {
+      hull[0].t0[i] = pose * hull[0].t0[i];
+      hull[0].t1[i] = pose * hull[0].t1[i];
+    }
+  }
+  HullPair pair;
+  pair.set(hull[0], hull[1]);
+  const Nearest nearest = pair.at(t, 0);
+  for (int side = 0; side < 2; ++side) {
+    const Vec3 point = pair.pointInMetres(nearest.point[side]);
+    distance.point[side] = leaf ? Vec3(pose.inverse() * point) : point;
+  }
+}
+
+void ClearanceFinder::search(Row& row, const ClearancePart& part) {
+  const auto [a, b] = row.answer.body;
+  const bool on_map = b == OBSTACLE_BODY;
+  if (row.unknown) return;
+  if (!bodies_[a].known || !(on_map ? part.map != nullptr : bodies_[b].known)) {
+    row.unknown = true;
+    return;
+  }
+  ++row.parts;
+  const bool last = part.index + 1 == part.count;
+  const bool moved = on_map && !isIdentity(part.step.map.map_from_fixed);
+  NearestSearch::Goal goal{options_.tolerance_m, limitOf(row) + radiusOf(row), false, part.deadline};
+  FoundDistance apart_only;
+  apart_only.lower_m = 0;
+  if (on_map && MapBoxes(*part.map).empty()) {
+    apart_only.lower_m = std::numeric_limits<double>::infinity();
+  } else if (a != b && !moved) {
+    const StepBox other = on_map ? boxOf(part.map->bounds()) : boxOf(part.scene.bodies()[b]);
+    if (!isUsable(other)) {
+      row.unknown = true;
+      return;
+    }
+    apart_only.lower_m = apart(boxOf(part.scene.bodies()[a]), other, 0);
+  }
+  const bool is_far = apart_only.lower_m >= goal.limit_m;
+  if (is_far || part.deadline.isOver()) {
+    apart_only.cut = !is_far;
+    row.over_step.lower_m = std::min(row.over_step.lower_m, apart_only.lower_m);
+    row.over_step.cut = row.over_step.cut || apart_only.cut;
+    if (last) row.at_end = apart_only;
+    return;
+  }
+  if (!fit(a, part, moved) || (!on_map && a != b && !fit(b, part, false))) {
+    row.unknown = true;
+    return;
+  }
+  FoundDistance known = row.over_step;
+  if (last) {
+    goal.at_end = true;
+    row.at_end = measure(row, part, goal, FoundDistance());
+    describe(row, part, row.at_end, row.answer.at_end);
+    goal.at_end = false;
+    if (row.at_end.upper_m < known.upper_m) {
+      known = row.at_end;
+      if (!row.touches) row.answer.over_step = row.answer.at_end;
+    }
+  }
+  if (row.touches && exact_) return;  // all is known of it
+  const FoundDistance found = measure(row, part, goal, known);
+  if (found.upper_m < known.upper_m && !row.touches) describe(row, part, found, row.answer.over_step);
+  row.over_step.upper_m = found.upper_m;
+  row.over_step.lower_m = std::min(row.over_step.lower_m, found.lower_m);
+  row.over_step.cut = row.over_step.cut || found.cut;
+}
+
+FoundDistance ClearanceFinder::measure(const Row& row, const ClearancePart& part, const NearestSearch::Goal& goal,
+                                       const FoundDistance& known) {
+  const auto [a, b] = row.answer.body;
+  BodyState& first = bodies_[a];
+  const FeatureTree& tree = first.tree;
+  const auto none = [](std::uint32_t, std::uint32_t) { return false; };
+  if (b == OBSTACLE_BODY) {
+    const MapBoxes map(*part.map);
+    return search_.run(tree, map, false, goal, known, none, [&](std::uint32_t i, std::uint32_t leaf) {
+      return meetAtEnd(tree.itemHull(i), map.leafBox(leaf));
+    });
+  }
+  const FeatureTree& other = bodies_[b].tree;
+  const auto meet = [&](std::uint32_t i, std::uint32_t j) { return meetAtEnd(tree.itemHull(i), other.itemHull(j)); };
+  if (a != b) return search_.run(tree, other, false, goal, known, none, meet);
+  if (first.self_m != options_.self_m) {
+    first.self_m = options_.self_m;
+    const Body& body = part.scene.bodies()[a].setup;
+    first.neighbours.set(*body.topology, body.reference ? body.reference->positions : *first.first_t0, first.self_m);
+  }
+  return search_.run(
+      tree, tree, true, goal, known,
+      [&](std::uint32_t i, std::uint32_t j) {
+        return shareVertex(tree.feature(i), tree.feature(j)) || first.neighbours.are(tree.feature(i), tree.feature(j));
+      },
+      meet);
+}
+
+void ClearanceFinder::describe(const Row& row, const ClearancePart& part, const FoundDistance& found,
+                               ClearanceDistance& distance) const {
+  if (!(found.upper_m < std::numeric_limits<double>::infinity())) return;
+  const auto [a, b] = row.answer.body;
+  distance.t = part.ofStep(found.t);
+  distance.point = found.point;
+  distance.vertex[0] = bodies_[a].tree.feature(found.item[0]);
+  if (b != OBSTACLE_BODY) {
+    distance.vertex[1] = bodies_[b].tree.feature(found.item[1]);
+    return;
+  }
+  const OccupiedLeaf& leaf = MapBoxes(*part.map).leaf(found.item[1]);
+  distance.voxel = leaf.min;
+  distance.voxel_size = leaf.size;
+  const Eigen::Isometry3d& pose = part.step.map.map_from_fixed;
+  if (isIdentity(pose)) return;
+  for (Vec3& point : distance.point) point = pose.inverse() * point;
+}
+
+void ClearanceFinder::judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const {
+  const double limit_m = limitOf(row), radius_m = radiusOf(row);
+  if (found.lower_m >= limit_m + radius_m) {
+    distance = ClearanceDistance();
+    distance.status = ClearanceStatus::FARTHER;
+    distance.lower_m = limit_m;
+    return;
+  }
+  const double wide_m = std::max(options_.tolerance_m, tolerance::CLEARANCE_RELATIVE * found.upper_m);
+  distance.status = found.upper_m == 0                                        ? ClearanceStatus::TOUCHING
+                    : found.cut || !(found.upper_m - found.lower_m <= wide_m) ? ClearanceStatus::LOWER
+                                                                              : ClearanceStatus::MEASURED;
+  distance.lower_m = std::max(0.0, found.lower_m - radius_m);
+  if (radius_m > 0) distance.lower_m *= 1 - tolerance::CLEARANCE_BOX;  // for the sum of radii, and the difference
+  distance.upper_m = found.upper_m;
+}
+
+void ClearanceFinder::finish(std::size_t parts, Outcome& outcome) {
+  StageStats& stats = outcome.stats[Effect::CLEARANCE];
+  stats.in = rows_.size();
+  stats.out = 0;
+  outcome.clearances.clear();
+  for (Row& row : rows_) {
+    Clearance& answer = row.answer;
+    if (row.parts < parts) {  // what was not come to may be anything
+      row.over_step.lower_m = row.at_end.lower_m = 0;
+      row.over_step.cut = row.at_end.cut = true;
+    }
+    if (!row.unknown) judge(row, row.at_end, answer.at_end);
+    if (row.touches) {
+      const double upper_m = exact_ || row.unknown ? 0 : row.over_step.upper_m;
+      answer.over_step.status = ClearanceStatus::TOUCHING;
+      answer.over_step.lower_m = 0;
+      answer.over_step.upper_m = upper_m;
+    } else if (row.unknown || row.undecided) {
+      answer.over_step = ClearanceDistance();
+    } else if (answer.at_end.status == ClearanceStatus::TOUCHING) {
+      answer.over_step = answer.at_end;
+    } else {
+      judge(row, row.over_step, answer.over_step);
+    }
+    const ClearanceStatus status = answer.over_step.status;
+    stats.out += status != ClearanceStatus::LOWER && status != ClearanceStatus::UNKNOWN;
+    outcome.clearances.push_back(answer);
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,110 @@
+#include "step/clearance/feature_tree.h"
+
+#include <algorithm>
+
+namespace dccd {
+
+void FeatureTree::build(const SceneBody& body, const Positions& positions) {
+  const Topology& topology = *body.setup.topology;
+  const auto asked = [&](Index v) { return body.asked.empty() || body.asked[v] != 0; };
+  features_.clear();
+  nodes_.clear();
+  std::vector<Edge> on_faces;
+  std::vector<bool> covered(topology.vertexCount());
+  for (const Face& f : topology.faces()) {
+    if (!asked(f[0]) || !asked(f[1]) || !asked(f[2])) continue;
+    features_.push_back(f);
+    for (int i = 0; i < 3; ++i) {
+      covered[f[i]] = true;
+      on_faces.push_back({std::min(f[i], f[(i + 1) % 3]), std::max(f[i], f[(i + 1) % 3])});
+    }
+  }
+  // Edges are on asked faces, all of them, unless some vertex is left out, or there are edges on no face.
+  std::sort(on_faces.begin(), on_faces.end());
+  for (const Edge& e : topology.edges()) {
+    if (!asked(e[0]) || !asked(e[1]) || std::binary_search(on_faces.begin(), on_faces.end(), e)) continue;
+    features_.push_back({e[0], e[1], NO_INDEX});
+    covered[e[0]] = covered[e[1]] = true;
+  }
+  for (const Index v : topology.usedVertices()) {
+    if (asked(v) && !covered[v]) features_.push_back({v, NO_INDEX, NO_INDEX});
+  }
+  std::vector<Vec3> centres;
+  for (const Feature& f : features_) {
+    Vec3 sum = Vec3::Zero();
+    int count = 0;
+    for (const Index v : f) {
+      if (v != NO_INDEX) sum += positions[v], ++count;
+    }
+    centres.push_back(sum.allFinite() ? Vec3(sum / count) : Vec3::Zero());
+  }
+  std::vector<std::uint32_t> order(features_.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  if (!order.empty()) addNode(order, centres, 0, static_cast<std::uint32_t>(order.size()));
+  std::vector<Feature> sorted;
+  for (const std::uint32_t i : order) sorted.push_back(features_[i]);
+  features_ = std::move(sorted);
+  boxes_.resize(nodes_.size());
+  built_ = true;
+}
+
+/// Halves at the median of the longest side.
+std::uint32_t FeatureTree::addNode(std::vector<std::uint32_t>& order, const std::vector<Vec3>& centres,
+                                   std::uint32_t first, std::uint32_t last) {
+  const auto node = static_cast<std::uint32_t>(nodes_.size());
+  nodes_.emplace_back();
+  nodes_[node].first = first;
+  if (last - first <= LEAF) {
+    nodes_[node].count = last - first;
+    return node;
+  }
+  Eigen::AlignedBox3d box;
+  for (std::uint32_t i = first; i < last; ++i) box.extend(centres[order[i]]);
+  Eigen::Index axis;
+  (box.max() - box.min()).maxCoeff(&axis);
+  const std::uint32_t middle = first + ((last - first) / 2 + LEAF - 1) / LEAF * LEAF;
+  std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last,
+                   [&](std::uint32_t x, std::uint32_t y) {
+                     const double p = centres[x][axis], q = centres[y][axis];
+                     return p != q ? p < q : x < y;
+                   });
+  addNode(order, centres, first, middle);
+  nodes_[node].right = addNode(order, centres, middle, last);
+  return node;
+}
+
+StepBox FeatureTree::itemBox(std::uint32_t feature) const {
+  StepBox box = StepBox::none();
+  for (const Index v : features_[feature]) {
+    if (v == NO_INDEX) break;
+    box.add(0, (*t0_)[v]);
+    box.add(1, (*t1_)[v]);
+  }
+  return box;
+}
+
+MovingHull FeatureTree::itemHull(std::uint32_t feature) const {
+  MovingHull hull;
+  for (const Index v : features_[feature]) {
+    if (v != NO_INDEX) hull.addCorner((*t0_)[v], (*t1_)[v]);
+  }
+  return hull;
+}
+
+void FeatureTree::refit(const Positions& t0, const Positions& t1) {
+  t0_ = &t0;
+  t1_ = &t1;
+  for (std::size_t n = nodes_.size(); n-- > 0;) {  // children come after their parents
+    const Node& node = nodes_[n];
+    StepBox box = StepBox::none();
+    if (node.count > 0) {
+      for (std::uint32_t i = node.first; i < node.first + node.count; ++i) box.add(itemBox(i));
+    } else {
+      box = boxes_[n + 1];
+      box.add(boxes_[node.right]);
+    }
+    boxes_[n] = box;
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,301 @@
+#include "step/clearance/hull_pair.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "step/clearance/margins.h"
+
+namespace dccd {
+namespace {
+
+constexpr int MOST_ROUNDS = 48;
+/// [m] More than underflow takes from a distance in all operations.
+constexpr double UNDERFLOW_M = tolerance::CLEARANCE_UNDERFLOW_M;
+
+/// The edges and triangles of a hull of so many corners.
+struct Shape {
+  int edges, triangles;
+  std::array<std::array<std::uint8_t, 2>, 12> edge;
+  std::array<std::array<std::uint8_t, 3>, 12> triangle;
+};
+constexpr Shape POINT{0, 0, {}, {}};
+constexpr Shape SEGMENT{1, 0, {{{0, 1}}}, {}};
+constexpr Shape TRIANGLE{3, 1, {{{0, 1}, {1, 2}, {2, 0}}}, {{{0, 1, 2}}}};
+constexpr Shape BOX{12,
+                    12,
+                    {{{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}},
+                    {{{0, 1, 3},
+                      {0, 3, 2},
+                      {4, 5, 7},
+                      {4, 7, 6},
+                      {0, 1, 5},
+                      {0, 5, 4},
+                      {2, 3, 7},
+                      {2, 7, 6},
+                      {0, 2, 6},
+                      {0, 6, 4},
+                      {1, 3, 7},
+                      {1, 7, 5}}}};
+const Shape& shapeOf(std::size_t corners) {
+  return corners == 1 ? POINT : corners == 2 ? SEGMENT : corners == 3 ? TRIANGLE : BOX;
+}
+
+}  // namespace
+
+/// Of the differences of a simplex.
+struct HullPair::Combination {
+  double norm2 = std::numeric_limits<double>::infinity();
+  std::array<double, 4> weight{};
+  Vec3 direction = Vec3::Zero();  // across what it is a mean of; zero where that goes through the origin
+};
+
+/// Some differences of a corner of the first and one of the second.
+struct HullPair::Simplex {
+  int count = 0;
+  std::array<Vec3, 4> w;
+  std::array<std::array<std::uint8_t, 2>, 4> corner;
+
+  static void takeNearer(const Combination& one, Combination& best) {
+    if (one.norm2 < best.norm2) best = one;
+  }
+
+  bool holds(std::size_t a, std::size_t b) const {
+    for (int i = 0; i < count; ++i) {
+      if (corner[i][0] == a && corner[i][1] == b) return true;
+    }
+    return false;
+  }
+
+  Combination pointAt(int i) const {
+    Combination c;
+    c.norm2 = w[i].squaredNorm();
+    c.weight[i] = 1;
+    c.direction = w[i];
+    return c;
+  }
+
+  Combination onSegment(int i, int j) const {
+    const Vec3 e = w[j] - w[i];
+    const double ee = e.squaredNorm(), s = -w[i].dot(e);
+    if (!(s > 0) || !(ee > 0)) return pointAt(i);
+    if (!(s < ee)) return pointAt(j);
+    Combination c;
+    c.weight[j] = s / ee;
+    c.weight[i] = 1 - c.weight[j];
+    const Vec3 v = w[i] + c.weight[j] * e;
+    c.norm2 = v.squaredNorm();
+    c.direction = v - e * (e.dot(v) / ee);
+    return c;
+  }
+
+  Combination onTriangle(int i, int j, int k) const {
+    const Vec3 n = (w[j] - w[i]).cross(w[k] - w[i]);
+    const double nn = n.squaredNorm();
+    const double a = n.dot(w[j].cross(w[k])), b = n.dot(w[k].cross(w[i])), c = n.dot(w[i].cross(w[j]));
+    if (nn > 0 && a > 0 && b > 0 && c > 0) {
+      Combination inside;
+      const double sum = a + b + c;
+      inside.weight[i] = a / sum;
+      inside.weight[j] = b / sum;
+      inside.weight[k] = c / sum;
+      inside.norm2 = (inside.weight[i] * w[i] + inside.weight[j] * w[j] + inside.weight[k] * w[k]).squaredNorm();
+      inside.direction = n.dot(w[i]) < 0 ? Vec3(-n) : n;
+      return inside;
+    }
+    Combination best = onSegment(i, j);
+    takeNearer(onSegment(j, k), best);
+    takeNearer(onSegment(k, i), best);
+    return best;
+  }
+
+  Combination onTetrahedron() const {
+    static constexpr int FACES[4][4] = {{0, 1, 2, 3}, {0, 1, 3, 2}, {0, 2, 3, 1}, {1, 2, 3, 0}};
+    Combination best;
+    double volume[4], sum = 0;
+    bool inside = true;
+    for (const auto& f : FACES) {
+      const Vec3 n = (w[f[1]] - w[f[0]]).cross(w[f[2]] - w[f[0]]);
+      const double origin = -n.dot(w[f[0]]), other = n.dot(w[f[3]] - w[f[0]]);
+      if (origin * other > 0) {
+        volume[f[3]] = std::abs(origin);
+        sum += volume[f[3]];
+        continue;
+      }
+      inside = false;
+      takeNearer(onTriangle(f[0], f[1], f[2]), best);
+    }
+    if (!inside) return best;
+    best.norm2 = 0;
+    for (int i = 0; i < 4; ++i) best.weight[i] = volume[i] / sum;
+    return best;
+  }
+
+  /// The point nearest to the origin.
+  Combination nearest() const {
+    return count == 1 ? pointAt(0) : count == 2 ? onSegment(0, 1) : count == 3 ? onTriangle(0, 1, 2) : onTetrahedron();
+  }
+
+  /// Leaves out what the point does not need.
+  void reduce(Combination& point) {
+    int kept = 0;
+    for (int i = 0; i < count; ++i) {
+      if (!(point.weight[i] > 0)) continue;
+      w[kept] = w[i];
+      corner[kept] = corner[i];
+      point.weight[kept++] = point.weight[i];
+    }
+    count = kept;
+  }
+};
+
+void HullPair::set(const MovingHull& a, const MovingHull& b) {
+  origin_ = a.t0[0];
+  time_ = -1;
+  double largest = 0;
+  const std::array<const MovingHull*, 2> hulls{&a, &b};
+  for (int side = 0; side < 2; ++side) {
+    count_[side] = hulls[side]->count;
+    for (std::size_t i = 0; i < count_[side]; ++i) {
+      t0_[side][i] = hulls[side]->t0[i] - origin_;
+      t1_[side][i] = hulls[side]->t1[i] - origin_;
+      largest = std::max({largest, t0_[side][i].cwiseAbs().maxCoeff(), t1_[side][i].cwiseAbs().maxCoeff()});
+    }
+  }
+  // Not less, whose reciprocal would overflow.
+  const int exponent = largest > 0 ? std::max(std::ilogb(largest), -1000) : -1000;
+  const double up = std::ldexp(1.0, -exponent);
+  scale_m_ = std::ldexp(1.0, exponent);
+  for (int side = 0; side < 2; ++side) {
+    for (std::size_t i = 0; i < count_[side]; ++i) {
+      t0_[side][i] *= up;
+      t1_[side][i] *= up;
+    }
+  }
+}
+
+double HullPair::lowerInMetres(double lower) const { return std::max(0.0, lower * scale_m_ - UNDERFLOW_M); }
+double HullPair::upperInMetres(double upper) const { return upper * scale_m_ + UNDERFLOW_M; }
+
+void HullPair::goTo(double t) {
+  if (t == time_) return;
+  time_ = t;
+  for (int side = 0; side < 2; ++side) {
+    for (std::size_t i = 0; i < count_[side]; ++i) now_[side][i] = (1 - t) * t0_[side][i] + t * t1_[side][i];
+  }
+}
+
+/// min n.a - max n.b, and which corners these are.
+double HullPair::along(const Vec3& n, std::size_t& a, std::size_t& b) const {
+  double least = n.dot(now_[0][0]), most = n.dot(now_[1][0]);
+  a = b = 0;
+  for (std::size_t i = 1; i < count_[0]; ++i) {
+    const double x = n.dot(now_[0][i]);
+    if (x < least) least = x, a = i;
+  }
+  for (std::size_t i = 1; i < count_[1]; ++i) {
+    const double x = n.dot(now_[1][i]);
+    if (x > most) most = x, b = i;
+  }
+  return least - most;
+}
+
+double HullPair::lowerAlong(const Vec3& direction, double t) {
+  goTo(t);
+  std::size_t a, b;
+  return along(direction, a, b) - tolerance::CLEARANCE;
+}
+
+void HullPair::takeMeans(const Simplex& simplex, const Combination& of, Nearest& nearest) const {
+  Vec3 on_a = Vec3::Zero(), on_b = Vec3::Zero();
+  double sum = 0;
+  for (int i = 0; i < simplex.count; ++i) sum += of.weight[i];
+  for (int i = 0; i < simplex.count; ++i) {
+    on_a += (of.weight[i] / sum) * now_[0][simplex.corner[i][0]];
+    on_b += (of.weight[i] / sum) * now_[1][simplex.corner[i][1]];
+  }
+  const double upper = (on_a - on_b).norm() + tolerance::CLEARANCE;
+  if (!(upper < nearest.upper)) return;
+  nearest.upper = upper;
+  nearest.point = {on_a, on_b};
+}
+
+void HullPair::tryDirection(const Vec3& direction, Nearest& nearest) const {
+  const double norm = direction.norm();
+  if (!(norm > 0)) return;
+  for (const double sign : {1.0, -1.0}) {
+    const Vec3 n = direction * (sign / norm);
+    if (!(n.squaredNorm() < 2)) return;  // of a vector so short that it has no direction
+    std::size_t a, b;
+    const double lower = along(n, a, b) - tolerance::CLEARANCE;
+    if (lower > nearest.lower) nearest.lower = lower, nearest.direction = n;
+  }
+}
+
+Nearest HullPair::at(double t, double wide_m) {
+  goTo(t);
+  Nearest nearest;
+  nearest.upper = std::numeric_limits<double>::infinity();
+  const double wide = std::max(wide_m / scale_m_, 4 * tolerance::CLEARANCE);
+  const auto isNarrow = [&] {
+    return nearest.upper - nearest.lower <= std::max(wide / 2, tolerance::CLEARANCE_RELATIVE / 2 * nearest.upper);
+  };
+  Simplex simplex;
+  std::size_t a = 0, b = 0;
+  double before = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < MOST_ROUNDS; ++round) {
+    simplex.w[simplex.count] = now_[0][a] - now_[1][b];
+    simplex.corner[simplex.count++] = {static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b)};
+    Combination point = simplex.nearest();
+    simplex.reduce(point);
+    takeMeans(simplex, point, nearest);
+    const double norm = point.direction.norm();
+    if (!(norm > 0)) break;
+    const Vec3 n = point.direction / norm;
+    const double lower = along(n, a, b) - tolerance::CLEARANCE;
+    if (lower > nearest.lower && n.squaredNorm() < 2) nearest.lower = lower, nearest.direction = n;
+    if (isNarrow() || simplex.count == 4 || simplex.holds(a, b) || !(point.norm2 < before)) break;
+    before = point.norm2;
+  }
+  if (!isNarrow()) improve(nearest);
+  return nearest;
+}
+
+/// What the search may have missed for rounding: every direction that can tell two hulls apart, and every pair of
+/// features: a corner and a triangle, or two edges, whose differences make two triangles.
+void HullPair::improve(Nearest& nearest) const {
+  const Shape &a = shapeOf(count_[0]), &b = shapeOf(count_[1]);
+  const auto tryTriangle = [&](std::array<std::array<std::uint8_t, 2>, 3> corners) {
+    Simplex s;
+    for (int k = 0; k < 3; ++k) {
+      s.corner[k] = corners[k];
+      s.w[k] = now_[0][corners[k][0]] - now_[1][corners[k][1]];
+    }
+    s.count = 3;
+    Combination c = s.onTriangle(0, 1, 2);
+    tryDirection(c.direction, nearest);
+    s.reduce(c);
+    takeMeans(s, c, nearest);
+  };
+  for (int f = 0; f < a.triangles; ++f) {
+    const auto& t = a.triangle[f];
+    tryDirection((now_[0][t[1]] - now_[0][t[0]]).cross(now_[0][t[2]] - now_[0][t[0]]), nearest);
+    for (std::uint8_t i = 0; i < count_[1]; ++i) tryTriangle({{{t[0], i}, {t[1], i}, {t[2], i}}});
+  }
+  for (int f = 0; f < b.triangles; ++f) {
+    const auto& t = b.triangle[f];
+    tryDirection((now_[1][t[1]] - now_[1][t[0]]).cross(now_[1][t[2]] - now_[1][t[0]]), nearest);
+    for (std::uint8_t i = 0; i < count_[0]; ++i) tryTriangle({{{i, t[0]}, {i, t[1]}, {i, t[2]}}});
+  }
+  for (int e = 0; e < a.edges; ++e) {
+    for (int f = 0; f < b.edges; ++f) {
+      const auto [a0, a1] = a.edge[e];
+      const auto [b0, b1] = b.edge[f];
+      tryDirection((now_[0][a1] - now_[0][a0]).cross(now_[1][b1] - now_[1][b0]), nearest);
+      tryTriangle({{{a0, b0}, {a0, b1}, {a1, b1}}});
+      tryTriangle({{{a0, b0}, {a1, b0}, {a1, b1}}});
+    }
+  }
+}
+
+}  // namespace dccd

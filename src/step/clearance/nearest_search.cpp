@@ -1,0 +1,70 @@
+#include "step/clearance/nearest_search.h"
+
+namespace dccd {
+namespace {
+
+constexpr int MOST_HALVINGS = 1 << 12;  // of one pair; what is left is as wide as it is
+constexpr std::uint64_t WORK = 64;      // boxes and times between two looks at the clock
+
+struct Interval {
+  double from, to, lower;
+  Vec3 direction[2];  // that held at either end
+};
+
+}  // namespace
+
+/// Nothing that far apart needs a further look.
+bool NearestSearch::prunes(double lower_m) {
+  double enough_m = goal_.limit_m;
+  if (found_.upper_m < std::numeric_limits<double>::infinity()) {
+    const double wide_m = std::max(goal_.tolerance_m, tolerance::CLEARANCE_RELATIVE * found_.upper_m);
+    enough_m = std::min(enough_m, found_.upper_m - wide_m);
+  }
+  if (lower_m < enough_m) return false;
+  settle(lower_m);
+  return true;
+}
+
+bool NearestSearch::isLate() { return found_.cut || (++looks_ % WORK == 0 && goal_.deadline.isOver()); }
+
+Nearest NearestSearch::takeAt(double t) {
+  const Nearest nearest = pair_.at(t, goal_.tolerance_m / 4);
+  const double upper_m = pair_.upperInMetres(nearest.upper);
+  if (upper_m < found_.upper_m) {
+    found_.upper_m = upper_m;
+    found_.t = t;
+    for (int side = 0; side < 2; ++side) found_.point[side] = pair_.pointInMetres(nearest.point[side]);
+    found_.item = item_;
+  }
+  return nearest;
+}
+
+/// Of the pair over the whole step. A direction bounds the distance over an interval by what it says at both ends, for
+/// min n.a - max n.b is concave in t. It errs by the square of the interval's length, so that few halvings do.
+void NearestSearch::refine() {
+  std::array<Interval, 64> left;  // a path to one interval leaves one beside each of its halvings
+  std::size_t count = 1;
+  left[0] = {0, 1, 0, {takeAt(0).direction, takeAt(1).direction}};
+  for (int halvings = 0; count > 0; ++halvings) {
+    Interval one = left[--count];
+    for (const Vec3& n : one.direction) {
+      one.lower = std::max(one.lower, std::min(pair_.lowerAlong(n, one.from), pair_.lowerAlong(n, one.to)));
+    }
+    const double lower_m = pair_.lowerInMetres(one.lower);
+    if (prunes(lower_m)) continue;
+    if (isLate()) {
+      cutAt(lower_m);
+      continue;
+    }
+    if (one.to - one.from <= tolerance::CLEARANCE_SHORTEST || halvings >= MOST_HALVINGS) {
+      settle(lower_m);
+      continue;
+    }
+    const double middle = (one.from + one.to) / 2;
+    const Vec3 direction = takeAt(middle).direction;
+    left[count++] = {middle, one.to, one.lower, {direction, one.direction[1]}};
+    left[count++] = {one.from, middle, one.lower, {one.direction[0], direction}};
+  }
+}
+
+}  // namespace dccd

@@ -1,0 +1,393 @@
+// How far apart partners are: small scenes whose distances can be worked out by hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/closed_meshes.h"
+#include "support/detector.h"
+#include "support/step_support.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+Options asking(double max_m = 10) {
+  Options options;
+  options.clearance.wanted = true;
+  options.clearance.max_m = max_m;
+  return options;
+}
+
+Body bodyOf(const char* name, const Topology& topology) {
+  Body body;
+  body.name = name;
+  body.topology = share(topology);
+  return body;
+}
+
+Positions movedBy(Positions positions, const Vec3& by) {
+  for (Vec3& p : positions) p += by;
+  return positions;
+}
+
+/// One triangle in the plane z = 0.
+const Topology TRIANGLE = Topology::fromTriangles(3, {{0, 1, 2}});
+const Positions FLAT{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+
+/// Two triangles, `above_m` apart at t0 and `end_m` at t1.
+Step twoTriangles(double above_m, double end_m) {
+  Step step = stepOf(bodyOf("low", TRIANGLE), FLAT, FLAT);
+  step.bodies.push_back(moving(bodyOf("high", TRIANGLE), movedBy(FLAT, {0, 0, above_m}), movedBy(FLAT, {0, 0, end_m})));
+  return step;
+}
+
+const Clearance& rowOf(const std::vector<Clearance>& rows, std::uint16_t a, std::uint16_t b) {
+  static const Clearance NONE;
+  for (const Clearance& row : rows) {
+    if (row.body == std::array<std::uint16_t, 2>{a, b}) return row;
+  }
+  ADD_FAILURE() << "no row of " << a << " and " << b;
+  return NONE;
+}
+
+void expectMeasured(const ClearanceDistance& d, double truth_m, double wide_m = 1e-4) {
+  EXPECT_EQ(d.status, ClearanceStatus::MEASURED) << toString(d.status);
+  EXPECT_LE(d.lower_m, truth_m);
+  EXPECT_GE(d.upper_m, truth_m);
+  EXPECT_LE(d.upper_m - d.lower_m, wide_m);
+}
+
+TEST(Clearance, OfTwoTrianglesThatComeNear) {
+  const std::vector<Clearance> rows = distance(twoTriangles(2, 0.5), asking());
+  ASSERT_EQ(rows.size(), 3u) << "each with itself, and the two";
+  const Clearance& row = rowOf(rows, 0, 1);
+  expectMeasured(row.at_end, 0.5);
+  expectMeasured(row.over_step, 0.5);
+  EXPECT_EQ(row.over_step.t, 1);
+  EXPECT_NEAR((row.at_end.point[1] - row.at_end.point[0]).z(), 0.5, 1e-4);
+  EXPECT_EQ(row.at_end.vertex, (std::array<std::array<Index, 3>, 2>{{{0, 1, 2}, {0, 1, 2}}}));
+  EXPECT_EQ(rowOf(rows, 0, 0).at_end.status, ClearanceStatus::FARTHER) << "one triangle has nothing but neighbours";
+}
+
+TEST(Clearance, IsLeastWithinTheStep) {
+  // The corner of one passes the other's at a distance of 0.3, at half of the step.
+  Step step = stepOf(bodyOf("low", TRIANGLE), FLAT, FLAT);
+  const Positions left = movedBy(FLAT, {-5, 0, 0.3}), right = movedBy(FLAT, {5, 0, 0.3});
+  step.bodies.push_back(moving(bodyOf("high", TRIANGLE), left, right));
+  const Clearance row = rowOf(distance(step, asking()), 0, 1);
+  expectMeasured(row.over_step, 0.3);
+  EXPECT_NEAR(row.over_step.t, 0.5, 0.1);
+  expectMeasured(row.at_end, std::hypot(4, 0.3));
+}
+
+TEST(Clearance, BeyondTheLargestIsOnlyFarther) {
+  const Clearance row = rowOf(distance(twoTriangles(2, 1), asking(0.9)), 0, 1);
+  for (const ClearanceDistance* d : {&row.at_end, &row.over_step}) {
+    EXPECT_EQ(d->status, ClearanceStatus::FARTHER);
+    EXPECT_EQ(d->lower_m, 0.9);
+    EXPECT_TRUE(std::isinf(d->upper_m));
+    EXPECT_FALSE(d->point[0].allFinite());
+  }
+}
+
+TEST(Clearance, OfWhatTouchesIsNothing) {
+  const Clearance through = rowOf(distance(twoTriangles(1, -1), asking()), 0, 1);
+  EXPECT_EQ(through.over_step.status, ClearanceStatus::TOUCHING);
+  EXPECT_EQ(through.over_step.lower_m, 0);
+  EXPECT_EQ(through.over_step.upper_m, 0);
+  EXPECT_NEAR(through.over_step.t, 0.5, 1e-6);
+  EXPECT_NEAR(through.over_step.point[0].z(), 0, 1e-6);
+  expectMeasured(through.at_end, 1);
+  const Clearance stays = rowOf(distance(twoTriangles(1, 0), asking()), 0, 1);
+  EXPECT_EQ(stays.at_end.status, ClearanceStatus::TOUCHING);
+}
+
+TEST(Clearance, SeesAnEdgeThroughTheMiddleOfAFace) {
+  const Positions big{{-9, -9, 0}, {9, -9, 0}, {0, 9, 0}}, upright{{0, 0, -3}, {0, 0, 3}, {0, 1, 3}};
+  Step step = stepOf(bodyOf("floor", TRIANGLE), big, big);
+  step.bodies.push_back(moving(bodyOf("blade", TRIANGLE), upright, upright));
+  const Clearance row = rowOf(distance(step, asking()), 0, 1);
+  EXPECT_EQ(row.at_end.status, ClearanceStatus::TOUCHING) << "corners and edges are a metre and more away";
+  EXPECT_EQ(row.over_step.status, ClearanceStatus::TOUCHING) << "no contact, but they cross from the start";
+  EXPECT_EQ(row.over_step.t, 0);
+}
+
+TEST(Clearance, IsFromTheSurfaceOfWhatIsInside) {
+  const StepBody large = box({-5, -5, -5}, {5, 5, 5}), small = box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
+  Step step = stepOf(bodyOf("large", large.topology), large.t0, large.t1);
+  step.bodies.push_back(moving(bodyOf("small", small.topology), small.t0, small.t1));
+  History history;
+  const Outcome outcome = detect(step, asking(), history);
+  ASSERT_EQ(outcome.start_state, StartState::INTERSECTING);
+  expectMeasured(rowOf(outcome.clearances, 0, 1).over_step, 4.5);
+}
+
+TEST(Clearance, OfABoxAndThreeVoxelsIsFortyCentimetres) {
+  // ../shared/cases/README.md: distances of octrees that are metres off elsewhere.
+  const StepBody cube = box({9.5, -0.5, -0.5}, {10.5, 0.5, 0.5});
+  Step step = stepOf(bodyOf("box", cube.topology), cube.t0, cube.t1);
+  const auto voxel = [](double x, double y, double z) {
+    const auto key = [](double c) { return static_cast<std::uint16_t>(std::floor(c / 0.1 + 1e-9) + 32768); };
+    return OccupiedLeaf{{key(x), key(y), key(z)}, 1};
+  };
+  step.map.surface = VoxelSurface::build(0.1, {voxel(1, 0, 0), voxel(9, 0, 0), voxel(12, 0, 1)});
+  const Clearance row = rowOf(distance(step, asking()), 0, OBSTACLE_BODY);
+  expectMeasured(row.at_end, 0.4, 1e-4);
+  expectMeasured(row.over_step, 0.4, 1e-4);
+  EXPECT_NEAR(row.at_end.point[0].x(), 9.5, 1e-6);
+  EXPECT_NEAR(row.at_end.point[1].x(), 9.1, 1e-6);
+  EXPECT_EQ(row.at_end.voxel, voxel(9, 0, 0).min);
+  EXPECT_EQ(row.at_end.voxel_size, 1u);
+  Step turned = step;  // the same in a map of another frame
+  turned.map.map_from_fixed.linear() = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  turned.map.map_from_fixed.translation() = Vec3(4, 5, 6);
+  for (auto* positions : {&turned.bodies[0].t0, &turned.bodies[0].t1}) {
+    Positions moved = **positions;
+    for (Vec3& p : moved) p = turned.map.map_from_fixed.inverse() * p;
+    *positions = share(moved);
+  }
+  const Clearance other = rowOf(distance(turned, asking()), 0, OBSTACLE_BODY);
+  EXPECT_EQ(other.over_step.status, ClearanceStatus::MEASURED);
+  EXPECT_NEAR(other.over_step.upper_m, 0.4, 1e-4);
+  EXPECT_NEAR((other.at_end.point[0] - turned.map.map_from_fixed.inverse() * Vec3(9.5, 0.05, 0.05)).norm(), 0, 0.1);
+}
+
+TEST(Clearance, IsNothingInsideOfTheMap) {
+  const Positions inside = movedBy(FLAT, {0.2, 0.2, 0.5});
+  Step step = stepOf(bodyOf("cloth", TRIANGLE), inside, inside);
+  step.map.surface = VoxelSurface::build(1, {{{32768, 32768, 32768}, 4}});
+  const Clearance row = rowOf(distance(step, asking()), 0, OBSTACLE_BODY);
+  EXPECT_EQ(row.at_end.status, ClearanceStatus::TOUCHING);
+  EXPECT_EQ(row.over_step.status, ClearanceStatus::TOUCHING);
+}
+
+TEST(Clearance, IsUnknownWhereSomethingWasNotLookedAt) {
+  const auto statusOf = [](const Step& step, const Options& options, std::uint16_t a, std::uint16_t b) {
+    const Clearance row = rowOf(distance(step, options), a, b);
+    EXPECT_EQ(row.at_end.status, row.over_step.status);
+    EXPECT_EQ(row.over_step.lower_m, 0);
+    return row.over_step.status;
+  };
+  Step step = twoTriangles(2, 1);
+  Positions broken = *step.bodies[1].t1;
+  broken[2].x() = std::numeric_limits<double>::quiet_NaN();
+  step.bodies[1].t1 = share(broken);
+  EXPECT_EQ(statusOf(step, asking(), 0, 1), ClearanceStatus::UNKNOWN) << "a vertex is not finite";
+  step = twoTriangles(2, 1);
+  step.bodies[0].dropped_faces = 1;
+  EXPECT_EQ(statusOf(step, asking(), 0, 1), ClearanceStatus::UNKNOWN) << "a face could not be used";
+  step = twoTriangles(2, 1);
+  step.bodies[0].vertex_mask = {0, 1, 2};
+  EXPECT_EQ(statusOf(step, asking(), 0, 1), ClearanceStatus::UNKNOWN) << "nothing of it is asked about";
+  step = twoTriangles(2e200, 1e200);
+  EXPECT_EQ(statusOf(step, asking(), 0, 1), ClearanceStatus::UNKNOWN) << "squares overflow";
+  step = twoTriangles(2, 1);
+  Options options = asking();
+  options.obstacle_expected = true;
+  EXPECT_EQ(statusOf(step, options, 0, OBSTACLE_BODY), ClearanceStatus::UNKNOWN) << "there is no map";
+  step.map.surface = VoxelSurface::build(1, {});
+  EXPECT_EQ(rowOf(distance(step, options), 0, OBSTACLE_BODY).over_step.status, ClearanceStatus::FARTHER)
+      << "it is empty";
+}
+
+/// A strip of 3 x 21 points, folded in the middle around a gap of `gap_m`.
+Positions folded(double gap_m) {
+  Positions positions;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 21; ++k) {
+      const bool upper = k > 10;
+      positions.emplace_back(upper ? (20 - k) * 0.1 : k * 0.1, i * 0.1, upper ? gap_m : 0);
+    }
+  }
+  return positions;
+}
+
+TEST(Clearance, OfAFoldIsFromLayerToLayer) {
+  Positions flat;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 21; ++k) flat.emplace_back(k * 0.1, i * 0.1, 0);
+  }
+  Body cloth = bodyOf("cloth", Topology::grid(3, 21));
+  ReferenceFrame reference;
+  reference.positions = flat;
+  cloth.reference = share(reference);
+  Options options = asking();
+  options.clearance.self_m = 0.45;
+  expectMeasured(rowOf(distance(stepOf(cloth, folded(0.07), folded(0.05)), options), 0, 0).over_step, 0.05);
+  const Clearance open = rowOf(distance(stepOf(cloth, flat, flat), options), 0, 0);
+  EXPECT_EQ(open.over_step.status, ClearanceStatus::FARTHER);
+  EXPECT_EQ(open.over_step.lower_m, 0.225) << "half of self_m: beyond it a flat sheet is near itself, too";
+}
+
+TEST(Clearance, IsNearerByTheUncertaintyOfVertices) {
+  Step step = twoTriangles(2, 0.5);
+  step.bodies[1].radius_m = share(std::vector<double>{0, 0.1, 0});
+  Options options = asking();
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  const Clearance row = rowOf(distance(step, options), 0, 1);
+  EXPECT_EQ(row.over_step.status, ClearanceStatus::MEASURED);
+  EXPECT_NEAR(row.over_step.lower_m, 0.4, 1e-4);
+  EXPECT_LE(row.over_step.lower_m, 0.4);
+  EXPECT_NEAR(row.over_step.upper_m, 0.5, 1e-4);
+}
+
+TEST(Clearance, HasNoLowerBoundBesideAContactWithinTheSeparation) {
+  Step step = twoTriangles(2, 0.5);
+  for (Body& body : step.bodies) body.minimum_separation_m = 0.6;
+  Options options = asking();
+  options.accuracy.rung = Accuracy::CONSERVATIVE;
+  const Clearance row = rowOf(distance(step, options), 0, 1);
+  EXPECT_EQ(row.over_step.status, ClearanceStatus::TOUCHING);
+  EXPECT_EQ(row.over_step.lower_m, 0);
+  EXPECT_NEAR(row.over_step.upper_m, 0.5, 1e-4);
+  expectMeasured(row.at_end, 0.5);
+}
+
+TEST(Clearance, OfATurningBodyIsAlongThePathThatIsTested) {
+  // A bar along x turns by 90 degrees about the origin; its tip passes a point that it is far from at both ends.
+  const Positions bar{{0, 0, 0}, {1, 0, 0}, {1, 0, 0.1}};
+  Body turning = bodyOf("bar", TRIANGLE);
+  turning.rigid = turning.turns = true;
+  turning.pose_t1.linear() = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()).toRotationMatrix();
+  Positions end = bar;
+  for (Vec3& p : end) p = turning.pose_t1 * p;
+  const Vec3 beside(1.2 * std::sqrt(0.5), 1.2 * std::sqrt(0.5), 0);
+  Step step = stepOf(turning, bar, end);
+  step.bodies.push_back(moving(bodyOf("post", TRIANGLE), movedBy(FLAT, beside), movedBy(FLAT, beside)));
+  Options options = asking();
+  options.rigid_tolerance_m = 1e-3;
+  step.bodies[1].minimum_separation_m = 0;
+  History history;
+  const Outcome outcome = detect(step, options, history);
+  ASSERT_GT(outcome.substeps, 1u);
+  const Clearance row = rowOf(outcome.clearances, 0, 1);
+  EXPECT_EQ(row.over_step.status, ClearanceStatus::MEASURED);
+  EXPECT_NEAR(row.over_step.upper_m, 0.2, 2e-3);
+  EXPECT_NEAR(row.over_step.t, 0.5, 0.1);
+  EXPECT_GT(row.at_end.lower_m, 0.8);
+}
+
+TEST(Clearance, NamesWhatIsExpected) {
+  Options options = asking();
+  options.expected.push_back({{ExpectedPartner{1, {}, ""}, ExpectedPartner{0, {}, ""}}, ""});
+  EXPECT_TRUE(rowOf(distance(twoTriangles(2, 1), options), 0, 1).expected);
+  EXPECT_FALSE(rowOf(distance(twoTriangles(2, 1), options), 0, 0).expected);
+  options.expected[0].partners[0].vertices = {0};
+  EXPECT_FALSE(rowOf(distance(twoTriangles(2, 1), options), 0, 1).expected) << "of one vertex alone";
+}
+
+TEST(Clearance, IsAskedOfThoseThatMeet) {
+  Step step = twoTriangles(2, 1);
+  step.bodies[0].not_against = {1};
+  step.bodies[1].rigid = true;
+  EXPECT_EQ(distance(step, asking()).size(), 1u) << "the first one with itself";
+  History history;
+  EXPECT_TRUE(detect(step, Options(), history).clearances.empty()) << "nobody asks";
+}
+
+bool sameBits(const Clearance& x, const Clearance& y) {
+  const auto same = [](const ClearanceDistance& a, const ClearanceDistance& b) {
+    bool points = true;
+    for (int side = 0; side < 2; ++side) {
+      for (int k = 0; k < 3; ++k) {
+        const double p = a.point[side][k], q = b.point[side][k];
+        points = points && (p == q || (std::isnan(p) && std::isnan(q)));
+      }
+    }
+    return points && a.status == b.status && a.lower_m == b.lower_m && a.upper_m == b.upper_m && a.t == b.t &&
+           a.vertex == b.vertex && a.voxel == b.voxel && a.voxel_size == b.voxel_size;
+  };
+  return x.body == y.body && same(x.at_end, y.at_end) && same(x.over_step, y.over_step);
+}
+
+void expectSame(const std::vector<Clearance>& x, const std::vector<Clearance>& y, const std::string& what) {
+  ASSERT_EQ(x.size(), y.size()) << what;
+  for (std::size_t i = 0; i < x.size(); ++i) EXPECT_TRUE(sameBits(x[i], y[i])) << what << ", row " << i;
+}
+
+/// A wavy cloth above another one and a table of voxels.
+Step wavySheets(double phase) {
+  Step step;
+  const Topology grid = Topology::grid(20, 30);
+  for (int b = 0; b < 2; ++b) {
+    Positions t0, t1;
+    for (int i = 0; i < 600; ++i) {
+      const double x = i % 30 * 0.05, y = i / 30 * 0.05;
+      const auto at = [&](double p) {
+        return Vec3(x, y, 0.3 * (b + 1) + 0.05 * std::sin(7 * x + 5 * y * (b + 1) + p));
+      };
+      t0.push_back(at(phase));
+      t1.push_back(at(phase + 0.2));
+    }
+    step.bodies.push_back(moving(bodyOf(b ? "upper" : "lower", grid), t0, t1));
+  }
+  std::vector<OccupiedLeaf> table;
+  for (int x = 0; x < 30; ++x) {
+    for (int y = 0; y < 20; ++y) {
+      table.push_back({{static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y), 32767}, 1});
+    }
+  }
+  step.map.surface = VoxelSurface::build(0.05, table);
+  return step;
+}
+
+TEST(Clearance, IsTheSameBitsWhateverComputesIt) {
+  const Step before = wavySheets(0), step = wavySheets(0.2);
+  const std::vector<Clearance> plain = distance(step, asking());
+  forEachSimdTarget([&](const std::string& target) { expectSame(distance(step, asking()), plain, target); });
+  Options threads = asking();
+  threads.num_threads = 4;
+  expectSame(distance(step, threads), plain, "four threads");
+  Detector detector(asking());
+  detector.run(before);
+  const Outcome carried = detector.run(step);
+  // Without a reference frame a body's is where it was first.
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    const bool itself = plain[i].body[0] == plain[i].body[1];
+    EXPECT_TRUE(itself || sameBits(plain[i], carried.clearances[i])) << "row " << i;
+  }
+}
+
+TEST(Clearance, IsStillBoundedWhereTheTimeRanOut) {
+  const Step step = wavySheets(0);
+  const std::vector<Clearance> whole = distance(step, asking());
+  int cut = 0, done = 0;
+  for (int looks = 0; looks < 4000; looks = looks * 5 / 4 + 1) {
+    std::atomic<std::int64_t> left{looks};
+    History history;
+    const Outcome outcome = detect(step, asking(), history, Deadline::afterLooks(left));
+    ASSERT_EQ(outcome.clearances.size(), whole.size());
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      for (const auto member : {&Clearance::at_end, &Clearance::over_step}) {
+        const ClearanceDistance &some = outcome.clearances[i].*member, &all = whole[i].*member;
+        EXPECT_LE(some.lower_m, all.upper_m) << looks << " looks";
+        EXPECT_GE(some.upper_m, all.lower_m) << looks << " looks";
+        ++(some.status == ClearanceStatus::LOWER ? cut : done);
+      }
+    }
+  }
+  EXPECT_GT(cut, 10);
+  EXPECT_GT(done, 10);
+}
+
+TEST(Clearance, RefusesNumbersThatMeanNothing) {
+  const auto said = [](double ClearanceOptions::*field, double value) -> std::string {
+    Options options = asking();
+    options.clearance.*field = value;
+    try {
+      check(options);
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return "nothing";
+  };
+  EXPECT_EQ(said(&ClearanceOptions::max_m, 0), "clearance.max_m = 0.000000 is out of range; above 0, to 1e9");
+  EXPECT_EQ(said(&ClearanceOptions::self_m, std::nan("")), "clearance.self_m = nan is out of range; above 0, to 1e9");
+  EXPECT_NE(said(&ClearanceOptions::tolerance_m, -1), "nothing");
+  EXPECT_NE(said(&ClearanceOptions::tolerance_m, INFINITY), "nothing");
+  EXPECT_EQ(said(&ClearanceOptions::max_m, 0.5), "nothing");
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
