@@ -293,6 +293,15 @@ def write_effects(folder, result):
                 table(header, rows))
 
 
+def write_slow(folder, result):
+    header = ["law", "its numbers", "runs", "with a contact", "arrived", "mean speed m/s"]
+    rows = [[row["law"], row["numbers"]] + ([str(row["seeds"]), str(row["contacts"]), str(row["arrived"]), "%.3f" % row["mean_speed_m_s"]]
+                                            if "seeds" in row else ["", "", "", ""]) for row in result["rows"]]
+    write_rows(os.path.join(folder, "slow.csv"), header, rows)
+    return save(folder, "slow", "# Slow down instead of stop\n\nA simulated arm carries a cloth over a post and up to a wall, %d times. Of the "
+                "other laws stand the numbers that are the fastest without a contact.\n\n" % result["seeds"] + table(header, rows))
+
+
 def write_latency(folder, result):
     """Table, histogram and page of benchmark/latency.py."""
     header = ["run", "vertices", "Hz", "frames", "answered", "dropped", "ran into the budget", "contacts (median)", "what",

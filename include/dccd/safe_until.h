@@ -1,0 +1,123 @@
+// Until when nothing can touch, and how fast one may go: what follows from a step's distances and bounds on speeds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dccd/export.h"
+#include "dccd/outcome.h"
+
+namespace dccd {
+
+/// What is assumed of a body's speed after a step.
+struct SpeedBound {
+  static constexpr double NONE = std::numeric_limits<double>::infinity();
+  double max_m_s = NONE;  ///< no vertex is faster [m/s], 0 or more; NONE: nobody says, and nothing is promised of it
+  /// Above 0: this many times the speed of the body's fastest vertex in the step, in the place of max_m_s.
+  double last_step_factor = 0;
+  bool slows_down = true;  ///< SpeedScale slows it; false: it goes on as fast, whatever the scale
+};
+
+/// Nothing is promised beyond this much after a step's end [s].
+constexpr double MOST_PROMISED_S = 10;
+
+/// No contact of two partners that is not expected comes before until_ns.
+///
+/// Theorem. Let d be the distance of two partners at the step's end, less what the step holds them apart (minimum
+/// separation), and v the sum of their bounds. Then they do not touch before the end + d / v.
+/// Proof. A point of a face or an edge is a mean of its vertices, with weights that stay; no vertex goes further than
+/// its bound times the time, so neither does the point. Two points that are d apart need d / v to meet.
+/// It rests on this:
+/// - a vertex is where the step ends, or within its uncertainty radius of there (d is less by the radii);
+/// - no vertex is faster afterwards than its body's bound; a body against itself counts with twice its bound;
+/// - the surface stays straight between its vertices, and has the same edges and faces;
+/// - the map gets no voxel, and stays where it is. Bodies and features that the step leaves out are not spoken of, nor
+///   are a body's own features that are neighbours (ClearanceOptions::self_m) or features that share a vertex.
+/// d / v is rounded down.
+struct SafeUntil {
+  static constexpr std::size_t NO_PAIR = std::numeric_limits<std::size_t>::max();
+  StampNs stamp_ns = 0;  ///< the step's end
+  StampNs until_ns = 0;  ///< not before stamp_ns; equal to it: nothing is promised
+  /// The same of pairs of two bodies, or of one and the map, alone: of a body and itself no more than half of
+  /// ClearanceOptions::self_m is known.
+  StampNs others_until_ns = 0;
+  std::size_t limiting = NO_PAIR;  ///< the pair in Outcome::clearances that ends first; of several the first
+  /// Of that pair, at stamp_ns: their least distance as above [m], and the sum of their bounds [m/s]. NaN without one.
+  double distance_m = std::numeric_limits<double>::quiet_NaN();
+  double closing_m_s = std::numeric_limits<double>::quiet_NaN();
+  std::string reason;  ///< why nothing is promised; empty where something is
+  bool isPromise() const { return others_until_ns > stamp_ns; }
+  double seconds() const { return secondsBetween(stamp_ns, until_ns); }  ///< 0 to MOST_PROMISED_S
+  double othersSeconds() const { return secondsBetween(stamp_ns, others_until_ns); }
+};
+
+/// From the outcome's clearances at its end. `bounds`: by body; of those that are missing nobody says anything.
+/// Nothing is promised of an outcome without an answer, of a step with anything unproved but what a budget cut off,
+/// without distances, and where a pair touches, is undecided, or has a body without a bound. Throws
+/// std::invalid_argument naming the body whose bound is NaN or below 0.
+DCCD_EXPORT SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& bounds);
+
+/// Holds each promise against the next answer: was a body faster than was assumed, or has the map new voxels? What it
+/// does not find may still have happened between the two. Not thread-safe.
+class DCCD_EXPORT PromiseWatch {
+ public:
+  /// From the next promise on.
+  void setBounds(std::vector<SpeedBound> bounds) { bounds_ = std::move(bounds); }
+  /// The next promise, after a look at the last one. Of an outcome without an answer none, and the last one stands.
+  const SafeUntil& follow(const Outcome& outcome);
+  /// Nothing is looked back on, as after a reset.
+  void forget();
+
+  const SafeUntil& promise() const { return promise_; }
+  /// Why the promise before this one was void; empty: it was not, as far as both answers tell, or there was none.
+  const std::string& broken() const { return broken_; }
+  std::uint64_t promises() const { return promises_; }
+  std::uint64_t brokenPromises() const { return broken_promises_; }
+
+ private:
+  std::vector<SpeedBound> bounds_;
+  SafeUntil promise_;
+  std::string broken_;
+  std::uint64_t promises_ = 0, broken_promises_ = 0;
+  // Of the last promise: what it was made of.
+  std::shared_ptr<const Step> step_;
+  std::shared_ptr<const VoxelSurface> obstacle_;
+  std::vector<SpeedBound> assumed_;
+};
+
+/// The three numbers of the law, in the terms of ISO/TS 15066, 5.5.4.
+struct SpeedLaw {
+  /// T_r: from a frame's stamp until what slows down begins to follow the next one's scale [s].
+  double reaction_time_s = 0;
+  double stopping_time_s = 0;  ///< T_s: from full speed to standing still, evenly slower; 0: at once [s]
+  double uncertainty_m = 0;    ///< C + Z_d + Z_r: what is to be left at the end [m]
+};
+
+/// The protective separation distance at a scale s [m]: S_p = S_h + S_r + S_s + C + Z_d + Z_r, where
+/// - S_h = v_h (T_r + s T_s) is the way of what does not slow down, of at most v_h [m/s];
+/// - S_r = s v_r T_r is the way of what does, of at most v_r at full speed, until it begins to;
+/// - S_s = s v_r (s T_s) / 2 is its way until it stands, which from s times the speed takes s times as long.
+DCCD_EXPORT double separationDistance(double scale, double v_r_m_s, double v_h_m_s, const SpeedLaw& law);
+/// The largest scale, 0 to 1, whose S_p is at most this distance; 0 where there is none, and of what is not finite.
+/// Never less for a larger distance, never more for larger speeds.
+DCCD_EXPORT double speedScale(double distance_m, double v_r_m_s, double v_h_m_s, const SpeedLaw& law);
+
+struct SpeedScale {
+  double scale = 0;                                              ///< 0 to 1 of full speed
+  std::size_t limiting = SafeUntil::NO_PAIR;                     ///< the pair in Outcome::clearances that allows least
+  double distance_m = std::numeric_limits<double>::quiet_NaN();  ///< of that pair, as in SafeUntil [m]
+  double needed_m = std::numeric_limits<double>::quiet_NaN();    ///< its S_p at full speed [m]
+  std::string reason;                                            ///< why it is less than 1; empty: it is 1
+};
+
+/// The least over all pairs of two bodies, or of one and the map, that are not expected to touch, and of which
+/// something slows down; 0 where safeUntil() promises nothing for lack of an answer or of a bound, and where something
+/// unexpected touches anew, be it a body and itself. What else stands in the way of a proof (Assurance) is the caller's
+/// matter. Throws as safeUntil() does, and names a number of the law that is not finite or below 0.
+DCCD_EXPORT SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds, const SpeedLaw& law);
+
+}  // namespace dccd

@@ -1,0 +1,339 @@
+#include "dccd/safe_until.h"
+
+#include <gmp.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "dccd/assurance.h"
+
+namespace dccd {
+namespace {
+
+constexpr double NONE = SpeedBound::NONE;
+
+double roundedDown(double value) { return std::nextafter(value, 0.0); }  // of what is 0 or more
+double roundedUp(double value) { return std::nextafter(value, NONE); }
+
+/// A rational number; doubles convert exactly.
+class Rational {
+ public:
+  explicit Rational(double value) {
+    mpq_init(q_);
+    mpq_set_d(q_, value);
+  }
+  Rational(const Rational&) = delete;
+  Rational& operator=(const Rational&) = delete;
+  ~Rational() { mpq_clear(q_); }
+  void subtract(const Rational& other) { mpq_sub(q_, q_, other.q_); }
+  void add(const Rational& other) { mpq_add(q_, q_, other.q_); }
+  void multiply(const Rational& other) { mpq_mul(q_, q_, other.q_); }
+  void square() { mpq_mul(q_, q_, q_); }
+  bool isAbove(const Rational& other) const { return mpq_cmp(q_, other.q_) > 0; }
+
+ private:
+  mpq_t q_;
+};
+
+/// |to - from| > max_m_s * time, by rational arithmetic.
+bool isFasterExactly(const Vec3& from, const Vec3& to, double max_m_s, StampNs time_ns) {
+  Rational way(0), limit(max_m_s), nanosecond(1e9);
+  for (int axis = 0; axis < 3; ++axis) {
+    Rational along(to[axis]);
+    along.subtract(Rational(from[axis]));
+    along.square();
+    way.add(along);
+  }
+  nanosecond.square();
+  way.multiply(nanosecond);                                // [m^2 ns^2 / s^2]
+  limit.multiply(Rational(static_cast<double>(time_ns)));  // below 2^53 ns, 104 days: exact
+  limit.square();
+  return way.isAbove(limit);
+}
+
+/// The first vertex that is certainly farther from where it was than its bound allows. One that is not finite says
+/// nothing.
+std::optional<std::size_t> faster(const Positions& from, const Positions& to, double max_m_s, StampNs time_ns) {
+  // Each of the rounded squares is wrong by less than eight units in its last place; what they leave open, and what is
+  // near to overflow or to underflow, rational arithmetic decides.
+  constexpr double SLACK = 0x1p-48, SMALL = 1e-200, BIG = 1e200;
+  const double limit = max_m_s * (static_cast<double>(time_ns) * 1e-9), limit_sq = limit * limit;
+  for (std::size_t v = 0; v < from.size(); ++v) {
+    if (!from[v].allFinite() || !to[v].allFinite() || from[v] == to[v]) continue;
+    const double way_sq = (to[v] - from[v]).squaredNorm();
+    const bool sure = limit_sq > SMALL && limit_sq < BIG && way_sq < BIG;
+    if (sure && way_sq < (1 - SLACK) * limit_sq) continue;
+    if ((sure && way_sq > (1 + SLACK) * limit_sq) || isFasterExactly(from[v], to[v], max_m_s, time_ns)) return v;
+  }
+  return std::nullopt;
+}
+
+double fastestOf(const Body& body, double seconds) {
+  double way_sq = 0;
+  for (std::size_t v = 0; v < body.t0->size(); ++v) {
+    const double one_sq = ((*body.t1)[v] - (*body.t0)[v]).squaredNorm();
+    if (std::isfinite(one_sq)) way_sq = std::max(way_sq, one_sq);
+  }
+  return seconds > 0 ? std::sqrt(way_sq) / seconds : NONE;
+}
+
+std::string nameOf(const Outcome& outcome, std::size_t body) {
+  return body == OBSTACLE_BODY ? "octomap" : "'" + outcome.step->bodies[body].name + "'";
+}
+
+bool isItself(const Clearance& pair) { return pair.body[0] == pair.body[1]; }
+
+std::string pairOf(const Outcome& outcome, const Clearance& pair) {
+  return nameOf(outcome, pair.body[0]) + " and " + (isItself(pair) ? "itself" : nameOf(outcome, pair.body[1]));
+}
+
+/// By body of the step, with what its last step says put in.
+std::vector<SpeedBound> boundsOf(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+  std::vector<SpeedBound> bounds = given;
+  bounds.resize(outcome.step ? outcome.step->bodies.size() : 0);
+  for (std::size_t b = 0; b < bounds.size(); ++b) {
+    const auto require = [&](double value, const char* name) {
+      if (value >= 0) return;
+      std::ostringstream text;
+      text << "the speed bound of body '" << outcome.step->bodies[b].name << "' has " << name << " " << value
+           << "; it must be 0 or more";
+      throw std::invalid_argument(text.str());
+    };
+    require(bounds[b].max_m_s, "max_m_s");
+    require(bounds[b].last_step_factor, "last_step_factor");
+    if (bounds[b].last_step_factor > 0) {
+      bounds[b].max_m_s = bounds[b].last_step_factor * fastestOf(outcome.step->bodies[b], outcome.duration_s());
+    }
+  }
+  return bounds;
+}
+
+/// Why the outcome allows no promise whatever its distances are; empty: it does.
+std::string whyNone(const Outcome& outcome) {
+  if (!outcome.answered) return std::string("no answer, ") + toString(outcome.status);
+  // What a budget cut off are pairs, whose distances are bounded nonetheless; nothing else may be open.
+  const bool only_cut = outcome.status == StepStatus::DEADLINE && outcome.unproved.size() == 1;
+  if (!outcome.unproved.empty() && !only_cut) return "not proved: " + outcome.unproved.front();
+  return outcome.clearances.empty() ? "no distances were computed" : "";
+}
+
+/// A pair that says something: not one that is expected to touch, nor one with a map that is not there and that nobody
+/// misses.
+bool counts(const Outcome& outcome, const Clearance& pair) {
+  const bool mapless = pair.body[1] == OBSTACLE_BODY && !outcome.obstacle && outcome.status != StepStatus::NO_MAP;
+  return !pair.expected && !mapless;
+}
+
+/// What is certainly between the two at the step's end until they touch [m]; 0: nothing, or nobody knows.
+double distanceOf(const Outcome& outcome, const Clearance& pair) {
+  const ClearanceStatus status = pair.at_end.status;
+  if (status == ClearanceStatus::TOUCHING || status == ClearanceStatus::UNKNOWN) return 0;
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  const double separation_m = pair.body[1] == OBSTACLE_BODY ? separationFromMap(bodies[pair.body[0]])
+                                                            : separationBetween(bodies[pair.body[0]], pair.body[0],
+                                                                                bodies[pair.body[1]], pair.body[1]);
+  const double rest_m = pair.at_end.lower_m - separation_m;
+  if (!(rest_m > 0) || !std::isfinite(rest_m)) return 0;
+  return separation_m > 0 ? roundedDown(rest_m) : rest_m;
+}
+
+/// Of both partners [m/s]; the map stands still.
+struct Speeds {
+  double slowed = 0, other = 0;
+  std::string unbounded;  // a body of which nobody says how fast it is
+};
+Speeds speedsOf(const Outcome& outcome, const Clearance& pair, const std::vector<SpeedBound>& bounds) {
+  Speeds speeds;
+  for (const std::uint16_t body : pair.body) {
+    if (body == OBSTACLE_BODY) continue;
+    double& sum = bounds[body].slows_down ? speeds.slowed : speeds.other;
+    if (!std::isfinite(bounds[body].max_m_s)) speeds.unbounded = outcome.step->bodies[body].name;
+    sum = sum == 0 ? bounds[body].max_m_s : roundedUp(sum + bounds[body].max_m_s);
+  }
+  return speeds;
+}
+
+std::string unboundedReason(const std::string& body) { return "no speed bound is known of body '" + body + "'"; }
+
+std::string zeroReason(const Outcome& outcome, const Clearance& pair) {
+  const bool unknown = pair.at_end.status == ClearanceStatus::UNKNOWN;
+  return "the distance of " + pairOf(outcome, pair) + (unknown ? " is not known" : " may be 0");
+}
+
+/// Rounded down: seconds in which a distance above 0 is closed.
+double secondsTo(double distance_m, double closing_m_s) {
+  return closing_m_s == 0 ? MOST_PROMISED_S : std::min(MOST_PROMISED_S, roundedDown(distance_m / closing_m_s));
+}
+
+StampNs nsIn(double seconds) {
+  if (seconds == MOST_PROMISED_S) return static_cast<StampNs>(MOST_PROMISED_S * 1e9);
+  return static_cast<StampNs>(std::floor(roundedDown(seconds * 1e9)));
+}
+
+/// Whether something is occupied that was not before: a leaf that no leaf of then holds.
+bool hasNewVoxels(const VoxelSurface& now, const VoxelSurface& before) {
+  const auto same = [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return a.min == b.min && a.size == b.size; };
+  const std::vector<OccupiedLeaf>&leaves = now.leaves(), &old = before.leaves();
+  if (now.resolution() == before.resolution() &&
+      std::equal(leaves.begin(), leaves.end(), old.begin(), old.end(), same)) {
+    return false;
+  }
+  if (now.resolution() != before.resolution()) return true;
+  return std::any_of(leaves.begin(), leaves.end(), [&](const OccupiedLeaf& leaf) {
+    const auto middle = [&](std::uint16_t min) { return (min - 32768 + 0.5 * leaf.size) * now.resolution(); };
+    const OccupiedLeaf* found = before.leafAt({middle(leaf.min.x), middle(leaf.min.y), middle(leaf.min.z)});
+    return !found || found->size < leaf.size;
+  });
+}
+
+}  // namespace
+
+SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given) {
+  SafeUntil result;
+  result.stamp_ns = result.until_ns = result.others_until_ns = outcome.stamp_ns;
+  const std::vector<SpeedBound> bounds = boundsOf(outcome, given);
+  result.reason = whyNone(outcome);
+  if (!result.reason.empty()) return result;
+  double least_s = MOST_PROMISED_S, others_s = MOST_PROMISED_S;
+  bool others = false;
+  for (std::size_t p = 0; p < outcome.clearances.size(); ++p) {
+    const Clearance& pair = outcome.clearances[p];
+    if (!counts(outcome, pair)) continue;
+    const Speeds speeds = speedsOf(outcome, pair, bounds);
+    const double distance_m = distanceOf(outcome, pair);
+    double closing_m_s = speeds.slowed + speeds.other;
+    if (speeds.slowed > 0 && speeds.other > 0) closing_m_s = roundedUp(closing_m_s);
+    const bool nothing = distance_m == 0 || !std::isfinite(closing_m_s);
+    const double seconds = nothing ? 0 : secondsTo(distance_m, closing_m_s);
+    if (!isItself(pair)) {
+      others = true;
+      others_s = std::min(others_s, seconds);
+    }
+    if (result.limiting != SafeUntil::NO_PAIR && seconds >= least_s) continue;
+    least_s = seconds;
+    result.limiting = p;
+    result.distance_m = distance_m;
+    result.closing_m_s = std::isfinite(closing_m_s) ? closing_m_s : std::numeric_limits<double>::quiet_NaN();
+    result.reason = !nothing                   ? ""
+                    : speeds.unbounded.empty() ? zeroReason(outcome, pair)
+                                               : unboundedReason(speeds.unbounded);
+  }
+  result.until_ns += nsIn(least_s);
+  result.others_until_ns = others ? outcome.stamp_ns + nsIn(others_s) : result.until_ns;
+  if (result.until_ns == result.stamp_ns && result.reason.empty()) result.reason = "the time is less than a nanosecond";
+  return result;
+}
+
+const SafeUntil& PromiseWatch::follow(const Outcome& outcome) {
+  broken_.clear();
+  promise_ = safeUntil(outcome, bounds_);
+  if (!outcome.answered) return promise_;
+  const StampNs time_ns = step_ ? outcome.stamp_ns - step_->stamp_ns : 0;
+  if (time_ns > 0) {
+    const auto say = [&](const std::string& what) { broken_ += (broken_.empty() ? "" : "; ") + what; };
+    const std::size_t bodies = std::min(step_->bodies.size(), outcome.step->bodies.size());
+    for (std::size_t b = 0; b < bodies; ++b) {
+      const Body &before = step_->bodies[b], &now = outcome.step->bodies[b];
+      if (before.name != now.name || before.t1->size() != now.t1->size()) {
+        say("body '" + before.name + "' has another mesh");
+      } else if (!std::isfinite(assumed_[b].max_m_s)) {
+        continue;
+      } else if (const auto v = faster(*before.t1, *now.t1, assumed_[b].max_m_s, time_ns)) {
+        std::ostringstream text;
+        text << "body '" << now.name << "' was faster than " << assumed_[b].max_m_s << " m/s: vertex " << *v << " came "
+             << ((*now.t1)[*v] - (*before.t1)[*v]).norm() << " m in " << secondsBetween(0, time_ns) << " s";
+        say(text.str());
+      }
+    }
+    if (step_->bodies.size() != outcome.step->bodies.size()) say("there are other bodies");
+    const bool moved = obstacle_ && outcome.obstacle &&
+                       step_->map.map_from_fixed.matrix() != outcome.step->map.map_from_fixed.matrix();
+    const bool grew = outcome.obstacle && outcome.obstacle != obstacle_ &&
+                      (obstacle_ ? hasNewVoxels(*outcome.obstacle, *obstacle_) : outcome.obstacle->leafCount() > 0);
+    if (moved) say("the map is elsewhere");
+    if (grew) say("the map has new voxels");
+    broken_promises_ += !broken_.empty();
+  }
+  step_ = nullptr;
+  if (!promise_.isPromise()) return promise_;
+  ++promises_;
+  step_ = outcome.step;
+  obstacle_ = outcome.obstacle;
+  assumed_ = boundsOf(outcome, bounds_);
+  return promise_;
+}
+
+void PromiseWatch::forget() {
+  step_ = nullptr;
+  obstacle_ = nullptr;
+  promise_ = {};
+  broken_.clear();
+}
+
+double separationDistance(double scale, double v_r_m_s, double v_h_m_s, const SpeedLaw& law) {
+  const double stopping_time_s = scale * law.stopping_time_s;
+  return v_h_m_s * (law.reaction_time_s + stopping_time_s) + scale * v_r_m_s * law.reaction_time_s +
+         scale * v_r_m_s * stopping_time_s / 2 + law.uncertainty_m;
+}
+
+double speedScale(double distance_m, double v_r_m_s, double v_h_m_s, const SpeedLaw& law) {
+  if (!(separationDistance(0, v_r_m_s, v_h_m_s, law) <= distance_m) || !std::isfinite(distance_m)) return 0;
+  if (separationDistance(1, v_r_m_s, v_h_m_s, law) <= distance_m) return 1;
+  // S_p grows with the scale. Halving finds the largest double that is short of the distance as it is rounded.
+  double low = 0, high = 1;
+  for (;;) {
+    const double middle = low + (high - low) / 2;
+    if (middle <= low || middle >= high) return low;
+    (separationDistance(middle, v_r_m_s, v_h_m_s, law) <= distance_m ? low : high) = middle;
+  }
+}
+
+SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& given, const SpeedLaw& law) {
+  const auto require = [](double value, const char* name) {
+    if (value >= 0 && std::isfinite(value)) return;
+    std::ostringstream text;
+    text << name << " of the speed law is " << value << "; it must be finite and 0 or more";
+    throw std::invalid_argument(text.str());
+  };
+  require(law.reaction_time_s, "reaction_time_s");
+  require(law.stopping_time_s, "stopping_time_s");
+  require(law.uncertainty_m, "uncertainty_m");
+  SpeedScale result;
+  const std::vector<SpeedBound> bounds = boundsOf(outcome, given);
+  result.reason = whyNone(outcome);
+  if (!result.reason.empty()) return result;
+  result.scale = 1;
+  for (std::size_t p = 0; p < outcome.clearances.size(); ++p) {
+    const Clearance& pair = outcome.clearances[p];
+    if (!counts(outcome, pair) || isItself(pair)) continue;
+    const Speeds speeds = speedsOf(outcome, pair, bounds);
+    if (speeds.slowed == 0) continue;
+    const double distance_m = distanceOf(outcome, pair);
+    const bool bounded = speeds.unbounded.empty();
+    const double scale = bounded && distance_m > 0 ? speedScale(distance_m, speeds.slowed, speeds.other, law) : 0;
+    if (scale >= result.scale) continue;
+    result.scale = scale;
+    result.limiting = p;
+    result.distance_m = distance_m;
+    result.needed_m =
+        bounded ? separationDistance(1, speeds.slowed, speeds.other, law) : std::numeric_limits<double>::quiet_NaN();
+    std::ostringstream text;
+    text << pairOf(outcome, pair) << " are " << distance_m << " m apart, and " << result.needed_m
+         << " m are needed at full speed";
+    result.reason = !bounded         ? unboundedReason(speeds.unbounded)
+                    : distance_m > 0 ? text.str()
+                                     : zeroReason(outcome, pair);
+  }
+  if (assuranceOf(outcome).touching == Touching::NEW) {
+    result.scale = 0;
+    result.reason = "something touches anew";
+  }
+  return result;
+}
+
+}  // namespace dccd

@@ -1,0 +1,163 @@
+#include "support/closed_loop.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <random>
+#include <vector>
+
+#include "dccd/detect.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr std::size_t ROWS = 8, COLS = 6;
+constexpr double SPACING_M = 0.035, HANGS_M = (ROWS - 1) * SPACING_M, VOXEL_M = 0.025, TICK_S = 1.0 / 600,
+                 DRAG_PER_S = 5;
+constexpr int TICKS_A_FRAME = 20, TICKS_A_CHECK = 5;
+
+double uniform(std::mt19937_64& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+/// Point masses on rods, by position: the upper row is the gripper's.
+class Cloth {
+ public:
+  Cloth(double x, double z) {
+    for (std::size_t i = 0; i < ROWS * COLS; ++i) {
+      const double y = (static_cast<double>(i % COLS) - 0.5 * (COLS - 1)) * SPACING_M;
+      now_.emplace_back(x, y, z - static_cast<double>(i / COLS) * SPACING_M);
+    }
+    before_ = now_;
+  }
+  const Positions& positions() const { return now_; }
+  void tick(double gripper_m, double gust_m_s2) {
+    const Vec3 acceleration(gust_m_s2, 0, -9.81);
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      const Vec3 speed = (1 - DRAG_PER_S * TICK_S) * (now_[i] - before_[i]);
+      before_[i] = now_[i];
+      if (i < COLS) {
+        now_[i].x() += gripper_m;
+      } else {
+        now_[i] += speed + acceleration * (TICK_S * TICK_S);
+      }
+    }
+    for (int round = 0; round < 12; ++round) {
+      for (std::size_t i = 0; i < now_.size(); ++i) {
+        if (i + COLS < now_.size()) pull(i, i + COLS);
+        if ((i + 1) % COLS != 0) pull(i, i + 1);
+      }
+    }
+  }
+
+ private:
+  void pull(std::size_t a, std::size_t b) {
+    const double share_a = a < COLS ? 0 : b < COLS ? 1 : 0.5, share_b = b < COLS ? 0 : a < COLS ? 1 : 0.5;
+    const Vec3 along = now_[b] - now_[a];
+    const double length_m = along.norm();
+    const Vec3 off = along * ((length_m - SPACING_M) / length_m);
+    now_[a] += share_a * off;
+    now_[b] -= share_b * off;
+  }
+  Positions now_, before_;
+};
+
+std::uint16_t keyOf(double x) { return static_cast<std::uint16_t>(std::lround(x / VOXEL_M) + 32768); }
+
+void addBox(const Vec3& low, const Vec3& high, std::vector<OccupiedLeaf>& leaves) {
+  for (std::uint16_t x = keyOf(low.x()); x < keyOf(high.x()); ++x) {
+    for (std::uint16_t y = keyOf(low.y()); y < keyOf(high.y()); ++y) {
+      for (std::uint16_t z = keyOf(low.z()); z < keyOf(high.z()); ++z) leaves.push_back({{x, y, z}, 1});
+    }
+  }
+}
+
+}  // namespace
+
+double distanceToMap(const Outcome& outcome) {
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const Clearance& pair : outcome.clearances) {
+    if (pair.body[1] == OBSTACLE_BODY) least_m = std::min(least_m, pair.at_end.lower_m);
+  }
+  return std::isfinite(least_m) ? least_m : 0;
+}
+
+ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const Outcome&)>& scale) {
+  using Loop = ClosedLoop;
+  std::mt19937_64 random(seed);
+  const double post_m = 0.025 * std::floor(uniform(random, 8, 20)), top_m = 0.025 * std::floor(uniform(random, 4, 16)),
+               wall_m = 0.025 * std::floor(uniform(random, 40, 60)), clears_m = uniform(random, 0.03, 0.08),
+               braking_m_s2 = Loop::BRAKING_M_S2 * uniform(random, 0.8, 1.2), gusts_m_s2 = uniform(random, 0, 0.3);
+  std::vector<OccupiedLeaf> leaves;
+  addBox({post_m, -0.2, 0}, {post_m + 0.1, 0.2, top_m}, leaves);
+  addBox({wall_m, -0.2, 0}, {wall_m + 0.05, 0.2, top_m + 0.4}, leaves);
+
+  Body body;
+  body.name = "cloth";
+  body.self_collision = false;
+  body.topology = share(Topology::grid(ROWS, COLS));
+  Step step;
+  step.map.surface = VoxelSurface::build(VOXEL_M, std::move(leaves));
+  Options options, truth;
+  options.clearance.wanted = true;
+  History history, truth_history;
+  const auto answer = [&](const Positions& from, const Positions& to, const Options& how, History& from_history) {
+    body.t0 = share(from);
+    body.t1 = share(to);
+    step.bodies = {body};
+    return detect(step, how, from_history);
+  };
+
+  Cloth cloth(0, top_m + clears_m + HANGS_M);
+  Positions frame = cloth.positions(), checked = frame;
+  struct Command {
+    double at_s, scale;
+  };
+  std::deque<Command> on_the_way;
+  double gripper_m = 0, speed_m_s = 0, wanted = 0, gust_m_s2 = 0, answered_s = 0, near_m = 0, end_s = Loop::LONGEST_S;
+  ClosedLoopRun run;
+  int tick = 0;
+  for (double now_s = 0; now_s < end_s && !run.contact; now_s = ++tick * TICK_S) {
+    while (!on_the_way.empty() && on_the_way.front().at_s <= now_s) {
+      wanted = on_the_way.front().scale;
+      on_the_way.pop_front();
+    }
+    // The arm knows nothing of the wall.
+    const bool late = now_s - answered_s > Loop::REACTION_S;
+    const double target_m_s = late ? 0 : wanted * Loop::FULL_SPEED_M_S;
+    speed_m_s = std::clamp(target_m_s, speed_m_s - braking_m_s2 * TICK_S, speed_m_s + 1.0 * TICK_S);
+    gripper_m += speed_m_s * TICK_S;
+    gust_m_s2 = std::clamp(gust_m_s2 + uniform(random, -0.02, 0.02) * gusts_m_s2, -gusts_m_s2, gusts_m_s2);
+    cloth.tick(speed_m_s * TICK_S, gust_m_s2);
+    if (!run.arrived && gripper_m >= wall_m - Loop::NEAR_WALL_M) {
+      run.arrived = true;
+      run.mean_speed_m_s = gripper_m / now_s;
+      end_s = now_s + Loop::ON_S;
+    }
+    if (tick % TICKS_A_CHECK == 0) {
+      // Far from all that it could reach until the next look there is nothing to see.
+      if (near_m < 0.2) {
+        const Outcome true_one = answer(checked, cloth.positions(), truth, truth_history);
+        run.contact = true_one.total_contacts > 0 || true_one.start_state != StartState::CLEAR;
+      } else {
+        truth_history.clear();
+      }
+      checked = cloth.positions();
+    }
+    if (tick % TICKS_A_FRAME != 0) continue;
+    if (uniform(random, 0, 1) < Loop::LOST_SHARE) continue;
+    const Outcome seen = answer(frame, cloth.positions(), options, history);
+    frame = cloth.positions();
+    near_m = distanceToMap(seen);
+    answered_s = now_s;
+    // In their order: a later command overtakes no earlier one.
+    const double at_s = now_s + uniform(random, 0.03, Loop::MOST_LATENCY_S);
+    on_the_way.push_back({on_the_way.empty() ? at_s : std::max(at_s, on_the_way.back().at_s), scale(seen)});
+  }
+  if (!run.arrived) run.mean_speed_m_s = gripper_m / (tick * TICK_S);
+  return run;
+}
+
+}  // namespace test
+}  // namespace dccd

@@ -1,0 +1,45 @@
+// An arm that carries a cloth past obstacles, and slows down as a law says: what holds such laws against each other.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "dccd/outcome.h"
+
+namespace dccd {
+namespace test {
+
+/// The loop's constants, which a law may know.
+struct ClosedLoop {
+  static constexpr double FULL_SPEED_M_S = 0.5;
+  static constexpr double CLOTH_SPEED_M_S = 0.8;  ///< no point of the cloth is faster, swinging included
+  static constexpr double BRAKING_M_S2 = 2;       ///< nominal; an arm of a run has 0.8 to 1.2 of it
+  static constexpr double FRAME_S = 1.0 / 30;     ///< from one frame to the next
+  static constexpr double MOST_LATENCY_S = 0.07;  ///< from a frame's stamp until the arm takes its scale
+  static constexpr double LOST_SHARE = 0.01;      ///< of the frames
+  static constexpr double NEAR_WALL_M = 0.08;     ///< between gripper and wall when the run has arrived
+  static constexpr double ON_S = 3;               ///< for which the arm then wants to go on at full speed
+  static constexpr double LONGEST_S = 60;         ///< a run that has not arrived by then ends
+  /// From a frame's stamp until the arm takes the next one's scale, one frame between them being lost.
+  static constexpr double REACTION_S = 2 * FRAME_S + MOST_LATENCY_S;
+};
+
+/// What became of a run.
+struct ClosedLoopRun {
+  bool contact = false;       ///< the cloth touched the map, by exact detection of every piece of its way
+  bool arrived = false;       ///< near the wall
+  double mean_speed_m_s = 0;  ///< of the arm, over its way or until the run ended
+};
+
+/// A cloth of 8 x 6 points hangs from a gripper that always wants to go along x at full speed: over a post, whose top
+/// the hem clears by 30 to 80 mm, and into a wall, of which the arm knows nothing. Post, wall, gusts, latency, lost
+/// frames and brakes follow from the seed. `scale`: of full speed, 0 to 1, from the answer to each frame that is not
+/// lost, clearances included; of the cloth alone (body 0) and the map. The arm stops where no newer answer comes within
+/// REACTION_S.
+ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const Outcome&)>& scale);
+
+/// The least distance of the cloth and the map at the answer's end [m], for laws that know no more.
+double distanceToMap(const Outcome& outcome);
+
+}  // namespace test
+}  // namespace dccd
