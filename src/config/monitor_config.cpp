@@ -142,6 +142,15 @@ void readMarkers(ParameterReader section, MarkerConfig& markers) {
   section.finish();
 }
 
+void readClearance(ParameterReader section, MonitorConfig& config) {
+  ClearanceOptions& clearance = config.monitor.detector.clearance;
+  clearance.tolerance_m = section.number("tolerance_m", clearance.tolerance_m, 1e-9, 1);
+  clearance.max_m = section.number("max_m", clearance.max_m, 1e-6, LARGE);
+  clearance.self_m = section.number("self_m", clearance.self_m, 1e-6, LARGE);
+  config.markers.clearance_max_m = clearance.max_m;
+  section.finish();
+}
+
 /// Their files are not read, their frames not asked for.
 void removeRigidBodies(MonitorConfig& config) {
   const std::string clock = config.bodies[config.monitor.clock_body].body.name;
@@ -326,6 +335,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, con
   readEffects(reader.section("effects"), config);
   readSpeeds(reader, config);
   readMarkers(reader.section("markers"), config.markers);
+  readClearance(reader.section("clearance"), config);
   readBodies(reader, config);
   readRobot(reader, load, config);
   readSeparationPairs(reader, config);

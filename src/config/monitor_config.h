@@ -53,6 +53,7 @@ struct MarkerConfig {
   bool swept = false;     ///< show what is watched of rigid bodies, and their separation
   bool mesh = false;      ///< republish the bodies as markers
   double obstacle_m = 0;  ///< show the map's voxels this close to the box around the bodies [m]; 0: none
+  double clearance_max_m = ClearanceOptions().max_m;  ///< distances of this and more are green [m]
 };
 
 constexpr std::size_t NO_MAP_LIMIT = std::size_t{1} << 50;

@@ -34,7 +34,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   if (config.takesClouds()) scene_.map_parameter = "obstacle_cloud_topic";
   scene_.map_seen = config.takesMapFileAlone();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
-  scene_.clearance_wanted = config.promises();
+  promised_ = scene_.clearance_wanted = config.promises();
   scene_.earliest_only = config.monitor.detector.earliest_only;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
   plan_ = EffectPlan(scene_, settings_);
@@ -52,6 +52,11 @@ void EffectTracker::hearPredictions(bool heard) {
   if (std::exchange(scene_.predictions_heard, heard) != heard) plan_ = EffectPlan(scene_, settings_);
 }
 
+void EffectTracker::hearDistances(bool heard) {
+  const bool wanted = heard || promised_;
+  if (std::exchange(scene_.clearance_wanted, wanted) != wanted) plan_ = EffectPlan(scene_, settings_);
+}
+
 void EffectTracker::setBody(std::size_t body, const Body& what) {
   scene_.bodies.resize(std::max(scene_.bodies.size(), body + 1));
   scene_.noise.resize(scene_.bodies.size());
@@ -60,9 +65,9 @@ void EffectTracker::setBody(std::size_t body, const Body& what) {
 }
 
 bool EffectTracker::decide(MonitorOptions& options) const {
-  const bool map_new = std::exchange(options.detector.obstacle_expected, mapExpected()) != mapExpected();
-  const bool clearance = plan_.running(Effect::CLEARANCE);
-  return std::exchange(options.detector.clearance.wanted, clearance) != clearance || map_new;
+  const bool map = mapExpected(), distances = plan_.running(Effect::CLEARANCE);
+  const bool other_map = std::exchange(options.detector.obstacle_expected, map) != map;
+  return std::exchange(options.detector.clearance.wanted, distances) != distances || other_map;
 }
 
 void EffectTracker::learn(const Outcome& outcome, const Monitor& monitor) {

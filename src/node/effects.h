@@ -25,6 +25,8 @@ class EffectTracker {
   void expectMap();
   /// Whether anybody subscribes to predictions, or they are asked for otherwise.
   void hearPredictions(bool heard);
+  /// Whether anybody subscribes to distances; where something is promised they are wanted all the same.
+  void hearDistances(bool heard);
   /// A body has come, or is another one.
   void setBody(std::size_t body, const Body& what);
   /// Sets what the plan decides of a monitor's options. False: they are so already.
@@ -43,6 +45,7 @@ class EffectTracker {
  private:
   EffectScene scene_;
   EffectSettings settings_;
+  bool promised_ = false;
   EffectPlan plan_, told_;
   std::vector<LeftOutPair> told_left_out_;
 };

@@ -241,6 +241,7 @@ bool CollisionMonitor::Impl::workOn(const std::vector<std::function<void()>>& co
   for (const auto& command : commands) carryOut(command);
   if (map_publisher_seen) pipeline.expectMap();
   pipeline.effects().hearPredictions(outputs.wantsPrediction());
+  pipeline.effects().hearDistances(outputs.wantsDistances());
   publishEffects(ros::Time::now());  // the first plan comes before the first frame
   takeMaps();
   const std::uint64_t static_frames = state.staticFrames();  // before it: what comes from here on may not be taken

@@ -123,9 +123,7 @@ void StateReporter::voidAnswer(const std::string& reason) {
   remedy_.clear();
   broken_.clear();
   speed_told_ = deformable_ccd::SpeedScale();
-  const std::string frame = std::move(told_.header.frame_id);
-  told_ = deformable_ccd::State();
-  told_.header.frame_id = frame;
+  told_ = toState(Outcome(), std::move(told_.header.frame_id));
 }
 
 void StateReporter::takeBack(const std::string& reason) {

@@ -308,6 +308,33 @@ Vec3 clearOf(const MarkerArray& markers, Vec3 at, double height) {
   return at;
 }
 
+std::string lengthInWords(double m) {
+  char words[32];
+  std::snprintf(words, sizeof words, m < 0.1 ? "%.1f mm" : "%.3f m", m < 0.1 ? 1e3 * m : m);
+  return words;
+}
+
+/// The shortest segment between each two partners at the step's end, with its length; where they touch, contacts show.
+void addClearances(const Outcome& outcome, const std::vector<Body>& bodies, const MarkerConfig& config,
+                   const std::string& frame, MarkerArray& out) {
+  Marker segments = list(outcome, frame, "clearance", Marker::LINE_LIST, 1.5 * config.line_width_m);
+  const double height = TEXT * config.point_size_m;
+  for (std::size_t i = 0; i < outcome.clearances.size(); ++i) {
+    const Clearance& clearance = outcome.clearances[i];
+    const auto& [from, to] = clearance.at_end.point;
+    if (!from.allFinite() || !to.allFinite() || from == to) continue;
+    const double length_m = clearance.at_end.upper_m, far = std::min(length_m / config.clearance_max_m, 1.0);
+    const std_msgs::ColorRGBA rgba =
+        clearance.expected ? EXPECTED : color(std::min(2 - 2 * far, 1.0), std::min(2 * far, 1.0), 0.1);
+    for (const Vec3& end : {from, to}) segments.points.push_back(point(end));
+    segments.colors.insert(segments.colors.end(), 2, rgba);
+    const Vec3 at = clearOf(out, 0.5 * (from + to), height);
+    out.markers.push_back(text(outcome, frame, "clearance", static_cast<int>(i) + 1, at, height, rgba,
+                               pairOf(clearance.body, bodies) + ' ' + lengthInWords(length_m)));
+  }
+  if (!segments.points.empty()) out.markers.push_back(std::move(segments));
+}
+
 /// At the patch of each pair of partners that began last, as long as that is news.
 void addBeginnings(const Outcome& outcome, const std::vector<Body>& bodies, double height, const std::string& frame,
                    MarkerArray& out) {
@@ -377,6 +404,7 @@ MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies, c
   if (config.swept) addSwept(outcome, config, frame, out);
   if (config.mesh) addMeshes(outcome, bodies, config, frame, out);
   addBeginnings(outcome, bodies, TEXT * config.point_size_m, frame, out);
+  addClearances(outcome, bodies, config, frame, out);
   for (Marker* marker : {&voxels, &faces, &normals, &expected, &initial, &contacts}) {
     if (!marker->points.empty()) out.markers.push_back(std::move(*marker));
   }

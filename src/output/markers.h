@@ -11,7 +11,8 @@ namespace dccd {
 
 /// First a DELETEALL, then a few list markers, in namespaces as doc/interface.md lists them: contacts, those that were
 /// there when the step began, expected ones, a normal of each patch, faces, edges of voxels, a text where a patch
-/// began; if asked for the map around the bodies, and the bodies with their names.
+/// began, the shortest segment between each two partners; if asked for the map around the bodies, and the bodies with
+/// their names.
 visualization_msgs::MarkerArray toMarkers(const Outcome& outcome, const std::vector<Body>& bodies,
                                           const MarkerConfig& config, const std::string& frame);
 

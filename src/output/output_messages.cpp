@@ -9,6 +9,7 @@
 #include "dccd/contact_fields.h"
 #include "dccd/contact_geometries.h"
 #include "dccd/new_contacts.h"
+#include "output/clearance_messages.h"
 #include "output/patch_messages.h"
 
 namespace dccd {
@@ -296,6 +297,10 @@ deformable_ccd::FirstContact toFirstContact(const Outcome& outcome, const std::v
 deformable_ccd::State toState(const Outcome& outcome, const std::string& frame) {
   deformable_ccd::State out;
   out.header = headerOf(outcome.stamp_ns, frame);
+  const NearestPartners nearest = nearestPartners(outcome);
+  out.clearance_lower = nearest.lower_m;
+  out.clearance_upper = nearest.upper_m;
+  out.clearance_between = nearest.names;
   if (!outcome.answered) return out;
   const std::vector<Body>& bodies = outcome.step->bodies;
   for (std::size_t b = 0; b < bodies.size(); ++b) {

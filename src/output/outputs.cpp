@@ -1,5 +1,6 @@
 #include "output/outputs.h"
 
+#include "output/clearance_messages.h"
 #include "output/markers.h"
 #include "output/patch_messages.h"
 
@@ -25,6 +26,9 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
     patches_ = node.advertise<deformable_ccd::PatchArray>("patches", TOPIC_QUEUE);
     events_ = node.advertise<deformable_ccd::PatchEvent>("events", EVENT_QUEUE);
   }
+  if (settingOf(config.effects, Effect::CLEARANCE) != EffectSetting::OFF) {
+    clearance_ = node.advertise<deformable_ccd::ClearanceArray>("clearance", TOPIC_QUEUE);
+  }
   if (config.promises()) safe_until_ = node.advertise<deformable_ccd::SafeUntil>("safe_until", TOPIC_QUEUE, true);
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
@@ -39,6 +43,10 @@ void Outputs::publishList(const ros::Publisher& topic, const Outcome& outcome, c
 void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bodies, const std::string& frame) {
   if (first_contact_.getNumSubscribers() > 0) first_contact_.publish(toFirstContact(outcome, bodies, frame));
   publishList(contacts_, outcome, bodies, frame);
+  // Of a step from before somebody asked there are no distances.
+  if (wantsDistances() && !(outcome.answered && outcome.clearances.empty())) {
+    clearance_.publish(toClearanceArray(outcome, bodies, frame));
+  }
   if (patches_ && patches_.getNumSubscribers() > 0) patches_.publish(toPatchArray(outcome, bodies, frame));
   if (events_ && events_.getNumSubscribers() > 0) {
     for (const auto& event : toPatchEvents(outcome, bodies, frame)) events_.publish(event);
@@ -64,6 +72,8 @@ bool Outputs::wantsPrediction() const {
   return (predicted_ && predicted_.getNumSubscribers() > 0) ||
          (time_to_contact_ && (time_to_contact_.getNumSubscribers() > 0 || markers_.getNumSubscribers() > 0));
 }
+
+bool Outputs::wantsDistances() const { return clearance_ && clearance_.getNumSubscribers() > 0; }
 
 void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                 const MarkerConfig& markers, const std::string& frame) {

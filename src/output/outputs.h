@@ -31,6 +31,8 @@ class Outputs {
   bool wantsStats() const;
   /// Whether anybody listens to predictions.
   bool wantsPrediction() const;
+  /// Whether anybody listens to distances.
+  bool wantsDistances() const;
   /// Also one without an answer.
   void publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                          const MarkerConfig& markers, const std::string& frame);
@@ -48,7 +50,7 @@ class Outputs {
                    const std::string& frame);
 
   ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_,
-      patches_, events_, safe_until_;
+      patches_, events_, clearance_, safe_until_;
   deformable_ccd::ContactArray list_;
   std::uint64_t markers_built_ = 0;
 };

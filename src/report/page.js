@@ -120,6 +120,18 @@ document.getElementById('headline').textContent = R.headline;
 
 // Points {x, y, name, group, missed, invented}: time across, error up, both logarithmic. Errors below `least` are drawn there.
 const COLOURS = ['#1c2430', '#2a6fb0', '#f0a030', '#3d9a50', '#8e5bb0', '#b71c1c', '#7a8794'];
+// Lower and upper bound of the distance of each two partners; a gap where nothing is known.
+if (!R.clearance.curves.length) document.getElementById('clearance_part').remove();
+else { const all = R.clearance.curves, hue = k => COLOURS[1 + k % (COLOURS.length - 1)], who = c => (c.names[0] === c.names[1] ? c.names[0] + ' with itself' : c.names.join(' with ')) + (c.expected ? ', expected' : '');
+  const a = axes('clearance', 220, Math.max(1e-6, ...all.flatMap(c => c.samples.map(s => s[2] ?? s[1] ?? 0))), 'distance [m]');
+  all.forEach((c, k) => [[2, '4 3'], [1, 'none']].forEach(([bound, dashes]) => { let run = [];
+    const end = () => { if (run.length) el('title', {}, el('polyline', { points: run.join(' '), fill: 'none', stroke: hue(k), 'stroke-width': 1.5,
+      'stroke-dasharray': dashes, opacity: c.expected ? .45 : 1 }, a.svg), who(c)); run = []; };
+    c.samples.forEach(s => s[bound] === null ? end() : run.push(`${a.x(s[0])},${a.y(s[bound])}`)); end(); }));
+  const note = document.getElementById('clearance_note');
+  note.textContent = 'The smallest distance of each two partners in each step: a lower bound, and dashed an upper one, which is missing where they are further apart than clearance/max_m. A gap: nothing is known.';
+  all.forEach((c, k) => { note.appendChild(document.createElement('i')).style.background = hue(k); note.append(who(c)); });
+  if (R.clearance.left_out) note.append(` and ${R.clearance.left_out} more in clearance.csv`); }
 function frontPlot(id, all, xlabel, ylabel, least) {
   const H = 400, floor = H - 46, box = document.getElementById(id), points = all.filter(p => p.x > 0 && p.y !== null).map(p => ({ ...p, y: Math.max(p.y, least) }));
   if (!points.length) { box.remove(); return; }

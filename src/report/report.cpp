@@ -16,14 +16,6 @@
 namespace dccd {
 namespace {
 
-// Commas, quotes and line ends in a field are quoted (RFC 4180).
-std::string csvField(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + '"';
-}
-
 /// What follows a field's name in the names of its columns, by its type.
 template <class T>
 std::vector<const char*> endsOf(const T&) {
@@ -79,7 +71,7 @@ struct Cells {
 
 }  // namespace
 
-Report::Report(const std::string& folder) : folder_(folder) {
+Report::Report(const std::string& folder) : folder_(folder), clearance_(folder + "/clearance.csv") {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   const auto open = [&](std::ofstream& file, const char* name) {
@@ -218,6 +210,7 @@ void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
   addProof(o);
   writePatches(o, bodies);  // a seam without an answer has events, too
   lanes_.add(o, bodies, origin_ns_);
+  clearance_.add(o, bodies, origin_ns_);
   player_.add(o, bodies, origin_ns_, lanes_.addedFirst());
   if (!o.answered) return;
   ++answered_;

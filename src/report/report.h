@@ -13,6 +13,7 @@
 #include "dccd/effect_plan.h"
 #include "dccd/look_ahead_score.h"
 #include "dccd/stream.h"
+#include "report/clearance_table.h"
 #include "report/lanes.h"
 #include "report/latency_histogram.h"
 #include "report/player_data.h"
@@ -20,9 +21,9 @@
 namespace dccd {
 
 /// Writes into a folder: contacts.csv, steps.csv, patches.csv and events.csv (the same bytes for any number of
-/// threads), timing.csv, left_out.csv (pairs that the minimum separation leaves out, where there are any), report.json
-/// and report.html. Outcomes are added in order; kept are their summaries and, in
-/// a bounded amount of memory, what the page's player shows.
+/// threads), timing.csv, left_out.csv (pairs that the minimum separation leaves out, where there are any),
+/// clearance.csv (distances, where they were asked for), report.json and report.html. Outcomes are added in order; kept
+/// are their summaries and, in a bounded amount of memory, what the page's player shows.
 class Report {
  public:
   /// Creates the folder. Throws std::runtime_error naming the file that cannot be written.
@@ -97,6 +98,7 @@ class Report {
   LatencyHistogram step_times_;
   std::vector<EffectDecision> effects_;
   ContactLanes lanes_;
+  ClearanceTable clearance_;
   PlayerData player_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;

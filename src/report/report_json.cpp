@@ -174,6 +174,7 @@ nlohmann::json Report::json() const {
   j["look_ahead"] = lookAheadJson();
   j["study"] = study_;
   j["partners"] = lanes_.json();
+  j["clearance"] = clearance_.json();
   j["bodies"] = heatJson();
   return j;
 }
@@ -186,6 +187,7 @@ std::string Report::dumped(const nlohmann::json& data, int indent) const {
 
 void Report::finish() {
   const nlohmann::json data = json();
+  clearance_.close();
   std::ofstream json_file(folder_ + "/report.json"), page(folder_ + "/report.html");
   json_file << dumped(data, 1) << '\n';
   page << reportPage(dumped(data, -1), player_.json());

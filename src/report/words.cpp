@@ -8,6 +8,13 @@ std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
   return body == OBSTACLE_BODY ? "octomap" : body < bodies.size() ? bodies[body].name : std::to_string(body);
 }
 
+std::string csvField(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + '"';
+}
+
 int meshPoints(const Contact& c) {
   return static_cast<int>(std::count_if(c.vertex.begin(), c.vertex.end(), [](Index v) { return v != NO_INDEX; }));
 }

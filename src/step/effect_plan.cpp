@@ -215,7 +215,7 @@ Finding ownVoxels(const EffectScene& scene) {
 }
 
 Finding clearance(const EffectScene& scene) {
-  return scene.clearance_wanted ? wanted("distances are asked for") : idle("nobody asks for distances");
+  return scene.clearance_wanted ? wanted("distances are asked for") : notWanted("nobody asks for distances");
 }
 
 /// By Effect: what a scene says of it.

@@ -5,6 +5,15 @@
 #include "stream/monitor_impl.h"
 
 namespace dccd {
+namespace {
+
+/// Nobody reads the distances of what is asked between steps.
+Options withoutDistances(Options options) {
+  options.clearance.wanted = false;
+  return options;
+}
+
+}  // namespace
 
 Outcome Monitor::checkNow() {
   Impl& m = *impl_;
@@ -28,7 +37,7 @@ Outcome Monitor::checkNow() {
   m.lookAtHeld(step);
   m.side_history.clear();
   // Without a budget: nothing is carried over from one question to the next, so a cut answer would stay one.
-  Outcome outcome = detect(step, m.options.detector, m.side_history, Deadline().orWhen(m.cancelled));
+  Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, Deadline().orWhen(m.cancelled));
   if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
   return outcome;
 }
@@ -68,7 +77,7 @@ Outcome Monitor::predict() {
   }
   m.side_history.clear();
   m.side_history.beginAt(m.history);
-  Outcome outcome = detect(step, m.options.detector, m.side_history, deadline);
+  Outcome outcome = detect(step, withoutDistances(m.options.detector), m.side_history, deadline);
   if (m.options.detector.patches) m.tracker.recognise(m.side_history.impl().patches, outcome);
   return outcome;
 }

@@ -12,7 +12,8 @@ CONFIG = ''.join(path.read_text() for path in sorted((CHECKOUT / 'src/config').g
 # What a function of src/config reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
             'readDepthImage': 'topology/',
-            'readSpeedLaw': 'speed_scale/', 'readMarkers': 'markers/', 'readRobotParameters': 'robot/', 'readSensorModel': 'sensor_model/'}
+            'readSpeedLaw': 'speed_scale/', 'readMarkers': 'markers/', 'readClearance': 'clearance/',
+            'readRobotParameters': 'robot/', 'readSensorModel': 'sensor_model/'}
 # Where a page names a family at once.
 # These read the fields of an entry of a list, which the list's own row explains.
 ENTRIES = {'readSeparationPair', 'readPartners', 'readExpectation', 'readLink'}

@@ -194,6 +194,23 @@ class ReportPageTest(unittest.TestCase):
         self.assertEqual([line for line in page.get_log('browser') if line['level'] == 'SEVERE'], [])
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
+    def test_how_close(self):
+        """A curve a bound of each two partners; what was not asked for takes no place."""
+        self.assertNotIn('id="clearance_part"', self.dom()[0])
+        page = yaml.safe_load((SCENES / 'table_edge.yaml').read_text())
+        page['monitor'].setdefault('effects', {})['clearance'] = 'on'
+        scene = self.folder / 'near.yaml'
+        scene.write_text(yaml.safe_dump(page))
+        self.report(scene, 40)
+        body, console = self.dom()
+        self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
+        drawn = body[body.index('id="clearance"'):].split('</svg>')[0]
+        self.assertRegex(drawn, r'<polyline [^>]*stroke-dasharray="4 3"[^>]*><title>cloth with octomap')
+        self.assertRegex(drawn, r'<polyline [^>]*stroke-dasharray="none"[^>]*><title>cloth with octomap')
+        self.assertIn('distance [m]', drawn)
+        self.assertRegex(body, r'id="clearance_note">[^<]*lower bound.*cloth with octomap')
+
+    @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_own_voxels(self):
         """Of a camera's map the player's legend names the voxels that are the cloth's own, and those in doubt: the first map has the cloth."""
         page = yaml.safe_load((SCENES / 'table_edge.yaml').read_text())

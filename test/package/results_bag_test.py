@@ -1,11 +1,14 @@
 """The bag of results that analyze_bag writes: every topic of the node, markers, diagnostics, beside what monitors recorded."""
 import collections
+import csv
 import json
+import math
 import re
 import unittest
 
 import genpy
 import rosbag
+from deformable_ccd.msg import ClearanceDistance, Contact
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from visualization_msgs.msg import Marker
 
@@ -76,7 +79,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
 
     def test_the_bag_of_results_has_every_topic_of_the_node(self):
         out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
-        params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\n')  # more than the cloth's edges
+        params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\neffects: {clearance: on}\n')  # more than the cloth's edges
         self.analyze('all', self.bag, '--params', params, '-o', out)
         by_topic = collections.defaultdict(list)
         for topic, message, _ in messages_of(out):
@@ -91,6 +94,51 @@ class ResultsBagTest(AnalyzeBagTestCase):
         self.assertLess(len(effects), 10, 'when the plan changes, and not in each step')
         listed = len((self.folder / 'all/left_out.csv').read_text().splitlines()) - 1
         self.assertEqual(len(by_topic[OWN + 'left_out'][-1].pairs), listed)
+
+    def test_distances_are_zero_exactly_where_something_touches(self):
+        out, params = self.folder / 'apart.bag', self.folder / 'apart.yaml'
+        params.write_text('effects: {clearance: on}\nexpected_contacts:\n  - {between: [mesh, self]}\n')
+        report = self.analyze('apart', self.bag, '--params', params, '-o', out)
+        by_topic = collections.defaultdict(list)
+        for topic, message, _ in messages_of(out):
+            by_topic[topic].append(message)
+        rows, touched, apart = [], 0, 0
+        self.assertEqual(len(by_topic[OWN + 'clearance']), len(by_topic[OWN + 'contacts']))
+        for contacts, distances, state in zip(*(by_topic[OWN + name] for name in ('contacts', 'clearance', 'state'))):
+            self.assertEqual((distances.header.stamp, distances.answered), (contacts.header.stamp, contacts.answered))
+            if not contacts.answered:
+                self.assertEqual((distances.pairs, math.isnan(state.clearance_lower)), ([], True))
+                continue
+            names = {Contact.OBSTACLE: 'octomap', **dict(enumerate(contacts.bodies))}
+            touching = {frozenset(names[b] for b in found.body) for found in contacts.contacts + contacts.intersections}
+            undecided = {frozenset(names[b] for b in c.body) for c in contacts.contacts if c.certainty == Contact.UNDECIDED}
+            self.assertEqual({frozenset(p.bodies) for p in distances.pairs if p.over_step.status == ClearanceDistance.TOUCHING}, touching)
+            self.assertEqual([p.bodies for p in distances.pairs], [['mesh', 'mesh'], ['mesh', 'octomap']])
+            self.assertEqual([p.expected for p in distances.pairs], [True, False])
+            self.assertEqual(state.clearance_between, 'mesh and octomap')
+            for p in distances.pairs:
+                rows.append(p)
+                least, end = p.over_step, p.at_end
+                if frozenset(p.bodies) in touching:
+                    self.assertEqual((least.lower, least.upper), (0, 0))
+                    touched += 1
+                elif least.status == ClearanceDistance.FARTHER:
+                    self.assertNotIn(frozenset(p.bodies), undecided)
+                    self.assertEqual(least.lower, 0.05 if p.bodies[1] == 'mesh' else 0.5)
+                else:
+                    self.assertEqual(least.status, ClearanceDistance.MEASURED)
+                    self.assertTrue(0 < least.lower <= least.upper <= least.lower + 1e-4, p)
+                    self.assertTrue(math.isnan(end.upper) or least.lower <= end.upper, p)
+                    apart += 1
+            self.assertEqual(state.clearance_lower, distances.pairs[1].over_step.lower)
+        self.assertTrue(touched > 5 and apart > 5, 'too little to mean anything')
+        with open(report / 'clearance.csv', encoding='utf-8') as file:
+            table = list(csv.DictReader(file))
+        self.assertEqual([float(row['step_lower_m']) for row in table], [p.over_step.lower for p in rows])
+        self.assertEqual([(row['body_0'], row['body_1'], row['expected']) for row in table],
+                         [(*p.bodies, str(int(p.expected))) for p in rows])
+        self.assertEqual(len(json.loads((report / 'report.json').read_text())['clearance']['curves']), 2)
+        self.assertFalse((self.plain / 'clearance.csv').exists(), 'where nobody asked for distances')
 
     def test_the_bag_of_results_is_diagnosed_once_a_second_of_its_time(self):
         """What a monitor said when the bag was recorded is not in it; what others said is."""

@@ -73,6 +73,7 @@ class WatchTest(unittest.TestCase):
         subprocess.run([TOOLS / 'make_scene_bag', scene, bag, '--monitor-config', params, '--quiet'], check=True)
         subprocess.run(['rosparam', 'load', params, '/cloth_monitor'], env=self.environment, check=True)
         subprocess.run(['rosparam', 'set', '/cloth_monitor/look_ahead_s', '0.1'], env=self.environment, check=True)
+        subprocess.run(['rosparam', 'set', '/cloth_monitor/effects/clearance', 'on'], env=self.environment, check=True)
         node = self.start(TOOLS / 'collision_monitor_node', '__name:=cloth_monitor')
         wait_for(lambda: 'no monitor runs as /other; these do: /cloth_monitor' in self.refused('other'), 30, 'the node')
 
@@ -98,7 +99,8 @@ class WatchTest(unittest.TestCase):
         self.assertNotIn('STALE', view.screen())
         screen = view.screen()
         for pattern in (r'PROVED, ', r'reason +\S', r'steps +\d+\.\d a second; from frame to answer \d+\.\d ms',
-                        r'frames +\d+ received, \d+ waiting, \d+ skipped', r'map +\d+ leaves', r'running .*octomap', r'off +\S'):
+                        r'frames +\d+ received, \d+ waiting, \d+ skipped', r'map +\d+ leaves', r'running .*octomap', r'off +\S',
+                        r'nearest +cloth and octomap, \d\.\d{4} to \d\.\d{4} m apart'):
             self.assertRegex(screen, pattern)
         self.assertGreater(float(re.search(r'steps +([\d.]+) a second', screen).group(1)), 0)
 

@@ -1,8 +1,10 @@
 // Effects through the live node: what is left out of the map, separations of bodies and of pairs, ropes,
 // and rigid bodies that turn.
+#include <deformable_ccd/ClearanceArray.h>
 #include <deformable_ccd/ContactArray.h>
 #include <deformable_ccd/EffectArray.h>
 #include <deformable_ccd/LeftOutPairs.h>
+#include <deformable_ccd/State.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +19,7 @@ namespace dccd {
 namespace test {
 namespace {
 
-constexpr std::size_t MONITORS = 3;  // in effects.test; each listens to /tf
+constexpr std::size_t MONITORS = 4;  // in effects.test; each listens to /tf
 
 using ContactMessage = deformable_ccd::ContactArray::_contacts_type::value_type;
 
@@ -129,6 +131,83 @@ TEST_F(Felt, WhatIsLeftOutIsListedAndCounted) {
   ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(10.1); }));
   EXPECT_EQ(stats.last().left_out_listed, listed.pairs.size());
   EXPECT_GT(stats.last().left_out_met, 0u);
+}
+
+// --- distances -------------------------------------------------------------------------------------------------------
+
+struct Apart : MonitorTest {
+  Apart() : MonitorTest("/apart") {}
+  ros::Publisher mesh = advertiseAndWait<sensor_msgs::PointCloud2>(node, "/apart/mesh");
+  ros::Publisher map = advertiseAndWait<octomap_msgs::Octomap>(node, "/apart/octomap", true);
+  Probe<deformable_ccd::EffectArray> effects{node, "/apart/effects"};
+  Probe<deformable_ccd::State> state{node, "/apart/state"};
+
+  bool running() {
+    for (const deformable_ccd::EffectState& effect : effects.last().effects) {
+      if (effect.name == "clearance") return effect.running;
+    }
+    return false;
+  }
+  /// The state after a step between two heights above the map.
+  deformable_ccd::State fall(double from_z, double to_z, double end_s) {
+    map.publish(blockBelowZero(true));
+    double stamp_s = end_s - 40;
+    EXPECT_TRUE(waitUntil([&] {
+      const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, from_z), stamp_s += 0.1));
+      return outcome.answered && outcome.status != deformable_ccd::ContactArray::NO_MAP;
+    }));
+    send(mesh, cloud(gridAt(3, 4, from_z), end_s - 0.25));
+    send(mesh, cloud(gridAt(3, 4, to_z), end_s));
+    EXPECT_TRUE(waitUntil([&] { return state.last().holds_until == ros::Time(end_s); }));
+    return state.last();
+  }
+};
+
+/// The row of the cloth and the map.
+deformable_ccd::Clearance withMap(const deformable_ccd::ClearanceArray& distances) {
+  for (const deformable_ccd::Clearance& pair : distances.pairs) {
+    if (pair.bodies[1] == "octomap") return pair;
+  }
+  ADD_FAILURE() << "no row of the map";
+  return {};
+}
+
+TEST_F(Apart, DistancesAreMeasuredWhileSomebodyListens) {
+  EXPECT_FALSE(running());
+  EXPECT_TRUE(std::isnan(fall(1, 0.75, 50).clearance_lower));
+  EXPECT_EQ(stats.last().clearance_in, 0u);
+  {
+    Probe<deformable_ccd::ClearanceArray> distances(node, "/apart/clearance");
+    ASSERT_TRUE(waitUntil([&] { return running(); }));
+    const deformable_ccd::State said = fall(0.75, 0.5, 100);
+    EXPECT_EQ(said.clearance_between, "mesh and octomap");
+    EXPECT_LE(said.clearance_lower, 0.5);
+    EXPECT_GE(said.clearance_upper, 0.5);
+    ASSERT_TRUE(waitUntil([&] { return distances.last().header.stamp == ros::Time(100); }));
+    EXPECT_EQ(distances.last().header.frame_id, "world");
+    EXPECT_EQ(distances.last().start, ros::Time(99.75));
+    const deformable_ccd::Clearance pair = withMap(distances.last());
+    EXPECT_EQ(pair.bodies[0], "mesh");
+    EXPECT_EQ(pair.at_end.status, deformable_ccd::ClearanceDistance::MEASURED);
+    EXPECT_LE(pair.at_end.lower, 0.5);
+    EXPECT_GE(pair.at_end.upper, 0.5);
+    EXPECT_LE(pair.at_end.upper - pair.at_end.lower, 1e-4);
+    EXPECT_NEAR(pair.at_end.points[0].z, 0.5, 1e-4);
+    EXPECT_NEAR(pair.at_end.points[1].z, 0, 1e-4) << "the top of the block";
+    EXPECT_NEAR(pair.direction.z, 1, 1e-6);
+    EXPECT_NEAR(pair.closing_speed, 1, 1e-6) << "0.25 m in 0.25 s";
+    EXPECT_GE(pair.speed_bound, 1);
+    ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100); }));
+    EXPECT_GE(stats.last().clearance_in, 1u);
+
+    const deformable_ccd::State touched = fall(0.25, -0.0625, 150);
+    EXPECT_EQ(touched.touching, deformable_ccd::State::NEW);
+    EXPECT_EQ(touched.clearance_lower, 0);
+    EXPECT_EQ(touched.clearance_upper, 0);
+    ASSERT_TRUE(waitUntil([&] { return distances.last().header.stamp == ros::Time(150); }));
+    EXPECT_EQ(withMap(distances.last()).over_step.status, deformable_ccd::ClearanceDistance::TOUCHING);
+  }
+  EXPECT_TRUE(waitUntil([&] { return !running(); })) << "the subscriber has gone";
 }
 
 // --- a rope, and a finger that turns ---------------------------------------------------------------------------------

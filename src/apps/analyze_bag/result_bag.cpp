@@ -10,6 +10,7 @@
 
 #include "input/known_types.h"
 #include "output/advice.h"
+#include "output/clearance_messages.h"
 #include "output/markers.h"
 #include "output/safe_until_messages.h"
 
@@ -137,6 +138,9 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
   write("stats", at, toStepStats(outcome, context, frame));
   write("first_contact", at, toFirstContact(outcome, bodies, frame));
   addPatches(outcome, pipeline, at);
+  if (pipeline.monitor().options().detector.clearance.wanted) {
+    write("clearance", at, toClearanceArray(outcome, bodies, frame));
+  }
   addState(outcome, pipeline, at);
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
   diagnostics_.add(outcome, context.latency_s);

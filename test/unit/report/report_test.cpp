@@ -161,6 +161,115 @@ TEST(ReportTables, APatchHasAColumnForEachOfItsFields) {
   std::filesystem::remove_all(folder);
 }
 
+ClearanceDistance distance(ClearanceStatus status, double lower_m, double upper_m) {
+  ClearanceDistance out;
+  out.status = status;
+  out.lower_m = lower_m;
+  out.upper_m = upper_m;
+  return out;
+}
+
+TEST(ClearanceTable, HasARowOfEachPairInWhichWhatIsNotThereIsEmpty) {
+  const std::string file = ::testing::TempDir() + "clearance.csv";
+  std::filesystem::remove(file);
+  std::vector<Body> bodies(1);
+  bodies[0].name = "cloth, red";
+  Outcome outcome;
+  outcome.answered = true;
+  outcome.sequence = 3;
+  outcome.stamp_ns = 40;
+  ClearanceTable table(file);
+  table.add(outcome, bodies, 0);
+  table.close();
+  EXPECT_FALSE(std::filesystem::exists(file)) << "where nobody asked for distances";
+  Clearance c;
+  c.body = {0, OBSTACLE_BODY};
+  c.at_end = distance(ClearanceStatus::FARTHER, 0.5, std::numeric_limits<double>::infinity());
+  c.over_step = distance(ClearanceStatus::MEASURED, 0.25, 0.2501);
+  c.over_step.t = 0.125;
+  c.over_step.point = {Vec3(1, 2, 3), Vec3(4, 5, 6)};
+  c.over_step.vertex[0] = {7, 8, NO_INDEX};
+  c.over_step.voxel = {9, 10, 11};
+  c.over_step.voxel_size = 2;
+  outcome.clearances = {c};
+  table.add(outcome, bodies, 0);
+  table.close();
+  bodies[0].name = "cloth";  // a name with a comma is quoted, which the reader below does not know
+  std::ifstream quoted(file);
+  EXPECT_NE(std::string(std::istreambuf_iterator<char>(quoted), {}).find(",\"cloth, red\",octomap,"),
+            std::string::npos);
+  ClearanceTable plain(file);
+  plain.add(outcome, bodies, 0);
+  plain.close();
+  const std::map<std::string, std::string> row = firstRowOf(file);
+  std::filesystem::remove(file);
+  const std::map<std::string, std::string> wanted{{"step", "3"},
+                                                  {"stamp_ns", "40"},
+                                                  {"body_0", "cloth"},
+                                                  {"body_1", "octomap"},
+                                                  {"expected", "0"},
+                                                  {"end_status", "FARTHER"},
+                                                  {"end_lower_m", "0.5"},
+                                                  {"end_upper_m", ""},
+                                                  {"end_t", ""},
+                                                  {"end_x0", ""},
+                                                  {"end_v0_0", ""},
+                                                  {"end_voxel_size", ""},
+                                                  {"step_status", "MEASURED"},
+                                                  {"step_lower_m", "0.25"},
+                                                  {"step_t", "0.125"},
+                                                  {"step_y0", "2"},
+                                                  {"step_z1", "6"},
+                                                  {"step_v0_1", "8"},
+                                                  {"step_v0_2", ""},
+                                                  {"step_v1_0", ""},
+                                                  {"step_voxel_y", "10"},
+                                                  {"step_voxel_size", "2"}};
+  for (const auto& [name, cell] : wanted) EXPECT_EQ(row.at(name), cell) << name;
+}
+
+// The bounds of neighbours that became one hold for all of them.
+TEST(ClearanceTable, ALongRunIsDrawnByTheSmallestDistances) {
+  ClearanceTable table(::testing::TempDir() + "long_clearance.csv");
+  std::vector<Body> bodies(2);
+  bodies[1].name = "palm";
+  const std::size_t steps = 3 * ClearanceTable::MOST_SAMPLES;
+  for (std::size_t i = 0; i < steps; ++i) {
+    Outcome outcome;
+    outcome.answered = i != 1000;
+    outcome.stamp_ns = static_cast<StampNs>(i) * 1'000'000'000;
+    Clearance near, far;
+    near.body = {0, 1};
+    near.over_step =
+        distance(ClearanceStatus::MEASURED, 100.0 + static_cast<double>(i), 101.0 + static_cast<double>(i));
+    if (i == 2000) near.over_step = distance(ClearanceStatus::FARTHER, 1, std::numeric_limits<double>::infinity());
+    far.body = {0, OBSTACLE_BODY};
+    far.expected = true;
+    far.over_step = distance(ClearanceStatus::UNKNOWN, 0, std::numeric_limits<double>::infinity());
+    if (outcome.answered) outcome.clearances = {far, near};
+    table.add(outcome, bodies, 0);
+  }
+  table.close();
+  std::filesystem::remove(::testing::TempDir() + "long_clearance.csv");
+  const nlohmann::json json = table.json();
+  ASSERT_EQ(json["curves"].size(), 2u);
+  EXPECT_EQ(json["curves"][0]["names"][1], "palm") << "what comes nearest is first";
+  EXPECT_EQ(json["curves"][1]["expected"], true);
+  EXPECT_TRUE(json["curves"][1]["samples"][0][1].is_null()) << "unknown";
+  const nlohmann::json& samples = json["curves"][0]["samples"];
+  ASSERT_EQ(samples.size(), 3 * ClearanceTable::MOST_SAMPLES / 4) << "four steps are one";
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double first = 4.0 * static_cast<double>(i);
+    EXPECT_DOUBLE_EQ(samples[i][0].get<double>(), first);
+    if (i == 250) {
+      EXPECT_TRUE(samples[i][1].is_null()) << "one of the four had no answer";
+    } else {
+      EXPECT_EQ(samples[i][1], i == 500 ? 1 : 100 + first);
+    }
+    EXPECT_EQ(samples[i][2], i == 500 || i == 250 ? 102 + first : 101 + first) << "finite, if one of the four is";
+  }
+}
+
 TEST(ReportJson, HoldsEachCounterOfTheSteps) {
   const std::string folder = ::testing::TempDir() + "report_of_counters";
   Outcome outcome = nothingFound(StepStatus::OK, StartState::CLEAR);

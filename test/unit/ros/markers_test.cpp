@@ -94,6 +94,50 @@ TEST(Markers, WhatIsWatchedOfARigidBodyIsShownOnRequest) {
   }
 }
 
+TEST(Markers, TheShortestSegmentOfTwoPartnersIsRedWhenNearAndGreenWhenFar) {
+  Outcome outcome = overABlock(1, 0);
+  std::vector<Body> bodies = twoBodies();
+  bodies[0].name = "cloth";
+  bodies[1].name = "palm";
+  const auto segment = [](std::uint16_t b, double length_m) {
+    Clearance clearance;
+    clearance.body = {0, b};
+    clearance.at_end.status = ClearanceStatus::MEASURED;
+    clearance.at_end.lower_m = clearance.at_end.upper_m = length_m;
+    clearance.at_end.point = {Vec3(0, b, 1), Vec3(0, b, 1 + length_m)};
+    return clearance;
+  };
+  Clearance farther;  // has no points
+  farther.body = {1, OBSTACLE_BODY};
+  farther.at_end.status = ClearanceStatus::FARTHER;
+  Clearance expected = segment(1, 0.25);
+  expected.expected = true;
+  outcome.clearances = {segment(0, 0.05), segment(OBSTACLE_BODY, 0.2), farther, expected};
+  MarkerConfig config;
+  config.clearance_max_m = 0.2;
+  std::vector<std::string> words;
+  std::vector<std_msgs::ColorRGBA> colors;
+  for (const Marker& marker : toMarkers(outcome, bodies, config, "world").markers) {
+    if (marker.ns != "clearance") continue;
+    if (marker.type == Marker::TEXT_VIEW_FACING) {
+      words.push_back(marker.text);
+    } else {
+      ASSERT_EQ(marker.points.size(), 6u);
+      EXPECT_EQ(marker.points[2].y, OBSTACLE_BODY);
+      EXPECT_EQ(marker.points[3].z, 1.2);
+      colors = marker.colors;
+    }
+  }
+  EXPECT_EQ(words, (std::vector<std::string>{"cloth and itself 50.0 mm", "cloth and octomap 0.200 m",
+                                             "cloth and palm 0.250 m"}));
+  ASSERT_EQ(colors.size(), 6u);
+  EXPECT_EQ(colors[0].r, 1);
+  EXPECT_EQ(colors[0].g, 0.5f) << "a quarter of what is far";
+  EXPECT_EQ(colors[2].r, 0);
+  EXPECT_EQ(colors[2].g, 1);
+  EXPECT_EQ(colors[4].r, 0.65f) << "expected ones are grey";
+}
+
 TEST(Markers, NoMoreVoxelsOfTheMapAreDrawnThanThePageSays) {
   MarkerConfig config;
   config.obstacle_m = 100;

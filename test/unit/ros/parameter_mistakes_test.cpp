@@ -135,6 +135,14 @@ TEST(Parameters, ContradictionsSayWhatToWrite) {
          t["minimum_separation_pairs"][1] = separationPair("felt", "felt", 0.004);
          t["minimum_separation_pairs"][2] = separationPair("finger", "felt", 0.01);
        }},
+      {"~clearance/tolerance_m is 0, it must be from 1e-09 to 1",
+       [](XmlRpcValue& t) { t["clearance"]["tolerance_m"] = 0; }},
+      {"~clearance/tolerance_m is nan", [](XmlRpcValue& t) { t["clearance"]["tolerance_m"] = NAN; }},
+      {"~clearance/max_m is -1, it must be from", [](XmlRpcValue& t) { t["clearance"]["max_m"] = -1; }},
+      {"~clearance/max_m is inf, it must be from", [](XmlRpcValue& t) { t["clearance"]["max_m"] = INFINITY; }},
+      {"~clearance/self_m is -0.5, it must be from", [](XmlRpcValue& t) { t["clearance"]["self_m"] = -0.5; }},
+      {"~clearance/max is not known; nearest is ~clearance/max_m", [](XmlRpcValue& t) { t["clearance"]["max"] = 1.0; }},
+      {"~clearance is a boolean, a section is needed", [](XmlRpcValue& t) { t["clearance"] = true; }},
       {"~uncertainty/radius_m is -0.1", [](XmlRpcValue& t) { t["uncertainty"]["radius_m"] = -0.1; }},
       {"~uncertainty/scale has no meaning without field", [](XmlRpcValue& t) { t["uncertainty"]["scale"] = 3.0; }},
       {"nearest is 'exact'", [](XmlRpcValue& t) { t["accuracy"] = "exakt"; }},

@@ -116,6 +116,24 @@ TEST(Parameters, RigidBodiesThatAreOffAreNotThere) {
   EXPECT_EQ(config.bodies[0].body.separations[0].body, 0u);
 }
 
+TEST(Parameters, DistancesHaveLimitsThatMarkersShowThemBy) {
+  const MonitorConfig defaults = readConfig(XmlRpcValue());
+  EXPECT_FALSE(defaults.monitor.detector.clearance.wanted) << "the plan of effects says so, in each step";
+  EXPECT_EQ(defaults.monitor.detector.clearance.tolerance_m, 1e-4);
+  EXPECT_EQ(defaults.monitor.detector.clearance.max_m, 0.5);
+  EXPECT_EQ(defaults.monitor.detector.clearance.self_m, 0.1);
+  EXPECT_EQ(defaults.markers.clearance_max_m, 0.5);
+  XmlRpcValue tree;
+  tree["clearance"]["tolerance_m"] = 1e-3;
+  tree["clearance"]["max_m"] = 2;
+  tree["clearance"]["self_m"] = 0.25;
+  const MonitorConfig given = readConfig(tree);
+  EXPECT_EQ(given.monitor.detector.clearance.tolerance_m, 1e-3);
+  EXPECT_EQ(given.monitor.detector.clearance.max_m, 2);
+  EXPECT_EQ(given.monitor.detector.clearance.self_m, 0.25);
+  EXPECT_EQ(given.markers.clearance_max_m, 2);
+}
+
 TEST(Parameters, OnAndOffAreWordsThoughYamlTakesThemForBooleans) {
   XmlRpcValue tree;
   tree["weld"] = false;

@@ -123,6 +123,14 @@ TEST(EffectPlan, NothingIsOnThatHasNothingToDo) {
   ahead.predictions_heard = true;
   EXPECT_EQ(reason(EffectPlan(ahead, {}), "look_ahead"), "predictions reach 0.5 s ahead");
   EXPECT_TRUE(EffectPlan(ahead, {}).running(Effect::LOOK_AHEAD));
+
+  EffectScene apart = cloth();
+  EXPECT_FALSE(EffectPlan(apart, {}).running(Effect::CLEARANCE));
+  EXPECT_EQ(reason(EffectPlan(apart, {}), "clearance"), "nobody asks for distances");
+  EXPECT_TRUE(on(apart, Effect::CLEARANCE).running(Effect::CLEARANCE)) << "for whoever reads ~state alone";
+  apart.clearance_wanted = true;
+  EXPECT_TRUE(EffectPlan(apart, {}).running(Effect::CLEARANCE));
+  EXPECT_FALSE(EffectPlan(apart, {{Effect::CLEARANCE, EffectSetting::OFF}}).running(Effect::CLEARANCE));
 }
 
 TEST(EffectPlan, RigidBodiesMeetOthersOnly) {
