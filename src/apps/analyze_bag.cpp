@@ -81,6 +81,14 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
   return text.str();
 }
 
+std::string promisesLine(const BagReplaySummary& summary) {
+  if (summary.promises == 0) return "";
+  std::ostringstream text;
+  text << "safe until: " << summary.promises << " promises, " << summary.promises_broken << " void"
+       << (summary.first_broken.empty() ? "" : "; the first: ") << summary.first_broken << '\n';
+  return text.str();
+}
+
 /// Its name, and in the lines after it what is in it.
 std::string textOf(const std::string& file) {
   std::ifstream in(file);
@@ -145,7 +153,7 @@ int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& 
   std::cout << report.headline(false) << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
-            << lookAheadLine(summary) << of_study << "octomap: " << mapUsed(summary) << '\n'
+            << lookAheadLine(summary) << promisesLine(summary) << of_study << "octomap: " << mapUsed(summary) << '\n'
             << "report: " << a.report << "/report.html\n";
   for (const std::string& sentence : summary.not_looked_at) std::cout << "note: " << sentence << '\n';
   const std::string unproved = report.unproved();

@@ -15,6 +15,15 @@ double ownVoxelsOf(ParameterReader& reader, double fallback) {
   return reader.number("own_voxels_m", 0, LARGE);
 }
 
+SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback) {
+  SpeedBound speed = fallback;
+  if (!section.has("max_speed_m_s")) return speed;
+  const double max_m_s = section.number("max_speed_m_s", 0, LARGE);
+  speed.max_m_s = max_m_s > 0 ? max_m_s : SpeedBound::NONE;
+  speed.last_step_factor = 0;
+  return speed;
+}
+
 double separationOf(ParameterReader& reader, double fallback) {
   return reader.number("minimum_separation_m", fallback, 0, LARGE);
 }
@@ -151,6 +160,26 @@ void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyC
   body.body.own_voxels_m = ownVoxelsOf(reader, config.own_voxels_m);
 }
 
+void readBodySpeed(ParameterReader& reader, const MonitorConfig& config, BodyConfig& body) {
+  const bool is_static = body.body.motion == BodyMotionKind::STATIC;
+  body.speed = speedBoundOf(reader, config.speed);
+  if (is_static) {
+    if (reader.has("max_speed_m_s") && config.bodies_listed) {
+      reader.fail("max_speed_m_s",
+                  "has no meaning for a static body, which stands still until its next frame; remove it");
+    }
+    body.speed.max_m_s = 0;
+  }
+  body.speed.slows_down = reader.get("slows_down", true);
+  const bool straight = !is_static && !body.isRigid();
+  if (!straight && reader.has("max_acceleration_m_s2") && config.bodies_listed) {
+    reader.fail("max_acceleration_m_s2", std::string("has no meaning for a ") + (is_static ? "static" : "rigid") +
+                                             " body, which does not go straight between two frames; remove it");
+  }
+  body.max_acceleration_m_s2 =
+      straight ? reader.number("max_acceleration_m_s2", config.max_acceleration_m_s2, 0, LARGE) : 0;
+}
+
 std::vector<std::string> namesOfBodies(const MonitorConfig& config) {
   std::vector<std::string> names{"octomap", "self"};
   for (const BodyConfig& body : config.bodies) names.push_back(body.body.name);
@@ -233,6 +262,7 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
     BodyConfig body = readBody(reader, "mesh", default_topic);
     if (body.isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
     readBodyEffects(reader, config, body);
+    readBodySpeed(reader, config, body);
     config.bodies.push_back(std::move(body));
   } else {
     config.bodies_listed = true;
@@ -249,6 +279,7 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
       ParameterReader one = section.section(name);
       BodyConfig body = readBody(one, name, name);
       readBodyEffects(one, config, body);
+      readBodySpeed(one, config, body);
       one.finish();
       config.bodies.push_back(std::move(body));
     }

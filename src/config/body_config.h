@@ -20,6 +20,12 @@ void checkOwnVoxels(const ParameterReader& reader, const MonitorConfig& config);
 double ownVoxelsOf(ParameterReader& reader, double fallback);
 /// minimum_separation_m of the section [m], or the fallback.
 double separationOf(ParameterReader& reader, double fallback);
+/// max_speed_m_s, max_acceleration_m_s2 and speed_scale, for all bodies. Before the bodies.
+void readSpeeds(ParameterReader& reader, MonitorConfig& config);
+/// max_speed_m_s of the section, or the fallback.
+SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback);
+/// Refuses a speed_scale that would be 0 for lack of any bound. After the robot.
+void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config);
 /// Two bodies that an entry names under `between`, or a body and OBSTACLE_BODY, or a body twice.
 using Partners = std::array<std::uint16_t, 2>;
 /// All that it names: a robot's link or group stands for its bodies, "octomap" is the map, "self" the other one again.

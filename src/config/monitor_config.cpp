@@ -47,6 +47,7 @@ std::string distanceAskedBy(const std::string& path, const MonitorConfig& config
     for (const SeparationFrom& from : body.body.separations) {
       if (from.separation_m > 0) return distance(path + "minimum_separation_pairs", "a minimum separation");
     }
+    if (body.max_acceleration_m_s2 > 0) return distance(own + "max_acceleration_m_s2", "room beside straight paths");
     if (body.isUncertain()) return distance(own + "uncertainty", "an uncertainty radius");
   }
   return "";
@@ -226,6 +227,7 @@ void applyEffects(MonitorConfig& config) {
     if (off(Effect::TRACKER_NOISE)) {
       body.input.noise_field.clear();
       body.input.noise_radius_m = 0;
+      body.max_acceleration_m_s2 = 0;
     }
   }
   if (off(Effect::OWN_VOXELS)) {
@@ -331,6 +333,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, con
   readThresholds(reader, config);
   readMap(reader, config);
   readEffects(reader.section("effects"), config);
+  readSpeeds(reader, config);
   readMarkers(reader.section("markers"), config.markers);
   readClearance(reader.section("clearance"), config);
   readBodies(reader, config);
@@ -344,6 +347,7 @@ MonitorConfig readConfig(const ParameterTree& tree, const std::string& path, con
   applyEffects(config);
   checkOwnVoxels(reader, config);
   settleAccuracy(reader, config);
+  checkSpeeds(reader, config);
   config.given_hash = hashOf(givenText(tree) + config.robot.text);
   return config;
 }

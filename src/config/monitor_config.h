@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "config/robot_config.h"
 #include "dccd/cloud_map.h"
 #include "dccd/effect_plan.h"
+#include "dccd/safe_until.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 
@@ -32,12 +34,15 @@ struct BodyConfig {
   std::string mesh_file;
   std::string tf_frame;
   double mesh_scale = 1;
+  SpeedBound speed;                  ///< after a step; of a static body 0
+  double max_acceleration_m_s2 = 0;  ///< between two frames no vertex has more; 0: nobody says
   // A robot's link: its mesh is made already.
   std::string link;
   std::shared_ptr<const MeshResource> link_mesh;
   bool isRigid() const { return body.rigid; }
   bool isDepthImage() const { return input.source == TopologySource::DEPTH_IMAGE; }
-  bool isUncertain() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
+  bool hasNoise() const { return !input.noise_field.empty() || input.noise_radius_m > 0; }
+  bool isUncertain() const { return hasNoise() || max_acceleration_m_s2 > 0; }
 };
 
 struct MarkerConfig {
@@ -67,8 +72,11 @@ struct MonitorConfig {
   std::vector<std::string> robot_excluded;  ///< what of it is left out by choice: a sentence each
   MonitorOptions monitor;
   EffectSettings effects;
-  double minimum_separation_m = 0;  ///< of bodies that name none
-  double own_voxels_m = 0;          ///< the same
+  double minimum_separation_m = 0;    ///< of bodies that name none
+  double own_voxels_m = 0;            ///< the same
+  SpeedBound speed;                   ///< the same
+  double max_acceleration_m_s2 = 0;   ///< the same
+  std::optional<SpeedLaw> speed_law;  ///< of ~speed_scale; none: nobody asks for it
   /// Of all phases. A partner's set that has a name but no vertices yet is looked up when the files are loaded.
   std::vector<Expectation> expected_contacts;
   std::vector<std::size_t> expected_entry;   ///< of each of these: which entry of the parameter it is from
@@ -121,6 +129,10 @@ struct MonitorConfig {
   /// Free leaves of maps are asked for, too.
   bool needsKnownSpace() const { return unknown_space != UnknownSpace::FREE || ownsVoxels(); }
   bool holdsDistance() const;
+  /// Some body has a speed bound, and distances may be computed: ~safe_until is there.
+  bool promises() const;
+  /// By body of the monitor, behind those of the configuration what is attached: it moves with a link.
+  std::vector<SpeedBound> speedBounds(std::size_t count) const;
   /// Of what was given and of the values in force that can be changed live: equal for two monitors that do the same.
   std::uint64_t hash() const;
 };

@@ -51,6 +51,11 @@ RobotConfig readRobotParameters(ParameterReader section) {
   robot.padding_m = section.number("padding_m", robot.padding_m, 0, LARGE);
   robot.own_voxels_m = ownVoxelsOf(section, robot.own_voxels_m);
   robot.scale = section.number("scale", robot.scale, 1e-6, 1e6);
+  if (section.has("max_speed_m_s")) robot.speed = speedBoundOf(section, {});
+  if (section.has("speed_factor")) {
+    if (robot.speed) section.fail("speed_factor", "and max_speed_m_s exclude each other; remove one of both");
+    robot.speed.emplace().last_step_factor = section.number("speed_factor", 1, 1e6);
+  }
   robot.visuals = section.get("visuals", robot.visuals);
   robot.against_links = section.get("against_links", robot.against_links);
   robot.against_map = section.get("against_map", robot.against_map);
@@ -112,6 +117,7 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
       body.body.not_against.push_back(static_cast<std::uint16_t>(first + other));
     }
     body.tf_frame = body.link = part.link;
+    body.speed = asked.speedOr(config.speed);
     body.link_mesh = part.mesh;
     config.bodies.push_back(std::move(body));
   }

@@ -13,6 +13,7 @@
 
 #include "dccd/body.h"
 #include "dccd/expectation.h"
+#include "dccd/safe_until.h"
 #include "input/mesh_resource.h"
 
 namespace dccd {
@@ -33,6 +34,7 @@ struct RobotConfig {
   double padding_m = 0;             ///< minimum separation of a link
   double scale = 1;                 ///< of the geometry about the link's origin
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link
+  std::optional<SpeedBound> speed;  ///< of each link
   std::map<std::string, LinkSettings> links;
   bool against_links = false, against_map = false;
   bool visuals = false;                                   ///< of links without a collision element
@@ -41,6 +43,7 @@ struct RobotConfig {
 
   double scaleOf(const std::string& link) const;
   double paddingOf(const std::string& link) const;
+  const SpeedBound& speedOr(const SpeedBound& otherwise) const { return speed ? *speed : otherwise; }
 };
 
 /// A collision element of a link.

@@ -232,6 +232,7 @@ struct BagReplay::Run {
     Outcome outcome;
     while (pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       const std::optional<Outcome> prediction = predict(outcome);
+      if (summary.first_broken.empty()) summary.first_broken = pipeline.promises().broken();
       lacked_transform = lacked_transform || outcome.reason.find("no transform") != std::string::npos;
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);
@@ -436,6 +437,8 @@ BagReplaySummary BagReplay::run(const Sink& sink, const MessageSink& messages, c
   run.summary.fixed_frame = run.pipeline.fixedFrame();
   run.summary.effects = run.pipeline.effects().plan();
   run.summary.left_out = run.pipeline.monitor().leftOut();
+  run.summary.promises = run.pipeline.promises().promises();
+  run.summary.promises_broken = run.pipeline.promises().brokenPromises();
   if (run.look_ahead) run.summary.look_ahead = run.look_ahead->summary();
   return run.summary;
 }

@@ -55,7 +55,7 @@ CollisionMonitor::Impl::Impl(const ros::NodeHandle& node_handle, const ros::Node
       config(pipeline.config()),
       recorder(config, pipeline.monitor(), private_node.getNamespace()),
       outputs(private_node, config),
-      state(private_node, livenessLimits(config)),
+      state(private_node, livenessLimits(config), config.speed_law),
       queue(config.bodies.size(), config.queue_size, config.queue_policy, config.max_queue_bytes),
       diagnostics(private_node.getNamespace()),
       diagnostics_publisher(node.advertise<diagnostic_msgs::DiagnosticArray>(DIAGNOSTICS_TOPIC, 10)),

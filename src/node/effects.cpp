@@ -8,8 +8,11 @@ namespace dccd {
 
 namespace {
 
-std::string noiseOf(const MeshInputConfig& input) {
+std::string noiseOf(const BodyConfig& body) {
+  const MeshInputConfig& input = body.input;
   std::ostringstream text;
+  if (body.max_acceleration_m_s2 > 0) text << body.max_acceleration_m_s2 << " m/s^2 x (time between frames)^2 / 8";
+  if (body.max_acceleration_m_s2 > 0 && body.hasNoise()) text << " + ";
   if (input.noise_radius_m > 0) text << input.noise_radius_m << " m";
   if (!input.noise_field.empty()) {
     text << (input.noise_radius_m > 0 ? " + " : "") << input.noise_scale << " x point field '" << input.noise_field
@@ -23,7 +26,7 @@ std::string noiseOf(const MeshInputConfig& input) {
 EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map_source) : settings_(config.effects) {
   for (const BodyConfig& body : config.bodies) {
     scene_.bodies.push_back(body.body);
-    scene_.noise.push_back(body.isUncertain() ? noiseOf(body.input) : "");
+    scene_.noise.push_back(body.isUncertain() ? noiseOf(body) : "");
   }
   scene_.map_source = config.mapName();
   if (!map_source.empty()) scene_.map_source = map_source;
@@ -31,6 +34,7 @@ EffectTracker::EffectTracker(const MonitorConfig& config, const std::string& map
   if (config.takesClouds()) scene_.map_parameter = "obstacle_cloud_topic";
   scene_.map_seen = config.takesMapFileAlone();
   scene_.look_ahead_s = config.monitor.look_ahead_s;
+  promised_ = scene_.clearance_wanted = config.promises();
   scene_.earliest_only = config.monitor.detector.earliest_only;
   scene_.unknown_space_counts = config.unknown_space != UnknownSpace::FREE;
   plan_ = EffectPlan(scene_, settings_);
@@ -49,7 +53,8 @@ void EffectTracker::hearPredictions(bool heard) {
 }
 
 void EffectTracker::hearDistances(bool heard) {
-  if (std::exchange(scene_.clearance_wanted, heard) != heard) plan_ = EffectPlan(scene_, settings_);
+  const bool wanted = heard || promised_;
+  if (std::exchange(scene_.clearance_wanted, wanted) != wanted) plan_ = EffectPlan(scene_, settings_);
 }
 
 void EffectTracker::setBody(std::size_t body, const Body& what) {

@@ -25,7 +25,7 @@ class EffectTracker {
   void expectMap();
   /// Whether anybody subscribes to predictions, or they are asked for otherwise.
   void hearPredictions(bool heard);
-  /// Whether anybody subscribes to distances.
+  /// Whether anybody subscribes to distances; where something is promised they are wanted all the same.
   void hearDistances(bool heard);
   /// A body has come, or is another one.
   void setBody(std::size_t body, const Body& what);
@@ -45,6 +45,7 @@ class EffectTracker {
  private:
   EffectScene scene_;
   EffectSettings settings_;
+  bool promised_ = false;
   EffectPlan plan_, told_;
   std::vector<LeftOutPair> told_left_out_;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <limits>
 #include <sstream>
 
 #include "dccd/types.h"
@@ -67,6 +68,10 @@ void Liveness::forget() {
   map_age_s_ = -1;
   lacked_map_ = false;
   asked_.clear();
+}
+
+double Liveness::answerAge(std::int64_t now_ns) const {
+  return answered_ns_ == NEVER ? std::numeric_limits<double>::infinity() : secondsBetween(answered_ns_, now_ns);
 }
 
 std::vector<Fault> Liveness::faults(std::int64_t now_ns) const {

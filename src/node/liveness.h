@@ -57,6 +57,8 @@ class Liveness {
   void stop() { stopped_ = true; }
 
   std::vector<Fault> faults(std::int64_t now_ns) const;
+  /// How long ago the newest frame came that has an outcome [s]; infinity: none has.
+  double answerAge(std::int64_t now_ns) const;
 
  private:
   static constexpr std::int64_t NEVER = -1;

@@ -344,6 +344,10 @@ bool MonitorPipeline::nextOutcome(std::int64_t now_ns, Outcome& outcome) {
   nameMissing(outcome);
   nameUnwatched(outcome);
   measureUnknown(outcome);
+  if (config_.promises()) {
+    promises_.setBounds(speedBounds());
+    promises_.follow(outcome);
+  }
   return true;
 }
 
@@ -375,6 +379,7 @@ void MonitorPipeline::reset(StepStatus status) {
     waiting_[b].reset();
   }
   monitor_->reset(status);
+  promises_.forget();
   if (status != StepStatus::RESET) return;
   for (MeshDecoder& decoder : decoders_) decoder.forgetWeld();
   learnAnew(status);

@@ -11,6 +11,7 @@
 
 #include "config/monitor_config.h"
 #include "dccd/known_space.h"
+#include "dccd/safe_until.h"
 #include "dccd/stream.h"
 #include "input/mesh_decoder.h"
 #include "input/mesh_message.h"
@@ -107,6 +108,11 @@ class MonitorPipeline {
   EffectTracker& effects() { return effects_; }
   const EffectTracker& effects() const { return effects_; }
   const std::string& fixedFrame() const { return fixed_frame_; }
+  /// What the last outcome promises, and what became of the promise before; nothing where the configuration has no
+  /// bounds.
+  const PromiseWatch& promises() const { return promises_; }
+  /// How fast bodies are assumed to be, by body.
+  std::vector<SpeedBound> speedBounds() const { return config_.speedBounds(monitor_->bodies().size()); }
   std::uint64_t transformsUnusable() const { return transforms_.unusable(); }
   std::uint64_t weldChanges() const { return weld_changes_; }
   /// Clouds with a row_step that their data contradict.
@@ -149,7 +155,9 @@ class MonitorPipeline {
   std::vector<MeshDecoder> decoders_;
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
-  std::vector<bool> placed_;  // a static body of which the monitor has a frame
+  PromiseWatch promises_;
+  std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
+  std::vector<bool> placed_;         // a static body of which the monitor has a frame
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
   std::vector<std::optional<Rigid>> rigid_;
   std::vector<std::optional<Attached>> attached_;
@@ -206,6 +214,8 @@ class MonitorPipeline {
   void nameMissing(Outcome& outcome) const;
   /// Adds what of the robot should be watched and is not.
   void nameUnwatched(Outcome& outcome) const;
+  /// Puts the room beside straight paths into the frame's radii, by max_acceleration_m_s2.
+  void widen(std::size_t body, MeshFrame& frame);
   /// False: still waits.
   bool placeFrame(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.

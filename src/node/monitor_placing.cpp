@@ -1,5 +1,6 @@
 // Where things are: frames, rigid bodies and the map wait for their transforms and are moved into the fixed frame,
 // which may be learnt, and learnt anew.
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <sstream>
@@ -149,6 +150,25 @@ bool MonitorPipeline::placeOthers(std::int64_t now_ns, bool overdue, StepStatus&
   return false;
 }
 
+/// Between two frames, h seconds apart, a vertex of at most the acceleration a goes within a h^2 / 8 of the straight
+/// way: along any direction its way from the straight one is 0 at both ends, and its second derivative is a at the
+/// most. Each frame carries this of the time before it, and a step takes the larger radius of the frames at its ends
+/// and between them. The path of a step of which another body is the clock leaves the frames' straight ways by
+/// rigid_tolerance_m at the most, or the step is PARTIAL.
+void MonitorPipeline::widen(std::size_t body, MeshFrame& frame) {
+  const double acceleration = config_.bodies[body].max_acceleration_m_s2;
+  if (!(acceleration > 0)) return;
+  widened_ns_.resize(config_.bodies.size());
+  const StampNs before_ns = std::exchange(widened_ns_[body], frame.stamp_ns);
+  const double h = secondsBetween(before_ns, frame.stamp_ns);
+  const bool joined = before_ns != 0 && h > 0 && h <= config_.monitor.store.max_step_s;  // else a seam parts the two
+  // Seven roundings, of half a unit in the last place each.
+  double radius_m = joined ? acceleration * h * h / 8 * (1 + 8 * std::numeric_limits<double>::epsilon()) : 0;
+  if (body != config_.monitor.clock_body) radius_m += config_.monitor.detector.rigid_tolerance_m;
+  frame.radius_m.resize(frame.positions.size());
+  for (double& radius : frame.radius_m) radius = std::nextafter(radius + radius_m, SpeedBound::NONE);
+}
+
 bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
   Waiting& waiting = *waiting_[body];
   const bool overdue = finishing_ || secondsBetween(waiting.mesh.arrival_ns, now_ns) >= config_.transform_timeout_s;
@@ -194,6 +214,7 @@ bool MonitorPipeline::placeFrame(std::size_t body, std::int64_t now_ns) {
     clock_ns_ = done.mesh.stamp_ns;
     for (const auto& one : held) monitor_->seen(one.first, one.second);
   }
+  widen(body, done.mesh);
   monitor_->push(body, std::move(done.mesh), now_ns);
   placed_[body] = isStatic(body);
   return true;

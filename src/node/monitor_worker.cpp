@@ -156,6 +156,8 @@ StatsContext CollisionMonitor::Impl::statsContext() const {
   context.requests_refused = requests_refused;
   context.maps_refused = maps ? maps->refused() : 0;
   context.parameter_hash = config.hash();
+  context.promises = pipeline.promises().promises();
+  context.promises_broken = pipeline.promises().brokenPromises();
   return context;
 }
 
@@ -180,7 +182,11 @@ void CollisionMonitor::Impl::publishTopics(Outcome& outcome) {
   newest_ns = outcome.stamp_ns;
   // Before the contacts, though these then wait some 50 us longer for roscpp: a long list is not to keep a clear state
   // standing that is over.
-  state.tell(outcome, outcome.arrival_ns, frame, log.adviceOn(outcome));
+  const std::vector<SpeedBound> bounds = pipeline.speedBounds();
+  state.tell(outcome, outcome.arrival_ns, frame, log.adviceOn(outcome), pipeline.promises().broken(), bounds);
+  if (config.promises()) {
+    outputs.publishSafeUntil(toSafeUntil(outcome, pipeline.promises(), bounds, ros::Time::now(), frame));
+  }
   outputs.publishResult(outcome, bodies, frame);
   const double latency_s = secondsBetween(outcome.arrival_ns, steadyNs());
   outputs.publishMarkers(outcome, bodies, config.markers, frame);

@@ -7,6 +7,7 @@
 
 #include <ros/time.h>
 #include <std_msgs/Bool.h>
+#include <std_msgs/Float64.h>
 
 #include "input/steady_clock.h"
 #include "output/output_messages.h"
@@ -32,10 +33,16 @@ std::int64_t WatchClock::now() {
   return elapsed_ns_;
 }
 
-StateReporter::StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits)
+StateReporter::StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits,
+                             const std::optional<SpeedLaw>& law)
     : state_(private_node.advertise<deformable_ccd::State>("state", TOPIC_QUEUE, true)),
       clear_(private_node.advertise<std_msgs::Bool>("clear", TOPIC_QUEUE, true)),
+      law_(law),
       liveness_(limits) {
+  if (law_) {
+    speed_ = private_node.advertise<deformable_ccd::SpeedScale>("speed_scale", TOPIC_QUEUE, true);
+    speed_value_ = private_node.advertise<std_msgs::Float64>("speed_scale/value", TOPIC_QUEUE, true);
+  }
   forgotten("no frame has been answered yet");
   thread_ = std::thread([this] { watch(); });
 }
@@ -87,11 +94,13 @@ void StateReporter::setHint(const std::string& hint) {
 }
 
 void StateReporter::tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame,
-                         const std::string& remedy) {
+                         const std::string& remedy, const std::string& broken, const std::vector<SpeedBound>& bounds) {
   const std::lock_guard<std::mutex> lock(mutex_);
   answer_ = assuranceOf(outcome);
   touches_ = touchesInWords(outcome);
   remedy_ = remedy;
+  broken_ = broken;
+  if (law_) speed_told_ = toSpeedScale(outcome, bounds, *law_, frame);
   const ros::Time before = told_.holds_until;
   told_ = toState(outcome, frame);
   // What was answered last stays to be seen; that it is no more proved is said.
@@ -112,6 +121,8 @@ void StateReporter::voidAnswer(const std::string& reason) {
   answer_.missing.push_back(reason);
   touches_.clear();
   remedy_.clear();
+  broken_.clear();
+  speed_told_ = deformable_ccd::SpeedScale();
   told_ = toState(Outcome(), std::move(told_.header.frame_id));
 }
 
@@ -162,16 +173,39 @@ void StateReporter::say(bool always) {
     kinds.push_back(fault.kind);
     sentences.push_back(std::move(fault.sentence));
   }
-  if (std::exchange(hinders_, kinds) == kinds && !always) return;
+  const bool slowed = law_ && isSlowed(clock_.now());
+  const bool as_slow = std::exchange(slowed_, slowed) == slowed;
+  if (std::exchange(hinders_, kinds) == kinds && as_slow && !always) return;
   Assurance assurance = answer_;
   assurance.hinder(sentences);
   deformable_ccd::State message = told_;
   fillState(assurance, touches_, remedy_.empty() || hint_.empty() ? remedy_ + hint_ : remedy_ + "; " + hint_, message);
+  tellBroken(broken_, message);
   message.header.stamp = ros::Time::now();
   std_msgs::Bool clear;
   clear.data = assurance.clear();
   clear_.publish(clear);
   state_.publish(message);
+  if (law_) saySpeed(assurance);
+}
+
+bool StateReporter::isSlowed(std::int64_t now_ns) const {
+  return !(liveness_.answerAge(now_ns) <= law_->reaction_time_s);
+}
+
+void StateReporter::saySpeed(const Assurance& assurance) {
+  deformable_ccd::SpeedScale message = speed_told_;
+  if (!assurance.proved) {
+    limitSpeed("not proved: " + assurance.missing.front(), message);
+  } else if (slowed_) {
+    limitSpeed("no newer answer within the reaction time", message);
+  }
+  message.header.stamp = ros::Time::now();
+  message.header.frame_id = told_.header.frame_id;
+  speed_.publish(message);
+  std_msgs::Float64 value;
+  value.data = message.scale;
+  speed_value_.publish(value);
 }
 
 }  // namespace dccd

@@ -1,9 +1,11 @@
-// ~state and ~clear: the one place where the node says what it can vouch for. Each step's assurance comes from the
-// worker; what ends it between steps is watched on a thread of its own, so that no step and no callback delays it.
+// ~state, ~clear and ~speed_scale: the one place where the node says what it can vouch for. Each step's assurance comes
+// from the worker; what ends it between steps is watched on a thread of its own, so that no step and no callback delays
+// it.
 #pragma once
 
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,7 +15,9 @@
 #include <ros/publisher.h>
 
 #include "dccd/assurance.h"
+#include "dccd/safe_until.h"
 #include "node/liveness.h"
+#include "output/safe_until_messages.h"
 
 namespace dccd {
 
@@ -32,7 +36,9 @@ class WatchClock {
 /// Safe to call from any thread.
 class StateReporter {
  public:
-  StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits);
+  /// `law`: of ~speed_scale, which is not there without one.
+  StateReporter(ros::NodeHandle& private_node, const LivenessLimits& limits,
+                const std::optional<SpeedLaw>& law = std::nullopt);
   ~StateReporter();
   StateReporter(const StateReporter&) = delete;
   StateReporter& operator=(const StateReporter&) = delete;
@@ -49,8 +55,10 @@ class StateReporter {
   std::uint64_t staticFrames();
   /// So many of them are in use from the next step on.
   void staticInUse(std::uint64_t frames);
-  /// A step's answer, or why there is none and what to do about it.
-  void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame, const std::string& remedy);
+  /// A step's answer, or why there is none and what to do about it. `broken`: PromiseWatch::broken(); `bounds`: for
+  /// ~speed_scale.
+  void tell(const Outcome& outcome, std::int64_t arrival_ns, const std::string& frame, const std::string& remedy,
+            const std::string& broken = {}, const std::vector<SpeedBound>& bounds = {});
   /// What looks like a mistake, with what to do; it stands in the reason as long as nothing is proved. Empty: nothing.
   void setHint(const std::string& hint);
   /// From now on nothing is proved, until forgotten() says that it is done: what is asked for waits for the worker.
@@ -68,15 +76,21 @@ class StateReporter {
   void voidAnswer(const std::string& reason);
   /// The mutex is held. Publishes what holds now; `always`: also if it is what was said last.
   void say(bool always);
+  /// No newer frame than one that came too long ago has an answer: what slows down would react too late.
+  bool isSlowed(std::int64_t now_ns) const;
+  void saySpeed(const Assurance& assurance);
 
   std::mutex mutex_;
   std::condition_variable ended_;
-  ros::Publisher state_, clear_;
+  ros::Publisher state_, clear_, speed_, speed_value_;  // the last two where there is a law
+  const std::optional<SpeedLaw> law_;
   WatchClock clock_;
   Liveness liveness_;
-  Assurance answer_;              // of the last step or what came instead, without what is wrong besides
-  deformable_ccd::State told_;    // its other fields
-  std::string touches_, remedy_;  // of the last step
+  Assurance answer_;                       // of the last step or what came instead, without what is wrong besides
+  deformable_ccd::State told_;             // its other fields
+  std::string touches_, remedy_, broken_;  // of the last step
+  deformable_ccd::SpeedScale speed_told_;  // of the last step
+  bool slowed_ = false;                    // isSlowed() as it was said last
   std::string hint_;
   std::vector<Fault::Kind> hinders_;  // what was said to stand in its way
   bool stopped_ = false;

@@ -60,6 +60,7 @@ struct StatsContext {
   LookAheadSummary look_ahead;
   std::uint64_t markers_built = 0;
   std::uint64_t parameter_hash = 0;
+  std::uint64_t promises = 0, promises_broken = 0;  ///< of ~safe_until, since the start
 };
 
 deformable_ccd::ContactArray toContactArray(const Outcome& outcome, const std::vector<Body>& bodies,

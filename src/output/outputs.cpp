@@ -29,6 +29,7 @@ Outputs::Outputs(ros::NodeHandle& node, const MonitorConfig& config) {
   if (settingOf(config.effects, Effect::CLEARANCE) != EffectSetting::OFF) {
     clearance_ = node.advertise<deformable_ccd::ClearanceArray>("clearance", TOPIC_QUEUE);
   }
+  if (config.promises()) safe_until_ = node.advertise<deformable_ccd::SafeUntil>("safe_until", TOPIC_QUEUE, true);
   if (config.holdsDistance()) left_out_ = node.advertise<deformable_ccd::LeftOutPairs>("left_out", 1, true);
 }
 
@@ -85,6 +86,8 @@ void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, con
     if (!ahead.markers.empty()) markers_.publish(ahead);
   }
 }
+
+void Outputs::publishSafeUntil(const deformable_ccd::SafeUntil& message) { safe_until_.publish(message); }
 
 void Outputs::publishEffects(const deformable_ccd::EffectArray& effects) { effects_.publish(effects); }
 

@@ -12,6 +12,7 @@
 #include <ros/node_handle.h>
 
 #include "config/monitor_config.h"
+#include "output/safe_until_messages.h"
 
 namespace dccd {
 
@@ -35,6 +36,8 @@ class Outputs {
   /// Also one without an answer.
   void publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                          const MarkerConfig& markers, const std::string& frame);
+  /// Latched. Only where the configuration promises something.
+  void publishSafeUntil(const deformable_ccd::SafeUntil& message);
   void publishEffects(const deformable_ccd::EffectArray& effects);
   /// Latched. Only where some body separates.
   void publishLeftOut(const deformable_ccd::LeftOutPairs& pairs);
@@ -47,7 +50,7 @@ class Outputs {
                    const std::string& frame);
 
   ros::Publisher contacts_, first_contact_, stats_, markers_, effects_, left_out_, predicted_, time_to_contact_,
-      patches_, events_, clearance_;
+      patches_, events_, clearance_, safe_until_;
   deformable_ccd::ContactArray list_;
   std::uint64_t markers_built_ = 0;
 };

@@ -310,6 +310,14 @@ class CommandsTest(unittest.TestCase):
             finally:
                 stop(client)
                 self.gone('/stop_the_arm/stop')
+        if words[:3] in (['rosrun', 'deformable_ccd', 'slow_the_arm'], ['rosrun', 'deformable_ccd', 'slow_the_arm.py']):
+            self.with_a_monitor()
+            client = self.start(command)
+            try:
+                return self.assertRegex(self.runs('timeout 40 rostopic echo -n 1 /slow_the_arm/scale', 60), r'data: [\d.]+')
+            finally:
+                stop(client)
+                self.gone('/slow_the_arm/scale')
         if words[:3] == ['rosrun', 'deformable_ccd', 'publish_cloth.py']:
             tracker = self.start(command)
             try:

@@ -12,7 +12,8 @@ CONFIG = ''.join(path.read_text() for path in sorted((CHECKOUT / 'src/config').g
 # What a function of src/config reads is below this name; the others read the root, or a body's own level.
 SECTIONS = {'readTopology': 'topology/', 'readRigid': 'rigid/', 'readUncertainty': 'uncertainty/', 'topologySource': 'topology/',
             'readDepthImage': 'topology/',
-            'readMarkers': 'markers/', 'readClearance': 'clearance/', 'readRobotParameters': 'robot/', 'readSensorModel': 'sensor_model/'}
+            'readSpeedLaw': 'speed_scale/', 'readMarkers': 'markers/', 'readClearance': 'clearance/',
+            'readRobotParameters': 'robot/', 'readSensorModel': 'sensor_model/'}
 # Where a page names a family at once.
 # These read the fields of an entry of a list, which the list's own row explains.
 ENTRIES = {'readSeparationPair', 'readPartners', 'readExpectation', 'readLink'}
@@ -36,6 +37,8 @@ def read_parameters():
             found.add('minimum_separation_m')
         if 'ownVoxelsOf(section' in body:
             found.add(SECTIONS.get(name, '') + 'own_voxels_m')
+        if 'speedBoundOf(section' in body:
+            found.add(SECTIONS.get(name, '') + 'max_speed_m_s')
     return found
 
 
@@ -88,7 +91,7 @@ class InterfaceTest(unittest.TestCase):
         self.assertEqual({name for name, unit in units.items() if unit == 'm'}, {n for n in units if n.endswith('_m')})
         numbers = numbers_of_bodies()
         self.assertEqual(numbers, {'minimum_separation_m', 'own_voxels_m', 'uncertainty/radius_m', 'uncertainty/scale', 'rigid/scale',
-                                   'topology/max_edge_m', 'topology/max_range_m'})
+                                   'topology/max_edge_m', 'topology/max_range_m', 'max_speed_m_s', 'max_acceleration_m_s2'})
         self.assertEqual({name for name, unit in units.items() if re.match(r'm\b', unit)}, numbers)
 
     def test_effects(self):

@@ -6,11 +6,13 @@
 #include <algorithm>
 
 #include <std_msgs/Bool.h>
+#include <std_msgs/Float64.h>
 
 #include "input/known_types.h"
 #include "output/advice.h"
 #include "output/clearance_messages.h"
 #include "output/markers.h"
+#include "output/safe_until_messages.h"
 
 namespace dccd {
 
@@ -35,6 +37,8 @@ static StatsContext countersOf(const MonitorPipeline& pipeline, const BagReplayS
   context.wrong_row_steps = pipeline.wrongRowSteps();
   context.maps_received = so_far.maps;
   context.maps_refused = so_far.maps_refused;
+  context.promises = pipeline.promises().promises();
+  context.promises_broken = pipeline.promises().brokenPromises();
   return context;
 }
 
@@ -96,15 +100,32 @@ void ResultBag::addPatches(const Outcome& outcome, const MonitorPipeline& pipeli
   for (const auto& event : toPatchEvents(outcome, bodies, frame)) write("events", at, event);
 }
 
-void ResultBag::addState(const Outcome& outcome, const std::string& frame, const ros::Time& at) {
-  deformable_ccd::State state = toState(outcome, frame);
+void ResultBag::addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at) {
+  deformable_ccd::State state = toState(outcome, pipeline.fixedFrame());
   state.header.stamp = at;
   fillState(assuranceOf(outcome), touchesInWords(outcome), adviceFor(outcome.status, outcome.reason, map_source_),
             state);
+  tellBroken(pipeline.promises().broken(), state);
   write("state", at, state);
   std_msgs::Bool clear;
   clear.data = state.clear;
   write("clear", at, clear);
+  addPromise(outcome, pipeline, state.proved, at);
+}
+
+void ResultBag::addPromise(const Outcome& outcome, const MonitorPipeline& pipeline, bool proved, const ros::Time& at) {
+  const MonitorConfig& config = pipeline.config();
+  const std::string& frame = pipeline.fixedFrame();
+  const std::vector<SpeedBound> bounds = pipeline.speedBounds();
+  if (config.promises()) write("safe_until", at, toSafeUntil(outcome, pipeline.promises(), bounds, at, frame));
+  if (!config.speed_law) return;
+  deformable_ccd::SpeedScale speed = toSpeedScale(outcome, bounds, *config.speed_law, frame);
+  if (!proved) limitSpeed("not proved", speed);
+  speed.header.stamp = at;
+  write("speed_scale", at, speed);
+  std_msgs::Float64 value;
+  value.data = speed.scale;
+  write("speed_scale/value", at, value);
 }
 
 void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const BagReplaySummary& so_far,
@@ -120,7 +141,7 @@ void ResultBag::add(const Outcome& outcome, MonitorPipeline& pipeline, const Bag
   if (pipeline.monitor().options().detector.clearance.wanted) {
     write("clearance", at, toClearanceArray(outcome, bodies, frame));
   }
-  addState(outcome, frame, at);
+  addState(outcome, pipeline, at);
   if (!frame.empty()) write("markers", at, toMarkers(outcome, bodies, pipeline.config().markers, frame));
   diagnostics_.add(outcome, context.latency_s);
   const MonitorConfig& config = pipeline.config();

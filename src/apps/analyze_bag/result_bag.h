@@ -28,7 +28,8 @@ class ResultBag {
   StatsContext contextOf(const Outcome& outcome, const MonitorPipeline& pipeline, const BagReplaySummary& so_far);
   void addPlan(const Outcome& outcome, MonitorPipeline& pipeline, const ros::Time& at);
   void addPatches(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
-  void addState(const Outcome& outcome, const std::string& frame, const ros::Time& at);
+  void addState(const Outcome& outcome, const MonitorPipeline& pipeline, const ros::Time& at);
+  void addPromise(const Outcome& outcome, const MonitorPipeline& pipeline, bool proved, const ros::Time& at);
 
   rosbag::Bag bag_;
   LookAheadScore look_ahead_;

@@ -105,6 +105,9 @@ Defaults defaultsInTheCode() {
       {"minimum_separation_m", shown(body.body.minimum_separation_m)},
       {"own_voxels_m", shown(body.body.own_voxels_m)},
       {"uncertainty/radius_m", shown(body.input.noise_radius_m)},
+      {"max_speed_m_s", body.speed.max_m_s == SpeedBound::NONE ? "0" : shown(body.speed.max_m_s)},
+      {"max_acceleration_m_s2", shown(body.max_acceleration_m_s2)},
+      {"slows_down", shown(body.speed.slows_down)},
       {"uncertainty/field", shown(body.input.noise_field)},
       {"uncertainty/scale", shown(body.input.noise_scale)},
       {"rigid/mesh", "none"},
@@ -231,6 +234,10 @@ Defaults inForceOfTheNode() {
           {"robot/timeout_s", plain(robot.timeout_s)},
           {"robot/padding_m", plain(robot.padding_m)},
           {"robot/own_voxels_m", robot.own_voxels_m == ONE_VOXEL ? "auto" : plain(robot.own_voxels_m)},
+          {"max_speed_m_s", config.speed.max_m_s == SpeedBound::NONE ? "0" : plain(config.speed.max_m_s)},
+          {"max_acceleration_m_s2", plain(config.max_acceleration_m_s2)},
+          {"speed_scale/uncertainty_m", plain(SpeedLaw().uncertainty_m)},
+          {"robot/speed_factor", plain(robot.speedOr(config.speed).last_step_factor)},
           {"robot/scale", plain(robot.scale)},
           {"robot/against_links", plain(robot.against_links)},
           {"robot/against_map", plain(robot.against_map)},
@@ -264,7 +271,10 @@ TEST(InterfacePage, DefaultsOfTheNodeAreThoseInForceWhereNoneIsGiven) {
                                       "robot/description",
                                       "robot/leave_out",
                                       "robot/links",
-                                      "robot/semantic"};
+                                      "robot/max_speed_m_s",
+                                      "robot/semantic",
+                                      "speed_scale/reaction_time_s",
+                                      "speed_scale/stopping_time_s"};
   EXPECT_EQ(others, without);
 }
 

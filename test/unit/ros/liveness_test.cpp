@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <random>
 #include <thread>
 
@@ -62,6 +63,19 @@ TEST(Liveness, Silence) {
   EXPECT_EQ(kinds(liveness, 503 * MS), Kinds{});
   liveness.setLimits({10, 0.1, 0});
   EXPECT_EQ(kinds(liveness, 650 * MS), Kinds{Fault::Kind::SILENCE}) << "a limit that changes counts at once";
+}
+
+TEST(Liveness, HowOldTheNewestAnswerIs) {
+  Liveness liveness({10, 10, 0});
+  EXPECT_EQ(liveness.answerAge(5 * MS), std::numeric_limits<double>::infinity());
+  liveness.frame(1, 0);
+  liveness.frame(2, 40 * MS);
+  liveness.outcome(1, -1, 60 * MS);
+  EXPECT_DOUBLE_EQ(liveness.answerAge(100 * MS), 0.1) << "since it came, not since it was answered";
+  liveness.outcome(2, -1, 110 * MS);
+  EXPECT_DOUBLE_EQ(liveness.answerAge(140 * MS), 0.1);
+  liveness.forget();
+  EXPECT_EQ(liveness.answerAge(150 * MS), std::numeric_limits<double>::infinity());
 }
 
 TEST(Liveness, AFrameThatOvertookAResetIsOneThatCame) {

@@ -55,6 +55,20 @@ TEST(RobotParameters, ANameIsAllThatIsNeeded) {
   }
 }
 
+TEST(RobotParameters, LinksHaveASpeedBoundOfTheirOwn) {
+  const MonitorConfig one = read("max_speed_m_s: 0.5\nrobot: {description: d, max_speed_m_s: 0.3}\n");
+  EXPECT_EQ(one.bodies[0].speed.max_m_s, 0.5);
+  EXPECT_EQ(one.bodies[1].speed.max_m_s, 0.3);
+  EXPECT_EQ(one.speedBounds(6)[5].max_m_s, 0.3) << "of what is attached, too";
+  EXPECT_EQ(read("max_speed_m_s: 0.5\nrobot: d\n").bodies[1].speed.max_m_s, 0.5);
+  const MonitorConfig factor = read("robot: {description: d, speed_factor: 3}\n");
+  EXPECT_EQ(factor.bodies[1].speed.last_step_factor, 3);
+  EXPECT_EQ(factor.bodies[0].speed.last_step_factor, 0);
+  EXPECT_TRUE(factor.promises());
+  EXPECT_TRUE(mentions(errorOf("robot: {description: d, speed_factor: 0.5}\n"), "robot/speed_factor"));
+  EXPECT_TRUE(mentions(errorOf("robot: {description: d, speed_factor: 2, max_speed_m_s: 1}\n"), "exclude each other"));
+}
+
 TEST(RobotParameters, LinksMeetEachOtherAndTheMapWhereThatIsAskedFor) {
   const std::string yaml = "robot: {description: d, against_links: true, against_map: true}\n";
   const MonitorConfig config = read(yaml, armAndHand(), "");

@@ -1,0 +1,57 @@
+// How fast bodies may be: max_speed_m_s, max_acceleration_m_s2, speed_scale.
+#include <algorithm>
+#include <cmath>
+
+#include "config/body_config.h"
+
+namespace dccd {
+namespace {
+
+SpeedLaw readSpeedLaw(ParameterReader section) {
+  SpeedLaw law;
+  law.reaction_time_s = section.number("reaction_time_s", 0, LARGE);
+  law.stopping_time_s = section.number("stopping_time_s", 0, LARGE);
+  law.uncertainty_m = section.number("uncertainty_m", 0.0, 0, LARGE);
+  section.finish();
+  return law;
+}
+
+bool isBounded(const SpeedBound& speed) { return std::isfinite(speed.max_m_s) || speed.last_step_factor > 0; }
+
+/// Bodies that move by themselves, or with a link.
+bool anyBounded(const MonitorConfig& config) {
+  return std::any_of(config.bodies.begin(), config.bodies.end(), [](const BodyConfig& body) {
+    return body.body.motion == BodyMotionKind::STREAM && isBounded(body.speed);
+  });
+}
+
+}  // namespace
+
+void readSpeeds(ParameterReader& reader, MonitorConfig& config) {
+  config.speed = speedBoundOf(reader, {});
+  config.max_acceleration_m_s2 = reader.number("max_acceleration_m_s2", 0.0, 0, LARGE);
+  if (reader.has("speed_scale")) config.speed_law = readSpeedLaw(reader.neededSection("speed_scale"));
+}
+
+void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config) {
+  if (!config.speed_law) return;
+  if (!anyBounded(config)) {
+    reader.fail("speed_scale", "needs a speed bound, without which it is always 0: give max_speed_m_s, or remove it");
+  }
+  if (!config.promises()) {
+    reader.fail("speed_scale", "needs distances, but effects/clearance is off; remove one of both");
+  }
+}
+
+bool MonitorConfig::promises() const {
+  return anyBounded(*this) && settingOf(effects, Effect::CLEARANCE) != EffectSetting::OFF;
+}
+
+std::vector<SpeedBound> MonitorConfig::speedBounds(std::size_t count) const {
+  std::vector<SpeedBound> bounds;
+  for (const BodyConfig& body : bodies) bounds.push_back(body.speed);
+  bounds.resize(std::max(count, bounds.size()), robot_asked.speedOr(speed));
+  return bounds;
+}
+
+}  // namespace dccd

@@ -1,0 +1,99 @@
+#include "output/safe_until_messages.h"
+
+#include <limits>
+#include <sstream>
+
+#include "output/output_messages.h"
+#include "report/words.h"
+
+namespace dccd {
+namespace {
+
+template <class Message>
+void fillPair(const Outcome& outcome, std::size_t limiting, Message& out) {
+  if (limiting == SafeUntil::NO_PAIR) return;
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  for (std::size_t side = 0; side < 2; ++side) {
+    out.bodies[side] = bodyName(outcome.clearances[limiting].body[side], bodies);
+  }
+}
+
+/// What is assumed of one body's speed.
+std::string assumedOf(const Body& body, const SpeedBound& bound) {
+  std::ostringstream text;
+  if (bound.last_step_factor > 0) {
+    text << "no vertex of '" << body.name << "' is faster than " << bound.last_step_factor
+         << " times its fastest in this step";
+  } else if (bound.max_m_s == 0) {
+    text << "'" << body.name << "' stands still";
+  } else if (std::isfinite(bound.max_m_s)) {
+    text << "no vertex of '" << body.name << "' is faster than " << bound.max_m_s << " m/s";
+  } else {
+    text << "nobody says how fast '" << body.name << "' is: nothing is promised of it";
+  }
+  return text.str();
+}
+
+std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<SpeedBound>& bounds) {
+  std::vector<std::string> sentences;
+  if (!outcome.answered) return sentences;
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  for (std::size_t b = 0; b < bodies.size() && b < bounds.size(); ++b) {
+    if (bodies[b].topology->vertexCount() > 0) sentences.push_back(assumedOf(bodies[b], bounds[b]));
+  }
+  sentences.push_back(outcome.obstacle
+                          ? "all that can be touched is in the map, which stands still and gets no new voxel"
+                          : "nothing was checked against a map");
+  for (const Body& body : bodies) {
+    if (meetsItself(body)) sentences.push_back("neighbours on the surface of '" + body.name + "' are not spoken of");
+  }
+  return sentences;
+}
+
+}  // namespace
+
+deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch& watch,
+                                      const std::vector<SpeedBound>& bounds, const ros::Time& now,
+                                      const std::string& frame) {
+  const SafeUntil& promise = watch.promise();
+  deformable_ccd::SafeUntil out;
+  out.header = headerOf(promise.stamp_ns, frame);
+  out.until = toRosTime(promise.until_ns);
+  out.seconds = promise.seconds();
+  out.others_until = toRosTime(promise.others_until_ns);
+  out.others_seconds = promise.othersSeconds();
+  out.left = (out.until - now).toSec();
+  out.most = MOST_PROMISED_S;
+  out.reason = promise.reason;
+  fillPair(outcome, promise.limiting, out);
+  out.distance = promise.distance_m;
+  out.closing_speed = promise.closing_m_s;
+  out.assumed = assumptions(outcome, bounds);
+  out.broken = watch.broken();
+  return out;
+}
+
+deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
+                                        const SpeedLaw& law, const std::string& frame) {
+  const SpeedScale speed = speedScale(outcome, bounds, law);
+  deformable_ccd::SpeedScale out;
+  out.header = headerOf(outcome.stamp_ns, frame);
+  out.scale = speed.scale;
+  out.reason = speed.reason;
+  fillPair(outcome, speed.limiting, out);
+  out.distance = speed.distance_m;
+  out.needed = speed.needed_m;
+  if (outcome.answered) out.holds_until = toRosTime(outcome.stamp_ns);
+  return out;
+}
+
+void limitSpeed(const std::string& reason, deformable_ccd::SpeedScale& message) {
+  message.scale = 0;
+  message.reason = reason;
+}
+
+void tellBroken(const std::string& broken, deformable_ccd::State& message) {
+  if (!broken.empty()) message.reason += "; the promise of ~safe_until was void: " + broken;
+}
+
+}  // namespace dccd

@@ -1,0 +1,27 @@
+// What a step promises as messages. Used by the node and by analyze_bag.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <deformable_ccd/SafeUntil.h>
+#include <deformable_ccd/SpeedScale.h>
+#include <deformable_ccd/State.h>
+
+#include "dccd/safe_until.h"
+
+namespace dccd {
+
+/// The watch has followed the outcome; `now`: when it is published.
+deformable_ccd::SafeUntil toSafeUntil(const Outcome& outcome, const PromiseWatch& watch,
+                                      const std::vector<SpeedBound>& bounds, const ros::Time& now,
+                                      const std::string& frame);
+/// What the distances allow; whether all else is proved is said by limitSpeed().
+deformable_ccd::SpeedScale toSpeedScale(const Outcome& outcome, const std::vector<SpeedBound>& bounds,
+                                        const SpeedLaw& law, const std::string& frame);
+/// 0 for this reason.
+void limitSpeed(const std::string& reason, deformable_ccd::SpeedScale& message);
+/// Says in `reason` that the promise before this answer was void; an empty one changes nothing.
+void tellBroken(const std::string& broken, deformable_ccd::State& message);
+
+}  // namespace dccd

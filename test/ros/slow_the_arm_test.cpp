@@ -1,0 +1,147 @@
+// ~safe_until and ~speed_scale of a live node; examples/slow_the_arm in C++ and Python.
+#include <deformable_ccd/SafeUntil.h>
+#include <deformable_ccd/SpeedScale.h>
+#include <deformable_ccd/State.h>
+#include <deformable_ccd/StepStats.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <std_msgs/Float64.h>
+
+#include <algorithm>
+
+#include "ros/support/live_tests.h"
+#include "ros/support/meshes.h"
+#include "ros/support/probe.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+class SlowTheArm : public ::testing::TestWithParam<const char*> {
+ protected:
+  SlowTheArm()
+      : scale(node, "/" + std::string(GetParam()) + "/scale"),
+        monitor(advertiseAndWait<deformable_ccd::SpeedScale>(node, "/played/speed_scale", true, 2)) {}
+
+  /// The monitor says this of a new frame, or of the same again, until the client says what is wanted steadily.
+  void expectScale(double said, bool new_frames, double wanted, const std::string& why) {
+    int steady = 0;
+    std::size_t seen = scale.count();
+    EXPECT_TRUE(waitUntil([&] {
+      deformable_ccd::SpeedScale message;
+      message.scale = said;
+      if (new_frames) holds_until_ += ros::Duration(0.03);
+      message.holds_until = holds_until_;
+      monitor.publish(message);
+      ros::WallDuration(1.0 / 30).sleep();
+      for (; seen < scale.count(); ++seen) steady = scale.all()[seen].data == wanted ? steady + 1 : 0;
+      return steady >= 5;
+    })) << why
+        << ": " << scale.last().data;
+  }
+
+  ros::NodeHandle node;
+  Probe<std_msgs::Float64> scale;
+  ros::Publisher monitor;
+  ros::Time holds_until_{1000};
+};
+
+TEST_P(SlowTheArm, TakesTheScaleAsLongAsItIsNews) {
+  EXPECT_TRUE(waitUntil([&] { return scale.count() > 0; }));
+  EXPECT_EQ(scale.last().data, 0) << "nothing has been heard";
+  expectScale(0.25, true, 0.25, "as it is said");
+  expectScale(1, true, 1, "full speed");
+  const std::size_t before = scale.count();
+  expectScale(0, true, 0, "nothing is proved");
+  const auto all = scale.all();
+  for (std::size_t i = before; i < all.size(); ++i) {
+    EXPECT_TRUE(all[i].data == 1 || all[i].data == 0) << "it falls at once, not by and by: " << all[i].data;
+  }
+  const std::size_t risen = all.size();
+  expectScale(1, true, 1, "it rises again");
+  double steepest = 0;
+  const auto more = scale.all();
+  for (std::size_t i = risen; i < more.size(); ++i) steepest = std::max(steepest, more[i].data - more[i - 1].data);
+  EXPECT_NEAR(steepest, 0.04, 1e-9) << "evenly, 2 a second";
+  expectScale(1, false, 0, "the same frame again and again, which grows old");
+  expectScale(2, true, 1, "never more than full speed");
+}
+
+INSTANTIATE_TEST_SUITE_P(Clients, SlowTheArm, ::testing::Values("cpp", "python"),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST(LiveNode, PromisesSlowsDownAndSaysWhatWasVoid) {
+  ros::NodeHandle node;
+  const std::string name = "/collision_monitor";
+  Probe<deformable_ccd::SafeUntil> promises(node, name + "/safe_until");
+  Probe<deformable_ccd::SpeedScale> scales(node, name + "/speed_scale");
+  Probe<std_msgs::Float64> values(node, name + "/speed_scale/value");
+  Probe<deformable_ccd::State> states(node, name + "/state");
+  Probe<deformable_ccd::StepStats> stats(node, name + "/stats");
+  const auto floor = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/floor", true);
+  const auto publisher = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tip");
+  floor.publish(meshStamped({{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{0, 1, 2}}}, 1000));
+  EXPECT_EQ(scales.after(0).scale, 0) << "latched, before the first frame";
+  EXPECT_FALSE(scales.last().reason.empty());
+  // A tip of at most 0.5 m/s above a floor. At full speed S_p is 0.5 (0.4 + 0.2 / 2) + 0.02 m.
+  double stamp_s = 1000;
+  const auto send = [&](double height) {
+    const std::size_t seen = promises.count(), said = stats.count();
+    publisher.publish(
+        meshStamped({{{0, 0, height}, {0.5, 0, height + 1}, {-0.5, 0, height + 1}}, {{0, 1, 2}}}, stamp_s += 0.1));
+    stats.after(said);
+    return promises.after(seen);
+  };
+  const auto scaleOf = [&](const deformable_ccd::SafeUntil& promise) {
+    deformable_ccd::SpeedScale first;
+    EXPECT_TRUE(waitUntil([&] {
+      for (const auto& one : scales.all()) {
+        first = one;
+        if (one.holds_until == promise.header.stamp) return true;
+      }
+      return false;
+    }));
+    return first;
+  };
+  send(0.45);
+  const auto far = send(0.45);
+  EXPECT_EQ(far.reason, "");
+  EXPECT_NEAR(far.distance, 0.45, 2e-4);
+  EXPECT_LE(far.distance, 0.45);
+  EXPECT_NEAR(far.closing_speed, 0.5, 1e-9);
+  EXPECT_NEAR(far.seconds, 0.9, 5e-4);
+  EXPECT_NEAR((far.until - far.header.stamp).toSec(), far.seconds, 2e-9);
+  EXPECT_EQ(far.bodies[0], "floor");
+  EXPECT_EQ(far.bodies[1], "tip");
+  EXPECT_EQ(far.most, 10);
+  EXPECT_EQ(far.assumed, (std::vector<std::string>{"'floor' stands still", "no vertex of 'tip' is faster than 0.5 m/s",
+                                                   "nothing was checked against a map"}));
+  EXPECT_EQ(scaleOf(far).scale, 1);
+  const auto near = send(0.43);
+  EXPECT_EQ(near.broken, "") << "0.02 m in 0.1 s";
+  const auto fast = send(0.25);
+  EXPECT_NE(fast.broken.find("'tip' was faster than 0.5 m/s: vertex 0 came 0.18 m in 0.1 s"), std::string::npos)
+      << fast.broken;
+  EXPECT_TRUE(waitUntil([&] {
+    const auto said = states.all();
+    return std::any_of(said.begin(), said.end(), [](const deformable_ccd::State& state) {
+      return state.proved && state.reason.find("the promise of ~safe_until was void") != std::string::npos;
+    });
+  })) << "of this step all is known, "
+      << states.last().reason;
+  EXPECT_EQ(stats.last().promises, 3u) << "the first frame has no answer";
+  EXPECT_EQ(stats.last().promises_broken, 1u);
+  const auto slow = scaleOf(fast);
+  EXPECT_LT(slow.scale, 1);
+  EXPECT_GT(slow.scale, 0.5);
+  EXPECT_NEAR(slow.needed, 0.27, 1e-9);
+  // No frame follows.
+  EXPECT_TRUE(waitUntil([&] { return scales.last().scale == 0; }, 2)) << "0.4 s are the reaction time";
+  EXPECT_EQ(values.last().data, 0);
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
+
+int main(int argc, char** argv) { return dccd::test::runLiveTests(argc, argv, "slow_the_arm_test"); }

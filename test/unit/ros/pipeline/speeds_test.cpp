@@ -1,0 +1,221 @@
+// How fast bodies may be: the parameters, the room beside straight paths, and what is promised in messages.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dccd/assurance.h"
+#include "output/output_messages.h"
+#include "output/safe_until_messages.h"
+#include "unit/ros/parameter_support.h"
+#include "unit/ros/pipeline/driven_pipeline.h"
+
+namespace dccd {
+namespace test {
+namespace {
+
+constexpr double NONE = SpeedBound::NONE;
+
+MonitorConfig read(const std::string& yaml) { return readConfig(parseYaml(yaml, "p.yaml"), ""); }
+std::string mistake(const std::string& yaml) {
+  return said<ParameterError>([&] { read(yaml); });
+}
+
+TEST(SpeedParameters, HoldForAllBodiesAndForOne) {
+  const MonitorConfig none = read("{}");
+  EXPECT_EQ(none.bodies[0].speed.max_m_s, NONE);
+  EXPECT_FALSE(none.promises());
+  EXPECT_FALSE(none.speed_law);
+  const MonitorConfig config = read(
+      "max_speed_m_s: 0.5\nmax_acceleration_m_s2: 4\n"
+      "speed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.2}\n"
+      "bodies:\n"
+      "  cloth: {topic: a}\n"
+      "  person: {topic: b, max_speed_m_s: 1.6, slows_down: false, max_acceleration_m_s2: 0}\n"
+      "  free: {topic: c, max_speed_m_s: 0}\n"
+      "  table: {topic: d, motion: static}\n");
+  ASSERT_EQ(config.bodies.size(), 4u);
+  const auto bodyOf = [&](const std::string& name) {
+    return *std::find_if(config.bodies.begin(), config.bodies.end(),
+                         [&](const BodyConfig& body) { return body.body.name == name; });
+  };
+  EXPECT_EQ(bodyOf("cloth").speed.max_m_s, 0.5);
+  EXPECT_EQ(bodyOf("cloth").max_acceleration_m_s2, 4);
+  EXPECT_TRUE(bodyOf("cloth").speed.slows_down);
+  EXPECT_EQ(bodyOf("person").speed.max_m_s, 1.6);
+  EXPECT_FALSE(bodyOf("person").speed.slows_down);
+  EXPECT_EQ(bodyOf("person").max_acceleration_m_s2, 0);
+  EXPECT_EQ(bodyOf("free").speed.max_m_s, NONE);
+  EXPECT_EQ(bodyOf("table").speed.max_m_s, 0) << "it stands still";
+  EXPECT_EQ(bodyOf("table").max_acceleration_m_s2, 0);
+  EXPECT_TRUE(config.promises());
+  EXPECT_EQ(config.speed_law->stopping_time_s, 0.2);
+  EXPECT_EQ(config.speed_law->uncertainty_m, 0);
+  EXPECT_EQ(config.monitor.detector.accuracy.rung, Accuracy::CONSERVATIVE);
+  const MonitorConfig off = read("max_speed_m_s: 0.5\neffects: {clearance: off}\n");
+  EXPECT_FALSE(off.promises());
+}
+
+TEST(SpeedParameters, MistakesAreNamed) {
+  for (const auto& [yaml, part] : {
+           std::pair{"max_speed_m_s: -1\n", "max_speed_m_s"},
+           {"max_speed_m_s: .inf\n", "max_speed_m_s"},
+           {"max_speed_m_s: .nan\n", "max_speed_m_s"},
+           {"max_acceleration_m_s2: -1\n", "max_acceleration_m_s2"},
+           {"max_acceleration_m_s2: 1\naccuracy: exact\n", "max_acceleration_m_s2 asks for room beside straight paths"},
+           {"max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1}\n", "speed_scale/stopping_time_s"},
+           {"max_speed_m_s: 1\nspeed_scale: {reaction_time_s: -0.1, stopping_time_s: 1}\n", "reaction_time_s"},
+           {"speed_scale: {reaction_time_s: 0.1, stopping_time_s: 1}\n", "speed_scale needs a speed bound"},
+           {"max_speed_m_s: 1\neffects: {clearance: off}\nspeed_scale: {reaction_time_s: 1, stopping_time_s: 1}\n",
+            "speed_scale needs distances"},
+           {"bodies: {cloth: {topic: a}, table: {topic: b, motion: static, max_speed_m_s: 1}}\n",
+            "max_speed_m_s has no meaning for a static body"},
+           {"bodies: {cloth: {topic: a}, pad: {rigid: {mesh: a.stl, frame: f}, max_acceleration_m_s2: 1}}\n",
+            "max_acceleration_m_s2 has no meaning for a rigid body"},
+           {"bodies: {cloth: {topic: a, slows_down: 1}}\n", "slows_down"},
+       }) {
+    EXPECT_TRUE(mentions(mistake(yaml), part)) << yaml << mistake(yaml);
+  }
+}
+
+// A fall onto the map's top at z = 0, seen at the same height in two frames: between them it may have been lower.
+TEST(PathsBetweenFrames, ATouchThatNobodySawIsReportedWhereTheAccelerationAllowsIt) {
+  XmlRpcValue tree = scene();
+  tree["max_acceleration_m_s2"] = 8.0;  // 8 * 0.1^2 / 8 = 0.01 m in 0.1 s
+  Driven cloth(tree);
+  cloth.giveMap(1);
+  EXPECT_TRUE(cloth.pipeline.effects().plan().running(Effect::TRACKER_NOISE));
+  cloth.feed(1, 0.011f);
+  EXPECT_TRUE(assuranceOf(cloth.feed(1.1, 0.011f)).clear()) << "1 mm is left of 11";
+  ASSERT_TRUE(cloth.outcome.step->bodies[0].radius_m);
+  for (const double radius_m : *cloth.outcome.step->bodies[0].radius_m) {
+    EXPECT_GE(radius_m, 0.01 * (1 - 1e-7)) << "a stamp has nanoseconds";
+    EXPECT_NEAR(radius_m, 0.01, 1e-8);
+  }
+  cloth.feed(1.2, 0.009f);
+  EXPECT_FALSE(assuranceOf(cloth.feed(1.3, 0.009f)).clear()) << "1 mm is missing";
+  EXPECT_FALSE(cloth.outcome.contacts.empty());
+  EXPECT_TRUE(cloth.feed(1.34, 0.009f).answered);
+  EXPECT_NEAR(cloth.outcome.step->bodies[0].radius_m->at(0), 0.01, 1e-8) << "of the frame before, in doubt";
+  cloth.feed(1.38, 0.009f);
+  EXPECT_NEAR(cloth.outcome.step->bodies[0].radius_m->at(0), 0.0016, 1e-8) << "a shorter time, a narrower tube";
+}
+
+TEST(PathsBetweenFrames, ABodyThatIsNotTheClockHasTheStepsToleranceBesides) {
+  XmlRpcValue tree;
+  tree["max_acceleration_m_s2"] = 8.0;
+  tree["effects"]["octomap"] = "off";
+  tree["fixed_frame"] = "world";
+  tree["clock_body"] = "a";
+  tree["bodies"]["a"]["topic"] = "a";
+  tree["bodies"]["b"]["topic"] = "b";
+  tree["bodies"]["b"]["uncertainty"]["radius_m"] = 0.5;
+  Driven both(tree);
+  Outcome outcome;
+  for (const double stamp_s : {1.0, 1.1}) {
+    both.pipeline.take(1, {"sensor_msgs/PointCloud2", cloud(stamp_s, 2), 0, 0});
+    both.pipeline.take(0, {"sensor_msgs/PointCloud2", cloud(stamp_s, 0), 0, 0});
+    while (both.pipeline.nextOutcome(0, outcome)) {
+    }
+  }
+  ASSERT_TRUE(outcome.answered) << outcome.reason;
+  EXPECT_NEAR(outcome.step->bodies[0].radius_m->at(0), 0.01, 1e-8);
+  EXPECT_NEAR(outcome.step->bodies[1].radius_m->at(0), 0.5 + 0.01 + both.config.monitor.detector.rigid_tolerance_m,
+              1e-8);
+}
+
+/// A step of a cloth whose distance to the map is as given.
+Outcome distant(double lower_m, ClearanceStatus status) {
+  Outcome outcome;
+  Step step;
+  step.bodies.resize(1);
+  step.bodies[0].name = "cloth";
+  step.bodies[0].topology = share(Topology::grid(2, 2));
+  step.bodies[0].t0 = step.bodies[0].t1 = share(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  step.map.surface = VoxelSurface::build(0.1, {});
+  step.start_ns = 900000000;
+  step.stamp_ns = 1000000000;
+  outcome.obstacle = step.map.surface;
+  outcome.step = std::make_shared<const Step>(step);
+  outcome.status = StepStatus::OK;
+  outcome.answered = true;
+  outcome.stamp_ns = step.stamp_ns;
+  Clearance pair;
+  pair.body = {0, OBSTACLE_BODY};
+  pair.at_end.status = status;
+  pair.at_end.lower_m = lower_m;
+  outcome.clearances = {pair};
+  return outcome;
+}
+
+TEST(SafeUntilMessage, SaysUntilWhenWhoAndWhatItRestsOn) {
+  const Outcome outcome = distant(0.3, ClearanceStatus::MEASURED);
+  const std::vector<SpeedBound> bounds{{0.5}};
+  PromiseWatch watch;
+  watch.setBounds(bounds);
+  watch.follow(outcome);
+  const auto message = toSafeUntil(outcome, watch, bounds, ros::Time(1.1), "world");
+  EXPECT_EQ(message.header.stamp, ros::Time(1.0));
+  EXPECT_EQ(message.header.frame_id, "world");
+  EXPECT_NEAR(message.until.toSec(), 1.6, 1e-8);
+  EXPECT_NEAR(message.seconds, 0.6, 1e-8);
+  EXPECT_NEAR(message.left, 0.5, 1e-8);
+  EXPECT_EQ(message.bodies[0], "cloth");
+  EXPECT_EQ(message.bodies[1], "octomap");
+  EXPECT_EQ(message.distance, 0.3);
+  EXPECT_EQ(message.closing_speed, 0.5);
+  EXPECT_EQ(message.assumed,
+            (std::vector<std::string>{"no vertex of 'cloth' is faster than 0.5 m/s",
+                                      "all that can be touched is in the map, which stands still and gets no new voxel",
+                                      "neighbours on the surface of 'cloth' are not spoken of"}));
+  EXPECT_EQ(message.reason + message.broken, "");
+}
+
+TEST(SafeUntilMessage, HasNoNumberWhereNothingIsKnown) {
+  for (const ClearanceStatus status : {ClearanceStatus::UNKNOWN, ClearanceStatus::TOUCHING}) {
+    const Outcome outcome = distant(0, status);
+    PromiseWatch watch;
+    watch.follow(outcome);
+    const auto message = toSafeUntil(outcome, watch, {}, ros::Time(1.1), "world");
+    EXPECT_EQ(message.until, message.header.stamp);
+    EXPECT_EQ(message.seconds, 0);
+    EXPECT_TRUE(std::isnan(message.closing_speed)) << "nobody says how fast it is";
+    EXPECT_FALSE(message.reason.empty());
+    EXPECT_FALSE(std::isinf(message.distance));
+  }
+  PromiseWatch watch;
+  watch.follow(Outcome());
+  const auto none = toSafeUntil(Outcome(), watch, {}, ros::Time(1.1), "world");
+  EXPECT_TRUE(std::isnan(none.distance) && std::isnan(none.closing_speed));
+  EXPECT_TRUE(none.bodies[0].empty() && none.assumed.empty());
+}
+
+TEST(SpeedScaleMessage, IsZeroForAReason) {
+  const SpeedLaw law{0.1, 0.2, 0.02};
+  auto message = toSpeedScale(distant(3, ClearanceStatus::FARTHER), {{0.5}}, law, "world");
+  EXPECT_EQ(message.scale, 1);
+  EXPECT_EQ(message.holds_until, ros::Time(1.0));
+  limitSpeed("not proved", message);
+  EXPECT_EQ(message.scale, 0);
+  EXPECT_EQ(message.reason, "not proved");
+  const auto near = toSpeedScale(distant(0.05, ClearanceStatus::MEASURED), {{0.5}}, law, "world");
+  EXPECT_NEAR(near.needed, 0.5 * 0.2 + 0.02, 1e-12);
+  EXPECT_EQ(near.bodies[1], "octomap");
+  const auto none = toSpeedScale(Outcome(), {{0.5}}, law, "world");
+  EXPECT_EQ(none.scale, 0);
+  EXPECT_TRUE(std::isnan(none.needed));
+  EXPECT_TRUE(none.holds_until.isZero());
+}
+
+TEST(SafeUntilMessage, TheStateSaysThatAPromiseWasVoid) {
+  deformable_ccd::State state;
+  state.reason = "proved, nothing touches";
+  tellBroken("", state);
+  EXPECT_EQ(state.reason, "proved, nothing touches");
+  tellBroken("the map has new voxels", state);
+  EXPECT_EQ(state.reason, "proved, nothing touches; the promise of ~safe_until was void: the map has new voxels");
+}
+
+}  // namespace
+}  // namespace test
+}  // namespace dccd
