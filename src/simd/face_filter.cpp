@@ -5,6 +5,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/face_filter.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -49,14 +50,15 @@ constexpr size_t PAIR_LANES = 16, PAIR_POINTS = 5, PAIR_POINT_SIZE = 4 * PAIR_LA
 constexpr double FLOAT_ULPS = 0x1p29;  // so many times as large as a double's half ulp is a float's
 
 /// a0, a1, a2, b1, b2 relative to b0.
-HWY_INLINE void gatherPair(const double* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT faces, size_t lane,
-                           float* HWY_RESTRICT block) {
+HWY_INLINE void gatherPair(const double* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT a,
+                           const uint32_t* HWY_RESTRICT b, size_t lane, float* HWY_RESTRICT block) {
+  const uint32_t corners[PAIR_POINTS] = {a[0], a[GROUP], a[2 * GROUP], b[GROUP], b[2 * GROUP]};
   const hn::CappedTag<double, 4> dd;
   const hn::Rebind<float, decltype(dd)> df;
   for (size_t k = 0; k < 4; k += hn::Lanes(dd)) {
-    const auto origin = hn::Load(dd, positions + size_t{faces[3]} * 8 + k);
+    const auto origin = hn::Load(dd, positions + size_t{b[0]} * 8 + k);
     for (size_t i = 0; i < PAIR_POINTS; ++i) {
-      const double* x = positions + size_t{faces[i < 3 ? i : i + 1]} * 8 + k;
+      const double* x = positions + size_t{corners[i]} * 8 + k;
       hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, x), origin)), df, block + i * PAIR_POINT_SIZE + lane * 4 + k);
     }
   }
@@ -74,7 +76,8 @@ HWY_INLINE hn::Mask<DF> differ(const Signs& a, const Signs& b, const Signs& c) {
   return hn::And(hn::Or(hn::Or(a.plus, b.plus), c.plus), hn::Or(hn::Or(a.minus, b.minus), c.minus));
 }
 
-HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, size_t count, uint8_t* HWY_RESTRICT edges) {
+HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, const uint32_t* HWY_RESTRICT asked, size_t count,
+                          uint8_t* HWY_RESTRICT edges) {
   const DF d;
   const hn::RebindToUnsigned<DF> du;
   Float3 a[3], b[2];
@@ -131,26 +134,36 @@ HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, size_t count, uint8_t
   const auto guarded = hn::Le(size, hn::Set(d, tolerance::FUSED_LARGEST_M));
   bits = hn::IfThenElse(hn::RebindMask(du, guarded), bits, all);
   HWY_ALIGN_MAX uint32_t words[PAIR_LANES];
-  hn::Store(bits, du, words);
+  hn::Store(hn::And(bits, hn::Load(du, asked)), du, words);
   for (size_t lane = 0; lane < count; ++lane) edges[lane] = static_cast<uint8_t>(words[lane]);
 }
 
-void FacePairFilter(const double* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT faces, size_t count,
-                    uint8_t* HWY_RESTRICT edges) {
+size_t FacePairFilter(const double* HWY_RESTRICT positions, const FacesView& a, const FacesView& b,
+                      const uint32_t* HWY_RESTRICT slots, size_t count, uint8_t* HWY_RESTRICT edges) {
   const size_t lanes = hn::Lanes(DF());
   HWY_ALIGN_MAX float blocks[2][PAIR_POINTS * PAIR_POINT_SIZE] = {};
-  const auto fill = [&](size_t first, float* HWY_RESTRICT block) HWY_ATTR {
+  HWY_ALIGN_MAX uint32_t asked[2][PAIR_LANES] = {};
+  size_t all = 0;
+  const auto corners = [](const FacesView& of, size_t slot)
+                           HWY_ATTR { return of.vertices + slot / GROUP * 3 * GROUP + slot % GROUP; };
+  const auto fill = [&](size_t first, size_t block) HWY_ATTR {
     const size_t n = first >= count ? 0 : HWY_MIN(lanes, count - first);
-    for (size_t lane = 0; lane < n; ++lane) gatherPair(positions, faces + 6 * (first + lane), lane, block);
+    for (size_t lane = 0; lane < n; ++lane) {
+      const size_t f = slots[2 * (first + lane)], g = slots[2 * (first + lane) + 1];
+      gatherPair(positions, corners(a, f), corners(b, g), lane, blocks[block]);
+      asked[block][lane] = uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
+      all += hwy::PopCount(asked[block][lane]);
+    }
     return n;
   };
   // The next block is filled before this one is tested, as in segment_filter.cpp.
   size_t now = 0;
-  for (size_t first = 0, n = fill(0, blocks[0]); n > 0; first += lanes, now = 1 - now) {
-    const size_t next = fill(first + lanes, blocks[1 - now]);
-    pairBlock(blocks[now], n, edges + first);
+  for (size_t first = 0, n = fill(0, 0); n > 0; first += lanes, now = 1 - now) {
+    const size_t next = fill(first + lanes, 1 - now);
+    pairBlock(blocks[now], asked[now], n, edges + first);
     n = next;
   }
+  return all;
 }
 
 // --- faces along the axes --------------------------------------------------------------------------------------------
@@ -195,6 +208,10 @@ void FaceViews(const double* HWY_RESTRICT positions, const uint32_t* HWY_RESTRIC
   // A group is written whole before any of it is read: a load in larger pieces than was written waits for the cache.
   HWY_ALIGN_MAX double blocks[GROUP / FACE_LANES][3 * FACE_POINT_SIZE] = {};
   for (size_t g = 0; g < count; ++g, groups += 3 * GROUP, views += GROUP) {
+    // The next group's vertices are fetched while this one's are tested.
+    for (size_t i = 3 * GROUP; g + 1 < count && i < 6 * GROUP; ++i) {
+      if (groups[i] != UINT32_MAX) hwy::Prefetch(positions + size_t{groups[i]} * 8);
+    }
     for (size_t lane = 0; lane < GROUP; ++lane) {
       if (groups[lane] == UINT32_MAX) continue;
       for (size_t k = 0; k < 4; k += hn::Lanes(dd)) {
@@ -223,8 +240,9 @@ namespace dccd {
 namespace simd {
 HWY_EXPORT(FacePairFilter);
 HWY_EXPORT(FaceViews);
-void facePairFilter(const double* positions, const std::uint32_t* faces, std::size_t count, std::uint8_t* edges) {
-  HWY_DYNAMIC_DISPATCH(FacePairFilter)(positions, faces, count, edges);
+std::size_t facePairFilter(const double* positions, const FacesView& a, const FacesView& b, const std::uint32_t* slots,
+                           std::size_t count, std::uint8_t* edges) {
+  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(positions, a, b, slots, count, edges);
 }
 void faceViews(const double* positions, const std::uint32_t* groups, std::size_t count, std::uint16_t* views) {
   HWY_DYNAMIC_DISPATCH(FaceViews)(positions, groups, count, views);

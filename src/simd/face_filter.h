@@ -32,15 +32,22 @@ namespace simd {
 /// other face.
 constexpr unsigned FIRST_EDGES = 0x07, SECOND_EDGES_SHIFT = 3;
 
-/// positions: as for segmentFilter(). faces: the corners of A and of B, six for each pair; these are all different.
-/// edges: such bits for each pair.
-void facePairFilter(const double* positions, const std::uint32_t* faces, std::size_t count, std::uint8_t* edges);
+/// Faces in groups, by their slots, and which of their edges are asked about (FIRST_EDGES).
+struct FacesView {
+  const std::uint32_t* vertices;  ///< as in GroupsView::vertices (simd/group_pairs.h)
+  const std::uint8_t* edges;
+};
+
+/// positions: as for segmentFilter(). slots: of A in a and of B in b for each pair, whose corners are all different.
+/// edges: such bits for each pair, of the edges that are asked about. Returns how many these are.
+std::size_t facePairFilter(const double* positions, const FacesView& a, const FacesView& b, const std::uint32_t* slots,
+                           std::size_t count, std::uint8_t* edges);
 
 /// Bits of how a face is seen: TURNS_LEFT << k and TURNS_RIGHT << k along axis k; RISES << (3 c + k): from the corner
 /// after corner c to the one after that it goes from low to not low.
 constexpr unsigned TURNS_LEFT = 1, TURNS_RIGHT = 1 << 3, RISES = 1 << 6;
 
-/// groups: of 16 faces as in GroupsView::vertices (simd/group_pairs.h), UINT32_MAX in empty lanes, whose bits mean
+/// groups: of 16 faces as in FacesView::vertices, UINT32_MAX in empty lanes, whose bits mean
 /// nothing. views: such bits of each face.
 void faceViews(const double* positions, const std::uint32_t* groups, std::size_t count, std::uint16_t* views);
 

@@ -303,9 +303,11 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   const bool all_pairs = result.complete;
   if (checksStartState(part)) result.start_state = StartState::CLEAR;  // until shown otherwise
   if (map_reduced && scene.mayMeetMap()) runMap(part);
-  rememberApart(all_pairs && !options->earliest_only);
+  // With earliest_only the contacts after the first are unknown; if there is none, there is no later one either.
+  const bool all_known = all_pairs && (!options->earliest_only || result.contacts.empty());
+  rememberApart(all_known);
   if (options->earliest_only) keepFirst(options->accuracy.rung == Accuracy::EXACT, result.contacts);
-  runStartState(part, begin, all_pairs);  // after the contacts: of a budget too small for both they come first
+  runStartState(part, begin, all_known);  // after the contacts: of a budget too small for both they come first
   if (options->clearance.wanted) findClearance(part, begin);
   addPart(part.index, part.count, result, outcome);
 }

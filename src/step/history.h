@@ -120,8 +120,8 @@ struct History::Impl {
   void keepMapAnswer(std::size_t body, const Part& part, std::size_t first, std::uint64_t pairs);
   bool checksStartState(const Part& part) const;
   bool isStartKnown() const;
-  /// all_pairs: no pair of meshes was left out.
-  void runStartState(const Part& part, Deadline::Clock::time_point begin, bool all_pairs);
+  /// all_known: no other pair of meshes touches in the part.
+  void runStartState(const Part& part, Deadline::Clock::time_point begin, bool all_known);
   bool listStart(const Part& part, const Deadline& deadline, std::vector<StartIntersection>& met);
   void findPatches(Outcome& outcome);
   void findClearance(const Part& part, Deadline::Clock::time_point begin);

@@ -9,6 +9,7 @@
 #include "obstacle/static_filters.h"
 #include "obstacle/voxel_surface_impl.h"
 #include "oracle/oracle.h"
+#include "simd/cluster_bounds.h"
 #include "simd/face_filter.h"
 #include "step/start/segment_triangle.h"
 #include "support/margin_numbers.h"
@@ -83,9 +84,13 @@ IsWrong judgeSegment(const MarginInput& input) {
     alignas(64) double points[6][8] = {};
     for (int i = 0; i < 5; ++i) std::copy_n(x.data() + 3 * i, 3, points[i < 2 ? i : i + 1]);
     for (int k = 0; k < 3; ++k) points[2][k] = x[k] + x[3 + k] - x[6 + k];
-    static constexpr std::uint32_t FACES[6] = {0, 1, 2, 3, 4, 5};
+    // Two faces of one group: corner k of face j at [GROUP * k + j].
+    static constexpr std::uint32_t CORNERS[2 * simd::GROUP + 2] = {0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+                                                                   4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 5};
+    static constexpr std::uint8_t ALL_EDGES[2] = {simd::FIRST_EDGES, simd::FIRST_EDGES};
+    static constexpr std::uint32_t SLOTS[2] = {0, 1};
     std::uint8_t edges;
-    simd::facePairFilter(points[0], FACES, 1, &edges);
+    simd::facePairFilter(points[0], {CORNERS, ALL_EDGES}, {CORNERS, ALL_EDGES}, SLOTS, 1, &edges);
     return meets && (edges & 1) == 0;
   };
 }

@@ -12,13 +12,9 @@ namespace {
 constexpr std::size_t NEXT = simd::GROUP;  // vertex of a lane
 // Pairs that stay in the first-level cache; with a deadline, also those between two looks at the clock.
 constexpr std::size_t CHUNK = 512, CHUNK_WITH_DEADLINE = 64;
+constexpr std::size_t GROUPS_VIEWED = 4;  // at once, of neighbouring faces
 // A unit that is begun may go on for this many tests, so that a search comes to its end in the end.
 constexpr std::size_t TESTS_IN_ANY_CASE = 1024, FACE_PAIRS_A_TEST = 8;
-
-/// A bit for each edge that a face stands for.
-unsigned ownEdges(const std::array<std::uint32_t, 3>& own) {
-  return unsigned{own[0] != NO_INDEX} | unsigned{own[1] != NO_INDEX} << 1 | unsigned{own[2] != NO_INDEX} << 2;
-}
 
 }  // namespace
 
@@ -97,41 +93,33 @@ bool CrossingFinder::searchEdges(std::uint32_t edge_body, std::uint32_t face_bod
 bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePair& trees,
                                  const std::uint32_t* group_pairs, std::size_t count, std::vector<EdgeFace>& found) {
   work_ = 0;
-  faces_.resize(CHUNK);
   edges_.resize(CHUNK);
   crossing_.resize(CHUNK);
-  const std::array<std::uint32_t, 3>*own_a = (*search_.neighbourhoods)[a].own_edges.data(),
-                                  *own_b = (*search_.neighbourhoods)[b].own_edges.data();
+  const Neighbourhood &around_a = (*search_.neighbourhoods)[a], &around_b = (*search_.neighbourhoods)[b];
+  const simd::FacesView faces_a{trees.a->leaves(false).vertices, around_a.owns.data()};
+  const simd::FacesView faces_b{trees.b->leaves(false).vertices, around_b.owns.data()};
   const bool whole = stream_.run(trees, group_pairs, count, [&](const std::uint32_t* slots, std::size_t count) {
     for (const std::uint32_t* end = slots + 2 * count; slots != end;) {
       const std::size_t n = std::min(CHUNK, static_cast<std::size_t>(end - slots) / 2);
-      for (std::size_t i = 0; i < n; ++i) {
-        const Index *f = trees.a->lane<3>(slots[2 * i]), *g = trees.b->lane<3>(slots[2 * i + 1]);
-        faces_[i] = {f[0], f[NEXT], f[2 * NEXT], g[0], g[NEXT], g[2 * NEXT]};
-      }
-      simd::facePairFilter(search_.scene->vertices()->t0, faces_[0].data(), n, edges_.data());
+      tested_ += simd::facePairFilter(search_.scene->vertices()->t0, faces_a, faces_b, slots, n, edges_.data());
       work_ += n / FACE_PAIRS_A_TEST;
       // First which, without a branch on what nothing foretells.
       std::size_t crossing = 0;
       for (std::size_t i = 0; i < n; ++i) {
-        const unsigned own = ownEdges(own_a[slots[2 * i]]) | ownEdges(own_b[slots[2 * i + 1]])
-                                                                 << simd::SECOND_EDGES_SHIFT;
-        tested_ += static_cast<unsigned>(__builtin_popcount(own));
-        edges_[i] &= static_cast<std::uint8_t>(own);
         crossing_[crossing] = static_cast<std::uint32_t>(i);
         crossing += edges_[i] != 0;
       }
       for (std::size_t c = 0; c < crossing; ++c) {
         const std::size_t i = crossing_[c];
         const std::uint32_t face = slots[2 * i], other = slots[2 * i + 1];
-        const std::array<std::uint32_t, 6>& x = faces_[i];
+        const Index *f = trees.a->lane<3>(face), *g = trees.b->lane<3>(other);
         for (unsigned edges = edges_[i]; edges != 0; edges &= edges - 1) {
           const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
           const std::size_t k = bit % 3, next = k == 2 ? 0 : k + 1;
           if (bit < 3) {
-            add({a, own_a[face][k], b, other}, {x[k], x[next], x[3], x[4], x[5]});
+            add({a, around_a.own_edges[face][k], b, other}, {f[k * NEXT], f[next * NEXT], g[0], g[NEXT], g[2 * NEXT]});
           } else {
-            add({b, own_b[other][k], a, face}, {x[3 + k], x[3 + next], x[0], x[1], x[2]});
+            add({b, around_b.own_edges[other][k], a, face}, {g[k * NEXT], g[next * NEXT], f[0], f[NEXT], f[2 * NEXT]});
           }
         }
       }
@@ -145,12 +133,13 @@ bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePai
 
 /// What is seen of a face along the axes, of the body that is searched.
 std::uint16_t CrossingFinder::viewOf(std::uint32_t body, std::uint32_t face) {
-  const std::size_t group = face / simd::GROUP;
-  if (!viewed_[group]) {
-    const simd::GroupsView faces = search_.scene->bodies()[body].tree(FeatureKind::FACE).leaves(false);
-    simd::faceViews(search_.scene->vertices()->t0, faces.vertices + group * 3 * simd::GROUP, 1,
-                    views_.data() + group * simd::GROUP);
-    viewed_[group] = 1;
+  const std::size_t run = face / simd::GROUP / GROUPS_VIEWED;
+  if (!viewed_[run]) {
+    const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
+    const std::size_t first = run * GROUPS_VIEWED, count = std::min(GROUPS_VIEWED, faces.level(0).groups - first);
+    simd::faceViews(search_.scene->vertices()->t0, faces.leaves(false).vertices + first * 3 * simd::GROUP, count,
+                    views_.data() + first * simd::GROUP);
+    viewed_[run] = 1;
   }
   return views_[face];
 }
@@ -180,17 +169,22 @@ bool CrossingFinder::isOneTurn(std::uint32_t body, const Neighbourhood& around, 
 void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std::size_t vertex) {
   const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
   const std::uint32_t first = around.faces.begin[vertex], last = around.faces.begin[vertex + 1];
+  const auto opposite = [&](std::uint32_t i) {
+    const Index* face = faces.feature(around.faces.slots[i]);
+    return std::array<Index, 2>{face[(around.corner[i] + 1u) % 3], face[(around.corner[i] + 2u) % 3]};
+  };
+  fan_.resize(last - first);
+  for (std::uint32_t i = first; i < last; ++i) fan_[i - first] = opposite(i);
+  const Index at = search_.scene->bodies()[body].internal_begin + static_cast<Index>(vertex);
   for (std::uint32_t i = first; i < last; ++i) {
-    const std::uint32_t face = around.faces.slots[i];
-    const std::size_t from = (around.corner[i] + 1u) % 3, to = (around.corner[i] + 2u) % 3;
-    const std::uint32_t edge = around.own_edges[face][from];
+    const std::uint32_t edge = around.own_edges[around.faces.slots[i]][(around.corner[i] + 1u) % 3];
     if (edge == NO_INDEX) continue;
-    const Index ends[2] = {faces.feature(face)[from], faces.feature(face)[to]};
+    const auto [from, to] = fan_[i - first];
     for (std::uint32_t j = first; j < last; ++j) {
-      const Index* other = faces.feature(around.faces.slots[j]);
-      if (shareVertex(ends, other)) continue;
+      const auto [x, y] = fan_[j - first];
+      if ((from == x) | (from == y) | (to == x) | (to == y)) continue;
       ++tested_;
-      add({body, edge, body, around.faces.slots[j]}, {ends[0], ends[1], other[0], other[1], other[2]});
+      add({body, edge, body, around.faces.slots[j]}, {from, to, at, x, y});
     }
   }
 }
@@ -198,8 +192,9 @@ void CrossingFinder::addFan(std::uint32_t body, const Neighbourhood& around, std
 bool CrossingFinder::searchFans(std::uint32_t body, std::size_t first, std::size_t last, std::vector<EdgeFace>& found) {
   work_ = 0;
   const std::size_t groups = search_.scene->bodies()[body].tree(FeatureKind::FACE).level(0).groups;
-  if (viewed_.size() != groups || viewed_body_ != body) {
-    viewed_.assign(groups, 0);
+  const std::size_t runs = (groups + GROUPS_VIEWED - 1) / GROUPS_VIEWED;
+  if (viewed_.size() != runs || viewed_body_ != body) {
+    viewed_.assign(runs, 0);
     views_.resize(groups * simd::GROUP);
     viewed_body_ = body;
   }

@@ -75,12 +75,12 @@ class CrossingFinder {
   std::vector<EdgeFace> pairs_;                        // to be tested together,
   std::vector<std::array<std::uint32_t, 5>> corners_;  // the vertices of each,
   std::vector<std::uint8_t> meet_;                     // and whether it meets
-  std::vector<std::array<std::uint32_t, 6>> faces_;    // pairs of faces,
-  std::vector<std::uint8_t> edges_;                    // which of their edges may meet the other,
+  std::vector<std::uint8_t> edges_;                    // of pairs of faces those that may meet the other,
   std::vector<std::uint32_t> crossing_;                // and those pairs with any
+  std::vector<std::array<Index, 2>> fan_;              // of the faces at a vertex, the edges opposite it
   std::uint32_t viewed_body_ = 0;
   std::vector<std::uint16_t> views_;  // of its faces,
-  std::vector<std::uint8_t> viewed_;  // of those groups that were looked at
+  std::vector<std::uint8_t> viewed_;  // of those runs of groups that were looked at
 };
 
 }  // namespace dccd

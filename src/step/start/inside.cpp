@@ -182,7 +182,7 @@ bool InsideSearch::searchBodies(const SceneArrays& scene, const Deadline& deadli
 
 void InsideSearch::remember(const SceneArrays& scene, const std::vector<Contact>& contacts, bool complete) {
   known_ = complete;
-  if (!complete) return;
+  if (!complete || scene.bodies().size() == 1) return;
   for (const Contact& contact : contacts) {
     const std::uint16_t body = contact.body[0], closed = contact.body[1];
     if (contact.kind != PairKind::VERTEX_FACE || body == closed || !scene.bodies()[closed].hasInside()) continue;

@@ -52,6 +52,11 @@ void Neighbourhood::learn(const SceneBody& body) {
     if (own) *own = slot;
     if (along != 1 || against != 1) closed[at] = closed[e[1] - body.internal_begin] = 0;
   }
+  owns.clear();
+  for (const std::array<std::uint32_t, 3>& own : own_edges) {
+    owns.push_back(
+        static_cast<std::uint8_t>((own[0] != NO_INDEX) | (own[1] != NO_INDEX) << 1 | (own[2] != NO_INDEX) << 2));
+  }
 }
 
 }  // namespace dccd

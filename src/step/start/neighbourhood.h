@@ -21,6 +21,7 @@ struct Neighbourhood {
   /// By slots of faces: the slot of the edge from each corner to the next, if this face stands for that edge, else
   /// NO_INDEX. Of an edge's faces the one of the lowest rank stands for it.
   std::vector<std::array<std::uint32_t, 3>> own_edges;
+  std::vector<std::uint8_t> owns;  ///< by slots of faces: bit k where the k-th of these is one
   /// Of each of faces.slots, which of the face's corners the vertex is.
   std::vector<std::uint8_t> corner;
   /// Per used vertex: each edge at it is on two faces, which pass along it in opposite directions.

@@ -6,7 +6,7 @@ namespace dccd {
 
 using Clock = Deadline::Clock;
 
-void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_pairs) {
+void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_known) {
   const auto forget = [&] {
     carried.start_state.clear();
     carried.inside.clear();
@@ -31,12 +31,15 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
     result.start_state = StartState::NOT_CHECKED;
   }
-  result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
+  if (result.intersections.empty()) {
+    result.intersections = std::move(met);
+  } else {
+    result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
+  }
   if (isStartKnown()) {
     forget();
   } else {
-    // With earliest_only the later contacts are unknown: nothing may be concluded about the end of the step.
-    const bool complete = all_pairs && !options->earliest_only && stats.unchecked_vertices == 0;
+    const bool complete = all_known && stats.unchecked_vertices == 0;
     carried.start_state.remember(scene, result.contacts, complete);
     carried.inside.remember(scene, result.contacts, complete);
   }
@@ -44,7 +47,8 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
 }
 
-/// What meets or is inside at t=0. False: the deadline ended it. The vertices come first, for they are few.
+/// What meets or is inside at t=0; with earliest_only one that meets is enough. False: the deadline ended it. The
+/// vertices come first, for they are few.
 bool History::Impl::listStart(const Part& part, const Deadline& deadline, std::vector<StartIntersection>& met) {
   std::vector<StartIntersection> inside;
   bool whole = false;
@@ -54,11 +58,12 @@ bool History::Impl::listStart(const Part& part, const Deadline& deadline, std::v
     whole = begins_at->carried.start_state.listEnd(before, deadline, met) && whole;
   } else {
     inside = carried.inside.run(scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
-    met = carried.start_state.run(scene, part.continues, deadline, result.stats, foundLimit(),
+    met = carried.start_state.run(scene, part.continues, deadline, result.stats, {foundLimit(), options->earliest_only},
                                   static_cast<std::size_t>(options->num_threads),
                                   [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
-    if (carried.start_state.isCut()) result.cut = true;
-    whole = carried.inside.isWhole() && carried.start_state.isWhole();
+    const bool is_enough = options->earliest_only && !met.empty();
+    if (carried.start_state.isCut() && !is_enough) result.cut = true;
+    whole = is_enough || (carried.inside.isWhole() && carried.start_state.isWhole());
   }
   met.insert(met.end(), inside.begin(), inside.end());
   return whole;

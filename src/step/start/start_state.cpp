@@ -1,7 +1,6 @@
 #include "step/start/start_state.h"
 
 #include <algorithm>
-#include <atomic>
 
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
@@ -17,6 +16,7 @@ constexpr std::size_t FEW_CANDIDATES = 4096;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
 constexpr std::size_t FAN_UNIT = 1024;             // vertices of a unit
 constexpr std::size_t UNITS_A_THREAD = 4;          // between two looks at the clock
+constexpr std::size_t LISTED_PIECE = 4096;         // pairs that a thread lists at once
 constexpr std::size_t PIECE = 4;                   // units that a thread takes at once
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
@@ -31,7 +31,7 @@ std::size_t edgeCount(const SceneArrays& scene) {
 
 const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& scene, bool continues,
                                                             const Deadline& deadline, StepStats& stats,
-                                                            std::size_t most_found, std::size_t threads,
+                                                            const CrossingsWanted& wanted, std::size_t threads,
                                                             const Parallel& parallel) {
   releaseBurst(found_);
   releaseBurst(candidates_);
@@ -48,17 +48,19 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
   }
   tested_ = 0;
   cut_ = false;
-  most_found_ = most_found;
+  most_found_ = wanted.one_is_enough ? 0 : wanted.most_found;
+  most_group_pairs_ =
+      wanted.most_found == FoundLimit::NONE ? FoundLimit::NONE : std::size_t{tolerance::MAX_SUPERCLUSTER_PAIRS};
   has_deadline_ = deadline.canEnd();
   if (!(continues && known_)) clear();
   testCandidates(scene, deadline);
   if (!searched_ && !hasEnough()) search(scene, deadline, threads, parallel);
   cut_ = cut_ || hasEnough();
-  if (hasEnough()) found_.resize(most_found_);
+  if (hasEnough()) found_.resize(wanted.one_is_enough ? 1 : most_found_);
   whole_ = searched_ && !cut_ && candidates_.empty() && touched_.empty();
   known_ = false;  // until remember() has this step's contacts
 
-  list(scene, found_, intersections_);
+  list(scene, found_, intersections_, parallel);
   stats[Stage::START_STATE].in += tested_;
   stats[Stage::START_STATE].out += intersections_.size();
   stats[Effect::START_STATE].in += tested_;
@@ -71,33 +73,44 @@ Deadline StartStateSearch::beforeListing(const std::vector<EdgeFace>& found, con
 }
 
 void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs,
-                            std::vector<StartIntersection>& out) {
+                            std::vector<StartIntersection>& out, const Parallel& parallel) {
   const std::vector<SceneBody>& bodies = scene.bodies();
-  // Ranks ascend from body to body.
+  // Ranks ascend from body to body. As few digits as there are ranks of faces: the fewer there are to sort.
+  std::uint32_t shift = 0;
+  while ((bodies.back().face_begin + bodies.back().rank(FeatureKind::FACE).size()) >> shift != 0) ++shift;
   const auto rank = [&](FeatureKind kind, std::uint32_t body, std::uint32_t slot) -> std::uint64_t {
     return bodies[body].rank(kind)[slot];
   };
-  const auto bodyOf = [&](Index SceneBody::*begin, Index rank) {
-    const auto next = std::upper_bound(bodies.begin(), bodies.end(), rank,
-                                       [begin](Index r, const SceneBody& body) { return r < body.*begin; });
-    return static_cast<std::uint16_t>(next - bodies.begin() - 1);
-  };
-  keys_.clear();
-  for (const EdgeFace& pair : pairs) {
-    keys_.push_back(rank(FeatureKind::EDGE, pair.edge_body, pair.edge) << 32 |
-                    rank(FeatureKind::FACE, pair.face_body, pair.face));
-  }
+  keys_.resize(pairs.size());
+  parallel(pairs.size(), LISTED_PIECE, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const EdgeFace& pair = pairs[i];
+      keys_[i] = rank(FeatureKind::EDGE, pair.edge_body, pair.edge) << shift |
+                 rank(FeatureKind::FACE, pair.face_body, pair.face);
+    }
+  });
   radixSort(keys_, other_keys_);
   keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());  // a candidate that the search came to as well
-  out.clear();
-  for (const std::uint64_t key : keys_) {
-    const Index edge = static_cast<Index>(key >> 32), face = static_cast<Index>(key);
-    StartIntersection found;
-    found.body = {bodyOf(&SceneBody::edge_begin, edge), bodyOf(&SceneBody::face_begin, face)};
-    scene.featureVertices(FeatureKind::EDGE, found.body[0], edge, found.vertex.data());
-    scene.featureVertices(FeatureKind::FACE, found.body[1], face, found.vertex.data() + 2);
-    out.push_back(found);
-  }
+  out.resize(keys_.size());
+  parallel(keys_.size(), LISTED_PIECE, [&](std::size_t first, std::size_t last) {
+    const auto bodyOf = [&](Index SceneBody::*begin, Index rank, std::size_t before) {
+      const bool same =
+          bodies[before].*begin <= rank && (before + 1 == bodies.size() || rank < bodies[before + 1].*begin);
+      if (same) return static_cast<std::uint16_t>(before);
+      const auto next = std::upper_bound(bodies.begin(), bodies.end(), rank,
+                                         [begin](Index r, const SceneBody& body) { return r < body.*begin; });
+      return static_cast<std::uint16_t>(next - bodies.begin() - 1);
+    };
+    std::array<std::uint16_t, 2> body{0, 0};
+    for (std::size_t i = first; i < last; ++i) {
+      const auto edge = static_cast<Index>(keys_[i] >> shift);
+      const auto face = static_cast<Index>(keys_[i] & ((std::uint64_t{1} << shift) - 1));
+      body = {bodyOf(&SceneBody::edge_begin, edge, body[0]), bodyOf(&SceneBody::face_begin, face, body[1])};
+      out[i].body = body;
+      scene.featureVertices(FeatureKind::EDGE, body[0], edge, out[i].vertex.data());
+      scene.featureVertices(FeatureKind::FACE, body[1], face, out[i].vertex.data() + 2);
+    }
+  });
 }
 
 bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadline,
@@ -112,7 +125,7 @@ bool StartStateSearch::listEnd(const SceneArrays& scene, const Deadline& deadlin
         finders_.local().addMeeting(scene, first, count, 1, met);
         return true;
       });
-  list(scene, met, out);
+  list(scene, met, out, oneByOne);
   return whole;
 }
 
@@ -226,8 +239,7 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
   if (beforeListing(deadline).isOver()) return false;
   learnNeighbourhoods(scene);
-  const std::size_t room = most_found_ == FoundLimit::NONE ? FoundLimit::NONE : tolerance::MAX_SUPERCLUSTER_PAIRS;
-  cut_ = superclusterPairs(trees, groups_, scratch_, room).toc <= 1 || cut_;
+  cut_ = superclusterPairs(trees, groups_, scratch_, most_group_pairs_).toc <= 1 || cut_;
   setUnits(trees.self ? (scene.bodies()[a].usedCount() + FAN_UNIT - 1) / FAN_UNIT : 0);
   const bool limited = deadline.canEnd() || most_found_ != FoundLimit::NONE;
   const std::size_t count = unit_number_.size(), block = !limited ? count : threads == 1 ? 1 : UNITS_A_THREAD * threads;
@@ -238,18 +250,19 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
     const std::size_t n = std::min(block, count - first);
     if (unit_found_.size() < n) unit_found_.resize(n);
     unit_whole_.assign(n, 0);
-    std::atomic<std::uint64_t> tested{0};
+    unit_tested_.assign(n, 0);
     parallel(n, limited ? 1 : PIECE, [&](std::size_t from, std::size_t to) {
       CrossingFinder& finder = finders_.local();
       finder.begin({&scene, &neighbourhoods_, beforeListing(deadline), most_found_ - found_.size()});
       for (std::size_t i = from; i < to; ++i) {
         unit_found_[i].clear();
+        const std::uint64_t before = finder.tested();
         unit_whole_[i] = searchUnit(finder, trees, first + i, unit_found_[i]);
+        unit_tested_[i] = finder.tested() - before;
       }
-      tested += finder.tested();
     });
-    tested_ += tested;
     for (std::size_t i = 0; i < n; ++i) {
+      tested_ += unit_tested_[i];
       found_.insert(found_.end(), unit_found_[i].begin(), unit_found_[i].end());
       if (unit_whole_[i] && !hasEnough()) continue;
       next_unit_ = unit_number_[first + i];

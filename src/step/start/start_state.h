@@ -33,6 +33,12 @@ bool goOn(std::vector<std::array<std::uint32_t, 2>>& pairs, std::array<std::uint
   return true;
 }
 
+/// What of the edges that meet faces is to be listed. The search ends where it has that.
+struct CrossingsWanted {
+  std::size_t most_found = FoundLimit::NONE;  ///< of more the first ones to be found
+  bool one_is_enough = false;                 ///< the first one to be found alone
+};
+
 /// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those
 /// of the bodies' setups: within bodies with self_collision, between bodies with against_bodies.
 ///
@@ -67,10 +73,10 @@ class StartStateSearch {
   /// Full test unless `continues` (t=0 is t=1 of the step given to remember()) and the last step's contacts are known.
   /// Found pairs are sorted by edge (body, index), then by face (body, vertex indices). Fills in and out of stage and
   /// effect START_STATE. Nothing more is tested once the deadline is over, but for what it takes to list what is
-  /// found; isWhole() is false then. Of more than most_found the first ones to be found are listed; isCut() is true
-  /// then, and the next run() begins anew. threads: that parallel has, more than one if it is worth while.
+  /// found; isWhole() is false then. isCut() is true where not all that is found is wanted, and the next run() begins
+  /// anew. threads: that parallel has, more than one if it is worth while.
   const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const Deadline& deadline,
-                                            StepStats& stats, std::size_t most_found = FoundLimit::NONE,
+                                            StepStats& stats, const CrossingsWanted& wanted = {},
                                             std::size_t threads = 1, const Parallel& parallel = oneByOne);
 
   /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
@@ -114,7 +120,8 @@ class StartStateSearch {
   bool searchBodies(const SceneArrays& scene, const Deadline& deadline, std::size_t threads, const Parallel& parallel);
   void setUnits(std::size_t fans);
   bool searchUnit(CrossingFinder& finder, const TreePair& trees, std::size_t unit, std::vector<EdgeFace>& found) const;
-  void list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out);
+  void list(const SceneArrays& scene, const std::vector<EdgeFace>& pairs, std::vector<StartIntersection>& out,
+            const Parallel& parallel);
   void addCandidates(const SceneArrays& scene, const Touched& contact, std::vector<EdgeFace>& out);
   void addFacesAtEdge(const SceneArrays& scene, std::uint32_t edge_body, const Index* edge, std::uint32_t face_body,
                       const Index* other_edge, std::vector<EdgeFace>& out);
@@ -123,7 +130,7 @@ class StartStateSearch {
 
   bool whole_ = false, has_deadline_ = false;
   bool cut_ = false;  // there was more to find than most_found_
-  std::size_t most_found_ = FoundLimit::NONE;
+  std::size_t most_found_ = FoundLimit::NONE, most_group_pairs_ = FoundLimit::NONE;
   bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
   bool searched_ = false;   // the search has come to its end
   BodyPair next_bodies_{};  // else where it goes on: pairs of bodies are taken in order, in them the units,
@@ -141,6 +148,7 @@ class StartStateSearch {
   std::vector<std::uint32_t> unit_number_;  // of those that are left
   std::vector<std::vector<EdgeFace>> unit_found_;
   std::vector<std::uint8_t> unit_whole_;
+  std::vector<std::uint64_t> unit_tested_;
   tbb::enumerable_thread_specific<CrossingFinder> finders_;
   std::vector<std::uint64_t> keys_, other_keys_;  // of what is listed
   std::vector<Neighbourhood> neighbourhoods_;     // one a body; empty until they are asked for

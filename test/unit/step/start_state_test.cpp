@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/closed_meshes.h"
 #include "support/step_support.h"
 #include "support/step_truth.h"
 
@@ -277,6 +278,58 @@ TEST(StartState, ASearchThatIsCutGoesOnInTheNextStep) {
   EXPECT_GT(cuts, 50u);
   EXPECT_GT(found_later, 0u);
   EXPECT_GT(ends_known, 50u);
+}
+
+// Where only the first contact is wanted, one edge through a face says that the step begins too late for it.
+TEST(StartState, OneCrossingIsEnoughForTheFirstContact) {
+  const TestStep step = crumpled(3, 2, 24);
+  Options options;
+  const Outcome whole = runOnce(step, options);
+  ASSERT_GT(whole.intersections.size(), 100u);
+  options.earliest_only = true;
+  const Outcome first = runOnce(step, options);
+  ASSERT_EQ(first.intersections.size(), 1u);
+  EXPECT_TRUE(std::any_of(whole.intersections.begin(), whole.intersections.end(),
+                          [&](const StartIntersection& one) { return one == first.intersections[0]; }));
+  EXPECT_EQ(first.start_state, StartState::INTERSECTING);
+  EXPECT_TRUE(first.start_state_complete);
+  EXPECT_FALSE(first.cut);
+  EXPECT_TRUE(assuranceOf(first).proved);
+  EXPECT_LT(2 * first.stats[Stage::START_STATE].in, whole.stats[Stage::START_STATE].in);
+  forEachSimdTarget([&](const std::string& target) {
+    for (const int threads : {1, 2, 3}) {
+      options.num_threads = threads;
+      const Outcome other = runOnce(step, options);
+      EXPECT_TRUE(same(other.intersections, first.intersections)) << target << ", " << threads << " threads";
+      EXPECT_EQ(other.stats[Stage::START_STATE].in, first.stats[Stage::START_STATE].in) << target << ' ' << threads;
+    }
+  });
+}
+
+// In a stream without a contact its end is known, as with all contacts; a contact, or a crossing, ends that.
+TEST(StartState, WithoutAFirstContactTheEndIsKnown) {
+  TestStep step;
+  step.bodies = {sheet(6, 6, Vec3::Zero(), 0.25), sheet(6, 6, Vec3(0, 0, 0.1), 0.25)};
+  for (std::size_t i = 0; i < 36; ++i) step.bodies[1].t0[i][2] += 0.05 * static_cast<double>(i % 6);  // bounds overlap
+  const Positions low = step.bodies[0].t0, high = step.bodies[1].t0;
+  Positions through = high;
+  for (Vec3& x : through) x[2] -= 0.2;
+  Options options;
+  options.earliest_only = true;
+  History history;
+  std::vector<std::uint64_t> tested;
+  const std::vector<Positions> ends = {high, high, through, through, through};
+  for (const Positions& end : ends) {
+    step = step.continued({low, end});
+    const Outcome outcome = detect(step.motion(), options, history);
+    EXPECT_EQ(outcome.start_state == StartState::INTERSECTING, !trueIntersections(step).empty()) << tested.size();
+    tested.push_back(outcome.stats[Stage::START_STATE].in);
+  }
+  EXPECT_GT(tested[0], 0u);
+  EXPECT_EQ(tested[1], 0u);
+  EXPECT_EQ(tested[2], 0u) << "it begins where nothing touched";
+  EXPECT_GT(tested[3], 0u) << "more than the first contact may have begun";
+  EXPECT_GT(tested[4], 0u);
 }
 
 // The same with many groups of edges a body, at rest: cut after any number of them, the parts are the whole.
