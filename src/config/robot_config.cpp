@@ -50,6 +50,7 @@ RobotConfig readRobotParameters(ParameterReader section) {
   robot.timeout_s = section.number("timeout_s", robot.timeout_s, 0, LARGE);
   robot.padding_m = section.number("padding_m", robot.padding_m, 0, LARGE);
   robot.own_voxels_m = ownVoxelsOf(section, robot.own_voxels_m);
+  robot.max_own_voxels = section.integer("max_own_voxels", robot.max_own_voxels, 0, MANY);
   robot.scale = section.number("scale", robot.scale, 1e-6, 1e6);
   if (section.has("max_speed_m_s")) robot.speed = speedBoundOf(section, {});
   if (section.has("speed_factor")) {

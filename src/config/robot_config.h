@@ -35,6 +35,7 @@ struct RobotConfig {
   double scale = 1;                 ///< of the geometry about the link's origin
   double own_voxels_m = ONE_VOXEL;  ///< Body::own_voxels_m of each link
   std::optional<SpeedBound> speed;  ///< of each link
+  std::size_t max_own_voxels = 0;   ///< of the links and of what they hold; with more nothing is proved; 0: no limit
   std::map<std::string, LinkSettings> links;
   bool against_links = false, against_map = false;
   bool visuals = false;                                   ///< of links without a collision element

@@ -220,7 +220,7 @@ bool SceneArrays::isStill(const SceneBody& body) const {
 /// By coordinates, which are projections without rounding.
 bool SceneArrays::isFar(std::size_t b) const {
   const SceneBody& body = bodies_[b];
-  if (meetsItself(body.setup) || meetsMap(body.setup) || uncertain_) return false;
+  if (uncertain_ || !keep_bounds_ || (body.kept && !body.stale)) return false;  // what is kept costs nothing
   const double reach_m = 2 * body.reach_m, up = std::numeric_limits<double>::infinity();  // of both bodies, all alike
   const auto below = [&](const SceneBody& one, const SceneBody& other) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -229,8 +229,8 @@ bool SceneArrays::isFar(std::size_t b) const {
     return false;
   };
   for (std::size_t other = 0; other < bodies_.size(); ++other) {
-    if (other == b || !meet(body.setup, b, bodies_[other].setup, other)) continue;
-    if (!below(body, bodies_[other]) && !below(bodies_[other], body)) return false;
+    if (other == b || below(body, bodies_[other]) || below(bodies_[other], body)) continue;
+    if (meet(body.setup, b, bodies_[other].setup, other)) return false;
   }
   return true;
 }
@@ -266,14 +266,14 @@ void SceneArrays::overlappingBodies(bool t0_only, std::vector<std::uint32_t>& pa
     scratch.clear();
     std::size_t done = 0;
     while (done < pairs.size() / 2) {
-      constexpr std::size_t STEP = 4096;
+      const std::size_t step = std::min<std::size_t>(4096, simd::GROUP * simd::GROUP * (pairs.size() / 2 - done));
       const std::size_t used = scratch.size();
-      scratch.resize(used + 2 * STEP);
+      scratch.resize(used + 2 * step);
       std::size_t consumed = 0;
       const std::size_t found =
           simd::testGroupPairs(view, view, pairs.data() + 2 * done, pairs.size() / 2 - done, true,
                                l > 0 ? simd::Diagonal::UPPER_WITH_DIAGONAL : simd::Diagonal::STRICT_UPPER, t0_only,
-                               scratch.data() + used, STEP, &consumed);
+                               scratch.data() + used, step, &consumed);
       scratch.resize(used + 2 * found);
       done += consumed;
     }

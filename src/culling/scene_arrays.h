@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <hwy/aligned_allocator.h>
@@ -25,6 +26,13 @@ static_assert(secondKind(PairKind::VERTEX_FACE) == FeatureKind::FACE);
 static_assert(firstKind(PairKind::EDGE_EDGE) == FeatureKind::EDGE);
 static_assert(secondKind(PairKind::EDGE_EDGE) == FeatureKind::EDGE);
 
+/// What positions span.
+struct Extent {
+  std::shared_ptr<const Positions> of;
+  Vec3 lo, hi;             ///< of coordinates that are numbers
+  bool is_finite = false;  ///< all of them are
+};
+
 /// One body: where its elements are in the scene's arrays.
 struct SceneBody {
   Body setup;              ///< as it was when it was set; where it is comes with each step
@@ -41,9 +49,11 @@ struct SceneBody {
   bool unchanged = false;  ///< every vertex is at both ends where it was in the step before, bit for bit
   bool kept = false;       ///< nothing of it changed since the last step, nor did the range of the records
   bool stale = false;      ///< its records and bounds are not those of its vertices
-  bool far = false;        ///< it comes near nothing that it is tested against, and has no bounds in this step
-  bool recorded = false;   ///< it has been through a step since it was set
-  double reach_m = 0;      ///< how far its bounds are widened: half of the scene's largest separation of meshes
+  bool far = false;        ///< it comes near no other body that it is tested against, and has no bounds in this step
+  bool passed_by = false;  ///< it is far, and nothing else is asked of it: its vertices are not those of the step
+  std::array<Extent, 2> extents;  ///< at t0 and t1, if it was asked for them
+  bool recorded = false;          ///< it has been through a step since it was set
+  double reach_m = 0;             ///< how far its bounds are widened: half of the scene's largest separation of meshes
   double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections of the step
   std::int16_t margin[16] = {};                   ///< reach_m in record units
   bool sewn = false;                              ///< it has a border by its numbers alone: its seams hold in this step
@@ -78,12 +88,13 @@ class SceneArrays {
   /// Whether these are the bodies that were set, wherever they are now.
   bool holds(const std::vector<Body>& bodies) const;
 
-  /// Copies the positions, leaves out what is not finite or not active, and sets the record scale. parallel(n, piece,
-  /// f): calls f(first, last) over [0, n), in parallel pieces of about that size or not.
+  /// Copies the positions, leaves out what is not finite or not active, and sets the record scale. may_pass_by: not of
+  /// bodies that are far and meet neither the map nor themselves. parallel(n, piece, f): calls f(first, last) over
+  /// [0, n), in parallel pieces of about that size or not.
   /// Throws std::invalid_argument naming the body when a frame has the wrong number of vertices.
   template <class Parallel>
-  void record(const Step& step, StepStats& stats, const Parallel& parallel) {
-    const bool bounds_valid = beginRecord(step);
+  void record(const Step& step, StepStats& stats, const Parallel& parallel, bool may_pass_by = false) {
+    const bool bounds_valid = beginRecord(step, may_pass_by);
     const std::size_t n = pieces_.size(), unit = piecesInAUnit();
     parallel(n, unit, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) copyPiece(step, pieces_[i]);
@@ -98,16 +109,16 @@ class SceneArrays {
     record(step, stats, [](std::size_t n, std::size_t, const auto& f) { f(std::size_t{0}, n); });
   }
 
-  /// Off: every body is refitted in every step.
+  /// Off: every body is refitted in every step that needs bounds.
   void setKeepBounds(bool keep) { keep_bounds_ = keep; }
 
-  /// Records and bounds of every body that is neither kept nor far. pieces(n, f): calls f(first, last) over [0, n), in
-  /// parallel or not.
+  /// Records and bounds of every body that is neither kept nor far. needed: per body, whether it has bounds however far
+  /// it is; empty: all. pieces(n, f): calls f(first, last) over [0, n), in parallel or not.
   template <class Pieces>
-  void refit(const Pieces& pieces, StepStats& stats) {
+  void refit(const Pieces& pieces, StepStats& stats, const std::vector<std::uint8_t>& needed = {}) {
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       SceneBody& body = bodies_[b];
-      body.far = isFar(b);
+      body.far = body.passed_by || (!needed.empty() && !needed[b] && isFar(b));
       ++(body.far ? stats.bodies_far : body.kept ? stats.bodies_kept : stats.bodies_refitted);
       body.stale = body.stale || !body.kept;
       if (body.far || !body.stale) continue;
@@ -208,7 +219,8 @@ class SceneArrays {
     std::size_t unchecked = 0, active = 0, first_active = 0;
     double bounds_min[8] = {}, bounds_max[8] = {};  ///< projections
   };
-  bool beginRecord(const Step& step);
+  bool beginRecord(const Step& step, bool may_pass_by);
+  void passByFar(const Step& step);
   std::size_t piecesInAUnit() const;
   void copyPiece(const Step& step, Piece& piece);
   bool closeCopies(const Step& step, bool bounds_valid, StepStats& stats);

@@ -39,6 +39,21 @@ void checkPositions(const SceneBody& body, const Body& motion) {
                               " and " + std::to_string(motion.t1 ? motion.t1->size() : 0));
 }
 
+Extent extentOf(const std::shared_ptr<const Positions>& positions) {
+  constexpr double MOST = std::numeric_limits<double>::infinity();
+  double lo[3] = {MOST, MOST, MOST}, hi[3] = {-MOST, -MOST, -MOST}, sum[3] = {};
+  for (const Vec3& p : *positions) {
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = p[a] < lo[a] ? p[a] : lo[a];
+      hi[a] = p[a] > hi[a] ? p[a] : hi[a];
+      sum[a] += p[a];
+    }
+  }
+  // False, too, where the sum overflows, which costs time alone.
+  const bool is_finite = std::isfinite(sum[0]) && std::isfinite(sum[1]) && std::isfinite(sum[2]);
+  return {positions, Vec3(lo[0], lo[1], lo[2]), Vec3(hi[0], hi[1], hi[2]), is_finite};
+}
+
 bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
   for (std::size_t i = 1; i < n; ++i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -76,8 +91,41 @@ bool SceneArrays::recordRadii(SceneBody& body, const Body& motion) {
   return body.uncertain;
 }
 
+/// By coordinates, as isFar() does later of what is recorded.
+void SceneArrays::passByFar(const Step& step) {
+  const auto mayBePassedBy = [](const SceneBody& body) { return !meetsItself(body.setup) && !meetsMap(body.setup); };
+  if (uncertain_ || !keep_bounds_ || std::none_of(bodies_.begin(), bodies_.end(), mayBePassedBy)) return;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    auto& [from, to] = bodies_[b].extents;
+    const Body& motion = step.bodies[b];
+    if (from.of != motion.t0) from = to.of == motion.t0 ? to : extentOf(motion.t0);
+    if (to.of != motion.t1) to = from.of == motion.t1 ? from : extentOf(motion.t1);
+  }
+  struct Swept {
+    Vec3 lo, hi;  // the upper side with the reach of both bodies, all alike
+  };
+  std::vector<Swept> swept;
+  for (const SceneBody& body : bodies_) {
+    Swept one{body.extents[0].lo.cwiseMin(body.extents[1].lo), body.extents[0].hi.cwiseMax(body.extents[1].hi)};
+    for (int a = 0; a < 3; ++a) {
+      one.hi[a] = std::nextafter(one.hi[a] + 2 * body.reach_m, std::numeric_limits<double>::infinity());
+    }
+    swept.push_back(one);
+  }
+  const auto apart = [&](std::size_t a, std::size_t b) {
+    return (swept[a].hi.array() < swept[b].lo.array()).any() || (swept[b].hi.array() < swept[a].lo.array()).any();
+  };
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    SceneBody& body = bodies_[b];
+    body.passed_by = mayBePassedBy(body) && body.extents[0].is_finite && body.extents[1].is_finite;
+    for (std::size_t other = 0; body.passed_by && other < bodies_.size(); ++other) {
+      if (other != b && !apart(b, other)) body.passed_by = !meet(body.setup, b, bodies_[other].setup, other);
+    }
+  }
+}
+
 /// Whether the bounds of the step before are those of what it recorded.
-bool SceneArrays::beginRecord(const Step& step) {
+bool SceneArrays::beginRecord(const Step& step, bool may_pass_by) {
   if (step.bodies.size() != bodies_.size()) {
     throw std::invalid_argument("the step has " + std::to_string(step.bodies.size()) + " bodies, the scene " +
                                 std::to_string(bodies_.size()));
@@ -90,6 +138,11 @@ bool SceneArrays::beginRecord(const Step& step) {
   pieces_.clear();
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     uncertain_ |= recordRadii(bodies_[b], step.bodies[b]);
+    bodies_[b].passed_by = false;
+  }
+  if (may_pass_by) passByFar(step);
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    if (bodies_[b].passed_by) continue;
     const std::size_t n = bodies_[b].usedCount();
     for (std::size_t first = 0; first < n; first += PIECE) pieces_.push_back({b, first, std::min(first + PIECE, n)});
   }
@@ -145,7 +198,11 @@ bool SceneArrays::closeCopies(const Step& step, bool bounds_valid, StepStats& st
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     Piece* const begin = piece;
     while (piece != end && piece->body == b) ++piece;
-    closeCopy(bodies_[b], step.bodies[b], {begin, piece}, bounds_valid, stats);
+    if (bodies_[b].passed_by) {
+      bodies_[b].recorded = bodies_[b].unchanged = bodies_[b].kept = false;
+    } else {
+      closeCopy(bodies_[b], step.bodies[b], {begin, piece}, bounds_valid, stats);
+    }
     any_kept |= bodies_[b].kept;
   }
   return any_kept;

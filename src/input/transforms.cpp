@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 #include <utility>
 
@@ -49,39 +50,42 @@ std::string problemOf(const geometry_msgs::TransformStamped& transform) {
 
 }  // namespace
 
-bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
-  const auto known = kept_.find(unslashed(transform.child_frame_id));
-  return known != kept_.end() &&
-         static_cast<StampNs>(transform.header.stamp.toNSec()) < known->second.rbegin()->first - JUMP_BACK_NS;
+const TransformFeed::Frame* TransformFeed::frameOf(const std::string& name) const {
+  const auto found = frames_.find(name);
+  return found == frames_.end() ? nullptr : &found->second;
 }
 
-bool TransformFeed::hasRoomFor(const geometry_msgs::TransformStamped& transform) {
-  for (const std::string* name : {&transform.header.frame_id, &transform.child_frame_id}) {
-    if (names_.count(*name) > 0) continue;
-    if (names_.size() >= MAX_FRAMES) return false;
-    names_.insert(*name);
-  }
-  return true;
+/// Null: there are too many frames.
+TransformFeed::Frame* TransformFeed::roomFor(const std::string& name) {
+  const auto known = frames_.find(name);
+  if (known != frames_.end()) return &known->second;
+  if (frames_.size() >= MAX_FRAMES) return nullptr;
+  Frame& frame = frames_[name];
+  frame.name = name;
+  return &frame;
+}
+
+bool TransformFeed::goesBack(const geometry_msgs::TransformStamped& transform) const {
+  const Frame* frame = frameOf(unslashed(transform.child_frame_id));
+  return frame && !frame->sent.empty() &&
+         static_cast<StampNs>(transform.header.stamp.toNSec()) < frame->sent.rbegin()->first - JUMP_BACK_NS;
 }
 
 /// Else it is kept, and those are forgotten that the buffer forgets with it.
-bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform) {
-  const auto& p = transform.transform.translation;
-  const auto& q = transform.transform.rotation;
-  std::map<StampNs, Pose>& kept = kept_[unslashed(transform.child_frame_id)];
-  const Pose pose{Eigen::Quaterniond(q.w, q.x, q.y, q.z), Vec3(p.x, p.y, p.z)};
-  if (!kept.emplace(static_cast<StampNs>(transform.header.stamp.toNSec()), pose).second) return true;
-  const auto old = kept.lower_bound(kept.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
-  const std::size_t before = kept.size();
-  kept.erase(kept.begin(), old);
-  kept_count_ += 1 + kept.size() - before;
+bool TransformFeed::isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame) {
+  if (!frame.sent.emplace(static_cast<StampNs>(transform.header.stamp.toNSec()), sent).second) return true;
+  const auto old =
+      frame.sent.lower_bound(frame.sent.rbegin()->first - static_cast<StampNs>(buffer_.getCacheLength().toNSec()));
+  const std::size_t before = frame.sent.size();
+  frame.sent.erase(frame.sent.begin(), old);
+  kept_count_ += 1 + frame.sent.size() - before;
   return false;
 }
 
 /// Keeps static transforms.
 void TransformFeed::clear() {
   buffer_.clear();
-  kept_.clear();
+  for (auto& named : frames_) named.second.sent.clear();
   kept_count_ = 0;
 }
 
@@ -98,7 +102,8 @@ void TransformFeed::leaveOut(const geometry_msgs::TransformStamped& transform, c
   if (!known && told_.size() >= MAX_TOLD) return;
   const std::string text = "transforms of '" + child + "' are left out: " + problem;
   // A frame that has had usable ones is not in want of a place.
-  if (!known && static_.count(transform.child_frame_id) == 0) only_unusable_[child] = text;
+  const Frame* frame = frameOf(unslashed(transform.child_frame_id));
+  if (!known && !(frame && frame->is_static)) only_unusable_[child] = text;
   if (told_.insert(child).second) complaints_.push_back(text);
 }
 
@@ -123,52 +128,74 @@ bool TransformFeed::add(const tf2_msgs::TFMessage& message, bool is_static) {
       continue;
     }
     if (!only_unusable_.empty()) only_unusable_.erase(unslashed(transform.child_frame_id));
-    if (!hasRoomFor(transform)) continue;
-    if (!static_.emplace(transform.child_frame_id, is_static).first->second) {
+    const Frame* parent = roomFor(unslashed(transform.header.frame_id));
+    Frame* frame = roomFor(unslashed(transform.child_frame_id));
+    if (!parent || !frame) continue;
+    ++change_;
+    const Sent sent{parent, poseOf(transform.transform)};
+    if (!frame->is_static) frame->is_static = is_static;
+    if (*frame->is_static) {
+      frame->fixed = sent;
+    } else {
       if (goesBack(transform) || kept_count_ >= MAX_KEPT) {
         clear();
         cleared = true;
       }
-      if (isRepeated(transform)) continue;
+      if (isRepeated(transform, sent, *frame)) continue;
     }
     buffer_.setTransform(transform, "tf", is_static);
   }
   return cleared;
 }
 
-std::pair<TransformFeed::Chain, TransformFeed::Chain> TransformFeed::chains(const std::string& target,
-                                                                            const std::string& source,
-                                                                            StampNs stamp_ns) const {
-  const ros::Time time = toTime(stamp_ns);
-  const auto upFrom = [&](const std::string& frame) {
-    Chain chain{frame};
-    std::string parent;
-    while (chain.size() <= MAX_CHAIN && buffer_._getParent(chain.back(), time, parent)) chain.push_back(parent);
-    return chain;
-  };
-  Chain from_target = upFrom(target), from_source = upFrom(source);
-  const auto meeting =
-      std::find_first_of(from_source.begin(), from_source.end(), from_target.begin(), from_target.end());
-  if (meeting == from_source.end()) return {};
-  from_target.erase(std::find(from_target.begin(), from_target.end(), *meeting) + 1, from_target.end());
-  from_source.erase(meeting + 1, from_source.end());
-  return {std::move(from_target), std::move(from_source)};
+/// Its rotation has the length 1.
+TransformFeed::Pose TransformFeed::poseOf(const geometry_msgs::Transform& transform) {
+  const auto& q = transform.rotation;
+  const auto& p = transform.translation;
+  return {Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized(), Vec3(p.x, p.y, p.z)};
 }
 
-TransformFeed::Pose TransformFeed::poseAlong(const Chain& chain, StampNs stamp_ns) const {
+/// Where the frame's parent has it: a transform of this very stamp as it was sent, else what tf2 says.
+const TransformFeed::Sent& TransformFeed::sentAt(const Frame& frame, StampNs stamp_ns) const {
+  if (!frame.is_static || *frame.is_static) return frame.fixed;
+  if (frame.asked_change == change_ && frame.asked_ns == stamp_ns) return frame.asked;
+  frame.asked = Sent();
+  const bool is_newest = !frame.sent.empty() && frame.sent.rbegin()->first == stamp_ns;  // most of the time
+  const auto at = is_newest ? std::prev(frame.sent.end()) : frame.sent.find(stamp_ns);
+  std::string parent;
+  if (at != frame.sent.end()) {
+    frame.asked = at->second;
+  } else if (buffer_._getParent(frame.name, toTime(stamp_ns), parent)) {
+    frame.asked = {frameOf(parent), poseOf(buffer_.lookupTransform(parent, frame.name, toTime(stamp_ns)).transform)};
+  }
+  frame.asked_change = change_;
+  frame.asked_ns = stamp_ns;
+  return frame.asked;
+}
+
+/// Both chains, up to where the two meet. False: they do not.
+template <class ParentOf>
+bool TransformFeed::findWay(const std::string& target, const std::string& source, ParentOf parentOf) const {
+  const auto climb = [&](const std::string& name, Chain& chain) {
+    chain.clear();
+    for (const Frame* at = frameOf(name); at && chain.size() <= MAX_CHAIN; at = parentOf(*at)) chain.push_back(at);
+  };
+  climb(target, from_target_);
+  climb(source, from_source_);
+  const auto meeting =
+      std::find_first_of(from_source_.begin(), from_source_.end(), from_target_.begin(), from_target_.end());
+  if (meeting == from_source_.end()) return false;
+  from_target_.erase(std::find(from_target_.begin(), from_target_.end(), *meeting) + 1, from_target_.end());
+  from_source_.erase(meeting + 1, from_source_.end());
+  return true;
+}
+
+/// By what sentAt() found last.
+TransformFeed::Pose TransformFeed::poseAlong(const Chain& chain) {
   Pose sum;
   for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
-    const auto sent = kept_.find(chain[i]);
-    const auto at = sent == kept_.end() ? std::map<StampNs, Pose>::const_iterator() : sent->second.find(stamp_ns);
-    Pose one;
-    if (sent != kept_.end() && at != sent->second.end()) {
-      one = at->second;
-    } else {
-      const auto found = buffer_.lookupTransform(chain[i + 1], chain[i], toTime(stamp_ns)).transform;
-      one.rotation = Eigen::Quaterniond(found.rotation.w, found.rotation.x, found.rotation.y, found.rotation.z);
-      one.translation = Vec3(found.translation.x, found.translation.y, found.translation.z);
-    }
-    one.rotation.normalize();
+    const Frame& frame = *chain[i];
+    const Pose& one = *frame.is_static ? frame.fixed.pose : frame.asked.pose;
     sum.translation = one.translation + one.rotation * sum.translation;
     sum.rotation = one.rotation * sum.rotation;
   }
@@ -179,19 +206,23 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
                            Eigen::Isometry3d& transform, std::string& reason) const {
   transform = Eigen::Isometry3d::Identity();
   if (target == source) return true;
-  for (const std::string* name : {&target, &source}) {
-    reason = frameNameProblem(*name);
-    if (reason.empty()) continue;
-    reason = "'" + shortText(*name, MAX_NAME) + "' is no frame's name: " + reason;
-    return false;
-  }
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    if (!buffer_.canTransform(target, source, toTime(stamp_ns), &reason)) return false;
-    // The newest common transform is tf2's to find.
-    const auto [from_target, from_source] =
-        stamp_ns > 0 ? chains(target, source, stamp_ns) : std::pair<Chain, Chain>({target}, {source, target});
-    const Pose of_target = poseAlong(from_target, stamp_ns), of_source = poseAlong(from_source, stamp_ns);
+    Pose of_target, of_source;
+    // The newest common transform is tf2's to find, and so is the reason why there is none.
+    if (stamp_ns > 0 && findWay(target, source, [&](const Frame& f) { return sentAt(f, stamp_ns).parent; })) {
+      of_target = poseAlong(from_target_);
+      of_source = poseAlong(from_source_);
+    } else {
+      for (const std::string* name : {&target, &source}) {
+        reason = frameNameProblem(*name);
+        if (reason.empty()) continue;
+        reason = "'" + shortText(*name, MAX_NAME) + "' is no frame's name: " + reason;
+        return false;
+      }
+      if (!buffer_.canTransform(target, source, toTime(stamp_ns), &reason)) return false;
+      of_source = poseOf(buffer_.lookupTransform(target, source, toTime(stamp_ns)).transform);
+    }
     const Eigen::Quaterniond back = of_target.rotation.conjugate();
     transform.linear() = (back * of_source.rotation).normalized().toRotationMatrix();
     transform.translation() = back * (of_source.translation - of_target.translation);
@@ -202,27 +233,29 @@ bool TransformFeed::lookup(const std::string& target, const std::string& source,
   }
 }
 
-/// With those that are kept of each frame on the way.
+/// With those that are kept of each frame on the way, as it is now.
 template <class Take>
 void TransformFeed::forEachKept(const std::string& target, const std::string& source, Take take) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  try {
-    const auto [from_target, from_source] = chains(target, source, 0);
-    for (const Chain* chain : {&from_target, &from_source}) {
-      for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
-        const auto kept = kept_.find((*chain)[i]);
-        if (kept != kept_.end() && !kept->second.empty()) take(kept->second);
-      }
+  const auto parentOf = [](const Frame& frame) {
+    return frame.sent.empty() ? frame.fixed.parent : frame.sent.rbegin()->second.parent;
+  };
+  if (!findWay(target, source, parentOf)) return;
+  for (const Chain* chain : {&from_target_, &from_source_}) {
+    for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
+      if (!(*chain)[i]->sent.empty()) take((*chain)[i]->sent);
     }
-  } catch (const tf2::TransformException&) {  // a frame that nobody has named yet
   }
 }
 
 std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                                   StampNs to_ns) const {
   std::vector<StampNs> stamps;
-  forEachKept(target, source, [&](const std::map<StampNs, Pose>& kept) {
-    for (auto it = kept.upper_bound(from_ns); it != kept.end() && it->first < to_ns; ++it) stamps.push_back(it->first);
+  forEachKept(target, source, [&](const std::map<StampNs, Sent>& kept) {
+    // From the newest one back: what is asked for lies there.
+    for (auto it = kept.rbegin(); it != kept.rend() && it->first > from_ns; ++it) {
+      if (it->first < to_ns) stamps.push_back(it->first);
+    }
   });
   std::sort(stamps.begin(), stamps.end());
   stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
@@ -231,7 +264,7 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
 
 std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, const std::string& source) const {
   std::optional<StampNs> first;
-  forEachKept(target, source, [&](const std::map<StampNs, Pose>& kept) {
+  forEachKept(target, source, [&](const std::map<StampNs, Sent>& kept) {
     first = std::max(first.value_or(kept.begin()->first), kept.begin()->first);
   });
   return first;

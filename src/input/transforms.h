@@ -10,7 +10,6 @@
 #include <set>
 #include <string>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include <tf2/buffer_core.h>
@@ -65,28 +64,47 @@ class TransformFeed {
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
     Vec3 translation = Vec3::Zero();
   };
+  struct Frame;
+  struct Sent {
+    const Frame* parent = nullptr;
+    Pose pose;  ///< parent_from_frame
+  };
+  /// One that tf has named. What the buffer holds of it is here as well, by numbers.
+  struct Frame {
+    std::string name;
+    std::optional<bool> is_static;  ///< as tf2 takes it, for good, from what came first; none: it is a parent alone
+    std::map<StampNs, Sent> sent;   ///< of one that moves
+    Sent fixed;                     ///< of one that is static
+    // What was asked for last is asked for again by every frame below this one.
+    mutable std::uint64_t asked_change = 0;
+    mutable StampNs asked_ns = 0;
+    mutable Sent asked;
+  };
   /// From a frame up to an ancestor, the frame first and the ancestor last.
-  using Chain = std::vector<std::string>;
+  using Chain = std::vector<const Frame*>;
 
   tf2::BufferCore& buffer_;
   mutable std::mutex mutex_;
-  std::unordered_map<std::string, std::map<StampNs, Pose>> kept_;  // what the buffer holds, per child frame
+  std::unordered_map<std::string, Frame> frames_;  // no more than the buffer forgets; places stay
+  std::uint64_t change_ = 1;                       // counts what was added
+  mutable Chain from_target_, from_source_;        // buffers of a question
   std::size_t kept_count_ = 0;
-  std::unordered_set<std::string> names_;
   std::atomic<std::uint64_t> unusable_{0};
   std::map<std::string, std::string> only_unusable_;  // per child frame that has had no usable one: what was wrong
   std::set<std::string> told_;
   std::vector<std::string> complaints_;
-  std::unordered_map<std::string, bool> static_;  // per child frame: as tf2 takes it, for good, from what came first
 
+  const Frame* frameOf(const std::string& name) const;
+  Frame* roomFor(const std::string& name);
   bool goesBack(const geometry_msgs::TransformStamped& transform) const;
-  bool hasRoomFor(const geometry_msgs::TransformStamped& transform);
-  bool isRepeated(const geometry_msgs::TransformStamped& transform);
+  bool isRepeated(const geometry_msgs::TransformStamped& transform, const Sent& sent, Frame& frame);
   void clear();
   void leaveOut(const geometry_msgs::TransformStamped& transform, const std::string& problem);
-  /// To where the two meet.
-  std::pair<Chain, Chain> chains(const std::string& target, const std::string& source, StampNs stamp_ns) const;
-  Pose poseAlong(const Chain& chain, StampNs stamp_ns) const;
+  const Sent& sentAt(const Frame& frame, StampNs stamp_ns) const;
+  template <class ParentOf>
+  bool findWay(const std::string& target, const std::string& source, ParentOf parentOf) const;
+  static Pose poseOf(const geometry_msgs::Transform& transform);
+  static Pose poseAlong(const Chain& chain);
   template <class Take>
   void forEachKept(const std::string& target, const std::string& source, Take take) const;
 };

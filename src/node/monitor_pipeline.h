@@ -163,6 +163,8 @@ class MonitorPipeline {
   std::vector<std::optional<Attached>> attached_;
   std::vector<std::string> excluded_;  // by the configuration
   std::vector<std::string> robot_changed_;
+  std::shared_ptr<const std::vector<OwnVoxel>> counted_voxels_;  // of a map: robots_voxels_ are the robot's
+  std::size_t robots_voxels_ = 0;
   std::vector<std::string> complaints_, hints_, remarks_;
   std::vector<std::string> refused_;  // of a static body: why its newest frame is none; empty: it is one
   std::vector<std::shared_ptr<const Topology>> checked_;  // of the hint; it has all indices that are named
@@ -212,10 +214,12 @@ class MonitorPipeline {
   std::string missing(std::size_t body) const;
   /// Says of an outcome without a body whether it waits for its transform.
   void nameMissing(Outcome& outcome) const;
-  /// Adds what of the robot should be watched and is not.
-  void nameUnwatched(Outcome& outcome) const;
   /// Puts the room beside straight paths into the frame's radii, by max_acceleration_m_s2.
   void widen(std::size_t body, MeshFrame& frame);
+  /// Adds what of the robot should be watched and is not, and that it owns too many voxels.
+  void nameUnwatched(Outcome& outcome);
+  /// Of the links and of what they hold, in the step's map.
+  std::size_t robotsVoxels(const Step& step);
   /// False: still waits.
   bool placeFrame(std::size_t body, std::int64_t now_ns);
   /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.

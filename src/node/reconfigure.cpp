@@ -40,6 +40,14 @@ void fromLive(const deformable_ccd::CollisionMonitorConfig& live, MonitorOptions
   });
 }
 
+/// Whether both messages have the same one value.
+bool isSame(const dynamic_reconfigure::Config& a, const dynamic_reconfigure::Config& b) {
+  const auto same = [](const auto& one, const auto& other) {
+    return one.empty() || one.front().value == other.front().value;
+  };
+  return same(a.bools, b.bools) && same(a.ints, b.ints) && same(a.doubles, b.doubles);
+}
+
 /// The one value of the message, in words.
 std::string textOf(const dynamic_reconfigure::Config& message) {
   std::ostringstream text;
@@ -88,29 +96,49 @@ struct Reconfigure::Impl {
     }
   }
 
+  /// What the monitor says of them, which also knows what is attached.
+  std::string take(const Live& live) {
+    const std::string problem =
+        events.change([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });
+    if (problem.empty()) in_force = live;
+    return problem;
+  }
+
   /// Each value by itself: a bad one is refused alone. The server has clamped them to their ranges, which a NaN passes.
   void apply(Live& live) {
     // The only rung that holds a distance.
     if (start.holdsDistance() && !holdsDistance(static_cast<Accuracy>(live.accuracy))) {
       live.accuracy = static_cast<int>(Accuracy::CONSERVATIVE);
     }
+    Live wanted = in_force;
+    forEachValue(live, wanted, [this](const Live& tried) { return problemOf(tried); });
+    // All at once; or where the monitor refuses that, too, all that it does not refuse.
+    if (!take(wanted).empty()) {
+      Live taken = in_force;
+      forEachValue(wanted, taken, [this](const Live& tried) { return take(tried); });
+    }
+    live = in_force;
+  }
+
+  /// Writes the values of `from` into `to` that have no problem there; tells of the others.
+  template <class Problem>
+  void forEachValue(const Live& from, Live& to, const Problem& problemWith) {
     for (const auto& parameter : Live::__getParamDescriptions__()) {
       dynamic_reconfigure::Config value, before;
-      parameter->toMessage(value, live);
-      parameter->toMessage(before, in_force);
-      Live tried = in_force;
+      parameter->toMessage(value, from);
+      parameter->toMessage(before, to);
+      if (isSame(value, before)) continue;
+      Live tried = to;
       parameter->fromMessage(value, tried);
       const bool is_number = value.doubles.empty() || std::isfinite(value.doubles.front().value);
-      const std::string problem = is_number ? problemOf(tried) : "it is no number";
+      const std::string problem = is_number ? problemWith(tried) : "it is no number";
       if (problem.empty()) {
-        in_force = tried;
+        to = tried;
       } else {
         events.refused("~live/" + parameter->name + " " + textOf(value) + " was refused, " + textOf(before) +
                        " stays: " + problem);
       }
     }
-    live = in_force;
-    events.changed([live](MonitorOptions& options, MarkerConfig& markers) { fromLive(live, options, markers); });
   }
 };
 

@@ -18,11 +18,12 @@ class Reconfigure {
   using Change = std::function<void(MonitorOptions&, MarkerConfig&)>;
   /// Called from the handle's callback queue.
   struct Events {
-    std::function<void(const Change&)> changed;           ///< what is in force from the next step on
+    /// To be in force from the next step on. Returns why that is refused, and all stays; empty: it is not.
+    std::function<std::string(const Change&)> change;
     std::function<void(const std::string& why)> refused;  ///< one value, for the log
   };
-  /// Starts with the values of `config`; nobody else is to change them. A value that is out of range is refused alone,
-  /// and the one before stays in force: what the services answer is in force from the next step on.
+  /// Starts with the values of `config`; nobody else is to change them. A value that is refused is so alone, and the
+  /// one before stays in force: what the services answer is in force from the next step on.
   Reconfigure(const ros::NodeHandle& private_node, const MonitorConfig& config, Events events);
   ~Reconfigure();
 

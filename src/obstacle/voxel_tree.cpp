@@ -48,16 +48,39 @@ std::size_t commonLeaves(const OccupiedLeaf* a, const OccupiedLeaf* b, std::size
   constexpr std::uint64_t MEANT[3] = {0x0000ffffffffffff, 0xffffffffffffffff, 0xffffffff0000ffff};
   for (; i + 8 <= most; i += 8) {
     const char *p = reinterpret_cast<const char*>(a + i), *q = reinterpret_cast<const char*>(b + i);
-    std::uint64_t other = 0, words[2];
-    for (int w = 0; w < 12; ++w) {
+    const auto otherBits = [&](int w) {
+      std::uint64_t words[2];
       std::memcpy(&words[0], p + 8 * w, 8);
       std::memcpy(&words[1], q + 8 * w, 8);
-      other |= (words[0] ^ words[1]) & MEANT[w % 3];
+      return words[0] ^ words[1];
+    };
+    std::uint64_t other = 0;
+    for (int w = 0; w < 3; ++w) {
+      other |= (otherBits(w) | otherBits(w + 3) | otherBits(w + 6) | otherBits(w + 9)) & MEANT[w];
     }
     if (other != 0) break;
   }
   while (i < most && isSame(a[i], b[i])) ++i;
   return i;
+}
+
+/// A leaf's key, 16 bits for each of its coordinates, x the lowest.
+std::uint64_t keyWord(const OccupiedLeaf& leaf) {
+  std::uint64_t word;
+  std::memcpy(&word, &leaf, sizeof word);
+  return word & 0x0000ffffffffffff;
+}
+constexpr std::uint64_t KEYS_WITHIN = 0x0000000300030003;  // of a node of level 0
+
+/// cellBit() of the key, at the number that its three pairs of lowest bits make.
+const std::array<std::uint8_t, 64> BIT_OF_KEY = [] {
+  std::array<std::uint8_t, 64> bits;
+  for (std::uint32_t i = 0; i < 64; ++i) bits[i] = static_cast<std::uint8_t>(cellBit(i, i >> 2, i >> 4));
+  return bits;
+}();
+unsigned bitOfKey(std::uint64_t key) {
+  key &= KEYS_WITHIN;
+  return BIT_OF_KEY[(key | key >> 14 | key >> 28) & 63];
 }
 
 struct CodedLeaf {
@@ -182,6 +205,10 @@ std::size_t VoxelTree::countNodes(int level, const std::vector<std::uint64_t>& p
   const int shift = 6 * (level + 1);
   std::uint32_t leaf = first_leaf_of_level_[level];
   std::size_t child = 0, count = 0;
+  if (leaf == first_leaf_of_level_[level + 1]) {  // nodes of nodes alone
+    for (; child < prefixes.size(); ++child) count += child == 0 || (prefixes[child] ^ prefixes[child - 1]) >> 6 != 0;
+    return count;
+  }
   for (std::uint64_t last = ~std::uint64_t{0}; leaf < first_leaf_of_level_[level + 1] || child < prefixes.size();) {
     const std::uint64_t of_leaf =
         leaf < first_leaf_of_level_[level + 1] ? codeOf(leaves_[leaf]) >> shift : ~std::uint64_t{0};
@@ -312,9 +339,16 @@ bool VoxelTree::occupiedKeys(std::array<std::int32_t, 3>& lo, std::array<std::in
   for (int level = 0; level < LEVELS; ++level) {
     for (std::size_t n = 0; n < levels_[level].nodes.size(); ++n) {
       const std::uint64_t full = levels_[level].nodes[n].full;
+      if (full == 0) continue;
+      const std::array<std::uint16_t, 3>& cell = levels_[level].cells[n];
+      const std::int32_t shift = 2 * (level + 1), x = cell[0] << shift, y = cell[1] << shift, z = cell[2] << shift,
+                         end = 1 << shift;
+      // Most lie within what others span.
+      if ((x >= lo[0]) & (y >= lo[1]) & (z >= lo[2]) & (x + end <= hi[0]) & (y + end <= hi[1]) & (z + end <= hi[2])) {
+        continue;
+      }
       for (int axis = 0; axis < 3; ++axis) {
         const std::int32_t first = levels_[level].cells[n][axis] << (2 * (level + 1)), side = 1 << (2 * level);
-        if (full == 0 || (first >= lo[axis] && first + 4 * side <= hi[axis])) continue;
         for (int i = 0; i < 4; ++i) {
           if ((full & RANGE_MASKS[axis][i][i]) == 0) continue;
           lo[axis] = std::min(lo[axis], first + i * side);
@@ -405,10 +439,13 @@ bool VoxelTree::followBlocks(const VoxelTree& before, Change& change, std::vecto
     }
     Node one;
     one.first_leaf = leaf;
-    for (; leaf < end && shareNode(leaves_[leaf], first, 0); ++leaf) {
+    const std::uint64_t first_key = keyWord(first);
+    for (; leaf < end; ++leaf) {
       const OccupiedLeaf& its = leaves_[leaf];
-      const unsigned bit = cellBit(its.min.x, its.min.y, its.min.z);
-      if (!isSmallLeaf(its) || one.full >> bit != 0) return false;
+      const std::uint64_t key = keyWord(its);
+      if (((key ^ first_key) & ~KEYS_WITHIN) != 0) break;
+      const unsigned bit = bitOfKey(key);
+      if ((its.size != 1 && !isSmallLeaf(its)) || one.full >> bit != 0) return false;
       one.full |= (its.size == 1 ? std::uint64_t{1} : 0xffu) << bit;
       one.start |= std::uint64_t{1} << bit;
     }

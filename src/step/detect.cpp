@@ -324,7 +324,8 @@ void History::Impl::leaveOutPart(const Part& part) {
 bool History::Impl::fill(const Part& part) {
   StepStats& stats = result.stats;
   Clock::time_point start = Clock::now();
-  scene.record(part.step, stats, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
+  scene.record(
+      part.step, stats, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, !observer);
   for (std::size_t b = 0; b < carried.map.size(); ++b) {
     if (!scene.bodies()[b].unchanged) carried.map[b] = MapAnswer();
   }
@@ -345,7 +346,13 @@ bool History::Impl::fill(const Part& part) {
       }
     });
   };
-  if (needsTrees(part)) scene.refit(inPieces, stats);
+  bounded = self_tested;
+  if (searchesStart(part)) {
+    for (std::size_t b = 0; b < bounded.size(); ++b) bounded[b] = bounded[b] || meetsItself(scene.bodies()[b].setup);
+  }
+  // A single body that does not meet itself is tested against the map alone, which has bounds of its own.
+  const bool any = std::find(bounded.begin(), bounded.end(), 1) != bounded.end();
+  if (any || bounded.size() > 1) scene.refit(inPieces, stats, bounded);
   stats[Stage::BOUNDS].ms = msSince(start);
   return !late;
 }

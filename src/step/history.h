@@ -86,7 +86,7 @@ struct History::Impl {
   void chooseSelfTests(const Part& part);
   bool staysApart(std::size_t body) const;
   bool isUnfolded(std::size_t body);
-  bool needsTrees(const Part& part) const;
+  bool searchesStart(const Part& part) const;
   void rememberApart(bool certain);
   /// Which pairs of groups a search is for: all of them, a sample of them, or the rest of it.
   enum class Share : std::uint8_t { ALL, SAMPLE, REST };
@@ -162,6 +162,7 @@ struct History::Impl {
   std::vector<std::uint32_t> group_pairs, found_groups, scratch, body_pairs;
   std::vector<std::tuple<double, std::uint32_t, std::array<std::uint32_t, 2>>> by_toc;  // and place, pair of groups
   std::vector<std::uint8_t> self_tested;  // per body: its pairs with itself are looked at
+  std::vector<std::uint8_t> bounded;      // per body: it needs bounds, whatever is near
   std::vector<std::uint8_t> obstacle_active;
   Positions map_t0, map_t1;
   std::array<HitOrder, 2> order;  // by PairKind

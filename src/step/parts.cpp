@@ -20,9 +20,9 @@ Eigen::Isometry3d movedBy(const Step& step, const Body& body, double u) {
 }
 
 double radiusOf(const Body& body) {
-  double radius = 0;
-  for (const Vec3& p : *body.t0) radius = std::max(radius, (p - body.pose_t0.translation()).norm());
-  return radius;
+  double squared = 0;
+  for (const Vec3& p : *body.t0) squared = std::max(squared, (p - body.pose_t0.translation()).squaredNorm());
+  return std::sqrt(squared);
 }
 
 /// Holds all of the body's ways through the step. One that turns does so about its frame's origin, which moves

@@ -42,8 +42,13 @@ struct Monitor::Impl {
   std::vector<MeshStore> stores;
   std::vector<FrameCounters> counters;
   std::deque<Pending> pending;
-  ObstacleMap map, trusted;              // in force; what is occupied besides
-  std::deque<ObstacleMap> maps_to_come;  // by stamp, as they were given: newer than what is known of the bodies
+  ObstacleMap map, trusted;  // in force; what is occupied besides
+  /// As it was given: newer than what is known of the bodies.
+  struct MapToCome {
+    ObstacleMap map;
+    bool after_missed = false;  // maps came before it that there was no room for
+  };
+  std::deque<MapToCome> maps_to_come;
   OwnVoxelFinder own_voxels;
   double own_voxels_ms = 0;  // of the step that is made
   std::string map_frame;     // of the last map that there was
@@ -100,6 +105,7 @@ struct Monitor::Impl {
   bool separates(const Body& body) const;
   std::vector<TrackedBody> tracked() const;
   void takeMaps(StampNs known_until_ns);
+  void limitMapsToCome();
   void takeMap(const ObstacleMap& next, const std::vector<TrackedBody>& bodies_tracked);
   void settleDoubt(Step& step, const Deadline& deadline);
   StampNs wayNeededFrom(std::size_t body, StampNs stamp_ns) const;

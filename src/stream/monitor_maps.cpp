@@ -10,13 +10,14 @@ namespace dccd {
 
 namespace {
 
-/// Maps that may wait for the bodies' frames. Of more, the oldest and the newest ones are kept.
-constexpr std::size_t MOST_MAPS_TO_COME = 4;
+// Maps that may wait for the bodies' frames: half a second of a camera's. Of large ones fewer, so that max_map_mb has
+// room for what follows.
+constexpr std::size_t MOST_MAPS_TO_COME = 16, FEWEST_MAPS_TO_COME = 4, MOST_BYTES_TO_COME = std::size_t{32} << 20;
 
 }  // namespace
 
 const ObstacleMap& Monitor::map() const {
-  return impl_->maps_to_come.empty() ? impl_->map : impl_->maps_to_come.back();
+  return impl_->maps_to_come.empty() ? impl_->map : impl_->maps_to_come.back().map;
 }
 
 const ObstacleMap& Monitor::mapInUse() const { return impl_->map; }
@@ -32,9 +33,22 @@ void Monitor::setMap(ObstacleMap map) {
     m.map = std::move(map);
     return;
   }
-  if (m.maps_to_come.size() >= MOST_MAPS_TO_COME) m.maps_to_come.erase(m.maps_to_come.begin() + 1);
-  m.maps_to_come.push_back(std::move(map));
-  if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().stamp_ns);
+  m.maps_to_come.push_back({std::move(map)});
+  m.limitMapsToCome();
+  if (m.tracked().empty()) m.takeMaps(m.maps_to_come.back().map.stamp_ns);
+}
+
+/// Of too many the oldest and the newest ones are kept.
+void Monitor::Impl::limitMapsToCome() {
+  const auto isTooMuch = [&] {
+    std::size_t bytes = 0;
+    for (const MapToCome& one : maps_to_come) bytes += one.map.surface->memoryBytes();
+    return maps_to_come.size() > (bytes > MOST_BYTES_TO_COME ? FEWEST_MAPS_TO_COME : MOST_MAPS_TO_COME);
+  };
+  while (isTooMuch()) {
+    maps_to_come.erase(maps_to_come.begin() + 1);
+    maps_to_come[1].after_missed = true;
+  }
 }
 
 void Monitor::setMapBeside(ObstacleMap map) { impl_->trusted = std::move(map); }
@@ -43,8 +57,8 @@ std::vector<TrackedBody> Monitor::Impl::tracked() const {
   std::vector<TrackedBody> tracked;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (ownsVoxels(bodies[b]))
-      tracked.push_back(
-          {static_cast<std::uint16_t>(b), bodies[b].name, bodies[b].own_voxels_m, &stores[b], !isStream(b)});
+      tracked.push_back({static_cast<std::uint16_t>(b), bodies[b].name, bodies[b].own_voxels_m, &stores[b],
+                         !isStream(b), bodies[b].shell});
   }
   return tracked;
 }
@@ -54,12 +68,13 @@ void Monitor::Impl::takeMaps(StampNs known_until_ns) {
   own_voxels_ms = 0;
   const std::vector<TrackedBody> bodies_tracked = tracked();
   std::size_t taken = maps_to_come.size();
-  while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].stamp_ns > known_until_ns) --taken;
+  while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].map.stamp_ns > known_until_ns) --taken;
   if (bodies_tracked.empty()) own_voxels.forget();
   for (; taken > 0; --taken) {
-    const ObstacleMap next = std::move(maps_to_come.front());
+    const MapToCome next = std::move(maps_to_come.front());
     maps_to_come.pop_front();
-    takeMap(next, bodies_tracked);
+    if (next.after_missed) own_voxels.missMaps();
+    takeMap(next.map, bodies_tracked);
   }
 }
 
@@ -95,7 +110,7 @@ void Monitor::Impl::settleDoubt(Step& step, const Deadline& deadline) {
 
 StampNs Monitor::Impl::wayNeededFrom(std::size_t body, StampNs stamp_ns) const {
   if (!ownsVoxels(bodies[body])) return stamp_ns;
-  const StampNs map_ns = maps_to_come.empty() ? stamp_ns : std::min(stamp_ns, maps_to_come.front().stamp_ns);
+  const StampNs map_ns = maps_to_come.empty() ? stamp_ns : std::min(stamp_ns, maps_to_come.front().map.stamp_ns);
   return own_voxels.pathNeededFrom(map_ns, options.own_voxels_lag_s);
 }
 

@@ -78,7 +78,7 @@ KeyBox reachedKeys(const ObstacleMap& map, const std::vector<TrackedBody>& bodie
 std::string countOf(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " voxel" : " voxels"); }
 
 /// Sets the counts of what is own and what is in doubt, and a sentence of each, by body.
-void describe(const std::vector<TrackedBody>& bodies, bool trust_first, OwnVoxels& own) {
+void describe(const std::vector<TrackedBody>& bodies, bool trust_first, bool missed, OwnVoxels& own) {
   for (const TrackedBody& body : bodies) {
     std::uint64_t its = 0, doubted = 0;
     for (const OwnVoxel& voxel : *own.voxels) {
@@ -97,9 +97,11 @@ void describe(const std::vector<TrackedBody>& bodies, bool trust_first, OwnVoxel
   if (trust_first && !own.excluded.empty()) own.excluded += ", by own_voxels_doubt: trust the first map's, too";
   if (own.doubt.empty()) return;
   own.doubt = "the step touches one of " + own.doubt + (own.doubted == 1 ? " that was" : " that were");
+  own.doubt += missed ? " there in the first map after some that came faster than frames and were not looked at"
+                      : " there in the first map";
   own.doubt +=
-      " there in the first map, so that nobody can tell the body from an obstacle; give a map without the body as "
-      "octomap_file, move it away once, or set own_voxels_doubt: trust";
+      ", so that nobody can tell the body from an obstacle; give a map without the body as octomap_file, move it away "
+      "once, or set own_voxels_doubt: trust";
 }
 
 }  // namespace
@@ -108,6 +110,11 @@ void OwnVoxelFinder::forget() {
   before_ = nullptr;
   own_.clear();
   remembered_.clear();
+  missed_ = false;
+}
+
+void OwnVoxelFinder::forgetBody(std::uint16_t body) {
+  for (auto one = own_.begin(); one != own_.end();) one = one->second.body == body ? own_.erase(one) : std::next(one);
 }
 
 StampNs OwnVoxelFinder::pathNeededFrom(StampNs now_ns, double lag_s) const {
@@ -190,6 +197,13 @@ void OwnVoxelFinder::follow(const std::vector<ReachedCube>& cubes, const KnownSp
         break;
     }
   }
+  // One that was not looked at may have shown it free, or before the body came near.
+  if (missed_ && !trust_first) {
+    for (auto& one : own_) one.second.doubted = true;
+  }
+  const bool any_doubted = std::any_of(own_.begin(), own_.end(), [](const auto& one) { return one.second.doubted; });
+  doubts_missed_ = any_doubted && (doubts_missed_ || missed_);
+  missed_ = false;
 }
 
 ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies,
@@ -198,7 +212,8 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   for (TrackedBody& body : bodies) {
     if (body.reach_m == ONE_VOXEL) body.reach_m = resolution_m;
   }
-  if (before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id)) forget();
+  const bool is_other = before_ && (before_->resolution() != resolution_m || frame_id_ != map.frame_id);
+  if (is_other || remembered_.size() > MOST_REMEMBERED) forget();
   const VoxelTree nothing{std::vector<OccupiedLeaf>()};
   const VoxelTree &now = map.surface->impl().tree, &sure = trusted ? trusted->impl().tree : nothing;
   const auto ways = waysOf(bodies, map.stamp_ns, lag_s);
@@ -226,7 +241,7 @@ ObstacleMap OwnVoxelFinder::reduce(const ObstacleMap& map, const VoxelSurface* t
   }
   if (!doubted.empty()) reduced.own.doubted_surface = VoxelSurface::build(resolution_m, std::move(doubted));
   reduced.own.voxels = share(std::move(voxels));
-  describe(bodies, trust_first, reduced.own);
+  describe(bodies, trust_first, doubts_missed_, reduced.own);
   if (!own_.empty() || trusted) {
     std::vector<OccupiedLeaf> without = sure.leaves();
     for (const auto& one : own_) {

@@ -3,14 +3,15 @@
 // The rule, voxel by voxel, from one map to the next:
 // 1. A voxel of a map that is trusted (octomap_file) is an obstacle.
 // 2. A voxel that was not occupied in the map before is own, if at some time between that map's stamp less the lag and
-//    this one's a body's surface was within own_voxels_m of it, or its middle was inside of a closed rigid one; else it
-//    is an obstacle.
+//    this one's a body's surface was within own_voxels_m of it, or its middle was inside of a closed rigid one (no
+//    shell); else it is an obstacle.
 // 3. An obstacle stays one as long as maps show it; also where it comes back after it vanished within reach of a body,
 //    or without having been seen free.
 // 4. What is own stays own until a map does not show it.
 // 5. What the first map shows within reach, or one that is older than all that is known of the body, is in doubt: no
-// obstacle, but no proof either of a step that touches it, until
-//    a map does not show it, or shows it with no body in reach, which makes it an obstacle.
+//    obstacle, but no proof either of a step that touches it, until a map does not show it, or shows it with no body in
+//    reach, which makes it an obstacle. After maps that were not looked at all is in doubt that is not an obstacle.
+// 6. Where a body is gone, nothing is its own any more.
 #pragma once
 
 #include <cstdint>
@@ -30,13 +31,21 @@ class OwnVoxelFinder {
  public:
   /// The map without what is own or in doubt, with what is trusted (null: nothing), and both in words. `trusted` has
   /// the map's frame and resolution. Maps come in the order of their stamps; one of another
-  /// frame or resolution, or after forget(), is a first one. Where ObstacleMap::known does not tell, what is not
+  /// frame or resolution, or after forget(), is a first one, and so is one after which more than MOST_REMEMBERED
+  /// obstacles would be remembered. Where ObstacleMap::known does not tell, what is not
   /// occupied counts as free. Bodies are known at the map's stamp; trust_first: what is in doubt is own.
   ObstacleMap reduce(const ObstacleMap& map, const VoxelSurface* trusted, std::vector<TrackedBody> bodies, double lag_s,
                      bool trust_first);
   void forget();
+  /// Maps between the last one and the next were not looked at.
+  void missMaps() { missed_ = true; }
+  void forgetBody(std::uint16_t body);
   /// For a map of this stamp, or a later one: since when the bodies' ways are needed.
   StampNs pathNeededFrom(StampNs now_ns, double lag_s) const;
+
+  /// Larger: more memory, and time for each map, where maps forget what is far from their sensor. Smaller: a large map
+  /// that was forgotten as a whole is not told from the bodies when it comes back.
+  static constexpr std::size_t MOST_REMEMBERED = std::size_t{1} << 18;
 
  private:
   std::vector<BodyWay> waysOf(const std::vector<TrackedBody>& bodies, StampNs stamp_ns, double lag_s) const;
@@ -51,6 +60,8 @@ class OwnVoxelFinder {
   std::unordered_map<std::uint64_t, OwnVoxel> own_;  // by the voxel's packed key
   std::vector<OccupiedLeaf> remembered_;             // obstacles by (3) that the last map did not show
   std::weak_ptr<const VoxelSurface> reduced_;        // of the map before, if it is still there
+  bool missed_ = false;                              // maps, since the last one
+  bool doubts_missed_ = false;                       // some doubt is for that reason
 };
 
 }  // namespace dccd

@@ -125,7 +125,7 @@ class ReachSearch {
       }
       const Topology& topology = *to.topology;
       for (const Face& f : topology.faces()) ask(body, {at_[f[0]], at_[f[1]], at_[f[2]]});
-      if (to.rigid && topology.isClosed()) askInside(body, topology);
+      if (to.rigid && topology.isClosed() && !body.shell) askInside(body, topology);
       if (topology.hasFaces()) continue;
       for (const Edge& e : topology.edges()) ask(body, {at_[e[0]], at_[e[1]], at_[e[1]]});
     }
@@ -173,7 +173,7 @@ class ReachSearch {
           const double la = a.norm(), lb = b.norm(), lc = c.norm();
           angle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
         }
-        if (std::abs(angle) < 2 * M_PI) continue;
+        if (!(std::abs(angle) >= 2 * M_PI)) continue;  // also where a vertex is not finite
         cube.body = body.body;
         --left_;
       }

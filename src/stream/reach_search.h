@@ -17,6 +17,7 @@ struct TrackedBody {
   double reach_m = 0;  ///< Body::own_voxels_m
   const MeshStore* frames = nullptr;
   bool holds_always = false;  ///< static: its newest frame, at all stamps
+  bool shell = false;         ///< Body::shell: what is inside is not in it
 };
 
 using BodyWay = std::vector<MeshStore::Stretch>;
@@ -32,7 +33,7 @@ struct ReachedCube {
 
 /// Sets the bodies. A cube counts as reached only where a point of a body's surface at some time of its way, and a
 /// point of the cube, are seen to be within reach_m: the answer may miss a reach at the very rim, and invents none. So
-/// does a cube whose middle is inside of a closed rigid body.
+/// does a cube whose middle is inside of a closed rigid body that is no shell.
 void searchReach(const std::vector<TrackedBody>& bodies, const std::vector<BodyWay>& ways,
                  const Eigen::Isometry3d& map_from_fixed, double resolution_m, std::vector<ReachedCube>& cubes);
 

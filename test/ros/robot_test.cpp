@@ -6,12 +6,14 @@
 #include <deformable_ccd/SetHold.h>
 #include <deformable_ccd/State.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <sensor_msgs/JointState.h>
 
 #include <cstdlib>
 #include <deque>
 #include <set>
 
+#include "dccd/elementary.h"
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
 
@@ -170,6 +172,31 @@ TEST_F(Held, WhatIsRefusedIsAnsweredInALineAndCounted) {
   deformable_ccd::RemoveObject remove;
   EXPECT_FALSE(called("/held/remove", remove).success);
   EXPECT_TRUE(waitUntil([&] { return std::stoi(refused()) == before + 3; })) << refused();
+}
+
+// dynamic_reconfigure answers what is in force.
+TEST_F(Held, ExactIsRefusedAsLongAsSomethingAttachedHasPadding) {
+  const auto setAccuracy = [](Accuracy accuracy) {
+    dynamic_reconfigure::Reconfigure call;
+    call.request.config.ints.emplace_back();
+    call.request.config.ints[0].name = "accuracy";
+    call.request.config.ints[0].value = static_cast<int>(accuracy);
+    EXPECT_TRUE(ros::service::call("/held/live/set_parameters", call));
+    for (const auto& value : call.response.config.ints) {
+      if (value.name == "accuracy") return static_cast<Accuracy>(value.value);
+    }
+    return Accuracy();
+  };
+  ASSERT_EQ(setAccuracy(Accuracy::CONSERVATIVE), Accuracy::CONSERVATIVE);
+  deformable_ccd::AttachObject padded = rod();
+  padded.request.padding_m = 0.01;
+  const auto said = called("/held/attach", padded);
+  ASSERT_TRUE(said.success) << said.message;
+  EXPECT_EQ(setAccuracy(Accuracy::EXACT), Accuracy::CONSERVATIVE);
+  deformable_ccd::RemoveObject remove;
+  remove.request.name = "rod";
+  ASSERT_TRUE(called("/held/remove", remove).success);
+  EXPECT_EQ(setAccuracy(Accuracy::EXACT), Accuracy::EXACT);
 }
 
 // Joint states at 100 Hz that come 30 ms late beside a mesh of 33 Hz: each frame waits for its link, none is lost.

@@ -101,10 +101,9 @@ void History::Impl::chooseSelfTests(const Part& part) {
   }
 }
 
-// A single body that cannot meet itself is tested against the obstacle alone, which has bounds of its own.
-bool History::Impl::needsTrees(const Part& part) const {
-  return self_tested.size() > 1 || std::count(self_tested.begin(), self_tested.end(), 1) > 0 ||
-         (checksStartState(part) && !isStartKnown() && carried.start_state.needsTrees(part.continues));
+/// Crossings at t = 0 are looked for among all pairs, those of a body with itself included.
+bool History::Impl::searchesStart(const Part& part) const {
+  return checksStartState(part) && !isStartKnown() && carried.start_state.needsTrees(part.continues);
 }
 
 bool History::Impl::isUnfolded(std::size_t body) {

@@ -52,6 +52,8 @@ std::size_t CrossingFinder::addMeeting(const SceneArrays& scene, const EdgeFace*
     pairs_.clear();
     corners_.clear();
     for (; next != end && pairs_.size() < CHUNK; ++next) {
+      // A body that is far from all others meets none of them, and where it is in this step was not recorded.
+      if (scene.bodies()[next->edge_body].passed_by || scene.bodies()[next->face_body].passed_by) continue;
       const bool is_checked = scene.bodies()[next->edge_body].holds(FeatureKind::EDGE, next->edge) &&
                               scene.bodies()[next->face_body].holds(FeatureKind::FACE, next->face);
       if (is_checked) add(scene, *next);

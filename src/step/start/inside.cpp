@@ -60,6 +60,8 @@ Sight sightOf(const double* point, const double* a, const double* b, const doubl
 }
 
 bool InsideSearch::isInside(const SceneArrays& scene, const Question& question, int at) {
+  // A far body is inside of nothing, and where it is in this step was perhaps not recorded.
+  if (scene.bodies()[question.body].far || scene.bodies()[question.closed].far) return false;
   const auto x = [&](Index v) { return at == 0 ? scene.vertices()[v].t0 : scene.vertices()[v].t1; };
   const ClusterTree& faces = scene.bodies()[question.closed].tree(FeatureKind::FACE);
   const double* point = x(question.internal);

@@ -1,11 +1,13 @@
 // The panda moves its joints at random through a random cloth: each contact that the monitor reports, and each that it
-// does not, by the rational oracle. DEFORMABLE_CCD_LONG=1 takes many more steps.
+// does not, by the rational oracle. Along straight paths, and along arcs in several parts. DEFORMABLE_CCD_LONG=1 takes
+// many more steps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <iostream>
 #include <random>
 
+#include "step/parts.h"
 #include "support/query_property.h"
 #include "support/step_truth.h"
 #include "unit/ros/pipeline/driven_pipeline.h"
@@ -93,70 +95,188 @@ Truth truthOf(const Step& step) {
   return truth;
 }
 
-TEST(RobotContacts, NoneOfThePandasIsMissedOrInventedAndTimesAreInTheirCells) {
-  DEFORMABLE_CCD_REQUIRE_DATA();
-  if (!Panda::isThere()) GTEST_SKIP() << "no panda in " << dataDir();
-  const Panda panda;
-  XmlRpcValue tree = scene();
-  tree["fixed_frame"] = "panda_link0";
-  tree["topology"]["rows"] = tree["topology"]["cols"] = SIDE;
-  tree["effects"]["octomap"] = "off";
-  tree["robot"]["description"] = "robot_description";
-  tree["rigid_tolerance_m"] = 10.0;  // straight paths, which the oracle has
-  Driven driven(tree, [&](const RobotConfig& config, double tolerance_m) {
-    return robotFrom(panda.urdf(), "", config, tolerance_m);
-  });
-  ASSERT_EQ(driven.config.bodies.size(), 12u);
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> unit(-1, 1);
-  const auto any = [&](double size) { return Vec3(size * unit(random), size * unit(random), size * unit(random)); };
-  std::vector<double> joints(panda.joints());
-  Positions cloth(SIDE * SIDE);
-  const int steps = longRun() ? 10000 : 110;  // ten with each link
-  std::size_t contacts = 0, touching = 0, crossing = 0;
-  for (int frame = 0; frame <= steps; ++frame) {
+/// In the order of their times, straight steps: where the monitor has the bodies at both ends of each part.
+std::vector<Step> partsOf(const Step& step, std::size_t parts) {
+  std::vector<Step> all;
+  Step at = step;
+  for (Body& body : at.bodies) body.t1 = body.t0;
+  for (std::size_t i = 1; i <= parts; ++i) {
+    advance(step, i, parts, at);
+    all.push_back(at);
+  }
+  return all;
+}
+
+/// How far the body is at the end of a part from where slerp has it, and how far its straight way through that part is
+/// from the arc [m]; half way it is furthest.
+std::pair<double, double> offArc(const Step& step, const Step& part, std::size_t body, double from, double to) {
+  const Body &whole = step.bodies[body], &straight = part.bodies[body];
+  const auto onArc = [&](double u, const Vec3& p) -> Vec3 {
+    const Eigen::Quaterniond a(whole.pose_t0.linear()), b(whole.pose_t1.linear());
+    const Vec3 origin = (1 - u) * whole.pose_t0.translation() + u * whole.pose_t1.translation();
+    return origin + a.slerp(u, b) * (a.conjugate() * (p - whole.pose_t0.translation()));
+  };
+  double end_m = 0, middle_m = 0;
+  for (std::size_t v = 0; v < whole.t0->size(); ++v) {
+    const Vec3 &p = (*whole.t0)[v], &t0 = (*straight.t0)[v], &t1 = (*straight.t1)[v];
+    end_m = std::max(end_m, (onArc(to, p) - t1).norm());
+    middle_m = std::max(middle_m, (onArc((from + to) / 2, p) - (t0 + t1) / 2).norm());
+  }
+  return {end_m, middle_m};
+}
+
+/// The panda's joints and a cloth, at random.
+class RobotContacts : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    DEFORMABLE_CCD_REQUIRE_DATA();
+    if (!Panda::isThere()) GTEST_SKIP() << "no panda in " << dataDir();
+    panda_.emplace();
+    joints_.resize(panda_->joints());
+  }
+
+  void start(double rigid_tolerance_m) {
+    XmlRpc::XmlRpcValue tree = scene();
+    tree["fixed_frame"] = "panda_link0";
+    tree["topology"]["rows"] = tree["topology"]["cols"] = SIDE;
+    tree["effects"]["octomap"] = "off";
+    tree["robot"]["description"] = "robot_description";
+    tree["rigid_tolerance_m"] = rigid_tolerance_m;
+    driven_.emplace(tree, [&](const RobotConfig& config, double tolerance_m) {
+      return robotFrom(panda_->urdf(), "", config, tolerance_m);
+    });
+    ASSERT_EQ(driven_->config.bodies.size(), 12u);
+  }
+
+  /// Each joint by up to so much [rad, m]; now and then the cloth goes to another link, from where it drifts and
+  /// crumples.
+  void move(int frame, double joint) {
     const double stamp_s = 1 + 0.1 * frame;
-    for (double& joint : joints) joint = std::clamp(joint + 0.02 * unit(random), -2.5, 2.5);
-    const Panda::Placed placed = panda.place(joints, stamp_s);
-    driven.feed_tf.add(placed.tf, false);
-    // Now and then to another link; from there it drifts and crumples.
+    for (double& one : joints_) one = std::clamp(one + joint * unit_(random_), -2.5, 2.5);
+    const Panda::Placed placed = panda_->place(joints_, stamp_s);
+    driven_->feed_tf.add(placed.tf, false);
     const KDL::Vector link = std::next(placed.from_base.begin(), frame / 10 % placed.from_base.size())->second.p;
     const Vec3 drift = any(0.01), center = Vec3(link.x(), link.y(), link.z()) + any(0.2);
     for (int i = 0; i < SIDE * SIDE; ++i) {
+      Vec3& p = cloth_[static_cast<std::size_t>(i)];
       const Vec3 flat(0.06 * (i % SIDE - SIDE / 2), 0.06 * (i / SIDE - SIDE / 2), 0);
-      cloth[static_cast<std::size_t>(i)] = frame % 10 == 0
-                                               ? Vec3(center + flat + any(0.01))
-                                               : Vec3(cloth[static_cast<std::size_t>(i)] + drift + any(0.005));
+      p = frame % 10 == 0 ? Vec3(center + flat + any(0.01)) : Vec3(p + drift + any(0.005));
     }
-    driven.pipeline.take(0, {"sensor_msgs/PointCloud2", gridAt(stamp_s, cloth), 0, 0});
-    Outcome& outcome = driven.outcome;
-    ASSERT_TRUE(driven.pipeline.nextOutcome(0, outcome));
-    if (frame == 0) continue;
-    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
-    ASSERT_EQ(outcome.substeps, 1u);
-    Truth truth = truthOf(*outcome.step);
-    ASSERT_EQ(outcome.start_state, truth.start == 0 ? StartState::CLEAR : StartState::INTERSECTING)
-        << "frame " << frame;
-    ASSERT_EQ(outcome.contacts.size(), truth.contacts.size()) << "frame " << frame;
-    for (std::size_t i = 0; i < truth.contacts.size(); ++i) {
-      const Contact &found = outcome.contacts[i], &expected = truth.contacts[i].contact;
-      ASSERT_EQ(std::tie(found.kind, found.body, found.vertex), std::tie(expected.kind, expected.body, expected.vertex))
-          << "frame " << frame << ": " << describe(found) << " instead of " << describe(expected);
-      ASSERT_EQ(found.certainty, Certainty::CERTAIN);
-      ElementaryResult cell;
-      cell.toc_lower = found.toc_lower;
-      cell.toc_upper = found.toc_upper;
-      ASSERT_TRUE(isCellOf(truth.contacts[i].toc, cell, driven.config.monitor.detector.accuracy.toc_bits))
-          << "frame " << frame << ": " << describe(found);
-      touching += found.body[0] != found.body[1];
-    }
-    contacts += truth.contacts.size();
-    crossing += truth.start > 0;
+    driven_->pipeline.take(0, {"sensor_msgs/PointCloud2", gridAt(stamp_s, cloth_), 0, 0});
+    ASSERT_TRUE(driven_->pipeline.nextOutcome(0, driven_->outcome));
   }
-  std::cout << steps << " steps, " << contacts << " contacts, " << touching << " of them with links; " << crossing
+
+  /// Of all parts of the step: a contact is that of the first part that has it.
+  void judge(const std::vector<Step>& parts) {
+    const Outcome& outcome = driven_->outcome;
+    struct InPart {
+      TrueContact truth;
+      std::size_t part;
+    };
+    std::vector<InPart> expected;
+    std::size_t start = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      Truth truth = truthOf(parts[i]);
+      if (i == 0) start = truth.start;
+      for (TrueContact& contact : truth.contacts) expected.push_back({std::move(contact), i});
+    }
+    const auto less = [](const InPart& a, const InPart& b) { return canonicalLess(a.truth.contact, b.truth.contact); };
+    std::stable_sort(expected.begin(), expected.end(), less);
+    const auto same = [&](const InPart& a, const InPart& b) { return !less(a, b) && !less(b, a); };
+    expected.erase(std::unique(expected.begin(), expected.end(), same), expected.end());
+    ASSERT_EQ(outcome.start_state, start == 0 ? StartState::CLEAR : StartState::INTERSECTING);
+    ASSERT_EQ(outcome.contacts.size(), expected.size());
+    const int bits = driven_->config.monitor.detector.accuracy.toc_bits;
+    const double count = static_cast<double>(parts.size());
+    for (std::size_t c = 0; c < expected.size(); ++c) {
+      const Contact &found = outcome.contacts[c], &truth = expected[c].truth.contact;
+      ASSERT_EQ(std::tie(found.kind, found.body, found.vertex), std::tie(truth.kind, truth.body, truth.vertex))
+          << describe(found) << " instead of " << describe(truth);
+      ASSERT_EQ(found.certainty, Certainty::CERTAIN);
+      // The part's cell, from which the whole step's is rounded outward.
+      const double part = static_cast<double>(expected[c].part);
+      ElementaryResult cell;
+      for (const auto& [mine, its] :
+           {std::pair(&cell.toc_lower, found.toc_lower), std::pair(&cell.toc_upper, found.toc_upper)}) {
+        *mine = std::ldexp(std::round(std::ldexp(its * count - part, bits)), -bits);
+        ASSERT_NEAR((part + *mine) / count, its, 1e-15);
+      }
+      ASSERT_LE(found.toc_lower * count, part + cell.toc_lower);
+      ASSERT_GE(found.toc_upper * count, part + cell.toc_upper);
+      ASSERT_TRUE(isCellOf(expected[c].truth.toc, cell, bits)) << describe(found);
+      touching_ += found.body[0] != found.body[1];
+      later_ += expected[c].part > 0;
+    }
+    contacts_ += expected.size();
+    crossing_ += start > 0;
+  }
+
+  Vec3 any(double size) { return {size * unit_(random_), size * unit_(random_), size * unit_(random_)}; }
+
+  std::optional<Panda> panda_;
+  std::optional<Driven> driven_;
+  std::mt19937_64 random_{11};
+  std::uniform_real_distribution<double> unit_{-1, 1};
+  std::vector<double> joints_;
+  Positions cloth_{SIDE * SIDE};
+  std::size_t contacts_ = 0, touching_ = 0, later_ = 0, crossing_ = 0;
+};
+
+TEST_F(RobotContacts, NoneOfThePandasIsMissedOrInventedAndTimesAreInTheirCells) {
+  start(10);                                  // straight paths
+  const int steps = longRun() ? 10000 : 110;  // ten with each link
+  for (int frame = 0; frame <= steps && !HasFatalFailure(); ++frame) {
+    SCOPED_TRACE("frame " + std::to_string(frame));
+    move(frame, 0.02);
+    if (frame == 0) continue;
+    ASSERT_EQ(driven_->outcome.status, StepStatus::OK) << driven_->outcome.reason;
+    ASSERT_EQ(driven_->outcome.substeps, 1u);
+    judge({*driven_->outcome.step});
+  }
+  std::cout << steps << " steps, " << contacts_ << " contacts, " << touching_ << " of them with links; " << crossing_
             << " steps began crossing\n";
-  EXPECT_GT(touching, static_cast<std::size_t>(steps));
-  EXPECT_LT(crossing, static_cast<std::size_t>(steps));
+  EXPECT_GT(touching_, static_cast<std::size_t>(steps));
+  EXPECT_LT(crossing_, static_cast<std::size_t>(steps));
+}
+
+TEST_F(RobotContacts, NorOfLinksThatTurnInAStepOfSeveralParts) {
+  constexpr double TOLERANCE_M = 2e-4;
+  start(TOLERANCE_M);
+  const int steps = longRun() ? 3000 : 33;
+  std::size_t in_parts = 0;
+  double end_m = 0, middle_m = 0;
+  for (int frame = 0; frame <= steps && !HasFatalFailure(); ++frame) {
+    SCOPED_TRACE("frame " + std::to_string(frame));
+    move(frame, 0.1);
+    if (frame == 0) continue;
+    const Outcome& outcome = driven_->outcome;
+    ASSERT_EQ(outcome.status, StepStatus::OK) << outcome.reason;
+    const std::vector<Step> parts = partsOf(*outcome.step, outcome.substeps);
+    judge(parts);
+    // One that is not cut, since all links are far, touches none on their arcs either.
+    const std::size_t finer = outcome.substeps > 1 ? outcome.substeps : 8;
+    const std::vector<Step> arcs = partsOf(*outcome.step, finer);
+    for (std::size_t i = 0; i < finer; ++i) {
+      const auto at = [&](std::size_t part) { return static_cast<double>(part) / static_cast<double>(finer); };
+      for (std::size_t b = 1; b < outcome.step->bodies.size(); ++b) {
+        const auto off = offArc(*outcome.step, arcs[i], b, at(i), at(i + 1));
+        end_m = std::max(end_m, off.first);
+        if (outcome.substeps > 1) middle_m = std::max(middle_m, off.second);
+      }
+      if (outcome.substeps > 1) continue;
+      for (const TrueContact& contact : truthOf(arcs[i]).contacts) ASSERT_EQ(contact.contact.body[1], 0);
+    }
+    in_parts += outcome.substeps > 1;
+  }
+  std::cout << steps << " steps, " << in_parts << " of them in parts, " << contacts_ << " contacts, " << touching_
+            << " of them with links, " << later_ << " after the first part; " << crossing_ << " steps began crossing\n";
+  EXPECT_LT(end_m, 1e-12);
+  EXPECT_GT(end_m, 0) << "two computations";
+  EXPECT_LE(middle_m, TOLERANCE_M);
+  EXPECT_GT(middle_m, TOLERANCE_M / 10);
+  EXPECT_GT(in_parts, static_cast<std::size_t>(steps) / 2);
+  EXPECT_GT(later_, static_cast<std::size_t>(steps));
+  EXPECT_LT(crossing_, static_cast<std::size_t>(steps));
 }
 
 }  // namespace

@@ -273,6 +273,76 @@ TEST_F(OwnVoxels, AMapWaitsUntilTheBodyIsKnownAtItsStamp) {
   EXPECT_TRUE(assuranceOf(newest).clear()) << "of several the newest";
 }
 
+// Of more than sixteen there is no room for all, and what the others showed is not known.
+TEST_F(OwnVoxels, MapsThatComeFasterThanFramesHideNothing) {
+  for (const int count : {10, 40}) {
+    start(0.1);
+    hoverAboveFloor();
+    const auto stampOf = [&](int i) { return (101 + 97 * i / count) * MS; };
+    map(stampOf(0), slab(1));
+    for (int i = 1; i < count; ++i) map(stampOf(i), slab(1) + voxelsOf(0.85));  // while the sheet is 0.2 m away
+    const Outcome outcome = feed(200 * MS, 0.85);
+    const Assurance said = assuranceOf(outcome);
+    EXPECT_EQ(said.touching, count > 16 ? Touching::NONE : Touching::NEW) << count;
+    EXPECT_EQ(said.proved, count <= 16) << describe(said);
+    EXPECT_EQ(own(outcome), 0u) << count;
+    if (count <= 16) continue;
+    EXPECT_NE(describe(said).find("first map after some that came faster than frames"), std::string::npos)
+        << describe(said);
+    map(210 * MS, slab(1));
+    feed(300 * MS, 0.55);
+    map(300 * MS, slab(1) + voxelsOf(0.55));
+    EXPECT_EQ(own(feed(400 * MS, 0.55)), 25u) << "once they are cleared all is as before";
+  }
+}
+
+// Also what was own before: it may have been cleared and have come back.
+TEST_F(OwnVoxels, AfterMapsThatWereNotLookedAtNothingIsOwn) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  ASSERT_EQ(own(feed(200 * MS, 0.55)), 25u);
+  for (int i = 1; i < 40; ++i) map((200 + i) * MS, slab(1) + voxelsOf(0.55));
+  const Outcome outcome = feed(300 * MS, 0.55);
+  EXPECT_EQ(own(outcome), 0u);
+  EXPECT_EQ(doubted(outcome), 25u);
+  EXPECT_FALSE(assuranceOf(outcome).proved);
+}
+
+// A map of what is near the sensor alone forgets all else: what is remembered of it must not grow for ever.
+TEST_F(OwnVoxels, WhereTooMuchIsRememberedTheNextMapIsAFirstOne) {
+  const Cells nothing;
+  for (const int rows : {1, 513}) {
+    start(0.05);
+    Cells wall;
+    for (int x = 0; x < 512; ++x) {
+      for (int y = 0; y < rows; ++y) wall.insert({x, y, -100});
+    }
+    feed(0, 0.55);
+    map(0, wall, &nothing);
+    feed(100 * MS, 0.55);
+    map(100 * MS, {}, &nothing);
+    feed(200 * MS, 0.55);
+    map(200 * MS, voxelsOf(0.55), &nothing);
+    const Outcome outcome = feed(300 * MS, 0.55);
+    EXPECT_EQ(own(outcome), rows == 1 ? 25u : 0u);
+    EXPECT_EQ(doubted(outcome), rows == 1 ? 0u : 25u);
+    EXPECT_EQ(assuranceOf(outcome).proved, rows == 1);
+  }
+}
+
+TEST_F(OwnVoxels, AmongVoxelsInDoubtNothingIsProved) {
+  start(0.35);
+  Cells block;
+  for (int z = 2; z < 9; ++z) {
+    for (const Cell& cell : voxelsOf(0.55)) block.insert({cell[0], cell[1], z});
+  }
+  feed(0, 0.55);
+  map(0, block);
+  const Outcome outcome = feed(100 * MS, 0.551);
+  EXPECT_EQ(doubted(outcome), block.size());
+  EXPECT_FALSE(assuranceOf(outcome).proved) << "it lies in the middle of them and touches none of their outer faces";
+}
+
 // A cell that was mapped before the tracker began.
 TEST_F(OwnVoxels, MapsOfBeforeTheFirstFrameAreLookedAtInTheirOrder) {
   map(-400 * MS, slab(1));
@@ -348,10 +418,12 @@ TEST_F(OwnVoxels, OverATeleportWhatIsOwnStaysOwn) {
 // What a camera sees through the gaps of a robot's link, or what noise puts there.
 TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
   for (const bool closed : {true, false}) {
-    for (const bool inside_out : {true, false}) {
+    for (const auto& [inside_out, shell, finite] : {std::tuple(true, false, true), std::tuple(false, false, true),
+                                                    std::tuple(false, true, true), std::tuple(false, false, false)}) {
       Body body = named("link");
       body.own_voxels_m = 0.05;
       body.rigid = true;
+      body.shell = shell;
       MonitorOptions options = loose();
       options.own_voxels_lag_s = 0;
       Monitor monitor(options, {body});
@@ -362,9 +434,10 @@ TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
         if (inside_out) std::swap(face[1], face[2]);
       }
       const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(8, faces));
-      const auto box = [&](StampNs stamp_ns) {
+      const auto box = [&, is_whole = finite](StampNs stamp_ns) {
         MeshFrame frame{stamp_ns, topology, {}, true, Eigen::Isometry3d::Identity()};
         for (int i = 0; i < 8; ++i) frame.positions.push_back(Vec3(i & 1, i >> 1 & 1, i >> 2));
+        if (!is_whole) frame.positions[7].setConstant(std::nan(""));
         return frame;
       };
       monitor.push(0, box(0), NOW);
@@ -374,7 +447,7 @@ TEST_F(OwnVoxels, WhatAppearsInsideOfAClosedRigidBodyIsItsOwn) {
       only(monitor);
       monitor.setMap(mapOf(VOXEL_M, {leafOf({5, 5, 5}), leafOf({15, 5, 5})}, 150 * MS));
       monitor.push(0, box(200 * MS), NOW);
-      EXPECT_EQ(own(only(monitor)), closed ? 1u : 0u);
+      EXPECT_EQ(own(only(monitor)), closed && finite && !shell ? 1u : 0u);
     }
   }
 }

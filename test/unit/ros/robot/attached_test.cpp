@@ -71,6 +71,16 @@ class Attached : public FolderTest {
     return driven_->feed(stamp_s, cloth_z);
   }
   Assurance said() const { return assuranceOf(driven_->outcome); }
+  /// Voxels of 0.1 m: far away, at (0.05, 0.05, 0.25), and so many beside each other in the plane z = 0.35.
+  void giveMap(double stamp_s, std::uint16_t count) {
+    std::vector<OccupiedLeaf> leaves{{{32868, 32868, 32868}, 1}, {{32768, 32768, 32770}, 1}};
+    for (std::uint16_t i = 0; i < count; ++i)
+      leaves.push_back({{static_cast<std::uint16_t>(32768 + i), 32768, 32771}, 1});
+    LoadedMap loaded;
+    loaded.surface = VoxelSurface::build(0.1, std::move(leaves));
+    loaded.stamp_ns = static_cast<StampNs>(stamp_s * 1e9);
+    pipeline().setMap(std::move(loaded), 0);
+  }
   double heightOf(std::size_t body) const { return driven_->outcome.step->bodies.at(body).t1->front().z(); }
   MonitorPipeline& pipeline() { return driven_->pipeline; }
 
@@ -193,28 +203,49 @@ TEST_F(Attached, WithoutATransformTheStateIsUnprovedAndNamesIt) {
 }
 
 // What a map first shows where it is, is its own; what was an obstacle before stays one.
-TEST_F(Attached, ItsVoxelsAreItsOwn) {
+TEST_F(Attached, ItsVoxelsAreItsOwnUntilItIsRemoved) {
   XmlRpcValue tree = handScene();
   tree["effects"]["octomap"] = "auto";
   start(tree);
-  const auto giveMap = [&](double stamp_s, bool with_plate) {
-    // Voxels of 0.1 m: far away, at (0.05, 0.05, 0.25), and in the plate's plane.
-    std::vector<OccupiedLeaf> leaves{{{32868, 32868, 32868}, 1}, {{32768, 32768, 32770}, 1}};
-    if (with_plate) leaves.push_back({{32768, 32768, 32771}, 1});
-    LoadedMap loaded;
-    loaded.surface = VoxelSurface::build(0.1, std::move(leaves));
-    loaded.stamp_ns = static_cast<StampNs>(stamp_s * 1e9);
-    pipeline().setMap(std::move(loaded), 0);
-  };
-  giveMap(0.9, false);
+  giveMap(0.9, 0);
   feed(1, -0.15, 0.8f);
   feed(1.1, -0.15, 0.8f);
   attach(plate());
   for (const double at : {1.2, 1.3, 1.4}) feed(at, -0.15, 0.8f);  // at 0.35
-  giveMap(1.4, true);
+  giveMap(1.4, 1);
   feed(1.5, -0.15, 0.8f);
   EXPECT_TRUE(says(driven_->outcome.excluded, "1 voxel of the map as own of body 'plate'"))
       << joinedText(driven_->outcome.excluded);
+  EXPECT_TRUE(said().clear()) << joinedText(said().missing);
+  const Vec3 voxel(0.05, 0.05, 0.35);
+  EXPECT_EQ(driven_->outcome.obstacle->leafAt(voxel), nullptr);
+  pipeline().remove("plate");
+  giveMap(1.5, 1);
+  feed(1.6, -0.15, 0.8f);
+  EXPECT_FALSE(says(driven_->outcome.excluded, "own of")) << joinedText(driven_->outcome.excluded);
+  EXPECT_NE(driven_->outcome.obstacle->leafAt(voxel), nullptr) << "nobody accounts for it any more";
+}
+
+// A mesh in millimetres, or a frame that is elsewhere, could cut anything out of the map.
+TEST_F(Attached, WhereMoreVoxelsAreOwnThanMayBeNothingIsProved) {
+  XmlRpcValue tree = handScene();
+  tree["effects"]["octomap"] = "auto";
+  tree["robot"]["max_own_voxels"] = 2;
+  start(tree);
+  giveMap(0.9, 0);
+  attach(plate());
+  for (const double at : {1.0, 1.1, 1.2}) feed(at, -0.15, 0.8f);
+  giveMap(1.2, 2);
+  feed(1.3, -0.15, 0.8f);
+  EXPECT_TRUE(said().clear()) << joinedText(said().missing);
+  giveMap(1.3, 3);
+  feed(1.4, -0.15, 0.8f);
+  const char sentence[] = "3 voxels of the map are own of the robot and what it holds, and robot/max_own_voxels is 2;";
+  EXPECT_TRUE(says(said().missing, sentence)) << joinedText(said().missing);
+  EXPECT_TRUE(says(pipeline().checkNow().unproved, sentence));
+  EXPECT_EQ(said().touching, Touching::NONE) << "and no alarm";
+  giveMap(1.4, 2);
+  feed(1.5, -0.15, 0.8f);
   EXPECT_TRUE(said().clear()) << joinedText(said().missing);
 }
 
