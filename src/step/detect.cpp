@@ -184,7 +184,11 @@ void History::Impl::setBodies(const Step& step) {
   carried.inside.forgetBodies();
   scene.setBodies(step.bodies);
   unfolded.clear();
-  for (const SceneBody& body : scene.bodies()) unfolded.emplace_back(body);
+  unfolded_parts.clear();
+  for (const SceneBody& body : scene.bodies()) {
+    unfolded.emplace_back(body);
+    unfolded_parts.emplace_back(body);
+  }
   obstacle_checks.clear();
   expected_known = false;
   findLeftOut(step);
@@ -270,6 +274,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   context.earliest_only = options->earliest_only;
   context.bounds_late = options->earliest_only && !stopsAtFirst();
   context.left_out = &left_out;
+  context.unfolded = &unfolded_parts;
   context.observer = observer;
   context.deadline = part.deadline;
   context.per_hit = per_hit;
@@ -327,6 +332,7 @@ bool History::Impl::fill(const Part& part) {
   };
   if (needsTrees(part)) scene.refit(inPieces, stats);
   stats[Stage::BOUNDS].ms = msSince(start);
+  if (!late) certifyParts();
   return !late;
 }
 
