@@ -37,12 +37,12 @@ inline Positions tubeAt(std::size_t rings, std::size_t around, double bend) {
   return x;
 }
 
-/// A sheet of which the last part, from 0.8 on, is rolled back over the rest by `turn`, around a cylinder.
-inline Positions rolled(std::size_t side, double turn, double radius = 0.02) {
+/// A sheet of which the last part, a share of it, is rolled back over the rest by `turn`, around a cylinder.
+inline Positions rolled(std::size_t side, double turn, double radius = 0.02, double share = 0.2) {
   Positions x;
   for (std::size_t r = 0; r < side; ++r) {
     for (std::size_t k = 0; k < side; ++k) {
-      const double s = static_cast<double>(k) / static_cast<double>(side - 1), beyond = std::max(0.0, s - 0.8);
+      const double s = static_cast<double>(k) / static_cast<double>(side - 1), beyond = std::max(0.0, s - (1 - share));
       const double angle = std::min(beyond / radius, turn), left = beyond - angle * radius;
       x.emplace_back(s - beyond + radius * std::sin(angle) + left * std::cos(angle),
                      static_cast<double>(r) / static_cast<double>(side - 1),
