@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "culling/cluster_tree.h"
+#include "culling/unfolded_parts.h"
 #include "dccd/deadline.h"
 
 namespace dccd {
@@ -16,7 +17,8 @@ struct TreePair {
   const ClusterTree* b = nullptr;
   bool self = false;
   Span span;
-  bool adjacent = false;  ///< both are of one body: features that share a vertex are no pair
+  bool adjacent = false;                   ///< both are of one body: features that share a vertex are no pair
+  const NearClusters* left_out = nullptr;  ///< pairs of clusters that are not looked at; null: none
 
   simd::GroupsView viewA(std::size_t level) const { return a->level(level).view(span.times == Times::SWEPT); }
   simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
@@ -54,11 +56,16 @@ class ClusterPairStream {
     std::size_t done = 0;
     while (done < count) {
       std::size_t consumed = 0;
-      const std::size_t clusters =
+      std::size_t clusters =
           simd::testGroupPairs(trees.viewA(1), trees.viewB(1), pairs + 2 * done, count - done, trees.self,
                                simd::Diagonal::UPPER_WITH_DIAGONAL, trees.span.times != Times::BOTH, clusters_.data(),
                                CLUSTER_PAIRS, &consumed);
       done += consumed;
+      if (trees.left_out) {
+        const std::size_t met = clusters;
+        clusters = trees.left_out->leaveOut(clusters_.data(), met);
+        cluster_pairs_left_out_ += met - clusters;
+      }
       std::size_t leaf_done = 0;
       while (leaf_done < clusters) {
         const std::uint32_t* from = clusters_.data() + 2 * leaf_done;
@@ -78,12 +85,13 @@ class ClusterPairStream {
   }
 
   std::uint64_t clusterPairsTested() const { return cluster_pairs_tested_; }
-  void clearCounters() { cluster_pairs_tested_ = 0; }
+  std::uint64_t clusterPairsLeftOut() const { return cluster_pairs_left_out_; }
+  void clearCounters() { cluster_pairs_tested_ = cluster_pairs_left_out_ = 0; }
 
  private:
   static constexpr std::size_t CLUSTER_PAIRS = 1024;
   std::vector<std::uint32_t> clusters_, slots_;
-  std::uint64_t cluster_pairs_tested_ = 0;
+  std::uint64_t cluster_pairs_tested_ = 0, cluster_pairs_left_out_ = 0;
 };
 
 }  // namespace dccd

@@ -62,9 +62,10 @@ struct StepContext {
   double tolerance_m = 0;                 ///< the elementary test may call features this far apart a contact
   std::atomic<double> best_toc_upper{2};  ///< earliest_only: contacts after this are not wanted
   FoundLimit* found = nullptr;            ///< null: no limit
-  double not_after = 2;                   ///< earliest_only: contacts that begin after this are not listed
-  bool bounds_late = false;               ///< earliest_only: a pair's TOC is bounded before its elementary test
-  Span span;                              ///< of the bounds
+  const std::vector<UnfoldedParts>* unfolded = nullptr;  ///< per body; null: none
+  double not_after = 2;      ///< earliest_only: contacts that begin after this are not listed
+  bool bounds_late = false;  ///< earliest_only: a pair's TOC is bounded before its elementary test
+  Span span;                 ///< of the bounds
   /// What each hit takes after the pairs, until it is in an outcome: the time for pairs ends so much earlier.
   std::chrono::nanoseconds per_hit{0};
   std::atomic<std::size_t> hits{0};

@@ -106,11 +106,29 @@ bool History::Impl::searchesStart(const Part& part) const {
   return checksStartState(part) && !isStartKnown() && carried.start_state.needsTrees(part.continues);
 }
 
-bool History::Impl::isUnfolded(std::size_t body) {
+bool History::Impl::mayBeUnfolded(std::size_t body) const {
   const SceneBody& b = scene.bodies()[body];
   // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
   if (!options->unfolded_test || options->broad_phase == BroadPhase::BRUTE_FORCE) return false;
-  return scene.separation(body, body) == 0 && !b.uncertain && !b.masked && unfolded[body].run(b, scene.vertices());
+  return scene.separation(body, body) == 0 && !b.uncertain && !b.masked;
+}
+
+bool History::Impl::isUnfolded(std::size_t body) {
+  return mayBeUnfolded(body) && unfolded[body].run(scene.bodies()[body], scene.vertices());
+}
+
+/// Of what is looked at, after its bounds were made.
+void History::Impl::certifyParts() {
+  const Clock::time_point start = Clock::now();
+  for (std::size_t b = 0; b < self_tested.size(); ++b) {
+    unfolded_parts[b].clear();
+    if (!self_tested[b] || observer || !mayBeUnfolded(b)) continue;  // an observer wants to see the pairs
+    result.stats.unfolded_parts += unfolded_parts[b].runWhereItPays(
+        scene.bodies()[b], scene, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
+  }
+  const double ms = msSince(start);
+  result.stats[Effect::SELF_COLLISION].ms += ms;
+  result.stats[Stage::BROAD_PHASE].ms += ms;
 }
 
 void History::Impl::rememberApart(bool certain) {

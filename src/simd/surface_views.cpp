@@ -1,0 +1,137 @@
+#include "simd/surface_views.h"
+
+#include "dccd/tolerances.h"
+#include "simd/cluster_bounds.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "simd/surface_views.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "simd/group_lanes-inl.h"
+#include "simd/vector_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dccd {
+namespace simd {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using ViewFloats = hn::CappedTag<float, GROUP>;
+using ViewFloat = hn::Vec<ViewFloats>;
+using ViewVector = VectorOf<ViewFloats>;
+constexpr size_t SIDES_SIZE = 4 * GROUP;  // floats of one difference of all lanes
+
+/// p0, q0, p1, q1 of a face.
+HWY_INLINE void gatherSides(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT face, size_t lane,
+                            float* HWY_RESTRICT block) {
+  const hn::CappedTag<double, 4> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  const double* a = vertices + size_t{face[lane]} * 8;
+  const double* b = vertices + size_t{face[GROUP + lane]} * 8;
+  const double* c = vertices + size_t{face[2 * GROUP + lane]} * 8;
+  for (size_t k = 0; k < 8; k += hn::Lanes(dd)) {
+    const auto origin = hn::Load(dd, a + k);
+    float* to = block + (k < 4 ? 0 : 2 * SIDES_SIZE) + lane * 4 + k % 4;
+    hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, b + k), origin)), df, to);
+    hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, c + k), origin)), df, to + SIDES_SIZE);
+  }
+}
+
+HWY_INLINE ViewVector sum(const ViewVector& a, const ViewVector& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
+/// Component k of VIEW_LINE, not normalised.
+HWY_INLINE ViewFloat along(const int (&line)[3], const ViewVector& v) {
+  const ViewFloats d;
+  ViewFloat total = hn::Zero(d);
+  if (line[0] != 0) total = v.x;  // never -1
+  if (line[1] != 0) total = line[1] > 0 ? hn::Add(total, v.y) : hn::Sub(total, v.y);
+  if (line[2] != 0) total = line[2] > 0 ? hn::Add(total, v.z) : hn::Sub(total, v.z);
+  return total;
+}
+
+HWY_INLINE void viewGroup(const float* HWY_RESTRICT block, uint32_t* HWY_RESTRICT views) {
+  const ViewFloats d;
+  const hn::RebindToUnsigned<ViewFloats> du;
+  for (size_t part = 0; part < GROUP; part += hn::Lanes(d), block += 4 * hn::Lanes(d)) {
+    const ViewVector p0 = loadPoint(d, block), q0 = loadPoint(d, block + SIDES_SIZE);
+    const ViewVector p1 = loadPoint(d, block + 2 * SIDES_SIZE), q1 = loadPoint(d, block + 3 * SIDES_SIZE);
+    const ViewVector first = cross(p0, q0), middle = sum(cross(p0, q1), cross(p1, q0)), last = cross(p1, q1);
+    const ViewFloat size = hn::Max(hn::Max(largest(p0), largest(q0)), hn::Max(largest(p1), largest(q1)));
+    const ViewFloat margin = hn::Add(hn::Mul(hn::Set(d, tolerance::FUSED_PLANAR), hn::Mul(size, size)),
+                                     hn::Set(d, tolerance::FUSED_UNDERFLOW));
+    auto faced = hn::Zero(du);
+    const auto add = [&](hn::Mask<ViewFloats> mask, size_t view) HWY_ATTR {
+      faced = hn::Or(faced, hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, 1u << view)));
+    };
+    for (size_t k = 0; k < VIEW_LINES; ++k) {
+      const ViewFloat a = along(VIEW_LINE[k], first), b = along(VIEW_LINE[k], middle), c = along(VIEW_LINE[k], last);
+      add(hn::Gt(hn::Min(hn::Min(a, b), c), margin), 2 * k);
+      add(hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(margin)), 2 * k + 1);
+    }
+    const auto guarded = hn::RebindMask(du, hn::Le(size, hn::Set(d, tolerance::FUSED_LARGEST_M)));
+    hn::StoreU(hn::IfThenElseZero(guarded, faced), du, views + part);
+  }
+}
+
+void FacedViews(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRICT groups, size_t count,
+                uint32_t* HWY_RESTRICT views) {
+  HWY_ALIGN_MAX float blocks[2][4 * SIDES_SIZE] = {};
+  const auto fill = [&](size_t g) HWY_ATTR {
+    const uint32_t* group = groups + g * 3 * GROUP;
+    for (size_t lane = 0; g < count && lane < GROUP; ++lane) {
+      if (group[lane] != UINT32_MAX) gatherSides(vertices, group, lane, blocks[g % 2]);
+    }
+  };
+  fill(0);
+  for (size_t g = 0; g < count; ++g) {
+    fill(g + 1);  // before this one is read: a load in larger pieces than was written waits for the cache
+    viewGroup(blocks[g % 2], views + g * GROUP);
+    for (size_t lane = 0; lane < GROUP; ++lane) {
+      if (groups[g * 3 * GROUP + lane] == UINT32_MAX) views[g * GROUP + lane] = (1u << VIEWS) - 1;
+    }
+  }
+}
+
+void SidesOf(const int16_t* bounds, uint32_t node, const uint32_t* others, size_t count, uint16_t* sides) {
+  const int16_t* HWY_RESTRICT low = bounds + size_t{node} * AOS_SIZE;
+  const int16_t* HWY_RESTRICT high = low + RECORD;
+  const hn::CappedTag<int16_t, RECORD> d;
+  for (size_t i = 0; i < count; ++i) {
+    const int16_t* HWY_RESTRICT other = bounds + size_t{others[i]} * AOS_SIZE;
+    uint32_t above = 0, below = 0;
+    for (size_t part = 0; part < RECORD; part += hn::Lanes(d)) {
+      above |= bitsOf(d, hn::Gt(hn::Load(d, other + part), hn::Load(d, high + part))) << part;
+      below |= bitsOf(d, hn::Lt(hn::Load(d, other + RECORD + part), hn::Load(d, low + part))) << part;
+    }
+    above &= above >> DIRECTIONS;
+    below &= below >> DIRECTIONS;
+    sides[i] = static_cast<uint16_t>((above & 0xff) | (below & 0xff) << DIRECTIONS);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace simd
+}  // namespace dccd
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace dccd {
+namespace simd {
+HWY_EXPORT(FacedViews);
+HWY_EXPORT(SidesOf);
+
+void facedViews(const double* vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views) {
+  HWY_DYNAMIC_DISPATCH(FacedViews)(vertices, groups, count, views);
+}
+
+void sidesOf(const std::int16_t* bounds, std::uint32_t node, const std::uint32_t* others, std::size_t count,
+             std::uint16_t* sides) {
+  HWY_DYNAMIC_DISPATCH(SidesOf)(bounds, node, others, count, sides);
+}
+
+}  // namespace simd
+}  // namespace dccd
+#endif
