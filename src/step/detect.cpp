@@ -330,7 +330,8 @@ bool History::Impl::fill(const Part& part) {
   StepStats& stats = result.stats;
   Clock::time_point start = Clock::now();
   scene.record(
-      part.step, stats, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); }, !observer);
+      part.step, stats, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); },
+      !observer && !options->clearance.wanted);
   for (std::size_t b = 0; b < carried.map.size(); ++b) {
     if (!scene.bodies()[b].unchanged) carried.map[b] = MapAnswer();
   }
