@@ -220,7 +220,7 @@ bool SceneArrays::isStill(const SceneBody& body) const {
 /// By coordinates, which are projections without rounding.
 bool SceneArrays::isFar(std::size_t b) const {
   const SceneBody& body = bodies_[b];
-  if (uncertain_ || !keep_bounds_ || (body.kept && !body.stale)) return false;  // what is kept costs nothing
+  if (uncertain_ || !keep_bounds_ || (body.kept && !body.stale)) return false;            // what is kept costs nothing
   const double reach_m = 2 * body.reach_m, up = std::numeric_limits<double>::infinity();  // of both bodies, all alike
   const auto below = [&](const SceneBody& one, const SceneBody& other) {
     for (int axis = 0; axis < 3; ++axis) {
