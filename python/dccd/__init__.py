@@ -92,7 +92,7 @@ def detect(bodies: Body | Sequence[Body], *, voxels: Voxels | None = None, histo
     step_budget_ms, max_compute_ms : float
         When the step has to end [ms]; what is left is undecided, with a bound. 0: never.
     earliest_only : bool
-        Only contacts that may be the first. Takes half of the time.
+        Only contacts that may be the first, and one edge through a face at the most. Takes half of the time.
     check_start_state : bool
         Whether surfaces cross already when the step begins. Without it nothing is proved. True.
     patches : bool

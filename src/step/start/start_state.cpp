@@ -29,14 +29,12 @@ std::size_t edgeCount(const SceneArrays& scene) {
 
 }  // namespace
 
-const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& scene, bool continues,
-                                                            const Deadline& deadline, StepStats& stats,
-                                                            const CrossingsWanted& wanted, std::size_t threads,
-                                                            const Parallel& parallel) {
+std::vector<StartIntersection> StartStateSearch::run(const SceneArrays& scene, bool continues, const Deadline& deadline,
+                                                     StepStats& stats, const CrossingsWanted& wanted,
+                                                     std::size_t threads, const Parallel& parallel) {
   releaseBurst(found_);
   releaseBurst(candidates_);
   releaseBurst(touched_);
-  releaseBurst(intersections_);
   releaseBurst(groups_);
   releaseBurst(scratch_, groups_.size());
   releaseBurst(by_group_);
@@ -60,12 +58,13 @@ const std::vector<StartIntersection>& StartStateSearch::run(const SceneArrays& s
   whole_ = searched_ && !cut_ && candidates_.empty() && touched_.empty();
   known_ = false;  // until remember() has this step's contacts
 
-  list(scene, found_, intersections_, parallel);
+  std::vector<StartIntersection> intersections;
+  list(scene, found_, intersections, parallel);
   stats[Stage::START_STATE].in += tested_;
-  stats[Stage::START_STATE].out += intersections_.size();
+  stats[Stage::START_STATE].out += intersections.size();
   stats[Effect::START_STATE].in += tested_;
-  stats[Effect::START_STATE].out += intersections_.size();
-  return intersections_;
+  stats[Effect::START_STATE].out += intersections.size();
+  return intersections;
 }
 
 Deadline StartStateSearch::beforeListing(const std::vector<EdgeFace>& found, const Deadline& deadline) {

@@ -75,9 +75,9 @@ class StartStateSearch {
   /// effect START_STATE. Nothing more is tested once the deadline is over, but for what it takes to list what is
   /// found; isWhole() is false then. isCut() is true where not all that is found is wanted, and the next run() begins
   /// anew. threads: that parallel has, more than one if it is worth while.
-  const std::vector<StartIntersection>& run(const SceneArrays& scene, bool continues, const Deadline& deadline,
-                                            StepStats& stats, const CrossingsWanted& wanted = {},
-                                            std::size_t threads = 1, const Parallel& parallel = oneByOne);
+  std::vector<StartIntersection> run(const SceneArrays& scene, bool continues, const Deadline& deadline,
+                                     StepStats& stats, const CrossingsWanted& wanted = {}, std::size_t threads = 1,
+                                     const Parallel& parallel = oneByOne);
 
   /// Whether the last run() came to all pairs: what it did not list is apart at t=0.
   bool isWhole() const { return whole_; }
@@ -139,7 +139,6 @@ class StartStateSearch {
   std::vector<Touched> touched_;        // of the last step; after run() those that the deadline left
   std::vector<EdgeFace> candidates_;    // to be looked at; after run() those that the deadline left
   std::vector<EdgeFace> found_;
-  std::vector<StartIntersection> intersections_;
   std::vector<std::uint32_t> groups_, scratch_, overlapping_;
   std::vector<BodyPair> body_pairs_;
   std::vector<std::array<std::uint32_t, 2>> by_group_;
