@@ -26,6 +26,14 @@ bool isUsable(const StepBox& box) {
   return true;
 }
 
+/// Empty where nothing is occupied.
+StepBox boxOf(const VoxelSurface& map) { return StepBox::still(map.bounds().min.data(), map.bounds().max.data()); }
+
+/// What the boxes are apart at least over the whole part [m].
+double apartByBoxes(const StepBox& a, const StepBox& b) {
+  return std::sqrt(squaredGap(a, b, 0)) * (1 - tolerance::CLEARANCE_BOX);
+}
+
 /// Exact, at t1: the hulls of 1 to 3 corners.
 bool meetAtEnd(const MovingHull& a, const MovingHull& b) {
   const auto at = [](const MovingHull& hull, std::size_t i) { return hull.t1[std::min(i, hull.count - 1)].data(); };
@@ -239,52 +247,47 @@ void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<st
   }
 }
 
+/// Whether nothing is to be searched: nothing can be known of the two, boxes or the steps before show that they are
+/// far, or there is no time.
+bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& part, double limit_m) {
+  const auto [a, b] = row.answer.body;
+  const bool on_map = b == OBSTACLE_BODY, empty = on_map && part.map && part.map->leafCount() == 0;
+  const bool known = on_map ? part.map && (empty || isUsable(boxOf(*part.map))) : bodies_[b].known;
+  row.unknown = row.unknown || !bodies_[a].known || !known;
+  if (row.unknown) return true;
+  ++row.parts;
+  FoundDistance apart;
+  apart.lower_m = 0;
+  if (empty) {
+    apart.lower_m = std::numeric_limits<double>::infinity();
+  } else if (a == b) {
+    apart.lower_m = isStillFar(a, part, limit_m) ? limit_m : 0;
+  } else if (!on_map || isIdentity(part.step.map.map_from_fixed)) {
+    apart.lower_m =
+        apartByBoxes(boxOf(part.scene.bodies()[a]), on_map ? boxOf(*part.map) : boxOf(part.scene.bodies()[b]));
+  }
+  const bool is_far = apart.lower_m >= limit_m;
+  if (!is_far && !part.deadline.isOver()) return false;
+  apart.cut = !is_far;
+  row.over_step.lower_m = std::min(row.over_step.lower_m, apart.lower_m);
+  row.over_step.cut = row.over_step.cut || apart.cut;
+  if (part.index + 1 == part.count) row.at_end = apart;
+  return true;
+}
+
 void ClearanceFinder::search(Row& row, const ClearancePart& part) {
   const auto [a, b] = row.answer.body;
-  const bool on_map = b == OBSTACLE_BODY;
-  if (row.unknown) return;
-  if (!bodies_[a].known || !(on_map ? part.map != nullptr : bodies_[b].known)) {
-    row.unknown = true;
-    return;
-  }
-  ++row.parts;
-  const bool last = part.index + 1 == part.count;
+  const bool on_map = b == OBSTACLE_BODY, last = part.index + 1 == part.count;
+  const double limit_m = limitOf(row) + radiusOf(row);
+  if (needsNoSearch(row, part, limit_m)) return;
   const bool moved = on_map && !isIdentity(part.step.map.map_from_fixed);
-  NearestSearch::Goal goal{options_.tolerance_m, limitOf(row) + radiusOf(row), false, part.deadline};
-  FoundDistance apart_only;
-  apart_only.lower_m = 0;
-  if (on_map && part.map->leafCount() == 0) {
-    apart_only.lower_m = std::numeric_limits<double>::infinity();
-  } else if (a != b && !moved) {
-    const StepBox other = on_map ? StepBox::still(part.map->bounds().min.data(), part.map->bounds().max.data())
-                                 : boxOf(part.scene.bodies()[b]);
-    if (!isUsable(other)) {
-      row.unknown = true;
-      return;
-    }
-    const double squared = squaredGap(boxOf(part.scene.bodies()[a]), other, 0);
-    apart_only.lower_m = std::sqrt(squared) * (1 - tolerance::CLEARANCE_BOX);
-  }
-  const bool is_far = apart_only.lower_m >= goal.limit_m;
-  if (is_far || part.deadline.isOver()) {
-    apart_only.cut = !is_far;
-    row.over_step.lower_m = std::min(row.over_step.lower_m, apart_only.lower_m);
-    row.over_step.cut = row.over_step.cut || apart_only.cut;
-    if (last) row.at_end = apart_only;
-    return;
-  }
-  if (a == b && isStillFar(a, part, goal.limit_m)) {
-    row.over_step.lower_m = std::min(row.over_step.lower_m, goal.limit_m);
-    if (last) row.at_end.lower_m = goal.limit_m;
-    return;
-  }
   if (!fit(a, part, moved) || (!on_map && a != b && !fit(b, part, false))) {
     row.unknown = true;
     return;
   }
+  NearestSearch::Goal goal{options_.tolerance_m, limit_m, false, part.deadline};
   FoundDistance at_end;
   if (!(row.touches && exact_)) {  // else all is known of the step
-    const double limit_m = goal.limit_m;
     if (a == b) goal.limit_m *= tolerance::CLEARANCE_SELF_REACH;
     const FoundDistance found = measure(row, part, goal, row.over_step);
     goal.limit_m = limit_m;

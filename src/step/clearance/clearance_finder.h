@@ -69,6 +69,7 @@ class DCCD_HIDDEN ClearanceFinder {
                std::array<FeatureTree::Feature, 2> vertex, const OccupiedLeaf* leaf);
   void learnBodies(const ClearancePart& part);
   bool fit(std::size_t body, const ClearancePart& part, bool to_map);
+  bool needsNoSearch(Row& row, const ClearancePart& part, double limit_m);
   void search(Row& row, const ClearancePart& part);
   bool isStillFar(std::size_t body, const ClearancePart& part, double limit_m) const;
   void keepFar(std::size_t body, const ClearancePart& part, const FoundDistance& found);
