@@ -266,6 +266,20 @@ def write_culling(folder, result):
                 "that do not fold, runs in turn.\n\n" + table(header, rows))
 
 
+def write_clearance(folder, result):
+    header = ["case", "triangles", "without, median ms", "with, median ms", "ratio (quartiles)", "FCL, median ms",
+              "FCL outside of the bounds, m"]
+    rows = []
+    for r in result["runs"]:
+        q, fcl = r["ratio"], r.get("fcl")
+        rows.append([r["case"], str(r["triangles"]), "%.3f" % r["without_ms"]["median"], "%.3f" % r["with_ms"]["median"],
+                     "%.2f (%.2f to %.2f)" % (q["median"], q["quartile_1"], q["quartile_3"]),
+                     "%.3f" % fcl["ms"]["median"] if fcl else "", "%.2g" % fcl["outside_m"] if fcl else ""])
+    write_rows(os.path.join(folder, "clearance.csv"), header, rows)
+    return save(folder, "clearance", "# Clearance\n\nThe step with and without distances, processor time of runs in turn; FCL's "
+                "distance at the end of the same steps.\n\n" + table(header, rows))
+
+
 def write_effects(folder, result):
     flag, rope = result["flag"], result["rope"]
     ratio = flag["ratio"]

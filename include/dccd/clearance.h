@@ -16,17 +16,22 @@ struct ClearanceOptions {
   bool wanted = false;        ///< nothing is asked, and nothing costs time, while this is false
   double tolerance_m = 1e-4;  ///< upper_m - lower_m is at most this, or 1e-9 of the distance [m]; above 0
   double max_m = 0.5;         ///< what is farther apart is FARTHER, and no minimum is looked for [m]; above 0
-  /// A body against itself: features that are closer than this along the surface of its reference frame are
-  /// neighbours, and are not asked for [m]; above 0.
+  /// A body against itself: faces (of ropes: edges) are neighbours, and are not asked for, where a way along the mesh's
+  /// edges from one to the other is shorter than this in its reference frame, or in its first step [m]; above 0.
   double self_m = 0.1;
 };
 
 enum class ClearanceStatus : std::uint8_t {
   MEASURED = 0,  ///< the interval is as narrow as was asked for
-  FARTHER = 1,   ///< than max_m: lower_m is max_m or more, upper_m is infinite
-  TOUCHING = 2,  ///< both bounds are 0; exactly where the step has a contact of the two, or they cross at its start
-  LOWER = 3,     ///< the budget ran out: lower_m holds, upper_m is what was found until then or infinite
-  UNKNOWN = 4,   ///< nothing is known: something of the two is unchecked or undecided, or the map is missing
+  /// Than max_m, or, of a body from itself, than a quarter of self_m if that is less: lower_m says it, upper_m is
+  /// infinite.
+  FARTHER = 1,
+  /// Over the step exactly where it has a certain contact of the two, or they cross at its start. Both bounds are 0;
+  /// but of a contact within a separation, an uncertainty or the tolerance of `conservative`, upper_m is what was
+  /// measured.
+  TOUCHING = 2,
+  LOWER = 3,  ///< the budget ran out, or rounding is wider than the tolerance: the bounds hold; upper_m may be infinite
+  UNKNOWN = 4,  ///< nothing is known: something of the two is unchecked or undecided, or the map is missing
 };
 DCCD_EXPORT const char* toString(ClearanceStatus status);
 

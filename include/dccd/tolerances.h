@@ -86,6 +86,22 @@ DCCD_MARGIN double SEGMENT_PLANE = 240 * HALF_ULP;     ///< [1] of the side of a
 DCCD_MARGIN double SEGMENT_UNDERFLOW = 0x1p-1000;
 constexpr double SEGMENT_LARGEST_M = 0x1p30;  ///< [m] guard: keeps the underflow below that margin
 
+// Distances (step/clearance/hull_pair.h).
+/// [1] Slack of a bound on a distance, of the power of two that is not above the largest coordinate: 113 half ulps are
+/// proved. Larger: bounds are further apart where coordinates are large.
+constexpr double CLEARANCE = 0x1p-45;
+constexpr double CLEARANCE_BOX = 16 * HALF_ULP;   ///< [1] slack of the squared distance of two boxes: 6 half ulps
+constexpr double CLEARANCE_RELATIVE = 1e-9;       ///< [1] of a distance: how far its bounds may be apart in any case
+constexpr double CLEARANCE_UNDERFLOW_M = 1e-290;  ///< [m] more than underflow takes from a distance
+constexpr double CLEARANCE_LARGEST_M = 1e150;     ///< [m] guard: squares stay finite
+constexpr double CLEARANCE_SHORTEST = 0x1p-48;    ///< [1] part of a step that is not halved any more
+/// [1] Of clearance.self_m, up to where a body's distance from itself is looked for. Larger: a sheet that is not folded
+/// may be found near itself, and searches take longer. Smaller: only narrower folds are seen.
+constexpr double CLEARANCE_SELF = 0.25;
+/// [1] How much farther than that it is looked for, so that the answer is known for some steps. Larger: it is known for
+/// longer, a search takes longer.
+constexpr double CLEARANCE_SELF_REACH = 1.5;
+
 // --- elementary tests ------------------------------------------------------------------------------------------------
 // Batched exact test (simd/exact_batch_bounds.h). Margins, each rounded up by more than 0.5 %.
 DCCD_MARGIN double BATCH_VALUE = 107 * HALF_ULP;        ///< [1] of f(t) and f's coefficients, times U V W

@@ -11,6 +11,7 @@
 #include "dccd/accuracy.h"
 #include "dccd/tolerances.h"
 #include "obstacle/excluded_leaves.h"
+#include "step/clearance/clearance_finder.h"
 #include "step/conclude.h"
 #include "step/history.h"
 #include "step/parts.h"
@@ -114,6 +115,10 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   if (!expected_known) expected.set(options->expected, step.bodies);
   expected_known = true;
   useMap(step.map);
+  if (options->clearance.wanted) {
+    if (!clearance) clearance = std::make_unique<ClearanceFinder>();
+    clearance->begin(step, scene, *options);
+  }
   // What is made once for many steps is not taken from the time of the first.
   const Clock::time_point begun = Clock::now();
   deadline = deadline.movedBy(begun - called);
@@ -133,9 +138,8 @@ Outcome History::Impl::run(const Step& step, const Options& wanted, Deadline dea
   outcome.sequence = step.sequence;
   outcome.substeps = parts;
   outcome.excluded_voxels = excluded_voxels;
-  if (options->clearance.wanted) clearance.begin(step, *options);
   if (!runParts(step, continues, parts, deadline, outcome)) carried.clear();
-  if (options->clearance.wanted) clearance.finish(parts, outcome);
+  if (options->clearance.wanted) clearance->finish(parts, outcome);
   outcome.step = std::make_shared<const Step>(step);
   outcome.obstacle = map_reduced;
   const std::size_t hits = outcome.contacts.size();
@@ -173,7 +177,7 @@ void History::Impl::findClearance(const Part& part, Clock::time_point begin) {
     const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
     deadline = deadline.movedTo(start + (deadline.at() - start - later * (start - begin)) / (later + 1));
   }
-  clearance.addPart({part.step, part.index, part.count, scene, map_reduced.get(), result, deadline});
+  clearance->addPart({part.step, part.index, part.count, scene, map_reduced, result, deadline});
   result.stats[Effect::CLEARANCE].ms = msSince(start);
 }
 
@@ -195,7 +199,7 @@ void History::Impl::setBodies(const Step& step) {
   check(*options, step.bodies);
   if (bodies_made && scene.holds(step.bodies)) return;
   bodies_made = false;
-  clearance.forgetBodies();
+  if (clearance) clearance->forgetBodies();
   carried.clear();
   carried.start_state.forgetBodies();
   carried.inside.forgetBodies();

@@ -19,7 +19,6 @@
 #include "culling/unfolded_parts.h"
 #include "dccd/detect.h"
 #include "simd/float_mode.h"
-#include "step/clearance/clearance_finder.h"
 #include "step/expected_contacts.h"
 #include "step/fork_join.h"
 #include "step/pairs/hit_order.h"
@@ -30,6 +29,11 @@
 #include "step/start/start_state.h"
 
 namespace dccd {
+
+class ClearanceFinder;
+
+/// `fixed` itself where the frames are the same, else `moved`, filled with the positions in the map's frame [m].
+const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved);
 
 /// One straight part of a step, of which the later ones begin where the one before ended.
 struct Part {
@@ -169,9 +173,9 @@ struct History::Impl {
   std::vector<std::uint8_t> bounded;      // per body: it needs bounds, whatever is near
   std::vector<std::uint8_t> obstacle_active;
   Positions map_t0, map_t1;
-  std::array<HitOrder, 2> order;  // by PairKind
-  Findings result;                // of the part; whether it is complete is said of its pairs alone
-  ClearanceFinder clearance;      // of the bodies, their trees and neighbours; no answer depends on the step before
+  std::array<HitOrder, 2> order;               // by PairKind
+  Findings result;                             // of the part; whether it is complete is said of its pairs alone
+  std::unique_ptr<ClearanceFinder> clearance;  // once it is wanted
   PatchMaker patches;
   Deadline::Clock::duration patches_took{0};  // in the last step
 };

@@ -276,7 +276,7 @@ std::string judgeClearances(const Step& step, const Options& options, const Outc
       say(std::string(touches ? "touch, and are " : "are apart, and are ") + toString(row.over_step.status));
     }
     const auto pairs = askedPairs(step, options, row);
-    const double limit_m = row.body[0] == row.body[1] ? std::min(options.clearance.max_m, options.clearance.self_m / 2)
+    const double limit_m = row.body[0] == row.body[1] ? std::min(options.clearance.max_m, options.clearance.self_m / 4)
                                                       : options.clearance.max_m;
     if (pairs.empty()) {
       for (const ClearanceDistance* d : {&row.at_end, &row.over_step}) {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "obstacle/start_contact.h"
-#include "step/clearance/map_boxes.h"
 #include "step/conclude.h"
 #include "step/start/segment_triangle.h"
 
@@ -16,38 +15,23 @@ using Feature = FeatureTree::Feature;
 bool isIdentity(const Eigen::Isometry3d& pose) { return pose.matrix() == Eigen::Isometry3d::Identity().matrix(); }
 
 /// Of the whole part. Empty bodies: nothing is in it.
-StepBox boxOf(const SceneBody& body) {
-  StepBox box;
-  for (int end = 0; end < 2; ++end) {
-    std::copy(body.bounds_min, body.bounds_min + 3, box.lo[end]);
-    std::copy(body.bounds_max, body.bounds_max + 3, box.hi[end]);
-  }
-  return box;
-}
-
-StepBox boxOf(const Box& still) {
-  StepBox box = StepBox::none();
-  for (int end = 0; end < 2; ++end) {
-    box.add(end, still.min);
-    box.add(end, still.max);
-  }
-  return box;
-}
+StepBox boxOf(const SceneBody& body) { return StepBox::still(body.bounds_min, body.bounds_max); }
 
 /// It holds something, and squares of distances stay finite.
 bool isUsable(const StepBox& box) {
-  for (int end = 0; end < 2; ++end) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double lo = box.lo[end][axis], hi = box.hi[end][axis];
-      if (!(lo > -tolerance::CLEARANCE_LARGEST_M && lo <= hi && hi < tolerance::CLEARANCE_LARGEST_M)) return false;
-    }
+  for (const int k : {0, 1, 2, 4, 5, 6}) {
+    const double lo = box.lo[k], hi = box.hi[k];
+    if (!(lo > -tolerance::CLEARANCE_LARGEST_M && lo <= hi && hi < tolerance::CLEARANCE_LARGEST_M)) return false;
   }
   return true;
 }
 
-bool shareVertex(const Feature& a, const Feature& b) {
-  return std::any_of(a.begin(), a.end(),
-                     [&](Index v) { return v != NO_INDEX && std::find(b.begin(), b.end(), v) != b.end(); });
+/// Empty where nothing is occupied.
+StepBox boxOf(const VoxelSurface& map) { return StepBox::still(map.bounds().min.data(), map.bounds().max.data()); }
+
+/// What the boxes are apart at least over the whole part [m].
+double apartByBoxes(const StepBox& a, const StepBox& b) {
+  return std::sqrt(squaredGap(a, b, 0)) * (1 - tolerance::CLEARANCE_BOX);
 }
 
 /// Exact, at t1: the hulls of 1 to 3 corners.
@@ -81,7 +65,7 @@ bool expectsAll(const std::vector<Expectation>& expected, std::uint16_t a, std::
 
 }  // namespace
 
-void ClearanceFinder::begin(const Step& step, const Options& options) {
+void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Options& options) {
   options_ = options.clearance;
   exact_ = options.accuracy.rung == Accuracy::EXACT;
   const std::size_t n = step.bodies.size();
@@ -96,6 +80,7 @@ void ClearanceFinder::begin(const Step& step, const Options& options) {
     row.unknown = unknown;
     rows_.push_back(row);
   };
+  for (std::size_t b = 0; b < n; ++b) learn(step.bodies[b], scene.bodies()[b], bodies_[b]);
   const auto lost = [&](std::size_t b) {
     return step.bodies[b].dropped_faces > 0 || looseVertices(step.bodies[b]) > 0;
   };
@@ -110,6 +95,20 @@ void ClearanceFinder::begin(const Step& step, const Options& options) {
   }
 }
 
+/// What is made once for many steps.
+void ClearanceFinder::learn(const Body& body, const SceneBody& scene_body, BodyState& state) const {
+  const std::size_t vertices = body.topology->vertexCount();
+  if (!body.t0 || body.t0->size() != vertices) return;  // the step will be refused
+  if (!state.first_t0) state.first_t0 = body.t0;
+  if (!state.tree.isBuilt()) state.tree.build(scene_body, *body.t0);
+  if (!meetsItself(body) || state.tree.empty() || state.self_m == options_.self_m) return;
+  const bool has_reference = body.reference && body.reference->positions.size() == vertices;
+  state.neighbours.set(*body.topology, has_reference ? body.reference->positions : *state.first_t0, options_.self_m,
+                       state.tree);
+  state.self_m = options_.self_m;
+  state.far_at.clear();
+}
+
 ClearanceFinder::Row* ClearanceFinder::rowOf(std::size_t a, std::size_t b) {
   const std::size_t n = bodies_.size();
   if (a > b) std::swap(a, b);
@@ -119,7 +118,7 @@ ClearanceFinder::Row* ClearanceFinder::rowOf(std::size_t a, std::size_t b) {
 
 double ClearanceFinder::limitOf(const Row& row) const {
   const bool itself = row.answer.body[0] == row.answer.body[1];
-  return itself ? std::min(options_.max_m, options_.self_m / 2) : options_.max_m;
+  return itself ? std::min(options_.max_m, tolerance::CLEARANCE_SELF * options_.self_m) : options_.max_m;
 }
 
 /// How much nearer the two may be than where they were seen.
@@ -133,7 +132,6 @@ void ClearanceFinder::learnBodies(const ClearancePart& part) {
     BodyState& state = bodies_[b];
     const SceneBody& body = part.scene.bodies()[b];
     const Body& motion = part.step.bodies[b];
-    if (!state.first_t0) state.first_t0 = motion.t0;
     state.fitted = state.fitted_to_map = false;
     state.known = body.usedCount() > 0 && isUsable(boxOf(body));
     for (std::size_t i = 0; body.masked && i < body.usedCount(); ++i) {
@@ -146,19 +144,23 @@ void ClearanceFinder::learnBodies(const ClearancePart& part) {
 /// The tree's boxes of this part. False: of such a size that nothing is computed with them.
 bool ClearanceFinder::fit(std::size_t b, const ClearancePart& part, bool to_map) {
   BodyState& state = bodies_[b];
+  const SceneBody& body = part.scene.bodies()[b];
   const Body& motion = part.step.bodies[b];
-  if (!state.tree.isBuilt()) state.tree.build(part.scene.bodies()[b], *motion.t0);
   if (state.tree.empty()) return false;
-  if (to_map ? !state.fitted_to_map : !state.fitted) {
-    state.fitted = !to_map;
-    state.fitted_to_map = to_map;
-    if (to_map) {
-      state.tree.refit(inMapFrame(part.step.map.map_from_fixed, *motion.t0, state.map_t0),
-                       inMapFrame(part.step.map.map_from_fixed, *motion.t1, state.map_t1));
-    } else {
-      state.tree.refit(*motion.t0, *motion.t1);
+  if (to_map && !state.fitted_to_map) {
+    const Positions& t0 = inMapFrame(part.step.map.map_from_fixed, *motion.t0, state.map_t0);
+    const Positions& t1 = inMapFrame(part.step.map.map_from_fixed, *motion.t1, state.map_t1);
+    state.on_map.resize(body.usedCount());
+    for (std::size_t i = 0; i < body.usedCount(); ++i) {
+      const Vec3 &p = t0[body.slot_vertex[i]], &q = t1[body.slot_vertex[i]];
+      state.on_map[i] = {{p[0], p[1], p[2], 0}, {q[0], q[1], q[2], 0}};
     }
+    state.tree.refit(state.on_map.data());
+  } else if (!to_map && !state.fitted) {
+    state.tree.refit(part.scene.vertices() + body.internal_begin);
   }
+  state.fitted = !to_map;
+  state.fitted_to_map = to_map;
   return isUsable(state.tree.box(state.tree.root()));
 }
 
@@ -245,59 +247,103 @@ void ClearanceFinder::touchAt(const ClearancePart& part, double t, std::array<st
   }
 }
 
+/// Whether nothing is to be searched: nothing can be known of the two, boxes or the steps before show that they are
+/// far, or there is no time.
+bool ClearanceFinder::needsNoSearch(Row& row, const ClearancePart& part, double limit_m) {
+  const auto [a, b] = row.answer.body;
+  const bool on_map = b == OBSTACLE_BODY, empty = on_map && part.map && part.map->leafCount() == 0;
+  const bool known = on_map ? part.map && (empty || isUsable(boxOf(*part.map))) : bodies_[b].known;
+  row.unknown = row.unknown || !bodies_[a].known || !known;
+  if (row.unknown) return true;
+  ++row.parts;
+  FoundDistance apart;
+  apart.lower_m = 0;
+  if (empty) {
+    apart.lower_m = std::numeric_limits<double>::infinity();
+  } else if (a == b) {
+    apart.lower_m = isStillFar(a, part, limit_m) ? limit_m : 0;
+  } else if (!on_map || isIdentity(part.step.map.map_from_fixed)) {
+    apart.lower_m =
+        apartByBoxes(boxOf(part.scene.bodies()[a]), on_map ? boxOf(*part.map) : boxOf(part.scene.bodies()[b]));
+  }
+  const bool is_far = apart.lower_m >= limit_m;
+  if (!is_far && !part.deadline.isOver()) return false;
+  apart.cut = !is_far;
+  row.over_step.lower_m = std::min(row.over_step.lower_m, apart.lower_m);
+  row.over_step.cut = row.over_step.cut || apart.cut;
+  if (part.index + 1 == part.count) row.at_end = apart;
+  return true;
+}
+
 void ClearanceFinder::search(Row& row, const ClearancePart& part) {
   const auto [a, b] = row.answer.body;
-  const bool on_map = b == OBSTACLE_BODY;
-  if (row.unknown) return;
-  if (!bodies_[a].known || !(on_map ? part.map != nullptr : bodies_[b].known)) {
-    row.unknown = true;
-    return;
-  }
-  ++row.parts;
-  const bool last = part.index + 1 == part.count;
+  const bool on_map = b == OBSTACLE_BODY, last = part.index + 1 == part.count;
+  const double limit_m = limitOf(row) + radiusOf(row);
+  if (needsNoSearch(row, part, limit_m)) return;
   const bool moved = on_map && !isIdentity(part.step.map.map_from_fixed);
-  NearestSearch::Goal goal{options_.tolerance_m, limitOf(row) + radiusOf(row), false, part.deadline};
-  FoundDistance apart_only;
-  apart_only.lower_m = 0;
-  if (on_map && MapBoxes(*part.map).empty()) {
-    apart_only.lower_m = std::numeric_limits<double>::infinity();
-  } else if (a != b && !moved) {
-    const StepBox other = on_map ? boxOf(part.map->bounds()) : boxOf(part.scene.bodies()[b]);
-    if (!isUsable(other)) {
-      row.unknown = true;
-      return;
-    }
-    apart_only.lower_m = apart(boxOf(part.scene.bodies()[a]), other, 0);
-  }
-  const bool is_far = apart_only.lower_m >= goal.limit_m;
-  if (is_far || part.deadline.isOver()) {
-    apart_only.cut = !is_far;
-    row.over_step.lower_m = std::min(row.over_step.lower_m, apart_only.lower_m);
-    row.over_step.cut = row.over_step.cut || apart_only.cut;
-    if (last) row.at_end = apart_only;
-    return;
-  }
   if (!fit(a, part, moved) || (!on_map && a != b && !fit(b, part, false))) {
     row.unknown = true;
     return;
   }
-  FoundDistance known = row.over_step;
-  if (last) {
-    goal.at_end = true;
-    row.at_end = measure(row, part, goal, FoundDistance());
-    describe(row, part, row.at_end, row.answer.at_end);
-    goal.at_end = false;
-    if (row.at_end.upper_m < known.upper_m) {
-      known = row.at_end;
-      if (!row.touches) row.answer.over_step = row.answer.at_end;
+  NearestSearch::Goal goal{options_.tolerance_m, limit_m, false, part.deadline};
+  FoundDistance at_end;
+  if (!(row.touches && exact_)) {  // else all is known of the step
+    if (a == b) goal.limit_m *= tolerance::CLEARANCE_SELF_REACH;
+    const FoundDistance found = measure(row, part, goal, row.over_step);
+    goal.limit_m = limit_m;
+    if (found.upper_m < row.over_step.upper_m) {
+      if (!row.touches) describe(row, part, found, row.answer.over_step);
+      if (found.t == 1) at_end = found;
+    }
+    row.over_step.upper_m = found.upper_m;
+    row.over_step.lower_m = std::min(row.over_step.lower_m, found.lower_m);
+    row.over_step.cut = row.over_step.cut || found.cut;
+    if (a == b) keepFar(a, part, found);
+    if (last && found.lower_m >= limit_m) {
+      row.at_end.lower_m = found.lower_m;
+      return;
     }
   }
-  if (row.touches && exact_) return;  // all is known of it
-  const FoundDistance found = measure(row, part, goal, known);
-  if (found.upper_m < known.upper_m && !row.touches) describe(row, part, found, row.answer.over_step);
-  row.over_step.upper_m = found.upper_m;
-  row.over_step.lower_m = std::min(row.over_step.lower_m, found.lower_m);
-  row.over_step.cut = row.over_step.cut || found.cut;
+  if (!last) return;
+  goal.at_end = true;
+  row.at_end = measure(row, part, goal, at_end);
+  describe(row, part, row.at_end, row.answer.at_end);
+}
+
+/// A body that is far enough from itself stays so while no vertex has moved by more than half of what there is to
+/// spare, but for a motion that all have in common. What a search would find is not otherwise.
+bool ClearanceFinder::isStillFar(std::size_t b, const ClearancePart& part, double limit_m) const {
+  const BodyState& state = bodies_[b];
+  const SceneBody& body = part.scene.bodies()[b];
+  if (state.far_at.size() != body.usedCount() || !(state.far_m > limit_m) || state.self_m != options_.self_m)
+    return false;
+  const VertexMotion* now = part.scene.vertices() + body.internal_begin;
+  double largest = 0, moved_squared = 0;
+  for (int end = 0; end < 2; ++end) {
+    const auto at = [&](std::size_t i) {
+      const double* x = end == 0 ? now[i].t0 : now[i].t1;
+      return Vec3(x[0], x[1], x[2]);
+    };
+    const Vec3 common = at(0) - state.far_at[0];
+    largest = std::max(largest, common.cwiseAbs().maxCoeff());
+    for (std::size_t i = 0; i < state.far_at.size(); ++i) {
+      moved_squared = std::max(moved_squared, (at(i) - state.far_at[i] - common).squaredNorm());
+    }
+  }
+  for (int k = 0; k < 3; ++k) largest = std::max({largest, std::abs(body.bounds_min[k]), std::abs(body.bounds_max[k])});
+  const double spare_m = state.far_m - limit_m - 2 * options_.tolerance_m - tolerance::CLEARANCE * largest;
+  return spare_m > 0 && 4 * moved_squared < spare_m * spare_m;
+}
+
+void ClearanceFinder::keepFar(std::size_t b, const ClearancePart& part, const FoundDistance& found) {
+  BodyState& state = bodies_[b];
+  const SceneBody& body = part.scene.bodies()[b];
+  const VertexMotion* now = part.scene.vertices() + body.internal_begin;
+  state.far_m = found.lower_m;
+  state.far_at.clear();
+  if (!(found.lower_m > limitOf(*rowOf(b, b)))) return;
+  for (std::size_t i = 0; i < body.usedCount(); ++i)
+    state.far_at.emplace_back(now[i].t1[0], now[i].t1[1], now[i].t1[2]);
 }
 
 FoundDistance ClearanceFinder::measure(const Row& row, const ClearancePart& part, const NearestSearch::Goal& goal,
@@ -305,27 +351,16 @@ FoundDistance ClearanceFinder::measure(const Row& row, const ClearancePart& part
   const auto [a, b] = row.answer.body;
   BodyState& first = bodies_[a];
   const FeatureTree& tree = first.tree;
-  const auto none = [](std::uint32_t, std::uint32_t) { return false; };
   if (b == OBSTACLE_BODY) {
-    const MapBoxes map(*part.map);
-    return search_.run(tree, map, false, goal, known, none, [&](std::uint32_t i, std::uint32_t leaf) {
-      return meetAtEnd(tree.itemHull(i), map.leafBox(leaf));
+    map_.set(part.map);
+    return search_.run(tree, map_, NearestSearch::AllPairs(), goal, known, [&](std::uint32_t i, std::uint32_t leaf) {
+      return meetAtEnd(tree.itemHull(i), map_.leafBox(leaf));
     });
   }
   const FeatureTree& other = bodies_[b].tree;
   const auto meet = [&](std::uint32_t i, std::uint32_t j) { return meetAtEnd(tree.itemHull(i), other.itemHull(j)); };
-  if (a != b) return search_.run(tree, other, false, goal, known, none, meet);
-  if (first.self_m != options_.self_m) {
-    first.self_m = options_.self_m;
-    const Body& body = part.scene.bodies()[a].setup;
-    first.neighbours.set(*body.topology, body.reference ? body.reference->positions : *first.first_t0, first.self_m);
-  }
-  return search_.run(
-      tree, tree, true, goal, known,
-      [&](std::uint32_t i, std::uint32_t j) {
-        return shareVertex(tree.feature(i), tree.feature(j)) || first.neighbours.are(tree.feature(i), tree.feature(j));
-      },
-      meet);
+  if (a != b) return search_.run(tree, other, NearestSearch::AllPairs(), goal, known, meet);
+  return search_.run(tree, tree, first.neighbours, goal, known, meet);
 }
 
 void ClearanceFinder::describe(const Row& row, const ClearancePart& part, const FoundDistance& found,
@@ -334,12 +369,12 @@ void ClearanceFinder::describe(const Row& row, const ClearancePart& part, const 
   const auto [a, b] = row.answer.body;
   distance.t = part.ofStep(found.t);
   distance.point = found.point;
-  distance.vertex[0] = bodies_[a].tree.feature(found.item[0]);
+  distance.vertex[0] = bodies_[a].tree.features()[found.item[0]];
   if (b != OBSTACLE_BODY) {
-    distance.vertex[1] = bodies_[b].tree.feature(found.item[1]);
+    distance.vertex[1] = bodies_[b].tree.features()[found.item[1]];
     return;
   }
-  const OccupiedLeaf& leaf = MapBoxes(*part.map).leaf(found.item[1]);
+  const OccupiedLeaf& leaf = map_.leaf(found.item[1]);
   distance.voxel = leaf.min;
   distance.voxel_size = leaf.size;
   const Eigen::Isometry3d& pose = part.step.map.map_from_fixed;

@@ -10,31 +10,29 @@
 #include "culling/scene_arrays.h"
 #include "dccd/detect.h"
 #include "step/clearance/feature_tree.h"
+#include "step/clearance/map_boxes.h"
 #include "step/clearance/nearest_search.h"
 #include "step/clearance/surface_neighbours.h"
 
 namespace dccd {
-
-/// `fixed` itself where the frames are the same, else `moved`, filled with the positions in the map's frame [m].
-const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved);
 
 /// What one part of a step gives the finder.
 struct ClearancePart {
   const Step& step;
   std::size_t index, count;
   const SceneArrays& scene;
-  const VoxelSurface* map;  ///< null: there is none
-  const Findings& found;    ///< contacts and crossings of the part
+  const std::shared_ptr<const VoxelSurface>& map;  ///< null: there is none
+  const Findings& found;                           ///< contacts and crossings of the part
   Deadline deadline;
 
   /// Where in the step its time t is.
   double ofStep(double t) const;
 };
 
-class ClearanceFinder {
+class DCCD_HIDDEN ClearanceFinder {
  public:
-  /// The pairs of a step, and what the bodies make unknown. Before its parts.
-  void begin(const Step& step, const Options& options);
+  /// The pairs of a step, what the bodies make unknown, and what is made once for many steps. Before its parts.
+  void begin(const Step& step, const SceneArrays& scene, const Options& options);
   /// In order.
   void addPart(const ClearancePart& part);
   /// Once no more parts come: of a step of `parts` those that did not come leave all unknown that they could change.
@@ -46,12 +44,15 @@ class ClearanceFinder {
   struct BodyState {
     FeatureTree tree;
     SurfaceNeighbours neighbours;
-    double self_m = 0;                           // of the neighbours
-    std::shared_ptr<const Positions> first_t0;   // where the body was first, the reference frame where it has none
+    double self_m = 0;                          // of the neighbours; 0: they are not known
+    std::shared_ptr<const Positions> first_t0;  // where the body was first, the reference frame where it has none
+    Positions far_at;                           // by slots, where it was when it was known to be far_m from itself
+    double far_m = 0;
     bool known = false;                          // in this part: it has features, and all of them have bounds
     bool fitted = false, fitted_to_map = false;  // the tree's boxes are of this part
     double radius_m = 0;                         // the largest
     Positions map_t0, map_t1;                    // this part's, in the frame of the map
+    std::vector<VertexMotion> on_map;            // the same, by slots
   };
   struct Row {
     Clearance answer;
@@ -61,13 +62,17 @@ class ClearanceFinder {
     std::size_t parts = 0;  // that it was looked for in
   };
 
+  void learn(const Body& body, const SceneBody& scene_body, BodyState& state) const;
   Row* rowOf(std::size_t a, std::size_t b);
   void takeContacts(const ClearancePart& part);
   void touchAt(const ClearancePart& part, double t, std::array<std::uint16_t, 2> body,
                std::array<FeatureTree::Feature, 2> vertex, const OccupiedLeaf* leaf);
   void learnBodies(const ClearancePart& part);
   bool fit(std::size_t body, const ClearancePart& part, bool to_map);
+  bool needsNoSearch(Row& row, const ClearancePart& part, double limit_m);
   void search(Row& row, const ClearancePart& part);
+  bool isStillFar(std::size_t body, const ClearancePart& part, double limit_m) const;
+  void keepFar(std::size_t body, const ClearancePart& part, const FoundDistance& found);
   FoundDistance measure(const Row& row, const ClearancePart& part, const NearestSearch::Goal& goal,
                         const FoundDistance& known);
   void describe(const Row& row, const ClearancePart& part, const FoundDistance& found,
@@ -81,6 +86,7 @@ class ClearanceFinder {
   std::vector<BodyState> bodies_;
   std::vector<Row> rows_;
   std::vector<std::int32_t> row_of_;  // [a * (bodies + 1) + b], b = bodies: the map; -1: none
+  MapBoxes map_;
   NearestSearch search_;
 };
 

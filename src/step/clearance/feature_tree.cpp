@@ -44,6 +44,24 @@ void FeatureTree::build(const SceneBody& body, const Positions& positions) {
   std::vector<Feature> sorted;
   for (const std::uint32_t i : order) sorted.push_back(features_[i]);
   features_ = std::move(sorted);
+  std::vector<Index> slot_of(topology.vertexCount(), NO_INDEX);
+  for (Index slot = 0; slot < body.usedCount(); ++slot) slot_of[body.slot_vertex[slot]] = slot;
+  slots_ = features_;
+  for (Feature& feature : slots_) {
+    for (Index& v : feature) v = v == NO_INDEX ? NO_INDEX : slot_of[v];
+  }
+  leaf_slots_.clear();
+  for (Node& node : nodes_) {
+    node.vertices = static_cast<std::uint32_t>(leaf_slots_.size());
+    if (node.right != 0) continue;
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      for (const Index slot : slots_[i]) {
+        const auto begin = leaf_slots_.begin() + node.vertices;
+        if (slot != NO_INDEX && std::find(begin, leaf_slots_.end(), slot) == leaf_slots_.end())
+          leaf_slots_.push_back(slot);
+      }
+    }
+  }
   boxes_.resize(nodes_.size());
   built_ = true;
 }
@@ -54,10 +72,8 @@ std::uint32_t FeatureTree::addNode(std::vector<std::uint32_t>& order, const std:
   const auto node = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   nodes_[node].first = first;
-  if (last - first <= LEAF) {
-    nodes_[node].count = last - first;
-    return node;
-  }
+  nodes_[node].count = last - first;
+  if (last - first <= LEAF) return node;
   Eigen::AlignedBox3d box;
   for (std::uint32_t i = first; i < last; ++i) box.extend(centres[order[i]]);
   Eigen::Index axis;
@@ -69,41 +85,43 @@ std::uint32_t FeatureTree::addNode(std::vector<std::uint32_t>& order, const std:
                      return p != q ? p < q : x < y;
                    });
   addNode(order, centres, first, middle);
-  nodes_[node].right = addNode(order, centres, middle, last);
+  const std::uint32_t right = addNode(order, centres, middle, last);
+  nodes_[node].right = right;
   return node;
 }
 
 StepBox FeatureTree::itemBox(std::uint32_t feature) const {
   StepBox box = StepBox::none();
-  for (const Index v : features_[feature]) {
-    if (v == NO_INDEX) break;
-    box.add(0, (*t0_)[v]);
-    box.add(1, (*t1_)[v]);
+  for (const Index slot : slots_[feature]) {
+    if (slot != NO_INDEX) box.add(vertices_[slot]);
   }
   return box;
 }
 
 MovingHull FeatureTree::itemHull(std::uint32_t feature) const {
   MovingHull hull;
-  for (const Index v : features_[feature]) {
-    if (v != NO_INDEX) hull.addCorner((*t0_)[v], (*t1_)[v]);
+  for (const Index slot : slots_[feature]) {
+    if (slot == NO_INDEX) break;
+    const VertexMotion& v = vertices_[slot];
+    hull.addCorner(Vec3(v.t0[0], v.t0[1], v.t0[2]), Vec3(v.t1[0], v.t1[1], v.t1[2]));
   }
   return hull;
 }
 
-void FeatureTree::refit(const Positions& t0, const Positions& t1) {
-  t0_ = &t0;
-  t1_ = &t1;
+void FeatureTree::refit(const VertexMotion* vertices) {
+  vertices_ = vertices;
+  std::size_t slots_end = leaf_slots_.size();
   for (std::size_t n = nodes_.size(); n-- > 0;) {  // children come after their parents
     const Node& node = nodes_[n];
-    StepBox box = StepBox::none();
-    if (node.count > 0) {
-      for (std::uint32_t i = node.first; i < node.first + node.count; ++i) box.add(itemBox(i));
+    if (node.right == 0) {
+      StepBox box = StepBox::none();
+      for (std::size_t i = node.vertices; i < slots_end; ++i) box.add(vertices[leaf_slots_[i]]);
+      slots_end = node.vertices;
+      boxes_[n] = box;
     } else {
-      box = boxes_[n + 1];
-      box.add(boxes_[node.right]);
+      boxes_[n] = boxes_[n + 1];
+      boxes_[n].add(boxes_[node.right]);
     }
-    boxes_[n] = box;
   }
 }
 

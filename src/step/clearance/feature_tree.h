@@ -18,46 +18,47 @@ class FeatureTree {
   using Feature = std::array<Index, 3>;  ///< the body's vertices; the rest NO_INDEX
   static constexpr std::uint32_t LEAF = 4;
 
-  struct Node {
-    std::uint32_t first = 0, count = 0;  ///< of the features; count 0: no leaf
-    std::uint32_t right = 0;             ///< the second child; the first one is the next node
-  };
-
   /// Positions guide the order alone; any will do.
   void build(const SceneBody& body, const Positions& positions);
   bool isBuilt() const { return built_; }
   bool empty() const { return features_.empty(); }
-  /// Makes the boxes anew. The positions must live while they are used; those of the features are finite.
-  void refit(const Positions& t0, const Positions& t1);
+  /// Makes the boxes anew. The body's used vertices by their slots; they must live while the tree is used, and those of
+  /// its features are finite.
+  void refit(const VertexMotion* vertices);
 
   std::uint32_t root() const { return 0; }
-  bool isLeaf(std::uint32_t node) const { return nodes_[node].count > 0; }
+  bool isLeaf(std::uint32_t node) const { return nodes_[node].right == 0; }
   const StepBox& box(std::uint32_t node) const { return boxes_[node]; }
-  /// Calls f(child) for each child.
+  std::size_t nodeCount() const { return nodes_.size(); }
+  /// Of the features of a node, which follow each other.
+  std::uint32_t first(std::uint32_t node) const { return nodes_[node].first; }
+  std::uint32_t count(std::uint32_t node) const { return nodes_[node].count; }
+  /// Calls f(child) for each of a node's two children.
   template <class F>
   void forChildren(std::uint32_t node, F&& f) const {
     f(node + 1);
     f(nodes_[node].right);
   }
-  /// Calls f(feature) for each feature of a leaf.
-  template <class F>
-  void forItems(std::uint32_t leaf, F&& f) const {
-    const Node& n = nodes_[leaf];
-    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) f(i);
-  }
-  const Feature& feature(std::uint32_t feature) const { return features_[feature]; }
+  const std::vector<Feature>& features() const { return features_; }
   StepBox itemBox(std::uint32_t feature) const;
   MovingHull itemHull(std::uint32_t feature) const;
 
  private:
+  struct Node {
+    std::uint32_t first = 0, count = 0;  // of the features
+    std::uint32_t right = 0;             // the second child; the first one is the next node. 0: a leaf
+    std::uint32_t vertices = 0;          // of a leaf, where its slots begin
+  };
   std::uint32_t addNode(std::vector<std::uint32_t>& order, const std::vector<Vec3>& centres, std::uint32_t first,
                         std::uint32_t last);
 
   bool built_ = false;
   std::vector<Feature> features_;
+  std::vector<Feature> slots_;  // the same by slots
   std::vector<Node> nodes_;
+  std::vector<Index> leaf_slots_;  // of each leaf, once each; then where they end
   std::vector<StepBox> boxes_;
-  const Positions *t0_ = nullptr, *t1_ = nullptr;
+  const VertexMotion* vertices_ = nullptr;
 };
 
 }  // namespace dccd

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "step/clearance/margins.h"
+#include "dccd/tolerances.h"
 
 namespace dccd {
 namespace {

@@ -1,5 +1,7 @@
 #include "step/clearance/nearest_search.h"
 
+#include <cmath>
+
 namespace dccd {
 namespace {
 
@@ -13,16 +15,33 @@ struct Interval {
 
 }  // namespace
 
-/// Nothing that far apart needs a further look.
-bool NearestSearch::prunes(double lower_m) {
-  double enough_m = goal_.limit_m;
+void NearestSearch::begin(const Goal& goal, const FoundDistance& known) {
+  goal_ = goal;
+  found_ = known;
+  found_.lower_m = settled_squared_ = std::numeric_limits<double>::infinity();
+  found_.cut = false;
+  looks_ = 0;
+  number_ = 0;
+  touching_.clear();
+  heap_.clear();
+  setEnough();
+}
+
+FoundDistance NearestSearch::result() const {
+  FoundDistance found = found_;
+  const double boxes_m = std::sqrt(settled_squared_) * (1 - tolerance::CLEARANCE_BOX);
+  found.lower_m = std::min({found.lower_m, boxes_m, found.upper_m});
+  return found;
+}
+
+/// From which distance on nothing needs a further look. Its square is rounded up, so that result() holds it.
+void NearestSearch::setEnough() {
+  enough_m_ = goal_.limit_m;
   if (found_.upper_m < std::numeric_limits<double>::infinity()) {
     const double wide_m = std::max(goal_.tolerance_m, tolerance::CLEARANCE_RELATIVE * found_.upper_m);
-    enough_m = std::min(enough_m, found_.upper_m - wide_m);
+    enough_m_ = std::min(enough_m_, found_.upper_m - wide_m);
   }
-  if (lower_m < enough_m) return false;
-  settle(lower_m);
-  return true;
+  enough_squared_ = enough_m_ > 0 ? enough_m_ * enough_m_ * (1 + 4 * tolerance::CLEARANCE_BOX) : 0;
 }
 
 bool NearestSearch::isLate() { return found_.cut || (++looks_ % WORK == 0 && goal_.deadline.isOver()); }
@@ -35,6 +54,7 @@ Nearest NearestSearch::takeAt(double t) {
     found_.t = t;
     for (int side = 0; side < 2; ++side) found_.point[side] = pair_.pointInMetres(nearest.point[side]);
     found_.item = item_;
+    setEnough();
   }
   return nearest;
 }
@@ -44,20 +64,25 @@ Nearest NearestSearch::takeAt(double t) {
 void NearestSearch::refine() {
   std::array<Interval, 64> left;  // a path to one interval leaves one beside each of its halvings
   std::size_t count = 1;
-  left[0] = {0, 1, 0, {takeAt(0).direction, takeAt(1).direction}};
+  const Vec3 at_end = takeAt(1).direction;
+  left[0] = {0, 1, 0, {at_end, at_end}};
   for (int halvings = 0; count > 0; ++halvings) {
     Interval one = left[--count];
     for (const Vec3& n : one.direction) {
       one.lower = std::max(one.lower, std::min(pair_.lowerAlong(n, one.from), pair_.lowerAlong(n, one.to)));
     }
-    const double lower_m = pair_.lowerInMetres(one.lower);
-    if (prunes(lower_m)) continue;
-    if (isLate()) {
-      cutAt(lower_m);
-      continue;
+    double lower_m = pair_.lowerInMetres(one.lower);
+    if (lower_m < enough_m_ && halvings == 0) {
+      one.direction[0] = takeAt(0).direction;
+      const Vec3& n = one.direction[0];
+      one.lower = std::max(one.lower, std::min(pair_.lowerAlong(n, 0), pair_.lowerAlong(n, 1)));
+      lower_m = pair_.lowerInMetres(one.lower);
     }
-    if (one.to - one.from <= tolerance::CLEARANCE_SHORTEST || halvings >= MOST_HALVINGS) {
+    const bool late = lower_m < enough_m_ && isLate();
+    if (late || lower_m >= enough_m_ || one.to - one.from <= tolerance::CLEARANCE_SHORTEST ||
+        halvings >= MOST_HALVINGS) {
       settle(lower_m);
+      found_.cut = found_.cut || late;
       continue;
     }
     const double middle = (one.from + one.to) / 2;

@@ -1,5 +1,5 @@
-// The smallest distance of two trees of features: branch and bound, from the nearest boxes to features, until no pair
-// that is left can be nearer than what was found by more than the tolerance.
+// The smallest distance of two trees of features: branch and bound, always on with the pair of boxes that may be
+// nearest, until none that is left can be nearer than what was found by more than the tolerance.
 //
 // The answer depends on the two trees alone, not on what was found in the step before: the search goes to the nearest
 // boxes first and so has a near pair after as many boxes as the trees are high.
@@ -34,99 +34,139 @@ class NearestSearch {
     bool at_end = false;                  ///< at t1 alone
     Deadline deadline;
   };
+  /// Of two different trees every pair of items is compared.
+  struct AllPairs {
+    static constexpr bool ITSELF = false;
+    std::uint32_t asked(std::uint32_t, std::uint32_t) const { return ~0u; }
+    bool leavesOut(std::uint32_t, std::uint32_t) const { return false; }
+  };
 
-  /// leavesOut(i, j): the items are not to be compared. meet(i, j): they certainly meet at t1, asked where they may.
-  /// known: of a distance that is not smaller, or nothing.
-  template <class A, class B, class LeavesOut, class Meet>
-  FoundDistance run(const A& a, const B& b, bool same, const Goal& goal, const FoundDistance& known,
-                    const LeavesOut& leavesOut, const Meet& meet) {
-    goal_ = goal;
-    found_ = known;
-    found_.lower_m = std::numeric_limits<double>::infinity();
-    found_.cut = false;
-    looks_ = 0;
-    stack_.clear();
-    push(a, a.root(), b, b.root());
-    while (!stack_.empty()) {
-      const Pair pair = stack_.back();
-      stack_.pop_back();
-      if (prunes(pair.lower_m)) continue;
-      if (isLate()) {
-        cutAt(pair.lower_m);
-        for (const Pair& left : stack_) cutAt(left.lower_m);
+  /// pairs: ITSELF: a and b are the same tree. asked(a, b): of two nodes, which pairs of items are to be compared (bit
+  /// LEAF * i + j, where both are leaves), or none: 0. leavesOut(i, j): the two items are not to be compared. meet(i,
+  /// j): they certainly meet at t1, asked where they may. known: of a distance that is not smaller, or nothing.
+  template <class A, class B, class Pairs, class Meet>
+  FoundDistance run(const A& a, const B& b, Pairs&& pairs, const Goal& goal, const FoundDistance& known,
+                    const Meet& meet) {
+    begin(goal, known);
+    push(a, a.root(), b, b.root(), pairs);
+    while (!touching_.empty() || !heap_.empty()) {
+      const Pair pair = take();
+      if (prunes(pair.squared) || isLate()) {  // nothing else is nearer
+        found_.cut = found_.cut || pair.squared < enough_squared_;
+        settleSquared(pair.squared);
         break;
       }
-      const std::size_t begin = stack_.size();
-      const bool leaf_a = a.isLeaf(pair.a), leaf_b = b.isLeaf(pair.b);
-      if (leaf_a && leaf_b) {
-        a.forItems(pair.a, [&](std::uint32_t i) {
-          b.forItems(pair.b, [&](std::uint32_t j) {
-            if (!same || pair.a != pair.b || i < j) compare(a, i, b, j, leavesOut, meet);
-          });
-        });
+      if (pair.items) {
+        if (!pairs.leavesOut(pair.a, pair.b)) compare(a, b, pair, meet);
         continue;
       }
-      if (same && pair.a == pair.b) {
+      const bool leaf_a = a.isLeaf(pair.a), leaf_b = b.isLeaf(pair.b);
+      if (leaf_a && leaf_b) {
+        pushItems(a, pair.a, b, pair.b, pairs);
+      } else if (pairs.ITSELF && pair.a == pair.b) {
         std::array<std::uint32_t, 2> child;
         std::size_t count = 0;
         a.forChildren(pair.a, [&](std::uint32_t c) { child[count++] = c; });
-        push(a, child[0], b, child[1]);
-        push(a, child[0], b, child[0]);
-        push(a, child[1], b, child[1]);
+        push(a, child[0], b, child[0], pairs);
+        push(a, child[1], b, child[1], pairs);
+        push(a, child[0], b, child[1], pairs);
       } else if (leaf_b || (!leaf_a && a.box(pair.a).length() >= b.box(pair.b).length())) {
-        a.forChildren(pair.a, [&](std::uint32_t child) { push(a, child, b, pair.b); });
+        a.forChildren(pair.a, [&](std::uint32_t child) { push(a, child, b, pair.b, pairs); });
       } else {
-        b.forChildren(pair.b, [&](std::uint32_t child) { push(a, pair.a, b, child); });
+        b.forChildren(pair.b, [&](std::uint32_t child) { push(a, pair.a, b, child, pairs); });
       }
-      // The nearest one is taken first; of equal ones the first that came.
-      std::stable_sort(stack_.begin() + static_cast<std::ptrdiff_t>(begin), stack_.end(),
-                       [](const Pair& x, const Pair& y) { return x.lower_m > y.lower_m; });
     }
-    found_.lower_m = std::min(found_.lower_m, found_.upper_m);
-    return found_;
+    return result();
   }
 
  private:
+  /// Of nodes, or of items.
   struct Pair {
-    double lower_m;
+    double squared;        // of what they are apart at least
+    std::uint32_t number;  // the later one comes first where they are equally far: it is nearer to the items
     std::uint32_t a, b;
+    bool items;
+    friend bool operator<(const Pair& x, const Pair& y) {
+      return x.squared != y.squared ? x.squared > y.squared : x.number < y.number;
+    }
   };
 
-  template <class A, class B>
-  void push(const A& a, std::uint32_t in_a, const B& b, std::uint32_t in_b) {
-    const double lower_m = apart(a.box(in_a), b.box(in_b), goal_.at_end ? 1 : 0);
-    if (!prunes(lower_m)) stack_.push_back({lower_m, in_a, in_b});
+  /// What touches comes before all else, in whatever order, but items before nodes.
+  void add(double squared, std::uint32_t a, std::uint32_t b, bool items) {
+    const Pair pair{squared, number_++, a, b, items};
+    if (squared == 0) {
+      touching_.push_back(pair);
+    } else {
+      heap_.push_back(pair);
+      std::push_heap(heap_.begin(), heap_.end());
+    }
   }
 
-  template <class A, class B, class LeavesOut, class Meet>
-  void compare(const A& a, std::uint32_t i, const B& b, std::uint32_t j, const LeavesOut& leavesOut, const Meet& meet) {
-    if (prunes(apart(a.itemBox(i), b.itemBox(j), goal_.at_end ? 1 : 0)) || leavesOut(i, j)) return;
-    pair_.set(a.itemHull(i), b.itemHull(j));
-    item_ = {i, j};
+  /// The one that may be nearest.
+  Pair take() {
+    std::vector<Pair>& from = touching_.empty() ? heap_ : touching_;
+    if (touching_.empty()) std::pop_heap(heap_.begin(), heap_.end());
+    const Pair pair = from.back();
+    from.pop_back();
+    return pair;
+  }
+
+  template <class A, class B, class Pairs>
+  void push(const A& a, std::uint32_t in_a, const B& b, std::uint32_t in_b, Pairs& pairs) {
+    const double squared = squaredGap(a.box(in_a), b.box(in_b), goal_.at_end ? 1 : 0);
+    if (!prunes(squared) && pairs.asked(in_a, in_b) != 0) add(squared, in_a, in_b, false);
+  }
+
+  template <class A, class B, class Pairs>
+  void pushItems(const A& a, std::uint32_t in_a, const B& b, std::uint32_t in_b, Pairs& pairs) {
+    const std::uint32_t asked = pairs.asked(in_a, in_b);
+    for (std::uint32_t i = 0; i < a.count(in_a); ++i) {
+      const StepBox box = a.itemBox(a.first(in_a) + i);
+      for (std::uint32_t j = 0; j < b.count(in_b); ++j) {
+        if ((asked >> (A::LEAF * i + j) & 1) == 0) continue;
+        const double squared = squaredGap(box, b.itemBox(b.first(in_b) + j), goal_.at_end ? 1 : 0);
+        if (!prunes(squared)) add(squared, a.first(in_a) + i, b.first(in_b) + j, true);
+      }
+    }
+  }
+
+  template <class A, class B, class Meet>
+  void compare(const A& a, const B& b, const Pair& pair, const Meet& meet) {
+    pair_.set(a.itemHull(pair.a), b.itemHull(pair.b));
+    item_ = {pair.a, pair.b};
     if (!goal_.at_end) return refine();
-    const double lower_m = takeAt(1).lower;
-    if (lower_m > 0 || !meet(i, j)) {
-      settle(pair_.lowerInMetres(lower_m));
+    const double lower = takeAt(1).lower;
+    if (lower > 0 || !meet(pair.a, pair.b)) {
+      settle(pair_.lowerInMetres(lower));
     } else {
       found_.upper_m = 0;
+      setEnough();
       settle(0);
     }
   }
 
-  bool prunes(double lower_m);
-  void settle(double lower_m) { found_.lower_m = std::min(found_.lower_m, lower_m); }
-  void cutAt(double lower_m) {
-    settle(lower_m);
-    found_.cut = true;
+  void begin(const Goal& goal, const FoundDistance& known);
+  FoundDistance result() const;
+  void setEnough();
+  /// Nothing that far apart needs a further look.
+  bool prunes(double squared) {
+    if (squared < enough_squared_) return false;
+    settleSquared(squared);
+    return true;
   }
+  void settleSquared(double squared) { settled_squared_ = std::min(settled_squared_, squared); }
+  void settle(double lower_m) { found_.lower_m = std::min(found_.lower_m, lower_m); }
   bool isLate();
   Nearest takeAt(double t);
   void refine();
 
   Goal goal_;
   FoundDistance found_;
+  double enough_m_ = 0, enough_squared_ = 0;
+  double settled_squared_ = 0;  // of all that was not looked into
   std::uint64_t looks_ = 0;
-  std::vector<Pair> stack_;
+  std::uint32_t number_ = 0;
+  std::vector<Pair> touching_, heap_;
   HullPair pair_;
   std::array<std::uint32_t, 2> item_{};
 };

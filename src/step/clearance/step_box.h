@@ -3,58 +3,65 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
-#include "dccd/types.h"
-#include "step/clearance/margins.h"
+#include "dccd/elementary.h"
+#include "dccd/tolerances.h"
 
 namespace dccd {
 
+/// In the layout of VertexMotion: x, y, z and 0 at t0, then at t1.
 struct StepBox {
-  double lo[2][3], hi[2][3];  ///< at t0, at t1
+  double lo[8], hi[8];
 
   static StepBox none() {
     StepBox box;
-    for (auto& end : box.lo) std::fill(end, end + 3, std::numeric_limits<double>::infinity());
-    for (auto& end : box.hi) std::fill(end, end + 3, -std::numeric_limits<double>::infinity());
+    for (int k = 0; k < 8; ++k) {
+      box.lo[k] = k % 4 == 3 ? 0 : std::numeric_limits<double>::infinity();
+      box.hi[k] = -box.lo[k];
+    }
     return box;
   }
-  void add(int end, const Vec3& point) {
-    for (int axis = 0; axis < 3; ++axis) {
-      lo[end][axis] = std::min(lo[end][axis], point[axis]);
-      hi[end][axis] = std::max(hi[end][axis], point[axis]);
+  /// The same at both ends.
+  static StepBox still(const double* lo, const double* hi) {
+    StepBox box;
+    for (int k = 0; k < 8; ++k) {
+      box.lo[k] = k % 4 == 3 ? 0 : lo[k % 4];
+      box.hi[k] = k % 4 == 3 ? 0 : hi[k % 4];
+    }
+    return box;
+  }
+  void add(const VertexMotion& vertex) {
+    for (int k = 0; k < 4; ++k) {
+      lo[k] = std::min(lo[k], vertex.t0[k]);
+      hi[k] = std::max(hi[k], vertex.t0[k]);
+      lo[4 + k] = std::min(lo[4 + k], vertex.t1[k]);
+      hi[4 + k] = std::max(hi[4 + k], vertex.t1[k]);
     }
   }
   void add(const StepBox& other) {
-    for (int end = 0; end < 2; ++end) {
-      for (int axis = 0; axis < 3; ++axis) {
-        lo[end][axis] = std::min(lo[end][axis], other.lo[end][axis]);
-        hi[end][axis] = std::max(hi[end][axis], other.hi[end][axis]);
-      }
+    for (int k = 0; k < 8; ++k) {
+      lo[k] = std::min(lo[k], other.lo[k]);
+      hi[k] = std::max(hi[k], other.hi[k]);
     }
   }
-  double length() const {
-    double most = 0;
-    for (int axis = 0; axis < 3; ++axis) most = std::max(most, hi[1][axis] - lo[1][axis]);
-    return most;
-  }
+  double length() const { return std::max({hi[4] - lo[4], hi[5] - lo[5], hi[6] - lo[6]}); }
 };
 
-/// What two boxes are apart at least from the end `first` (0 or 1) of the step to t1, rounded down. The gap on an axis
-/// is linear in t, so that it is least at one of the two times.
-inline double apart(const StepBox& a, const StepBox& b, int first) {
+/// The square of what two boxes are apart at least from the end `first` (0 or 1) of the step to t1, rounded down. The
+/// gap on an axis is linear in t, so that it is least at one of the two times.
+inline double squaredGap(const StepBox& a, const StepBox& b, int first) {
   double sum = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    double above = a.lo[1][axis] - b.hi[1][axis], below = b.lo[1][axis] - a.hi[1][axis];
+    double above = a.lo[4 + axis] - b.hi[4 + axis], below = b.lo[4 + axis] - a.hi[4 + axis];
     if (first == 0) {
-      above = std::min(above, a.lo[0][axis] - b.hi[0][axis]);
-      below = std::min(below, b.lo[0][axis] - a.hi[0][axis]);
+      above = std::min(above, a.lo[axis] - b.hi[axis]);
+      below = std::min(below, b.lo[axis] - a.hi[axis]);
     }
-    const double gap = std::max({above, below, 0.0});
+    const double gap = std::max(std::max(above, below), 0.0);
     sum += gap * gap;
   }
-  return std::sqrt(sum) * (1 - tolerance::CLEARANCE_BOX);
+  return sum * (1 - tolerance::CLEARANCE_BOX);
 }
 
 }  // namespace dccd

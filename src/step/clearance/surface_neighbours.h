@@ -6,31 +6,52 @@
 #include <utility>
 #include <vector>
 
-#include "dccd/topology.h"
-#include "dccd/types.h"
+#include "step/clearance/feature_tree.h"
 
 namespace dccd {
 
 /// Two features are neighbours where a way along the edges of the mesh leads from a vertex of one to a vertex of the
-/// other that is shorter than self_m, in the reference frame. No way on the surface is longer than the one along its
-/// edges by more than the mesh's grain, so that what is not left out is at least almost self_m away.
+/// other that is shorter than self_m, in the reference frame. The way along edges is never shorter than the way on the
+/// surface: what is left out is nearer than self_m there, and some of what is as near is asked for.
+///
+/// Made once. A patch is a node of the tree whose features are so few that a search around each patch is little work.
+/// Where patches are leaves, a table has every pair of neighbours; else it has the pairs of patches whose features are
+/// all neighbours, and what else comes near in space is searched for one feature at a time.
 class SurfaceNeighbours {
  public:
-  void set(const Topology& topology, const Positions& reference, double self_m);
-  bool isSet() const { return !begin_.empty(); }
-  /// Features as a FeatureTree has them. Quick where `a` is the one that was asked about last.
-  bool are(const std::array<Index, 3>& a, const std::array<Index, 3>& b);
+  static constexpr bool ITSELF = true;
+
+  void set(const Topology& topology, const Positions& reference, double self_m, const FeatureTree& tree);
+  /// For NearestSearch, of two nodes of the tree, the second not before the first. Of leaves bit LEAF * i + j for each
+  /// pair of their features that are not known to be neighbours; of other nodes 0 where all of them are.
+  std::uint32_t asked(std::uint32_t node_a, std::uint32_t node_b) const;
+  bool leavesOut(std::uint32_t feature_a, std::uint32_t feature_b);
 
  private:
-  void lookAround(const std::array<Index, 3>& feature);
+  using Feature = FeatureTree::Feature;
+  struct Entry {
+    std::uint32_t patch, mask;
+  };
+  const std::vector<Index>& around(const Index* begin, const Index* end);
+  void choosePatches();
+  void listNeighbours();
+  void listWholePatches();
 
+  const FeatureTree* tree_ = nullptr;
   double self_m_ = 0;
   std::vector<std::uint32_t> begin_;             // of each vertex's edges
   std::vector<std::pair<Index, double>> edges_;  // the other end, and the length [m]
-  std::array<Index, 3> asked_{NO_INDEX, NO_INDEX, NO_INDEX};
+  std::vector<std::uint32_t> patch_of_;          // per node; NO_INDEX above them
+  std::vector<std::uint32_t> patch_node_;        // per patch
+  bool exact_ = true;                            // the patches are leaves, and the table has all neighbours
+  std::vector<std::uint32_t> row_;               // per patch, where its entries begin, and their end
+  std::vector<Entry> entries_;                   // with patches that are not before it
+  // Of the search that was made last:
   std::vector<std::uint32_t> reached_;  // per vertex the number of the last search that came there
   std::vector<double> way_m_;           // per vertex, of that search
   std::uint32_t search_ = 0;
+  std::uint32_t around_ = NO_INDEX;  // the feature, if it was from one
+  std::vector<Index> found_;
   std::vector<std::pair<double, Index>> heap_;
 };
 

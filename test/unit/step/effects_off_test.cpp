@@ -118,6 +118,12 @@ std::vector<Case> cases() {
          s.body.against_obstacle = true;
        },
        [](Scene& s) { s.body.own_voxels_m = 0.1; }},
+      {Effect::CLEARANCE,
+       [=](Scene& s) {
+         s.map.surface = surface;
+         s.body.self_collision = s.body.against_obstacle = true;
+       },
+       [](Scene& s) { s.options.detector.clearance.wanted = true; }},
       {Effect::MINIMUM_SEPARATION, [](Scene& s) { s.body.self_collision = true; },
        [](Scene& s) { s.body.minimum_separation_m = 0.2; }},
       {Effect::TRACKER_NOISE, [](Scene& s) { s.body.self_collision = true; },
