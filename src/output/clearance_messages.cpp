@@ -87,7 +87,8 @@ deformable_ccd::Clearance toMessage(const Outcome& outcome, const Clearance& cle
     closing += side == 0 ? Vec3(-motion) : motion;
   }
   out.closing_speed = plottable(closing.dot(direction) / outcome.duration_s());
-  out.speed_bound = clearance.over_step.status == ClearanceStatus::UNKNOWN ? NONE : plottable(speed);
+  const auto unknown = [](const ClearanceDistance& distance) { return distance.status == ClearanceStatus::UNKNOWN; };
+  out.speed_bound = unknown(clearance.at_end) || unknown(clearance.over_step) ? NONE : plottable(speed);
   return out;
 }
 
