@@ -226,11 +226,12 @@ TEST(ClosedLoopProperty, AnArmThatSlowsDownTouchesNothingAndIsFasterThanAThresho
     EXPECT_FALSE(ours.contact) << seed;
     EXPECT_TRUE(ours.arrived) << seed;
     ours_m_s += ours.mean_speed_m_s;
-    // Of thresholds without a contact this is the fastest (scripts/benchmark slow).
+    // Thresholds with which the cloth touches nothing, either; nearer or faster ones touch (doc/slow_down.md).
     const ClosedLoopRun threshold = runClosedLoop(seed, [](const Outcome& outcome) {
       const double d = distanceToMap(outcome);
-      return d > 0.15 ? 1 : d > 0.02 ? 0.1 : 0;
+      return d > 0.2 ? 1 : d > 0.03 ? 0.1 : 0;
     });
+    EXPECT_FALSE(threshold.contact) << seed;
     threshold_m_s += threshold.mean_speed_m_s;
   }
   EXPECT_GT(ours_m_s, threshold_m_s);
