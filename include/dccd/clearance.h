@@ -17,8 +17,9 @@ struct ClearanceOptions {
   double tolerance_m = 1e-4;  ///< upper_m - lower_m is at most this, or 1e-9 of the distance [m]; above 0
   double max_m = 0.5;         ///< what is farther apart is FARTHER, and no minimum is looked for [m]; above 0
   /// A body against itself: faces (of ropes: edges) are neighbours, and are not asked for, where a way along the mesh's
-  /// edges from one to the other is shorter than this in its reference frame, or in its first step [m]; above 0.
-  double self_m = 0.1;
+  /// edges from one to the other is shorter than this in its reference frame, or in its first step [m]. 0: no body is
+  /// asked for itself, which takes longer than all else while it bends.
+  double self_m = 0;
 };
 
 enum class ClearanceStatus : std::uint8_t {

@@ -42,14 +42,14 @@ struct SafeUntil {
   static constexpr std::size_t NO_PAIR = std::numeric_limits<std::size_t>::max();
   StampNs stamp_ns = 0;  ///< the step's end
   StampNs until_ns = 0;  ///< not before stamp_ns; equal to it: nothing is promised
-  /// The same of pairs of two bodies, or of one and the map, alone: of a body and itself no more than half of
-  /// ClearanceOptions::self_m is known.
+  /// The same of pairs of two bodies, or of one and the map, alone: of a body and itself no more than a quarter of
+  /// ClearanceOptions::self_m is known, and where that is 0 nothing.
   StampNs others_until_ns = 0;
   std::size_t limiting = NO_PAIR;  ///< the pair in Outcome::clearances that ends first; of several the first
   /// Of that pair, at stamp_ns: their least distance as above [m], and the sum of their bounds [m/s]. NaN without one.
   double distance_m = std::numeric_limits<double>::quiet_NaN();
   double closing_m_s = std::numeric_limits<double>::quiet_NaN();
-  std::string reason;  ///< why nothing is promised; empty where something is
+  std::string reason;  ///< why until_ns is the step's end; empty where it is not
   bool isPromise() const { return others_until_ns > stamp_ns; }
   double seconds() const { return secondsBetween(stamp_ns, until_ns); }  ///< 0 to MOST_PROMISED_S
   double othersSeconds() const { return secondsBetween(stamp_ns, others_until_ns); }

@@ -146,7 +146,7 @@ void readClearance(ParameterReader section, MonitorConfig& config) {
   ClearanceOptions& clearance = config.monitor.detector.clearance;
   clearance.tolerance_m = section.number("tolerance_m", clearance.tolerance_m, 1e-9, 1);
   clearance.max_m = section.number("max_m", clearance.max_m, 1e-6, LARGE);
-  clearance.self_m = section.number("self_m", clearance.self_m, 1e-6, LARGE);
+  clearance.self_m = section.number("self_m", clearance.self_m, 0, LARGE);
   config.markers.clearance_max_m = clearance.max_m;
   section.finish();
 }

@@ -76,12 +76,14 @@ std::string takeUnchecked(const Step& step, StepStats& stats) {
   stats.unchecked_vertices += loose;
   stats.unchecked_faces += dropped;
   std::string text;
-  const auto add = [&](std::uint64_t count, const std::string& what) {
-    if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + what;
+  const auto add = [&](std::uint64_t count, const char* one, const char* many) {
+    if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + (count == 1 ? one : many);
   };
-  add(lost, " vertices are not finite and were not checked");
-  add(dropped, " faces were sent that cannot be used and were not checked");
-  add(loose, " vertices belong to no face and no edge and were not checked");
+  add(lost, " vertex is not finite and was not checked", " vertices are not finite and were not checked");
+  add(dropped, " face was sent that cannot be used and was not checked",
+      " faces were sent that cannot be used and were not checked");
+  add(loose, " vertex belongs to no face and no edge and was not checked",
+      " vertices belong to no face and no edge and were not checked");
   return text;
 }
 

@@ -29,11 +29,13 @@ void check(const Options& options, const std::vector<Body>& bodies) {
   }
   if (!(options.rigid_tolerance_m > 0)) refuse("rigid_tolerance_m must be above 0");
   if (options.max_substeps < 1) refuse("max_substeps must be 1 or more");
-  for (const auto& [name, value_m] :
-       {std::make_pair("tolerance_m", options.clearance.tolerance_m), std::make_pair("max_m", options.clearance.max_m),
-        std::make_pair("self_m", options.clearance.self_m)}) {
+  for (const auto& [name, value_m] : {std::make_pair("tolerance_m", options.clearance.tolerance_m),
+                                      std::make_pair("max_m", options.clearance.max_m)}) {
     if (value_m > 0 && value_m <= 1e9) continue;
     refuse(std::string("clearance.") + name + " = " + std::to_string(value_m) + " is out of range; above 0, to 1e9");
+  }
+  if (!(options.clearance.self_m >= 0 && options.clearance.self_m <= 1e9)) {
+    refuse("clearance.self_m = " + std::to_string(options.clearance.self_m) + " is out of range; 0 (none) to 1e9");
   }
   for (const Box& box : options.exclude_boxes) {
     if (box.empty()) refuse("exclude_boxes: a box's min exceeds its max");

@@ -289,7 +289,7 @@ class StateTest(LiveNodeTest):
         send(partly)
         dropped = send(partly)
         self.assertEqual(dropped.status, ContactArray.PARTIAL, dropped.reason)
-        self.assertIn('1 faces were sent that cannot be used', dropped.reason)
+        self.assertIn('1 face was sent that cannot be used', dropped.reason)
         self.wait_missing('cannot be used')
 
     def test_a_second_list_of_triangles(self):

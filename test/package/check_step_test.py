@@ -80,7 +80,7 @@ class CheckStepTest(unittest.TestCase):
     def test_a_vertex_that_is_nan(self):
         lost = sheet(0) + sheet(0.05)
         lost[700] = (float('nan'), 0.0, 0.0)
-        self.refused('1 vertices are not finite', sheet(0) + sheet(0.1), lost)
+        self.refused('1 vertex is not finite', sheet(0) + sheet(0.1), lost)
 
     def test_what_is_not_proved_stays_so_in_later_steps(self):
         lost = sheet(0) + sheet(0.1)
@@ -138,7 +138,7 @@ class CheckStepTest(unittest.TestCase):
         self.assertEqual(self.obj(square, [(0, 1, 2), (0, 2, 3), (0, 1, 1)]), 0, 'the edge of a face')
         for face in ((1, 3, 3), (0, 2, 1, 3)):
             self.assertEqual(self.obj(square, [(0, 1, 2), (0, 2, 3), face]), NOT_PROVED)
-            self.assertIn('1 faces were sent that cannot be used', self.said)
+            self.assertIn('1 face was sent that cannot be used', self.said)
             self.assertIn('0.obj: 1 polygons cannot be used and are unchecked, the first is in line 7', self.remarked)
             self.assertNotIn('nothing touches', self.said)
 

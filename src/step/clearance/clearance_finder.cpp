@@ -85,7 +85,7 @@ void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Op
     return step.bodies[b].dropped_faces > 0 || looseVertices(step.bodies[b]) > 0;
   };
   for (std::size_t a = 0; a < n; ++a) {
-    if (meetsItself(step.bodies[a])) add(a, a, lost(a));
+    if (options_.self_m > 0 && meetsItself(step.bodies[a])) add(a, a, lost(a));
     for (std::size_t b = a + 1; b < n; ++b) {
       if (meet(step.bodies[a], a, step.bodies[b], b)) add(a, b, lost(a) || lost(b));
     }

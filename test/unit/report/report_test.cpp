@@ -55,9 +55,9 @@ TEST(Headline, OnlyClearStepsSayNoContact) {
             "No contact found in 2 answered steps; not proved: 1 of 4 frames: NO_TRANSFORM: no transform from 'camera' "
             "to 'world' (1).");
   Outcome doubtful = clear;
-  doubtful.unproved = {"1 vertices are not finite", "and more"};
+  doubtful.unproved = {"1 vertex is not finite", "and more"};
   EXPECT_EQ(headlineOf({doubtful}),
-            "No contact found in 1 answered step; not proved: 1 of 1 frame: 1 vertices are not finite (1).");
+            "No contact found in 1 answered step; not proved: 1 of 1 frame: 1 vertex is not finite (1).");
 }
 
 TEST(Headline, WhatWasNotLookedAtStandsBesideWhatWasFound) {

@@ -39,8 +39,8 @@ TEST(Summary, NoContactIsSaidOfClearStepsAlone) {
   suppressed.touching = Touching::LASTING;
   EXPECT_EQ(summaryOf(suppressed), "no contact found, but 3 initial ones suppressed, starts CLEAR");
   Outcome doubtful = nothingFound(StepStatus::OK, StartState::CLEAR);
-  doubtful.unproved = {"1 vertices are not finite"};
-  EXPECT_EQ(summaryOf(doubtful), "no contact found, but 1 vertices are not finite, starts CLEAR");
+  doubtful.unproved = {"1 vertex is not finite"};
+  EXPECT_EQ(summaryOf(doubtful), "no contact found, but 1 vertex is not finite, starts CLEAR");
   Outcome unanswered;
   unanswered.status = StepStatus::GAP;
   EXPECT_EQ(summaryOf(unanswered), "no answer: GAP");

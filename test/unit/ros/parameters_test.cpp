@@ -121,7 +121,7 @@ TEST(Parameters, DistancesHaveLimitsThatMarkersShowThemBy) {
   EXPECT_FALSE(defaults.monitor.detector.clearance.wanted) << "the plan of effects says so, in each step";
   EXPECT_EQ(defaults.monitor.detector.clearance.tolerance_m, 1e-4);
   EXPECT_EQ(defaults.monitor.detector.clearance.max_m, 0.5);
-  EXPECT_EQ(defaults.monitor.detector.clearance.self_m, 0.1);
+  EXPECT_EQ(defaults.monitor.detector.clearance.self_m, 0);
   EXPECT_EQ(defaults.markers.clearance_max_m, 0.5);
   XmlRpcValue tree;
   tree["clearance"]["tolerance_m"] = 1e-3;

@@ -82,7 +82,7 @@ struct Missing {
 
 const std::vector<Missing>& list() {
   static const std::vector<Missing> LIST = {
-      {"a position", "1 vertices are not finite", lose},
+      {"a position", "1 vertex is not finite", lose},
       {"a face", "7 faces were sent that cannot be used", [](Asked& a) { a.upper().dropped_faces = 7; }},
       {"a surface at a vertex", "13 vertices belong to no face and no edge", loosen},
       {"the map that is expected", "nobody came",

@@ -15,6 +15,7 @@ Options asking(double max_m = 10) {
   Options options;
   options.clearance.wanted = true;
   options.clearance.max_m = max_m;
+  options.clearance.self_m = 0.1;
   return options;
 }
 
@@ -217,6 +218,8 @@ TEST(Clearance, OfAFoldIsFromLayerToLayer) {
   const Clearance open = rowOf(distance(stepOf(cloth, flat, flat), options), 0, 0);
   EXPECT_EQ(open.over_step.status, ClearanceStatus::FARTHER);
   EXPECT_EQ(open.over_step.lower_m, 0.1125) << "a quarter of self_m";
+  options.clearance.self_m = 0;
+  EXPECT_TRUE(distance(stepOf(cloth, flat, flat), options).empty()) << "nobody asks for it";
 }
 
 TEST(Clearance, IsNearerByTheUncertaintyOfVertices) {
@@ -416,7 +419,8 @@ TEST(Clearance, RefusesNumbersThatMeanNothing) {
     return "nothing";
   };
   EXPECT_EQ(said(&ClearanceOptions::max_m, 0), "clearance.max_m = 0.000000 is out of range; above 0, to 1e9");
-  EXPECT_EQ(said(&ClearanceOptions::self_m, std::nan("")), "clearance.self_m = nan is out of range; above 0, to 1e9");
+  EXPECT_EQ(said(&ClearanceOptions::self_m, std::nan("")), "clearance.self_m = nan is out of range; 0 (none) to 1e9");
+  EXPECT_EQ(said(&ClearanceOptions::self_m, 0), "nothing");
   EXPECT_NE(said(&ClearanceOptions::tolerance_m, -1), "nothing");
   EXPECT_NE(said(&ClearanceOptions::tolerance_m, INFINITY), "nothing");
   EXPECT_EQ(said(&ClearanceOptions::max_m, 0.5), "nothing");
