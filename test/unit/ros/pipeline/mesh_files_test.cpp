@@ -127,8 +127,7 @@ TEST(Files, FacesThatCannotBeUsedAreUnchecked) {
       const Outcome& outcome = driven.feed(1.1, 0.2f);
       EXPECT_EQ(outcome.status, usable ? StepStatus::OK : StepStatus::PARTIAL) << face << outcome.reason;
       EXPECT_EQ(assuranceOf(outcome).clear(), usable) << face;
-      EXPECT_EQ(outcome.reason.find(" sent that cannot be used") != std::string::npos, !usable)
-          << outcome.reason;
+      EXPECT_EQ(outcome.reason.find(" sent that cannot be used") != std::string::npos, !usable) << outcome.reason;
     }
   }
 }
