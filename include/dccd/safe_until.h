@@ -36,14 +36,15 @@ constexpr double MOST_PROMISED_S = 10;
 /// - no vertex is faster afterwards than its body's bound; a body against itself counts with twice its bound;
 /// - the surface stays straight between its vertices, and has the same edges and faces;
 /// - the map gets no voxel, and stays where it is. Bodies and features that the step leaves out are not spoken of, nor
-///   are a body's own features that are neighbours (ClearanceOptions::self_m) or features that share a vertex.
+///   are a body's own features that are neighbours (ClearanceOptions::self_m; where that is 0 all of them) or features
+///   that share a vertex.
 /// d / v is rounded down.
 struct SafeUntil {
   static constexpr std::size_t NO_PAIR = std::numeric_limits<std::size_t>::max();
   StampNs stamp_ns = 0;  ///< the step's end
   StampNs until_ns = 0;  ///< not before stamp_ns; equal to it: nothing is promised
   /// The same of pairs of two bodies, or of one and the map, alone: of a body and itself no more than a quarter of
-  /// ClearanceOptions::self_m is known, and where that is 0 nothing.
+  /// ClearanceOptions::self_m is known.
   StampNs others_until_ns = 0;
   std::size_t limiting = NO_PAIR;  ///< the pair in Outcome::clearances that ends first; of several the first
   /// Of that pair, at stamp_ns: their least distance as above [m], and the sum of their bounds [m/s]. NaN without one.

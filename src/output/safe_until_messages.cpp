@@ -1,5 +1,6 @@
 #include "output/safe_until_messages.h"
 
+#include <algorithm>
 #include <limits>
 #include <sstream>
 
@@ -34,6 +35,12 @@ std::string assumedOf(const Body& body, const SpeedBound& bound) {
   return text.str();
 }
 
+/// With clearance/self_m each body that may touch itself has such a row.
+bool asksItself(const Outcome& outcome) {
+  return std::any_of(outcome.clearances.begin(), outcome.clearances.end(),
+                     [](const Clearance& row) { return row.body[0] == row.body[1]; });
+}
+
 std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<SpeedBound>& bounds) {
   std::vector<std::string> sentences;
   if (!outcome.answered) return sentences;
@@ -45,7 +52,10 @@ std::vector<std::string> assumptions(const Outcome& outcome, const std::vector<S
                           ? "all that can be touched is in the map, which stands still and gets no new voxel"
                           : "nothing was checked against a map");
   for (const Body& body : bodies) {
-    if (meetsItself(body)) sentences.push_back("neighbours on the surface of '" + body.name + "' are not spoken of");
+    if (!meetsItself(body)) continue;
+    sentences.push_back(asksItself(outcome)
+                            ? "neighbours on the surface of '" + body.name + "' are not spoken of"
+                            : "what '" + body.name + "' does to itself is not spoken of (clearance/self_m is 0)");
   }
   return sentences;
 }

@@ -223,16 +223,6 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
                     : speeds.unbounded.empty() ? zeroReason(outcome, pair)
                                                : unboundedReason(speeds.unbounded);
   }
-  for (std::size_t b = 0; b < outcome.step->bodies.size() && least_s > 0; ++b) {
-    const auto& all = outcome.clearances;
-    const bool asked =
-        std::any_of(all.begin(), all.end(), [&](const Clearance& c) { return isItself(c) && c.body[0] == b; });
-    if (asked || !meetsItself(outcome.step->bodies[b])) continue;
-    least_s = 0;
-    result.limiting = SafeUntil::NO_PAIR;
-    result.distance_m = result.closing_m_s = std::numeric_limits<double>::quiet_NaN();
-    result.reason = nameOf(outcome, b) + " is not asked how far it is from itself (clearance/self_m is 0)";
-  }
   result.until_ns += nsIn(least_s);
   result.others_until_ns = others ? outcome.stamp_ns + nsIn(others_s) : result.until_ns;
   if (result.until_ns == result.stamp_ns && result.reason.empty()) result.reason = "the time is less than a nanosecond";

@@ -233,6 +233,7 @@ Defaults inForceOfTheNode() {
           {"markers/swept", plain(config.markers.swept)},
           {"robot/timeout_s", plain(robot.timeout_s)},
           {"robot/padding_m", plain(robot.padding_m)},
+          {"robot/max_own_voxels", plain(robot.max_own_voxels)},
           {"robot/own_voxels_m", robot.own_voxels_m == ONE_VOXEL ? "auto" : plain(robot.own_voxels_m)},
           {"max_speed_m_s", config.speed.max_m_s == SpeedBound::NONE ? "0" : plain(config.speed.max_m_s)},
           {"max_acceleration_m_s2", plain(config.max_acceleration_m_s2)},

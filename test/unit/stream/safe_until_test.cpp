@@ -32,16 +32,11 @@ ClearanceDistance apart(double lower_m, ClearanceStatus status = ClearanceStatus
   return distance;
 }
 
-/// A floor and a tip above it, a map of one voxel far away; an answered, proved step that ends at one second. A body
-/// meets itself where a distance says so.
+/// A floor and a tip above it, a map of one voxel far away; an answered, proved step that ends at one second.
 Outcome answered(std::vector<Clearance> clearances) {
   Outcome outcome;
   Step step;
   step.bodies = {placed("floor", floor(1000 * MS, 0)), placed("tip", tip(1000 * MS, 1))};
-  for (Body& body : step.bodies) body.self_collision = false;
-  for (const Clearance& c : clearances) {
-    if (c.body[0] == c.body[1]) step.bodies[c.body[0]].self_collision = true;
-  }
   step.start_ns = 900 * MS;
   step.stamp_ns = 1000 * MS;
   step.map.surface = VoxelSurface::build(0.1, {{{40000, 40000, 40000}, 1}});
@@ -145,13 +140,6 @@ TEST(SafeUntil, OfABodyAndItselfIsToldApart) {
   EXPECT_NEAR(touching.othersSeconds(), 0.5, 3e-9);
   EXPECT_TRUE(touching.isPromise());
   EXPECT_FALSE(safeUntil(answered({touch}), bounds).isPromise()) << "there are no others";
-  Outcome not_asked = answered({fold, other});
-  not_asked.clearances.erase(not_asked.clearances.begin());
-  const SafeUntil half = safeUntil(not_asked, bounds);
-  EXPECT_EQ(half.until_ns, half.stamp_ns);
-  EXPECT_EQ(half.reason, "'floor' is not asked how far it is from itself (clearance/self_m is 0)");
-  EXPECT_EQ(half.limiting, SafeUntil::NO_PAIR);
-  EXPECT_NEAR(half.othersSeconds(), 0.5, 3e-9);
 }
 
 TEST(SafeUntil, ABudgetLeavesLowerBoundsThatHold) {

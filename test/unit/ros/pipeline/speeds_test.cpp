@@ -167,8 +167,13 @@ TEST(SafeUntilMessage, SaysUntilWhenWhoAndWhatItRestsOn) {
   EXPECT_EQ(message.assumed,
             (std::vector<std::string>{"no vertex of 'cloth' is faster than 0.5 m/s",
                                       "all that can be touched is in the map, which stands still and gets no new voxel",
-                                      "neighbours on the surface of 'cloth' are not spoken of"}));
+                                      "what 'cloth' does to itself is not spoken of (clearance/self_m is 0)"}));
   EXPECT_EQ(message.reason + message.broken, "");
+  Outcome asked = outcome;
+  asked.clearances.push_back(asked.clearances[0]);
+  asked.clearances[1].body = {0, 0};
+  EXPECT_EQ(toSafeUntil(asked, watch, bounds, ros::Time(1.1), "world").assumed[2],
+            "neighbours on the surface of 'cloth' are not spoken of");
 }
 
 TEST(SafeUntilMessage, HasNoNumberWhereNothingIsKnown) {
