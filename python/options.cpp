@@ -163,6 +163,9 @@ const std::vector<Row>& rows() {
 #define DCCD_ACCURACY(name) \
   plain(                    \
       #name, [](auto& o) -> auto& { return o.accuracy.name; })
+#define DCCD_CLEARANCE(name, member) \
+  plain(                             \
+      name, [](auto& o) -> auto& { return o.clearance.member; })
   static const std::vector<Row> ROWS = {
       {"accuracy",
        [](Options& o, py::handle value, const Bodies&) {
@@ -193,7 +196,12 @@ const std::vector<Row>& rows() {
       DCCD_PLAIN(obstacle_expected),
       {"expected", setExpected, getExpected},
       DCCD_PLAIN(patches),
+      DCCD_CLEARANCE("clearance", wanted),
+      DCCD_CLEARANCE("clearance_tolerance_m", tolerance_m),
+      DCCD_CLEARANCE("clearance_max_m", max_m),
+      DCCD_CLEARANCE("clearance_self_m", self_m),
       DCCD_PLAIN(excluded)};
+#undef DCCD_CLEARANCE
 #undef DCCD_PLAIN
 #undef DCCD_ACCURACY
   return ROWS;

@@ -57,6 +57,27 @@ const py::dtype& patchType() {
   return *TYPE;
 }
 
+const py::dtype& clearanceType() {
+  static_assert(sizeof(ClearanceStatus) == 1);
+#define DCCD_DISTANCE(prefix, distance)                                                                    \
+  {prefix "status", "u1", offsetof(Clearance, distance) + offsetof(ClearanceDistance, status)},            \
+      {prefix "lower_m", "f8", offsetof(Clearance, distance) + offsetof(ClearanceDistance, lower_m)},      \
+      {prefix "upper_m", "f8", offsetof(Clearance, distance) + offsetof(ClearanceDistance, upper_m)},      \
+      {prefix "t", "f8", offsetof(Clearance, distance) + offsetof(ClearanceDistance, t)},                  \
+      {prefix "points", "(2,3)f8", offsetof(Clearance, distance) + offsetof(ClearanceDistance, point)},    \
+      {prefix "vertices", "(2,3)u4", offsetof(Clearance, distance) + offsetof(ClearanceDistance, vertex)}, \
+      {prefix "voxel", "(3,)u2", offsetof(Clearance, distance) + offsetof(ClearanceDistance, voxel)}, {    \
+    prefix "voxel_size", "u4", offsetof(Clearance, distance) + offsetof(ClearanceDistance, voxel_size)     \
+  }
+  static const auto* const TYPE = new py::dtype(structured({{"bodies", "(2,)u2", offsetof(Clearance, body)},
+                                                            {"expected", "?", offsetof(Clearance, expected)},
+                                                            DCCD_DISTANCE("end_", at_end),
+                                                            DCCD_DISTANCE("step_", over_step)},
+                                                           sizeof(Clearance)));
+#undef DCCD_DISTANCE
+  return *TYPE;
+}
+
 const py::dtype& geometryType() {
   static const auto* const TYPE =
       new py::dtype(structured({{"point", "(3,)f8", offsetof(ContactGeometry, point)},
@@ -187,6 +208,12 @@ void bindAnswer(Class& c) {
         "centroid [m], normal, box (min and max [m]); in a Stream id, which lasts from step to step, is_new, beginning "
         "(0: NEW, 1: INITIAL, 2: MAP_CHANGED), and began_from_ns and began_to_ns, between which it began; the least "
         "int64: nobody knows");
+  array(
+      "clearances", &clearanceType, &Outcome::clearances,
+      "structured array, with the option clearance: how far apart each two partners are. bodies (the same twice: "
+      "itself), expected; at the step's end (end_...) and the smallest over the step (step_...): status (0: MEASURED, "
+      "1: FARTHER, 2: TOUCHING, 3: LOWER, 4: UNKNOWN), lower_m <= truth <= upper_m (inf: nobody knows), t where "
+      "upper_m was taken, points [m], vertices of their features, voxel, voxel_size");
   c.def_property_readonly(
       "patch_of",
       [](py::object self) {

@@ -97,6 +97,11 @@ def detect(bodies: Body | Sequence[Body], *, voxels: Voxels | None = None, histo
         Whether surfaces cross already when the step begins. Without it nothing is proved. True.
     patches : bool
         Say which contacts belong together: Outcome.patches.
+    clearance : bool
+        Say how far apart things are: Outcome.clearances.
+    clearance_tolerance_m, clearance_max_m, clearance_self_m : float
+        How narrow its bounds are [m], 1e-4; beyond which things are only farther [m], 0.5; how far along its surface a
+        body is not asked for itself [m], 0: it is not asked at all.
     expected : list of dict
         {'between': [NAME, NAME], 'vertices': {NAME: indices}}: contacts that are no alarm; 'octomap' is the voxels, 'self'
         the other body itself, and vertices may be left out.

@@ -417,6 +417,32 @@ class ArraysTest(PythonTestCase):
         self.assertEqual(np.sort(outcome.contacts, order='vertices').dtype, outcome.contacts.dtype)
         self.assertEqual(pickle.loads(pickle.dumps(outcome.contacts)).tolist()[0][0], .5)
 
+    def test_distances_are_bounds_of_the_truth(self):
+        """Two sheets, one above the other, the upper one sinks from 0.5 m to 0.25 m; and one voxel below both."""
+        low = dccd.Body(sheet(5), sheet(5), mesh=dccd.Mesh.grid(5, 5), name='low')
+        high = dccd.Body(sheet(5, .5), sheet(5, .25), mesh=dccd.Mesh.grid(5, 5), name='high')
+        voxels = dccd.Voxels(.25, centres=[[.125, .125, -.375]])
+        outcome = dccd.detect([low, high], voxels=voxels, clearance=True, clearance_tolerance_m=1e-6,
+                              clearance_max_m=.45)
+        rows = outcome.clearances
+        self.assertEqual(rows['bodies'].tolist(), [[0, 1], [0, dccd.OBSTACLE_BODY], [1, dccd.OBSTACLE_BODY]])
+        self.assertEqual(rows['end_status'].tolist(), [0, 0, 1], 'the upper one is farther than 0.45 m from the map')
+        for row, truth in ((rows[0], .25), (rows[1], .25)):
+            for when in ('end_', 'step_'):
+                self.assertLessEqual(row[when + 'lower_m'], truth)
+                self.assertGreaterEqual(row[when + 'upper_m'], truth)
+                self.assertLess(row[when + 'upper_m'] - row[when + 'lower_m'], 1e-6)
+                self.assertAlmostEqual(np.linalg.norm(row[when + 'points'][1] - row[when + 'points'][0]), truth, 6)
+        self.assertEqual((rows[0]['end_t'], rows[0]['step_t']), (1, 1))
+        self.assertEqual(rows[1]['end_voxel_size'], 1)
+        self.assertEqual(rows['end_vertices'].shape, (3, 2, 3))
+        words = dccd.Outcome.clearances.__doc__
+        for name in rows.dtype.names:
+            self.assertRegex(words, r'\b%s\b' % re.sub('^(end|step)_', '', name))
+        self.assertEqual(len(dccd.detect([low, high], voxels=voxels).clearances), 0)
+        itself = dccd.detect(low, clearance=True, clearance_self_m=.1).clearances
+        self.assertEqual(itself['bodies'].tolist(), [[0, 0]])
+
     def test_each_field_has_its_words(self):
         outcome = dccd.detect(dccd.Body(self.t0, self.t1, FACES), patches=True)
         for rows, words in ((outcome.contacts, dccd.Outcome.__doc__), (outcome.patches, dccd.Outcome.patches.__doc__)):
