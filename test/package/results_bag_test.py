@@ -79,7 +79,8 @@ class ResultsBagTest(AnalyzeBagTestCase):
 
     def test_the_bag_of_results_has_every_topic_of_the_node(self):
         out, params = self.folder / 'all.bag', self.folder / 'all.yaml'
-        params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\neffects: {clearance: on}\n')  # more than the cloth's edges
+        params.write_text('accuracy: conservative\nminimum_separation_m: 0.03\nlook_ahead_s: 0.1\neffects: {clearance: on}\n'  # more than the cloth's edges
+                          'max_speed_m_s: 1\nspeed_scale: {reaction_time_s: 0.1, stopping_time_s: 0.1}\n')
         self.analyze('all', self.bag, '--params', params, '-o', out)
         by_topic = collections.defaultdict(list)
         for topic, message, _ in messages_of(out):
@@ -97,7 +98,7 @@ class ResultsBagTest(AnalyzeBagTestCase):
 
     def test_distances_are_zero_exactly_where_something_touches(self):
         out, params = self.folder / 'apart.bag', self.folder / 'apart.yaml'
-        params.write_text('effects: {clearance: on}\nexpected_contacts:\n  - {between: [mesh, self]}\n')
+        params.write_text('effects: {clearance: on}\nclearance: {self_m: 0.1}\nexpected_contacts:\n  - {between: [mesh, self]}\n')
         report = self.analyze('apart', self.bag, '--params', params, '-o', out)
         by_topic = collections.defaultdict(list)
         for topic, message, _ in messages_of(out):
