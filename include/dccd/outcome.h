@@ -196,7 +196,7 @@ struct ContactCounts {
 struct Findings {
   std::vector<Contact> contacts;  ///< in canonical order
   StartState start_state = StartState::NOT_CHECKED;
-  std::vector<StartIntersection> intersections;
+  std::vector<StartIntersection> intersections;  ///< of edges through faces one at the most with earliest_only
   bool start_state_complete = true;  ///< false: the budget ran out before all that can meet at t0 was looked at
   /// False: the step budget ran out, or max_found was reached, before the last pair or, of a whole step, before the
   /// start state was known.
