@@ -314,6 +314,14 @@ TEST(PromiseWatch, AMapThatGrowsOrMovesAndNotOneThatShrinks) {
   EXPECT_EQ(brokenBy(withMap(1, {a, b}), withMap(2 * MS, {b, a})), "");
   EXPECT_EQ(brokenBy(withMap(1, {a, b}), withMap(2 * MS, {part})), "");
   EXPECT_EQ(brokenBy(withMap(1, {part}), withMap(2 * MS, {a})), "the map has new voxels");
+  std::vector<OccupiedLeaf> parts;  // of a, as a map is before it is pruned
+  for (std::uint16_t i = 0; i < 8; ++i) {
+    const auto at = [i](int axis) { return static_cast<std::uint16_t>(40000 + 2 * (i >> axis & 1)); };
+    parts.push_back({{at(0), at(1), at(2)}, 2});
+  }
+  EXPECT_EQ(brokenBy(withMap(1, parts), withMap(2 * MS, {a})), "");
+  parts.pop_back();
+  EXPECT_EQ(brokenBy(withMap(1, parts), withMap(2 * MS, {a})), "the map has new voxels");
   EXPECT_EQ(brokenBy(withMap(1, {a}), withMap(2 * MS, {a, b})), "the map has new voxels");
   EXPECT_EQ(brokenBy(withMap(1, {}), withMap(2 * MS, {b})), "the map has new voxels");
   EXPECT_EQ(brokenBy(withMap(1, {a}), withMap(2 * MS, {})), "");
