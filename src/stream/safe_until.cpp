@@ -11,6 +11,8 @@
 #include <utility>
 
 #include "dccd/assurance.h"
+#include "obstacle/leaf_sets.h"
+#include "obstacle/voxel_surface_impl.h"
 
 namespace dccd {
 namespace {
@@ -175,28 +177,11 @@ StampNs nsIn(double seconds) {
   return static_cast<StampNs>(std::floor(roundedDown(seconds * 1e9)));
 }
 
-/// Whether all of a leaf is occupied, by one leaf or by smaller ones.
-bool isOccupied(const VoxelSurface& map, const OccupiedLeaf& leaf) {
-  const auto middle = [&](std::uint16_t min) { return (min - 32768 + 0.5 * leaf.size) * map.resolution(); };
-  const OccupiedLeaf* found = map.leafAt({middle(leaf.min.x), middle(leaf.min.y), middle(leaf.min.z)});
-  if (!found || found->size >= leaf.size) return found != nullptr;
-  for (int octant = 0; octant < 8; ++octant) {
-    OccupiedLeaf part{leaf.min, leaf.size / 2};
-    if (octant & 1) part.min.x += part.size;
-    if (octant & 2) part.min.y += part.size;
-    if (octant & 4) part.min.z += part.size;
-    if (!isOccupied(map, part)) return false;
-  }
-  return true;
-}
-
 /// Whether something is occupied that was not before.
 bool hasNewVoxels(const VoxelSurface& now, const VoxelSurface& before) {
-  const auto same = [](const OccupiedLeaf& a, const OccupiedLeaf& b) { return a.min == b.min && a.size == b.size; };
-  const std::vector<OccupiedLeaf>&leaves = now.leaves(), &old = before.leaves();
-  if (now.resolution() != before.resolution()) return true;
-  if (std::equal(leaves.begin(), leaves.end(), old.begin(), old.end(), same)) return false;
-  return !std::all_of(leaves.begin(), leaves.end(), [&](const OccupiedLeaf& leaf) { return isOccupied(before, leaf); });
+  bool found = now.resolution() != before.resolution();
+  if (!found) visitDifference(now.impl().tree, before.impl().tree, [&](const OccupiedLeaf&) { found = true; });
+  return found;
 }
 
 }  // namespace
