@@ -48,28 +48,6 @@ TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
   EXPECT_FALSE(isAdvertised("/pair/left_out")) << "no separation";
 }
 
-TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
-  finger(300, -5);
-  finger(300.4, -5);
-  cloth.publish(meshStamped(floorAt(0), 300));
-  gripper.publish(meshStamped(tipAt(4), 299.9));
-  ASSERT_TRUE(waitUntil([&] { return contacts.count() > 0; }));
-  const std::size_t seen = contacts.count();
-  cloth.publish(meshStamped(floorAt(0), 300.1));
-  ros::Duration(0.05).sleep();
-  EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
-  gripper.publish(meshStamped(tipAt(-4), 300.3));  // 2 at 300, 0 at 300.1
-  const deformable_ccd::ContactArray outcome = contacts.after(seen);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  ASSERT_EQ(outcome.bodies.size(), 3u);
-  EXPECT_FALSE(outcome.contacts.empty());
-
-  const deformable_ccd::ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
-  EXPECT_EQ(late.status, deformable_ccd::ContactArray::NO_BODY);
-  EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
-  expectAddsUp();
-}
-
 struct Tabled : MonitorTest {
   Tabled() : MonitorTest("/tabled") {}
   ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/tabled/cloth");
