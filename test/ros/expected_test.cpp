@@ -5,7 +5,6 @@
 #include <deformable_ccd/SetPhase.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/TimeToContact.h>
-#include <diagnostic_msgs/DiagnosticArray.h>
 
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
@@ -17,8 +16,8 @@ namespace {
 using deformable_ccd::ContactArray;
 using deformable_ccd::State;
 
-struct Expected : MonitorTest {
-  explicit Expected(const std::string& name) : MonitorTest(name) {}
+struct Pressing : MonitorTest {
+  Pressing() : MonitorTest("/pressing") {}
   ros::Publisher mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, name_ + "/mesh");
   Probe<State> state{node, name_ + "/state"};
   Probe<deformable_ccd::FirstContact> first{node, name_ + "/first_contact"};
@@ -51,10 +50,6 @@ struct Expected : MonitorTest {
     EXPECT_TRUE(waitUntil([&] { return stats.count() > 0 && stats.last().header.stamp == end; }));
     return outcome;
   }
-};
-
-struct Pressing : Expected {
-  Pressing() : Expected("/pressing") {}
 };
 
 // The first case of this monitor: nobody has listened to its predictions.

@@ -1,5 +1,4 @@
-// The live node with a grid over an octomap: what is missing, unknown or refused of the map, and clouds that do not
-// fit.
+// The live node with a grid over an octomap, which may be missing, and as either kind of message.
 #include <deformable_ccd/ContactArray.h>
 
 #include <algorithm>

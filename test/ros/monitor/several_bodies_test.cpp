@@ -1,4 +1,4 @@
-// The live node with several bodies: one is the clock, one is moved by tf, one is static and sent once.
+// The live node with several bodies: what is off has no topic, and one that is static and sent once stays.
 #include <deformable_ccd/ContactArray.h>
 
 #include <algorithm>
@@ -7,9 +7,7 @@
 #include <octomap_msgs/Octomap.h>
 #include <ros/ros.h>
 #include <std_srvs/SetBool.h>
-#include <tf2_msgs/TFMessage.h>
 
-#include "ros/monitor/monitors.h"
 #include "ros/support/monitor_fixture.h"
 
 namespace dccd {
@@ -27,11 +25,6 @@ Mesh tipAt(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {
 
 struct Pair : MonitorTest {
   Pair() : MonitorTest("/pair") {}
-  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/cloth");
-  ros::Publisher gripper = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/gripper");
-  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
-
-  void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
 };
 
 // What is off has no topic, neither to listen to nor to speak on.
