@@ -28,7 +28,12 @@ if(MISSING_FOR_TESTS)
 endif()
 enable_testing()
 
+# One test holds the scenes that the benchmarks generate.
+file(GLOB GENERATED_SCENES CONFIGURE_DEPENDS benchmark/support/generated_*.cpp)
+set_source_files_properties(${GENERATED_SCENES} test/unit/support/generated_scene_test.cpp PROPERTIES
+  INCLUDE_DIRECTORIES ${CMAKE_CURRENT_SOURCE_DIR}/benchmark)
 file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS test/support/*.cpp)
+list(APPEND SUPPORT_SOURCES ${GENERATED_SCENES})
 add_library(deformable_ccd_test_support STATIC EXCLUDE_FROM_ALL ${SUPPORT_SOURCES})
 target_include_directories(deformable_ccd_test_support PUBLIC src test)
 # The truth data lie beside the checkout, not beside a workspace's links.

@@ -1,6 +1,5 @@
 """A step budget is kept as a time, live: latency is printed, and asserted only against a hang, ten times what is promised."""
 import math
-import struct
 import time
 import unittest
 
@@ -44,21 +43,6 @@ class BudgetTest(AttackTest):
                         [(o.status, o.reason) for o in outcomes])
         self.assertFalse(any(o.complete for o in outcomes[1:]))
         self.recovers(30, rows, cols)
-
-    def test_random_bytes(self):
-        self.start_node('bytes', step_budget_ms=10)
-        rows, cols = 16, 16
-        state, messages = 12345, []
-        for i in range(10):
-            values = []
-            while len(values) < 3 * rows * cols:
-                state = (1103515245 * state + 12345) % 2**32
-                [value] = struct.unpack('<f', struct.pack('<I', state))
-                if math.isfinite(value):
-                    values.append(value)
-            messages.append(cloud_of(i, list(zip(*[iter(values)] * 3)), rows, cols))
-        self.run_frames(10, messages)
-        self.assertFalse(any(s.clear for s in self.states[1:]))
 
     def test_unknown_space_that_a_large_cloth_sweeps(self):
         self.start_node('unknown', step_budget_ms=5, unknown_space='report', **{'effects/octomap': 'on', 'octomap_topic': '/unknown/map'})

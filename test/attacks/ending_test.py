@@ -56,6 +56,7 @@ class EndingTest(AttackTest):
             time.sleep(0.4)
             self.ends(node, number, 'a step of seconds')
             wait_for(lambda: 'stopped' in self.states[-1].reason, 5, 'the last word')
+            self.assertFalse(self.clear[-1].data)
 
     def test_a_map_that_is_being_decoded(self):
         """A checkerboard: 8.4 million leaves in 4.8 MB; a file, so that it is there at once."""

@@ -12,18 +12,14 @@ import unittest
 
 import rosbag
 import rospy
-from deformable_ccd.msg import ContactArray, MeshStamped, State
-from geometry_msgs.msg import Point
-from rosgraph_msgs.msg import Clock
+from deformable_ccd.msg import ContactArray, State
 from sensor_msgs.msg import PointCloud2
-from shape_msgs.msg import MeshTriangle
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
-from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / 'scripts/lib'))
-from ros_process import SLOW, wait_for
-from live_node import Cloud, LiveNodeTest, grid_faces, simulated_time
+from ros_process import wait_for
+from live_node import Cloud, LiveNodeTest, simulated_time
 
 ROWS, COLS = 30, 40  # 1,200 vertices
 
@@ -108,27 +104,6 @@ class StateTest(LiveNodeTest):
         self.wait_proved()
         self.assertNotIn('nobody publishes', self.states[-1].reason)
         self.assert_consistent()
-
-    def test_a_tracker_that_is_killed_and_replaced_by_another_type(self):
-        self.start_node('replaced')
-        self.publisher.unregister()
-        tracker = subprocess.Popen([sys.executable, __file__, 'publish', '/replaced/mesh'])
-        self.addCleanup(self.end, tracker)
-        self.wait_proved()
-        self.assertTrue(self.states[-1].clear)
-        tracker.kill()
-        tracker.wait()
-        self.wait_missing('no frame has come')
-        self.wait_reason('nobody publishes /replaced/mesh any more')
-        said = len(self.states)
-        successor = rospy.Publisher('/replaced/mesh', MeshStamped, queue_size=5)
-        self.addCleanup(successor.unregister)
-        for i in range(30):
-            successor.publish(mesh_of(Sheet(), [(0, 1, COLS)], 200 + 0.03 * i))
-            time.sleep(0.03)
-        # Whether they are taken or not: of 1,200 vertices but three have a face.
-        self.assertFalse(any(s.proved for s in self.states[said:]))
-        self.assertFalse(self.late_subscriber('replaced').clear)
 
     def test_steps_that_take_longer_than_frames_come(self):
         self.start_node('slow', max_compute_s=0.0, max_memory_mb=4096, answer_timeout_s=0.1, queue_size=1, max_step_s=1e6, max_contacts=10)
@@ -229,86 +204,6 @@ class StateTest(LiveNodeTest):
         self.assertFalse(self.states[-1].clear)
         self.assert_consistent()
 
-    def test_a_clock_that_runs_backwards(self):
-        with simulated_time():
-            self.start_node('backwards')
-        clock = self.advertise('/clock', Clock, 10)
-        cloth, now_s = Sheet(), 1000.0
-        for k in range(4):
-            now_s += 0.05
-            clock.publish(Clock(rospy.Time.from_sec(now_s)))
-            time.sleep(0.05)
-            self.step(cloth.message(now_s))
-        self.wait_proved()
-        end = time.monotonic() + 20
-        while self.states[-1].proved and time.monotonic() < end:  # from now on there are no frames
-            now_s -= 0.05
-            clock.publish(Clock(rospy.Time.from_sec(now_s)))
-            time.sleep(0.05)
-        self.wait_missing('no frame has come')
-        self.assertGreater(now_s, 1000.2 - 10, 'within seconds, not for want of a clock')
-
-    def test_the_last_word_of_a_node_that_ends(self):
-        for number in (signal.SIGINT, signal.SIGTERM):
-            with self.subTest(signal=number):
-                name = 'ends_%d' % number
-                node = self.start_node(name)
-                stream = self.stream(Sheet())
-                self.wait_proved()
-                node.send_signal(number)
-                self.assertEqual(node.wait(20 * SLOW), 0)
-                wait_for(lambda: 'stopped' in self.states[-1].reason, 5, 'the last word')
-                self.assertFalse(self.clear[-1].data)
-                stream.end()
-
-    def test_a_mesh_that_is_not_wholly_used(self):
-        """Faces that name a vertex twice, none at all, and a second list of triangles."""
-        self.start_node('dropped')
-        self.retype('dropped', MeshStamped)
-        whole = grid_faces(ROWS, COLS)
-        stamp = [100.0]
-
-        def send(faces):
-            stamp[0] += 0.03
-            return self.send(mesh_of(Sheet(), faces, stamp[0]))
-
-        none = send([])
-        self.assertEqual(none.status, ContactArray.BAD_MESSAGE)
-        self.assertIn('no triangles', none.reason)
-        send(whole)
-        self.assertEqual(send(whole).status, ContactArray.OK)
-        self.wait_proved()
-        for faces, words in (([(0, 0, 0)] * 10, 'nothing to check'), ([(1, 2, 1)], 'nothing to check')):
-            said = len(self.states)
-            refused = send(faces)
-            self.assertEqual(refused.status, ContactArray.BAD_MESSAGE, faces[:1])
-            self.assertIn(words, refused.reason)
-            wait_for(lambda: len(self.states) > said, 5, 'a word')
-            self.assertFalse(self.states[-1].proved)
-        partly = whole[:-2] + [(0, 0, 0), (1199, 1199, 0)]
-        send(partly)
-        dropped = send(partly)
-        self.assertEqual(dropped.status, ContactArray.PARTIAL, dropped.reason)
-        self.assertIn('1 face was sent that cannot be used', dropped.reason)
-        self.wait_missing('cannot be used')
-
-    def test_a_second_list_of_triangles(self):
-        self.start_node('lists')
-        self.retype('lists', MarkerArray)
-
-        def send(count, stamp_s):
-            return self.send(MarkerArray([soup(Sheet(), stamp_s, i) for i in range(count)]))
-
-        send(1, 100)
-        self.assertEqual(send(1, 100.03).status, ContactArray.OK)
-        self.wait_proved()
-        two = send(2, 100.06)
-        self.assertEqual(two.status, ContactArray.PARTIAL, two.reason)
-        self.wait_missing('%d faces' % (2 * (ROWS - 1) * (COLS - 1)))
-
-    def send(self, message):
-        return self.outcomes_of(self.publisher, [message])[0]
-
     # rosbag play, at several rates and paused: the watchdog lives in the bag's time.
 
     @staticmethod
@@ -372,38 +267,5 @@ class StateTest(LiveNodeTest):
         self.assertEqual(self.unproved_since_first(), [])
 
 
-def points_of(cloud):
-    data = cloud.variants[cloud.count % len(cloud.variants)]
-    return [Point(*xyz) for xyz in struct.iter_unpack('<3d', data)]
-
-
-def mesh_of(cloud, faces, stamp_s):
-    message = MeshStamped()
-    message.header.frame_id = 'world'
-    message.header.stamp = rospy.Time.from_sec(stamp_s)
-    message.vertices = points_of(cloud)
-    message.triangles = [MeshTriangle(face) for face in faces]
-    return message
-
-
-def soup(cloud, stamp_s, number):
-    points = points_of(cloud)
-    marker = Marker(type=Marker.TRIANGLE_LIST, action=Marker.ADD, id=number)
-    marker.header.frame_id = 'world'
-    marker.header.stamp = rospy.Time.from_sec(stamp_s)
-    marker.pose.orientation.w = 1
-    marker.points = [points[v] for face in grid_faces(ROWS, COLS) for v in face]
-    return marker
-
-
-def publish_until_killed(topic):
-    rospy.init_node('tracker', anonymous=True)
-    publisher = rospy.Publisher(topic, PointCloud2, queue_size=10)
-    wait_for(lambda: publisher.get_num_connections() == 1, 20, 'the node to subscribe')
-    Stream(publisher, Sheet()).thread.join()
-
-
 if __name__ == '__main__':
-    if sys.argv[1:2] == ['publish']:
-        publish_until_killed(sys.argv[2])
     unittest.main()

@@ -129,10 +129,6 @@ class CheckStepTest(unittest.TestCase):
         self.obj(start, polygons, end)
         self.assertIn('something touches anew', self.said)
 
-    def test_a_dart_at_rest_touches_nothing(self):
-        self.assertEqual(self.obj([(0, 0, 0), (2, 1, 0), (0, 2, 0), (1.5, 1, 0)], [(0, 1, 2, 3)]), 0)
-        self.assertIn('proved, nothing touches', self.said)
-
     def test_faces_that_cannot_be_used(self):
         square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
         self.assertEqual(self.obj(square, [(0, 1, 2), (0, 2, 3), (0, 1, 1)]), 0, 'the edge of a face')
@@ -149,7 +145,6 @@ class CheckStepTest(unittest.TestCase):
 
 
 OBJ_TRIANGLES = 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0.2 0.2 %(z)s\nv 0.3 0.2 %(z)s\nv 0.2 0.3 %(z)s\n%(faces)s'
-PLY_HEAD = 'ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n'
 
 
 class Files(unittest.TestCase):
@@ -184,28 +179,12 @@ class FilesTest(Files):
     def obj(self, faces):
         return self.check('.obj', *(OBJ_TRIANGLES % {'z': z, 'faces': faces} for z in ('0.5', '-0.5')))
 
-    def test_obj_lines_that_go_on_and_blanks_before_words(self):
-        for faces in ('f 1 2 3\nf 4 5 6\n', 'f 1 2 \\\n3\nf 4 5 6\n', '  f 1 2 3\n\tf 4 5 6\n', '\ff 1 2 3\n\vf 4 5 6\n'):
-            self.assertEqual(self.obj(faces), 0, self.remarks)
-            self.assertEqual(self.contacts, self.THROUGH, faces)
-            self.assertEqual(self.remarks, '')
-
     def test_what_is_not_known_is_said(self):
         self.assertEqual(self.obj('face 1 2 3\nf 1 2 3\nf 4 5 6\n'), 0)
         self.assertEqual(self.contacts, self.THROUGH)
         for frame in '01':
             self.assertIn("check_step: %s.obj: 1 lines with unknown keywords are skipped, the first is 'face' in line 7" % frame,
                           self.remarks)
-
-    def test_geometry_that_is_not_read_is_an_error(self):
-        for faces, word in (('fo 1 2 3\nf 4 5 6\n', "0.obj:7: 'fo'"), ('f 1 2 3\nF 4 5 6\n', "0.obj:8: 'F'"),
-                            ('f 1 2 3.0\n', "0.obj:7: '3.0'")):
-            self.assertEqual(self.obj(faces), 1)
-            self.assertIn(word, self.remarks)
-
-    def test_a_face_that_repeats_a_corner_is_unchecked(self):
-        self.assertEqual(self.obj('f 1 2 3\nf 4 5 6\nf 2 4 4\n'), NOT_PROVED, self.said)
-        self.assertIn('0.obj: 1 polygons cannot be used and are unchecked, the first is in line 9', self.remarks)
 
     def test_ropes(self):
         text = 'v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0.3 -0.2 %(z)s\nv 0.3 0.2 %(z)s\nl 1 2 3\nl 4 5\n'
@@ -214,28 +193,6 @@ class FilesTest(Files):
         apart = self.check('.obj', text % {'z': '0.4'}, text.replace('l 4 5', 'l 5 4 3') % {'z': '0.4'})
         self.assertEqual(apart, 1)
         self.assertIn('not the topology of', self.remarks)
-
-    def test_ply_elements_of_other_names(self):
-        head = PLY_HEAD % 6 + ('element material 1\nproperty list uchar float weights\nelement face 2\nproperty list uchar int '
-                               'vertex_indices\nelement edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n')
-        frames = [head + '0 0 0\n1 0 0\n0 1 0\n0.2 0.2 {0}\n0.3 0.2 {0}\n0.2 0.3 {0}\n2 0.5 0.5\n3 0 1 2\n3 3 4 5\n0 1\n'.format(z)
-                  for z in ('0.5', '-0.5')]
-        self.assertEqual(self.check('.ply', *frames), 0, self.remarks)
-        self.assertEqual(self.contacts, self.THROUGH)
-        self.assertIn("check_step: 1.ply: element 'edge' (1) is skipped", self.remarks)
-
-    def test_ply_strips(self):
-        head = PLY_HEAD % 7 + 'element tristrips 1\nproperty list int int vertex_indices\nend_header\n'
-        frames = [head + '0 0 0\n1 0 0\n0 1 0\n1 1 0\n0.75 0.75 %s\n0.8 0.75 %s\n0.75 0.8 %s\n8 0 1 2 3 -1 4 5 6\n' % (z, z, z)
-                  for z in ('0.5', '-0.5')]
-        self.assertEqual(self.check('.ply', *frames), 0, self.remarks)
-        self.assertEqual(self.contacts, [('VF', v, 2, 1, 3) for v in (4, 5, 6)])
-
-    def test_a_range_grid_is_named(self):
-        text = PLY_HEAD % 3 + ('element range_grid 2\nproperty list uchar int vertex_indices\nend_header\n'
-                               '0 0 0\n1 0 0\n0 1 0\n1 0\n0\n')
-        self.assertEqual(self.check('.ply', text, text), 1)
-        self.assertIn('range grid', self.remarks)
 
 
 def stl(*triangles):
@@ -295,24 +252,6 @@ class SoupsTest(Files):
             done = subprocess.run([tool(), folder + '/0.stl', folder + '/1.ply'], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1)
             self.assertIn('write all frames in one format', done.stderr)
-
-    def test_a_triangle_that_repeats_a_corner_is_named(self):
-        thin = [(5, 0, 0), (6, 0, 0), (6, 0, 0)]
-        self.assertEqual(self.check('.stl', *2 * [stl(*self.FLOOR, thin)]), NOT_PROVED)
-        self.assertIn('0.stl: 1 polygons cannot be used and are unchecked, the first is triangle 2, in line 16', self.remarks)
-        self.assertEqual(self.check('.dae', *2 * [dae(*self.FLOOR, thin)]), NOT_PROVED)
-        self.assertIn('the first is polygon 2 of the scene', self.remarks)
-
-    def test_three_frames(self):
-        with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
-            for k, z in enumerate((1.0, 0.5, -0.5)):
-                (folder / ('%d.stl' % k)).write_text(stl(*self.FLOOR, self.falling(z)))
-            done = subprocess.run([tool(), *(str(folder / ('%d.stl' % k)) for k in range(3)), '--contacts', str(folder / 'out.csv')],
-                                  capture_output=True, text=True)
-            self.assertEqual((done.returncode, done.stderr), (0, ''))
-            rows = [row.split(',')[:6] for row in (folder / 'out.csv').read_text().splitlines()[1:]]
-            self.assertEqual(rows, [['1', *map(str, contact)] for contact in self.THROUGH])
 
 
 class SequenceTest(unittest.TestCase):

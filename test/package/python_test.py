@@ -182,36 +182,6 @@ class AnswersTest(PythonTestCase):
         self.assertEqual((falls.t0.tolist(), falls.t1[0].tolist()), (t1[3:].tolist(), [.25, .25, -2]))
         self.assertTrue(dccd.detect([still, falls]).clear)
 
-    def test_separations_and_noise(self):
-        t0, t1 = two_triangles()
-        t1[3:, 2] = .25
-        far = dccd.Body(t0, t1, FACES)
-        self.assertTrue(dccd.detect(far, accuracy='conservative').clear)
-        near = dccd.Body(t0, t1, FACES, minimum_separation_m=.5)
-        contacts = dccd.detect(near, accuracy='conservative').contacts
-        contacts = contacts[(contacts['kind'] == dccd.VERTEX_FACE) & (contacts['vertices'][:, 0] >= 3)]
-        self.assertEqual(len(contacts), 3)
-        self.assertTrue((contacts['toc_lower'] <= 2 / 3).all() and (contacts['toc_lower'] > 2 / 3 - 1e-5).all())
-        noisy = dccd.Body(t0, t1, FACES, radius_m=np.full(6, .2))
-        self.assertGreater(len(dccd.detect(noisy, accuracy='conservative').contacts), 0)
-        with self.assertRaisesRegex(ValueError, 'needs accuracy = conservative'):
-            dccd.detect(near)
-        named = dccd.Body(t0, t1, FACES, name='it', minimum_separation_m=.5, separations_m={'self': 0})
-        self.assertTrue(dccd.detect(named, accuracy='conservative').clear)
-        with self.assertRaisesRegex(ValueError, "no body is called 'table'"):
-            dccd.detect(dccd.Body(t0, t1, FACES, separations_m={'table': 1}))
-
-    def test_a_body_that_turns(self):
-        """By half a turn about z: its tip passes x = 0 in the middle, at 1 m from the axis, where a chord would be at the axis."""
-        t0, poses = np.array([[1., 0, 0], [.5, 0, 0], [.5, 0, .1]]), [np.eye(4), np.diag([-1., -1, 1, 1])]
-        poses[1][:2, :2] = [[0, -1], [1, 0]]  # a quarter: two of them
-        t1 = t0 @ poses[1][:3, :3].T
-        post = dccd.Body([[.7, .7, -1], [.7, .7, 1], [.71, .71, 1]], triangles=[[0, 1, 2]], name='post')
-        outcome = dccd.detect([dccd.Body(t0, t1, [[0, 1, 2]], rigid=True, pose_t0=poses[0], pose_t1=poses[1]), post])
-        self.assertGreater(outcome.substeps, 4)
-        self.assertTrue(len(outcome.contacts) and (abs(outcome.contacts['toc_lower'] - .5) < .02).all())
-        self.assertTrue(dccd.detect([dccd.Body(t0, t1, [[0, 1, 2]], rigid=True), post]).clear, 'the chord is further in')
-
     def test_voxels(self):
         drop = dccd.Body([[.01, .01, 1]] + [[.01, .02, 1]], [[.01, .01, -1]] + [[.01, .02, -1]], edges=[[0, 1]])
         by_centre = dccd.Voxels(.5, [[.1, .1, .1], [.4, .4, .4], [5, 5, 5]])

@@ -2,8 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cstdlib>
-#include <iostream>
 #include <memory>
 #include <sstream>
 
@@ -164,37 +162,6 @@ Chunk hardChunk(RandomSource& random, PairKind kind, std::size_t count) {
   Chunk chunk;
   while (chunk.queries.size() < count) chunk.add(hardQuery(random, kind));
   return chunk;
-}
-
-// The oracle's answer once, every target's against it. With --long ten million pairs, and as many as
-// DEFORMABLE_CCD_HARD_PAIRS says where that is set.
-TEST(ElementaryExact, EveryTargetGivesTheOraclesAnswers) {
-  constexpr std::size_t CHUNK = 500;
-  const char* asked = std::getenv("DEFORMABLE_CCD_HARD_PAIRS");
-  const std::size_t pairs = asked ? std::strtoull(asked, nullptr, 10) : longRun() ? 10000000 : 10000;
-
-  RandomSource random(propertySeed());
-  const auto test = makeRung(exactOptions(32));
-  std::size_t judged = 0, contacts = 0;
-  for (int round = 0; judged < pairs; ++round) {
-    const Chunk chunk = hardChunk(random, round % 2 ? PairKind::EDGE_EDGE : PairKind::VERTEX_FACE, CHUNK);
-    std::vector<std::optional<Root>> truth;
-    for (const Query& query : chunk.queries) truth.push_back(firstContact(query.kind, query.motion));
-    forEachTarget([&](const std::string& target) {
-      TierCounters counters;
-      const std::vector<ElementaryResult> results = chunk.run(*test, counters);
-      for (std::size_t i = 0; i < results.size(); ++i) {
-        const std::string broken = brokenPromise(exactOptions(32), chunk.queries[i], truth[i], results[i]);
-        ASSERT_EQ(broken, "") << target << ": " << described(results[i]) << "\nreplay: run_queries "
-                              << writeReplayFile("exact-targets", chunk.queries[i]);
-      }
-    });
-    if (HasFatalFailure()) return;
-    judged += chunk.queries.size();
-    for (const auto& toc : truth) contacts += toc.has_value();
-    if (judged % 100000 == 0) std::cout << judged << " pairs judged, " << contacts << " contacts" << std::endl;
-  }
-  std::cout << judged << " hard pairs on " << simdTargets().size() << " targets, " << contacts << " contacts\n";
 }
 
 // Lanes must not disturb each other, whatever stands beside a pair and wherever in the batch it stands.

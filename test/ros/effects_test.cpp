@@ -110,18 +110,6 @@ TEST_F(Felt, APlanIsThereBeforeTheFirstFrameAndRenewedOnlyWhenItChanges) {
   EXPECT_EQ(effects.count(), before + 1) << "nothing has changed since";
 }
 
-TEST_F(Felt, APairOfBodiesHasItsOwnDistance) {
-  sendBoth(1, 10);
-  const deformable_ccd::ContactArray outcome = sendBoth(-1, 10.1);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  ASSERT_FALSE(outcome.contacts.empty());
-  EXPECT_LE(earliest(outcome), 0.49) << "never late: 2 cm above the felt, not 12";
-  EXPECT_NEAR(earliest(outcome), 0.49, 1e-4);
-  for (const ContactMessage& contact : outcome.contacts) {
-    EXPECT_NE(contact.body[0], contact.body[1]) << "neighbours on the felt are closer than 12 cm by nature";
-  }
-}
-
 TEST_F(Felt, WhatIsLeftOutIsListedAndCounted) {
   sendBoth(1, 10);
   sendBoth(0.9, 10.1);
@@ -244,22 +232,6 @@ TEST_F(Turning, ALargeTurnSplitsTheStepAndTheStatisticsSaySo) {
   EXPECT_GT(stats.last().rigid_bodies_ms, 0);
   turn(0.05, 0, 0.4, 30);
   EXPECT_EQ(stats.last().substeps, 1u);
-}
-
-TEST_F(Turning, ARopeOnTheArcIsMetThoughBothEndsAreClearOfIt) {
-  // A corner is 0.354 m from the axis, a side 0.25 m. The corner at 45 degrees passes the rope at 90.
-  const deformable_ccd::ContactArray outcome = turn(1.5, 0, 0.34, 40);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  EXPECT_EQ(outcome.start_state, deformable_ccd::ContactArray::CLEAR);
-  bool vertex_face = false, edge_edge = false;
-  for (const ContactMessage& contact : outcome.contacts) {
-    vertex_face |= contact.kind == ContactMessage::VERTEX_FACE;
-    edge_edge |= contact.kind == ContactMessage::EDGE_EDGE;
-  }
-  EXPECT_TRUE(vertex_face) << "the rope's vertices against faces";
-  EXPECT_TRUE(edge_edge) << "its edges against edges";
-  // A side is 0.25 m from the axis and reaches (0, 0.34) when it has turned by a with 0.34 cos(a) = 0.25.
-  EXPECT_NEAR(earliest(outcome), std::acos(0.25 / 0.34) / 1.5, 0.02);
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <deformable_ccd/SetPhase.h>
 #include <deformable_ccd/State.h>
 #include <deformable_ccd/TimeToContact.h>
-#include <diagnostic_msgs/DiagnosticArray.h>
 
 #include "ros/support/live_tests.h"
 #include "ros/support/monitor_fixture.h"
@@ -17,8 +16,8 @@ namespace {
 using deformable_ccd::ContactArray;
 using deformable_ccd::State;
 
-struct Expected : MonitorTest {
-  explicit Expected(const std::string& name) : MonitorTest(name) {}
+struct Pressing : MonitorTest {
+  Pressing() : MonitorTest("/pressing") {}
   ros::Publisher mesh = advertiseAndWait<deformable_ccd::MeshStamped>(node, name_ + "/mesh");
   Probe<State> state{node, name_ + "/state"};
   Probe<deformable_ccd::FirstContact> first{node, name_ + "/first_contact"};
@@ -53,10 +52,6 @@ struct Expected : MonitorTest {
   }
 };
 
-struct Pressing : Expected {
-  Pressing() : Expected("/pressing") {}
-};
-
 // The first case of this monitor: nobody has listened to its predictions.
 TEST_F(Pressing, NoEffectIsOnThatNobodyListensTo) {
   Probe<deformable_ccd::EffectArray> effects(node, "/pressing/effects");
@@ -86,14 +81,6 @@ TEST_F(Pressing, InAnotherPhaseAContactIsAnAlarm) {
   EXPECT_EQ(said.touching, State::NEW);
   EXPECT_TRUE(said.expected.empty());
   EXPECT_TRUE(first.last().contact);
-}
-
-TEST_F(Pressing, AnUnknownPhaseIsRefusedWithTheKnownOnes) {
-  EXPECT_TRUE(setPhase("press").success);
-  const auto reply = setPhase("prss");
-  EXPECT_FALSE(reply.success);
-  EXPECT_NE(reply.message.find("known phases are 'carry', 'press'"), std::string::npos) << reply.message;
-  EXPECT_NE(reply.message.find("in force is phase 'press'"), std::string::npos) << reply.message;
 }
 
 TEST_F(Pressing, InItsPhaseItIsFoundListedCountedMarkedAndNoAlarm) {
@@ -167,35 +154,6 @@ TEST_F(Pressing, APredictionIsAboutWhatIsNotExpected) {
   EXPECT_TRUE(quiet.answered);
   EXPECT_GE(quiet.expected_contacts, 1u) << "found and counted";
   EXPECT_FALSE(quiet.seconds <= alarm.seconds + 0.01) << "the tip's own arrival is no alarm";
-}
-
-struct Beyond : Expected {
-  Beyond() : Expected("/beyond") {}
-};
-
-TEST_F(Beyond, AnIndexThatTheMeshHasNotIsCountedAndSaid) {
-  Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
-  const ContactArray outcome = send(mesh, meshStamped(tipAbove(0.1), 100));
-  EXPECT_EQ(outcome.status, ContactArray::VERTEX_COUNT);
-  const std::string reason =
-      "parameter expected_contacts[0]/vertices of body 'mesh' names vertex 60, but the mesh has 6";
-  EXPECT_EQ(outcome.reason, reason);
-  EXPECT_TRUE(waitUntil([&] { return stats.count() > 0 && stats.last().skipped_vertex_count > 0; }));
-  double stamp_s = 100;
-  const auto isDiagnosed = [&] {
-    for (const auto& array : diagnostics.all()) {
-      for (const auto& status : array.status) {
-        if (status.name == "/beyond: steps" && status.message.find(reason) != std::string::npos) return true;
-      }
-    }
-    return false;
-  };
-  EXPECT_TRUE(waitUntil(
-      [&] {
-        send(mesh, meshStamped(tipAbove(0.1), stamp_s += 0.1));
-        return isDiagnosed();
-      },
-      10));
 }
 
 }  // namespace

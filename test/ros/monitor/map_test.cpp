@@ -1,9 +1,7 @@
-// The live node with a grid over an octomap: what is missing, unknown or refused of the map, and clouds that do not
-// fit.
+// The live node with a grid over an octomap, which may be missing, and as either kind of message.
 #include <deformable_ccd/ContactArray.h>
 
 #include <algorithm>
-#include <limits>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
@@ -64,22 +62,6 @@ TEST_F(Grid, OctomapBinaryAndFull) {
   }
 }
 
-TEST_F(Grid, UnknownSpaceIsReported) {
-  giveMap(blockBelowZero(true, 90));
-  send(mesh, cloud(gridAt(3, 4, 0.35), 100));
-  send(mesh, cloud(gridAt(3, 4, 0.15), 100.1));
-  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.1); }));
-  const Stats swept = stats.last();
-  EXPECT_EQ(swept.unknown_fraction, 1) << "the map knows what is occupied, and nothing of the air";
-  EXPECT_GT(swept.unknown_space_in, 0u);
-  EXPECT_EQ(swept.unknown_space_out, swept.unknown_space_in);
-  EXPECT_GT(swept.unknown_space_ms, 0);
-  EXPECT_NEAR(swept.map_age, 10.1, 1e-6);
-  send(mesh, cloud(gridAt(3, 4, -0.05), 100.2));
-  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.2); }));
-  EXPECT_LT(stats.last().unknown_fraction, 1) << "into what is known";
-}
-
 TEST_F(Grid, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {
   giveMap(blockBelowZero(true));
   Probe<diagnostic_msgs::DiagnosticArray> diagnostics(node, "/diagnostics");
@@ -104,25 +86,6 @@ TEST_F(Grid, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {
   for (std::size_t i = 1; i < found.size(); ++i) {  // the first may tell of the time before
     EXPECT_EQ(found[i].level, diagnostic_msgs::DiagnosticStatus::OK) << found[i].message;
   }
-}
-
-TEST_F(Grid, MalformedMapsAreRefused) {
-  giveMap(blockBelowZero(true));
-  const std::uint64_t refused = stats.last().maps_refused;
-  octomap_msgs::Octomap bad = blockBelowZero(true);
-  bad.data.resize(bad.data.size() / 2);
-  bad.resolution = std::numeric_limits<double>::quiet_NaN();
-  map.publish(bad);
-  double stamp_s = 200;
-  ASSERT_TRUE(waitUntil([&] {
-    send(mesh, cloud(gridAt(3, 4, 5), stamp_s += 0.1));
-    return stats.last().maps_refused > refused;
-  }));
-  const deformable_ccd::ContactArray outcome = send(mesh, cloud(gridAt(3, 4, 5), stamp_s + 0.1));
-  EXPECT_EQ(outcome.status, deformable_ccd::ContactArray::NO_MAP) << "no map is better than an old one";
-  EXPECT_NE(outcome.reason.find("refused"), std::string::npos) << outcome.reason;
-  giveMap(blockBelowZero(true));
-  EXPECT_EQ(contacts.last().status, deformable_ccd::ContactArray::OK);
 }
 
 }  // namespace

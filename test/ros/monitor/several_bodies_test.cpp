@@ -1,4 +1,4 @@
-// The live node with several bodies: one is the clock, one is moved by tf, one is static and sent once.
+// The live node with several bodies: what is off has no topic, and one that is static and sent once stays.
 #include <deformable_ccd/ContactArray.h>
 
 #include <algorithm>
@@ -7,9 +7,7 @@
 #include <octomap_msgs/Octomap.h>
 #include <ros/ros.h>
 #include <std_srvs/SetBool.h>
-#include <tf2_msgs/TFMessage.h>
 
-#include "ros/monitor/monitors.h"
 #include "ros/support/monitor_fixture.h"
 
 namespace dccd {
@@ -27,11 +25,6 @@ Mesh tipAt(double z) { return {{{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, {
 
 struct Pair : MonitorTest {
   Pair() : MonitorTest("/pair") {}
-  ros::Publisher cloth = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/cloth");
-  ros::Publisher gripper = advertiseAndWait<deformable_ccd::MeshStamped>(node, "/pair/gripper");
-  ros::Publisher tf = advertiseAndWait<tf2_msgs::TFMessage>(node, "/tf", false, MONITORS);
-
-  void finger(double stamp_s, double z) { tf.publish(transformAt(stamp_s, "finger", {0, 0, z})); }
 };
 
 // What is off has no topic, neither to listen to nor to speak on.
@@ -46,28 +39,6 @@ TEST_F(Pair, EffectsThatAreOffHaveNoTopics) {
   EXPECT_FALSE(isAdvertised("/pair/time_to_contact")) << "no look-ahead";
   EXPECT_FALSE(isAdvertised("/pair/predicted_contacts"));
   EXPECT_FALSE(isAdvertised("/pair/left_out")) << "no separation";
-}
-
-TEST_F(Pair, StepsEndAtTheClockBodysFrames) {
-  finger(300, -5);
-  finger(300.4, -5);
-  cloth.publish(meshStamped(floorAt(0), 300));
-  gripper.publish(meshStamped(tipAt(4), 299.9));
-  ASSERT_TRUE(waitUntil([&] { return contacts.count() > 0; }));
-  const std::size_t seen = contacts.count();
-  cloth.publish(meshStamped(floorAt(0), 300.1));
-  ros::Duration(0.05).sleep();
-  EXPECT_EQ(contacts.count(), seen) << "waits for the gripper";
-  gripper.publish(meshStamped(tipAt(-4), 300.3));  // 2 at 300, 0 at 300.1
-  const deformable_ccd::ContactArray outcome = contacts.after(seen);
-  ASSERT_EQ(outcome.status, deformable_ccd::ContactArray::OK) << outcome.reason;
-  ASSERT_EQ(outcome.bodies.size(), 3u);
-  EXPECT_FALSE(outcome.contacts.empty());
-
-  const deformable_ccd::ContactArray late = send(cloth, meshStamped(floorAt(0), 300.35));
-  EXPECT_EQ(late.status, deformable_ccd::ContactArray::NO_BODY);
-  EXPECT_NE(late.reason.find("gripper"), std::string::npos) << late.reason;
-  expectAddsUp();
 }
 
 struct Tabled : MonitorTest {

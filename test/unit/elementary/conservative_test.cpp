@@ -54,38 +54,6 @@ PairMotion crossing(double z0, double z1) {
   return {{{{-1, 0, 0}, {1, 0, 0}, {0, -1, z0}, {0, 1, z0}}, {{-1, 0, 0}, {1, 0, 0}, {0, -1, z1}, {0, 1, z1}}}};
 }
 
-TEST(Conservative, ReportsNearTheTimeOfContact) {
-  for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
-    const auto test = makeRung(optionsOf(tolerance));
-    const ElementaryResult drop = testPair(*test, PairKind::VERTEX_FACE, dropping(0.25, 0.25, 0.5, -1));
-    const ElementaryResult cross = testPair(*test, PairKind::EDGE_EDGE, crossing(0.5, -1));
-    for (const ElementaryResult& result : {drop, cross}) {
-      EXPECT_EQ(result.verdict, Verdict::CONTACT);
-      EXPECT_LE(result.toc_lower, 1.0 / 3);
-      EXPECT_GE(result.toc_lower, 1.0 / 3 - tolerance / 1.5 * (1 + 1e-9));
-      EXPECT_GE(result.toc_upper, 1.0 / 3);
-    }
-    EXPECT_EQ(testPair(*test, PairKind::VERTEX_FACE, dropping(0.75, 0.75, 0.5, -1)).verdict, Verdict::NO_CONTACT);
-    EXPECT_EQ(testPair(*test, PairKind::EDGE_EDGE, crossing(0.5, 0.1)).verdict, Verdict::NO_CONTACT);
-  }
-}
-
-// Distances d at t = (1 - d) / 2: the contact is at the minimum separation, not at the surface.
-TEST(Conservative, MinimumSeparationMovesTheContact) {
-  constexpr double TOLERANCE = 1e-6;
-  for (const double d : {1e-9, 1e-4, 0.25, 0.75}) {
-    const double toc = (1 - d) / 2;
-    for (const PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
-      const PairMotion pair = kind == PairKind::VERTEX_FACE ? dropping(0.25, 0.25, 1, -1) : crossing(1, -1);
-      const ElementaryResult result = testApart(optionsOf(TOLERANCE), kind, pair, d);
-      EXPECT_EQ(result.verdict, Verdict::CONTACT) << d;
-      EXPECT_LE(result.toc_lower, toc + 1e-16) << d;
-      EXPECT_TRUE(isWithin(kind, pair, result.toc_lower, d + TOLERANCE)) << d;
-      EXPECT_FALSE(isWithin(kind, pair, std::nextafter(result.toc_lower, 0), d)) << d;
-    }
-  }
-}
-
 // A pair at rest at exactly the minimum separation is in contact; the next larger distance may be; one beyond the
 // tolerance is not.
 TEST(Conservative, MinimumSeparationIsClosedAndTheToleranceIsKept) {

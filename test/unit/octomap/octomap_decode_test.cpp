@@ -158,33 +158,8 @@ TYPED_TEST(OctomapRoundTrip, CutAtEveryByteItIsRefused) {
   }
 }
 
-TYPED_TEST(OctomapRoundTrip, FlippedBitsGiveAMapOrAnError) {
+TYPED_TEST(OctomapRoundTrip, WhatItReadsOfDamagedStreamsIsWhatLiboctomapReads) {
   TypeParam tree(0.1);
-  paint(tree, 4);
-  std::mt19937 random(5);
-  int read = 0, refused = 0;
-  for (const Stream& stream : streamsOf(tree)) {
-    for (int i = 0; i < 2000; ++i) {
-      Stream bad = stream;
-      for (unsigned flips = 1 + random() % 4; flips > 0; --flips) {
-        bad.data[random() % bad.data.size()] ^= static_cast<char>(1u << random() % 8);
-      }
-      try {
-        const DecodedOctomap map = decode(bad);
-        EXPECT_LE(map.occupied.size() + map.free.size(), 4 * bad.data.size());
-        VoxelSurface::build(map.resolution_m, map.occupied);  // whatever was read is a set of leaves
-        ++read;
-      } catch (const OctomapError&) {
-        ++refused;
-      }
-    }
-  }
-  EXPECT_GT(read, 100);
-  EXPECT_GT(refused, 100);
-}
-
-TEST(OctomapDecode, WhatItReadsOfDamagedStreamsIsWhatLiboctomapReads) {
-  octomap::OcTree tree(0.1);
   paint(tree, 4);
   std::mt19937 random(7);
   int compared = 0;
@@ -192,14 +167,16 @@ TEST(OctomapDecode, WhatItReadsOfDamagedStreamsIsWhatLiboctomapReads) {
     if (stream.data[0] == '#') continue;
     for (int i = 0; i < 1000; ++i) {
       Stream bad = stream;
-      bad.data[random() % bad.data.size()] ^= static_cast<char>(1u << random() % 8);
+      for (unsigned flips = 1 + random() % 4; flips > 0; --flips) {
+        bad.data[random() % bad.data.size()] ^= static_cast<char>(1u << random() % 8);
+      }
       DecodedOctomap map;
       try {
         map = decode(bad);
       } catch (const OctomapError&) {
         continue;
       }
-      octomap::OcTree other(0.1);
+      TypeParam other(0.1);
       std::istringstream in(bad.data);
       if (bad.binary) {
         other.readBinaryData(in);
@@ -345,15 +322,6 @@ TEST(OctomapDecode, InASolidMapNothingIsClear) {
     EXPECT_EQ(outcome.start_state, StartState::INTERSECTING) << at;
     EXPECT_GT(outcome.counts.initial, 0u) << at;
   }
-}
-
-TEST(OctomapDecode, InAFreeMapNothingIsUnknown) {
-  const DecodedOctomap map = decode(rootAlone(octomap::OcTree(0.1), -1.0f)[0]);
-  const auto known = KnownSpace::build(map.resolution_m, map.free);
-  Box box;
-  box.min = Vec3(-1, -1, -1);
-  box.max = Vec3(1, 1, 1);
-  EXPECT_TRUE(known->unknownLeaves(box, 1000).empty());
 }
 
 TEST(OctomapDecode, FilesAreReadByTheirHeader) {

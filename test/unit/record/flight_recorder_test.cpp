@@ -1,7 +1,5 @@
 #include "record/flight_recorder.h"
 
-#include <sys/stat.h>
-
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -81,14 +79,6 @@ TEST_F(FlightRecorderTest, AFailureNamesWhatWasWrittenBefore) {
   EXPECT_NE(text.find("newest first:\n" + name(newest)), std::string::npos) << text;
   EXPECT_TRUE(fs::exists(name(newest)));
   EXPECT_FALSE(fs::exists(name(oldest))) << "nothing is left of what failed";
-}
-
-TEST_F(FlightRecorderTest, SpecialFilesAreNotRead) {
-  const std::string pipe = folder_ / "pipe.step";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  for (const std::string& path : {pipe, std::string("/dev/zero"), folder_.string()}) {
-    EXPECT_THROW(readRecordingFile(path), RecordingError) << path;
-  }
 }
 
 TEST_F(FlightRecorderTest, SurprisesAreWrittenAndBounded) {

@@ -94,20 +94,6 @@ TEST(StepReplay, OneBitIsADifference) {
   EXPECT_FALSE(replayStep(r).differences.empty());
 }
 
-TEST(StepReplay, PatchesAreRecordedAndMadeAgain) {
-  MonitorOptions options;
-  options.detector.patches = true;
-  StepRecording r = recordScene(options);
-  ASSERT_FALSE(r.answer.patches.empty());
-  const std::vector<std::uint8_t> bytes = recordingBytes(r);
-  StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
-  EXPECT_TRUE(read.options.patches);
-  EXPECT_EQ(read.answer.patch_of, r.answer.patch_of);
-  EXPECT_TRUE(replayStep(read).differences.empty());
-  read.answer.patches.back().area_m2 = std::nextafter(read.answer.patches.back().area_m2, 1);
-  EXPECT_EQ(replayStep(read).differences.size(), 1u);
-}
-
 TEST(StepReplay, AStepThatRanOutOfItsBudgetIsConfirmed) {
   StepRecording r = recordScene();
   r.options.step_budget_ms = 1e-6;
@@ -134,8 +120,10 @@ TEST(StepReplay, AStepWithoutAnAnswerIsComputed) {
 TEST(StepReplay, PatchesOfExpectedContactsAreMadeAgain) {
   MonitorOptions options = expecting();
   options.detector.patches = true;
-  const std::vector<std::uint8_t> bytes = recordingBytes(recordScene(options));
+  const StepRecording r = recordScene(options);
+  const std::vector<std::uint8_t> bytes = recordingBytes(r);
   StepRecording read = readRecording(bytes.data(), bytes.size(), "FILE");
+  EXPECT_EQ(read.answer.patch_of, r.answer.patch_of);
   const auto expected = std::find_if(read.answer.patches.begin(), read.answer.patches.end(),
                                      [](const Patch& patch) { return patch.expected > 0; });
   ASSERT_NE(expected, read.answer.patches.end());

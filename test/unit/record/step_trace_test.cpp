@@ -89,26 +89,6 @@ std::vector<TraceLine::Says> atTheRung(const std::vector<TraceLine>& lines) {
   return said;
 }
 
-TEST(VoxelTrace, ContactsWithTheMapAreTheRecordedOnes) {
-  const StepRecording r = recordScene();
-  std::size_t traced = 0;
-  for (const Contact& c : r.answer.contacts) {
-    if (c.body[1] != OBSTACLE_BODY) continue;
-    PairQuestion q = questionOf(c);
-    std::reverse(q.vertex.begin(), q.vertex.end());  // the order does not matter
-    const std::vector<TraceLine> lines = explain(r.step, r.options, q);
-    const std::vector<TraceLine::Says> said = atTheRung(lines);
-    EXPECT_NE(std::count(said.begin(), said.end(), TraceLine::Says::CONTACT), 0) << describeContact(c, r.step.bodies);
-    for (const TraceLine& line : lines) {
-      const bool proof = line.stage == "rules" || line.stage == "bounds";
-      EXPECT_FALSE(proof && said.size() == 1 && line.says == TraceLine::Says::REJECTED)
-          << line.stage << ": " << line.text;
-    }
-    ++traced;
-  }
-  EXPECT_GT(traced, 0u);
-}
-
 TEST(VoxelTrace, SaysWhyThereIsNone) {
   StepRecording r = recordScene();
   const auto contact = std::find_if(r.answer.contacts.begin(), r.answer.contacts.end(),

@@ -28,21 +28,6 @@ std::vector<Fault::Kind> kinds(const Liveness& liveness, std::int64_t now_ns) {
 
 using Kinds = std::vector<Fault::Kind>;
 
-TEST(Liveness, AFrameWithoutAnAnswer) {
-  Liveness liveness({0.1, 10, 0});
-  EXPECT_EQ(kinds(liveness, 1000 * MS), Kinds{}) << "before the first frame there is no answer to lose";
-  liveness.frame(1, 0);
-  EXPECT_EQ(kinds(liveness, 100 * MS), Kinds{});
-  EXPECT_EQ(kinds(liveness, 100 * MS + 1), Kinds{Fault::Kind::NO_ANSWER}) << "one nanosecond later";
-  liveness.frame(2, 90 * MS);
-  liveness.frame(3, 110 * MS);
-  liveness.outcome(1, -1, 120 * MS);
-  EXPECT_EQ(kinds(liveness, 190 * MS), Kinds{}) << "the first is answered, the second came 100 ms ago";
-  EXPECT_EQ(kinds(liveness, 191 * MS), Kinds{Fault::Kind::NO_ANSWER});
-  liveness.outcome(3, -1, 195 * MS);
-  EXPECT_EQ(kinds(liveness, 900 * MS), Kinds{}) << "the second gave way, the third is answered";
-}
-
 TEST(Liveness, TheOldestFrameWithoutAnAnswerCountsHoweverManyFollow) {
   Liveness liveness({0.1, 10, 0});
   std::int64_t now_ns = 0;

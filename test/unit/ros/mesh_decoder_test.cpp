@@ -288,20 +288,5 @@ TEST(MeshDecoder, WeldsTheFirstFrameAndComesApartForGood) {
   EXPECT_EQ(decode(loose, MARKER, marker({a, b, c, c, b, d})).topology->vertexCount(), 6u);
 }
 
-TEST(MeshDecoder, ChoosesTheMarker) {
-  MeshInputConfig config;
-  config.marker_id = 3;
-  EXPECT_TRUE(mentions(errorOf(config, MARKER, marker({SQUARE[0], SQUARE[1], SQUARE[2]})), "'cloth', 2"));
-}
-
-TEST(MeshDecoder, PolylineFollowsTheOrderOfThePoints) {
-  MeshInputConfig config;
-  config.source = TopologySource::POLYLINE;
-  MeshDecoder decoder(config);
-  const DecodedMesh rope = decode(decoder, CLOUD, cloud());
-  EXPECT_EQ(rope.topology->edges().size(), 3u);
-  EXPECT_FALSE(rope.topology->hasFaces());
-}
-
 }  // namespace
 }  // namespace dccd

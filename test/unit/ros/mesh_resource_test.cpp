@@ -119,11 +119,6 @@ class OddFiles : public test::FolderTest {
   std::string dae_;
 };
 
-TEST_F(OddFiles, TheUpAxisTurnsNothing) {
-  expectPyramid(loadMeshResource(daeWith("Z_UP", "Y_UP"), 1), 1);
-  expectPyramid(loadMeshResource(daeWith("Z_UP", "X_UP"), 1), 1);
-}
-
 /// What fuzzing found: assimp 5.2.5 appends to its list of indices for ever. The child's limit on memory ends that.
 TEST_F(OddFiles, ALetterAmongTheIndicesOfADaeEndsTheChildAndNothingElse) {
   if (std::getenv("DEFORMABLE_CCD_SANITIZED")) GTEST_SKIP() << "the end of the child would be a sanitizer's report";

@@ -59,15 +59,6 @@ std::vector<std::uint32_t> allGroupPairs(std::size_t na, std::size_t nb, bool up
   return pairs;
 }
 
-TEST(GroupPairs, MoreThanOneTargetRuns) {
-  std::vector<std::string> names;
-  forEachSimdTarget([&](const std::string& name) { names.push_back(name); });
-  for (const std::string& name : names) std::cout << "SIMD target: " << name << '\n';
-  ASSERT_FALSE(names.empty());
-  std::sort(names.begin(), names.end());
-  EXPECT_EQ(std::unique(names.begin(), names.end()), names.end());
-}
-
 TEST(GroupPairs, PairsOfTwoTreesAreThoseOfTheDefinition) {
   forEachSimdTarget([](const std::string& target) {
     Random random(7);
@@ -201,29 +192,6 @@ TEST(GroupPairs, StrictAndOneUnitEitherSide) {
         }
       }
     }
-  });
-}
-
-// Two that pass each other are beyond each other at both times, on different sides: they may meet.
-TEST(GroupPairs, PassingEachOtherIsKept) {
-  Node a, b;
-  a.lo.fill(0);
-  a.hi.fill(1);
-  b = a;
-  for (std::size_t k = 0; k < 8; ++k) {
-    b.lo[k] = b.hi[k] = 10;
-    b.lo[k + 8] = b.hi[k + 8] = -10;
-  }
-  Groups x, y;
-  x.nodes.assign(GROUP, emptyNode());
-  y.nodes = x.nodes;
-  x.nodes[0] = a;
-  y.nodes[0] = b;
-  x.pack();
-  y.pack();
-  forEachSimdTarget([&](const std::string& target) {
-    EXPECT_EQ(kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, false, 256).size(), 1u) << target;
-    EXPECT_EQ(kernelPairs(x.view(), y.view(), {0, 0}, false, simd::Diagonal::ALL, true, 256).size(), 0u) << target;
   });
 }
 

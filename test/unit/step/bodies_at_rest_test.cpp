@@ -41,28 +41,6 @@ Options tested() {
   return options;
 }
 
-TEST(BodiesAtRest, AreNotRefittedAndAnswersStayTheSame) {
-  const Waved scene;
-  Detector kept(tested());
-  std::uint64_t kept_bodies = 0, contacts = 0;
-  for (int k = 0; k < 20; ++k) {
-    const Positions t0 = scene.at(k), t1 = scene.at(k + 1);
-    Step step;
-    step.bodies = {test::moving(scene.setups[0], scene.rest, scene.rest), test::moving(scene.setups[1], t0, t1)};
-    const Outcome result = kept.run(step);
-    EXPECT_EQ(result.stats.bodies_kept + result.stats.bodies_refitted, 2u);
-    kept_bodies += result.stats.bodies_kept;
-    Detector fresh;
-    const Outcome expected = fresh.run(step);
-    ASSERT_EQ(difference(result.contacts, expected.contacts), "") << "step " << k;
-    EXPECT_EQ(result.intersections.size(), expected.intersections.size());
-    EXPECT_EQ(expected.stats.bodies_kept, 0u) << "a first step has nothing to keep";
-    contacts += result.contacts.size();
-  }
-  EXPECT_GT(contacts, 100u);
-  EXPECT_GE(kept_bodies, 12u) << "all but the first step and those in which the wave leaves the range";
-}
-
 TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
   const Waved scene;
   Detector detector;

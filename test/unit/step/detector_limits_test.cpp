@@ -13,41 +13,6 @@ namespace dccd {
 namespace test {
 namespace {
 
-TEST(DetectorLimits, EarliestOnlyGivesTheFirstOfTheFullAnswer) {
-  const tbb::global_control more_than_cores(tbb::global_control::max_allowed_parallelism, 4);
-  for (const Accuracy rung : {Accuracy::EXACT, Accuracy::CONSERVATIVE}) {
-    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-      // Start apart, so that the first contact is not at 0.
-      TestStep step = crumpled(seed, 2, 9);
-      for (StepBody& body : step.bodies) body.self_collision = false;
-      for (Vec3& x : step.bodies[1].t0) x[2] += 6;
-      Options options;
-      options.accuracy.rung = rung;
-      if (rung == Accuracy::CONSERVATIVE) options.accuracy.tolerance_m = 0.02;
-      const Outcome full = runOnce(step, options);
-      ASSERT_GT(full.contacts.size(), 10u);
-      ASSERT_GT(full.earliest_toc, 0.01);
-      options.earliest_only = true;
-      const Outcome first = runOnce(step, options);
-      ASSERT_FALSE(first.contacts.empty());
-      EXPECT_LT(first.contacts.size(), full.contacts.size());
-      EXPECT_EQ(first.earliest_toc, full.earliest_toc) << toString(rung) << ", seed " << seed;
-      if (rung == Accuracy::CONSERVATIVE) {
-        EXPECT_LT(first.stats[Stage::ELEMENTARY].in, full.stats[Stage::ELEMENTARY].in) << "nothing is pruned";
-      }
-      for (const Contact& c : first.contacts) {
-        const auto same = std::lower_bound(full.contacts.begin(), full.contacts.end(), c, canonicalLess);
-        ASSERT_TRUE(same != full.contacts.end() && difference({c}, {*same}).empty()) << describe(c);
-      }
-      for (const int threads : {2, 3}) {
-        options.num_threads = threads;
-        EXPECT_EQ(difference(runOnce(step, options).contacts, first.contacts), "")
-            << toString(rung) << ", seed " << seed;
-      }
-    }
-  }
-}
-
 /// Of an answer with all contacts, those in the cell that ends first.
 std::vector<Contact> firstCell(const std::vector<Contact>& contacts) {
   double upper = 2, lower = 2;

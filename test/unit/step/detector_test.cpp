@@ -53,57 +53,6 @@ TEST(Detector, TheSameForAnyNumberOfThreadsAndAnyTarget) {
   }
 }
 
-TEST(Detector, BruteForceFindsTheSame) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    const TestStep step = crumpled(seed, 2, 9);
-    for (const Accuracy rung : {Accuracy::CONSERVATIVE, Accuracy::EXACT}) {
-      Options options;
-      options.accuracy.rung = rung;
-      const Outcome clustered = runOnce(step, options);
-      options.broad_phase = BroadPhase::BRUTE_FORCE;
-      const Outcome all = runOnce(step, options);
-      EXPECT_GT(clustered.contacts.size(), 100u);
-      EXPECT_LT(clustered.stats.ee_candidates * 3, all.stats.ee_candidates);
-      // Whether features that come close without touching are called a contact is up to the bounds before the test.
-      if (rung == Accuracy::EXACT) {
-        EXPECT_EQ(difference(clustered.contacts, all.contacts), "");
-      }
-      for (const Contact& c : clustered.contacts) {
-        EXPECT_TRUE(std::binary_search(all.contacts.begin(), all.contacts.end(), c, canonicalLess)) << describe(c);
-      }
-    }
-  }
-}
-
-TEST(Detector, SeveralBodiesAreThePairsOfThem) {
-  const TestStep step = crumpled(4, 3, 10);
-  const Options options;
-  const Outcome all = runOnce(step, options);
-  std::vector<Contact> sum;
-  for (std::uint16_t a = 0; a < 3; ++a) {
-    TestStep alone;
-    alone.bodies = {step.bodies[a]};
-    for (Contact c : runOnce(alone, options).contacts) {
-      c.body = {a, a};
-      sum.push_back(c);
-    }
-    for (std::uint16_t b = static_cast<std::uint16_t>(a + 1); b < 3; ++b) {
-      TestStep pair;
-      pair.bodies = {step.bodies[a], step.bodies[b]};
-      for (StepBody& body : pair.bodies) body.self_collision = false;
-      for (Contact c : runOnce(pair, options).contacts) {
-        for (auto& body : c.body) body = body == 0 ? a : b;
-        sum.push_back(c);
-      }
-    }
-  }
-  std::sort(sum.begin(), sum.end(), canonicalLess);
-  EXPECT_EQ(difference(all.contacts, sum), "");
-  EXPECT_GT(all.stats[Effect::SELF_COLLISION].out, 0u);
-  EXPECT_GT(all.stats[Effect::BODY_BODY].out, 0u);
-  EXPECT_EQ(all.stats[Effect::SELF_COLLISION].out + all.stats[Effect::BODY_BODY].out, all.contacts.size());
-}
-
 TEST(Detector, ManyBodies) {
   TestStep step;
   for (int b = 0; b < 300; ++b) {
@@ -187,29 +136,9 @@ TEST(Detector, NothingIsLostOfBodiesThatAreFarFromAllOthers) {
   EXPECT_GT(crossings, 100u);
 }
 
-TEST(Detector, EffectsThatAreOffCostNothing) {
-  TestStep step = crumpled(5, 2, 8);
-  for (StepBody& body : step.bodies) body.self_collision = false;
-  Outcome result = runOnce(step, {});
-  EXPECT_EQ(result.stats[Effect::SELF_COLLISION].in, 0u);
-  EXPECT_GT(result.stats[Effect::BODY_BODY].in, 0u);
-  for (const Contact& c : result.contacts) EXPECT_NE(c.body[0], c.body[1]);
-  step.bodies[0].self_collision = true;
-  step.bodies[1].against_bodies = false;
-  result = runOnce(step, {});
-  EXPECT_GT(result.stats[Effect::SELF_COLLISION].in, 0u);
-  EXPECT_EQ(result.stats[Effect::BODY_BODY].in, 0u);
-  for (const Contact& c : result.contacts) EXPECT_EQ(c.body, (std::array<std::uint16_t, 2>{0, 0}));
-  Options options;
-  options.check_start_state = false;
-  result = runOnce(step, options);
-  EXPECT_EQ(result.start_state, StartState::NOT_CHECKED);
-  EXPECT_EQ(result.stats[Effect::START_STATE].in, 0u);
-}
-
-TEST(Detector, VerticesThatAreNotFiniteAreLeftOutAndCounted) {
+// That they are left out, and masked ones, is StepProperty's matter.
+TEST(Detector, VerticesThatAreNotFiniteAreCounted) {
   TestStep step = crumpled(6, 2, 9);
-  const Outcome whole = runOnce(step, {});
   step.bodies[0].t0[10][1] = NOT_A_NUMBER;
   step.bodies[0].t1[40][2] = HUGE_VAL;
   step.bodies[1].t1[3][0] = -HUGE_VAL;
@@ -221,16 +150,6 @@ TEST(Detector, VerticesThatAreNotFiniteAreLeftOutAndCounted) {
     for (const Face& f : step.bodies[b].topology.faces()) faces += isBad(b, f[0]) || isBad(b, f[1]) || isBad(b, f[2]);
   }
   EXPECT_EQ(result.stats.unchecked_faces, faces);
-  // The contacts are those of the whole mesh without the features at these vertices.
-  std::vector<Contact> expected;
-  for (const Contact& c : whole.contacts) {
-    const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
-    bool bad = false;
-    for (int i = 0; i < 4; ++i) bad |= isBad(c.body[i < first ? 0 : 1], c.vertex[i]);
-    if (!bad) expected.push_back(c);
-  }
-  ASSERT_LT(expected.size(), whole.contacts.size());
-  EXPECT_EQ(difference(result.contacts, expected), "");
 }
 
 // The same detector, with vertices that come and go: what is left out of one step must be back in the next.
@@ -254,24 +173,6 @@ TEST(Detector, VerticesComeBack) {
   Detector other;
   other.run(gone.motion());
   EXPECT_EQ(difference(other.run(step.motion()).contacts, expected.contacts), "");
-}
-
-TEST(Detector, InactiveVerticesAreLeftOutWithTheirFeatures) {
-  TestStep step = crumpled(7, 2, 9);
-  const Outcome whole = runOnce(step, {});
-  step.bodies[0].vertex_active.assign(81, 1);
-  for (std::size_t v = 0; v < 81; v += 5) step.bodies[0].vertex_active[v] = 0;
-  const Outcome result = runOnce(step, {});
-  std::vector<Contact> expected;
-  for (const Contact& c : whole.contacts) {
-    const int first = c.kind == PairKind::VERTEX_FACE ? 1 : 2;
-    bool bad = false;
-    for (int i = 0; i < 4; ++i) bad |= c.body[i < first ? 0 : 1] == 0 && c.vertex[i] % 5 == 0;
-    if (!bad) expected.push_back(c);
-  }
-  ASSERT_LT(expected.size(), whole.contacts.size());
-  EXPECT_EQ(difference(result.contacts, expected), "");
-  EXPECT_EQ(result.stats.unchecked_vertices, 0u);
 }
 
 template <class Call>
@@ -321,22 +222,6 @@ TEST(Detector, RefusesWhatDoesNotFitAndSaysWhere) {
   detector.setOptions(Options());
   // And goes on as if nothing had happened.
   EXPECT_EQ(difference(detector.run(step.motion()).contacts, runOnce(step, {}).contacts), "");
-}
-
-TEST(Detector, KnownTimesOfContact) {
-  const Outcome result = runOnce(crossing(), {});
-  // The corner (1,1,1) moves down by 2 and meets the plane z = 0 half way.
-  ASSERT_EQ(result.contacts[0].kind, PairKind::VERTEX_FACE);
-  const auto corner = std::find_if(result.contacts.begin(), result.contacts.end(), [](const Contact& c) {
-    return c.kind == PairKind::VERTEX_FACE && c.body[0] == 1 && c.vertex[0] == 0;
-  });
-  ASSERT_NE(corner, result.contacts.end());
-  EXPECT_EQ(corner->vertex, (std::array<Index, 4>{0, 0, 1, 2}));
-  EXPECT_EQ(corner->toc_lower, 0.5);
-  EXPECT_EQ(corner->toc_upper, 0.5 + 0x1p-32);
-  EXPECT_EQ(result.start_state, StartState::CLEAR);
-  EXPECT_EQ(result.earliest_toc, 0.5);
-  EXPECT_EQ(result.unchecked_toc_lower, std::numeric_limits<double>::infinity());
 }
 
 // Several bodies and a map: the canonical order puts kinds before bodies.

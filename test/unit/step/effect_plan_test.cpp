@@ -249,33 +249,6 @@ TEST(EffectPlan, ASeparationThatNoPairCarriesDoesNotRun) {
   expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
 }
 
-TEST(EffectPlan, ASeparationOfBodiesCountsWhereTheyMeet) {
-  EffectScene scene = cloth();
-  scene.bodies = {body("cloth"), body("finger", true)};
-  scene.bodies[0].self_collision = scene.bodies[0].against_obstacle = false;
-  scene.bodies[1].minimum_separation_m = 0.02;
-  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.02 m");
-  scene.bodies[0].against_bodies = false;
-  expectIdle(scene, Effect::MINIMUM_SEPARATION, ONLY_THE_MAP_WOULD);
-  scene.bodies[1].against_obstacle = false;
-  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
-}
-
-TEST(EffectPlan, WhatPairsAreGivenTakesThePlaceOfTheBodiesOwn) {
-  EffectScene scene = cloth();
-  scene.bodies = {body("felt"), body("finger", true), body("table", true)};
-  scene.map_seen = scene.map_used = true;
-  for (Body& one : scene.bodies) one.minimum_separation_m = 0.12;
-  // Either of two bodies may name a pair; each pair that there is, but felt and table.
-  scene.bodies[0].separations = {{0, 0}, {1, 0}, {OBSTACLE_BODY, 0}};
-  scene.bodies[1].separations = {{OBSTACLE_BODY, 0}};
-  scene.bodies[2].separations = {{1, 0}, {OBSTACLE_BODY, 0}};
-  EXPECT_EQ(saidOf(scene, "minimum_separation"), "contacts are reported from 0.12 m");
-  scene.bodies[2].separations.push_back({0, 0});
-  expectIdle(scene, Effect::MINIMUM_SEPARATION, NO_PAIR_CARRIES);
-  EXPECT_EQ(largestSeparation(scene.bodies), 0.12) << "it is asked for, all the same";
-}
-
 TEST(EffectPlan, AnOverrideMayMakeOnePairAloneSeparated) {
   EffectScene scene = cloth();
   scene.bodies = {body("felt"), body("finger", true), body("table", true)};

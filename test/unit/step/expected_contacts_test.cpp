@@ -116,16 +116,6 @@ TEST(ExpectedContacts, AllThatTheExpectationNamesMustBeInIt) {
   EXPECT_LT(both.counts.expected, seen);
 }
 
-TEST(ExpectedContacts, OfSeveralExpectationsOneMustHoldAll) {
-  const Outcome outcome =
-      Falling().expect(only(UPPER, {0, 1}), all(LOWER)).expect(only(UPPER, {2, 3}), all(LOWER)).answer();
-  for (const Contact& c : outcome.contacts) {
-    const std::set<Index> side = sideOf(c, UPPER);
-    EXPECT_EQ(c.expected, within(side, {0, 1}) || within(side, {2, 3})) << describe(c);
-  }
-  EXPECT_GT(outcome.counts.expected, 0u);
-}
-
 TEST(ExpectedContacts, AreTheSameForHoweverManyExpectations) {
   // Pairs of neighbouring vertices of the upper sheet, and of each the lower sheet's left or right half.
   const auto halfOf = [](bool right) {

@@ -4,47 +4,29 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "dccd/stream.h"
 #include "step/parts.h"
+#include "unit/stream/monitor_support.h"
 
 namespace dccd {
+namespace test {
 namespace {
 
-constexpr StampNs MS = 1000000;
-constexpr std::int64_t NOW = 0;
-
-std::shared_ptr<const Topology> oneTriangle() {
-  static const auto topology = std::make_shared<const Topology>(Topology::fromTriangles(3, {{0, 1, 2}}));
-  return topology;
-}
-
-/// A triangle that points down with vertex 0, at (0, 0, z).
-MeshFrame tip(StampNs stamp_ns, double z) {
-  return {
-      stamp_ns, oneTriangle(), {{0, 0, z}, {0.1, 0, z - 1.1}, {-0.1, 0, z - 1.1}}, false, Eigen::Isometry3d::Identity(),
-      {}};
+/// A triangle that points up with vertex 0, at (0, 0, z).
+MeshFrame peak(StampNs stamp_ns, double z) {
+  return {stamp_ns, oneTriangle(), {{0, 0, z}, {0.1, 0, z - 1.1}, {-0.1, 0, z - 1.1}}};
 }
 
 /// A bar of 1 m along x that has turned by `angle` about the y axis at its end: downwards first.
 MeshFrame bar(StampNs stamp_ns, double angle) {
-  MeshFrame frame{
-      stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true, Eigen::Isometry3d::Identity(), {}};
+  MeshFrame frame{stamp_ns, oneTriangle(), {{0, -0.2, 0}, {1, -0.2, 0}, {1, 0.2, 0}}, true};
   frame.pose.linear() = Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix();
   for (Vec3& p : frame.positions) p = frame.pose * p;
   return frame;
 }
 
-MonitorOptions loose() {
-  MonitorOptions options;
-  options.store.max_vertex_step_m = 0;
-  return options;
-}
-
 /// The clock body and a rigid bar.
 std::vector<Body> clockAndBar() {
-  std::vector<Body> bodies(2);
-  bodies[0].name = "clock";
-  bodies[1].name = "bar";
+  std::vector<Body> bodies{named("clock"), named("bar")};
   bodies[1].rigid = true;
   return bodies;
 }
@@ -87,13 +69,13 @@ TEST(TurningBody, MoreThanHalfATurnLeavesTheArcByMoreThanTheRadius) {
 // A bar of 1 m turns by nearly 180 degrees about its end; half way its other end passes what no chord comes near.
 TEST(TurningBody, MeetsWhatOnlyTheArcPasses) {
   Monitor far(loose(), clockAndBar());
-  step(far, tip(0, -1.01), 0);
-  const Outcome missed = step(far, tip(100 * MS, -1.01), 3.1);
+  step(far, peak(0, -1.01), 0);
+  const Outcome missed = step(far, peak(100 * MS, -1.01), 3.1);
   EXPECT_GT(missed.substeps, 30u);
   ASSERT_TRUE(missed.contacts.empty()) << "the tip is 1 cm below";
   Monitor near(loose(), clockAndBar());
-  step(near, tip(0, -0.9), 0);
-  const Outcome met = step(near, tip(100 * MS, -0.9), 3.1);
+  step(near, peak(0, -0.9), 0);
+  const Outcome met = step(near, peak(100 * MS, -0.9), 3.1);
   ASSERT_EQ(met.status, StepStatus::OK) << met.reason;
   EXPECT_NEAR(met.earliest_toc, 0.5 * M_PI / 3.1, 0.01);
 }
@@ -103,16 +85,16 @@ TEST(TurningBody, ThatComesNearNothingIsNotCut) {
   std::vector<Body> bodies = clockAndBar();
   bodies[1].against_obstacle = false;
   Monitor monitor(loose(), bodies);
-  step(monitor, tip(0, -1.03), 0);
-  const Outcome outcome = step(monitor, tip(100 * MS, -1.03), 3.1);
+  step(monitor, peak(0, -1.03), 0);
+  const Outcome outcome = step(monitor, peak(100 * MS, -1.03), 3.1);
   EXPECT_EQ(outcome.substeps, 1u);
   EXPECT_EQ(outcome.stats.bodies_far, 1u);
   EXPECT_TRUE(assuranceOf(outcome).clear());
-  EXPECT_GT(step(monitor, tip(200 * MS, -1.01), 6.2).substeps, 30u) << "its corners come to 1.02 m";
+  EXPECT_GT(step(monitor, peak(200 * MS, -1.01), 6.2).substeps, 30u) << "its corners come to 1.02 m";
   bodies[0].not_against = {1};
   Monitor blind(loose(), bodies);
-  step(blind, tip(0, -0.9), 0);
-  const Outcome unseen = step(blind, tip(100 * MS, -0.9), 3.1);
+  step(blind, peak(0, -0.9), 0);
+  const Outcome unseen = step(blind, peak(100 * MS, -0.9), 3.1);
   EXPECT_EQ(unseen.substeps, 1u);
   EXPECT_TRUE(unseen.contacts.empty());
 }
@@ -120,16 +102,16 @@ TEST(TurningBody, ThatComesNearNothingIsNotCut) {
 TEST(TurningBody, MeetsWhatOfTheMapOnlyTheArcPasses) {
   Monitor monitor(loose(), clockAndBar());
   monitor.setMap({VoxelSurface::build(0.1, {{{32768, 32768, 32758}, 1}}), 0, Eigen::Isometry3d::Identity(), {}});
-  step(monitor, tip(0, -1.2), 0);
-  EXPECT_NEAR(step(monitor, tip(100 * MS, -1.2), 3.1).earliest_toc, std::atan2(0.9, 0.1) / 3.1, 0.01);
+  step(monitor, peak(0, -1.2), 0);
+  EXPECT_NEAR(step(monitor, peak(100 * MS, -1.2), 3.1).earliest_toc, std::atan2(0.9, 0.1) / 3.1, 0.01);
 }
 
 // The point that is shown lies on the arc, where the part's straight paths meet, not half way of the whole step's
 // chord.
 TEST(TurningBody, TheGeometryIsThatOfThePart) {
   Monitor monitor(loose(), clockAndBar());
-  step(monitor, tip(0, -0.9), 0);
-  const Outcome outcome = step(monitor, tip(100 * MS, -0.9), 3.1);
+  step(monitor, peak(0, -0.9), 0);
+  const Outcome outcome = step(monitor, peak(100 * MS, -0.9), 3.1);
   ASSERT_FALSE(outcome.contacts.empty());
   for (const Contact& contact : outcome.contacts) {
     const ContactGeometry geometry = contactGeometry(outcome, contact);
@@ -153,9 +135,9 @@ TEST(TurningBody, TheGeometryIsThatOfThePart) {
 TEST(TurningBody, FramesBetweenTheEndsAreHeldAgainstTheArc) {
   const auto lastOf = [](double middle, double end) {
     Monitor monitor(loose(), clockAndBar());
-    step(monitor, tip(0, -3), 0);
+    step(monitor, peak(0, -3), 0);
     monitor.push(1, bar(50 * MS, middle), NOW);
-    return step(monitor, tip(100 * MS, -3), end);
+    return step(monitor, peak(100 * MS, -3), end);
   };
   EXPECT_TRUE(assuranceOf(lastOf(0.5, 1)).clear());
   const Outcome back = lastOf(0.5, 0);
@@ -169,8 +151,8 @@ TEST(TurningBody, TheBudgetIsForTheWholeStep) {
     MonitorOptions options = loose();
     options.detector.step_budget_ms = budget_ms;
     Monitor monitor(options, clockAndBar());
-    step(monitor, tip(0, -1.01), 0);
-    return step(monitor, tip(100 * MS, -1.01), 3.1);
+    step(monitor, peak(0, -1.01), 0);
+    return step(monitor, peak(100 * MS, -1.01), 3.1);
   };
   const Outcome whole = run(0);
   ASSERT_EQ(whole.status, StepStatus::OK);
@@ -200,7 +182,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
   int at = 0;
   const auto next = [&](Monitor& monitor) {
     ++at;
-    return step(monitor, {at * 100 * MS, grid, flat, false, Eigen::Isometry3d::Identity(), {}}, 0.5 * at);
+    return step(monitor, {at * 100 * MS, grid, flat}, 0.5 * at);
   };
   MonitorOptions options = loose();
   const auto shortest_ms = [&](bool check_start_state) {
@@ -236,9 +218,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
 TEST(TurningBody, AStepAfterOneThatWasCutStartsAnew) {
   // Pierced in its middle by the bar's long edges when the bar hangs down, and by nothing before.
   const auto sheet = [](StampNs stamp_ns) {
-    return MeshFrame{
-        stamp_ns, oneTriangle(), {{-2, -2, -0.5}, {2, -2, -0.5}, {0, 3, -0.5}}, false, Eigen::Isometry3d::Identity(),
-        {}};
+    return MeshFrame{stamp_ns, oneTriangle(), {{-2, -2, -0.5}, {2, -2, -0.5}, {0, 3, -0.5}}};
   };
   MonitorOptions options = loose();
   const auto last = [&](double budget_ms) {
@@ -264,8 +244,8 @@ TEST(TurningBody, APredictionMayTurnByMoreThanAHalf) {
   options.look_ahead_s = 0.5;
   options.detector.max_substeps = 1000;
   Monitor monitor(options, clockAndBar());
-  step(monitor, tip(0, -0.9), -2.0);
-  ASSERT_TRUE(assuranceOf(step(monitor, tip(100 * MS, -0.9), -0.8)).clear());
+  step(monitor, peak(0, -0.9), -2.0);
+  ASSERT_TRUE(assuranceOf(step(monitor, peak(100 * MS, -0.9), -0.8)).clear());
   const Outcome ahead = monitor.predict();
   ASSERT_EQ(ahead.status, StepStatus::OK) << ahead.reason;
   ASSERT_FALSE(ahead.contacts.empty());
@@ -283,8 +263,8 @@ TEST(TurningBody, APairThatIsCertainInOnePartIsCertain) {
     std::vector<Body> bodies = clockAndBar();
     bodies[0].minimum_separation_m = 0.05;
     Monitor monitor(options, bodies);
-    step(monitor, tip(0, -0.9), 0);
-    return step(monitor, tip(100 * MS, -0.9), 1.6);
+    step(monitor, peak(0, -0.9), 0);
+    return step(monitor, peak(100 * MS, -0.9), 1.6);
   };
   const Outcome few = run(1), many = run(AccuracyOptions().max_subdivisions);
   ASSERT_GT(many.counts.certain, 0u);
@@ -296,4 +276,5 @@ TEST(TurningBody, APairThatIsCertainInOnePartIsCertain) {
 }
 
 }  // namespace
+}  // namespace test
 }  // namespace dccd

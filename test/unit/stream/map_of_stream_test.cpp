@@ -67,11 +67,7 @@ TEST_F(OneBody, OldMapIsNoMap) {
 
 /// A triangle over the map's first voxel, its lowest corner at the height z.
 MeshFrame overTheVoxel(StampNs stamp_ns, double z) {
-  return {stamp_ns,
-          oneTriangle(),
-          {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}},
-          false,
-          Eigen::Isometry3d::Identity()};
+  return {stamp_ns, oneTriangle(), {{0.5, 0.5, z}, {0.6, 0.5, z + 1}, {0.5, 0.6, z + 1}}};
 }
 
 TEST_F(OneBody, VoxelContactInTheMapsFrame) {

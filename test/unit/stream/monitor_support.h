@@ -22,9 +22,7 @@ inline std::shared_ptr<const Topology> twoTriangles() {
 inline MeshFrame pair(StampNs stamp_ns, double tip_z) {
   return {stamp_ns,
           twoTriangles(),
-          {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, tip_z}, {0.5, 0, tip_z + 1}, {-0.5, 0, tip_z + 1}},
-          false,
-          Eigen::Isometry3d::Identity()};
+          {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, tip_z}, {0.5, 0, tip_z + 1}, {-0.5, 0, tip_z + 1}}};
 }
 
 inline std::shared_ptr<const Topology> oneTriangle() {
@@ -32,11 +30,10 @@ inline std::shared_ptr<const Topology> oneTriangle() {
   return topology;
 }
 inline MeshFrame floor(StampNs stamp_ns, double z) {
-  return {stamp_ns, oneTriangle(), {{-1, -1, z}, {1, -1, z}, {0, 1, z}}, false, Eigen::Isometry3d::Identity()};
+  return {stamp_ns, oneTriangle(), {{-1, -1, z}, {1, -1, z}, {0, 1, z}}};
 }
 inline MeshFrame tip(StampNs stamp_ns, double z) {
-  return {
-      stamp_ns, oneTriangle(), {{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}, false, Eigen::Isometry3d::Identity()};
+  return {stamp_ns, oneTriangle(), {{0, 0, z}, {0.5, 0, z + 1}, {-0.5, 0, z + 1}}};
 }
 
 inline MonitorOptions loose() {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <sstream>
 #include <utility>
 
 #include "dccd/assurance.h"
@@ -194,103 +196,48 @@ TEST_F(PhasesOfCrossing, ACrossingWithoutAContactIsAnAlarmOnceItIsNoLongerExpect
   EXPECT_EQ(unexpected(), 1u);
 }
 
-TEST_F(PhasesOfCrossing, InEachStepThatFollowsTheSwitch) {
-  // What becomes of the tip in the step after the switch, from below the sheet: it stays, moves on, leaves.
-  for (const double z : {-0.2, -0.3, 0.2}) {
+/// What a stream does, word by word: the tip is "above" the sheet, "below" it, "higher" or "deeper"; "!" behind a place
+/// is an alarm in the step that ends there. "on" and "off" expect them to meet or not, "seam" and "gap" begin anew.
+TEST_F(PhasesOfCrossing, AnAlarmFollowsThePhaseThatEnds) {
+  const struct {
+    const char *story, *events;
+  } CASES[] = {
+      {"above below off below!", "BEGAN 1, UNEXPECTED 1"},
+      {"above below off deeper!", "BEGAN 1, UNEXPECTED 1"},
+      {"above below off above!", "BEGAN 1, UNEXPECTED 1"},
+      {"above below above off higher below!", "BEGAN 1, UNEXPECTED 1"},  // it returns within the gap
+      {"above below off on below", "BEGAN 1"},                           // a phase between two steps is none
+      {"above below off below! on below off deeper! on below off below! on below",
+       "BEGAN 1, UNEXPECTED 1, UNEXPECTED 1, UNEXPECTED 1"},
+      // Within the gap something touched without an expectation that no phase has looked at.
+      {"off above below! on below off below!", "BEGAN 1, UNEXPECTED 1"},
+      {"below below off below! below", "BEGAN 1 INITIAL, UNEXPECTED 1"},
+      {"above below seam below off below! below seam below below", nullptr},
+      {"above below off seam below below! below seam below below", nullptr},
+      {"above below gap off below below!", nullptr},
+      {"above below seam below below", nullptr},  // a seam alone is no alarm
+  };
+  const std::map<std::string, double> PLACES = {{"above", 0.2}, {"below", -0.2}, {"higher", 0.3}, {"deeper", -0.3}};
+  for (const auto& [story, events] : CASES) {
+    SCOPED_TRACE(story);
     Stream fresh{{oneTriangle(), oneTriangle()}, carrying()};
     std::swap(stream, fresh);
-    isAlarm(0.2);
-    EXPECT_FALSE(isAlarm(-0.2)) << z;
-    expectMeeting(false);
-    EXPECT_TRUE(isAlarm(z)) << z;
-    EXPECT_EQ(unexpected(), 1u) << z;
+    std::istringstream words(story);
+    for (std::string word; words >> word;) {
+      const bool alarm = word.back() == '!';
+      if (alarm) word.pop_back();
+      if (word == "on" || word == "off") {
+        expectMeeting(word == "on");
+      } else if (word == "seam") {
+        stream.monitor().reset();
+      } else if (word == "gap") {
+        stream.wait(1000000000);
+      } else {
+        EXPECT_EQ(isAlarm(PLACES.at(word)), alarm) << word << ": " << stream.text();
+      }
+    }
+    if (events) EXPECT_EQ(stream.text(), events);
   }
-}
-
-TEST_F(PhasesOfCrossing, WhatReturnsWithinTheGapAfterTheSwitch) {
-  isAlarm(0.2);
-  isAlarm(-0.2);
-  isAlarm(0.2);
-  expectMeeting(false);
-  EXPECT_FALSE(isAlarm(0.3)) << "nothing touches";
-  EXPECT_TRUE(isAlarm(-0.2));
-  EXPECT_EQ(stream.text(), "BEGAN 1, UNEXPECTED 1");
-}
-
-TEST_F(PhasesOfCrossing, APhaseThatComesAndGoesBetweenTwoStepsIsNone) {
-  isAlarm(0.2);
-  isAlarm(-0.2);
-  expectMeeting(false);
-  expectMeeting(true);
-  EXPECT_FALSE(isAlarm(-0.2));
-  EXPECT_EQ(unexpected(), 0u);
-}
-
-TEST_F(PhasesOfCrossing, EachPhaseThatEndsIsAnAlarm) {
-  isAlarm(0.2);
-  isAlarm(-0.2);
-  for (int k = 0; k < 3; ++k) {
-    expectMeeting(false);
-    EXPECT_TRUE(isAlarm(-0.2 - 0.01 * k)) << k;
-    expectMeeting(true);
-    EXPECT_FALSE(isAlarm(-0.2)) << k;
-  }
-  EXPECT_EQ(unexpected(), 3u);
-}
-
-TEST_F(PhasesOfCrossing, WhatTouchedFirstWithoutAnExpectationIsToldWhenAPhaseOfItEnds) {
-  expectMeeting(false);
-  isAlarm(0.2);
-  EXPECT_TRUE(isAlarm(-0.2));
-  // Within the gap something else touched that no phase has looked at.
-  expectMeeting(true);
-  EXPECT_FALSE(isAlarm(-0.2));
-  expectMeeting(false);
-  EXPECT_TRUE(isAlarm(-0.2));
-}
-
-TEST_F(PhasesOfCrossing, WhatWasInitialIsToldToo) {
-  isAlarm(-0.2);
-  EXPECT_FALSE(isAlarm(-0.2));
-  expectMeeting(false);
-  EXPECT_TRUE(isAlarm(-0.2));
-  EXPECT_FALSE(isAlarm(-0.2));
-  EXPECT_EQ(stream.text(), "BEGAN 1 INITIAL, UNEXPECTED 1");
-}
-
-TEST_F(PhasesOfCrossing, ASeamAtTheSwitchHidesNothing) {
-  for (const bool seam_first : {true, false}) {
-    Stream fresh{{oneTriangle(), oneTriangle()}, carrying()};
-    std::swap(stream, fresh);
-    isAlarm(0.2);
-    isAlarm(-0.2);
-    if (!seam_first) expectMeeting(false);
-    stream.monitor().reset();
-    isAlarm(-0.2);
-    if (seam_first) expectMeeting(false);
-    EXPECT_TRUE(isAlarm(-0.2)) << seam_first << ": " << stream.text();
-    EXPECT_FALSE(isAlarm(-0.2));
-    stream.monitor().reset();
-    isAlarm(-0.2);
-    EXPECT_FALSE(isAlarm(-0.2)) << "a seam alone is no alarm";
-  }
-}
-
-TEST_F(PhasesOfCrossing, AGapAtTheSwitchHidesNothingEither) {
-  isAlarm(0.2);
-  isAlarm(-0.2);
-  stream.wait(1000000000);
-  expectMeeting(false);
-  isAlarm(-0.2);
-  EXPECT_TRUE(isAlarm(-0.2)) << stream.text();
-}
-
-TEST_F(PhasesOfCrossing, WithoutASwitchASeamIsNoAlarm) {
-  isAlarm(0.2);
-  isAlarm(-0.2);
-  stream.monitor().reset();
-  isAlarm(-0.2);
-  EXPECT_FALSE(isAlarm(-0.2));
 }
 
 TEST_F(PhasesOfCrossing, WithoutPatchesEveryStepIsAnAlarm) {

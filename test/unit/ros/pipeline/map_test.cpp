@@ -54,19 +54,6 @@ TEST(Map, ARefusedMessageMakesTheMapInUseVoid) {
   EXPECT_EQ(mapMessageProblem("octomap_msgs/Octomap", "*", std::size_t{1} << 17, driven.config), "");
 }
 
-TEST(Map, OneFromTheFutureIsNoMap) {
-  XmlRpcValue tree = scene();
-  tree["octomap_timeout_s"] = 1.0;
-  Driven early(tree);
-  early.giveMap(2.25);
-  early.feed(1, 0.35f);
-  EXPECT_EQ(early.feed(1.2, 0.35f).status, StepStatus::NO_MAP);
-  EXPECT_NE(early.outcome.reason.find("1.05 s after the end of the step, more than octomap_timeout_s"),
-            std::string::npos)
-      << early.outcome.reason;
-  EXPECT_EQ(early.feed(1.3, 0.35f).status, StepStatus::OK) << early.outcome.reason;
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd

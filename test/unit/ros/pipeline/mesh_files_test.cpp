@@ -3,7 +3,6 @@
 
 #include <array>
 #include <fstream>
-#include <sstream>
 
 #include "dccd/assurance.h"
 #include "support/said.h"
@@ -62,51 +61,6 @@ TEST(Inside, AClothInARigidBodyOfAnStlIsNoClearStart) {
   container.raise("finger", -20);
   container.feed(1, 0.3f);
   EXPECT_TRUE(assuranceOf(container.feed(1.1, 0.2f)).clear()) << "a container is meant to hold others";
-}
-
-/// The same box as an OBJ or a PLY, each of its faces with corners of its own.
-std::string boxWithOwnCorners(const std::string& ending) {
-  const std::string file = ::testing::TempDir() + "own_corners." + ending;
-  const int quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
-  const bool obj = ending == "obj";
-  std::ostringstream vertices, faces;
-  for (int q = 0; q < 6; ++q) {
-    faces << (obj ? "f" : "4");
-    for (int k = 0; k < 4; ++k) {
-      const int v = quads[q][k];
-      vertices << (obj ? "v " : "") << (v & 1 ? 10 : -10) << ' ' << (v & 2 ? 10 : -10) << ' ' << (v & 4 ? 40 : 0)
-               << '\n';
-      faces << ' ' << 4 * q + k + obj;
-    }
-    faces << '\n';
-  }
-  std::ofstream out(file);
-  if (!obj) {
-    out << "ply\nformat ascii 1.0\nelement vertex 24\nproperty float x\nproperty float y\nproperty float z\n"
-           "element face 6\nproperty list uchar int vertex_indices\nend_header\n";
-  }
-  out << vertices.str() << faces.str();
-  return file;
-}
-
-// One box has one answer, in whatever way its file numbers the corners.
-TEST(Inside, AClothInARigidBodyWithDoubledCornersIsNoClearStart) {
-  for (const std::string ending : {"stl", "obj", "ply"}) {
-    XmlRpcValue tree = clothAndFinger();
-    if (ending != "stl") tree["bodies"]["finger"]["rigid"]["mesh"] = boxWithOwnCorners(ending);
-    Driven driven(tree);
-    driven.raise("finger", -20);
-    driven.feed(1, 0.3f);
-    const Outcome& inside = driven.feed(1.1, 0.2f);
-    ASSERT_EQ(inside.status, StepStatus::OK) << inside.reason;
-    EXPECT_EQ(inside.start_state, StartState::INTERSECTING) << ending;
-    EXPECT_EQ(inside.intersections.size(), 1u);
-    EXPECT_FALSE(assuranceOf(inside).clear());
-    Driven beside(tree);
-    beside.raise("finger", -500);
-    beside.feed(1, 0.3f);
-    EXPECT_TRUE(assuranceOf(beside.feed(1.1, 0.2f)).clear()) << ending;
-  }
 }
 
 // One rule for files and messages: what cannot be used is missing, and the step is PARTIAL.

@@ -111,20 +111,6 @@ TEST(UnknownSpace, OccupiedIsAnObstacleWithinItsBox) {
   EXPECT_NEAR(outcome.earliest_toc, 0.5, 1e-4);
 }
 
-TEST(UnknownSpace, AnOldMapIsNoMap) {
-  XmlRpcValue tree = scene();
-  tree["octomap_timeout_s"] = 1.0;
-  tree["unknown_space"] = "report";
-  Driven old(tree);
-  old.giveMap(1);
-  old.feed(1.8, 0.12f);
-  EXPECT_EQ(old.feed(1.9, 0.13f).status, StepStatus::OK);
-  const Outcome& late = old.feed(2.1, 0.14f);
-  EXPECT_EQ(late.status, StepStatus::NO_MAP);
-  EXPECT_NE(late.reason.find("octomap_timeout_s"), std::string::npos) << late.reason;
-  EXPECT_EQ(late.unknown_fraction, 0) << "of no map nothing is unknown";
-}
-
 }  // namespace
 }  // namespace test
 }  // namespace dccd
