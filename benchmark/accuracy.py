@@ -294,31 +294,38 @@ def markdown(rows, rivals, pairs):
     return "\n".join(lines) + "\n"
 
 
+def measured(a):
+    scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
+    steps, details = whole_steps(a.tools, scenes, a.rounds)
+    add_second_run(steps, whole_steps(a.tools, scenes, a.rounds)[0])
+    pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
+    return {"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "rivals": with_rivals(details, pairs),
+            "stages": details, "pairs": pairs, "studies": studies(a.tools, a.study, a.out)}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tools", required=True, help="folder of step_settings, accuracy_pairs and, for --study, analyze_bag")
+    parser.add_argument("--tools", help="folder of step_settings, accuracy_pairs and, for --study, analyze_bag")
     parser.add_argument("--data", required=True, help="folder with ccd_queries/ and scenes/")
     parser.add_argument("--study", action="append", default=[],
                         help="a recording, or RECORDING:PARAMETERS, to study with fewer frames, vertices and voxels; repeatable")
     parser.add_argument("--out", required=True, help="folder for the results")
     parser.add_argument("--repeat", type=int, default=15, help="of the elementary tests alone")
     parser.add_argument("--rounds", type=int, default=60, help="at most, of the whole step; fewer where the ratios are known to 2 %%")
+    parser.add_argument("--reuse", action="store_true", help="measure nothing: draw what accuracy.json in that folder has")
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
-    scenes = [os.path.join(a.data, "scenes", s) for s in ("cloth-ball", "n-body")]
-    steps, details = whole_steps(a.tools, scenes, a.rounds)
-    add_second_run(steps, whole_steps(a.tools, scenes, a.rounds)[0])
-    pairs = per_pair(a.tools, os.path.join(a.data, "ccd_queries"), scenes, a.repeat)
-    rivals = with_rivals(details, pairs)
-    found = studies(a.tools, a.study, a.out)
-    write_csv(os.path.join(a.out, "accuracy_steps.csv"), steps)
-    write_csv(os.path.join(a.out, "accuracy_pairs.csv"), pairs)
-    with open(os.path.join(a.out, "accuracy.json"), "w") as f:
-        json.dump({"machine": platform.processor() or platform.machine(), "repeat": a.repeat, "steps": steps, "rivals": rivals, "stages": details,
-                   "pairs": pairs, "studies": found}, f, indent=1)
+    path = os.path.join(a.out, "accuracy.json")
+    if not a.reuse:
+        with open(path, "w") as f:
+            json.dump(measured(a), f, indent=1)
+    with open(path) as f:
+        found = json.load(f)
+    write_csv(os.path.join(a.out, "accuracy_steps.csv"), found["steps"])
+    write_csv(os.path.join(a.out, "accuracy_pairs.csv"), found["pairs"])
     with open(os.path.join(a.out, "accuracy.md"), "w") as f:
-        f.write(markdown(steps, rivals, pairs) + study_tables(found))
-    plot(steps, rivals, pairs, a.out)
+        f.write(markdown(found["steps"], found["rivals"], found["pairs"]) + study_tables(found["studies"]))
+    plot(found["steps"], found["rivals"], found["pairs"], a.out)
     print("results: " + a.out)
 
 

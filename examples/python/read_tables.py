@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Who touched whom in a recording, and when first: reads the tables of a report with pandas.
 
-usage: read_tables.py REPORT        the folder that analyze_bag --report made; doc/interface.md explains its columns
+usage: read_tables.py REPORT        the folder that analyze_bag --report made; doc/tools.md explains its columns
 """
 import pathlib
 import sys

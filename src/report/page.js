@@ -203,17 +203,20 @@ function map(parent, b, values, ramp, gradient, caption, low, high, below) {
   text.append(caption + (below === undefined ? '' : below ? ', seen from below' : ', seen from above') + ': ');
   text.append(...low === high ? [bar, low] : [low, bar, high]);  // one value alone has no scale
 }
-R.bodies.forEach(b => {
-  const box = document.getElementById('heat'), most = Math.max(0, ...b.count), times = b.first.filter(t => t !== null);
-  box.appendChild(document.createElement('p')).textContent = `${b.name}: ${b.flat.length} vertices, ` +
-    (most ? `${b.count.filter(c => c).length} of them in contact at some time` : 'never in contact');
-  if (!most) return;
-  const row = box.appendChild(document.createElement('div')), sides = turnsOver(b) ? [false, true] : [undefined]; row.className = 'maps';
+const FEW_VERTICES = 20;  // as of a box: that one of them touched says no place
+const heat = document.getElementById('heat'), sentence = text => { heat.appendChild(document.createElement('p')).textContent = text; };
+const touched = b => b.count.some(c => c), untouched = R.bodies.filter(b => !touched(b)).map(b => b.name);
+R.bodies.filter(touched).forEach(b => {
+  const most = Math.max(...b.count), times = b.first.filter(t => t !== null);
+  sentence(`${b.name}: ${b.flat.length} vertices, ${b.count.filter(c => c).length} of them in contact at some time`);
+  if (b.flat.length < FEW_VERTICES) return;
+  const row = heat.appendChild(document.createElement('div')), sides = turnsOver(b) ? [false, true] : [undefined]; row.className = 'maps';
   sides.forEach(below => map(row, b, b.count.map(n => n > 0 ? Math.log(1 + n) / Math.log(1 + most) : null), many, FEW_TO_MANY, 'contacts of a vertex (logarithmic)', '1', String(most), below));
   if (!times.length) return;
   const t0 = times.reduce((a, t) => Math.min(a, t)), t1 = times.reduce((a, t) => Math.max(a, t));
   sides.forEach(below => map(row, b, b.first.map(t => t === null ? null : t1 > t0 ? (t - t0) / (t1 - t0) : 0), early, EARLY_TO_LATE, 'first contact, early to late', number(t0) + ' s', number(t1) + ' s', below));
 });
+if (untouched.length) sentence('Never in contact: ' + untouched.join(', '));
 const MEANING = { FIRST_FRAME: 'a step needs two frames', PARTIAL: 'vertices could not be checked, or left the path',
   DEADLINE: 'the step budget ran out', TRUNCATED: 'more contacts than max_contacts; the earliest are listed' };
 const STAGE = { record: 'takes in the frames', bounds: 'boxes of what the features sweep', broad_phase: 'pairs whose boxes meet',

@@ -315,7 +315,7 @@ const player = (() => {
   if (D.maps.some(m => m.doubted)) swatch(DOUBTED, "voxels in doubt, a body's or an obstacle's");
   note.textContent = (frames.length < D.seen ? `${frames.length} of ${D.seen} recorded frames are kept, those with events of patches first: what is between is not shown. ` :
     `All ${D.seen} recorded frames. `) + 'Nothing is interpolated. Positions are rounded for display, to ' +
-    D.bodies.filter(b => b.quantum).map(b => `${b.quantum.toExponential(1)} m (${b.name})`).join(', ') + `. At most ${D.most_contacts} contacts of a frame are drawn, new ones first.` +
+    `${Math.max(0, ...D.bodies.map(b => b.quantum || 0)).toExponential(1)} m or finer. At most ${D.most_contacts} contacts of a frame are drawn, new ones first.` +
     (D.maps.some(m => !m.all) ? ' Of the map the voxels next to the bodies are drawn.' : D.maps.length ? ' Of the map the voxels near the bodies are drawn.' : '') +
     (D.maps_left_out ? ` ${D.maps_left_out} later changes of the map are not drawn.` : '') + ' Drag to turn, wheel to zoom, right button to move.';
   const firsts = R.partners.filter(p => p.first).map(p => p.first.t);

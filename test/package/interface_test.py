@@ -104,7 +104,7 @@ class InterfaceTest(unittest.TestCase):
         """The rows of the code's table, the page's, and the message's fields."""
         names = re.findall(r'  COUNTER\((\w+), ', (CHECKOUT / 'include/dccd/outcome.h').read_text())
         self.assertGreater(len(names), 10, 'the search found too little to mean anything')
-        table = PAGE[PAGE.index('**What else a step counts**'):PAGE.index('## Services')]
+        table = PAGE[PAGE.index('### What else a step counts'):PAGE.index('## Services')]
         self.assertEqual(sorted(name for line in table.splitlines() for name in names_of(line)), sorted(names))
         fields = re.findall(r'(?m)^uint\d+ (\w+)', (CHECKOUT / 'msg/StepStats.msg').read_text())
         self.assertEqual([name for name in names if fields.count(name) != 1], [])
@@ -112,7 +112,7 @@ class InterfaceTest(unittest.TestCase):
     def test_topics(self):
         code = {topic for source in ('output/outputs.cpp', 'node/state_reporter.cpp')
                 for topic in re.findall(r'advertise<.*>\("(\w+)"', (CHECKOUT / 'src' / source).read_text())}
-        table = PAGE[PAGE.index('## What comes out'):PAGE.index('**How to read a contact.**')]
+        table = PAGE[PAGE.index('## What comes out'):PAGE.index('### How to read a contact')]
         rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
         self.assertEqual(code, {name for row in rows for name in re.findall(r'`~(\w+)`', row)})
 
@@ -142,8 +142,8 @@ class InterfaceTest(unittest.TestCase):
 
     def test_live_parameters(self):
         code = re.findall(r'gen\.add\("(\w+)"', (CHECKOUT / 'cfg/CollisionMonitor.cfg').read_text())
-        paragraph = PAGE[PAGE.index('**While it runs**'):]
-        listed = re.findall(r'`(\w+)`', paragraph[paragraph.index('):'):paragraph.index('\n\n')])
+        paragraph = PAGE[PAGE.index('### While it runs'):]
+        listed = re.findall(r'`(\w+)`', paragraph[:paragraph.index('\n\n')])
         self.assertEqual(sorted(listed), sorted(code))
 
     def test_live_limits(self):

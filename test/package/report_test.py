@@ -78,8 +78,9 @@ class ReportPageTest(unittest.TestCase):
         body, console = self.dom()
         self.assertNotRegex(console, r'CONSOLE.*(?:Error|error)')
         heat = body[body.index('id="heat"'):].split('<h2')[0]
-        self.assertEqual(heat.count('<canvas'), 8, 'of two bodies two pictures, from both sides')
-        self.assertEqual((heat.count('seen from above'), heat.count('seen from below')), (4, 4))
+        self.assertEqual(heat.count('<canvas'), 4, 'of the felt two pictures, from both sides; of the finger, a box, none')
+        self.assertEqual((heat.count('seen from above'), heat.count('seen from below')), (2, 2))
+        self.assertRegex(heat, r'finger: 8 vertices, \d of them in contact')
         facts = body[body.index('id="facts"'):].split('</table>')[0]
         self.assertRegex(facts, r'analyze_bag \S*scene\.bag --params \S*scene\.yaml --report ')
         self.assertRegex(facts, r'deformable_ccd \d+\.\d+\.\d+, compiled by ')
