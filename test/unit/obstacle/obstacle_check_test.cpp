@@ -58,6 +58,27 @@ TEST(ObstacleCheck, AVertexMeetsAFaceInItsCell) {
   EXPECT_GE(answer.stats.pairs_in, 1u);
 }
 
+TEST(ObstacleCheck, TheLastMomentCounts) {
+  const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
+  const Positions t0 = {{0.5, 0.5, 3}, {0.5, 0.5, 5}};
+  const Answer touching = run(*surface, ROPE, t0, {{0.5, 0.5, 1}, {0.5, 0.5, 5}});
+  ASSERT_EQ(touching.contacts.size(), 1u);
+  EXPECT_EQ(touching.contacts[0].toc_lower, 1.0);
+  EXPECT_EQ(touching.contacts[0].toc_upper, 1.0);
+  EXPECT_TRUE(run(*surface, ROPE, t0, {{0.5, 0.5, std::nextafter(1.0, 2.0)}, {0.5, 0.5, 5}}).contacts.empty());
+}
+
+TEST(ObstacleCheck, AnEdgeMeetsAnEdge) {
+  const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
+  // A line along y that falls onto the box's upper edge at x = 1 beside its corner.
+  const Positions t0 = {{1, -1, 2}, {1, 3, 2}};
+  const Answer answer = run(*surface, ROPE, {{0.5, -1, 2}, {0.75, 3, 2}}, {{0.5, -1, 0}, {0.75, 3, 0}});
+  ASSERT_EQ(answer.contacts.size(), 1u);
+  EXPECT_EQ(answer.contacts[0].kind, PairKind::EDGE_VOXEL_EDGE);
+  EXPECT_EQ(answer.contacts[0].toc_lower, 0.5);
+  EXPECT_EQ(run(*surface, ROPE, t0, moved(t0, {0, 0, -2})).contacts.size(), 1u) << "exactly along the box's edge";
+}
+
 TEST(ObstacleCheck, ACornerMeetsAFace) {
   const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
   const Positions t0 = {{-9, -9, 3}, {11, -9, 4}, {1, 19, 5}};
@@ -108,6 +129,19 @@ TEST(ObstacleCheck, WhatPiercesAVoxelAtTheStartIsInitial) {
   ASSERT_EQ(face.contacts.size(), 1u);
   EXPECT_EQ(face.contacts[0].kind, PairKind::FACE_VOXEL_CORNER);
   EXPECT_TRUE(face.contacts[0].initial);
+}
+
+TEST(ObstacleCheck, WhatTouchesAnEdgeOfTheBoxAtOnePointIsMet) {
+  const auto surface = unitVoxels({leafAt(32768, 32768, 32768)});
+  const Vec3 below(-0.5, 0.5, 0.5), above(0.5, 0.5, 1.5), away(-3, 0.5, 5);
+  const Answer grazing = run(*surface, ROPE, {below, away}, {above, away});
+  ASSERT_FALSE(grazing.contacts.empty());
+  EXPECT_EQ(grazing.contacts[0].kind, PairKind::VERTEX_VOXEL_FACE);
+  EXPECT_EQ(grazing.contacts[0].toc_lower, 0.5);
+  const Answer resting = run(*surface, ROPE, {below, above}, {below, above});
+  ASSERT_EQ(resting.contacts.size(), 1u);
+  EXPECT_EQ(resting.contacts[0].kind, PairKind::EDGE_VOXEL_EDGE);
+  EXPECT_TRUE(resting.contacts[0].initial);
 }
 
 TEST(ObstacleCheck, WhatPassesThroughIsNotLeavingWhatItWasNotIn) {
