@@ -77,7 +77,7 @@ class BareRoot:
     def __init__(self, folder, release):
         self.folder, self.release = pathlib.Path(folder), release
 
-    def make(self):
+    def make(self, include=('--include=git,ca-certificates',)):
         """Raises CannotMake with a reason where this machine cannot."""
         if os.geteuid() != 0:
             raise CannotMake('only root makes a bare root')
@@ -85,7 +85,7 @@ class BareRoot:
             if not shutil.which(program):
                 raise CannotMake('%s is not installed' % program)
         lines = sources_of(self.release, source_entries(), host_release())
-        made = subprocess.run(['mmdebstrap', '--quiet', '--mode=root', '--variant=minbase', '--include=git,ca-certificates',
+        made = subprocess.run(['mmdebstrap', '--quiet', '--mode=root', '--variant=minbase', *include,
                                self.release, str(self.folder), '-'], input='\n'.join(lines) + '\n', text=True,
                               capture_output=True, check=False)
         if made.returncode != 0:

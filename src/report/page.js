@@ -1,5 +1,5 @@
 // Plots are as wide as the page, so that their words stay as large as the others.
-const NS = 'http://www.w3.org/2000/svg', W = Math.max(300, document.getElementById('lanes').clientWidth || 1040), LEFT = W < 600 ? 54 : 62,
+const NS = 'http://www.w3.org/2000/svg', W = Math.max(300, document.getElementById('lanes').clientWidth || 1040), LEFT = 66,
   RIGHT = 14, BOTTOM = 34, TOP = 10;
 const el = (name, attributes, parent, text) => {
   const e = document.createElementNS(NS, name);
@@ -60,7 +60,7 @@ function axes(id, height, ymax, ylabel, whole, rise = v => v / ymax, marks = tic
     el('text', { x: LEFT - 6, y: y(v) + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
   ticks(span).forEach(t => x(t0 + t) <= W - RIGHT && el('text', { x: x(t0 + t), y: height - BOTTOM + 18, 'text-anchor': 'middle', 'font-size': 12,
     fill: '#556' }, svg, +(t0 + t).toPrecision(6) + ' s'));
-  el('text', { x: 14, y: height / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${height / 2})`,
+  el('text', { x: 11, y: height / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 11 ${height / 2})`,
     'text-anchor': 'middle' }, svg, ylabel);
   return { svg, x, y, bar: Math.max(1.5, 0.8 * slot) };
 }
@@ -111,7 +111,7 @@ document.getElementById('headline').textContent = R.headline;
   ticks(most, true).forEach(v => { const y = floor - (floor - 10) * v / most;
     el('line', { x1: LEFT, x2: W - RIGHT, y1: y, y2: y, stroke: '#e3e8ee' }, svg);
     el('text', { x: LEFT - 6, y: y + 4, 'text-anchor': 'end', 'font-size': 12, fill: '#556' }, svg, v.toLocaleString('en')); });
-  el('text', { x: 14, y: floor / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 14 ${floor / 2})`,
+  el('text', { x: 11, y: floor / 2, 'font-size': 12, fill: '#556', transform: `rotate(-90 11 ${floor / 2})`,
     'text-anchor': 'middle' }, svg, 'steps');
   bins.forEach((b, i) => { const h = (floor - 10) * b.steps / most, upper = short(b.upper_ms) + ' ms';
     const bar = el('rect', { x: LEFT + i * w, y: floor - h, width: Math.max(1, w - 1), height: h, fill: '#2a6fb0' }, svg);
@@ -150,7 +150,7 @@ function frontPlot(id, all, xlabel, ylabel, least) {
     el('line', { x1: LEFT, x2: W - RIGHT, y1: y(v), y2: y(v), stroke: '#e3e8ee' }, svg);
     label(LEFT - 6, y(v) + 4, v <= least ? '0' : v < 1e-2 ? v.toExponential(0) : +v.toPrecision(2), { 'text-anchor': 'end' }); });
   label((W + LEFT) / 2, H - 8, xlabel, { 'text-anchor': 'middle' });
-  label(14, H / 2, ylabel, { transform: `rotate(-90 14 ${H / 2})`, 'text-anchor': 'middle' });
+  label(11, H / 2, ylabel, { transform: `rotate(-90 11 ${H / 2})`, 'text-anchor': 'middle' });
   let best = Infinity;
   const front = points.filter(p => !p.missed && !p.invented).sort((a, b) => a.x - b.x || a.y - b.y).filter(p => p.y < best && (best = p.y, true));
   el('polyline', { points: front.map((p, i) => (i ? `${x(p.x)},${y(front[i - 1].y)} ` : '') + `${x(p.x)},${y(p.y)}`).join(' '), fill: 'none', stroke: '#9aa4b0' }, svg);

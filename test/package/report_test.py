@@ -174,10 +174,10 @@ class ReportPageTest(unittest.TestCase):
         self.assertLessEqual(page.execute_script('return player.time()'), before + 0.04)
         page.execute_script('player.seek(0)')
         page.find_element('id', 'play').click()
-        page.execute_async_script('setTimeout(arguments[0], 700)')
+        # Until it has: a busy machine draws seldom. What never plays runs into Selenium's own limit.
+        page.execute_async_script('const done = arguments[0], look = () => player.time() > 0.2 ? done() : setTimeout(look, 20); look()')
         page.find_element('id', 'play').click()
         stopped = page.execute_script('return player.time()')
-        self.assertGreater(stopped, 0.2)
         self.assertEqual(text('play'), 'Play')
         page.execute_async_script('setTimeout(arguments[0], 300)')
         self.assertEqual(page.execute_script('return player.time()'), stopped)
