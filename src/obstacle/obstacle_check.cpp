@@ -1,5 +1,5 @@
-// One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for
-// each face; the others are tested exactly at t=0, then along the step against what the leaf exposes.
+// One body's step against a voxel surface. Features whose swept bounds reach no leaf cost one query of the tree for a
+// few faces together; the others are tested exactly at t=0, then along the step against what the leaf exposes.
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -71,21 +71,45 @@ std::uint8_t ObstacleCheck::Impl::nearBits(const Run& run, const KeyLanes& swept
   return NEAR | (reached.edge ? NEAR_EDGE : 0) | (at_start ? NEAR_START : 0);
 }
 
+/// The NEAR bits of faces that mostly lie side by side, where one look at all of them tells: they reach no leaf, or
+/// leaves during the step alone and no edge or corner. That some of them reach none is seen by their vertices.
+std::optional<std::uint8_t> ObstacleCheck::Impl::nearBitsOfAll(const Run& run, const Face* first,
+                                                               const Face* last) const {
+  std::uint8_t all_states = ACTIVE;
+  KeyLanes swept = unite(keys, *first), start = unite(start_keys, *first);
+  for (const Face* face = first; face != last; ++face) {
+    for (const Index v : *face) {
+      all_states &= state[v];
+      swept.include(keys[v]);
+      start.include(start_keys[v]);
+    }
+  }
+  if (!all_states || !VoxelTree::isSmall(swept.box())) return std::nullopt;
+  bool corner = false;
+  const std::uint8_t bits = nearBits(run, swept, start, corner);
+  return corner || (bits & ~NEAR) != 0 ? std::nullopt : std::optional(bits);
+}
+
 void ObstacleCheck::Impl::markNearFaces(const Run& run) {
   near_faces.clear();
   const std::vector<Face>& faces = run.query.topology.faces();
-  for (std::size_t f = 0; f < faces.size() && !isLate(run); ++f) {
-    const Face& face = faces[f];
-    // The other features of a face with an inactive vertex are looked at themselves.
-    std::uint8_t bits = NEAR | NEAR_EDGE | NEAR_START;
-    if (state[face[0]] & state[face[1]] & state[face[2]] & ACTIVE) {
-      bool corner = false;
-      bits = nearBits(run, unite(keys, face), unite(start_keys, face), corner);
-      if (bits == 0) continue;
-      const bool start = (bits & NEAR_START) != 0;
-      if (corner || start) near_faces.push_back({static_cast<Index>(f), corner, start});
+  for (std::size_t first = 0; first < faces.size() && !isLate(run); first += TOGETHER) {
+    const std::size_t last = std::min(first + TOGETHER, faces.size());
+    const std::optional<std::uint8_t> bits_of_all = nearBitsOfAll(run, &faces[first], &faces[0] + last);
+    if (bits_of_all == 0) continue;
+    for (std::size_t f = first; f < last; ++f) {
+      const Face& face = faces[f];
+      // The other features of a face with an inactive vertex are looked at themselves.
+      std::uint8_t bits = bits_of_all.value_or(NEAR | NEAR_EDGE | NEAR_START);
+      if (!bits_of_all && (state[face[0]] & state[face[1]] & state[face[2]] & ACTIVE)) {
+        bool corner = false;
+        bits = nearBits(run, unite(keys, face), unite(start_keys, face), corner);
+        if (bits == 0) continue;
+        const bool start = (bits & NEAR_START) != 0;
+        if (corner || start) near_faces.push_back({static_cast<Index>(f), corner, start});
+      }
+      for (const Index v : face) state[v] |= bits;
     }
-    for (const Index v : face) state[v] |= bits;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dccd/tolerances.h"
@@ -79,6 +80,8 @@ struct ObstacleCheck::Impl {
   void prepareVertices(const Run& run);
   /// What the keys of a face or an edge reach, as NEAR bits for its vertices; corner: also a corner.
   std::uint8_t nearBits(const Run& run, const KeyLanes& swept, const KeyLanes& start, bool& corner) const;
+  static constexpr std::size_t TOGETHER = 8;  ///< faces that are looked at together first
+  std::optional<std::uint8_t> nearBitsOfAll(const Run& run, const Face* first, const Face* last) const;
   void markNearFaces(const Run& run);
   void markNearEdges(const Run& run);
   void runVertices(const Run& run);
@@ -96,7 +99,7 @@ struct ObstacleCheck::Impl {
     setInitial(contact);
     contacts.push_back(contact);
   }
-  void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
+  void vertexPath(const Run& run, Index vertex, std::uint32_t leaf, const LeafBox& box);
   void vertexSeparation(const Run& run, Index vertex, std::uint32_t leaf, bool inside);
   void edgePairs(const Run& run, const Edge& edge, const VertexMotion* points, const MovingBounds& moving,
                  double separation_m, std::uint32_t leaf, bool inside);

@@ -121,9 +121,11 @@ void ObstacleCheck::Impl::findLeaves(const Run& run, const KeyBox& box) {
 
 void ObstacleCheck::Impl::sortLeaves(const VoxelSurface::Impl& surface, std::vector<std::uint32_t>& list) {
   if (list.size() < 2) return;
-  const std::vector<OccupiedLeaf>& leaves = surface.tree.leaves();
-  std::sort(list.begin(), list.end(),
-            [&leaves](std::uint32_t a, std::uint32_t b) { return leaves[a].min < leaves[b].min; });
+  const auto key = [&](std::uint32_t leaf) {  // as one number: to compare three takes branches
+    const VoxelKey& min = surface.tree.leaves()[leaf].min;
+    return std::uint64_t{min.x} << 32 | std::uint64_t{min.y} << 16 | min.z;
+  };
+  std::sort(list.begin(), list.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
 }
 
 /// A feature that lies in an axis plane and moves along that axis alone (level cloth that is let fall, a level plate
@@ -156,43 +158,51 @@ void ObstacleCheck::Impl::runVertices(const Run& run) {
   for (const Index v : run.query.topology.usedVertices()) {
     if ((state[v] & (ACTIVE | NEAR)) != (ACTIVE | NEAR)) continue;
     if (isLate(run)) return;
-    findLeaves(run, keys[v].box());
+    near_leaves.clear();
+    run.surface->tree.visitLeaves(keys[v].box(), [&](std::uint32_t leaf) { return addNear(run, leaf); });
     if (near_leaves.empty()) continue;
+    const bool separate = separationOf(run, std::array<Index, 1>{v}) > 0;
+    if (separate && !late) sortLeaves(*run.surface, near_leaves);
     tellObserver(run, std::array<Index, 1>{v});
     run.stats->pairs_in += near_leaves.size();
-    const double* p0 = run.query.map_t0[v].data();
+    const Vec3 &p0 = run.query.map_t0[v], &p1 = run.query.map_t1[v];
+    const bool moves = p0 != p1;
+    const std::size_t first_contact = vertex_contacts.size();
     std::size_t apart = 0;
     for (const std::uint32_t leaf : near_leaves) {
-      if (isLate(run)) return;
-      if (!pointInBox(p0, leafBox(run.surface->tree.leaves()[leaf], resolution))) {
-        near_leaves[apart++] = leaf;
+      if (isLate(run)) break;
+      const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], resolution);
+      if (pointInBox(p0.data(), box)) {
+        state[v] |= INSIDE;
+        addInitial(run, PairKind::VERTEX_VOXEL_FACE, std::array<Index, 1>{v}, leaf, vertex_contacts);
+      } else if (!(run.surface->features[leaf] & FACE_MASK)) {
         continue;
+      } else if (separate) {
+        near_leaves[apart++] = leaf;
+      } else if (moves) {
+        vertexPath(run, v, leaf, box);
       }
-      state[v] |= INSIDE;
-      addInitial(run, PairKind::VERTEX_VOXEL_FACE, std::array<Index, 1>{v}, leaf, vertex_contacts);
     }
-    if (!(state[v] & MOVES)) continue;
     const bool inside = (state[v] & INSIDE) != 0;
+    // Vertices are ascending: where isLate() has sorted what was found, this one's are still the last.
+    const auto found = vertex_contacts.begin() + static_cast<std::ptrdiff_t>(first_contact);
+    if (!inside) std::for_each(found, vertex_contacts.end(), [](Contact& contact) { contact.leaving = false; });
+    if (!separate) std::sort(found, vertex_contacts.end(), canonicalLess);  // fewer than the leaves
     for (std::size_t i = 0; i < apart; ++i) {
       if (isLate(run)) return;
-      if (!(run.surface->features[near_leaves[i]] & FACE_MASK)) continue;
-      if (separationOf(run, std::array<Index, 1>{v}) > 0) {
-        vertexSeparation(run, v, near_leaves[i], inside);
-      } else if (run.query.map_t0[v] != run.query.map_t1[v]) {
-        vertexPath(run, v, near_leaves[i], inside);
-      }
+      vertexSeparation(run, v, near_leaves[i], inside);
     }
   }
 }
 
-void ObstacleCheck::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, bool inside) {
-  const LeafBox box = leafBox(run.surface->tree.leaves()[leaf], run.surface->resolution_m);
+/// leaving: of a vertex that started inside of something.
+void ObstacleCheck::Impl::vertexPath(const Run& run, Index vertex, std::uint32_t leaf, const LeafBox& box) {
   const FaceHit hit = firstFaceHit(run.query.map_t0[vertex].data(), run.query.map_t1[vertex].data(), box,
                                    run.surface->features[leaf] & FACE_MASK);
   if (!hit.hit) return;
   Contact contact = contactOf(run, PairKind::VERTEX_VOXEL_FACE, leaf);
   contact.vertex[0] = vertex;
-  contact.leaving = inside && hit.outward;
+  contact.leaving = hit.outward;
   setTime(contact, hit.time);
   vertex_contacts.push_back(contact);
 }

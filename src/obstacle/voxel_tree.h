@@ -103,6 +103,10 @@ class VoxelTree {
     bool leaf = false, edge = false, corner = false;
   };
   Reached reached(const KeyBox& box) const;
+  /// Does it span less than a node of level 1 along each axis?
+  static bool isSmall(const KeyBox& box) {
+    return box.hi[0] - box.lo[0] < 16 && box.hi[1] - box.lo[1] < 16 && box.hi[2] - box.lo[2] < 16;
+  }
   bool reachesLeaf(const KeyBox& box) const;
 
  private:
@@ -234,8 +238,7 @@ bool VoxelTree::visitSmall(const Node& node, const std::array<std::int32_t, 3>& 
 
 template <class Visit>
 bool VoxelTree::visitNodes(const KeyBox& box, Visit&& visit) const {
-  if (levels_with_leaves_ < 4 && box.hi[0] - box.lo[0] < 16 && box.hi[1] - box.lo[1] < 16 &&
-      box.hi[2] - box.lo[2] < 16) {  // the common case: small box, small leaves
+  if (levels_with_leaves_ < 4 && isSmall(box)) {  // the common case: small box, small leaves
     for (std::int32_t z = box.lo[2] >> 4; z <= box.hi[2] >> 4; ++z) {
       for (std::int32_t y = box.lo[1] >> 4; y <= box.hi[1] >> 4; ++y) {
         for (std::int32_t x = box.lo[0] >> 4; x <= box.hi[0] >> 4; ++x) {

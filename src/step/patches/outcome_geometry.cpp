@@ -148,7 +148,7 @@ void contactGeometries(const Outcome& outcome, std::size_t first, std::size_t la
     one.approach_speed = block.approach_speed[lane];
   };
   const auto other = [&](std::size_t c) { out[c - first] = contactGeometry(outcome, outcome.contacts[c]); };
-  inLanes(outcome, first, last, simd::touchGeometry, use, other);
+  inLanes<false>(outcome, first, last, simd::touchGeometry, use, other);
 }
 
 Vec3 vertexAtContact(const Outcome& outcome, const Contact& contact, int i) {

@@ -10,6 +10,8 @@
 namespace dccd {
 namespace {
 
+constexpr std::size_t AHEAD = 8;  // touches that are fetched from memory
+
 Vec3 along(const Body& body, Index v, double toc) {
   const Vec3 &from = (*body.t0)[v], &to = (*body.t1)[v];
   return toc == 0 ? from : Vec3(from + toc * (to - from));
@@ -48,12 +50,20 @@ void PatchMaker::begin(const Outcome& outcome) {
   graph_.setBodies(outcome.step->bodies);
   contacts_ = outcome.contacts.size();
   releaseBurst(places_);
-  touches_.resize(contacts_);
   places_.resize(contacts_);
-  touches_.reserve(contacts_ + outcome.intersections.size());
-  for (const StartIntersection& crossing : outcome.intersections) {
-    // A vertex inside of the map is a contact as well; a body inside of another touches nothing.
-    if (crossing.vertex[4] != NO_INDEX) touches_.push_back(graph_.touchOf(crossing));
+  // They come first: a vertex inside of the map is a contact as well, and a body inside of another touches nothing.
+  const auto& met = outcome.intersections;
+  const auto crosses = [](const StartIntersection& one) { return one.vertex[4] != NO_INDEX; };
+  const auto crossings = std::partition_point(met.begin(), met.end(), crosses) - met.begin();
+  touches_.resize(contacts_ + static_cast<std::size_t>(crossings));
+}
+
+void PatchMaker::findTouches(const Outcome& outcome, std::size_t first, std::size_t last) {
+  // In place: a copy would wait for bytes to be joined to words.
+  for (std::size_t t = first; t < last; ++t) {
+    void* const at = &touches_[t];
+    t < contacts_ ? new (at) Touch(graph_.touchOf(outcome.contacts[t]))
+                  : new (at) Touch(graph_.touchOf(outcome.intersections[t - contacts_]));
   }
 }
 
@@ -74,12 +84,12 @@ PatchMaker::Place PatchMaker::placeOf(const Outcome& outcome, const Contact& con
   return {geometry.point, geometry.normal};
 }
 
-PatchMaker::Place PatchMaker::placeOfCrossing(const Outcome& outcome, const Touch& touch) const {
+Vec3 PatchMaker::pointOfCrossing(const Outcome& outcome, const Touch& touch) const {
   const auto at = [&](int i, int side) -> const Vec3& {
     return (*outcome.step->bodies[touch.body[side]].t0)[touch.point[i] - graph_.firstVertex(touch.body[side])];
   };
   const Vec3 &f0 = at(2, 1), &f1 = at(3, 1), &f2 = at(4, 1);
-  return {throughPlane(at(0, 0), at(1, 0), f0, (f1 - f0).cross(f2 - f0)), Vec3::Zero()};
+  return throughPlane(at(0, 0), at(1, 0), f0, (f1 - f0).cross(f2 - f0));
 }
 
 void PatchMaker::findPlaces(const Outcome& outcome, std::size_t piece) {
@@ -87,7 +97,7 @@ void PatchMaker::findPlaces(const Outcome& outcome, std::size_t piece) {
     places_[c] = {laneOf(block.point, lane), laneOf(block.normal, lane)};
   };
   const auto other = [&](std::size_t c) { places_[c] = placeOf(outcome, outcome.contacts[c]); };
-  inLanes(outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces, use, other);
+  inLanes<true>(outcome, piece * PIECE, std::min(contacts_, (piece + 1) * PIECE), simd::touchPlaces, use, other);
 }
 
 /// As near as a voxel is large: on its cube, where the feature is nearest to its centre, with the normal from there.
@@ -122,43 +132,54 @@ PatchMaker::Place PatchMaker::placeOnMap(const Outcome& outcome, const Contact& 
 
 void PatchMaker::measure(const Outcome& outcome, std::size_t piece) {
   const std::size_t end = std::min(touches_.size(), (piece + 1) * PIECE);
-  std::uint32_t p = NO_PATCH;
-  bool crosses_alone = false;  // only then do crossings say where the patch is
-  Vec3 first_normal = Vec3::Zero();
-  for (std::size_t i = piece * PIECE; i < end; ++i) {
-    const std::uint32_t t = order_[i];
-    const Touch& touch = touches_[t];
-    if ((*patch_of_)[t] != p) {
-      p = (*patch_of_)[t];
-      const std::uint32_t first = order_[begin_[p]];
-      crosses_alone = first >= contacts_;
-      if (!crosses_alone) first_normal = places_[first].normal;
-    }
+  for (std::size_t i = piece * PIECE; i < end;) {
+    const std::uint32_t p = (*patch_of_)[order_[i]], first = order_[begin_[p]];
+    const bool crosses_alone = first >= contacts_;  // only then do crossings say where the patch is
+    const Vec3 first_normal = crosses_alone ? Vec3(Vec3::Zero()) : places_[first].normal;
     Part& part = parts_[piece + p];
-    part.expected += touch.expected;
-    if (!touch.expected) (touch.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
-    if (touch.kind == Touch::CROSSING) {
-      ++part.crossings;
-      part.toc_lower = part.toc_upper = 0;
-      if (!crosses_alone) continue;
+    for (const std::size_t end_of_patch = std::min<std::size_t>(end, begin_[p + 1]); i < end_of_patch; ++i) {
+      const std::uint32_t t = order_[i], ahead = order_[std::min(i + AHEAD, end - 1)];
+      if (ahead < contacts_) {
+        __builtin_prefetch(&places_[ahead]);
+        __builtin_prefetch(&outcome.contacts[ahead]);
+      }
+      if (t < contacts_) {
+        addContact(outcome.contacts[t], places_[t], first_normal, part);
+      } else {
+        addCrossing(outcome, touches_[t], crosses_alone, part);
+      }
     }
-    const Place at = t < contacts_ ? places_[t] : placeOfCrossing(outcome, touch);
-    part.centroid += at.point;
-    part.box.min = part.box.min.cwiseMin(at.point);
-    part.box.max = part.box.max.cwiseMax(at.point);
-    // Of a body with itself neither side is the first: all are turned to the side of the first one.
-    const bool self = touch.body[0] == touch.body[1];
-    const bool turned = self ? first_normal.dot(at.normal) < 0 : touch.body[0] > touch.body[1];
-    part.normal += turned ? Vec3(-at.normal) : at.normal;
-    if (touch.kind == Touch::CROSSING) continue;
-    const Contact& contact = outcome.contacts[t];
-    if (part.contacts == 0 || isEarlier(contact, part.earliest)) part.earliest = contact;
-    ++part.contacts;
-    part.certain += touch.certain;
-    part.initial += touch.initial;
-    part.toc_lower = std::min(part.toc_lower, contact.toc_lower);
-    part.toc_upper = std::min(part.toc_upper, contact.toc_upper);
   }
+}
+
+void PatchMaker::addContact(const Contact& contact, const Place& at, const Vec3& first_normal, Part& part) {
+  part.expected += contact.expected;
+  if (!contact.expected) (contact.initial ? part.unexpected.is_initial : part.unexpected.is_new) = true;
+  part.centroid += at.point;
+  part.box.min = part.box.min.cwiseMin(at.point);
+  part.box.max = part.box.max.cwiseMax(at.point);
+  // Of a body with itself neither side is the first: all are turned to the side of the first one.
+  const bool self = contact.body[0] == contact.body[1];
+  const bool turned = self ? first_normal.dot(at.normal) < 0 : contact.body[0] > contact.body[1];
+  part.normal += turned ? Vec3(-at.normal) : at.normal;
+  if (part.contacts == 0 || isEarlier(contact, part.earliest)) part.earliest = contact;
+  ++part.contacts;
+  part.certain += contact.certainty == Certainty::CERTAIN;
+  part.initial += contact.initial;
+  part.toc_lower = std::min(part.toc_lower, contact.toc_lower);
+  part.toc_upper = std::min(part.toc_upper, contact.toc_upper);
+}
+
+void PatchMaker::addCrossing(const Outcome& outcome, const Touch& touch, bool alone, Part& part) const {
+  part.expected += touch.expected;
+  if (!touch.expected) part.unexpected.is_initial = true;
+  ++part.crossings;
+  part.toc_lower = part.toc_upper = 0;
+  if (!alone) return;
+  const Vec3 point = pointOfCrossing(outcome, touch);
+  part.centroid += point;
+  part.box.min = part.box.min.cwiseMin(point);
+  part.box.max = part.box.max.cwiseMax(point);
 }
 
 void PatchMaker::make(Outcome& outcome) {
@@ -223,29 +244,26 @@ void PatchMaker::findAreas(const Outcome& outcome) {
 
 void PatchMaker::findSpots() {
   seen_.assign(graph_.vertexCount(), {NO_PATCH, 0});
-  std::uint32_t patch = NO_PATCH;
-  bool some_expected = false;  // of the patch's spots
-  for (const std::uint32_t t : order_) {
-    const Touch& touch = touches_[t];
-    if ((*patch_of_)[t] != patch) {
-      patch = (*patch_of_)[t];
-      some_expected = false;
-    }
-    const int first = touch.firstSize(), all = first + touch.secondSize();
-    for (int i = 0; i < all; ++i) {
-      const Index vertex = touch.point[i];
-      Seen& seen = seen_[vertex];
-      if (seen.patch == patch) {
-        if (some_expected && !touch.expected) spots_[seen.spot].expected = false;
-        continue;
+  for (std::uint32_t patch = 0; patch < graph_.componentCount(); ++patch) {
+    bool some_expected = false;  // of the patch's spots
+    for (std::uint32_t k = begin_[patch]; k < begin_[patch + 1]; ++k) {
+      const Touch& touch = touches_[order_[k]];
+      const int first = touch.firstSize(), all = touch.size();
+      for (int i = 0; i < all; ++i) {
+        const Index vertex = touch.point[i];
+        Seen& seen = seen_[vertex];
+        if (seen.patch == patch) {
+          if (some_expected && !touch.expected) spots_[seen.spot].expected = false;
+          continue;
+        }
+        seen = {patch, static_cast<std::uint32_t>(spots_.size())};
+        some_expected = some_expected || touch.expected;
+        const bool is_first = i < first;
+        const Index across = touch.onMap() ? NO_INDEX : touch.point[is_first ? first : 0];
+        const auto side =
+            static_cast<std::uint8_t>(touch.body[is_first ? 0 : 1] != std::min(touch.body[0], touch.body[1]));
+        spots_.push_back({vertex, across, patch, side, touch.expected});
       }
-      seen = {patch, static_cast<std::uint32_t>(spots_.size())};
-      some_expected = some_expected || touch.expected;
-      const bool is_first = i < first;
-      const Index across = touch.onMap() ? NO_INDEX : touch.point[is_first ? first : 0];
-      const auto side =
-          static_cast<std::uint8_t>(touch.body[is_first ? 0 : 1] != std::min(touch.body[0], touch.body[1]));
-      spots_.push_back({vertex, across, patch, side, touch.expected});
     }
   }
 }

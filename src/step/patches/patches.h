@@ -31,9 +31,7 @@ class PatchMaker {
   template <class Parallel>
   void run(const Parallel& parallel, Outcome& outcome) {
     begin(outcome);
-    parallel(contacts_, PIECE, [&](std::size_t first, std::size_t last) {
-      for (std::size_t c = first; c < last; ++c) touches_[c] = graph_.touchOf(outcome.contacts[c]);
-    });
+    parallel(touches_.size(), PIECE, [&](std::size_t first, std::size_t last) { findTouches(outcome, first, last); });
     // The first piece of work is of another kind, and as long as several of the others. Few are not worth a thread.
     const std::size_t grain = touches_.size() < PIECE ? 2 : 1;
     parallel(piecesOf(contacts_) + 1, grain, [&](std::size_t first, std::size_t last) {
@@ -61,16 +59,22 @@ class PatchMaker {
   struct Place {
     Vec3 point, normal;
   };
+  struct Part : Patch {
+    PatchUnexpected unexpected;
+  };
 
   void begin(const Outcome& outcome);
+  void findTouches(const Outcome& outcome, std::size_t first, std::size_t last);
   void connect();
   static std::size_t piecesOf(std::size_t count) { return (count + PIECE - 1) / PIECE; }
   std::size_t pieces() const { return piecesOf(touches_.size()); }
   void findPlaces(const Outcome& outcome, std::size_t piece);
   Place placeOf(const Outcome& outcome, const Contact& contact) const;
-  Place placeOfCrossing(const Outcome& outcome, const Touch& touch) const;
+  Vec3 pointOfCrossing(const Outcome& outcome, const Touch& touch) const;
   Place placeOnMap(const Outcome& outcome, const Contact& contact) const;
   void measure(const Outcome& outcome, std::size_t piece);
+  static void addContact(const Contact& contact, const Place& at, const Vec3& first_normal, Part& part);
+  void addCrossing(const Outcome& outcome, const Touch& touch, bool alone, Part& part) const;
   void findAreas(const Outcome& outcome);
   void findSpots();
   void findVertexAreas(const Step& step);
@@ -83,9 +87,6 @@ class PatchMaker {
   const std::vector<std::uint32_t>* patch_of_ = nullptr;
   std::vector<std::uint32_t> order_;  // the touches, patch by patch, each patch's ascending
   std::vector<std::uint32_t> begin_;  // per patch, in order_
-  struct Part : Patch {
-    PatchUnexpected unexpected;
-  };
   /// What a piece of order_ gives to a patch: that of piece i to patch p is at i + p, since in order_ with each of them
   /// either i or p goes on.
   std::vector<Part> parts_;

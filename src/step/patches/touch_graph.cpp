@@ -8,8 +8,6 @@
 namespace dccd {
 namespace {
 
-constexpr std::uint32_t AHEAD = 8;  // vertices whose neighbours are fetched from memory
-
 constexpr std::uint8_t kindOf(PairKind kind) { return static_cast<std::uint8_t>(kind); }
 
 }  // namespace
@@ -46,7 +44,8 @@ void TouchGraph::setBodies(const std::vector<Body>& bodies) {
   for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) {
     neighbours_[--neighbours_begin_[(*edge)[1]]] = (*edge)[0];
   }
-  place_.assign(vertexCount(), NO_INDEX);
+  is_touched_.assign(vertexCount(), false);
+  area_.resize(vertexCount());
 }
 
 Touch TouchGraph::touchOf(const Contact& contact) const {
@@ -79,7 +78,9 @@ void TouchGraph::findGroups(const std::vector<Touch>& touches) {
   groups_.clear();
   for (std::uint32_t t = 0; t < touches.size(); ++t) {
     const Touch& touch = touches[t];
-    if (t == 0 || touch.kind != touches[t - 1].kind || touch.body != touches[t - 1].body) {
+    const auto& body = touch.body;
+    if (t == 0 || touch.kind != touches[t - 1].kind || body[0] != touches[t - 1].body[0] ||
+        body[1] != touches[t - 1].body[1]) {
       const auto [low, high] = std::minmax(touch.body[0], touch.body[1]);
       groups_.push_back({{low, high}, t, t});
     }
@@ -90,49 +91,43 @@ void TouchGraph::findGroups(const std::vector<Touch>& touches) {
   });
 }
 
-std::uint32_t TouchGraph::areaRoot(std::uint32_t place) {
-  while (area_[place] != place) place = area_[place] = area_[area_[place]];
-  return place;
+Index TouchGraph::areaRoot(Index vertex) {
+  while (area_[vertex] != vertex) vertex = area_[vertex] = area_[area_[vertex]];
+  return vertex;
 }
 
 /// The vertices that touch the partner, joined where an edge of the mesh joins them.
 void TouchGraph::findAreas(const std::vector<Touch>& touches, const Group* first, const Group* last) {
   for (const Group* group = first; group != last; ++group) {
-    const int first_size = touches[group->first].firstSize();
-    const int size = first_size + touches[group->first].secondSize();
+    const int size = touches[group->first].size();
     for (std::uint32_t t = group->first; t < group->last; ++t) {
-      // In their order most have the first feature of the one before.
-      const auto& point = touches[t].point;
-      const bool same_first =
-          t > group->first && std::equal(point.begin(), point.begin() + first_size, touches[t - 1].point.begin());
-      for (int i = same_first ? first_size : 0; i < size; ++i) {
-        std::uint32_t& place = place_[point[i]];
-        if (place != NO_INDEX) continue;
-        place = static_cast<std::uint32_t>(touched_.size());
-        touched_.push_back(point[i]);
-        area_.push_back(place);
-      }
+      for (int i = 0; i < size; ++i) is_touched_[touches[t].point[i]] = true;
     }
   }
-  for (std::uint32_t i = 0; i < touched_.size(); ++i) {
-    const Index vertex = touched_[i];
-    // They lie anywhere in memory, which the rest of the step has taken out of the caches.
-    if (i + AHEAD < touched_.size()) {
-      __builtin_prefetch(&neighbours_[neighbours_begin_[touched_[i + AHEAD]]]);
-      __builtin_prefetch(&neighbours_begin_[touched_[std::min<std::size_t>(i + 2 * AHEAD, touched_.size() - 1)]]);
-    }
-    std::uint32_t root = areaRoot(i);
+  const auto [low, high] = first->partners;
+  findAreasOf(low);
+  if (high != low && high != OBSTACLE_BODY) findAreasOf(high);
+}
+
+void TouchGraph::findAreasOf(std::size_t body) {
+  const Index begin = vertex_begin_[body], end = vertex_begin_[body + 1];
+  for (Index vertex = begin; vertex < end; ++vertex) {
+    if (!is_touched_[vertex]) continue;
+    Index root = area_[vertex] = vertex;
     for (std::uint32_t n = neighbours_begin_[vertex]; n < neighbours_begin_[vertex + 1]; ++n) {
       const Index other = neighbours_[n];
       if (other > vertex) break;  // that one comes to this
-      if (place_[other] == NO_INDEX) continue;
-      const std::uint32_t other_root = areaRoot(place_[other]);
+      if (!is_touched_[other]) continue;
+      const Index other_root = areaRoot(other);
       area_[std::max(root, other_root)] = std::min(root, other_root);
       root = std::min(root, other_root);
     }
   }
-  // No place is before the first one of its area.
-  for (std::uint32_t& area : area_) area = area_[area];
+  for (Index vertex = begin; vertex < end; ++vertex) {
+    if (!is_touched_[vertex]) continue;
+    area_[vertex] = area_[area_[vertex]];  // no vertex is before the first one of its area
+    is_touched_[vertex] = false;
+  }
 }
 
 /// Touches between the same two areas are one component.
@@ -144,7 +139,7 @@ void TouchGraph::nameComponents(const std::vector<Touch>& touches, const Group* 
     const Touch& any = touches[group->first];
     const int second = any.onMap() ? 0 : any.firstSize();
     for (std::uint32_t t = group->first; t < group->last; ++t) {
-      const auto [low, high] = std::minmax(area_[place_[touches[t].point[0]]], area_[place_[touches[t].point[second]]]);
+      const auto [low, high] = std::minmax(area_[touches[t].point[0]], area_[touches[t].point[second]]);
       const std::uint64_t areas = std::uint64_t{low} << 32 | high;
       if (by_areas_.empty() || areas != last_areas) {
         const auto [at, is_new] = by_areas_.try_emplace(areas, component_count_);
@@ -168,10 +163,8 @@ const std::vector<std::uint32_t>& TouchGraph::components(const std::vector<Touch
   const Group* const end = groups_.data() + groups_.size();
   for (const Group *first = groups_.data(), *last = first; first != end; first = last) {
     last = std::find_if(first, end, [&](const Group& group) { return group.partners != first->partners; });
-    empty(touched_, area_);
     findAreas(touches, first, last);
     nameComponents(touches, first, last);
-    for (const Index vertex : touched_) place_[vertex] = NO_INDEX;
   }
   // In the order of their first touches.
   number_.assign(component_count_, NO_INDEX);

@@ -33,6 +33,7 @@ struct Touch {
   /// How many vertices are on its sides; a leaf has none.
   int firstSize() const { return sizes()[0]; }
   int secondSize() const { return sizes()[1]; }
+  int size() const { return firstSize() + secondSize(); }
   const std::array<std::uint8_t, 2>& sizes() const {
     return kind < CROSSING ? PAIR_KINDS[kind].vertices : MORE_SIZES[kind - CROSSING];
   }
@@ -70,7 +71,8 @@ class TouchGraph {
 
   void findGroups(const std::vector<Touch>& touches);
   void findAreas(const std::vector<Touch>& touches, const Group* first, const Group* last);
-  std::uint32_t areaRoot(std::uint32_t place);
+  void findAreasOf(std::size_t body);
+  Index areaRoot(Index vertex);
   void nameComponents(const std::vector<Touch>& touches, const Group* first, const Group* last);
 
   std::vector<std::shared_ptr<const Topology>> topologies_;
@@ -79,9 +81,8 @@ class TouchGraph {
 
   std::vector<Group> groups_;  // by partners
   // Of the same two partners.
-  std::vector<Index> touched_;        // vertices
-  std::vector<std::uint32_t> place_;  // per vertex: where it is in touched_, or NO_INDEX
-  std::vector<std::uint32_t> area_;   // per touched one, one of its area: in the end the first of them
+  std::vector<std::uint8_t> is_touched_;  // per vertex; between two runs none is
+  std::vector<Index> area_;               // per touched vertex, one of its area: in the end the first of them
   std::unordered_map<std::uint64_t, std::uint32_t> by_areas_;
   std::vector<std::uint32_t> component_, number_;
   std::uint32_t component_count_ = 0;

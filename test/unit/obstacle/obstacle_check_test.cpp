@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "dccd/voxel_surface.h"
 
@@ -149,6 +150,33 @@ TEST(ObstacleCheck, WhatPassesThroughIsNotLeavingWhatItWasNotIn) {
   const Answer through = run(*surface, ROPE, {{-1, 0.5, 0.5}, {-1, 0.5, 5}}, {{3, 0.5, 0.5}, {-1, 0.5, 5}});
   ASSERT_GE(through.contacts.size(), 2u);
   for (const Contact& contact : through.contacts) EXPECT_FALSE(contact.leaving) << contact.voxel.x;
+}
+
+TEST(ObstacleCheck, AWallThroughAPlateStartsInsideWithTheEdgesThatPierceIt) {
+  // The plate is one voxel thick and its rim far away: what is near the wall's faces has no edge and no corner.
+  std::vector<OccupiedLeaf> leaves;
+  for (int i = 0; i < 20 * 20; ++i) leaves.push_back(leafAt(32768 + i % 20, 32768 + i / 20, 32768));
+  constexpr Index COLUMNS = 9;
+  Positions wall;  // below, above, below, …
+  std::vector<Face> faces;
+  for (Index i = 0; i < COLUMNS; ++i) {
+    for (const double z : {-0.5, 1.5}) wall.emplace_back(5.5 + i, 9.5, z);
+    if (i == 0) continue;
+    faces.push_back({2 * i - 2, 2 * i, 2 * i - 1});
+    faces.push_back({2 * i - 1, 2 * i, 2 * i + 1});
+  }
+  std::set<std::array<Index, 2>> piercing, found;
+  for (Index i = 0; i < COLUMNS; ++i) {
+    piercing.insert({2 * i, 2 * i + 1});
+    if (i > 0) piercing.insert({2 * i - 1, 2 * i});
+  }
+  const Answer answer = run(*unitVoxels(leaves), Topology::fromTriangles(wall.size(), faces), wall, wall);
+  for (const Contact& contact : answer.contacts) {
+    EXPECT_EQ(contact.kind, PairKind::EDGE_VOXEL_EDGE);
+    EXPECT_TRUE(contact.initial);
+    found.insert({contact.vertex[0], contact.vertex[1]});
+  }
+  EXPECT_EQ(found, piercing);
 }
 
 TEST(ObstacleCheck, InteriorLeavesHoldWhatStartsInThem) {
