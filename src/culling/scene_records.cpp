@@ -39,19 +39,37 @@ void checkPositions(const SceneBody& body, const Body& motion) {
                               " and " + std::to_string(motion.t1 ? motion.t1->size() : 0));
 }
 
+/// Of one vertex or more, if all are finite: two at a time, so that coordinates lie in three pairs.
+bool spanFinite(const Positions& positions, Extent& extent) {
+  using Pair = Eigen::Array2d;
+  const auto pairAt = [](const double* at) -> Pair { return Eigen::Map<const Pair>(at); };
+  const Vec3& last = positions.back();
+  Pair lo_xy = last.head<2>(), lo_zx(last.z(), last.x()), lo_yz = last.tail<2>();
+  Pair hi_xy = lo_xy, hi_zx = lo_zx, hi_yz = lo_yz, sum = lo_xy + lo_yz;
+  const double* at = positions.front().data();
+  for (std::size_t two = positions.size() / 2; two > 0; --two, at += 6) {
+    const Pair xy = pairAt(at), zx = pairAt(at + 2), yz = pairAt(at + 4);
+    lo_xy = lo_xy.min(xy), lo_zx = lo_zx.min(zx), lo_yz = lo_yz.min(yz);
+    hi_xy = hi_xy.max(xy), hi_zx = hi_zx.max(zx), hi_yz = hi_yz.max(yz);
+    sum += (xy + zx) + yz;
+  }
+  extent.lo = {std::min(lo_xy[0], lo_zx[1]), std::min(lo_xy[1], lo_yz[0]), std::min(lo_zx[0], lo_yz[1])};
+  extent.hi = {std::max(hi_xy[0], hi_zx[1]), std::max(hi_xy[1], hi_yz[0]), std::max(hi_zx[0], hi_yz[1])};
+  return sum.isFinite().all();  // false, too, where a sum overflows, which costs time alone
+}
+
 Extent extentOf(const std::shared_ptr<const Positions>& positions) {
+  Extent finite{positions, Vec3::Zero(), Vec3::Zero(), true};
+  if (!positions->empty() && spanFinite(*positions, finite)) return finite;
   constexpr double MOST = std::numeric_limits<double>::infinity();
-  double lo[3] = {MOST, MOST, MOST}, hi[3] = {-MOST, -MOST, -MOST}, sum[3] = {};
+  double lo[3] = {MOST, MOST, MOST}, hi[3] = {-MOST, -MOST, -MOST};
   for (const Vec3& p : *positions) {
     for (int a = 0; a < 3; ++a) {
       lo[a] = p[a] < lo[a] ? p[a] : lo[a];
       hi[a] = p[a] > hi[a] ? p[a] : hi[a];
-      sum[a] += p[a];
     }
   }
-  // False, too, where the sum overflows, which costs time alone.
-  const bool is_finite = std::isfinite(sum[0]) && std::isfinite(sum[1]) && std::isfinite(sum[2]);
-  return {positions, Vec3(lo[0], lo[1], lo[2]), Vec3(hi[0], hi[1], hi[2]), is_finite};
+  return {positions, Vec3(lo[0], lo[1], lo[2]), Vec3(hi[0], hi[1], hi[2]), false};
 }
 
 bool sameDisplacement(const VertexMotion* vertices, std::size_t n) {
@@ -107,7 +125,7 @@ void SceneArrays::passByFar(const Step& step) {
   std::vector<Swept> swept;
   for (const SceneBody& body : bodies_) {
     Swept one{body.extents[0].lo.cwiseMin(body.extents[1].lo), body.extents[0].hi.cwiseMax(body.extents[1].hi)};
-    for (int a = 0; a < 3; ++a) {
+    for (int a = 0; a < 3 && body.reach_m > 0; ++a) {
       one.hi[a] = std::nextafter(one.hi[a] + 2 * body.reach_m, std::numeric_limits<double>::infinity());
     }
     swept.push_back(one);
@@ -248,12 +266,14 @@ void SceneArrays::closeCopy(SceneBody& body, const Body& motion, const std::arra
   }
 }
 
-/// Seams that hold are kept.
+/// Seams that hold are kept. A body beside which nothing is near has nobody inside, and is not asked.
 void SceneArrays::sew(SceneBody& body, const Body& motion, bool all_finite) const {
   if (body.unchanged && body.sewn_known) return;
-  body.sewn_known = all_finite;
+  const auto present =
+      std::count_if(bodies_.begin(), bodies_.end(), [](const SceneBody& one) { return !one.passed_by; });
+  body.sewn_known = all_finite && present > 1;
   body.sewn = false;
-  if (!all_finite || body.setup.topology->isClosed() || body.setup.shell || bodies_.size() < 2) return;
+  if (!all_finite || body.setup.topology->isClosed() || body.setup.shell || present < 2) return;
   if (body.seams.vertices.empty() || !hold(body.seams, *motion.t0, *motion.t1)) {
     body.seams = seamsOf(*body.setup.topology, *motion.t0, *motion.t1, body.seams);
     body.repeated_slot.clear();

@@ -243,7 +243,7 @@ void TransformFeed::forEachKept(const std::string& target, const std::string& so
   if (!findWay(target, source, parentOf)) return;
   for (const Chain* chain : {&from_target_, &from_source_}) {
     for (std::size_t i = 0; i + 1 < chain->size(); ++i) {
-      if (!(*chain)[i]->sent.empty()) take((*chain)[i]->sent);
+      if (!(*chain)[i]->sent.empty()) take(*(*chain)[i]);
     }
   }
 }
@@ -251,11 +251,15 @@ void TransformFeed::forEachKept(const std::string& target, const std::string& so
 std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, const std::string& source, StampNs from_ns,
                                                   StampNs to_ns) const {
   std::vector<StampNs> stamps;
-  forEachKept(target, source, [&](const std::map<StampNs, Sent>& kept) {
+  const std::tuple question(change_, from_ns, to_ns);
+  forEachKept(target, source, [&](const Frame& frame) {
+    if (frame.none_between == question) return;
+    const std::size_t before = stamps.size();
     // From the newest one back: what is asked for lies there.
-    for (auto it = kept.rbegin(); it != kept.rend() && it->first > from_ns; ++it) {
+    for (auto it = frame.sent.rbegin(); it != frame.sent.rend() && it->first > from_ns; ++it) {
       if (it->first < to_ns) stamps.push_back(it->first);
     }
+    if (stamps.size() == before) frame.none_between = question;
   });
   std::sort(stamps.begin(), stamps.end());
   stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
@@ -264,8 +268,8 @@ std::vector<StampNs> TransformFeed::stampsBetween(const std::string& target, con
 
 std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, const std::string& source) const {
   std::optional<StampNs> first;
-  forEachKept(target, source, [&](const std::map<StampNs, Sent>& kept) {
-    first = std::max(first.value_or(kept.begin()->first), kept.begin()->first);
+  forEachKept(target, source, [&](const Frame& frame) {
+    first = std::max(first.value_or(frame.sent.begin()->first), frame.sent.begin()->first);
   });
   return first;
 }
@@ -273,6 +277,13 @@ std::optional<StampNs> TransformFeed::firstStamp(const std::string& target, cons
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions) {
   if (target_from_source.matrix() == Eigen::Matrix4d::Identity()) return;  // keeps the bits
   for (Vec3& p : positions) p = target_from_source * p;
+}
+
+Positions transformed(const Eigen::Isometry3d& target_from_source, const Positions& positions) {
+  if (target_from_source.matrix() == Eigen::Matrix4d::Identity()) return positions;
+  Positions out(positions.size());
+  for (std::size_t v = 0; v < out.size(); ++v) out[v] = target_from_source * positions[v];
+  return out;
 }
 
 }  // namespace dccd

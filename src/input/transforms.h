@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -79,6 +80,7 @@ class TransformFeed {
     mutable std::uint64_t asked_change = 0;
     mutable StampNs asked_ns = 0;
     mutable Sent asked;
+    mutable std::tuple<std::uint64_t, StampNs, StampNs> none_between{};  ///< change_, and the stamps
   };
   /// From a frame up to an ancestor, the frame first and the ancestor last.
   using Chain = std::vector<const Frame*>;
@@ -110,5 +112,6 @@ class TransformFeed {
 };
 
 void transform(const Eigen::Isometry3d& target_from_source, Positions& positions);
+Positions transformed(const Eigen::Isometry3d& target_from_source, const Positions& positions);
 
 }  // namespace dccd

@@ -115,7 +115,7 @@ void MonitorPipeline::loadFiles() {
 MonitorPipeline::Rigid MonitorPipeline::rigidOf(const MeshResource& mesh) {
   Rigid rigid;
   rigid.mesh.topology = mesh.topology;
-  rigid.mesh.positions = mesh.positions;
+  rigid.reference = mesh.positions;
   rigid.mesh.dropped_faces = mesh.dropped_faces;
   rigid.mesh.rigid = true;
   return rigid;
@@ -128,7 +128,7 @@ void MonitorPipeline::setRigid(std::size_t body, const MeshResource& mesh) {
   rigid.frame = config.tf_frame;
   rigid.may_be_lost = !config.link.empty();
   const double radius_m = config.input.noise_radius_m;
-  if (radius_m > 0) rigid.mesh.radius_m.assign(rigid.mesh.positions.size(), radius_m);
+  if (radius_m > 0) rigid.mesh.radius_m.assign(rigid.reference.size(), radius_m);
 }
 
 std::string MonitorPipeline::expectedEntry(std::size_t expectation) const {

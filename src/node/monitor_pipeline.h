@@ -136,13 +136,14 @@ class MonitorPipeline {
   };
   /// What tf carries.
   struct Rigid {
-    MeshFrame mesh;  // as its file has it
+    MeshFrame mesh;       // as its file has it, but for
+    Positions reference;  // its positions
     std::string name, frame;
     Eigen::Isometry3d frame_from_mesh = Eigen::Isometry3d::Identity();
     bool may_be_lost = false;               // others go on without it
     bool lost = false;                      // it had no transform at the last frame
     std::optional<Eigen::Isometry3d> pose;  // the last one
-    bool isNone() const { return mesh.positions.empty(); }
+    bool isNone() const { return reference.empty(); }
   };
   struct Attached {
     AttachedObject object;

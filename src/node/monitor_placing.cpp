@@ -45,14 +45,14 @@ bool MonitorPipeline::placeOne(const Rigid& rigid, StampNs from_ns, StampNs stam
   if (!transforms_.lookup(fixed_frame_, rigid.frame, stamp_ns, frame.pose, reason)) {
     // It stays where it was, and all of it is unknown there: unchecked.
     frame.pose = rigid.pose.value_or(Eigen::Isometry3d::Identity());
-    for (Vec3& p : frame.positions) p.setConstant(std::numeric_limits<double>::quiet_NaN());
+    frame.positions.assign(rigid.reference.size(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
     frame.seen = {unknownAt(stamp_ns - 1)};
     reason = noTransform(rigid.frame, fixed_frame_, reason) + unusableTransforms() + "; body '" + rigid.name +
              "' is carried by it";
     return false;
   }
   frame.pose = frame.pose * rigid.frame_from_mesh;
-  transform(frame.pose, frame.positions);
+  frame.positions = transformed(frame.pose, rigid.reference);
   frame.seen = posesBetween(fixed_frame_, rigid.frame, from_ns, stamp_ns);
   for (SeenPose& seen : frame.seen) seen.pose = seen.pose * rigid.frame_from_mesh;
   return true;
@@ -80,14 +80,14 @@ bool MonitorPipeline::placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may
     std::string lost;
   };
   std::vector<Placed> all;
+  all.reserve(rigid_.size());
   for (std::size_t b = 0; b < rigid_.size(); ++b) {
     if (!rigid_[b]) continue;
-    Placed one{b, {}, {}};
+    Placed& one = all.emplace_back(Placed{b, {}, {}});
     if (!placeOne(*rigid_[b], clock_ns_, stamp_ns, one.frame, reason)) {
       if (!may_lose_links || !rigid_[b]->may_be_lost) return false;
       one.lost = reason;
     }
-    all.push_back(std::move(one));
   }
   for (Placed& one : all) pushRigid(one.body, std::move(one.frame), one.lost, now_ns);
   return true;

@@ -158,7 +158,7 @@ std::vector<std::string> excludedByChoice(const Options& options, const Step& st
     std::size_t count = 0;
     for (const Body& body : step.bodies) {
       if (!holds(body) || body.topology->vertexCount() == 0) continue;
-      names += (names.empty() ? "'" : ", '") + body.name + "'";
+      names.append(names.empty() ? "'" : ", '").append(body.name).append("'");
       ++count;
     }
     if (count > 0) excluded.push_back((count == 1 ? "body " : "bodies ") + names + ": " + what);

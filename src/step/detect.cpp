@@ -240,7 +240,7 @@ std::size_t History::Impl::neededParts(const Step& step, StepStats& stats) const
       std::count_if(step.bodies.begin(), step.bodies.end(), [](const Body& body) { return body.turns; });
   if (turning == 0) return 1;
   const Clock::time_point start = Clock::now();
-  const std::size_t needed = dccd::neededParts(step, options->rigid_tolerance_m);
+  const std::size_t needed = dccd::neededParts(step, options->rigid_tolerance_m, scene.bodies());
   stats[Effect::RIGID_BODIES] = {static_cast<std::uint64_t>(turning), 0, msSince(start)};
   return needed;
 }

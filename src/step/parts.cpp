@@ -51,14 +51,23 @@ Eigen::AlignedBox3d sweptBounds(const Step& step, const Body& body, double margi
 
 }  // namespace
 
-double partsFor(const Body& body, double pose_scale, double tolerance_m) {
-  const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1), radius = radiusOf(body);
+double partsFor(const Body& body, double pose_scale, double tolerance_m, const Extent* extent) {
+  const double angle = pose_scale * rotationAngle(body.pose_t0, body.pose_t1);
   // A chord leaves its arc by radius (1 - cos(angle / 2)) at most, which is the whole diameter from a full turn on.
-  if (radius * (1 - std::cos(std::min(angle, 2 * M_PI) / 2)) <= tolerance_m) return 1;
-  return std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius)));
+  const auto isStraight = [&](double radius) {
+    return radius * (1 - std::cos(std::min(angle, 2 * M_PI) / 2)) <= tolerance_m;
+  };
+  // The farthest corner of what its vertices span is no nearer than any of them, also as it is rounded.
+  if (extent && extent->of == body.t0 && extent->is_finite) {
+    const Vec3 centre = body.pose_t0.translation();
+    const Vec3 corner = (extent->lo - centre).cwiseAbs().cwiseMax((extent->hi - centre).cwiseAbs());
+    if (isStraight(corner.norm())) return 1;
+  }
+  const double radius = radiusOf(body);
+  return isStraight(radius) ? 1 : std::ceil(angle / (2 * std::acos(1 - tolerance_m / radius)));
 }
 
-std::size_t neededParts(const Step& step, double tolerance_m) {
+std::size_t neededParts(const Step& step, double tolerance_m, const std::vector<SceneBody>& before) {
   std::vector<std::optional<Eigen::AlignedBox3d>> bounds(step.bodies.size());
   const double margin_m = largestSeparation(step.bodies) + tolerance_m;  // the tolerance is far above all rounding
   const auto boundsOf = [&](std::size_t b) -> const Eigen::AlignedBox3d& {
@@ -77,7 +86,8 @@ std::size_t neededParts(const Step& step, double tolerance_m) {
   for (std::size_t b = 0; b < step.bodies.size(); ++b) {
     const Body& body = step.bodies[b];
     if (!body.turns) continue;
-    const double own = partsFor(body, step.pose_scale, tolerance_m);
+    const double own =
+        partsFor(body, step.pose_scale, tolerance_m, b < before.size() ? &before[b].extents[1] : nullptr);
     if (own > parts && isNear(b)) parts = own;
   }
   return parts < 1e9 ? static_cast<std::size_t>(parts) : static_cast<std::size_t>(1e9);

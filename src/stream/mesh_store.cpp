@@ -119,8 +119,13 @@ std::shared_ptr<const MeshFrame> MeshStore::previous() const {
 }
 
 std::size_t MeshStore::firstAtOrAfter(StampNs stamp_ns) const {
-  const auto it = std::lower_bound(frames_.begin(), frames_.end(), stamp_ns,
-                                   [](const Kept& kept, StampNs at) { return kept.frame->stamp_ns < at; });
+  const auto isBefore = [](const Kept& kept, StampNs at) { return kept.frame->stamp_ns < at; };
+  auto it = frames_.end();
+  // Most questions are about the newest frames; the others lie anywhere in memory.
+  for (int newest = 0; newest < 4 && it != frames_.begin() && !isBefore(*std::prev(it), stamp_ns); ++newest) --it;
+  if (it != frames_.begin() && !isBefore(*std::prev(it), stamp_ns)) {
+    it = std::lower_bound(frames_.begin(), it, stamp_ns, isBefore);
+  }
   return static_cast<std::size_t>(it - frames_.begin());
 }
 

@@ -86,11 +86,11 @@ void placeBetween(const std::shared_ptr<const MeshFrame>& from, const std::share
 
 Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, bool timed_out) {
   const MeshStore& store = stores[body];
-  const std::string name = "body '" + bodies[body].name + "' ";
+  const auto name = [&] { return "body '" + bodies[body].name + "' "; };  // most of the time nobody asks
   if (!isStream(body)) {
     if (!store.empty()) return Ready::YES;
     if (!timed_out) return Ready::WAIT;
-    drop(step, StepStatus::NO_BODY, name + "has not been received yet");
+    drop(step, StepStatus::NO_BODY, name() + "has not been received yet");
     return Ready::NEVER;
   }
   std::uint64_t run_t0 = 0;
@@ -98,7 +98,7 @@ Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, b
   if (at_t1 == Lookup::NOT_YET) {
     if (!timed_out) return Ready::WAIT;
     drop(step, StepStatus::NO_BODY,
-         name + (store.empty() ? "has not been received yet" : "has no frame at or after the end of the step"));
+         name() + (store.empty() ? "has not been received yet" : "has no frame at or after the end of the step"));
     return Ready::NEVER;
   }
   const Lookup at_t0 = store.lookup(step.from->stamp_ns, &run_t0);
@@ -107,7 +107,7 @@ Monitor::Impl::Ready Monitor::Impl::placeable(std::size_t body, Pending& step, b
   }
   if (at_t1 == Lookup::READY) told_runs[body] = runs[body];
   drop(step, store.runReason() == StepStatus::FIRST_FRAME ? StepStatus::NO_BODY : store.runReason(),
-       name + "has no unbroken frames around the step (" + toString(store.runReason()) + ")");
+       name() + "has no unbroken frames around the step (" + toString(store.runReason()) + ")");
   return Ready::NEVER;
 }
 

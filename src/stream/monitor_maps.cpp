@@ -1,4 +1,5 @@
 // Which map a step has: the newest one whose own voxels can be told, with the one that is trusted.
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -66,6 +67,7 @@ std::vector<TrackedBody> Monitor::Impl::tracked() const {
 /// Until when the bodies' ways are known. Of several maps up to then each is looked at, and the newest is in force.
 void Monitor::Impl::takeMaps(StampNs known_until_ns) {
   own_voxels_ms = 0;
+  if (maps_to_come.empty() && std::any_of(bodies.begin(), bodies.end(), ownsVoxels)) return;
   const std::vector<TrackedBody> bodies_tracked = tracked();
   std::size_t taken = maps_to_come.size();
   while (taken > 0 && !bodies_tracked.empty() && maps_to_come[taken - 1].map.stamp_ns > known_until_ns) --taken;

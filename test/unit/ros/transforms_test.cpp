@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
 #include <random>
 
 namespace dccd {
@@ -112,9 +114,30 @@ TEST_F(Transforms, StampsAndTheFirstOneAreThoseOfTheWayBetweenTheTwoFrames) {
   EXPECT_EQ(feed.stampsBetween("tool", "world", START, START + 20 * MS), after({4, 10}));
   EXPECT_EQ(feed.stampsBetween("world", "base", START, START + 30 * MS), after({})) << "static";
   EXPECT_EQ(feed.stampsBetween("world", "camera", START + 30 * MS, START), after({})) << "the wrong way round";
+  for (int again = 0; again < 2; ++again)
+    EXPECT_EQ(feed.stampsBetween("base", "hand", START, START + 5 * MS), after({}));
+  EXPECT_EQ(feed.stampsBetween("base", "tool", START, START + 5 * MS), after({4}));
+  add(sent("base", "hand", START + 3 * MS, turn(), place()));
+  EXPECT_EQ(feed.stampsBetween("base", "hand", START, START + 5 * MS), after({3})) << "it came late";
   EXPECT_EQ(feed.firstStamp("world", "tool"), START + 4 * MS);
   EXPECT_FALSE(feed.firstStamp("world", "base").has_value());
   EXPECT_FALSE(feed.firstStamp("world", "nobody").has_value());
+}
+
+TEST_F(Transforms, PositionsAreMovedAsASinglePointIs) {
+  Eigen::Isometry3d pose(turn());
+  pose.translation() = place();
+  const Positions here{place(), place(), {-0.0, NAN, 1}};
+  const Positions there = transformed(pose, here);
+  Positions in_place = here;
+  transform(pose, in_place);
+  for (std::size_t v = 0; v < here.size(); ++v) {
+    const Vec3 one = pose * here[v];
+    EXPECT_EQ(std::memcmp(&there[v], &one, sizeof one), 0);
+    EXPECT_EQ(std::memcmp(&in_place[v], &one, sizeof one), 0);
+  }
+  const Positions unmoved = transformed(Eigen::Isometry3d::Identity(), here);
+  EXPECT_EQ(std::memcmp(unmoved.data(), here.data(), here.size() * sizeof(Vec3)), 0) << "to the sign of a zero";
 }
 
 }  // namespace

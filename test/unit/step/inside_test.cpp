@@ -234,6 +234,26 @@ TEST(Inside, ABoxThatComesApartAndClosesAgainIsAskedAnew) {
   EXPECT_EQ(detector.run(step.motion()).start_state, StartState::INTERSECTING);
 }
 
+// While all else is passed by, nobody looks whether the box is closed; that it rests makes this no answer for later.
+TEST(Inside, ABoxAtRestIsSewnOnceSomethingComesNear) {
+  TestStep near = clothInABox();
+  near.bodies[1] = withOwnCorners(near.bodies[1]);
+  near.bodies[0].self_collision = false;
+  TestStep far = near;
+  for (Positions* x : {&far.bodies[0].t0, &far.bodies[0].t1}) {
+    for (Vec3& p : *x) p[0] += 5;
+  }
+  Detector detector;
+  for (const bool is_near : {false, false, true, true, false, true}) {
+    Step step = (is_near ? near : far).motion();
+    step.bodies[0].against_obstacle = false;
+    const Outcome outcome = detector.run(step);
+    EXPECT_EQ(outcome.stats.bodies_far == 0, is_near);
+    EXPECT_TRUE(same(outcome.intersections, trueInsides(is_near ? near : far)));
+    EXPECT_EQ(outcome.start_state, is_near ? StartState::INTERSECTING : StartState::CLEAR);
+  }
+}
+
 // A prediction is told by the step that it begins at.
 TEST(Inside, APredictionKnowsItsStart) {
   TestStep step = clothInABox();

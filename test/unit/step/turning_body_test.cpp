@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <random>
 
 #include "step/parts.h"
 #include "unit/stream/monitor_support.h"
@@ -52,6 +53,35 @@ TEST(TurningBody, IsCutIntoAsManyPartsAsTheToleranceAsksFor) {
   EXPECT_LE(1.005 * (1 - std::cos(3.1 / (2 * parts))), 1e-3);
   body.pose_t1 = body.pose_t0;
   EXPECT_EQ(partsFor(body, 1, 1e-3), 1);
+}
+
+// What the vertices span says sooner that one part is enough, and nothing else.
+TEST(TurningBody, NeedsAsManyPartsWhereItIsKnownWhatItSpans) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int straight = 0;
+  for (int i = 0; i < 2000; ++i) {
+    Body body;
+    Positions t0;
+    for (int v = 0; v < 4; ++v) t0.emplace_back(unit(random), unit(random), unit(random));
+    Extent extent{share(t0), t0[0], t0[0], true};
+    for (const Vec3& p : t0) {
+      extent.lo = extent.lo.cwiseMin(p);
+      extent.hi = extent.hi.cwiseMax(p);
+    }
+    body.t0 = extent.of;
+    body.pose_t0.translation() = Vec3(unit(random), unit(random), unit(random));
+    body.pose_t1.linear() = Eigen::AngleAxisd(0.2 * unit(random), Vec3::UnitZ()).toRotationMatrix();
+    const double parts = partsFor(body, 1, 1e-3);
+    EXPECT_EQ(partsFor(body, 1, 1e-3, &extent), parts);
+    straight += parts == 1;
+    Extent of_others = extent;
+    of_others.of = share(t0);
+    of_others.lo = of_others.hi = body.pose_t0.translation();
+    EXPECT_EQ(partsFor(body, 1, 1e-3, &of_others), parts);
+  }
+  EXPECT_GT(straight, 200);
+  EXPECT_LT(straight, 1800);
 }
 
 // A prediction may turn a body by more than half a turn. Then its chord leaves the arc by more than the body's radius.

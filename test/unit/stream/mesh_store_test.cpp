@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -89,6 +90,21 @@ TEST_F(MeshStoreTest, RigidFramesFollowTheArc) {
   const Positions at = loose.frameAt(50 * MS)->positions;
   EXPECT_NEAR(at[1].norm(), 1, 1e-12) << "the chord would be at 0.707";
   EXPECT_NEAR(at[1].x(), std::sqrt(0.5), 1e-12);
+}
+
+TEST_F(MeshStoreTest, FindsTheFrameOfAnyStamp) {
+  store.setOptions({0.1, 0.5, 64});
+  for (int frames = 1; frames <= 12; ++frames) {
+    store.push(frame(frames * 10 * MS));
+    EXPECT_EQ(store.lookup(5 * MS), Lookup::TOO_OLD);
+    for (int at = 10; at <= frames * 10; at += 5) {
+      ASSERT_EQ(store.lookup(at * MS), Lookup::READY);
+      EXPECT_EQ(store.frameAt(at * MS)->stamp_ns, at * MS);
+      EXPECT_EQ(store.framesWithin(at * MS, frames * 10 * MS).size(),
+                static_cast<std::size_t>(std::max(0, frames - at / 10 - 1)));
+    }
+    EXPECT_EQ(store.lookup(frames * 10 * MS + 1), Lookup::NOT_YET);
+  }
 }
 
 TEST_F(MeshStoreTest, KeepsNoMoreThanItsCapacity) {
