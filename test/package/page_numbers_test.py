@@ -37,6 +37,9 @@ def fleet(option):
 
 # Of each page: what it says, with the number in brackets, and what the code has.
 NUMBERS = {
+    'doc/clearance.md': [
+        (r'Of more than ([\d,]+) pairs', lambda: constant('src/step/clearance/clearance_finder.h', 'MOST_ROWS')),
+    ],
     'doc/interface.md': [
         (r'`~stats` \(newest (\d+)\)', lambda: constant('include/dccd/look_ahead_score.h', 'LOOK_AHEAD_SAMPLES')),
         (r'at most (\d+) files a run', lambda: constant('src/record/flight_recorder.h', 'MAX_SURPRISES')),
