@@ -63,8 +63,8 @@ struct Clearance {
 
 struct Options;
 struct Step;
-/// The distances of one step, whatever Options::clearance.wanted says, without its contacts; see detect() for what is
-/// thrown. Pairs of partners by body[0], then body[1].
+/// The distances of one step, whatever Options::clearance.wanted says; throws as detect() does. By body[0], then [1].
+/// Of more than 1,000 pairs those that are FARTHER and not expected have no row, but for the first of different bodies.
 DCCD_EXPORT std::vector<Clearance> distance(const Step& step, const Options& options);
 
 }  // namespace dccd

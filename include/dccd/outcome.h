@@ -223,7 +223,7 @@ struct Outcome : Findings {
   std::vector<std::uint32_t> patch_of;   ///< per listed contact its patch; empty without Options::patches
   bool tracked = false;                  ///< patches have identities: it is of a stream, or a prediction of one
   std::vector<PatchEvent> patch_events;  ///< in a stream, in order; also of an outcome without a result, at a seam
-  std::vector<Clearance> clearances;     ///< with Options::clearance, in the order of distance()
+  std::vector<Clearance> clearances;     ///< with Options::clearance, as of distance(); of stats' clearance.in pairs
   std::size_t suppressed = 0;            ///< initial contacts left out by choice
   std::uint64_t excluded_voxels = 0;     ///< finest voxels of the map taken out by exclude_boxes
   double earliest_toc = std::numeric_limits<double>::infinity();             ///< over contacts and what was left out

@@ -46,7 +46,8 @@ struct SafeUntil {
   /// The same of pairs of two bodies, or of one and the map, alone: of a body and itself no more than a quarter of
   /// ClearanceOptions::self_m is known.
   StampNs others_until_ns = 0;
-  std::size_t limiting = NO_PAIR;  ///< the pair in Outcome::clearances that ends first; of several the first
+  /// The pair in Outcome::clearances that ends first; of several the first. NO_PAIR: none, or one without a row.
+  std::size_t limiting = NO_PAIR;
   /// Of that pair, at stamp_ns: their least distance as above [m], and the sum of their bounds [m/s]. NaN without one.
   double distance_m = std::numeric_limits<double>::quiet_NaN();
   double closing_m_s = std::numeric_limits<double>::quiet_NaN();
@@ -109,7 +110,7 @@ DCCD_EXPORT double speedScale(double distance_m, double v_r_m_s, double v_h_m_s,
 
 struct SpeedScale {
   double scale = 0;                                              ///< 0 to 1 of full speed
-  std::size_t limiting = SafeUntil::NO_PAIR;                     ///< the pair in Outcome::clearances that allows least
+  std::size_t limiting = SafeUntil::NO_PAIR;                     ///< as there, the pair that allows least
   double distance_m = std::numeric_limits<double>::quiet_NaN();  ///< of that pair, as in SafeUntil [m]
   double needed_m = std::numeric_limits<double>::quiet_NaN();    ///< its S_p at full speed [m]
   std::string reason;                                            ///< why it is less than 1; empty: it is 1

@@ -106,6 +106,8 @@ deformable_ccd::ClearanceArray toClearanceArray(const Outcome& outcome, const st
   std::vector<double> speeds;
   for (const Body& body : outcome.step->bodies) speeds.push_back(speedBound(body, outcome.duration_s()));
   for (const Clearance& c : outcome.clearances) out.pairs.push_back(toMessage(outcome, c, speeds, bodies));
+  const std::uint64_t pairs = outcome.stats[Effect::CLEARANCE].in;
+  out.farther = static_cast<std::uint32_t>(pairs - std::min<std::uint64_t>(pairs, outcome.clearances.size()));
   return out;
 }
 

@@ -89,6 +89,7 @@ void ClearanceTable::add(const Outcome& o, const std::vector<Body>& bodies, Stam
   if (!o.answered) {
     for (auto& [partners, curve] : curves_) curve.add({t_s, UNKNOWN, INFINITE});
   }
+  double farther_m = UNKNOWN;
   for (const Clearance& c : o.clearances) {
     if (!rows_.is_open()) begin();
     rows_ << o.sequence << ',' << o.stamp_ns << ',' << csvField(bodyName(c.body[0], bodies)) << ','
@@ -99,8 +100,14 @@ void ClearanceTable::add(const Outcome& o, const std::vector<Body>& bodies, Stam
     Curve& curve = curves_[c.body];
     curve.names = {bodyName(c.body[0], bodies), bodyName(c.body[1], bodies)};
     curve.expected = curve.expected && c.expected;
+    curve.last_ns = o.stamp_ns;
     const bool known = c.over_step.status != ClearanceStatus::UNKNOWN;
     curve.add({t_s, known ? c.over_step.lower_m : UNKNOWN, known ? c.over_step.upper_m : INFINITE});
+    if (c.over_step.status == ClearanceStatus::FARTHER && c.body[0] != c.body[1]) farther_m = c.over_step.lower_m;
+  }
+  if (o.clearances.size() >= o.stats[Effect::CLEARANCE].in) return;
+  for (auto& [partners, curve] : curves_) {  // what has no row is farther apart than that
+    if (curve.last_ns != o.stamp_ns && partners[0] != partners[1]) curve.add({t_s, farther_m, INFINITE});
   }
 }
 

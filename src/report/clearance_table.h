@@ -39,6 +39,7 @@ class ClearanceTable {
     std::array<std::string, 2> names;
     bool expected = true;  // in each step
     std::vector<Sample> samples;
+    StampNs last_ns = 0;  // of the last step that has a row of the two
     std::size_t steps_each = 1, in_last = 0;
     void add(const Sample& sample);
     double nearest() const;

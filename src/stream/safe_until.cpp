@@ -167,6 +167,33 @@ std::string zeroReason(const Outcome& outcome, const Clearance& pair) {
   return "the distance of " + pairOf(outcome, pair) + (unknown ? " is not known" : " may be 0");
 }
 
+/// Calls f(row, its number) for each pair of partners. Those without a row are as far apart as the one that stands for
+/// them says (distance()); their number is NO_PAIR.
+template <class F>
+void forPairs(const Outcome& outcome, F&& f) {
+  const std::vector<Clearance>& rows = outcome.clearances;
+  for (std::size_t p = 0; p < rows.size(); ++p) f(rows[p], p);
+  if (rows.size() >= outcome.stats[Effect::CLEARANCE].in) return;
+  const auto stands = std::find_if(rows.begin(), rows.end(), [](const Clearance& row) {
+    return row.over_step.status == ClearanceStatus::FARTHER && !isItself(row) && !row.expected;
+  });
+  Clearance without = stands == rows.end() ? Clearance() : *stands;
+  const std::vector<Body>& bodies = outcome.step->bodies;
+  auto row = rows.begin();
+  for (std::size_t a = 0; a < bodies.size(); ++a) {
+    for (std::size_t b = a; b <= bodies.size(); ++b) {
+      without.body = {static_cast<std::uint16_t>(a),
+                      b == bodies.size() ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
+      if (row != rows.end() && row->body == without.body) {
+        ++row;
+      } else if (b == bodies.size() ? meetsMap(bodies[a]) && outcome.obstacle
+                                    : b > a && meet(bodies[a], a, bodies[b], b)) {
+        f(without, SafeUntil::NO_PAIR);
+      }
+    }
+  }
+}
+
 /// Rounded down: seconds in which a distance above 0 is closed.
 double secondsTo(double distance_m, double closing_m_s) {
   return closing_m_s == 0 ? MOST_PROMISED_S : std::min(MOST_PROMISED_S, roundedDown(distance_m / closing_m_s));
@@ -194,9 +221,9 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
   if (!result.reason.empty()) return result;
   double least_s = MOST_PROMISED_S, others_s = MOST_PROMISED_S;
   bool others = false;
-  for (std::size_t p = 0; p < outcome.clearances.size(); ++p) {
-    const Clearance& pair = outcome.clearances[p];
-    if (!counts(outcome, pair)) continue;
+  bool first = true;
+  forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
+    if (!counts(outcome, pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
     const double distance_m = distanceOf(outcome, pair);
     double closing_m_s = speeds.slowed + speeds.other;
@@ -207,15 +234,15 @@ SafeUntil safeUntil(const Outcome& outcome, const std::vector<SpeedBound>& given
       others = true;
       others_s = std::min(others_s, seconds);
     }
-    if (result.limiting != SafeUntil::NO_PAIR && seconds >= least_s) continue;
+    if (!std::exchange(first, false) && seconds >= least_s) return;
     least_s = seconds;
-    result.limiting = p;
+    result.limiting = number;
     result.distance_m = distance_m;
     result.closing_m_s = std::isfinite(closing_m_s) ? closing_m_s : std::numeric_limits<double>::quiet_NaN();
     result.reason = !nothing                   ? ""
                     : speeds.unbounded.empty() ? zeroReason(outcome, pair)
                                                : unboundedReason(speeds.unbounded);
-  }
+  });
   result.until_ns += nsIn(least_s);
   result.others_until_ns = others ? outcome.stamp_ns + nsIn(others_s) : result.until_ns;
   if (result.until_ns == result.stamp_ns && result.reason.empty()) result.reason = "the time is less than a nanosecond";
@@ -301,17 +328,16 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
   result.reason = whyNone(outcome);
   if (!result.reason.empty()) return result;
   result.scale = 1;
-  for (std::size_t p = 0; p < outcome.clearances.size(); ++p) {
-    const Clearance& pair = outcome.clearances[p];
-    if (!counts(outcome, pair) || isItself(pair)) continue;
+  forPairs(outcome, [&](const Clearance& pair, std::size_t number) {
+    if (!counts(outcome, pair) || isItself(pair)) return;
     const Speeds speeds = speedsOf(outcome, pair, bounds);
-    if (speeds.slowed == 0) continue;
+    if (speeds.slowed == 0) return;
     const double distance_m = distanceOf(outcome, pair);
     const bool bounded = speeds.unbounded.empty();
     const double scale = bounded && distance_m > 0 ? speedScale(distance_m, speeds.slowed, speeds.other, law) : 0;
-    if (scale >= result.scale) continue;
+    if (scale >= result.scale) return;
     result.scale = scale;
-    result.limiting = p;
+    result.limiting = number;
     result.distance_m = distance_m;
     result.needed_m =
         bounded ? separationDistance(1, speeds.slowed, speeds.other, law) : std::numeric_limits<double>::quiet_NaN();
@@ -321,7 +347,7 @@ SpeedScale speedScale(const Outcome& outcome, const std::vector<SpeedBound>& giv
     result.reason = !bounded         ? unboundedReason(speeds.unbounded)
                     : distance_m > 0 ? text.str()
                                      : zeroReason(outcome, pair);
-  }
+  });
   if (assuranceOf(outcome).touching == Touching::NEW) {
     result.scale = 0;
     result.reason = "something touches anew";

@@ -37,6 +37,9 @@ def fleet(option):
 
 # Of each page: what it says, with the number in brackets, and what the code has.
 NUMBERS = {
+    'doc/clearance.md': [
+        (r'Of more than ([\d,]+) pairs', lambda: constant('src/step/clearance/clearance_finder.h', 'MOST_ROWS')),
+    ],
     'doc/interface.md': [
         (r'(\d+) steps wait at most', lambda: constant('include/dccd/stream.h', 'max_waiting')),
         (r'box around them, ([\d,]+) at most', lambda: constant('src/output/markers.cpp', 'MAX_VOXELS_SHOWN')),

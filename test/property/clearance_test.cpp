@@ -93,7 +93,8 @@ TEST(ClearanceProperty, PairsHoldTheTruth) {
     const double lower_m = pair.lowerInMetres(nearest.lower), upper_m = pair.upperInMetres(nearest.upper);
     const Rational truth = trueSquaredDistance(hulls[0], hulls[1], t), lower(lower_m), upper(upper_m);
     ASSERT_LE(lower * lower, truth) << "pair " << i << ": lower_m " << lower_m << " is above the truth";
-    ASSERT_GE(upper * upper, truth) << "pair " << i << ": upper_m " << upper_m << " is below the truth";
+    ASSERT_GE(upper * upper, truth) << "pair " << i << ": upper_m " << upper_m << " is below the truth, of "
+                                    << hulls[0].size() << " and " << hulls[1].size() << " corners";
     ASSERT_LE(upper_m - lower_m, std::max(wide_m, 1e-288)) << "pair " << i << ", size " << largest_m;
     // A direction that is not the best one, at another time, bounds the distance then, too.
     const double later = draw(0, 64) / 64.0;

@@ -82,13 +82,14 @@ int side(const RationalPoint& a, const RationalPoint& b, const RationalPoint& c,
   return volume.sign();
 }
 
-/// The inside of an edge through the inside of a face. All else that meets shows in corners and edges.
+/// The inside of an edge through a face, its border included, which may be the diagonal of a box's side. All else that
+/// meets shows in corners and edges.
 bool passes(const std::array<Corner, 2>& edge, const std::array<Corner, 3>& face, double t) {
   const RationalPoint p = at(edge[0], t), q = at(edge[1], t), a = at(face[0], t), b = at(face[1], t),
                       c = at(face[2], t);
   if (side(a, b, c, p) * side(a, b, c, q) >= 0) return false;
-  const int first = side(p, q, a, b);
-  return first != 0 && side(p, q, b, c) == first && side(p, q, c, a) == first;
+  const auto [least, most] = std::minmax({side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)});
+  return least >= 0 || most <= 0;
 }
 
 bool isInBox(const Corner& corner, const TrueHull& box, double t) {

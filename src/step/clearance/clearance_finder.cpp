@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "obstacle/start_contact.h"
 #include "step/conclude.h"
@@ -71,28 +72,72 @@ void ClearanceFinder::begin(const Step& step, const SceneArrays& scene, const Op
   const std::size_t n = step.bodies.size();
   bodies_.resize(n);
   rows_.clear();
-  row_of_.assign(n * (n + 1), -1);
-  const auto add = [&](std::size_t a, std::size_t b, bool unknown) {
-    row_of_[a * (n + 1) + b] = static_cast<std::int32_t>(rows_.size());
-    Row row;
-    row.answer.body = {static_cast<std::uint16_t>(a), b == n ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
-    row.answer.expected = expectsAll(options.expected, row.answer.body[0], row.answer.body[1]);
-    row.unknown = unknown;
-    rows_.push_back(row);
-  };
+  row_of_.assign(n * (n + 1), NOT_ASKED);
+  pairs_ = parts_ = 0;
+  expected_ = options.expected;
   for (std::size_t b = 0; b < n; ++b) learn(step.bodies[b], scene.bodies()[b], bodies_[b]);
-  const auto lost = [&](std::size_t b) {
-    return step.bodies[b].dropped_faces > 0 || looseVertices(step.bodies[b]) > 0;
+  const auto ask = [&](std::size_t a, std::size_t b) {
+    row_of_[a * (n + 1) + b] = ROWLESS;
+    ++pairs_;
   };
   for (std::size_t a = 0; a < n; ++a) {
-    if (options_.self_m > 0 && meetsItself(step.bodies[a])) add(a, a, lost(a));
+    if (options_.self_m > 0 && meetsItself(step.bodies[a])) ask(a, a);
     for (std::size_t b = a + 1; b < n; ++b) {
-      if (meet(step.bodies[a], a, step.bodies[b], b)) add(a, b, lost(a) || lost(b));
+      if (meet(step.bodies[a], a, step.bodies[b], b)) ask(a, b);
     }
-    if (meetsMap(step.bodies[a]) && (step.map.surface || options.obstacle_expected)) {
-      add(a, n, lost(a) || !step.map.surface);
+    if (meetsMap(step.bodies[a]) && (step.map.surface || options.obstacle_expected)) ask(a, n);
+  }
+  std::vector<bool> lost;
+  for (const Body& body : step.bodies) lost.push_back(body.dropped_faces > 0 || looseVertices(body) > 0);
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::size_t b = a; b <= n; ++b) {
+      if (row_of_[a * (n + 1) + b] == NOT_ASKED) continue;
+      const bool unknown = lost[a] || (b == n ? !step.map.surface : lost[b]);
+      if (pairs_ <= MOST_ROWS || unknown || a == b || b == n) addRow(a, b).unknown = unknown;
     }
   }
+}
+
+std::int32_t& ClearanceFinder::placeOf(std::size_t a, std::size_t b) {
+  const std::size_t n = bodies_.size();
+  if (a > b) std::swap(a, b);
+  return row_of_[a * (n + 1) + std::min(b, n)];
+}
+
+/// Of a pair that was far in all parts that came.
+ClearanceFinder::Row ClearanceFinder::newRow(std::size_t a, std::size_t b) const {
+  Row row;
+  row.answer.body = {static_cast<std::uint16_t>(a),
+                     b == bodies_.size() ? OBSTACLE_BODY : static_cast<std::uint16_t>(b)};
+  row.answer.expected = expectsAll(expected_, row.answer.body[0], row.answer.body[1]);
+  row.parts = parts_;
+  if (parts_ > 0) row.at_end.lower_m = row.over_step.lower_m = limitOf(row) + radiusOf(row);
+  return row;
+}
+
+ClearanceFinder::Row& ClearanceFinder::addRow(std::size_t a, std::size_t b) {
+  placeOf(a, b) = static_cast<std::int32_t>(rows_.size());
+  rows_.push_back(newRow(a, b));
+  return rows_.back();
+}
+
+/// Of two bodies that boxes do not show to be far, of which nothing is known, or that have a contact.
+void ClearanceFinder::addRowsOfNear(const ClearancePart& part) {
+  std::vector<StepBox> boxes;
+  for (const SceneBody& body : part.scene.bodies()) boxes.push_back(boxOf(body));
+  for (std::size_t a = 0; a < boxes.size(); ++a) {
+    for (std::size_t b = a + 1; b < boxes.size(); ++b) {
+      if (placeOf(a, b) != ROWLESS) continue;
+      const double limit_m = options_.max_m + bodies_[a].radius_m + bodies_[b].radius_m;
+      const bool known = bodies_[a].known && bodies_[b].known;
+      if (!known || !(apartByBoxes(boxes[a], boxes[b]) >= limit_m)) addRow(a, b);
+    }
+  }
+  const auto addRowOf = [&](const std::array<std::uint16_t, 2>& body) {
+    if (placeOf(body[0], body[1]) == ROWLESS) addRow(body[0], body[1]);
+  };
+  for (const StartIntersection& s : part.found.intersections) addRowOf(s.body);
+  for (const Contact& c : part.found.contacts) addRowOf(c.body);
 }
 
 /// What is made once for many steps.
@@ -110,9 +155,7 @@ void ClearanceFinder::learn(const Body& body, const SceneBody& scene_body, BodyS
 }
 
 ClearanceFinder::Row* ClearanceFinder::rowOf(std::size_t a, std::size_t b) {
-  const std::size_t n = bodies_.size();
-  if (a > b) std::swap(a, b);
-  const std::int32_t row = row_of_[a * (n + 1) + (b == OBSTACLE_BODY ? n : b)];
+  const std::int32_t row = placeOf(a, b);
   return row < 0 ? nullptr : &rows_[static_cast<std::size_t>(row)];
 }
 
@@ -166,6 +209,7 @@ bool ClearanceFinder::fit(std::size_t b, const ClearancePart& part, bool to_map)
 
 void ClearanceFinder::addPart(const ClearancePart& part) {
   learnBodies(part);
+  if (rows_.size() < pairs_) addRowsOfNear(part);
   takeContacts(part);
   // The map's rows last: they may want the boxes of another frame.
   for (const bool maps : {false, true}) {
@@ -173,6 +217,7 @@ void ClearanceFinder::addPart(const ClearancePart& part) {
       if ((row.answer.body[1] == OBSTACLE_BODY) == maps) search(row, part);
     }
   }
+  ++parts_;
 }
 
 /// What of it lies in the whole step.
@@ -399,33 +444,54 @@ void ClearanceFinder::judge(const Row& row, const FoundDistance& found, Clearanc
   distance.upper_m = found.upper_m;
 }
 
+void ClearanceFinder::conclude(Row& row, std::size_t parts) const {
+  Clearance& answer = row.answer;
+  if (row.parts < parts) {  // what was not come to may be anything
+    row.over_step.lower_m = row.at_end.lower_m = 0;
+    row.over_step.cut = row.at_end.cut = true;
+  }
+  if (!row.unknown) judge(row, row.at_end, answer.at_end);
+  if (row.touches) {
+    const double upper_m = exact_ || row.unknown ? 0 : row.over_step.upper_m;
+    answer.over_step.status = ClearanceStatus::TOUCHING;
+    answer.over_step.lower_m = 0;
+    answer.over_step.upper_m = upper_m;
+  } else if (row.unknown || row.undecided) {
+    answer.over_step = ClearanceDistance();
+  } else if (answer.at_end.status == ClearanceStatus::TOUCHING) {
+    answer.over_step = answer.at_end;
+  } else {
+    judge(row, row.over_step, answer.over_step);
+  }
+}
+
 void ClearanceFinder::finish(std::size_t parts, Outcome& outcome) {
   StageStats& stats = outcome.stats[Effect::CLEARANCE];
-  stats.in = rows_.size();
+  stats.in = pairs_;
   stats.out = 0;
   outcome.clearances.clear();
-  for (Row& row : rows_) {
-    Clearance& answer = row.answer;
-    if (row.parts < parts) {  // what was not come to may be anything
-      row.over_step.lower_m = row.at_end.lower_m = 0;
-      row.over_step.cut = row.at_end.cut = true;
+  const std::size_t n = bodies_.size();
+  bool one_is_far = false;  // and has its row
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::size_t b = a; b <= n; ++b) {
+      const std::int32_t place = row_of_[a * (n + 1) + b];
+      if (place == NOT_ASKED) continue;
+      // Of half a million pairs nothing is made for most. One that is far shows that no part is missing.
+      const std::uint16_t partner = b == n ? OBSTACLE_BODY : static_cast<std::uint16_t>(b);
+      if (place == ROWLESS && one_is_far && !expectsAll(expected_, static_cast<std::uint16_t>(a), partner)) {
+        ++stats.out;
+        continue;
+      }
+      Row none;
+      if (place == ROWLESS) none = newRow(a, b);
+      Row& row = place == ROWLESS ? none : rows_[static_cast<std::size_t>(place)];
+      conclude(row, parts);
+      const ClearanceStatus status = row.answer.over_step.status;
+      stats.out += status != ClearanceStatus::LOWER && status != ClearanceStatus::UNKNOWN;
+      const bool stands_for_others = status == ClearanceStatus::FARTHER && a != b && !row.answer.expected;
+      if (pairs_ > MOST_ROWS && stands_for_others && std::exchange(one_is_far, true)) continue;
+      outcome.clearances.push_back(row.answer);
     }
-    if (!row.unknown) judge(row, row.at_end, answer.at_end);
-    if (row.touches) {
-      const double upper_m = exact_ || row.unknown ? 0 : row.over_step.upper_m;
-      answer.over_step.status = ClearanceStatus::TOUCHING;
-      answer.over_step.lower_m = 0;
-      answer.over_step.upper_m = upper_m;
-    } else if (row.unknown || row.undecided) {
-      answer.over_step = ClearanceDistance();
-    } else if (answer.at_end.status == ClearanceStatus::TOUCHING) {
-      answer.over_step = answer.at_end;
-    } else {
-      judge(row, row.over_step, answer.over_step);
-    }
-    const ClearanceStatus status = answer.over_step.status;
-    stats.out += status != ClearanceStatus::LOWER && status != ClearanceStatus::UNKNOWN;
-    outcome.clearances.push_back(answer);
   }
 }
 

@@ -31,6 +31,10 @@ struct ClearancePart {
 
 class DCCD_HIDDEN ClearanceFinder {
  public:
+  /// Of more pairs than this, what is FARTHER and not expected has no row but for the first, which says how far. A body
+  /// and itself always has one.
+  static constexpr std::size_t MOST_ROWS = 1000;
+
   /// The pairs of a step, what the bodies make unknown, and what is made once for many steps. Before its parts.
   void begin(const Step& step, const SceneArrays& scene, const Options& options);
   /// In order.
@@ -62,8 +66,15 @@ class DCCD_HIDDEN ClearanceFinder {
     std::size_t parts = 0;  // that it was looked for in
   };
 
+  /// In row_of_, beside the numbers of rows.
+  enum : std::int32_t { NOT_ASKED = -1, ROWLESS = -2 };
+
   void learn(const Body& body, const SceneBody& scene_body, BodyState& state) const;
+  std::int32_t& placeOf(std::size_t a, std::size_t b);
   Row* rowOf(std::size_t a, std::size_t b);
+  Row newRow(std::size_t a, std::size_t b) const;
+  Row& addRow(std::size_t a, std::size_t b);
+  void addRowsOfNear(const ClearancePart& part);
   void takeContacts(const ClearancePart& part);
   void touchAt(const ClearancePart& part, double t, std::array<std::uint16_t, 2> body,
                std::array<FeatureTree::Feature, 2> vertex, const OccupiedLeaf* leaf);
@@ -77,15 +88,18 @@ class DCCD_HIDDEN ClearanceFinder {
                         const FoundDistance& known);
   void describe(const Row& row, const ClearancePart& part, const FoundDistance& found,
                 ClearanceDistance& distance) const;
+  void conclude(Row& row, std::size_t parts) const;
   void judge(const Row& row, const FoundDistance& found, ClearanceDistance& distance) const;
   double limitOf(const Row& row) const;
   double radiusOf(const Row& row) const;
 
   ClearanceOptions options_;
   bool exact_ = true;  // a contact is a touch, not a distance
+  std::vector<Expectation> expected_;
   std::vector<BodyState> bodies_;
   std::vector<Row> rows_;
-  std::vector<std::int32_t> row_of_;  // [a * (bodies + 1) + b], b = bodies: the map; -1: none
+  std::vector<std::int32_t> row_of_;   // [a * (bodies + 1) + b], b = bodies: the map
+  std::size_t pairs_ = 0, parts_ = 0;  // that are asked for; that came
   MapBoxes map_;
   NearestSearch search_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <numeric>
 
 namespace dccd {
 namespace {
@@ -35,6 +36,7 @@ void SurfaceNeighbours::set(const Topology& topology, const Positions& reference
   entries_.clear();
   exact_ ? listNeighbours() : listWholePatches();
   row_.push_back(static_cast<std::uint32_t>(entries_.size()));
+  listWholeNodes();
 }
 
 /// Dijkstra's search from all of the vertices, as far as self_m.
@@ -182,9 +184,84 @@ void SurfaceNeighbours::listWholePatches() {
   }
 }
 
+/// A level has the nodes of one depth, and the patches that are less deep: together they hold each feature once. A pair
+/// of nodes is whole, all features of one are neighbours of all of the other, exactly where each pair of what they are
+/// made of on the level below is, for each two of their features are in such a pair: four, three of a node and itself,
+/// or fewer where one is a patch and stays what it is. So the pairs of a level are found by counting those below.
+void SurfaceNeighbours::listWholeNodes() {
+  using Pair = std::pair<std::uint32_t, std::uint32_t>;
+  const auto nodes = static_cast<std::uint32_t>(patch_of_.size());
+  depth_.assign(nodes, 0);
+  std::vector<std::uint32_t> parent(nodes, 0);
+  std::uint32_t level = 0;
+  for (std::uint32_t n = 0; n < nodes; ++n) {
+    if (patch_of_[n] != NO_INDEX) continue;
+    tree_->forChildren(n, [&](std::uint32_t child) {
+      parent[child] = n;
+      depth_[child] = depth_[n] + 1;
+      level = std::max(level, depth_[child]);
+    });
+  }
+  std::vector<Pair> whole;
+  for (std::uint32_t p = 0; p < patch_node_.size(); ++p) {
+    for (std::uint32_t e = row_[p]; e < row_[p + 1]; ++e) {
+      const Pair pair{patch_node_[p], patch_node_[entries_[e].patch]};
+      if (!exact_ || asked(pair.first, pair.second) == 0) whole.push_back(pair);
+    }
+  }
+  std::vector<Pair> all = whole;
+  for (; level > 0 && !whole.empty(); --level) {
+    const auto above = [&](std::uint32_t node) { return depth_[node] == level ? parent[node] : node; };
+    const auto parts = [&](std::uint32_t node) {
+      return depth_[node] + 1 == level && patch_of_[node] == NO_INDEX ? 2 : 1;
+    };
+    for (auto& [a, b] : whole) a = above(a), b = above(b);
+    std::sort(whole.begin(), whole.end());
+    std::vector<Pair> next;
+    for (auto begin = whole.begin(), end = begin; begin != whole.end(); begin = end) {
+      end = std::upper_bound(begin, whole.end(), *begin);
+      const auto [a, b] = *begin;
+      if (end - begin == (a != b ? parts(a) * parts(b) : parts(a) == 2 ? 3 : 1)) next.push_back(*begin);
+    }
+    whole = std::move(next);
+    all.insert(all.end(), whole.begin(), whole.end());
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  whole_row_.assign(nodes + 1, 0);
+  whole_nodes_.clear();
+  for (const auto& [a, b] : all) {
+    ++whole_row_[a + 1];
+    whole_nodes_.push_back(b);
+  }
+  std::partial_sum(whole_row_.begin(), whole_row_.end(), whole_row_.begin());
+}
+
+/// Of two nodes. Where one is a level above the other its two children are asked for.
+bool SurfaceNeighbours::isWhole(std::uint32_t a, std::uint32_t b) const {
+  if (patch_of_[a] != NO_INDEX) a = patch_node_[patch_of_[a]];
+  if (patch_of_[b] != NO_INDEX) b = patch_node_[patch_of_[b]];
+  const auto isListed = [&](std::uint32_t first, std::uint32_t second) {
+    return std::binary_search(whole_nodes_.begin() + whole_row_[first], whole_nodes_.begin() + whole_row_[first + 1],
+                              second);
+  };
+  const auto isAbove = [&](std::uint32_t x, std::uint32_t y) {
+    return patch_of_[x] == NO_INDEX && depth_[x] < depth_[y];
+  };
+  bool whole = true;
+  if (isAbove(a, b)) {
+    tree_->forChildren(a, [&](std::uint32_t child) { whole = whole && isListed(child, b); });
+  } else if (isAbove(b, a)) {
+    tree_->forChildren(b, [&](std::uint32_t child) { whole = whole && isListed(a, child); });
+  } else {
+    whole = isListed(a, b);
+  }
+  return whole;
+}
+
 std::uint32_t SurfaceNeighbours::asked(std::uint32_t node_a, std::uint32_t node_b) const {
   const std::uint32_t in_a = patch_of_[node_a], in_b = patch_of_[node_b];
-  if (in_a == NO_INDEX || in_b == NO_INDEX) return ~0u;
+  if (in_a == NO_INDEX || in_b == NO_INDEX) return isWhole(node_a, node_b) ? 0 : ~0u;
   const auto begin = entries_.begin() + row_[in_a], end = entries_.begin() + row_[in_a + 1];
   const auto entry =
       std::lower_bound(begin, end, in_b, [](const Entry& e, std::uint32_t patch) { return e.patch < patch; });

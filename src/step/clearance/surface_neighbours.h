@@ -16,7 +16,8 @@ namespace dccd {
 ///
 /// Made once. A patch is a node of the tree whose features are so few that a search around each patch is little work.
 /// Where patches are leaves, a table has every pair of neighbours; else it has the pairs of patches whose features are
-/// all neighbours, and what else comes near in space is searched for one feature at a time.
+/// all neighbours, and what else comes near in space is searched for one feature at a time. Of nodes above patches
+/// another table has the pairs whose features are all neighbours.
 class SurfaceNeighbours {
  public:
   static constexpr bool ITSELF = true;
@@ -36,6 +37,8 @@ class SurfaceNeighbours {
   void choosePatches();
   void listNeighbours();
   void listWholePatches();
+  void listWholeNodes();
+  bool isWhole(std::uint32_t node_a, std::uint32_t node_b) const;
 
   const FeatureTree* tree_ = nullptr;
   double self_m_ = 0;
@@ -46,6 +49,9 @@ class SurfaceNeighbours {
   bool exact_ = true;                            // the patches are leaves, and the table has all neighbours
   std::vector<std::uint32_t> row_;               // per patch, where its entries begin, and their end
   std::vector<Entry> entries_;                   // with patches that are not before it
+  std::vector<std::uint32_t> depth_;             // of a node down to patches
+  std::vector<std::uint32_t> whole_row_;         // per node, where its partners begin, and their end
+  std::vector<std::uint32_t> whole_nodes_;       // that are not before it
   // Of the search that was made last:
   std::vector<std::uint32_t> reached_;  // per vertex the number of the last search that came there
   std::vector<double> way_m_;           // per vertex, of that search

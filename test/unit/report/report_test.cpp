@@ -253,6 +253,31 @@ TEST(ClearanceTable, HasARowOfEachPairInWhichWhatIsNotThereIsEmpty) {
   for (const auto& [name, cell] : wanted) EXPECT_EQ(row.at(name), cell) << name;
 }
 
+TEST(ClearanceTable, WhatHasNoRowIsDrawnAsFarAsTheOneThatStandsForIt) {
+  const std::string file = ::testing::TempDir() + "many_clearance.csv";
+  ClearanceTable table(file);
+  const std::vector<Body> bodies(3);
+  Outcome outcome;
+  outcome.answered = true;
+  Clearance near, far;
+  near.body = {0, 1};
+  near.over_step = distance(ClearanceStatus::MEASURED, 0.25, 0.2501);
+  far.body = {0, 2};
+  far.over_step = distance(ClearanceStatus::FARTHER, 0.5, std::numeric_limits<double>::infinity());
+  outcome.clearances = {near, far};
+  table.add(outcome, bodies, 0);
+  outcome.clearances = {far};
+  outcome.stats[Effect::CLEARANCE].in = 2;
+  outcome.stamp_ns = 1'000'000'000;
+  table.add(outcome, bodies, 0);
+  table.close();
+  std::filesystem::remove(file);
+  const nlohmann::json near_samples = table.json()["curves"][0]["samples"];
+  ASSERT_EQ(near_samples.size(), 2u);
+  EXPECT_EQ(near_samples[1], (nlohmann::json{1.0, 0.5, nullptr}));
+  EXPECT_EQ(table.json()["curves"][1]["samples"].size(), 2u) << "one sample a step";
+}
+
 // The bounds of neighbours that became one hold for all of them.
 TEST(ClearanceTable, ALongRunIsDrawnByTheSmallestDistances) {
   ClearanceTable table(::testing::TempDir() + "long_clearance.csv");

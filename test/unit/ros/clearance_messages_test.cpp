@@ -116,6 +116,9 @@ TEST(ClearanceRow, WhatIsNotThereIsNaNAndNeverInfinite) {
                         row(1, OBSTACLE_BODY, between(ClearanceStatus::TOUCHING, 0, 0))};
   const auto array = toClearanceArray(outcome, outcome.step->bodies, "world");
   ASSERT_EQ(array.pairs.size(), 4u);
+  EXPECT_EQ(array.farther, 0u);
+  outcome.stats[Effect::CLEARANCE].in = 9;
+  EXPECT_EQ(toClearanceArray(outcome, outcome.step->bodies, "world").farther, 5u);
   std::ostringstream text;
   text << array;
   EXPECT_EQ(text.str().find("inf"), std::string::npos) << text.str();

@@ -308,6 +308,32 @@ void expectSame(const std::vector<Clearance>& x, const std::vector<Clearance>& y
   for (std::size_t i = 0; i < x.size(); ++i) EXPECT_TRUE(sameBits(x[i], y[i])) << what << ", row " << i;
 }
 
+/// 48 triangles in a row, about 1 m from one to the next, that go their ways; one turns, in several parts of the step,
+/// past the next, and of one nothing is known.
+Step manyBodies() {
+  Step step;
+  for (int i = 0; i < 48; ++i) {
+    const Vec3 from(2 * i + 0.35 * (i * 7 % 5), 0, 0), to(2 * i + 0.35 * (i * 3 % 5), 0, 0);
+    Body body = moving(bodyOf("one", TRIANGLE), movedBy(FLAT, from), movedBy(FLAT, to));
+    body.name += std::to_string(i);
+    body.self_collision = i % 2 == 0;
+    step.bodies.push_back(body);
+  }
+  step.bodies[20].dropped_faces = 1;
+  Body& turning = step.bodies[30];
+  turning.rigid = turning.turns = true;
+  turning.pose_t1.linear() = Eigen::AngleAxisd(M_PI, Vec3::UnitZ()).toRotationMatrix();
+  turning.pose_t0.translation() = turning.pose_t1.translation() = Vec3(60, 0, 0);
+  Positions from, to;
+  for (const Vec3& p : FLAT) {
+    from.push_back(turning.pose_t0 * p);
+    to.push_back(turning.pose_t1 * p);
+  }
+  turning.t0 = share(from);
+  turning.t1 = share(to);
+  return step;
+}
+
 /// A wavy cloth above another one and a table of voxels.
 Step wavySheets(double phase) {
   Step step;
@@ -405,6 +431,71 @@ TEST(Clearance, IsStillBoundedWhereTheTimeRanOut) {
   }
   EXPECT_GT(cut, 10);
   EXPECT_GT(done, 10);
+}
+
+TEST(Clearance, OfManyBodiesOnlyTheFirstThatIsFarHasARow) {
+  Step step = manyBodies();
+  Options options = asking(0.9);
+  options.rigid_tolerance_m = 1e-3;
+  options.expected.push_back({{ExpectedPartner{3, {}, ""}, ExpectedPartner{40, {}, ""}}, ""});
+  History history;
+  const Outcome outcome = detect(step, options, history);
+  ASSERT_GT(outcome.substeps, 1u);
+  const std::uint64_t pairs = outcome.stats[Effect::CLEARANCE].in;
+  EXPECT_EQ(pairs, 48u * 47 / 2 + 24 - 1) << "one that could meet itself is rigid";
+  EXPECT_LT(outcome.clearances.size(), 250u);
+  expectSame(distance(step, options), outcome.clearances, "distance()");
+  // Each two for themselves.
+  std::size_t rows = 0, farther = 0, statuses[5] = {};
+  for (std::uint16_t a = 0; a < step.bodies.size(); ++a) {
+    for (std::uint16_t b = a + 1; b < step.bodies.size(); ++b) {
+      Step two = step;
+      two.bodies = {step.bodies[a], step.bodies[b]};
+      options.expected.clear();
+      options.max_substeps = outcome.substeps;
+      Clearance alone = rowOf(distance(two, options), 0, 1);
+      alone.body = {a, b};
+      const auto row = std::find_if(outcome.clearances.begin(), outcome.clearances.end(),
+                                    [&](const Clearance& r) { return r.body == alone.body; });
+      ++statuses[static_cast<std::size_t>(alone.over_step.status)];
+      if (row == outcome.clearances.end()) {
+        EXPECT_EQ(alone.over_step.status, ClearanceStatus::FARTHER) << a << " and " << b;
+        EXPECT_EQ(alone.over_step.lower_m, 0.9);
+        continue;
+      }
+      ++rows;
+      EXPECT_EQ(row->over_step.status, alone.over_step.status) << a << " and " << b;
+      EXPECT_EQ(row->at_end.status, alone.at_end.status) << a << " and " << b;
+      EXPECT_NEAR(row->over_step.lower_m, alone.over_step.lower_m, 2e-3) << a << " and " << b;
+      farther += row->over_step.status == ClearanceStatus::FARTHER && !row->expected;
+    }
+  }
+  EXPECT_EQ(rows + 23, outcome.clearances.size());
+  EXPECT_EQ(farther, 1u) << "it stands for the others";
+  EXPECT_TRUE(rowOf(outcome.clearances, 3, 40).expected);
+  EXPECT_EQ(statuses[static_cast<std::size_t>(ClearanceStatus::UNKNOWN)], 46u) << "of 47 pairs one certainly touches";
+  EXPECT_GT(statuses[static_cast<std::size_t>(ClearanceStatus::MEASURED)], 15u);
+  EXPECT_GT(statuses[static_cast<std::size_t>(ClearanceStatus::TOUCHING)], 5u);
+}
+
+TEST(Clearance, OfManyBodiesNoneIsSilentlyFarWhereTheTimeRanOut) {
+  const Step step = manyBodies();
+  Options options = asking(0.9);
+  options.rigid_tolerance_m = 1e-3;
+  const std::vector<Clearance> whole = distance(step, options);
+  bool cut = false;
+  for (int looks = 0; looks < 4000; looks = looks * 2 + 1) {
+    std::atomic<std::int64_t> left{looks};
+    History history;
+    const Outcome outcome = detect(step, options, history, Deadline::afterLooks(left));
+    for (const Clearance& row : whole) {
+      if (row.over_step.status == ClearanceStatus::FARTHER) continue;
+      const Clearance& some = rowOf(outcome.clearances, row.body[0], row.body[1]);
+      EXPECT_LE(some.over_step.lower_m, row.over_step.upper_m) << looks << " looks";
+      cut = cut || some.over_step.status == ClearanceStatus::LOWER;
+    }
+  }
+  EXPECT_TRUE(cut);
 }
 
 TEST(Clearance, RefusesNumbersThatMeanNothing) {

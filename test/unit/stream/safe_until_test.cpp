@@ -78,6 +78,31 @@ TEST(SafeUntil, TheLeastOfAllPairsWithTheMapAtRestAndTwiceTheSpeedOfABodyItself)
   EXPECT_EQ(least.limiting, 2u);
 }
 
+TEST(SafeUntil, APairWithoutARowIsAsFarAsTheOneThatStandsForIt) {
+  Outcome outcome = answered({between(0, 1, apart(0.6)), between(0, 2, apart(0.5, ClearanceStatus::FARTHER))});
+  Step step = *outcome.step;
+  step.bodies.push_back(placed("lamp", tip(1000 * MS, 9)));
+  outcome.step = std::make_shared<const Step>(step);
+  const std::vector<SpeedBound> bounds{{0.1}, {1.0}, {9.0}};
+  EXPECT_NEAR(safeUntil(outcome, bounds).seconds(), 0.5 / 9.1, 3e-9);
+  EXPECT_EQ(safeUntil(outcome, bounds).limiting, 1u);
+  outcome.stats[Effect::CLEARANCE].in = 6;  // 'tip' and 'lamp', and all of them and the map
+  const SafeUntil promise = safeUntil(outcome, bounds);
+  EXPECT_NEAR(promise.seconds(), 0.5 / 10, 3e-9) << "'tip' and 'lamp' are the fastest";
+  EXPECT_EQ(promise.limiting, SafeUntil::NO_PAIR);
+  EXPECT_EQ(promise.distance_m, 0.5);
+  EXPECT_NEAR(promise.closing_m_s, 10, 1e-14);
+  const SpeedLaw law{0.1, 0, 0};
+  EXPECT_NEAR(speedScale(outcome, bounds, law).scale, 0.5, 1e-12);
+  EXPECT_LT(speedScale(0.5, 10, 0, law), speedScale(0.5, 9.1, 0, law));
+  EXPECT_EQ(safeUntil(outcome, {{0.1}, {1.0}}).reason, "no speed bound is known of body 'lamp'");
+  step.bodies[2].not_against = {1};
+  outcome.step = std::make_shared<const Step>(step);
+  EXPECT_NEAR(safeUntil(outcome, bounds).seconds(), 0.5 / 9.1, 3e-9) << "these two are not asked for";
+  outcome.clearances.pop_back();
+  EXPECT_FALSE(safeUntil(outcome, bounds).isPromise()) << "nothing stands for what has no row";
+}
+
 TEST(SafeUntil, NeverPastTheQuotientOfTheDoubles) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> exponent(-30, 3);
