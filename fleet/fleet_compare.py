@@ -115,6 +115,6 @@ def compare(before_folder, after_folder):
     text.append('%d of %d recordings changed' % (changed, len(names)))
     head = '<th>recording</th><th>what changed</th><th>median step [ms]</th>'
     (folders[1] / 'compare.html').write_text(
-        fleet_database.page(after, 'What changed', html.escape('%s, held against %s: %s.' % (folders[1], folders[0], text[-1])), head,
+        fleet_database.page('What changed', html.escape('%s, held against %s: %s.' % (folders[1], folders[0], text[-1])), head,
                             '\n'.join(page_rows)))
     return text, changed > 0

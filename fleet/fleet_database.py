@@ -97,7 +97,7 @@ def page_row(database, one):
         cell('<br>'.join(map(html.escape, (one['said'] or '').split('\n'))))]))
 
 
-def page(database, title, lead, head, body):
+def page(title, lead, head, body):
     text = PAGE.read_text()
     for mark, value in (('@title@', title), ('@lead@', lead), ('@head@', head), ('@rows@', body)):
         text = text.replace(mark, value, 1)
@@ -107,7 +107,7 @@ def page(database, title, lead, head, body):
 def fleet_page(database):
     recordings = database.execute('SELECT * FROM recordings ORDER BY name').fetchall()
     head = ''.join('<th>%s%s</th>' % (name, ' [%s]' % unit if unit else '') for name, unit in COLUMNS)
-    return page(database, 'Recordings', summary(database), head, '\n'.join(page_row(database, one) for one in recordings))
+    return page('Recordings', summary(database), head, '\n'.join(page_row(database, one) for one in recordings))
 
 
 def summary(database):
@@ -120,6 +120,13 @@ def open_database(path):
     database = sqlite3.connect(str(path))
     database.row_factory = sqlite3.Row
     return database
+
+
+def write_whole(path, text):
+    """Whole or not at all."""
+    unfinished = path.with_name(path.name + '.part')
+    unfinished.write_text(text)
+    unfinished.replace(path)
 
 
 def write(fleet, folder, snakemake_version):

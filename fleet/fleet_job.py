@@ -21,14 +21,6 @@ ANSWERED = (0, 3)  # analyze_bag: proved; answered, but not all of it is proved
 ERROR = 1
 
 
-def write(path, data):
-    """Whole or not at all."""
-    path = pathlib.Path(path)
-    unfinished = path.with_name(path.name + '.part')
-    unfinished.write_text(json.dumps(data, indent=1) + '\n')
-    unfinished.replace(path)
-
-
 def analyze(fleet, recording, folder):
     """Runs analyze_bag with its report in the folder, which is there afterwards only where it was answered. What it said and
     cost."""
@@ -64,7 +56,7 @@ def compute_recording(fleet, name):
     result.update({'name': name, 'bag': recording['bag']})
     if result['exit'] in ANSWERED:
         result['tables'] = fleet_tables.of_report(folder / 'report')
-    write(folder / 'result.json', result)
+    fleet_database.write_whole(folder / 'result.json', json.dumps(result, indent=1) + '\n')
 
 
 def main():

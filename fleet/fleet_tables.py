@@ -22,8 +22,8 @@ def digest(path):
         return hashlib.sha256(content).hexdigest()
 
 
-def number(text, kind=float):
-    return kind(text) if text else None
+def number(text):
+    return float(text) if text else None
 
 
 def of_report(folder):

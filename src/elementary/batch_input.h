@@ -1,4 +1,4 @@
-// What all rungs do with a batch of pairs before a kernel gets it.
+// What all rungs do with a batch of pairs before a kernel gets it, and what that says of a block of them.
 #pragma once
 
 #include "dccd/elementary.h"
@@ -10,7 +10,16 @@ namespace dccd {
 /// for its kind, or for the distance that it asks for.
 simd::BatchInput inputOf(const PairBatch& batch, Accuracy rung);
 
-/// The pairs from `begin` on, at most `most` of them.
-void setBlock(const PairBatch& batch, std::size_t begin, std::size_t most, simd::BatchInput& input);
+constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched tier lie on the stack at once
+
+/// The batched tier's outputs for one block.
+struct BlockOutput {
+  std::uint8_t verdict[BLOCK];
+  std::uint64_t cell[BLOCK];
+  double lo[BLOCK], hi[BLOCK];
+};
+
+/// The pairs from `begin` on, at most BLOCK of them.
+void setBlock(const PairBatch& batch, std::size_t begin, simd::BatchInput& input);
 
 }  // namespace dccd

@@ -15,14 +15,7 @@
 namespace dccd {
 namespace {
 
-constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched test lie on the stack at once
 constexpr int BATCH_TOC_BITS = 10;  ///< the batch's cells are not used, only its brackets; coarse ones cost least
-
-struct BlockOutput {
-  std::uint8_t verdict[BLOCK];
-  std::uint64_t cell[BLOCK];
-  double lo[BLOCK], hi[BLOCK];
-};
 
 class ConservativeRung : public Rung {
  public:
@@ -42,22 +35,14 @@ class ConservativeRung : public Rung {
 /// lower end the features are within the tolerance, UNDECIDED otherwise.
 ElementaryResult ConservativeRung::fromBatch(PairKind kind, const conservative::Corners& corners,
                                              const BlockOutput& output, std::size_t i) const {
-  ElementaryResult result;
-  result.tier = Tier::DOUBLE_BATCH;
-  result.verdict = Verdict::UNDECIDED;
-  if (output.verdict[i] == simd::BATCH_NO) {
-    result.verdict = Verdict::NO_CONTACT;
-    result.toc_lower = 1;
-  }
+  if (output.verdict[i] == simd::BATCH_NO) return exact::noContact(Tier::DOUBLE_BATCH);
   if (output.verdict[i] == simd::BATCH_YES || output.verdict[i] == simd::BATCH_YES_BRACKET) {
     const double width = output.hi[i] - output.lo[i];  // exact: both are multiples of 2^-52
     if (conservative::closingSpeed(kind, corners) * width * (1 + tolerance::CLOSING_SPEED) <= options_.tolerance_m) {
-      result.verdict = Verdict::CONTACT;
-      result.toc_lower = output.lo[i];
-      result.toc_upper = output.hi[i];
+      return {output.lo[i], output.hi[i], Verdict::CONTACT, Tier::DOUBLE_BATCH};
     }
   }
-  return result;
+  return exact::undecided(Tier::DOUBLE_BATCH);
 }
 
 /// What features that come nearer than the tolerance truly do: distances cannot say when they meet, signs can.
@@ -79,7 +64,7 @@ void ConservativeRung::run(const PairBatch& batch, ElementaryResult* results, Ti
   input.toc_bits = BATCH_TOC_BITS;
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
     const double* separation = batch.minimum_separation_m == nullptr ? nullptr : batch.minimum_separation_m + begin;
-    setBlock(batch, begin, BLOCK, input);
+    setBlock(batch, begin, input);
     const bool batched =
         separation == nullptr || std::find(separation, separation + input.count, 0.0) != separation + input.count;
     if (batched) simd::exactBatch(input, {output.verdict, output.cell, output.lo, output.hi});

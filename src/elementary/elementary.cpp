@@ -88,10 +88,10 @@ simd::BatchInput inputOf(const PairBatch& batch, Accuracy rung) {
   return input;
 }
 
-void setBlock(const PairBatch& batch, std::size_t begin, std::size_t most, simd::BatchInput& input) {
+void setBlock(const PairBatch& batch, std::size_t begin, simd::BatchInput& input) {
   static_assert(sizeof(VertexMotion) == 8 * sizeof(double) && sizeof(Quad) == 4 * sizeof(std::uint32_t));
   input.quads = reinterpret_cast<const std::uint32_t(*)[4]>(batch.pairs + begin);
-  input.count = std::min(most, batch.count - begin);
+  input.count = std::min(BLOCK, batch.count - begin);
 }
 
 ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pair) {
@@ -101,14 +101,9 @@ ElementaryResult testPair(const Rung& test, PairKind kind, const PairMotion& pai
     std::memcpy(vertices[i].t1, pair.x[1][i], sizeof pair.x[1][i]);
   }
   const Quad quad = {0, 1, 2, 3};
-  PairBatch batch;
-  batch.kind = kind;
-  batch.vertices = vertices;
-  batch.pairs = &quad;
-  batch.count = 1;
   ElementaryResult result;
   TierCounters counters;
-  test.run(batch, &result, counters);
+  test.run({kind, vertices, &quad, 1}, &result, counters);
   return result;
 }
 

@@ -1,5 +1,4 @@
-#include "elementary/exact.h"
-
+// The rung `exact`: the tiers of doc/algorithm.md, cheapest first, until one decides. Complete: never undecided.
 #include <algorithm>
 #include <cmath>
 
@@ -25,18 +24,9 @@ ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_
 
 namespace {
 
-constexpr std::size_t BLOCK = 512;  ///< pairs whose outputs of the batched tier lie on the stack at once
-
 /// What is left when time is up still goes through the batched tier, which knows most of it at once, but not for longer
 /// than this: denormal numbers are slow.
 constexpr std::chrono::microseconds TIME_FOR_BATCHES(100);
-
-/// The batched tier's outputs for one block.
-struct BlockOutput {
-  std::uint8_t verdict[BLOCK];
-  std::uint64_t cell[BLOCK];
-  double lo[BLOCK], hi[BLOCK];
-};
 
 /// A pair for which the batched tier has no complete answer.
 ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const BlockOutput& output, std::size_t i,
@@ -54,7 +44,15 @@ ElementaryResult finish(const PairBatch& batch, std::size_t pair_index, const Bl
   return exact::decideUncertain(batch.kind, pair, toc_bits);
 }
 
-}  // namespace
+/// Allocates only for coordinates that span more than exact::FIXED_INTEGER_MAX_BITS bits.
+class ExactRung : public Rung {
+ public:
+  explicit ExactRung(int toc_bits) : toc_bits_(toc_bits) {}
+  void run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const override;
+
+ private:
+  int toc_bits_;
+};
 
 void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCounters& counters) const {
   const ScopedFloatMode mode;
@@ -64,7 +62,7 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
   const ElementaryResult no_contact = exact::noContact(Tier::DOUBLE_BATCH);
   const double width = std::ldexp(1.0, -toc_bits_);
   for (std::size_t begin = 0; begin < batch.count; begin += BLOCK) {
-    setBlock(batch, begin, BLOCK, input);
+    setBlock(batch, begin, input);
     if (batch.deadline && batch.deadline->movedBy(TIME_FOR_BATCHES).isOver()) {
       std::fill_n(results + begin, input.count, exact::undecided(Tier::DOUBLE_BATCH));
       counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)] += input.count;
@@ -89,6 +87,8 @@ void ExactRung::run(const PairBatch& batch, ElementaryResult* results, TierCount
     counters.settled[static_cast<std::size_t>(Tier::DOUBLE_BATCH)] += input.count - finished;
   }
 }
+
+}  // namespace
 
 std::unique_ptr<Rung> makeExactRung(const AccuracyOptions& options) {
   return std::make_unique<ExactRung>(options.toc_bits);

@@ -90,12 +90,6 @@ class Decision {
     return line;
   }
 
-  static void addProduct(Quadratic<Z>& sum, const Z& a0, const Z& a1, const Z& b0, const Z& b1) {
-    sum.c[0] = sum.c[0] + a0 * b0;
-    sum.c[1] = sum.c[1] + (a0 * b1 + a1 * b0);
-    sum.c[2] = sum.c[2] + a1 * b1;
-  }
-
   static Quadratic<Z> cross(const Line& u, const Line& v, int k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
     Quadratic<Z> result;
@@ -109,7 +103,11 @@ class Decision {
 
   static Quadratic<Z> dot(const Line& u, const Line& v) {
     Quadratic<Z> result;
-    for (int k = 0; k < 3; ++k) addProduct(result, u.start[k], u.change[k], v.start[k], v.change[k]);
+    for (int k = 0; k < 3; ++k) {
+      result.c[0] = result.c[0] + u.start[k] * v.start[k];
+      result.c[1] = result.c[1] + (u.start[k] * v.change[k] + u.change[k] * v.start[k]);
+      result.c[2] = result.c[2] + u.change[k] * v.change[k];
+    }
     return result;
   }
 

@@ -30,33 +30,12 @@ namespace dccd {
 namespace exact {
 namespace {
 
-DoubleDouble twoSum(double a, double b) {
-  const double sum = a + b, part = sum - a;
-  return {sum, (a - (sum - part)) + (b - part)};
-}
-
-/// A double in two halves of at most 26 bits each, so that products of halves are exact.
-struct Halves {
-  double hi, lo;
-  explicit Halves(double x) {
-    const double scaled = 134217729.0 * x;  // 2^27 + 1
-    hi = scaled - (scaled - x);
-    lo = x - hi;
-  }
-};
-
 /// A factor of products: the pair and the halves of its leading part.
 struct Factor {
   DoubleDouble value;
   Halves halves;
   explicit Factor(const DoubleDouble& x) : value(x), halves(x.hi) {}
 };
-
-/// fl(a b) and its error, exactly.
-DoubleDouble twoProduct(double a, const Halves& ah, double b, const Halves& bh) {
-  const double product = a * b;
-  return {product, ((ah.hi * bh.hi - product) + ah.hi * bh.lo + ah.lo * bh.hi) + ah.lo * bh.lo};
-}
 
 DoubleDouble product(const Factor& a, const Factor& b) {
   const DoubleDouble p = twoProduct(a.value.hi, a.halves, b.value.hi, b.halves);

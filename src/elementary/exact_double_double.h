@@ -15,6 +15,28 @@ struct DoubleDouble {
   double hi, lo;
 };
 
+/// fl(a + b) and its error, exactly.
+inline DoubleDouble twoSum(double a, double b) {
+  const double sum = a + b, part = sum - a;
+  return {sum, (a - (sum - part)) + (b - part)};
+}
+
+/// A double in two halves of at most 26 bits each, so that products of halves are exact.
+struct Halves {
+  double hi, lo;
+  explicit Halves(double x) {
+    const double scaled = 134217729.0 * x;  // 2^27 + 1
+    hi = scaled - (scaled - x);
+    lo = x - hi;
+  }
+};
+
+/// fl(a b) and its error, exactly (Dekker).
+inline DoubleDouble twoProduct(double a, const Halves& ah, double b, const Halves& bh) {
+  const double product = a * b;
+  return {product, ((ah.hi * bh.hi - product) + ah.hi * bh.lo + ah.lo * bh.hi) + ah.lo * bh.lo};
+}
+
 /// f = (u x v).w with VF (p; a b c): u = b-a, v = c-a, w = p-a; EE (a b; c d): u = b-a, v = d-c, w = c-a.
 class CoplanarityCubic {
  public:

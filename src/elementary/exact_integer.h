@@ -2,11 +2,12 @@
 // BigInteger lets GMP allocate. Both cost what the number's actual length costs, not what it might grow to.
 #pragma once
 
-#include <gmp.h>
+#include <gmpxx.h>
 
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <utility>
 
 namespace dccd {
 
@@ -169,67 +170,31 @@ class StackInteger {
 /// The same interface over GMP's allocating integers, for lengths that the stack should not carry.
 class BigInteger {
  public:
-  BigInteger() { mpz_init(value_); }
-  BigInteger(std::int64_t value) { mpz_init_set_si(value_, value); }
-  BigInteger(const BigInteger& other) { mpz_init_set(value_, other.value_); }
-  BigInteger(BigInteger&& other) noexcept {
-    mpz_init(value_);
-    mpz_swap(value_, other.value_);
-  }
-  ~BigInteger() { mpz_clear(value_); }
-  BigInteger& operator=(const BigInteger& other) {
-    mpz_set(value_, other.value_);
-    return *this;
-  }
-  BigInteger& operator=(BigInteger&& other) noexcept {
-    mpz_swap(value_, other.value_);
-    return *this;
-  }
+  BigInteger() = default;
+  BigInteger(std::int64_t value) : value_(value) {}
 
   static BigInteger shifted(std::int64_t value, int shift) { return BigInteger(value) << shift; }
 
-  int sign() const { return mpz_sgn(value_); }
+  int sign() const { return sgn(value_); }
   const BigInteger& sharpened() const { return *this; }
 
-  BigInteger operator-() const {
-    BigInteger result;
-    mpz_neg(result.value_, value_);
-    return result;
-  }
-  BigInteger operator+(const BigInteger& other) const {
-    BigInteger result;
-    mpz_add(result.value_, value_, other.value_);
-    return result;
-  }
-  BigInteger operator-(const BigInteger& other) const {
-    BigInteger result;
-    mpz_sub(result.value_, value_, other.value_);
-    return result;
-  }
-  BigInteger operator*(const BigInteger& other) const {
-    BigInteger result;
-    mpz_mul(result.value_, value_, other.value_);
-    return result;
-  }
-  BigInteger operator*(std::int64_t factor) const {
-    BigInteger result;
-    mpz_mul_si(result.value_, value_, factor);
-    return result;
-  }
-  BigInteger operator<<(int bits) const {
-    BigInteger result;
-    mpz_mul_2exp(result.value_, value_, static_cast<mp_bitcnt_t>(bits));
-    return result;
-  }
+  BigInteger operator-() const { return BigInteger(mpz_class(-value_)); }
+  BigInteger operator+(const BigInteger& other) const { return BigInteger(mpz_class(value_ + other.value_)); }
+  BigInteger operator-(const BigInteger& other) const { return BigInteger(mpz_class(value_ - other.value_)); }
+  BigInteger operator*(const BigInteger& other) const { return BigInteger(mpz_class(value_ * other.value_)); }
+  BigInteger operator*(std::int64_t factor) const { return BigInteger(mpz_class(value_ * factor)); }
+  BigInteger operator<<(int bits) const { return BigInteger(mpz_class(value_ << static_cast<mp_bitcnt_t>(bits))); }
 
   ScaledDouble approximate() const {
     ScaledDouble result;
-    result.mantissa = mpz_get_d_2exp(&result.exponent, value_);
+    result.mantissa = mpz_get_d_2exp(&result.exponent, value_.get_mpz_t());
     return result;
   }
 
  private:
-  mpz_t value_;
+  explicit BigInteger(mpz_class&& value) : value_(std::move(value)) {}
+
+  mpz_class value_;
 };
 
 }  // namespace dccd

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "dccd/tolerances.h"
+#include "elementary/exact_double_double.h"
 #include "elementary/exact_integer.h"
 
 namespace dccd {
@@ -130,10 +131,10 @@ class LazyInteger {
       Number number = made(Made::PRODUCT, a, b);
       const std::int32_t known = find(number);
       if (known >= 0) return known;
-      const double p = x.high * y.high, q = errorOfProduct(x.high, y.high, p);
+      const exact::DoubleDouble p = exact::twoProduct(x.high, exact::Halves(x.high), y.high, exact::Halves(y.high));
       const bool is_exact = x.low == 0 && y.low == 0;
-      const double rest = q + (x.high * y.low + x.low * y.high);
-      const double high = p + rest, low = rest - (high - p);  // |rest| is far below |p|
+      const double rest = p.lo + (x.high * y.low + x.low * y.high);
+      const double high = p.hi + rest, low = rest - (high - p.hi);  // |rest| is far below |p.hi|
       // |x|, |y| <= 1.
       const double error =
           BOUND_OF_BOUNDS * (x.error + y.error + x.error * y.error) + (is_exact ? 0 : tolerance::LAZY_ROUNDING);
@@ -159,19 +160,18 @@ class LazyInteger {
       }
       const double scale = powerOfTwo(static_cast<int>(-apart));
       const double yh = y.high * scale, yl = y.low * scale;  // exact: far from underflow
-      const double s = x.high + yh, part = s - x.high, t = (x.high - (s - part)) + (yh - part);
+      const exact::DoubleDouble leading = exact::twoSum(x.high, yh);
       const bool is_exact = x.low == 0 && yl == 0;
-      const double rest = t + (x.low + yl);
-      const double high = s + rest, back = high - s, low = (s - (high - back)) + (rest - back);
+      const exact::DoubleDouble all = exact::twoSum(leading.hi, leading.lo + (x.low + yl));
       const double error = BOUND_OF_BOUNDS * (x.error + y.error * scale) + (is_exact ? 0 : tolerance::LAZY_ROUNDING);
-      number.about = normalized(high, low, error, x.exponent);
+      number.about = normalized(all.hi, all.lo, error, x.exponent);
       return add(number);
     }
 
     int sign(std::int32_t a) {
       const Approximation& x = numbers_[a].about;
       if (std::fabs(x.high) * tolerance::LAZY_SIGN > x.error) return x.high > 0 ? 1 : -1;
-      return x.isZero() ? 0 : mpz_sgn(exact(a));
+      return x.isZero() ? 0 : sgn(exact(a));
     }
 
     void sharpen(std::int32_t a) {
@@ -187,21 +187,12 @@ class LazyInteger {
         result.mantissa = x.high;
         result.exponent = x.exponent;
       } else {
-        result.mantissa = mpz_get_d_2exp(&result.exponent, exact(a));
+        result.mantissa = mpz_get_d_2exp(&result.exponent, exact(a).get_mpz_t());
       }
       return result;
     }
 
    private:
-    /// What GMP computes lives on from decision to decision, so that nothing is allocated in the long run.
-    struct Exact {
-      mpz_t value;
-      Exact() { mpz_init(value); }
-      ~Exact() { mpz_clear(value); }
-      Exact(const Exact&) = delete;
-      Exact& operator=(const Exact&) = delete;
-    };
-
     static Number made(Made how, std::int32_t first, std::int32_t second) {
       Number number;
       number.made = how;
@@ -248,43 +239,35 @@ class LazyInteger {
       return {high * scale, low * scale, error * scale, exponent + shift};
     }
 
-    /// The error of the rounded product of two numbers below 1 (Dekker).
-    static double errorOfProduct(double a, double b, double product) {
-      constexpr double SPLIT = 134217729.0;  // 2^27 + 1
-      const double ca = SPLIT * a, cb = SPLIT * b;
-      const double ah = ca - (ca - a), bh = cb - (cb - b), al = a - ah, bl = b - bh;
-      return ((ah * bh - product) + ah * bl + al * bh) + al * bl;
-    }
-
-    mpz_srcptr exact(std::int32_t a) {
-      if (numbers_[a].exact >= 0) return exacts_[static_cast<std::size_t>(numbers_[a].exact)].value;
+    const mpz_class& exact(std::int32_t a) {
+      if (numbers_[a].exact >= 0) return exacts_[static_cast<std::size_t>(numbers_[a].exact)];
       const Number number = numbers_[a];
       const bool is_leaf = number.made == Made::CONSTANT;
-      const mpz_srcptr first = is_leaf ? nullptr : exact(number.first);
+      const mpz_class* first = is_leaf ? nullptr : &exact(number.first);
       const bool has_two = number.made == Made::SUM || number.made == Made::DIFFERENCE || number.made == Made::PRODUCT;
-      const mpz_srcptr second = has_two ? exact(number.second) : nullptr;
+      const mpz_class* second = has_two ? &exact(number.second) : nullptr;
       if (exact_count_ == exacts_.size()) exacts_.emplace_back();
       numbers_[a].exact = static_cast<std::int32_t>(exact_count_);
-      const mpz_ptr result = exacts_[exact_count_++].value;
+      mpz_class& result = exacts_[exact_count_++];
       switch (number.made) {
         case Made::CONSTANT:
-          mpz_set_si(result, number.constant);
-          mpz_mul_2exp(result, result, static_cast<mp_bitcnt_t>(number.second));
+          result = number.constant;
+          result <<= static_cast<mp_bitcnt_t>(number.second);
           break;
         case Made::NEGATED:
-          mpz_neg(result, first);
+          result = -*first;
           break;
         case Made::SUM:
-          mpz_add(result, first, second);
+          result = *first + *second;
           break;
         case Made::DIFFERENCE:
-          mpz_sub(result, first, second);
+          result = *first - *second;
           break;
         case Made::PRODUCT:
-          mpz_mul(result, first, second);
+          result = *first * *second;
           break;
         case Made::SHIFTED:
-          mpz_mul_2exp(result, first, static_cast<mp_bitcnt_t>(number.second));
+          result = *first << static_cast<mp_bitcnt_t>(number.second);
           break;
       }
       numbers_[a].about = approximationOf(result);
@@ -292,15 +275,15 @@ class LazyInteger {
     }
 
     /// The leading 106 bits.
-    Approximation approximationOf(mpz_srcptr value) {
-      if (mpz_sgn(value) == 0) return {};
-      const long rest = static_cast<long>(mpz_sizeinbase(value, 2)) - 106;
-      mpz_tdiv_q_2exp(leading_.value, value, static_cast<mp_bitcnt_t>(rest > 0 ? rest : 0));
-      const double first = mpz_get_d(leading_.value);  // 53 bits, the others cut off
-      mpz_set_d(part_.value, first);
-      mpz_sub(leading_.value, leading_.value, part_.value);
-      const double second = mpz_get_d(leading_.value), high = first + second;
-      const bool is_cut = rest > 0 && mpz_scan1(value, 0) < static_cast<mp_bitcnt_t>(rest);
+    Approximation approximationOf(const mpz_class& value) {
+      if (sgn(value) == 0) return {};
+      const long rest = static_cast<long>(mpz_sizeinbase(value.get_mpz_t(), 2)) - 106;
+      mpz_tdiv_q_2exp(leading_.get_mpz_t(), value.get_mpz_t(), static_cast<mp_bitcnt_t>(rest > 0 ? rest : 0));
+      const double first = leading_.get_d();  // 53 bits, the others cut off
+      part_ = first;
+      leading_ -= part_;
+      const double second = leading_.get_d(), high = first + second;
+      const bool is_cut = rest > 0 && mpz_scan1(value.get_mpz_t(), 0) < static_cast<mp_bitcnt_t>(rest);
       return normalized(high, second - (high - first), is_cut ? 1 : 0, rest > 0 ? rest : 0);
     }
 
@@ -314,8 +297,10 @@ class LazyInteger {
     std::vector<Place> table_ = std::vector<Place>(std::size_t{1} << TABLE_BITS);  ///< the newest number of each key
     std::uint64_t decision_ = 0;
     std::size_t place_ = 0;
-    Exact leading_, part_;
-    std::deque<Exact> exacts_;  ///< a deque: what was computed stays where it is
+    mpz_class leading_, part_;
+    /// What GMP computes lives on from decision to decision, so that nothing is allocated in the long run. A deque: it
+    /// stays where it is.
+    std::deque<mpz_class> exacts_;
     std::size_t exact_count_ = 0;
   };
 

@@ -173,15 +173,10 @@ class RefinedDecision {
 
 ElementaryResult decideByDoubleDouble(PairKind kind, const PairMotion& pair, int toc_bits) {
   RefinedDecision decision(kind, pair);
-  switch (decision.decide()) {
-    case Outcome::FREE:
-      return noContact(Tier::DOUBLE_DOUBLE);
-    case Outcome::CONTACT:
-      return contactInCell(decision.cell52() >> (52 - toc_bits), toc_bits, Tier::DOUBLE_DOUBLE);
-    case Outcome::UNCERTAIN:
-      break;
-  }
-  return undecided(Tier::DOUBLE_DOUBLE);
+  const Outcome outcome = decision.decide();
+  if (outcome == Outcome::FREE) return noContact(Tier::DOUBLE_DOUBLE);
+  if (outcome == Outcome::UNCERTAIN) return undecided(Tier::DOUBLE_DOUBLE);
+  return contactInCell(decision.cell52() >> (52 - toc_bits), toc_bits, Tier::DOUBLE_DOUBLE);
 }
 
 }  // namespace exact

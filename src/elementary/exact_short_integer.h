@@ -41,13 +41,8 @@ struct ShortInteger {
   }
 
   ShortInteger operator-(const ShortInteger& other) const {
-    ShortInteger result;
-    std::uint64_t borrow = 0;
-    for (int i = 0; i < LIMBS; ++i) {
-      const unsigned __int128 difference = static_cast<unsigned __int128>(limb[i]) - other.limb[i] - borrow;
-      result.limb[i] = static_cast<std::uint64_t>(difference);
-      borrow = static_cast<std::uint64_t>(difference >> 64) & 1;
-    }
+    ShortInteger result = *this;
+    result.subtractAt(0, other);
     return result;
   }
 

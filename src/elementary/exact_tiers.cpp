@@ -17,27 +17,13 @@ PairMotion motionOf(const VertexMotion* vertices, const Quad& quad) {
 
 ElementaryResult contactInCell(std::int64_t cell, int toc_bits, Tier tier) {
   const double width = std::ldexp(1.0, -toc_bits);
-  ElementaryResult result;
-  result.toc_lower = static_cast<double>(cell) * width;
-  result.toc_upper = std::min(1.0, static_cast<double>(cell + 1) * width);
-  result.verdict = Verdict::CONTACT;
-  result.tier = tier;
-  return result;
+  return {static_cast<double>(cell) * width, std::min(1.0, static_cast<double>(cell + 1) * width), Verdict::CONTACT,
+          tier};
 }
 
-ElementaryResult noContact(Tier tier) {
-  ElementaryResult result;
-  result.verdict = Verdict::NO_CONTACT;
-  result.toc_lower = 1;
-  result.tier = tier;
-  return result;
-}
+ElementaryResult noContact(Tier tier) { return {1, 1, Verdict::NO_CONTACT, tier}; }
 
-ElementaryResult undecided(Tier tier) {
-  ElementaryResult result;
-  result.tier = tier;
-  return result;
-}
+ElementaryResult undecided(Tier tier) { return {0, 1, Verdict::UNDECIDED, tier}; }
 
 ElementaryResult decideByCoincidence(PairKind kind, const PairMotion& pair, int toc_bits) {
   const auto meet = [&](int i, int j) { return std::equal(pair.x[0][i], pair.x[0][i] + 3, pair.x[0][j]); };

@@ -132,18 +132,14 @@ void walk(Bytes bytes, bool binary, TreeKind kind, Leaf&& leaf) {
   }
 }
 
-void fillLeaves(Bytes bytes, bool binary, TreeKind kind, const OctomapLimits& limits, DecodedOctomap& map) {
-  listLeaves([&](auto&& leaf) { walk(bytes, binary, kind, leaf); }, limits, map);
-}
-
 void checkSize(std::size_t size, const OctomapLimits& limits) {
   if (size > limits.max_bytes) {
     throw OctomapError("octomap data have " + text(size) + " bytes, more than the limit of " + text(limits.max_bytes));
   }
 }
 
-DecodedOctomap decodeWithHeader(const OctomapHeader& header, const unsigned char* data, std::size_t size,
-                                double resolution, const OctomapLimits& limits) {
+DecodedOctomap decode(const OctomapHeader& header, const unsigned char* data, std::size_t size, double resolution,
+                      const OctomapLimits& limits) {
   DecodedOctomap map;
   map.resolution_m = resolution;
   map.id = header.id;
@@ -152,25 +148,19 @@ DecodedOctomap decodeWithHeader(const OctomapHeader& header, const unsigned char
     throw OctomapError("octomap header: size is 0, but " + text(size - header.length) + " bytes of data follow");
   }
   if (!header.empty && size == header.length) throw OctomapError("octomap header: no data follow it");
-  fillLeaves(Bytes(data + header.length, size - header.length), header.binary, kind, limits, map);
+  const Bytes bytes(data + header.length, size - header.length);
+  listLeaves([&](auto&& leaf) { walk(bytes, header.binary, kind, leaf); }, limits, map);
   return map;
 }
 
 }  // namespace
 
 DecodedOctomap decodeOctomap(const OctomapFields& fields, const OctomapLimits& limits) {
-  const TreeKind kind = treeKind(fields.id);
+  treeKind(fields.id);  // throws where it is none
   checkResolution(fields.resolution);
   checkSize(fields.size, limits);
-  const OctomapHeader header = parseOctomapHeader(static_cast<const char*>(fields.data), fields.size);
-  const auto* data = static_cast<const unsigned char*>(fields.data);
-  if (!header.present) {
-    DecodedOctomap map;
-    map.resolution_m = fields.resolution;
-    map.id = fields.id;
-    fillLeaves(Bytes(data, fields.size), fields.binary, kind, limits, map);
-    return map;
-  }
+  OctomapHeader header = parseOctomapHeader(static_cast<const char*>(fields.data), fields.size);
+  if (!header.present) header = {false, fields.binary, fields.id, fields.resolution, fields.size == 0, 0};
   if (header.binary != fields.binary) {
     throw OctomapError(std::string("octomap binary is ") + (fields.binary ? "true" : "false") +
                        ", but the data begin with the header of a " + (header.binary ? ".bt" : ".ot") + " file");
@@ -183,7 +173,7 @@ DecodedOctomap decodeOctomap(const OctomapFields& fields, const OctomapLimits& l
     throw OctomapError("octomap resolution is " + text(fields.resolution) + ", but the data's header says " +
                        text(header.resolution));
   }
-  return decodeWithHeader(header, data, fields.size, fields.resolution, limits);
+  return decode(header, static_cast<const unsigned char*>(fields.data), fields.size, fields.resolution, limits);
 }
 
 DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& limits) {
@@ -201,8 +191,7 @@ DecodedOctomap readOctomapFile(const std::string& path, const OctomapLimits& lim
     const OctomapHeader header = parseOctomapHeader(data.data(), data.size());
     if (!header.present) throw OctomapError("the file has no header of a .bt or .ot file");
     checkResolution(header.resolution);
-    return decodeWithHeader(header, reinterpret_cast<const unsigned char*>(data.data()), data.size(), header.resolution,
-                            limits);
+    return decode(header, reinterpret_cast<const unsigned char*>(data.data()), data.size(), header.resolution, limits);
   } catch (const OctomapError& error) {
     // Whole: what is relative begins in the folder that roslaunch starts nodes in, which is not the reader's.
     std::error_code ignored;

@@ -1,6 +1,8 @@
 #include "octomap/octomap_header.h"
 
+#include <algorithm>
 #include <cstring>
+#include <sstream>
 
 #include "dccd/decimal.h"
 #include "dccd/octomap_decode.h"
@@ -52,20 +54,14 @@ OctomapHeader parseOctomapHeader(const char* data, std::size_t size) {
   header.present = header.binary || beginsWith(data, size, FULL_MARK);
   if (!header.present) return header;
   bool has_resolution = false;
-  const std::size_t limit = size < MAX_HEADER ? size : MAX_HEADER;
-  for (std::size_t at = 0; at < limit;) {
-    const void* newline = std::memchr(data + at, '\n', limit - at);
-    if (newline == nullptr) break;
-    std::size_t end = static_cast<std::size_t>(static_cast<const char*>(newline) - data);
-    const std::size_t next = end + 1;
-    if (end > at && data[end - 1] == '\r') --end;
-    if (!readLine(std::string(data + at, end - at), header, has_resolution)) {
-      if (header.id.empty()) throw OctomapError("octomap header: the id is missing");
-      if (!has_resolution) throw OctomapError("octomap header: the resolution (res) is missing");
-      header.length = next;
-      return header;
-    }
-    at = next;
+  std::istringstream lines(std::string(data, std::min(size, MAX_HEADER)));
+  for (std::string line; std::getline(lines, line) && !lines.eof();) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (readLine(line, header, has_resolution)) continue;
+    if (header.id.empty()) throw OctomapError("octomap header: the id is missing");
+    if (!has_resolution) throw OctomapError("octomap header: the resolution (res) is missing");
+    header.length = static_cast<std::size_t>(lines.tellg());
+    return header;
   }
   throw OctomapError("octomap header: it ends before its line 'data'");
 }

@@ -60,7 +60,7 @@ class RecordingWriter {
   }
   /// The count of a list whose items are visited one by one.
   template <typename T>
-  void count(const std::vector<T>& values, std::size_t, std::size_t) {
+  void count(const std::vector<T>& values, std::size_t, std::size_t = 0) {
     number(static_cast<std::uint64_t>(values.size()));
   }
 
@@ -75,6 +75,8 @@ class RecordingWriter {
   }
 
   void map(const std::shared_ptr<const VoxelSurface>& surface) {
+    flag(surface != nullptr);
+    if (!surface) return;
     number(surface->resolution());
     if (image_.surface_ != surface) {
       image_.leaves_.clear();
@@ -153,7 +155,7 @@ class RecordingReader {
   }
   template <typename T>
   void array(std::vector<T>& values) {
-    count(values, sizeof(T), std::numeric_limits<std::size_t>::max());
+    count(values, sizeof(T));
     bytes(static_cast<void*>(values.data()), values.size() * sizeof(T));
   }
   template <typename T>
@@ -163,6 +165,9 @@ class RecordingReader {
     values = share(std::move(read));
   }
   void map(std::shared_ptr<const VoxelSurface>& surface) {
+    bool present = false;
+    flag(present);
+    if (!present) return;
     double resolution_m = 0;
     std::vector<RecordingImage::PackedLeaf> packed;
     number(resolution_m);
@@ -179,7 +184,8 @@ class RecordingReader {
     }
   }
   template <typename T>
-  void count(std::vector<T>& values, std::size_t item_bytes, std::size_t most) {
+  void count(std::vector<T>& values, std::size_t item_bytes,
+             std::size_t most = std::numeric_limits<std::size_t>::max()) {
     std::uint64_t n = 0;
     number(n);
     if (n > left() / item_bytes) fail("a list of " + std::to_string(n) + " items is longer than the file");

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <tuple>
 #include <type_traits>
 
@@ -39,7 +38,7 @@ void visitPose(Archive& a, Pose& pose) {
 
 template <typename Archive, typename Expectations>
 void visitExpectations(Archive& a, Expectations& expected) {
-  a.count(expected, EXPECTATION_BYTES, std::numeric_limits<std::size_t>::max());
+  a.count(expected, EXPECTATION_BYTES);
   for (auto& one : expected) {
     for (auto& partner : one.partners) {
       a.number(partner.body);
@@ -183,17 +182,6 @@ void visitTopology(RecordingReader& a, Body& body) {
   }
 }
 
-void visitMap(RecordingWriter& a, const ObstacleMap& map) {
-  a.flag(map.surface != nullptr);
-  if (map.surface) a.map(map.surface);
-}
-
-void visitMap(RecordingReader& a, ObstacleMap& map) {
-  bool present = false;
-  a.flag(present);
-  if (present) a.map(map.surface);
-}
-
 #define DCCD_VISIT_CONTACT(member, published) visitValue(a, c.member);
 template <typename Archive, typename Contact>
 void visitContact(Archive& a, Contact& c) {
@@ -204,7 +192,7 @@ void visitContact(Archive& a, Contact& c) {
 #define DCCD_VISIT_PATCH(member, published) visitValue(a, patch.member);
 template <typename Archive, typename Answer>
 void visitPatches(Archive& a, Answer& answer) {
-  a.count(answer.patches, PATCH_BYTES, std::numeric_limits<std::size_t>::max());
+  a.count(answer.patches, PATCH_BYTES);
   for (auto& patch : answer.patches) {
     DCCD_PATCH_FIELDS(DCCD_VISIT_PATCH, DCCD_VISIT_PATCH, DCCD_NO_FIELD)
   }
@@ -216,12 +204,12 @@ void visitAnswer(Archive& a, Answer& answer) {
   visitValues(a, answer.status, answer.reason, answer.answered, answer.complete, answer.cut, answer.start_state,
               answer.touching, answer.total_contacts, answer.suppressed, answer.excluded_voxels, answer.substeps,
               answer.unchecked_toc_lower, answer.earliest_toc, answer.earliest_unexpected_toc);
-  a.count(answer.contacts, CONTACT_BYTES, std::numeric_limits<std::size_t>::max());
+  a.count(answer.contacts, CONTACT_BYTES);
   for (auto& contact : answer.contacts) visitContact(a, contact);
-  a.count(answer.intersections, INTERSECTION_BYTES, std::numeric_limits<std::size_t>::max());
+  a.count(answer.intersections, INTERSECTION_BYTES);
   for (auto& crossing : answer.intersections) visitValues(a, crossing.body, crossing.vertex, crossing.expected);
   for (auto* sentences : {&answer.unproved, &answer.excluded, &answer.expected}) {
-    a.count(*sentences, TEXT_BYTES, std::numeric_limits<std::size_t>::max());
+    a.count(*sentences, TEXT_BYTES);
     for (auto& sentence : *sentences) a.text(sentence);
   }
   visitPatches(a, answer);
@@ -281,7 +269,7 @@ void visit(Archive& a, Recording& r) {
     visitSeparations(a, body);
     visitReference(a, body);
   }
-  visitMap(a, r.step.map);
+  a.map(r.step.map.surface);
   a.number(r.step.map.stamp_ns);
   visitPose(a, r.step.map.map_from_fixed);
   auto& own = r.step.map.own;
