@@ -105,7 +105,13 @@ int main(int argc, char** argv) {
         wavingCloth(101), wavingCloth(216),
         made("sheet with a fold over a tenth", Topology::grid(101, 101), test::rolled(101, 2.8, 0.02, 0.1),
              test::rolled(101, 3, 0.02, 0.1)),
+        made("sheet with a fold over a tenth", Topology::grid(216, 216), test::rolled(216, 2.8, 0.02, 0.1),
+             test::rolled(216, 3, 0.02, 0.1)),
         made("bending tube", test::tube(101, 100), test::tubeAt(101, 100, 0.1), test::tubeAt(101, 100, 0.12))};
+    for (const std::size_t side : {80, 160}) {
+      const test::Glove glove(side);
+      cases.push_back(made("bending glove", glove.topology, glove.curled(0.3), glove.curled(0.33)));
+    }
     if (!test::dataDir().empty()) {
       const std::string folder = test::dataDir() + "/scenes/cloth-ball/";
       const test::PlyMesh first = test::readPly(folder + "frame_0.ply"), second = test::readPly(folder + "frame_1.ply");

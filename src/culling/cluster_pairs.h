@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "culling/cluster_tree.h"
-#include "culling/unfolded_parts.h"
+#include "culling/unfolded.h"
 #include "dccd/deadline.h"
 
 namespace dccd {
@@ -17,11 +17,16 @@ struct TreePair {
   const ClusterTree* b = nullptr;
   bool self = false;
   Span span;
-  bool adjacent = false;                   ///< both are of one body: features that share a vertex are no pair
-  const NearClusters* left_out = nullptr;  ///< pairs of clusters that are not looked at; null: none
+  bool adjacent = false;  ///< both are of one body: features that share a vertex are no pair
+  /// Groups that are in one part of a surface are not looked at. Null: there are no parts.
+  const PartsOfGroups *parts_a = nullptr, *parts_b = nullptr;
 
   simd::GroupsView viewA(std::size_t level) const { return a->level(level).view(span.times == Times::SWEPT); }
   simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
+  /// Takes out of flattened pairs of groups those that are not looked at; returns how many are left.
+  std::size_t leaveOut(std::size_t level, std::uint32_t* pairs, std::size_t count) const {
+    return parts_a ? leaveOutPairs(*parts_a, *parts_b, level, pairs, count) : count;
+  }
 };
 
 /// What of the pairs a search that was cut did not come to.
@@ -32,11 +37,12 @@ struct SearchRest {
 
 /// Pairs of groups of level 1, (a, b) flattened: the units of work that are spread over threads. Of more than max_pairs
 /// that many are kept, the first in the trees' order; the rest is bounded as by superclusterTocBound(). The deadline
-/// ends the search as max_pairs does; once it was over it is not asked again.
+/// ends the search as max_pairs does; once it was over it is not asked again. left_out: counts on what the parts of a
+/// surface leave out.
 SearchRest superclusterPairs(const TreePair& trees, std::vector<std::uint32_t>& pairs,
                              std::vector<std::uint32_t>& scratch,
                              std::size_t max_pairs = std::numeric_limits<std::size_t>::max(),
-                             const Deadline& deadline = {});
+                             const Deadline& deadline = {}, std::uint64_t* left_out = nullptr);
 
 /// No features of the two level-1 groups can touch before this time, in [0, 1]; 0 only where the groups' projections
 /// overlap (to two record units) in all 8 directions at t=0. The end of the bounds when they never meet until then.
@@ -61,11 +67,9 @@ class ClusterPairStream {
                                simd::Diagonal::UPPER_WITH_DIAGONAL, trees.span.times != Times::BOTH, clusters_.data(),
                                CLUSTER_PAIRS, &consumed);
       done += consumed;
-      if (trees.left_out) {
-        const std::size_t met = clusters;
-        clusters = trees.left_out->leaveOut(clusters_.data(), met);
-        cluster_pairs_left_out_ += met - clusters;
-      }
+      const std::size_t met = clusters;
+      clusters = trees.leaveOut(0, clusters_.data(), met);
+      cluster_pairs_left_out_ += met - clusters;
       std::size_t leaf_done = 0;
       while (leaf_done < clusters) {
         const std::uint32_t* from = clusters_.data() + 2 * leaf_done;

@@ -1,200 +1,381 @@
 #include "culling/unfolded.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <unordered_map>
+#include <numeric>
 
-#include "dccd/tolerances.h"
+#include "culling/surface_cells.h"
+#include "simd/surface_views.h"
 
 namespace dccd {
 namespace {
 
-constexpr std::size_t SAMPLES = 1024;     // faces that give the direction, and are looked at first
-constexpr std::size_t SWEEP_FACTOR = 64;  // pairs of boundary edges, per edge, after which the test gives up
-constexpr int SWEEP_DIRECTION = 3;        // along no side of a grid whose sides lie in the plane's axes
+using simd::GROUP;
 
-struct DirectedEdge {
-  Index low, high;
-  bool forward;
-  bool operator<(const DirectedEdge& other) const { return low != other.low ? low < other.low : high < other.high; }
-  bool sameAs(const DirectedEdge& other) const { return low == other.low && high == other.high; }
-};
-
-/// Successor of each boundary vertex; empty when the faces are no manifold with one orientation. Counts the edges.
-std::unordered_map<Index, Index> boundaryOf(const ClusterTree& faces, std::size_t& edge_count) {
-  std::vector<DirectedEdge> sides;
-  sides.reserve(3 * faces.featureCount());
-  for (std::size_t f = 0; f < faces.featureCount(); ++f) {
-    const Index* v = faces.feature(f);
-    for (int k = 0; k < 3; ++k) {
-      const Index a = v[k], b = v[(k + 1) % 3];
-      sides.push_back({std::min(a, b), std::max(a, b), a < b});
-    }
-  }
-  std::sort(sides.begin(), sides.end());
-  std::unordered_map<Index, Index> next;
-  edge_count = 0;
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
-    for (end = i + 1; end < sides.size() && sides[end].sameAs(sides[i]); ++end) {
-    }
-    ++edge_count;
-    if (end - i > 2 || (end - i == 2 && sides[i].forward == sides[i + 1].forward)) return {};
-    if (end - i == 2) continue;
-    const DirectedEdge& s = sides[i];
-    if (!next.emplace(s.forward ? s.low : s.high, s.forward ? s.high : s.low).second) return {};
-  }
-  return next;
-}
+// Runs left out after one that certified next to nothing, each time about twice as many; of a view without a part.
+constexpr std::size_t RUNS_LEFT_OUT = 15, MOST_LEFT_OUT = 127;
+constexpr std::size_t FEW = 8;  // one in so many of the cells beside each other is next to nothing
+constexpr std::size_t MOST_PARTS = 64;
+constexpr std::size_t SAMPLES = 256;           // faces that give the mean normal; pairs of cells that choose a view
+constexpr std::size_t FEWEST_CELLS = 16;       // of a part of a surface
+constexpr std::size_t PAIRS_A_DIRECTION = 32;  // one in so many of the cells beside each other are worth a direction
+constexpr std::size_t LEAST_BUDGET = 4096;     // edges of borders that are tested in a run, or one for each cell
+constexpr std::size_t TRIES = 8;               // of a part whose border meets itself
+constexpr std::size_t CELLS_A_PIECE = 256, CELLS_AT_ONCE = 32;
+constexpr std::uint32_t ALL_VIEWS = (1u << simd::VIEWS) - 1;
 
 Vec3 normalAt(const double (&a)[4], const double (&b)[4], const double (&c)[4]) {
   const Eigen::Map<const Vec3> p(a), q(b), r(c);
   return (q - p).cross(r - p);
 }
 
+/// Bernstein coefficients of the face's area over the step, the middle one doubled, are positive.
+bool keepsOrientation(const PlanarSpan::Point& a, const PlanarSpan::Point& b, const PlanarSpan::Point& c,
+                      double margin) {
+  const double px0 = b.x0 - a.x0, py0 = b.y0 - a.y0, qx0 = c.x0 - a.x0, qy0 = c.y0 - a.y0;
+  const double px1 = b.x1 - a.x1, py1 = b.y1 - a.y1, qx1 = c.x1 - a.x1, qy1 = c.y1 - a.y1;
+  const double first = px0 * qy0 - py0 * qx0, last = px1 * qy1 - py1 * qx1;
+  const double middle = (px0 * qy1 - py0 * qx1) + (px1 * qy0 - py1 * qx0);
+  return first > margin && last > margin && middle > 3 * margin;
+}
+
+ViewPlane planeOf(std::size_t view) {
+  const int* line = simd::VIEW_LINE[view / 2];
+  return ViewPlane::alongLine((view % 2 ? -1.0 : 1.0) * Vec3(line[0], line[1], line[2]));
+}
+
 }  // namespace
 
-bool UnfoldedProof::Span::isApartFrom(const Span& other, double margin) const {
-  for (int d = 0; d < DIRECTIONS; ++d) {
-    if (low[0][d] > other.high[0][d] + margin && low[1][d] > other.high[1][d] + margin) return true;
-    if (other.low[0][d] > high[0][d] + margin && other.low[1][d] > high[1][d] + margin) return true;
+std::size_t leaveOutPairs(const PartsOfGroups& a, const PartsOfGroups& b, std::size_t level, std::uint32_t* pairs,
+                          std::size_t count) {
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t first = pairs[2 * i], second = pairs[2 * i + 1];
+    pairs[2 * left] = first;
+    pairs[2 * left + 1] = second;
+    left += !a.isLeftOut(level, b, first, second);
   }
-  return false;
+  return left;
 }
 
-UnfoldedProof::UnfoldedProof(const SceneBody& body) {
-  const ClusterTree& faces = body.tree(FeatureKind::FACE);
-  if (faces.featureCount() == 0) return;
-  std::size_t edge_count = 0;
-  const std::unordered_map<Index, Index> next = boundaryOf(faces, edge_count);
-  // A disk has the Euler characteristic 1 and one boundary. (Closed parts beside it could make up for other holes;
-  // they have faces of either orientation in any direction.) Edges and vertices beside the faces are not certified.
-  if (next.empty() || edge_count != body.tree(FeatureKind::EDGE).featureCount()) return;
-  if (body.usedCount() + faces.featureCount() != edge_count + 1) return;
-  std::vector<Index> loop;
-  const Index first = std::min_element(next.begin(), next.end())->first;
-  Index at = first;
-  do {
-    loop.push_back(at - body.internal_begin);
-    const auto successor = next.find(at);
-    if (successor == next.end()) return;
-    at = successor->second;
-  } while (at != first && loop.size() <= next.size());
-  if (loop.size() == next.size()) loop_ = std::move(loop);
-}
+class Unfolded::Search {
+ public:
+  explicit Search(const SceneBody& body)
+      : cells_(body),
+        contour_(body.internal_begin, body.usedCount()),
+        parts_of_(cells_.count()),
+        views_(cells_.count()),
+        marks_(cells_.count()) {}
 
-bool UnfoldedProof::run(const SceneBody& body, const VertexMotion* vertices) {
-  if (!isDisk()) return false;
-  const ClusterTree& faces = body.tree(FeatureKind::FACE);
-  const std::size_t stride = std::max<std::size_t>(1, faces.featureCount() / SAMPLES);
-  Vec3 sum = Vec3::Zero();
-  const auto sampled = [&](std::size_t f, bool at_t1) {
-    const Index* v = faces.feature(f);
-    const VertexMotion &a = vertices[v[0]], &b = vertices[v[1]], &c = vertices[v[2]];
-    return at_t1 ? normalAt(a.t1, b.t1, c.t1) : normalAt(a.t0, b.t0, c.t0);
-  };
-  for (std::size_t f = 0; f < faces.featureCount(); f += stride) sum += sampled(f, false) + sampled(f, true);
-  const double length = sum.norm();
-  if (!(length > tolerance::UNFOLDED_SMALLEST_NORMAL && length < tolerance::UNFOLDED_LARGEST_NORMAL)) return false;
-  for (std::size_t f = 0; f < faces.featureCount(); f += stride) {
-    if (!(sampled(f, false).dot(sum) > 0 && sampled(f, true).dot(sum) > 0)) return false;
-  }
-
-  const ViewPlane plane(sum);
-  points_.resize(body.usedCount());
-  double size = 0;  // largest |x| + |y| + |z|
-  const double inf = std::numeric_limits<double>::infinity();
-  double low[2] = {inf, inf}, high[2] = {-inf, -inf};
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const VertexMotion& v = vertices[body.internal_begin + i];
-    const Eigen::Map<const Vec3> p(v.t0), q(v.t1);
-    const auto [x0, y0] = plane.coordinates(v.t0);
-    const auto [x1, y1] = plane.coordinates(v.t1);
-    points_[i] = {x0, y0, x1, y1};
-    size = std::max(size, std::max(p.lpNorm<1>(), q.lpNorm<1>()));
-    low[0] = std::min(low[0], std::min(points_[i].x0, points_[i].x1));
-    low[1] = std::min(low[1], std::min(points_[i].y0, points_[i].y1));
-    high[0] = std::max(high[0], std::max(points_[i].x0, points_[i].x1));
-    high[1] = std::max(high[1], std::max(points_[i].y0, points_[i].y1));
-  }
-  if (!(size > tolerance::UNFOLDED_SMALLEST_M && size < tolerance::UNFOLDED_LARGEST_M)) return false;
-  error_ = ViewPlane::error(size);
-  // Differences are at most L = extent, and off by 2 error + 2^-53 L <= 2.5 error; so a product of two by 5 L error and
-  // 7 error^2, twice for two products, and their three roundings add less than 3 L error: below 20 error (L + error).
-  const double extent = std::max(high[0] - low[0], high[1] - low[1]);
-  product_error_ = tolerance::UNFOLDED_PRODUCT * error_ * (extent + error_);
-  return facesKeepOrientation(body) && contourIsSimple();
-}
-
-bool UnfoldedProof::facesKeepOrientation(const SceneBody& body) const {
-  const ClusterTree& faces = body.tree(FeatureKind::FACE);
-  for (std::size_t f = 0; f < faces.featureCount(); ++f) {
-    const Index* v = faces.feature(f);
-    const Planar &a = points_[v[0] - body.internal_begin], &b = points_[v[1] - body.internal_begin],
-                 &c = points_[v[2] - body.internal_begin];
-    const double px0 = b.x0 - a.x0, py0 = b.y0 - a.y0, qx0 = c.x0 - a.x0, qy0 = c.y0 - a.y0;
-    const double px1 = b.x1 - a.x1, py1 = b.y1 - a.y1, qx1 = c.x1 - a.x1, qy1 = c.y1 - a.y1;
-    // Bernstein coefficients of the area over the step, the middle one doubled.
-    const double first = px0 * qy0 - py0 * qx0, last = px1 * qy1 - py1 * qx1;
-    const double middle = (px0 * qy1 - py0 * qx1) + (px1 * qy0 - py1 * qx0);
-    if (!(first > product_error_ && last > product_error_ && middle > 3 * product_error_)) return false;
-  }
-  return true;
-}
-
-/// Two successive edges of the boundary meet in their vertex alone, unless one folds back onto the other.
-bool UnfoldedProof::turnsAt(const Planar& before, const Planar& at, const Planar& after) const {
-  const double px0 = before.x0 - at.x0, py0 = before.y0 - at.y0, qx0 = after.x0 - at.x0, qy0 = after.y0 - at.y0;
-  const double px1 = before.x1 - at.x1, py1 = before.y1 - at.y1, qx1 = after.x1 - at.x1, qy1 = after.y1 - at.y1;
-  const double cross[3] = {px0 * qy0 - py0 * qx0, px1 * qy1 - py1 * qx1,
-                           (px0 * qy1 - py0 * qx1) + (px1 * qy0 - py1 * qx0)};
-  const double dot[3] = {px0 * qx0 + py0 * qy0, px1 * qx1 + py1 * qy1,
-                         (px0 * qx1 + py0 * qy1) + (px1 * qx0 + py1 * qy0)};
-  const double margin = 3 * product_error_;
-  const auto all = [margin](const double(&c)[3], double sign) {
-    return sign * c[0] > margin && sign * c[1] > margin && sign * c[2] > margin;
-  };
-  return all(dot, -1) || all(cross, 1) || all(cross, -1);
-}
-
-bool UnfoldedProof::contourIsSimple() {
-  const std::size_t n = loop_.size();
-  const auto point = [this](std::size_t i) -> const Planar& { return points_[loop_[i]]; };
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!turnsAt(point((i + n - 1) % n), point(i), point((i + 1) % n))) return false;
-  }
-  spans_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Planar &a = point(i), &b = point((i + 1) % n);
-    Span& span = spans_[i];
-    for (int d = 0; d < DIRECTIONS; ++d) {
-      const double c = std::cos(d * M_PI / DIRECTIONS), s = std::sin(d * M_PI / DIRECTIONS);
-      const double a0 = c * a.x0 + s * a.y0, b0 = c * b.x0 + s * b.y0;
-      const double a1 = c * a.x1 + s * a.y1, b1 = c * b.x1 + s * b.y1;
-      span.low[0][d] = std::min(a0, b0);
-      span.high[0][d] = std::max(a0, b0);
-      span.low[1][d] = std::min(a1, b1);
-      span.high[1][d] = std::max(a1, b1);
+  /// The number of parts. Whether the first one is the whole surface.
+  std::size_t run(const SceneBody& body, const VertexMotion* vertices, const Parallel& parallel, bool& whole) {
+    part_count_ = 0;
+    whole = false;
+    vertices_ = vertices;
+    if (left_out_runs_ > 0 && !(cells_.isWhole() && findNormal(body))) {
+      --left_out_runs_;
+      return 0;
     }
-    span.sweep_low = std::min(span.low[0][SWEEP_DIRECTION], span.low[1][SWEEP_DIRECTION]);
-    span.sweep_high = std::max(span.high[0][SWEEP_DIRECTION], span.high[1][SWEEP_DIRECTION]);
-    span.edge = i;
+    std::fill(parts_of_.begin(), parts_of_.end(), 0);
+    budget_ = std::max(LEAST_BUDGET, cells_.count());
+    rest();
+    findViews(body.tree(FeatureKind::FACE), parallel);
+    const bool one = certifyMost();
+    whole = cells_.isWhole() && (one || (findNormal(body) && isWholeAlongNormal(body)));
+    if (!whole && cells_.count() >= FEWEST_CELLS) certifyRest();
+    return part_count_;
   }
-  std::sort(spans_.begin(), spans_.end(), [](const Span& a, const Span& b) { return a.sweep_low < b.sweep_low; });
-  // A projection is off by sqrt(2) error for its point's coordinates and below 2 error for its own roundings; two meet.
-  const double margin = 8 * error_;
-  std::size_t budget = SWEEP_FACTOR * n;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Span& span = spans_[i];
-    for (std::size_t j = i + 1; j < n && spans_[j].sweep_low <= span.sweep_high + margin; ++j) {
-      if (budget-- == 0) return false;
-      const std::size_t gap = (spans_[j].edge + n - span.edge) % n;
-      if (gap != 1 && gap != n - 1 && !span.isApartFrom(spans_[j], margin)) return false;
+
+  void markGroups(const SceneBody& body, FeatureKind kind, std::vector<std::vector<std::uint64_t>>& levels) const {
+    const std::size_t clusters = (body.tree(kind).featureCount() + GROUP - 1) / GROUP;
+    for (std::size_t g = 0; g < clusters; ++g) {
+      const std::uint32_t *home = cells_.firstHome(kind, g), *last = cells_.lastHome(kind, g);
+      std::uint64_t parts = home == last ? 0 : ~std::uint64_t{0};
+      for (; home != last; ++home) parts &= parts_of_[*home];
+      levels[0][g] = parts;
+    }
+    for (std::size_t l = 1; l < levels.size(); ++l) {
+      std::fill(levels[l].begin(), levels[l].end(), ~std::uint64_t{0});
+      for (std::size_t g = 0; g < levels[l - 1].size(); ++g) levels[l][g / GROUP] &= levels[l - 1][g];
     }
   }
-  return true;
+
+ private:
+  /// Some part holds both.
+  bool areTogether(std::uint32_t a, std::uint32_t b) const { return (parts_of_[a] & parts_of_[b]) != 0; }
+  bool isMarked(std::uint32_t cell) const { return marks_[cell] == mark_; }
+
+  /// What stood against a part is left out of the same view for some runs, and so is a view without a part.
+  void rest() {
+    allowed_ = ALL_VIEWS;
+    for (std::size_t v = 0; v < simd::VIEWS; ++v) {
+      if (resting_[v] > 0 && --resting_[v] > 0) allowed_ &= ~(1u << v);
+      if (++runs_with_[v] <= RUNS_LEFT_OUT) continue;
+      runs_with_[v] = 0;
+      dropped_[v].clear();
+    }
+  }
+  /// Of the cells that are not dropped.
+  void certifyAlong(std::size_t view, std::vector<std::uint32_t>& cells) {
+    if (!dropped_[view].empty()) {
+      mark(dropped_[view]);
+      cells.erase(std::remove_if(cells.begin(), cells.end(), [&](std::uint32_t c) { return isMarked(c); }),
+                  cells.end());
+    }
+    const std::size_t before = part_count_;
+    if (cells.size() == cells_.count()) {
+      certifyPart(cells, planeOf(view), &dropped_[view]);
+    } else {
+      for (std::vector<std::uint32_t>& component : componentsOf(cells)) {
+        if (part_count_ < MOST_PARTS) certifyPart(std::move(component), planeOf(view), &dropped_[view]);
+      }
+    }
+    if (part_count_ == before && budget_ > 0) resting_[view] = RUNS_LEFT_OUT + 1;
+  }
+
+  /// Views of each cell that all its faces face.
+  void findViews(const ClusterTree& faces, const Parallel& parallel) {
+    const auto* positions = reinterpret_cast<const double*>(vertices_);
+    const std::uint32_t* groups = faces.leaves(false).vertices;
+    parallel(cells_.count(), CELLS_A_PIECE, [&](std::size_t first, std::size_t last) {
+      std::uint32_t views[CELLS_AT_ONCE * GROUP];
+      for (std::size_t c = first, end = first; c < last; c = end) {
+        end = std::min(c + CELLS_AT_ONCE, last);
+        simd::facedViews(positions, groups + c * 3 * GROUP, end - c, views);
+        for (std::size_t cell = c; cell < end; ++cell) {
+          const std::uint32_t* face = views + (cell - c) * GROUP;
+          views_[cell] = cells_.isSound(cell) ? std::accumulate(face, face + GROUP, ALL_VIEWS, std::bit_and<>()) : 0;
+        }
+      }
+    });
+  }
+
+  /// Of a budget, in edges of borders, that grows with the surface: they take up to a third of a microsecond.
+  bool canPay(std::size_t edges) {
+    const bool can = edges <= budget_;
+    budget_ = can ? budget_ - edges : 0;
+    return can;
+  }
+
+  /// Along the direction that most cells face. True: it holds all of them.
+  bool certifyMost() {
+    std::array<std::size_t, simd::VIEWS> counts{};
+    for (const std::uint32_t views : views_) {
+      for (std::uint32_t v = views & allowed_; v != 0; v &= v - 1) ++counts[static_cast<std::size_t>(__builtin_ctz(v))];
+    }
+    const auto most = std::max_element(counts.begin(), counts.end());
+    if (*most < std::min(FEWEST_CELLS, cells_.count())) return false;
+    std::vector<std::uint32_t> cells;
+    first_view_ = static_cast<std::size_t>(most - counts.begin());
+    for (std::uint32_t c = 0; c < cells_.count(); ++c) {
+      if ((views_[c] >> first_view_ & 1) != 0) cells.push_back(c);
+    }
+    const bool all = cells.size() == cells_.count();
+    certifyAlong(first_view_, cells);
+    return all && part_count_ == 1 && std::find(parts_of_.begin(), parts_of_.end(), 0) == parts_of_.end();
+  }
+
+  /// False: the surface is certainly not to be seen from its front along its mean normal.
+  bool findNormal(const SceneBody& body) {
+    const ClusterTree& faces = body.tree(FeatureKind::FACE);
+    const std::size_t stride = std::max<std::size_t>(1, faces.featureCount() / SAMPLES);
+    const auto sampled = [&](std::size_t f, bool at_t1) {
+      const Index* v = faces.feature(f);
+      const VertexMotion &a = vertices_[v[0]], &b = vertices_[v[1]], &c = vertices_[v[2]];
+      return at_t1 ? normalAt(a.t1, b.t1, c.t1) : normalAt(a.t0, b.t0, c.t0);
+    };
+    normal_.setZero();
+    for (std::size_t f = 0; f < faces.featureCount(); f += stride) normal_ += sampled(f, false) + sampled(f, true);
+    const double length = normal_.norm();
+    if (!(length > tolerance::UNFOLDED_SMALLEST_NORMAL && length < tolerance::UNFOLDED_LARGEST_NORMAL)) return false;
+    for (std::size_t f = 0; f < faces.featureCount(); f += stride) {
+      if (!(sampled(f, false).dot(normal_) > 0 && sampled(f, true).dot(normal_) > 0)) return false;
+    }
+    return true;
+  }
+
+  bool isWholeAlongNormal(const SceneBody& body) {
+    const ViewPlane plane(normal_);
+    PlanarSpan span;
+    points_.resize(body.usedCount());
+    for (std::size_t i = 0; i < points_.size(); ++i) points_[i] = span.add(plane, vertices_[body.internal_begin + i]);
+    if (!span.isGuarded()) return false;
+    const double margin = span.productError();
+    const ClusterTree& faces = body.tree(FeatureKind::FACE);
+    for (std::size_t f = 0; f < faces.featureCount(); ++f) {
+      const Index* v = faces.feature(f);
+      const auto point = [&](int k) -> const PlanarSpan::Point& { return points_[v[k] - body.internal_begin]; };
+      if (!keepsOrientation(point(0), point(1), point(2), margin)) return false;
+    }
+    std::vector<std::uint32_t> cells(cells_.count());
+    std::iota(cells.begin(), cells.end(), 0);
+    if (certifyPart(cells, plane, nullptr) != cells_.count()) return false;
+    part_count_ = 1;
+    std::fill(parts_of_.begin(), parts_of_.end(), 1);
+    return true;
+  }
+
+  /// Along further directions, cells that lie beside each other in no part.
+  void certifyRest() {
+    open_.clear();
+    std::size_t all = 0;
+    for (std::uint32_t c = 0; c < cells_.count(); ++c) {
+      for (auto n = cells_.firstNeighbour(c); n != cells_.lastNeighbour(c); ++n) {
+        if (n->cell == SurfaceCells::BORDER || n->cell < c) continue;
+        ++all;
+        if (!areTogether(c, n->cell)) open_.push_back({c, n->cell});
+      }
+    }
+    const std::size_t fewest = std::max(FEWEST_CELLS, all / PAIRS_A_DIRECTION);
+    std::vector<std::uint32_t> cells;
+    std::uint32_t left = allowed_ & ~(1u << first_view_);
+    while (open_.size() >= fewest) {
+      std::array<std::size_t, simd::VIEWS> counts{};
+      const std::size_t stride = std::max<std::size_t>(1, open_.size() / SAMPLES);
+      for (std::size_t i = 0; i < open_.size(); i += stride) {
+        const auto [a, b] = open_[i];
+        for (std::uint32_t v = views_[a] & views_[b] & left; v != 0; v &= v - 1) {
+          counts[static_cast<std::size_t>(__builtin_ctz(v))] += stride;
+        }
+      }
+      const auto most = std::max_element(counts.begin(), counts.end());
+      if (*most < fewest) break;
+      const auto view = static_cast<std::size_t>(most - counts.begin());
+      left &= ~(1u << view);
+      cells.clear();
+      mark(cells);
+      for (const auto& [a, b] : open_) {
+        if ((views_[a] & views_[b] & 1u << view) != 0) add(a, cells), add(b, cells);
+      }
+      for (std::size_t i = 0, last = cells.size(); i < last; ++i) {
+        for (auto n = cells_.firstNeighbour(cells[i]); n != cells_.lastNeighbour(cells[i]); ++n) {
+          if (n->cell != SurfaceCells::BORDER && (views_[n->cell] >> view & 1) != 0) add(n->cell, cells);
+        }
+      }
+      certifyAlong(view, cells);
+      open_.erase(std::remove_if(open_.begin(), open_.end(), [&](const auto& p) { return areTogether(p[0], p[1]); }),
+                  open_.end());
+    }
+    const bool hardly_any = (all - open_.size()) * FEW < all;
+    if (hardly_any) left_out_runs_ = next_left_out_;
+    next_left_out_ = hardly_any ? std::min(2 * next_left_out_ + 1, MOST_LEFT_OUT) : RUNS_LEFT_OUT;
+  }
+
+  /// From now on those in the list are marked, and no others.
+  void mark(const std::vector<std::uint32_t>& cells) {
+    ++mark_;
+    for (const std::uint32_t c : cells) marks_[c] = mark_;
+  }
+  /// And marks it. One that is marked is in the list.
+  void add(std::uint32_t cell, std::vector<std::uint32_t>& cells) {
+    if (isMarked(cell)) return;
+    marks_[cell] = mark_;
+    cells.push_back(cell);
+  }
+
+  /// Those of more than a few cells, in the order of their first cells.
+  std::vector<std::vector<std::uint32_t>> componentsOf(const std::vector<std::uint32_t>& cells) {
+    std::vector<std::vector<std::uint32_t>> components;
+    mark(cells);
+    for (const std::uint32_t start : cells) {
+      if (!isMarked(start)) continue;
+      std::vector<std::uint32_t> component{start};
+      marks_[start] = 0;
+      for (std::size_t i = 0; i < component.size(); ++i) {
+        for (auto n = cells_.firstNeighbour(component[i]); n != cells_.lastNeighbour(component[i]); ++n) {
+          if (n->cell == SurfaceCells::BORDER || !isMarked(n->cell)) continue;
+          marks_[n->cell] = 0;
+          component.push_back(n->cell);
+        }
+      }
+      if (component.size() >= FEWEST_CELLS) components.push_back(std::move(component));
+    }
+    return components;
+  }
+
+  /// The number of cells of the part; 0: there is none.
+  std::size_t certifyPart(std::vector<std::uint32_t> cells, const ViewPlane& plane,
+                          std::vector<std::uint32_t>* dropped) {
+    for (std::size_t i = 0; i < TRIES; ++i) {
+      mark(cells);
+      border_.clear();
+      border_cell_.clear();
+      std::size_t won = 0;
+      for (const std::uint32_t c : cells) {
+        for (auto n = cells_.firstNeighbour(c); n != cells_.lastNeighbour(c); ++n) {
+          if (n->cell != SurfaceCells::BORDER && isMarked(n->cell)) {
+            won += c < n->cell && !areTogether(c, n->cell);
+            continue;
+          }
+          border_.insert(border_.end(), cells_.firstSide(*n), cells_.lastSide(*n));
+          border_cell_.resize(border_.size(), c);
+        }
+      }
+      // A pair of cells saves about what two edges of the border take.
+      if (cells.size() < cells_.count() && 2 * won < border_.size()) return 0;
+      if (!canPay(border_.size())) return 0;
+      if (contour_.isSimple(border_, plane, vertices_)) {
+        for (const std::uint32_t c : cells) parts_of_[c] |= std::uint64_t{1} << part_count_;
+        ++part_count_;
+        return cells.size();
+      }
+      for (std::size_t s = 0; s < border_.size(); ++s) {
+        if (!contour_.bad()[s] || marks_[border_cell_[s]] == 0) continue;
+        marks_[border_cell_[s]] = 0;
+        if (dropped) dropped->push_back(border_cell_[s]);
+      }
+      cells.erase(std::remove_if(cells.begin(), cells.end(), [&](std::uint32_t c) { return !isMarked(c); }),
+                  cells.end());
+      std::vector<std::vector<std::uint32_t>> components = componentsOf(cells);
+      if (components.empty()) return 0;
+      const auto fewer = [](const auto& a, const auto& b) { return a.size() < b.size(); };
+      cells = std::move(*std::max_element(components.begin(), components.end(), fewer));
+    }
+    return 0;
+  }
+
+  SurfaceCells cells_;
+  Contour contour_;
+  const VertexMotion* vertices_ = nullptr;
+  std::size_t part_count_ = 0, left_out_runs_ = 0, first_view_ = 0, budget_ = 0, next_left_out_ = RUNS_LEFT_OUT;
+  std::uint32_t allowed_ = ALL_VIEWS;
+  std::array<std::size_t, simd::VIEWS> resting_{}, runs_with_{};  // runs: left out of them; with what is dropped
+  std::array<std::vector<std::uint32_t>, simd::VIEWS> dropped_;   // cells
+  Vec3 normal_;
+  std::vector<PlanarSpan::Point> points_;  // per used vertex
+  std::vector<std::uint64_t> parts_of_;    // per cell: a bit for each part that holds it
+  std::vector<std::uint32_t> views_;       // per cell: views that all its faces face
+  std::vector<std::uint64_t> marks_;       // per cell
+  std::uint64_t mark_ = 0;
+  std::vector<Contour::Side> border_;
+  std::vector<std::uint32_t> border_cell_;
+  std::vector<std::array<std::uint32_t, 2>> open_;  // cells beside each other that no part holds
+};
+
+Unfolded::Unfolded(const SceneBody& body) {
+  if (!meetsItself(body.setup) || body.tree(FeatureKind::FACE).featureCount() == 0) return;
+  search_ = std::make_unique<Search>(body);
+  for (const FeatureKind kind : {FeatureKind::VERTEX, FeatureKind::EDGE, FeatureKind::FACE}) {
+    for (std::size_t l = 0; l < body.tree(kind).height(); ++l) {
+      parts_[static_cast<int>(kind)].levels_.emplace_back(body.tree(kind).level(l).groups);
+    }
+  }
+}
+
+Unfolded::~Unfolded() = default;
+Unfolded::Unfolded(Unfolded&&) noexcept = default;
+
+void Unfolded::run(const SceneBody& body, const VertexMotion* vertices, const Parallel& parallel) {
+  clear();
+  if (!search_) return;
+  part_count_ = search_->run(body, vertices, parallel, whole_);
+  if (part_count_ == 0) return;
+  for (const FeatureKind kind : {FeatureKind::VERTEX, FeatureKind::EDGE, FeatureKind::FACE}) {
+    std::vector<std::vector<std::uint64_t>>& levels = parts_[static_cast<int>(kind)].levels_;
+    if (!whole_) search_->markGroups(body, kind, levels);
+    for (std::vector<std::uint64_t>& level : levels) {
+      if (whole_) std::fill(level.begin(), level.end(), 1);
+    }
+  }
 }
 
 }  // namespace dccd

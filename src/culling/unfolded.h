@@ -1,72 +1,81 @@
-// High-level culling of self-collision: normal cone and contour test over a whole body and a whole step.
+// High-level culling of self-collision: normal cone and contour test over a surface, or parts of it, and a whole step.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "culling/scene_arrays.h"
-#include "dccd/tolerances.h"
 
 namespace dccd {
 
-/// The plane that a surface is seen in: (u . x, w . x), for which the certificate holds with these very doubles.
-struct ViewPlane {
-  explicit ViewPlane(const Vec3& along) : u(along.normalized().unitOrthogonal()), w(along.normalized().cross(u)) {}
-  std::array<double, 2> coordinates(const double* x) const {
-    const Eigen::Map<const Vec3> p(x);
-    return {u.dot(p), w.dot(p)};
-  }
-  /// What a coordinate is off by for points with |x| + |y| + |z| <= size: three products and two sums with components
-  /// of at most 1 + 2^-50, below 4 * 2^-53 size.
-  static double error(double size) { return tolerance::UNFOLDED_COORDINATE * size; }
-
-  Vec3 u, w;
-};
-
-/// Certifies that a surface cannot touch itself during a step (Volino and Magnenat-Thalmann 1994, made continuous).
-///
-/// If the body is a disk and there is a direction V with n(t) . V > 0 for the normal n of every face at every t in
-/// [0,1], the projection along V keeps the orientation of every face. If in addition the projected boundary never
-/// meets itself, the projection is one to one at every t: a point away from the boundary's image has as many preimages
-/// as the boundary winds around it, at most one, each counting +1; and two points of the surface with the same image
-/// would give nearby points two preimages. So features without a common vertex never meet. doc/algorithm.md has the
-/// proof with its rounding margins. A false answer says nothing.
-class UnfoldedProof {
+/// Which parts of a surface the groups of a cluster tree lie in, at every level: a bit for each part.
+class PartsOfGroups {
  public:
-  /// Finds the boundary; the body cannot be certified unless it is a manifold disk with consistent orientation.
-  explicit UnfoldedProof(const SceneBody& body);
-
-  bool isDisk() const { return !loop_.empty(); }
-
-  /// Whether the step is certified. The body must have no separation and no inactive vertex. Costs a look at about a
-  /// thousand faces where the surface is folded, otherwise a pass over vertices and faces.
-  bool run(const SceneBody& body, const VertexMotion* vertices);
+  /// Two groups lie in one part, so that no features of theirs are to be looked at.
+  bool isLeftOut(std::size_t level, const PartsOfGroups& other, std::uint32_t a, std::uint32_t b) const {
+    return (levels_[level][a] & other.levels_[level][b]) != 0;
+  }
 
  private:
-  /// A vertex in the plane at both times [m].
-  struct Planar {
-    double x0, y0, x1, y1;
-  };
-  static constexpr int DIRECTIONS = 8;  ///< of the plane, 22.5 degrees apart
-  /// An edge of the boundary, projected on the directions.
-  struct Span {
-    double low[2][DIRECTIONS], high[2][DIRECTIONS];  ///< at t=0 and t=1
-    double sweep_low, sweep_high;
-    std::size_t edge;  ///< from loop_[edge] to the next
+  friend class Unfolded;
+  std::vector<std::vector<std::uint64_t>> levels_;
+};
 
-    bool isApartFrom(const Span& other, double margin) const;
-  };
+/// Takes out of `count` flattened pairs of groups those that need not be looked at; returns how many are left.
+std::size_t leaveOutPairs(const PartsOfGroups& a, const PartsOfGroups& b, std::size_t level, std::uint32_t* pairs,
+                          std::size_t count);
 
-  bool facesKeepOrientation(const SceneBody& body) const;
-  bool contourIsSimple();
-  bool turnsAt(const Planar& before, const Planar& at, const Planar& after) const;
+/// Certifies that parts of a surface, at best all of it, cannot touch themselves during a step (Volino and
+/// Magnenat-Thalmann 1994, made continuous).
+///
+/// A part S is a set of faces. No more than two of them meet in an edge, in opposite directions; nothing else is asked
+/// of it, so that it may have holes. Let there be a direction V with n(t) . V > 0 for the normal n of each of its faces
+/// at every t in [0,1], and let P project along V. Then P keeps the orientation of every face, and a point of the plane
+/// away from the image of S's border is the image of as many points of S as the border winds around it, since each one
+/// counts +1. Let the edges of the border never meet at any t but in common vertices, and let the border wind around
+/// no point more than once (contour.h). Then P is one to one, but that S may come to a vertex of its border from
+/// several sides: let two other points of S have one image. If one of them is no point of the border, its neighbourhood
+/// covers one of the image, and that of the other one covers a sector, so that points nearby would have two preimages.
+/// Two points of the border would be where two of its edges meet. So features of S without a common vertex never meet.
+/// doc/algorithm.md has the rounding margins. What is not certified says nothing.
+///
+/// Parts are sets of cells, seen along 24 fixed directions, one after another, as long as that pays: first all that are
+/// seen from their front along the direction for which they are most, which may be the whole surface; then those that
+/// lie beside each other in no part yet, and those around them. A part whose border meets itself is tried again without
+/// the cells at such places. Where a part is not the whole, but the surface may be seen along its mean normal, that is
+/// tried, too. Two clusters of features are left out where one part holds both.
+class Unfolded {
+ public:
+  using Parallel =
+      std::function<void(std::size_t n, std::size_t piece, const std::function<void(std::size_t, std::size_t)>& f)>;
+  static void oneByOne(std::size_t n, std::size_t, const std::function<void(std::size_t, std::size_t)>& f) { f(0, n); }
 
-  std::vector<Index> loop_;     ///< used vertices of the body along its boundary; empty: no disk
-  std::vector<Planar> points_;  ///< per used vertex of the body
-  std::vector<Span> spans_;
-  double error_ = 0;          ///< of a projected coordinate
-  double product_error_ = 0;  ///< of a cross or dot product of two differences
+  explicit Unfolded(const SceneBody& body);
+  ~Unfolded();
+  Unfolded(Unfolded&& other) noexcept;
+
+  /// The body must have no separation from itself and no inactive vertex. After a run that certified next to nothing,
+  /// parts are left out of some runs, so that a surface that is folded everywhere pays for a look at some faces.
+  void run(const SceneBody& body, const VertexMotion* vertices, const Parallel& parallel = oneByOne);
+  /// Forgets what was certified.
+  void clear() { part_count_ = 0; }
+
+  /// The whole body is one part.
+  bool isWhole() const { return part_count_ > 0 && whole_; }
+  std::size_t partCount() const { return part_count_; }
+  /// Of the body's tree; null: nothing is left out.
+  const PartsOfGroups* parts(FeatureKind kind) const {
+    return part_count_ > 0 ? &parts_[static_cast<int>(kind)] : nullptr;
+  }
+
+ private:
+  class Search;
+  std::unique_ptr<Search> search_;  // null: no surface, or not one that meets itself
+  std::size_t part_count_ = 0;
+  bool whole_ = false;
+  PartsOfGroups parts_[3];  // by FeatureKind
 };
 
 }  // namespace dccd

@@ -205,11 +205,7 @@ void History::Impl::setBodies(const Step& step) {
   carried.inside.forgetBodies();
   scene.setBodies(step.bodies);
   unfolded.clear();
-  unfolded_parts.clear();
-  for (const SceneBody& body : scene.bodies()) {
-    unfolded.emplace_back(body);
-    unfolded_parts.emplace_back(body);
-  }
+  for (const SceneBody& body : scene.bodies()) unfolded.emplace_back(body);
   obstacle_checks.clear();
   expected_known = false;
   findLeftOut(step);
@@ -295,7 +291,7 @@ void History::Impl::runPart(const Part& part, Outcome& outcome) {
   context.earliest_only = options->earliest_only;
   context.bounds_late = options->earliest_only && !stopsAtFirst();
   context.left_out = &left_out;
-  context.unfolded = &unfolded_parts;
+  context.unfolded = &unfolded;
   context.observer = observer;
   context.deadline = part.deadline;
   context.per_hit = per_hit;
@@ -364,7 +360,6 @@ bool History::Impl::fill(const Part& part) {
   const bool any = std::find(bounded.begin(), bounded.end(), 1) != bounded.end();
   if (any || bounded.size() > 1) scene.refit(inPieces, stats, bounded);
   stats[Stage::BOUNDS].ms = msSince(start);
-  if (!late) certifyParts();
   return !late;
 }
 

@@ -16,7 +16,6 @@
 
 #include "culling/scene_arrays.h"
 #include "culling/unfolded.h"
-#include "culling/unfolded_parts.h"
 #include "dccd/detect.h"
 #include "simd/float_mode.h"
 #include "step/expected_contacts.h"
@@ -90,10 +89,9 @@ struct History::Impl {
   void leaveOutPart(const Part& part);
   void chooseSelfTests(const Part& part);
   bool staysApart(std::size_t body) const;
-  bool isUnfolded(std::size_t body);
   bool searchesStart(const Part& part) const;
   bool mayBeUnfolded(std::size_t body) const;
-  void certifyParts();
+  bool certify(std::size_t body);
   void rememberApart(bool certain);
   /// Which pairs of groups a search is for: all of them, a sample of them, or the rest of it.
   enum class Share : std::uint8_t { ALL, SAMPLE, REST };
@@ -146,9 +144,8 @@ struct History::Impl {
   std::unique_ptr<Rung> elementary;
   std::optional<tbb::task_arena> arena;
   SceneArrays scene;
-  std::vector<UnfoldedProof> unfolded;        // per body
-  std::vector<UnfoldedParts> unfolded_parts;  // per body
-  std::vector<LeftOutOfBody> left_out;        // per body
+  std::vector<Unfolded> unfolded;       // per body
+  std::vector<LeftOutOfBody> left_out;  // per body
   std::vector<LeftOutPair> left_out_list;
   std::vector<double> left_out_m;  // of each one, how far apart it is in the reference frame
   std::shared_ptr<const VoxelSurface> map_given, map_reduced;  // the step's, and what exclude_boxes leave of it

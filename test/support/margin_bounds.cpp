@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "culling/contour.h"
 #include "culling/toc_bound.h"
-#include "culling/unfolded.h"
 #include "obstacle/static_filters.h"
 #include "oracle/exact_distance.h"
 #include "oracle/oracle.h"

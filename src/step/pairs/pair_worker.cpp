@@ -110,12 +110,7 @@ void PairWorker::runBruteForce(StepContext& context, const PairTask& task, std::
 void PairWorker::run(StepContext& context, const PairTask& task, std::size_t index,
                      const std::vector<std::uint32_t>& pairs) {
   begin(context, task, index);
-  const TreePair trees{&a_->tree(firstKind(task.kind)),
-                       &b_->tree(secondKind(task.kind)),
-                       task.self && task.kind == PairKind::EDGE_EDGE,
-                       context.span,
-                       task.self,
-                       task.self && context.unfolded ? (*context.unfolded)[task.body_a].leftOut(task.kind) : nullptr};
+  const TreePair trees = context.treesOf(task.kind, task.body_a, task.body_b);
   for (std::size_t p = task.first; p < task.last; ++p) {
     const bool whole_pair =
         goesOn() && stream_.run(trees, pairs.data() + 2 * p, 1, [&](const std::uint32_t* slots, std::size_t n) {

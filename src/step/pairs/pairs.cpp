@@ -36,16 +36,16 @@ void keepShare(bool sample, std::vector<std::uint32_t>& pairs) {
 void History::Impl::addTasks(PairKind kind, std::uint16_t a, std::uint16_t b, const StepContext& context, Share share) {
   const ClusterTree &ta = scene.bodies()[a].tree(firstKind(kind)), &tb = scene.bodies()[b].tree(secondKind(kind));
   if (ta.featureCount() == 0 || tb.featureCount() == 0) return;
-  const bool same_tree = a == b && kind == PairKind::EDGE_EDGE;
   PairTask task{kind, a, b, a == b, 0, 0, false};
   if (options->broad_phase == BroadPhase::BRUTE_FORCE) {
     tasks.push_back(task);
     return;
   }
-  const TreePair trees{&ta, &tb, same_tree, context.span};
+  const TreePair trees = context.treesOf(kind, a, b);
   const bool limited = foundLimit() != FoundLimit::NONE;
   const std::size_t room = limited ? tolerance::MAX_SUPERCLUSTER_PAIRS - group_pairs.size() / 2 : FoundLimit::NONE;
-  const SearchRest rest = superclusterPairs(trees, found_groups, scratch, room, context.deadline);
+  const SearchRest rest =
+      superclusterPairs(trees, found_groups, scratch, room, context.deadline, &result.stats.unfolded_pairs);
   if (rest.toc <= 1) leaveOutAt(rest.toc, !rest.late);
   if (share != Share::ALL) keepShare(share == Share::SAMPLE, found_groups);
   const auto ordering = ORDERING_A_PAIR * static_cast<std::int64_t>(found_groups.size() / 2);
@@ -85,17 +85,17 @@ void History::Impl::chooseSelfTests(const Part& part) {
   self_tested.assign(scene.bodies().size(), 0);
   for (std::size_t b = 0; b < self_tested.size(); ++b) {
     if (!meetsItself(scene.bodies()[b].setup)) continue;
+    unfolded[b].clear();
     if (part.continues && staysApart(b)) {
       if (observer)
         observer->onSelfLeftOut(b, "the whole body moves without turning, and was apart from itself before");
       continue;
     }
     const Clock::time_point start = Clock::now();
-    const bool unfolded = isUnfolded(b);
+    const bool whole = certify(b);
     result.stats[Effect::SELF_COLLISION].ms += msSince(start);
-    result.stats.unfolded_bodies += unfolded;
-    self_tested[b] = !unfolded;
-    if (unfolded && observer) {
+    self_tested[b] = !whole;
+    if (whole && observer) {
       observer->onSelfLeftOut(b, "the whole surface certainly does not fold onto itself in this step");
     }
   }
@@ -113,22 +113,16 @@ bool History::Impl::mayBeUnfolded(std::size_t body) const {
   return scene.separation(body, body) == 0 && !b.uncertain && !b.masked;
 }
 
-bool History::Impl::isUnfolded(std::size_t body) {
-  return mayBeUnfolded(body) && unfolded[body].run(scene.bodies()[body], scene.vertices());
-}
-
-/// Of what is looked at, after its bounds were made.
-void History::Impl::certifyParts() {
-  for (std::size_t b = 0; b < self_tested.size(); ++b) {
-    unfolded_parts[b].clear();
-    if (!self_tested[b] || observer || !mayBeUnfolded(b)) continue;  // an observer wants to see the pairs
-    const Clock::time_point start = Clock::now();
-    result.stats.unfolded_parts += unfolded_parts[b].runWhereItPays(
-        scene.bodies()[b], scene, [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
-    const double ms = msSince(start);
-    result.stats[Effect::SELF_COLLISION].ms += ms;
-    result.stats[Stage::BROAD_PHASE].ms += ms;
-  }
+/// True: all of it is certified.
+bool History::Impl::certify(std::size_t body) {
+  if (!mayBeUnfolded(body)) return false;
+  unfolded[body].run(scene.bodies()[body], scene.vertices(),
+                     [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
+  const bool whole = unfolded[body].isWhole();
+  if (observer && !whole) unfolded[body].clear();  // it wants to see the pairs
+  result.stats.unfolded_bodies += whole;
+  result.stats.unfolded_parts += whole ? 0 : unfolded[body].partCount();
+  return whole;
 }
 
 void History::Impl::rememberApart(bool certain) {

@@ -58,7 +58,8 @@ bool History::Impl::listStart(const Part& part, const Deadline& deadline, std::v
     whole = begins_at->carried.start_state.listEnd(before, deadline, met) && whole;
   } else {
     inside = carried.inside.run(scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
-    met = carried.start_state.run(scene, part.continues, deadline, result.stats, {foundLimit(), options->earliest_only},
+    met = carried.start_state.run(scene, part.continues, deadline, result.stats,
+                                  {foundLimit(), options->earliest_only, &unfolded},
                                   static_cast<std::size_t>(options->num_threads),
                                   [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
     const bool is_enough = options->earliest_only && !met.empty();

@@ -46,6 +46,7 @@ std::vector<StartIntersection> StartStateSearch::run(const SceneArrays& scene, b
   }
   tested_ = 0;
   cut_ = false;
+  unfolded_ = wanted.unfolded;
   most_found_ = wanted.one_is_enough ? 0 : wanted.most_found;
   most_group_pairs_ =
       wanted.most_found == FoundLimit::NONE ? FoundLimit::NONE : std::size_t{tolerance::MAX_SUPERCLUSTER_PAIRS};
@@ -235,6 +236,10 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   trees.span.times = Times::T0;
   trees.adjacent = a == b;
   trees.self = by_faces && a == b;
+  if (a == b && unfolded_) {  // what does not meet during the step does not at t=0
+    trees.parts_a = (*unfolded_)[a].parts(by_faces ? FeatureKind::FACE : FeatureKind::EDGE);
+    trees.parts_b = (*unfolded_)[a].parts(FeatureKind::FACE);
+  }
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
   if (beforeListing(deadline).isOver()) return false;
   learnNeighbourhoods(scene);

@@ -35,8 +35,9 @@ bool goOn(std::vector<std::array<std::uint32_t, 2>>& pairs, std::array<std::uint
 
 /// What of the edges that meet faces is to be listed. The search ends where it has that.
 struct CrossingsWanted {
-  std::size_t most_found = FoundLimit::NONE;  ///< of more the first ones to be found
-  bool one_is_enough = false;                 ///< the first one to be found alone
+  std::size_t most_found = FoundLimit::NONE;        ///< of more the first ones to be found
+  bool one_is_enough = false;                       ///< the first one to be found alone
+  const std::vector<Unfolded>* unfolded = nullptr;  ///< per body, in this step; null: nothing is known of them
 };
 
 /// Lists the edges that meet faces at t=0, touching included; pairs that share a vertex are left out. Pairs are those
@@ -130,6 +131,7 @@ class StartStateSearch {
 
   bool whole_ = false, has_deadline_ = false;
   bool cut_ = false;  // there was more to find than most_found_
+  const std::vector<Unfolded>* unfolded_ = nullptr;
   std::size_t most_found_ = FoundLimit::NONE, most_group_pairs_ = FoundLimit::NONE;
   bool known_ = false;      // all contacts since the last run(): what that found out can be carried over
   bool searched_ = false;   // the search has come to its end

@@ -116,17 +116,17 @@ TEST(Unfolded, ContourKeepsASpiralFromBeingCertified) {
   EXPECT_TRUE(certified(topology, strip(60, 0.9, 0, 0.4), strip(60, 0.9, 0, 0.0))) << "less than a turn";
 }
 
-TEST(Unfolded, OnlyDisks) {
+TEST(Unfolded, OnePieceTheSameWayRound) {
   const Positions square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {3, 0, 0}, {4, 0, 0}, {3, 1, 0}};
-  const auto disk = [&](const std::vector<Face>& faces) {
+  const auto isWhole = [&](const std::vector<Face>& faces) {
     const Topology topology = Topology::fromTriangles(square.size(), faces);
     return certified(topology, square, square);
   };
-  EXPECT_TRUE(disk({{0, 1, 2}, {0, 2, 3}}));
-  EXPECT_FALSE(disk({{0, 1, 2}, {0, 3, 2}})) << "opposite orientation";
-  EXPECT_FALSE(disk({{0, 1, 2}, {0, 2, 3}, {4, 5, 6}})) << "two parts";
-  EXPECT_FALSE(disk({{0, 1, 2}, {2, 4, 5}})) << "one vertex in common";
-  EXPECT_FALSE(disk({{0, 1, 2}, {0, 2, 3}, {0, 2, 4}})) << "three faces at an edge";
+  EXPECT_TRUE(isWhole({{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_FALSE(isWhole({{0, 1, 2}, {0, 3, 2}})) << "opposite orientation";
+  EXPECT_FALSE(isWhole({{0, 1, 2}, {0, 2, 3}, {4, 5, 6}})) << "two parts";
+  EXPECT_FALSE(isWhole({{0, 1, 2}, {2, 4, 5}})) << "one vertex in common";
+  EXPECT_FALSE(isWhole({{0, 1, 2}, {0, 2, 3}, {0, 2, 4}})) << "three faces at an edge";
 
   Positions ring = strip(12, 11.0 / 12, 0, 0);
   std::vector<Face> faces;
@@ -135,8 +135,12 @@ TEST(Unfolded, OnlyDisks) {
     faces.push_back({i, i + 12, j});
     faces.push_back({j, i + 12, j + 12});
   }
-  EXPECT_FALSE(certified(Topology::fromTriangles(24, faces), ring, ring)) << "two boundaries";
-  EXPECT_EQ(trueContacts(Topology::fromTriangles(24, faces), ring, ring), 0u);
+  const Topology closed_ring = Topology::fromTriangles(24, faces);
+  EXPECT_TRUE(certified(closed_ring, ring, ring)) << "it may have a hole";
+  EXPECT_EQ(trueContacts(closed_ring, ring, ring), 0u);
+  Positions inside_out = ring;
+  for (std::size_t i = 0; i < 12; ++i) inside_out[i] *= 1.4;  // beyond the outer border
+  EXPECT_FALSE(certified(closed_ring, ring, inside_out));
 }
 
 TEST(Unfolded, NothingIsCertifiedOfFoldsAndDegenerateFaces) {

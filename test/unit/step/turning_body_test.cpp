@@ -215,6 +215,7 @@ TEST(TurningBody, TheSearchOfTheStartStateLeavesTimeForAllParts) {
     return step(monitor, {at * 100 * MS, grid, flat}, 0.5 * at);
   };
   MonitorOptions options = loose();
+  options.detector.unfolded_test = false;  // else there is nothing to search in a flat sheet
   const auto shortest_ms = [&](bool check_start_state) {
     options.detector.check_start_state = check_start_state;
     double ms = 1e9;
