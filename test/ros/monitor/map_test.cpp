@@ -1,4 +1,4 @@
-// The live node with a grid over an octomap, which may be missing, and as either kind of message.
+// The live node with a grid over an octomap: what is missing or unknown of the map, and both kinds of message.
 #include <deformable_ccd/ContactArray.h>
 
 #include <algorithm>
@@ -60,6 +60,22 @@ TEST_F(Grid, OctomapBinaryAndFull) {
     EXPECT_EQ(vertices, 12u) << "each vertex falls on one face";
     send(mesh, cloud(gridAt(3, 4, 0.3), 100.2));
   }
+}
+
+TEST_F(Grid, UnknownSpaceIsReported) {
+  giveMap(blockBelowZero(true, 90));
+  send(mesh, cloud(gridAt(3, 4, 0.35), 100));
+  send(mesh, cloud(gridAt(3, 4, 0.15), 100.1));
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.1); }));
+  const Stats swept = stats.last();
+  EXPECT_EQ(swept.unknown_fraction, 1) << "the map knows what is occupied, and nothing of the air";
+  EXPECT_GT(swept.unknown_space_in, 0u);
+  EXPECT_EQ(swept.unknown_space_out, swept.unknown_space_in);
+  EXPECT_GT(swept.unknown_space_ms, 0);
+  EXPECT_NEAR(swept.map_age, 10.1, 1e-6);
+  send(mesh, cloud(gridAt(3, 4, -0.05), 100.2));
+  ASSERT_TRUE(waitUntil([&] { return stats.last().header.stamp == ros::Time(100.2); }));
+  EXPECT_LT(stats.last().unknown_fraction, 1) << "into what is known";
 }
 
 TEST_F(Grid, AFrameWithoutAnAnswerSaysNothingAgainstTheMap) {

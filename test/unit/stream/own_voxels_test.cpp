@@ -116,6 +116,34 @@ TEST_F(OwnVoxels, WhatAMapFirstShowsWhereTheBodyIsIsNoObstacle) {
   EXPECT_EQ(assuranceOf(feed(200 * MS, 0.55)).touching, Touching::LASTING) << "none are own where none may be";
 }
 
+TEST_F(OwnVoxels, WhatWasThereBeforeStaysAnObstacle) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  feed(200 * MS, 0.12);
+  map(200 * MS, slab(1) + voxelsOf(0.12));
+  const Outcome near = feed(300 * MS, 0.12);
+  EXPECT_TRUE(assuranceOf(near).clear());
+  EXPECT_EQ(own(near), 25u) << "the floor's voxels lie within reach, and are older";
+  const Outcome on = feed(400 * MS, 0.09);
+  EXPECT_EQ(assuranceOf(on).touching, Touching::NEW);
+  EXPECT_NEAR(on.earliest_toc, 2.0 / 3, 1e-6);
+}
+
+TEST_F(OwnVoxels, WhatIsOwnStaysSoUntilAMapHasClearedIt) {
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  feed(200 * MS, 0.25);
+  map(200 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(0.25));  // slow to clear
+  EXPECT_EQ(own(feed(300 * MS, 0.25)), 50u);
+  EXPECT_TRUE(assuranceOf(feed(400 * MS, 0.55)).clear()) << "back through its own trail";
+  feed(500 * MS, 0.25);
+  map(500 * MS, slab(1) + voxelsOf(0.25));
+  EXPECT_EQ(own(feed(600 * MS, 0.25)), 25u);
+  map(600 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(0.25));
+  const Outcome back = feed(700 * MS, 0.55);
+  EXPECT_EQ(assuranceOf(back).touching, Touching::NEW) << "it was cleared, and came back where no body was";
+}
+
 TEST_F(OwnVoxels, WhatTheFirstMapShowsWithinReachIsInDoubt) {
   feed(0, 0.55);
   map(0, slab(1) + voxelsOf(0.55));
@@ -189,6 +217,47 @@ TEST_F(OwnVoxels, WhatTheCameraSawBeforeItsStampIsOwnWithinTheLag) {
     const Outcome late = feed(320 * MS, 0.25);
     EXPECT_EQ(own(late), lag_s > 0 ? 25u : 0u) << "passed there at 0.255 s, 0.065 s before the map";
   }
+}
+
+TEST_F(OwnVoxels, AnObstacleThatABodyHidesForAWhileStaysOne) {
+  hoverAboveFloor();
+  feed(150 * MS, 0.12);
+  map(150 * MS, voxelsOf(0.12));  // the floor is gone below the sheet
+  feed(200 * MS, 0.12);
+  map(200 * MS, slab(1) + voxelsOf(0.12));
+  const Outcome outcome = feed(300 * MS, 0.09);
+  EXPECT_EQ(own(outcome), 25u);
+  EXPECT_EQ(assuranceOf(outcome).touching, Touching::NEW);
+}
+
+// octomap_server restarted: what it knew is gone, which is not the same as seen free.
+TEST_F(OwnVoxels, AnObstacleThatAMapForgetsStaysOne) {
+  for (const bool tells_free : {true, false}) {
+    start(0.05);
+    const Cells above = slab(3), nothing;
+    feed(0, 0.55);
+    map(0, slab(1), &above);
+    feed(100 * MS, 0.55);
+    map(100 * MS, {}, tells_free ? &nothing : nullptr);
+    feed(200 * MS, 0.12);
+    map(200 * MS, slab(1) + voxelsOf(0.12), &nothing);
+    feed(300 * MS, 0.12);
+    const Outcome outcome = feed(400 * MS, 0.09);
+    EXPECT_EQ(assuranceOf(outcome).touching, tells_free ? Touching::NEW : Touching::NONE);
+    EXPECT_GE(own(outcome), tells_free ? 25u : 50u);
+  }
+}
+
+TEST_F(OwnVoxels, OfALargeLeafOnlyWhatIsWithinReach) {
+  hoverAboveFloor();
+  const auto large = [&](StampNs stamp_ns) { monitor_->setMap(mapOf(VOXEL_M, {leafOf({0, 0, 0}, 8)}, stamp_ns)); };
+  large(150 * MS);
+  const Outcome outcome = feed(200 * MS, 0.551);
+  EXPECT_EQ(own(outcome), 36u + 25u) << "of its own layer, and of the one that begins 0.049 m above it";
+  EXPECT_EQ(outcome.obstacle->leafAt({0.55, 0.55, 0.55}), nullptr);
+  std::uint64_t left = 0;
+  for (const OccupiedLeaf& leaf : outcome.obstacle->leaves()) left += leaf.size * leaf.size * leaf.size;
+  EXPECT_EQ(left, 512u - 61u);
 }
 
 TEST_F(OwnVoxels, AMapWaitsUntilTheBodyIsKnownAtItsStamp) {
@@ -330,6 +399,20 @@ TEST_F(OwnVoxels, HugeReachesAndPlacesAndWhatIsNoReach) {
   }
   for (const double wrong : {-0.01, -2.0, std::nan(""), HUGE_VAL})
     EXPECT_THROW(start(wrong), std::invalid_argument) << wrong;
+}
+
+TEST_F(OwnVoxels, OverATeleportWhatIsOwnStaysOwn) {
+  MonitorOptions options = monitor_->options();
+  options.store.max_vertex_step_m = 0.3;
+  monitor_->setOptions(options);
+  hoverAboveFloor();
+  map(150 * MS, slab(1) + voxelsOf(0.55));
+  EXPECT_EQ(own(feed(200 * MS, 0.55)), 25u);
+  EXPECT_EQ(feed(300 * MS, 2.05).status, StepStatus::TELEPORT);
+  map(350 * MS, slab(1) + voxelsOf(0.55) + voxelsOf(1.25) + voxelsOf(2.05));
+  const Outcome outcome = feed(400 * MS, 2.05);
+  EXPECT_EQ(own(outcome), 50u) << "where it was and where it is; nobody saw it on the way";
+  EXPECT_NE(outcome.obstacle->leafAt({0.55, 0.55, 1.25}), nullptr);
 }
 
 // What a camera sees through the gaps of a robot's link, or what noise puts there.
