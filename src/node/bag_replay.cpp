@@ -1,59 +1,25 @@
-#include "output/output_messages.h"
-
 #include "node/bag_replay.h"
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
 
 #include <rosbag/view.h>
-#include <tf2_msgs/TFMessage.h>
 
-#include "dccd/regular_file.h"
 #include "input/known_types.h"
 #include "input/message_bytes.h"
 #include "input/message_type.h"
-#include "input/short_text.h"
 #include "input/transforms.h"
+#include "node/bag_reading.h"
 #include "octomap/coarser.h"
+#include "output/output_messages.h"
 #include "report/progress_bar.h"
 
 namespace dccd {
 namespace {
 
-/// rosbag reads a device for its first line until memory is gone.
-void requireFile(const std::string& bag) {
-  const std::string problem = regularFileProblem(bag);
-  if (!problem.empty()) throw std::runtime_error(bag + ": " + problem);
-}
-
-/// Throws std::runtime_error naming the file and what to do.
-void openBag(const std::string& path, rosbag::Bag& bag) {
-  requireFile(path);
-  const std::string remedy = "; run: rosbag reindex " + path;
-  try {
-    bag.open(path, rosbag::bagmode::Read);
-  } catch (const rosbag::BagUnindexedException&) {
-    throw std::runtime_error(path + ": the bag has no index, as its recording was not ended" + remedy);
-  } catch (const rosbag::BagException& error) {
-    const std::string mark = "#ROSBAG V";
-    std::string begin(mark.size(), '\0');
-    std::ifstream file(path, std::ios::binary);
-    file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-    if (file.gcount() == 0) throw std::runtime_error(path + ": the file is empty: nothing was recorded");
-    if (begin != mark) throw std::runtime_error(path + ": the file is no bag: it does not begin with '" + mark + "'");
-    throw std::runtime_error(path + ": the bag is cut or damaged (" + shortText(error.what()) + ")" + remedy);
-  }
-}
-
-// Transforms are fed this far ahead of the meshes and kept this long behind them; so a long bag needs no more memory.
-const ros::Duration TF_AHEAD(10.0);
-const ros::Duration TF_KEPT(60.0);
 constexpr std::size_t MOST_NAMES = 6;
-// Where stamps go back (a recorded loop), transforms and meshes are recorded this much apart at most.
-const ros::Duration SEAM(1.0);
 
 std::string absolute(const std::string& topic) { return topic.empty() || topic[0] == '/' ? topic : "/" + topic; }
 
@@ -95,55 +61,6 @@ std::string listOf(const std::vector<std::string>& names) {
   return list;
 }
 
-/// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the
-/// meshes have gone back, too.
-class TransformWindow {
- public:
-  TransformWindow(const rosbag::Bag& bag, TransformFeed& feed)
-      : feed_(feed),
-        view_(bag, rosbag::TopicQuery(std::vector<std::string>{"/tf", "/tf_static"})),
-        next_(view_.begin()) {
-    rosbag::View statics(bag, rosbag::TopicQuery("/tf_static"));
-    for (const rosbag::MessageInstance& m : statics) {
-      if (const auto tf = m.instantiate<tf2_msgs::TFMessage>()) feed_.add(*tf, true);
-    }
-  }
-
-  /// A mesh with this stamp (0: none) is the next message of the bag.
-  void meshComes(std::size_t body, StampNs stamp_ns, const ros::Time& at) {
-    if (stamp_ns == 0) return;
-    const auto [newest, first] = newest_mesh_.try_emplace(body, stamp_ns);
-    if (!first && stamp_ns < newest->second - JUMP_BACK_NS) {
-      meshes_went_back_ = at;
-      newest_mesh_.clear();
-      newest_mesh_[body] = stamp_ns;
-    } else {
-      newest->second = std::max(newest->second, stamp_ns);
-    }
-  }
-
-  void feedUntil(const ros::Time& at) {
-    for (; next_ != view_.end() && next_->getTime() <= at + TF_AHEAD; ++next_) {
-      const bool is_static = next_->getTopic() == "/tf_static";
-      if (!waiting_) waiting_ = next_->instantiate<tf2_msgs::TFMessage>();
-      // Where the meshes never go back, its turn comes all the same.
-      const ros::Time recorded = next_->getTime();
-      const bool due = recorded + SEAM <= at || (meshes_went_back_ && recorded <= *meshes_went_back_ + SEAM);
-      if (waiting_ && feed_.clears(*waiting_, is_static) && !due) return;
-      if (waiting_) feed_.add(*waiting_, is_static);
-      waiting_.reset();
-    }
-  }
-
- private:
-  TransformFeed& feed_;
-  rosbag::View view_;
-  rosbag::View::iterator next_;
-  tf2_msgs::TFMessage::ConstPtr waiting_;  // the message at next_, where it was read already
-  std::map<std::size_t, StampNs> newest_mesh_;
-  std::optional<ros::Time> meshes_went_back_;
-};
-
 }  // namespace
 
 struct BagReplay::Run {
@@ -151,7 +68,7 @@ struct BagReplay::Run {
   const Sink& predictions;
   const Variation& variation;
   rosbag::Bag bag;
-  tf2::BufferCore transforms{TF_KEPT + TF_AHEAD};
+  tf2::BufferCore transforms{TransformWindow::length()};
   TransformFeed feed{transforms};
   MonitorPipeline pipeline;
   const MapMemory memory{pipeline.config()};

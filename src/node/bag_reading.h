@@ -1,0 +1,39 @@
+// Bags as they lie on the disk: opened or refused with what to do, and their transforms, read ahead of the meshes.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include "input/transforms.h"
+
+namespace dccd {
+
+/// Throws std::runtime_error naming the file and what to do.
+void openBag(const std::string& path, rosbag::Bag& bag);
+
+/// Feeds tf ahead of the meshes. Where tf's stamps go back, which forgets all before, it waits until those of the
+/// meshes have gone back, too.
+class TransformWindow {
+ public:
+  /// Static transforms are fed at once.
+  TransformWindow(const rosbag::Bag& bag, TransformFeed& feed);
+  /// What a buffer must hold: ahead of the meshes, and behind them.
+  static ros::Duration length();
+  /// A mesh with this stamp (0: none) is the next message of the bag.
+  void meshComes(std::size_t body, StampNs stamp_ns, const ros::Time& at);
+  void feedUntil(const ros::Time& at);
+
+ private:
+  TransformFeed& feed_;
+  rosbag::View view_;
+  rosbag::View::iterator next_;
+  tf2_msgs::TFMessage::ConstPtr waiting_;  // the message at next_, where it was read already
+  std::map<std::size_t, StampNs> newest_mesh_;
+  std::optional<ros::Time> meshes_went_back_;
+};
+
+}  // namespace dccd
