@@ -19,6 +19,8 @@ struct TreePair {
   Span span;
   bool adjacent = false;                   ///< both are of one body: features that share a vertex are no pair
   const NearClusters* left_out = nullptr;  ///< pairs of clusters that are not looked at; null: none
+  /// Of a tree and itself, at t0: all that share a vertex, where that is known; null: it is found out.
+  const simd::KnownPairs* sharing = nullptr;
 
   simd::GroupsView viewA(std::size_t level) const { return a->level(level).view(span.times == Times::SWEPT); }
   simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
@@ -71,7 +73,9 @@ class ClusterPairStream {
         const std::uint32_t* from = clusters_.data() + 2 * leaf_done;
         const bool swept = trees.span.times == Times::SWEPT, one_end = trees.span.times != Times::BOTH;
         const std::size_t found =
-            trees.adjacent
+            trees.sharing ? simd::testOtherPairs(trees.a->leaves(false), from, clusters - leaf_done, *trees.sharing,
+                                                 slots_.data(), CHUNK, &consumed)
+            : trees.adjacent
                 ? simd::testUnsharedPairs(trees.a->leaves(swept), trees.b->leaves(swept), from, clusters - leaf_done,
                                           trees.self, one_end, slots_.data(), CHUNK, &consumed)
                 : simd::testGroupPairs(trees.viewA(0), trees.viewB(0), from, clusters - leaf_done, trees.self,
