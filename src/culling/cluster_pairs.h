@@ -20,6 +20,8 @@ struct TreePair {
   bool adjacent = false;  ///< both are of one body: features that share a vertex are no pair
   /// Groups that are in one part of a surface are not looked at. Null: there are no parts.
   const PartsOfGroups *parts_a = nullptr, *parts_b = nullptr;
+  /// Of a tree and itself, at t0: all that share a vertex, where that is known; null: it is found out.
+  const simd::KnownPairs* sharing = nullptr;
 
   simd::GroupsView viewA(std::size_t level) const { return a->level(level).view(span.times == Times::SWEPT); }
   simd::GroupsView viewB(std::size_t level) const { return b->level(level).view(span.times == Times::SWEPT); }
@@ -75,7 +77,9 @@ class ClusterPairStream {
         const std::uint32_t* from = clusters_.data() + 2 * leaf_done;
         const bool swept = trees.span.times == Times::SWEPT, one_end = trees.span.times != Times::BOTH;
         const std::size_t found =
-            trees.adjacent
+            trees.sharing ? simd::testOtherPairs(trees.a->leaves(false), from, clusters - leaf_done, *trees.sharing,
+                                                 slots_.data(), CHUNK, &consumed)
+            : trees.adjacent
                 ? simd::testUnsharedPairs(trees.a->leaves(swept), trees.b->leaves(swept), from, clusters - leaf_done,
                                           trees.self, one_end, slots_.data(), CHUNK, &consumed)
                 : simd::testGroupPairs(trees.viewA(0), trees.viewB(0), from, clusters - leaf_done, trees.self,

@@ -1,11 +1,13 @@
 #include "simd/face_filter.h"
 
+#include <cmath>
+#include <limits>
+
 #include "dccd/tolerances.h"
 #include "simd/cluster_bounds.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/face_filter.cpp"
-#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -26,18 +28,25 @@ constexpr size_t PAIR_LANES = 16, PAIR_POINTS = 5, PAIR_POINT_SIZE = 4 * PAIR_LA
 constexpr double FLOAT_ULPS = 0x1p29;  // so many times as large as a double's half ulp is a float's
 
 /// a0, a1, a2, b1, b2 relative to b0.
-HWY_INLINE void gatherPair(const double* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT a,
+HWY_INLINE void gatherPair(const float* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT a,
                            const uint32_t* HWY_RESTRICT b, size_t lane, float* HWY_RESTRICT block) {
   const uint32_t corners[PAIR_POINTS] = {a[0], a[GROUP], a[2 * GROUP], b[GROUP], b[2 * GROUP]};
-  const hn::CappedTag<double, 4> dd;
-  const hn::Rebind<float, decltype(dd)> df;
-  for (size_t k = 0; k < 4; k += hn::Lanes(dd)) {
-    const auto origin = hn::Load(dd, positions + size_t{b[0]} * 8 + k);
+  const hn::CappedTag<float, 4> d;
+  for (size_t k = 0; k < 4; k += hn::Lanes(d)) {
+    const auto origin = hn::LoadU(d, positions + size_t{b[0]} * 4 + k);
     for (size_t i = 0; i < PAIR_POINTS; ++i) {
-      const double* x = positions + size_t{corners[i]} * 8 + k;
-      hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::Load(dd, x), origin)), df, block + i * PAIR_POINT_SIZE + lane * 4 + k);
+      const auto x = hn::LoadU(d, positions + size_t{corners[i]} * 4 + k);
+      hn::Store(hn::Sub(x, origin), d, block + i * PAIR_POINT_SIZE + lane * 4 + k);
     }
   }
+}
+
+/// The margin of a sum of products of as many factors as `powers` of M has, and M^2 (M + 2R) or M (M + 2R) it takes.
+HWY_INLINE VF marginOf(double multiple, VF powers, VF size, float largest) {
+  const DF d;
+  const VF reach = hn::Add(size, hn::Set(d, 2 * largest));
+  return hn::Add(hn::Mul(hn::Set(d, static_cast<float>(multiple * FLOAT_ULPS)), hn::Mul(powers, reach)),
+                 hn::Set(d, tolerance::FUSED_UNDERFLOW));
 }
 
 /// Of which sign numbers certainly are.
@@ -52,8 +61,8 @@ HWY_INLINE hn::Mask<DF> differ(const Signs& a, const Signs& b, const Signs& c) {
   return hn::And(hn::Or(hn::Or(a.plus, b.plus), c.plus), hn::Or(hn::Or(a.minus, b.minus), c.minus));
 }
 
-HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, const uint32_t* HWY_RESTRICT asked, size_t count,
-                          uint8_t* HWY_RESTRICT edges) {
+HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, float largest_coordinate, const uint32_t* HWY_RESTRICT asked,
+                          size_t count, uint8_t* HWY_RESTRICT edges) {
   const DF d;
   const hn::RebindToUnsigned<DF> du;
   Float3 a[3], b[2];
@@ -63,11 +72,9 @@ HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, const uint32_t* HWY_R
     point = loadPoint(d, block + i * PAIR_POINT_SIZE);
     size = hn::Max(size, largest(point));
   }
-  const VF cubed = hn::Mul(hn::Mul(size, size), size), underflow = hn::Set(d, tolerance::FUSED_UNDERFLOW);
-  const VF line = hn::Set(d, static_cast<float>(tolerance::SEGMENT_LINE * FLOAT_ULPS));
-  const VF plane = hn::Set(d, static_cast<float>(tolerance::SEGMENT_PLANE * FLOAT_ULPS));
-  const VF short_margin = hn::Add(hn::Mul(line, cubed), underflow);
-  const VF long_margin = hn::Add(hn::Mul(plane, cubed), underflow);
+  const VF squared = hn::Mul(size, size);
+  const VF short_margin = marginOf(tolerance::SEGMENT_LINE, squared, size, largest_coordinate);
+  const VF long_margin = marginOf(tolerance::SEGMENT_PLANE, squared, size, largest_coordinate);
 
   const Float3 normal_b = cross(b[0], b[1]);
   const VF height[3] = {dot(normal_b, a[0]), dot(normal_b, a[1]), dot(normal_b, a[2])};
@@ -114,7 +121,7 @@ HWY_INLINE void pairBlock(const float* HWY_RESTRICT block, const uint32_t* HWY_R
   for (size_t lane = 0; lane < count; ++lane) edges[lane] = static_cast<uint8_t>(words[lane]);
 }
 
-size_t FacePairFilter(const double* HWY_RESTRICT positions, const FacesView& a, const FacesView& b,
+size_t FacePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
                       const uint32_t* HWY_RESTRICT slots, size_t count, uint8_t* HWY_RESTRICT edges) {
   const size_t lanes = hn::Lanes(DF());
   HWY_ALIGN_MAX float blocks[2][PAIR_POINTS * PAIR_POINT_SIZE] = {};
@@ -126,7 +133,7 @@ size_t FacePairFilter(const double* HWY_RESTRICT positions, const FacesView& a, 
     const size_t n = first >= count ? 0 : HWY_MIN(lanes, count - first);
     for (size_t lane = 0; lane < n; ++lane) {
       const size_t f = slots[2 * (first + lane)], g = slots[2 * (first + lane) + 1];
-      gatherPair(positions, corners(a, f), corners(b, g), lane, blocks[block]);
+      gatherPair(vertices.positions, corners(a, f), corners(b, g), lane, blocks[block]);
       asked[block][lane] = uint32_t{a.edges[f]} | uint32_t{b.edges[g]} << SECOND_EDGES_SHIFT;
       all += hwy::PopCount(asked[block][lane]);
     }
@@ -136,7 +143,7 @@ size_t FacePairFilter(const double* HWY_RESTRICT positions, const FacesView& a, 
   size_t now = 0;
   for (size_t first = 0, n = fill(0, 0); n > 0; first += lanes, now = 1 - now) {
     const size_t next = fill(first + lanes, 1 - now);
-    pairBlock(blocks[now], asked[now], n, edges + first);
+    pairBlock(blocks[now], vertices.largest, asked[now], n, edges + first);
     n = next;
   }
   return all;
@@ -144,64 +151,73 @@ size_t FacePairFilter(const double* HWY_RESTRICT positions, const FacesView& a, 
 
 // --- faces along the axes --------------------------------------------------------------------------------------------
 
-using DD = hn::CappedTag<double, 8>;
-using VD = hn::Vec<DD>;
-using Double3 = VectorOf<DD>;
-constexpr size_t FACE_LANES = 8, FACE_POINT_SIZE = 4 * FACE_LANES;
+constexpr size_t FACE_POINT_SIZE = 4 * GROUP;
 
-/// Of all lanes of a vector of faces: their edges 0-1, 0-2 and 1-2.
-HWY_INLINE void viewBlock(const double* HWY_RESTRICT block, uint16_t* HWY_RESTRICT views) {
-  const DD d;
-  const Double3 x = loadPoint(d, block), y = loadPoint(d, block + FACE_POINT_SIZE);
-  const Double3 z = loadPoint(d, block + 2 * FACE_POINT_SIZE);
-  const VD size = hn::Max(largest(x), largest(y)), zero = hn::Zero(d);
-  const auto guarded = hn::Le(size, hn::Set(d, tolerance::SEGMENT_LARGEST_M));
-  const VD margin = hn::Add(hn::Mul(hn::Set(d, tolerance::SEGMENT_PROJECTED), hn::Mul(size, size)),
-                            hn::Set(d, tolerance::SEGMENT_UNDERFLOW));
-  const Double3 normal = cross(x, y);
-  const VD n[3] = {normal.x, normal.y, normal.z};
+/// Of all lanes of a vector of faces.
+HWY_INLINE void viewBlock(const float* HWY_RESTRICT block, float largest_coordinate, uint16_t* HWY_RESTRICT views) {
+  const DF d;
+  const hn::RebindToUnsigned<DF> du;
+  const Float3 p0 = loadPoint(d, block), p1 = loadPoint(d, block + FACE_POINT_SIZE);
+  const Float3 p2 = loadPoint(d, block + 2 * FACE_POINT_SIZE);
+  const Float3 x{hn::Sub(p1.x, p0.x), hn::Sub(p1.y, p0.y), hn::Sub(p1.z, p0.z)};
+  const Float3 y{hn::Sub(p2.x, p0.x), hn::Sub(p2.y, p0.y), hn::Sub(p2.z, p0.z)};
+  const VF size = hn::Max(largest(x), largest(y));
+  const auto guarded = hn::Le(size, hn::Set(d, tolerance::FUSED_LARGEST_M));
+  const VF margin = marginOf(tolerance::SEGMENT_PROJECTED, size, size, largest_coordinate);
+  const Float3 normal = cross(x, y);
+  const VF n[3] = {normal.x, normal.y, normal.z};
   // What is low along axis k is low in the coordinate after k.
-  const VD to_1[3] = {x.y, x.z, x.x}, to_2[3] = {y.y, y.z, y.x}, between[3] = {z.y, z.z, z.x};
-  VD bits = zero;
-  const auto add = [&](hn::Mask<DD> mask, unsigned bit)
-                       HWY_ATTR { bits = hn::Add(bits, hn::IfThenElseZero(mask, hn::Set(d, bit))); };
+  const VF c0[3] = {p0.y, p0.z, p0.x}, c1[3] = {p1.y, p1.z, p1.x}, c2[3] = {p2.y, p2.z, p2.x};
+  auto bits = hn::Zero(du);
+  const auto add = [&](hn::Mask<DF> mask, unsigned bit) HWY_ATTR {
+    bits = hn::Or(bits, hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, bit)));
+  };
   for (size_t k = 0; k < 3; ++k) {
     add(hn::And(guarded, hn::Gt(n[k], margin)), TURNS_LEFT << k);
     add(hn::And(guarded, hn::Lt(n[k], hn::Neg(margin))), TURNS_RIGHT << k);
-    add(hn::And(hn::Lt(to_1[k], zero), hn::Ge(to_2[k], zero)), RISES << k);
-    add(hn::And(hn::Lt(between[k], zero), hn::Le(to_1[k], zero)), RISES << (3 + k));
-    add(hn::And(hn::Gt(to_2[k], zero), hn::Le(between[k], zero)), RISES << (6 + k));
+    add(hn::And(hn::Lt(c1[k], c0[k]), hn::Ge(c2[k], c0[k])), RISES << k);
+    add(hn::And(hn::Lt(c2[k], c1[k]), hn::Ge(c0[k], c1[k])), RISES << (3 + k));
+    add(hn::And(hn::Lt(c0[k], c2[k]), hn::Ge(c1[k], c2[k])), RISES << (6 + k));
   }
-  HWY_ALIGN_MAX double words[FACE_LANES];
-  hn::Store(bits, d, words);
+  HWY_ALIGN_MAX uint32_t words[PAIR_LANES];
+  hn::Store(bits, du, words);
   for (size_t lane = 0; lane < hn::Lanes(d); ++lane) views[lane] = static_cast<uint16_t>(words[lane]);
 }
 
-void FaceViews(const double* HWY_RESTRICT positions, const uint32_t* HWY_RESTRICT groups, size_t count,
+void FaceViews(const NearVertices& vertices, const uint32_t* HWY_RESTRICT groups, size_t count,
                uint16_t* HWY_RESTRICT views) {
-  const size_t lanes = hn::Lanes(DD());
-  const hn::CappedTag<double, 4> dd;
-  // A group is written whole before any of it is read: a load in larger pieces than was written waits for the cache.
-  HWY_ALIGN_MAX double blocks[GROUP / FACE_LANES][3 * FACE_POINT_SIZE] = {};
-  for (size_t g = 0; g < count; ++g, groups += 3 * GROUP, views += GROUP) {
-    // The next group's vertices are fetched while this one's are tested.
-    for (size_t i = 3 * GROUP; g + 1 < count && i < 6 * GROUP; ++i) {
-      if (groups[i] != UINT32_MAX) hwy::Prefetch(positions + size_t{groups[i]} * 8);
-    }
-    for (size_t lane = 0; lane < GROUP; ++lane) {
-      if (groups[lane] == UINT32_MAX) continue;
-      for (size_t k = 0; k < 4; k += hn::Lanes(dd)) {
-        const auto a = hn::Load(dd, positions + size_t{groups[lane]} * 8 + k);
-        const auto b = hn::Load(dd, positions + size_t{groups[GROUP + lane]} * 8 + k);
-        const auto c = hn::Load(dd, positions + size_t{groups[2 * GROUP + lane]} * 8 + k);
-        double* to = blocks[lane / FACE_LANES] + lane % FACE_LANES * 4 + k;
-        hn::Store(hn::Sub(b, a), dd, to);
-        hn::Store(hn::Sub(c, a), dd, to + FACE_POINT_SIZE);
-        hn::Store(hn::Sub(c, b), dd, to + 2 * FACE_POINT_SIZE);
+  const hn::CappedTag<float, 4> d;
+  HWY_ALIGN_MAX float blocks[2][3 * FACE_POINT_SIZE] = {};
+  const auto fill = [&](size_t g) HWY_ATTR {
+    const uint32_t* group = groups + g * 3 * GROUP;
+    for (size_t lane = 0; g < count && lane < GROUP; ++lane) {
+      if (group[lane] == UINT32_MAX) continue;
+      for (size_t k = 0; k < 4; k += hn::Lanes(d)) {
+        for (size_t i = 0; i < 3; ++i) {
+          const auto x = hn::LoadU(d, vertices.positions + size_t{group[i * GROUP + lane]} * 4 + k);
+          hn::Store(x, d, blocks[g % 2] + i * FACE_POINT_SIZE + lane * 4 + k);
+        }
       }
     }
-    for (size_t lane = 0; lane < GROUP; lane += lanes) {
-      viewBlock(blocks[lane / FACE_LANES] + lane % FACE_LANES * 4, views + lane);
+  };
+  // The next group is filled before this one is looked at, as above.
+  fill(0);
+  for (size_t g = 0; g < count; ++g) {
+    fill(g + 1);
+    for (size_t lane = 0; lane < GROUP; lane += hn::Lanes(DF())) {
+      viewBlock(blocks[g % 2] + lane * 4, vertices.largest, views + g * GROUP + lane);
+    }
+  }
+}
+
+void MoveNear(const double* HWY_RESTRICT positions, size_t count, const double* HWY_RESTRICT origin,
+              float* HWY_RESTRICT near) {
+  const hn::CappedTag<double, 4> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t k = 0; k < 4; k += hn::Lanes(dd)) {
+      const auto x = hn::Sub(hn::LoadU(dd, positions + i * 8 + k), hn::LoadU(dd, origin + k));
+      hn::StoreU(hn::DemoteTo(df, x), df, near + i * 4 + k);
     }
   }
 }
@@ -216,12 +232,20 @@ namespace dccd {
 namespace simd {
 HWY_EXPORT(FacePairFilter);
 HWY_EXPORT(FaceViews);
-std::size_t facePairFilter(const double* positions, const FacesView& a, const FacesView& b, const std::uint32_t* slots,
-                           std::size_t count, std::uint8_t* edges) {
-  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(positions, a, b, slots, count, edges);
+HWY_EXPORT(MoveNear);
+float largestNear(double largest) {
+  constexpr float INFINITE = std::numeric_limits<float>::infinity();
+  return largest < tolerance::FUSED_LARGEST_M ? std::nextafter(static_cast<float>(largest), INFINITE) : INFINITE;
 }
-void faceViews(const double* positions, const std::uint32_t* groups, std::size_t count, std::uint16_t* views) {
-  HWY_DYNAMIC_DISPATCH(FaceViews)(positions, groups, count, views);
+void moveNear(const double* positions, std::size_t count, const double* origin, float* near) {
+  HWY_DYNAMIC_DISPATCH(MoveNear)(positions, count, origin, near);
+}
+std::size_t facePairFilter(const NearVertices& vertices, const FacesView& a, const FacesView& b,
+                           const std::uint32_t* slots, std::size_t count, std::uint8_t* edges) {
+  return HWY_DYNAMIC_DISPATCH(FacePairFilter)(vertices, a, b, slots, count, edges);
+}
+void faceViews(const NearVertices& vertices, const std::uint32_t* groups, std::size_t count, std::uint16_t* views) {
+  HWY_DYNAMIC_DISPATCH(FaceViews)(vertices, groups, count, views);
 }
 }  // namespace simd
 }  // namespace dccd

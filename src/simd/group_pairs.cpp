@@ -75,29 +75,51 @@ uint32_t* PairWriter::write(uint32_t node, uint32_t mask, uint32_t* HWY_RESTRICT
 #endif
 
 // Which pairs of nodes are not reported, of those whose bounds meet: from() takes a mask of the lanes of the group
-// opposite node i and returns those that stay. by_rows: i is in the first group.
+// opposite node i and returns those that stay. FIRST: it is asked before the bounds are.
 struct LeaveNoneOut {
-  HWY_INLINE uint32_t from(bool, uint32_t, uint32_t mask) const { return mask; }
+  static constexpr bool FIRST = true;
+  HWY_INLINE uint32_t from(uint32_t, uint32_t mask) const { return mask; }
 };
 
 // Features of A and B vertices that share one: their vertices lane by lane.
 template <size_t A, size_t B>
 struct LeaveAdjacentOut {
+  static constexpr bool FIRST = false;
   const uint32_t* HWY_RESTRICT a;
   const uint32_t* HWY_RESTRICT b;
-  HWY_INLINE uint32_t from(bool by_rows, uint32_t i, uint32_t mask) const {
+  bool by_rows;  // node i is in the first group
+  HWY_INLINE uint32_t from(uint32_t i, uint32_t mask) const {
     return mask & ~(by_rows ? sharing<A, B>(a, i, b) : sharing<B, A>(b, i, a));
   }
 };
+
+struct LeaveKnownOut {
+  static constexpr bool FIRST = true;
+  const uint16_t* HWY_RESTRICT lanes;  // by node
+  HWY_INLINE uint32_t from(uint32_t i, uint32_t mask) const { return mask & ~uint32_t{lanes[i]}; }
+};
+
+HWY_INLINE const LanePairs& pairsOf(const KnownPairs& known, uint32_t g, uint32_t h) {
+  static constexpr LanePairs NONE{};
+  const hn::CappedTag<uint32_t, 8> d;
+  const uint32_t end = known.begin[g + 1];
+  for (uint32_t k = known.begin[g]; k < end; k += static_cast<uint32_t>(hn::Lanes(d))) {
+    const uint32_t same = bitsOf(d, hn::Eq(hn::Set(d, h), hn::LoadU(d, known.others + k)));
+    if (same == 0) continue;
+    const uint32_t found = k + static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(same));
+    return found < end ? known.pairs[found] : NONE;
+  }
+  return NONE;
+}
 
 // Whether a node meets anything is unpredictable. Where a test costs no more than a mispredicted branch, all nodes are
 // tested first, and then what met is written.
 constexpr bool WRITES_LATER = DCCD_AVX512;
 
 // The surviving lanes of one pair of groups, less what is left out: to o, which is returned moved on.
-template <bool T0_ONLY, class LeaveOut>
+template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t g, uint32_t h, bool same,
-                              Diagonal diagonal, const LeaveOut& leave_out, uint32_t* HWY_RESTRICT o) {
+                              Diagonal diagonal, const LeaveOutOf& leaveOutOf, uint32_t* HWY_RESTRICT o) {
   const int16_t* HWY_RESTRICT sa = a.soa + size_t{g} * SOA_SIZE;
   const int16_t* HWY_RESTRICT sb = b.soa + size_t{h} * SOA_SIZE;
   const int16_t* HWY_RESTRICT bound_a = a.aos + size_t{g} * AOS_SIZE;
@@ -113,8 +135,10 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   const uint32_t inner_mask = by_rows ? cols : rows;
   const PairWriter writer(by_rows, (by_rows ? h : g) * GROUP);
   const uint32_t base = (by_rows ? g : h) * GROUP;
+  const auto leave_out = leaveOutOf(g, h, by_rows);
+  constexpr bool LEAVES_OUT_FIRST = decltype(leave_out)::FIRST;
   const auto write = [&](uint32_t i, uint32_t mask)
-                         HWY_ATTR { o = writer.write(base + i, leave_out.from(by_rows, i, mask), o); };
+                         HWY_ATTR { o = writer.write(base + i, LEAVES_OUT_FIRST ? mask : leave_out.from(i, mask), o); };
   uint32_t met[GROUP], to_write = 0;
   for (uint32_t left = by_rows ? rows : cols; left; left &= left - 1) {
     const uint32_t i = static_cast<uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
@@ -122,6 +146,7 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
     // A group with itself: rows and columns are both full, so that i is a row, and only the lanes above it are new.
     if (same && diagonal == Diagonal::UPPER_WITH_DIAGONAL) mask &= ~0u << i;
     if (same && diagonal == Diagonal::STRICT_UPPER) mask &= ~0u << (i + 1);
+    if (LEAVES_OUT_FIRST) mask = leave_out.from(i, mask);
     if (mask == 0) continue;
     mask &= lanes.meets(outer + soaIndex(0, i), outer + RECORD * GROUP + soaIndex(0, i));
     if (WRITES_LATER) {
@@ -138,12 +163,16 @@ HWY_INLINE uint32_t* testPair(const GroupsView& a, const GroupsView& b, uint32_t
   return o;
 }
 
+template <bool T0_ONLY>
 HWY_INLINE void prefetch(const GroupsView& view, uint32_t group) {
   const int16_t* next = view.soa + size_t{group} * SOA_SIZE;
-  for (size_t line = 0; line < SOA_SIZE; line += 32) hwy::Prefetch(next + line);
+  for (size_t line = 0; line < SOA_SIZE; line += 32) {
+    if (!T0_ONLY || line % (RECORD * GROUP) < SOA_T1) hwy::Prefetch(next + line);
+  }
 }
 
-// leaveOutOf(g, h): what is left out of a pair of groups.
+// leaveOutOf(g, h, by_rows): what is left out of a pair of groups, of which the first one's nodes are gone through, or
+// the other's.
 template <bool T0_ONLY, class LeaveOutOf>
 HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint32_t* HWY_RESTRICT group_pairs,
                             size_t count, bool self, Diagonal diagonal, const LeaveOutOf& leaveOutOf,
@@ -154,10 +183,10 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
   for (; p < count && static_cast<size_t>(o - out) + 2 * GROUP * GROUP <= 2 * capacity; ++p) {
     const uint32_t g = group_pairs[2 * p], h = group_pairs[2 * p + 1];
     if (p + 2 < count) {
-      prefetch(a, group_pairs[2 * p + 4]);
-      prefetch(b, group_pairs[2 * p + 5]);
+      prefetch<T0_ONLY>(a, group_pairs[2 * p + 4]);
+      prefetch<T0_ONLY>(b, group_pairs[2 * p + 5]);
     }
-    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, leaveOutOf(g, h), o);
+    o = testPair<T0_ONLY>(a, b, g, h, self && g == h, diagonal, leaveOutOf, o);
   }
   *consumed = p;
   return static_cast<size_t>(o - out) / 2;
@@ -165,7 +194,7 @@ HWY_INLINE size_t testPairs(const GroupsView& a, const GroupsView& b, const uint
 
 size_t TestGroupPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
                       Diagonal diagonal, bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
-  const auto none = [](uint32_t, uint32_t) { return LeaveNoneOut(); };
+  const auto none = [](uint32_t, uint32_t, bool) { return LeaveNoneOut(); };
   return t0_only ? testPairs<true>(a, b, group_pairs, count, self, diagonal, none, out, capacity, consumed)
                  : testPairs<false>(a, b, group_pairs, count, self, diagonal, none, out, capacity, consumed);
 }
@@ -174,8 +203,8 @@ template <size_t A, size_t B>
 HWY_INLINE size_t testUnsharedPairsOf(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs,
                                       size_t count, bool self, bool t0_only, uint32_t* out, size_t capacity,
                                       size_t* consumed) {
-  const auto adjacent = [&](uint32_t g, uint32_t h) {
-    return LeaveAdjacentOut<A, B>{a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP};
+  const auto adjacent = [&](uint32_t g, uint32_t h, bool by_rows) {
+    return LeaveAdjacentOut<A, B>{a.vertices + size_t{g} * A * GROUP, b.vertices + size_t{h} * B * GROUP, by_rows};
   };
   constexpr auto UPPER = Diagonal::STRICT_UPPER;
   return t0_only ? testPairs<true>(a, b, group_pairs, count, self, UPPER, adjacent, out, capacity, consumed)
@@ -185,9 +214,17 @@ HWY_INLINE size_t testUnsharedPairsOf(const GroupsView& a, const GroupsView& b, 
 size_t TestUnsharedPairs(const GroupsView& a, const GroupsView& b, const uint32_t* group_pairs, size_t count, bool self,
                          bool t0_only, uint32_t* out, size_t capacity, size_t* consumed) {
   if (a.arity == 1) return testUnsharedPairsOf<1, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
-  if (a.arity == 3) return testUnsharedPairsOf<3, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
   if (b.arity == 3) return testUnsharedPairsOf<2, 3>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
   return testUnsharedPairsOf<2, 2>(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+}
+
+size_t TestOtherPairs(const GroupsView& tree, const uint32_t* group_pairs, size_t count, const KnownPairs& left_out,
+                      uint32_t* out, size_t capacity, size_t* consumed) {
+  const auto known = [&](uint32_t g, uint32_t h, bool by_rows) HWY_ATTR {
+    const LanePairs& pairs = pairsOf(left_out, g, h);
+    return LeaveKnownOut{by_rows ? pairs.rows : pairs.columns};
+  };
+  return testPairs<true>(tree, tree, group_pairs, count, true, Diagonal::STRICT_UPPER, known, out, capacity, consumed);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -200,6 +237,7 @@ namespace dccd {
 namespace simd {
 HWY_EXPORT(TestGroupPairs);
 HWY_EXPORT(TestUnsharedPairs);
+HWY_EXPORT(TestOtherPairs);
 
 std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                            std::size_t count, bool self, Diagonal diagonal, bool t0_only, std::uint32_t* out,
@@ -212,6 +250,12 @@ std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const st
                               std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
                               std::size_t* consumed) {
   return HWY_DYNAMIC_DISPATCH(TestUnsharedPairs)(a, b, group_pairs, count, self, t0_only, out, capacity, consumed);
+}
+
+std::size_t testOtherPairs(const GroupsView& tree, const std::uint32_t* group_pairs, std::size_t count,
+                           const KnownPairs& left_out, std::uint32_t* out, std::size_t capacity,
+                           std::size_t* consumed) {
+  return HWY_DYNAMIC_DISPATCH(TestOtherPairs)(tree, group_pairs, count, left_out, out, capacity, consumed);
 }
 
 }  // namespace simd

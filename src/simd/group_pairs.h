@@ -27,10 +27,27 @@ std::size_t testGroupPairs(const GroupsView& a, const GroupsView& b, const std::
                            std::size_t capacity, std::size_t* consumed);
 
 /// testGroupPairs() for leaves with vertices, STRICT_UPPER, without the pairs that share one; both trees are of the
-/// same body, and their features have 1 and 3, 2 and 2, 2 and 3, or 3 and 3 vertices.
+/// same body, and their features have 1 and 3, 2 and 2, or 2 and 3 vertices.
 std::size_t testUnsharedPairs(const GroupsView& a, const GroupsView& b, const std::uint32_t* group_pairs,
                               std::size_t count, bool self, bool t0_only, std::uint32_t* out, std::size_t capacity,
                               std::size_t* consumed);
+
+/// Pairs of lanes of two groups: bit j of rows[i], and bit i of columns[j], for lane i of the first one and lane j of
+/// the other.
+struct alignas(64) LanePairs {
+  std::uint16_t rows[GROUP], columns[GROUP];
+};
+
+/// Pairs of features of one tree, by their groups: those of group g and group others[k], which is not smaller, are
+/// pairs[k], k from begin[g] to begin[g + 1]. Behind the last one 8 more of others can be read.
+struct KnownPairs {
+  const std::uint32_t *begin, *others;
+  const LanePairs* pairs;
+};
+
+/// testGroupPairs() of a tree with itself, STRICT_UPPER, at t0 alone, without those pairs.
+std::size_t testOtherPairs(const GroupsView& tree, const std::uint32_t* group_pairs, std::size_t count,
+                           const KnownPairs& left_out, std::uint32_t* out, std::size_t capacity, std::size_t* consumed);
 
 }  // namespace simd
 }  // namespace dccd

@@ -170,15 +170,17 @@ TEST(StartCrossing, FacesThatLieAroundTheirVertexTwiceAreLookedAt) {
 }
 
 /// A ball that is rough, or folded, so that some of its fans lie around their vertices more than once, or not at all.
+/// Where a vertex is far away, floats hardly tell the others from each other.
 StepBody crumpledBall(const Draw& draw, int depth) {
   StepBody body = ball(Vec3(draw(-4, 4), draw(-4, 4), draw(-4, 4)) / 8.0, 1, depth);
   const int rough = draw(0, 2) == 0 ? 0 : draw(1, 12);
-  const bool flat = draw(0, 5) == 0, folded = draw(0, 2) == 0;
+  const bool flat = draw(0, 5) == 0, folded = draw(0, 2) == 0, spiked = draw(0, 3) == 0;
   for (Vec3& x : body.t0) {
     x += Vec3(draw(-99, 99), draw(-99, 99), draw(-99, 99)) * (0.001 * rough);
     if (folded) x[2] = std::fabs(x[2]);
     if (flat) x[draw(0, 1)] = 0.25;
   }
+  if (spiked) body.t0[0] *= std::ldexp(1.0, draw(8, 24));
   body.t1 = body.t0;
   return body;
 }

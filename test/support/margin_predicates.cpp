@@ -89,8 +89,17 @@ IsWrong judgeSegment(const MarginInput& input) {
                                                                    4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 5};
     static constexpr std::uint8_t ALL_EDGES[2] = {simd::FIRST_EDGES, simd::FIRST_EDGES};
     static constexpr std::uint32_t SLOTS[2] = {0, 1};
+    double middle[4] = {}, largest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax({x[k], x[3 + k], x[6 + k], x[9 + k], x[12 + k], points[2][k]});
+      middle[k] = low / 2 + high / 2;
+      largest = std::max({largest, high - middle[k], middle[k] - low});
+    }
+    float near[6 * 4];
+    simd::moveNear(points[0], 6, middle, near);
     std::uint8_t edges;
-    simd::facePairFilter(points[0], {CORNERS, ALL_EDGES}, {CORNERS, ALL_EDGES}, SLOTS, 1, &edges);
+    simd::facePairFilter({near, simd::largestNear(largest)}, {CORNERS, ALL_EDGES}, {CORNERS, ALL_EDGES}, SLOTS, 1,
+                         &edges);
     return meets && (edges & 1) == 0;
   };
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "obstacle/burst.h"
-#include "simd/face_filter.h"
 #include "step/start/segment_triangle.h"
 
 namespace dccd {
@@ -103,7 +102,7 @@ bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePai
   const bool whole = stream_.run(trees, group_pairs, count, [&](const std::uint32_t* slots, std::size_t count) {
     for (const std::uint32_t* end = slots + 2 * count; slots != end;) {
       const std::size_t n = std::min(CHUNK, static_cast<std::size_t>(end - slots) / 2);
-      tested_ += simd::facePairFilter(search_.scene->vertices()->t0, faces_a, faces_b, slots, n, edges_.data());
+      tested_ += simd::facePairFilter(search_.vertices, faces_a, faces_b, slots, n, edges_.data());
       work_ += n / FACE_PAIRS_A_TEST;
       // First which, without a branch on what nothing foretells.
       std::size_t crossing = 0;
@@ -115,6 +114,10 @@ bool CrossingFinder::searchFaces(std::uint32_t a, std::uint32_t b, const TreePai
         const std::size_t i = crossing_[c];
         const std::uint32_t face = slots[2 * i], other = slots[2 * i + 1];
         const Index *f = trees.a->lane<3>(face), *g = trees.b->lane<3>(other);
+        for (std::size_t k = 0; k < 3; ++k) {  // only their copies in float were read
+          __builtin_prefetch(search_.scene->vertices()[f[k * NEXT]].t0);
+          __builtin_prefetch(search_.scene->vertices()[g[k * NEXT]].t0);
+        }
         for (unsigned edges = edges_[i]; edges != 0; edges &= edges - 1) {
           const auto bit = static_cast<std::size_t>(__builtin_ctz(edges));
           const std::size_t k = bit % 3, next = k == 2 ? 0 : k + 1;
@@ -139,7 +142,7 @@ std::uint16_t CrossingFinder::viewOf(std::uint32_t body, std::uint32_t face) {
   if (!viewed_[run]) {
     const ClusterTree& faces = search_.scene->bodies()[body].tree(FeatureKind::FACE);
     const std::size_t first = run * GROUPS_VIEWED, count = std::min(GROUPS_VIEWED, faces.level(0).groups - first);
-    simd::faceViews(search_.scene->vertices()->t0, faces.leaves(false).vertices + first * 3 * simd::GROUP, count,
+    simd::faceViews(search_.vertices, faces.leaves(false).vertices + first * 3 * simd::GROUP, count,
                     views_.data() + first * simd::GROUP);
     viewed_[run] = 1;
   }

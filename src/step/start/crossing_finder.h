@@ -9,6 +9,7 @@
 #include "culling/cluster_pairs.h"
 #include "culling/scene_arrays.h"
 #include "dccd/deadline.h"
+#include "simd/face_filter.h"
 #include "step/start/neighbourhood.h"
 
 namespace dccd {
@@ -31,6 +32,7 @@ class CrossingFinder {
   struct Search {
     const SceneArrays* scene = nullptr;
     const std::vector<Neighbourhood>* neighbourhoods = nullptr;
+    simd::NearVertices vertices{nullptr, 0};  ///< at t=0; of bodies that are searched by faces
     Deadline deadline;
     std::size_t most_found = 0;
   };

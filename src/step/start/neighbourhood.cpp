@@ -16,6 +16,36 @@ void SlotsAtVertex::build(const SceneBody& body, FeatureKind kind) {
   }
 }
 
+void FacesSharing::build(const ClusterTree& faces, const SlotsAtVertex& at, Index first_vertex) {
+  const std::size_t groups = faces.level(0).groups;
+  begin.assign(1, 0);
+  others.clear();
+  pairs.clear();
+  std::vector<std::uint32_t> place(groups, 0);  // of a group in others, if not before the group's that is looked at
+  for (std::size_t g = 0; g < groups; ++g) {
+    const std::size_t end = std::min((g + 1) * simd::GROUP, faces.featureCount()), own = others.size();
+    for (std::size_t slot = g * simd::GROUP; slot < end; ++slot) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index vertex = faces.feature(slot)[k] - first_vertex;
+        for (std::uint32_t i = at.begin[vertex]; i < at.begin[vertex + 1]; ++i) {
+          const std::uint32_t other = at.slots[i], h = other / simd::GROUP;
+          if (h < g) continue;
+          if (place[h] < own || place[h] >= others.size() || others[place[h]] != h) {
+            place[h] = static_cast<std::uint32_t>(others.size());
+            others.push_back(h);
+            pairs.emplace_back();
+          }
+          simd::LanePairs& lanes = pairs[place[h]];
+          lanes.rows[slot % simd::GROUP] |= static_cast<std::uint16_t>(1u << other % simd::GROUP);
+          lanes.columns[other % simd::GROUP] |= static_cast<std::uint16_t>(1u << slot % simd::GROUP);
+        }
+      }
+    }
+    begin.push_back(static_cast<std::uint32_t>(others.size()));
+  }
+  others.resize(others.size() + 8);
+}
+
 void Neighbourhood::learn(const SceneBody& body) {
   internal_of_local.assign(body.setup.topology->vertexCount(), NO_INDEX);
   for (std::size_t i = 0; i < body.usedCount(); ++i) {
@@ -52,6 +82,7 @@ void Neighbourhood::learn(const SceneBody& body) {
     if (own) *own = slot;
     if (along != 1 || against != 1) closed[at] = closed[e[1] - body.internal_begin] = 0;
   }
+  if (meetsItself(body.setup)) sharing.build(face_tree, faces, body.internal_begin);
   owns.clear();
   for (const std::array<std::uint32_t, 3>& own : own_edges) {
     owns.push_back(

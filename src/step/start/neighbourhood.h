@@ -15,6 +15,14 @@ struct SlotsAtVertex {
   void build(const SceneBody& body, FeatureKind kind);
 };
 
+/// Which faces of a body share a vertex.
+struct FacesSharing {
+  std::vector<std::uint32_t> begin, others;
+  std::vector<simd::LanePairs> pairs;
+  void build(const ClusterTree& faces, const SlotsAtVertex& at, Index first_vertex);
+  simd::KnownPairs view() const { return {begin.data(), others.data(), pairs.data()}; }
+};
+
 struct Neighbourhood {
   std::vector<Index> internal_of_local;
   SlotsAtVertex edges, faces;
@@ -26,6 +34,8 @@ struct Neighbourhood {
   std::vector<std::uint8_t> corner;
   /// Per used vertex: each edge at it is on two faces, which pass along it in opposite directions.
   std::vector<std::uint8_t> closed;
+
+  FacesSharing sharing;  ///< of a body that meets itself
 
   void learn(const SceneBody& body);
 };

@@ -1,6 +1,7 @@
 #include "step/start/start_state.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
@@ -16,7 +17,9 @@ constexpr std::size_t FEW_CANDIDATES = 4096;
 constexpr std::size_t CANDIDATES_PER_CONTACT = 4;  // on a regular mesh, before those that are the same are one
 constexpr std::size_t FAN_UNIT = 1024;             // vertices of a unit
 constexpr std::size_t UNITS_A_THREAD = 4;          // between two looks at the clock
+constexpr std::size_t LISTED_AHEAD = 16;           // pairs whose faces are fetched before they are listed
 constexpr std::size_t LISTED_PIECE = 4096;         // pairs that a thread lists at once
+constexpr std::size_t NEAR_PIECE = 4096;           // vertices that a thread moves near at once
 constexpr std::size_t PIECE = 4;                   // units that a thread takes at once
 constexpr std::size_t PAIRS_PER_LOOK_AT_THE_CLOCK = 1024, LARGEST_BLOCK = 1 << 18;
 constexpr std::chrono::nanoseconds LISTING_AN_INTERSECTION(400);  // sorting and copying one of half a million
@@ -102,9 +105,11 @@ void StartStateSearch::list(const SceneArrays& scene, const std::vector<EdgeFace
       return static_cast<std::uint16_t>(next - bodies.begin() - 1);
     };
     std::array<std::uint16_t, 2> body{0, 0};
+    const std::uint64_t faces = (std::uint64_t{1} << shift) - 1;
     for (std::size_t i = first; i < last; ++i) {
-      const auto edge = static_cast<Index>(keys_[i] >> shift);
-      const auto face = static_cast<Index>(keys_[i] & ((std::uint64_t{1} << shift) - 1));
+      const auto edge = static_cast<Index>(keys_[i] >> shift), face = static_cast<Index>(keys_[i] & faces);
+      const std::uint64_t soon = keys_[std::min(i + LISTED_AHEAD, last - 1)];
+      scene.prefetchFeature(FeatureKind::FACE, body[1], static_cast<Index>(soon & faces));
       body = {bodyOf(&SceneBody::edge_begin, edge, body[0]), bodyOf(&SceneBody::face_begin, face, body[1])};
       out[i].body = body;
       scene.featureVertices(FeatureKind::EDGE, body[0], edge, out[i].vertex.data());
@@ -185,8 +190,39 @@ void StartStateSearch::search(const SceneArrays& scene, const Deadline& deadline
     body_pairs_.push_back({a, b});
     if (!by_faces_[a] || !by_faces_[b]) body_pairs_.push_back({b, a});  // else {a, b} is both
   }
+  moveNear(scene, parallel);
   searched_ =
       goOn(body_pairs_, next_bodies_, next_unit_, [&] { return searchBodies(scene, deadline, threads, parallel); });
+}
+
+/// Of bodies that are searched by faces, from the middle of all of them.
+void StartStateSearch::moveNear(const SceneArrays& scene, const Parallel& parallel) {
+  std::vector<std::uint8_t> wanted(by_faces_.size(), 0);
+  for (const BodyPair& pair : body_pairs_) {
+    if (by_faces_[pair[0]] && by_faces_[pair[1]]) wanted[pair[0]] = wanted[pair[1]] = 1;
+  }
+  double low[3], high[3], middle[4] = {}, largest = 0;
+  for (int k = 0; k < 3; ++k) {
+    low[k] = std::numeric_limits<double>::infinity();
+    high[k] = -low[k];
+    for (std::size_t b = 0; b < wanted.size(); ++b) {
+      if (!wanted[b]) continue;
+      low[k] = std::min(low[k], scene.bodies()[b].bounds_min[k]);
+      high[k] = std::max(high[k], scene.bodies()[b].bounds_max[k]);
+    }
+    if (low[k] > high[k]) return;
+    middle[k] = low[k] / 2 + high[k] / 2;
+    largest = std::max({largest, high[k] - middle[k], middle[k] - low[k]});
+  }
+  largest_near_ = simd::largestNear(largest);
+  near_.resize(4 * scene.vertexCount());
+  for (std::size_t b = 0; b < wanted.size(); ++b) {
+    if (!wanted[b]) continue;
+    parallel(scene.bodies()[b].usedCount(), NEAR_PIECE, [&](std::size_t first, std::size_t last) {
+      first += scene.bodies()[b].internal_begin, last += scene.bodies()[b].internal_begin;
+      simd::moveNear(scene.vertices()[first].t0, last - first, middle, near_.data() + 4 * first);
+    });
+  }
 }
 
 /// From next_unit_ on.
@@ -243,6 +279,8 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
   if (trees.a->featureCount() == 0 || trees.b->featureCount() == 0) return true;
   if (beforeListing(deadline).isOver()) return false;
   learnNeighbourhoods(scene);
+  const simd::KnownPairs sharing = neighbourhoods_[a].sharing.view();
+  if (trees.self) trees.sharing = &sharing;
   cut_ = superclusterPairs(trees, groups_, scratch_, most_group_pairs_).toc <= 1 || cut_;
   setUnits(trees.self ? (scene.bodies()[a].usedCount() + FAN_UNIT - 1) / FAN_UNIT : 0);
   const bool limited = deadline.canEnd() || most_found_ != FoundLimit::NONE;
@@ -257,7 +295,11 @@ bool StartStateSearch::searchBodies(const SceneArrays& scene, const Deadline& de
     unit_tested_.assign(n, 0);
     parallel(n, limited ? 1 : PIECE, [&](std::size_t from, std::size_t to) {
       CrossingFinder& finder = finders_.local();
-      finder.begin({&scene, &neighbourhoods_, beforeListing(deadline), most_found_ - found_.size()});
+      finder.begin({&scene,
+                    &neighbourhoods_,
+                    {near_.data(), largest_near_},
+                    beforeListing(deadline),
+                    most_found_ - found_.size()});
       for (std::size_t i = from; i < to; ++i) {
         unit_found_[i].clear();
         const std::uint64_t before = finder.tested();
