@@ -60,6 +60,7 @@ bool Contour::Span::isApartFrom(const Span& other, double margin) const {
 
 bool Contour::isSimple(const std::vector<Side>& sides, const ViewPlane& plane, const VertexMotion* vertices) {
   PlanarSpan span;
+  for (const Corner& corner : corners_) corner_of_[corner.vertex - first_vertex_] = NONE;
   corners_.clear();
   ends_.clear();
   for (const Side& side : sides) {
@@ -69,7 +70,6 @@ bool Contour::isSimple(const std::vector<Side>& sides, const ViewPlane& plane, c
     ends_.push_back({from, to, corners_[from].first_out, corners_[to].first_in});
     corners_[from].first_out = corners_[to].first_in = number;
   }
-  for (const Side& side : sides) corner_of_[side.from - first_vertex_] = NONE;
   bad_.assign(sides.size(), 1);
   if (sides.empty() || !span.isGuarded())
     return false;  // no surface without a border is seen from its front everywhere
@@ -91,9 +91,8 @@ bool Contour::isSimple(const std::vector<Side>& sides, const ViewPlane& plane, c
 std::uint32_t Contour::cornerAt(Index vertex, const ViewPlane& plane, const VertexMotion* vertices, PlanarSpan& span) {
   std::uint32_t& corner = corner_of_[vertex - first_vertex_];
   if (corner != NONE) return corner;
-  corner = static_cast<std::uint32_t>(corners_.size());
-  corners_.push_back({span.add(plane, vertices[vertex]), NONE, NONE, NONE, NONE, {}});
-  return corner;
+  corners_.push_back({span.add(plane, vertices[vertex]), vertex, NONE, NONE, NONE, NONE, {}});
+  return corner = static_cast<std::uint32_t>(corners_.size() - 1);
 }
 
 /// Follows the sides, and takes a cycle out of the way as soon as it comes to a vertex again.

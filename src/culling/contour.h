@@ -77,6 +77,7 @@ class Contour {
   /// Of a vertex of the border: its sides are listed, one after another.
   struct Corner {
     PlanarSpan::Point point;
+    Index vertex;
     std::uint32_t first_out, first_in;  ///< sides that begin and end here
     std::uint32_t next_out;             ///< of the walk
     std::uint32_t on_path;
@@ -107,7 +108,7 @@ class Contour {
   bool turnsAt(const PlanarSpan::Point& before, const PlanarSpan::Point& at, const PlanarSpan::Point& after) const;
 
   Index first_vertex_;
-  std::vector<std::uint32_t> corner_of_;  // per vertex; none between two calls
+  std::vector<std::uint32_t> corner_of_;  // per vertex, as of the last call
   std::vector<Corner> corners_;
   std::vector<Ends> ends_;                           // per side
   std::vector<std::uint32_t> cycles_, cycle_begin_;  // sides, cycle by cycle
