@@ -95,7 +95,7 @@ TEST(ClearanceProperty, PairsHoldTheTruth) {
     ASSERT_LE(lower * lower, truth) << "pair " << i << ": lower_m " << lower_m << " is above the truth";
     ASSERT_GE(upper * upper, truth) << "pair " << i << ": upper_m " << upper_m << " is below the truth, of "
                                     << hulls[0].size() << " and " << hulls[1].size() << " corners";
-    // Of two triangles that are needles as thin as rounding the search misses the best points now and then.
+    // Of triangles that are needles as thin as rounding the search misses the best points now and then.
     wider += upper_m - lower_m > std::max(wide_m, 1e-288);
     ASSERT_LE(upper_m - lower_m, std::max(16 * wide_m, 1e-288)) << "pair " << i << ", size " << largest_m;
     // A direction that is not the best one, at another time, bounds the distance then, too.
