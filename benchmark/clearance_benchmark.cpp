@@ -1,10 +1,19 @@
-// What distances cost: whole steps with and without clearance in turns, as processor time; and FCL's distances of the
-// same frames beside ours, which bound the truth, so that it is seen how far FCL's are off.
+// What distances cost: whole steps with and without clearance in turns, as processor time; and the distances that FCL,
+// CGAL's tree and octomap's distance map tell of the same frames beside ours, which bound the truth, so that it is seen
+// how far theirs are off.
+#include <CGAL/AABB_face_graph_triangle_primitive.h>
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/Simple_cartesian.h>
+#include <CGAL/Surface_mesh.h>
+#include <dynamicEDT3D/dynamicEDTOctomap.h>
 #include <fcl/fcl.h>
+
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <ctime>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -80,6 +89,34 @@ Step stepOf(const Case& c, std::size_t frame) {
   return step;
 }
 
+/// One that tells distances of the cloth and the table.
+struct Peer {
+  std::string name;
+  double once_ms = 0;                                // what is made of the table
+  std::function<double(const Positions&)> distance;  // [m] of a frame; its time is taken
+  std::function<double(const Positions&)> judged;    // the same; its error is taken
+};
+
+/// The map as the sides of its boxes.
+struct Sides {
+  Positions positions;
+  std::vector<std::array<std::size_t, 3>> triangles;
+
+  explicit Sides(const VoxelSurface& map) {
+    static constexpr std::size_t SIDES[12][3] = {{0, 1, 3}, {0, 3, 2}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                                                 {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 3, 7}, {1, 7, 5}};
+    for (const OccupiedLeaf& leaf : map.leaves()) {
+      const LeafBox box = leafBox(leaf, map.resolution());
+      const std::size_t first = positions.size();
+      for (int i = 0; i < 8; ++i) {
+        positions.emplace_back((i & 1 ? box.hi : box.lo)[0], (i & 2 ? box.hi : box.lo)[1],
+                               (i & 4 ? box.hi : box.lo)[2]);
+      }
+      for (const auto& s : SIDES) triangles.push_back({first + s[0], first + s[1], first + s[2]});
+    }
+  }
+};
+
 using Model = fcl::BVHModel<fcl::OBBRSSd>;
 std::shared_ptr<Model> modelOf(const Positions& positions, const std::vector<fcl::Triangle>& triangles) {
   auto model = std::make_shared<Model>();
@@ -89,28 +126,94 @@ std::shared_ptr<Model> modelOf(const Positions& positions, const std::vector<fcl
   return model;
 }
 
-/// The map as the sides of its boxes.
-std::shared_ptr<Model> modelOf(const VoxelSurface& map) {
-  static constexpr std::size_t SIDES[12][3] = {{0, 1, 3}, {0, 3, 2}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
-                                               {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 3, 7}, {1, 7, 5}};
-  Positions positions;
-  std::vector<fcl::Triangle> triangles;
-  for (const OccupiedLeaf& leaf : map.leaves()) {
-    const LeafBox box = leafBox(leaf, map.resolution());
-    const std::size_t first = positions.size();
-    for (int i = 0; i < 8; ++i) {
-      positions.emplace_back((i & 1 ? box.hi : box.lo)[0], (i & 2 ? box.hi : box.lo)[1], (i & 4 ? box.hi : box.lo)[2]);
-    }
-    for (const auto& s : SIDES) triangles.emplace_back(first + s[0], first + s[1], first + s[2]);
-  }
-  return modelOf(positions, triangles);
+/// Of the two meshes. Its time is that of a model that is refitted; its error that of one made anew: what is refitted
+/// may be off.
+Peer fclPeer(const Case& c) {
+  std::vector<fcl::Triangle> triangles, sides;
+  for (const Face& f : c.topology->faces()) triangles.emplace_back(f[0], f[1], f[2]);
+  const Sides table_sides(*c.map);
+  for (const auto& s : table_sides.triangles) sides.emplace_back(s[0], s[1], s[2]);
+  const double start = processorMs();
+  const auto table = modelOf(table_sides.positions, sides);
+  Peer peer{"FCL", processorMs() - start, {}};
+  const auto apart = [table](const std::shared_ptr<Model>& cloth) {
+    fcl::DistanceResultd found;
+    fcl::distance<double>(cloth.get(), fcl::Transform3d::Identity(), table.get(), fcl::Transform3d::Identity(),
+                          fcl::DistanceRequestd(), found);
+    return found.min_distance;
+  };
+  peer.distance = [apart, cloth = modelOf(c.frames[0], triangles)](const Positions& frame) {
+    cloth->beginReplaceModel();
+    cloth->replaceSubModel(frame);
+    cloth->endReplaceModel(true);
+    return apart(cloth);
+  };
+  peer.judged = [apart, triangles](const Positions& frame) { return apart(modelOf(frame, triangles)); };
+  return peer;
 }
 
-/// FCL's distance at the end of each step, its time, and the most by which it lies outside of our bounds.
-nlohmann::json beside(const Case& c) {
-  std::vector<fcl::Triangle> triangles;
-  for (const Face& f : c.topology->faces()) triangles.emplace_back(f[0], f[1], f[2]);
-  const auto cloth = modelOf(c.frames[0], triangles), table = modelOf(*c.map);
+double leastOf(const Positions& frame, const std::function<double(const Vec3&)>& distance) {
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const Vec3& p : frame) least_m = std::min(least_m, distance(p));
+  return least_m;
+}
+
+/// Its tree tells the distance of a point: of each vertex from the table.
+Peer cgalPeer(const Case& c) {
+  using Kernel = CGAL::Simple_cartesian<double>;
+  using Surface = CGAL::Surface_mesh<Kernel::Point_3>;
+  using Primitive = CGAL::AABB_face_graph_triangle_primitive<Surface>;
+  using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+  const Sides sides(*c.map);
+  const auto surface = std::make_shared<Surface>();
+  for (const auto& triangle : sides.triangles) {
+    // Each has corners of its own: together they are no manifold.
+    std::array<Surface::Vertex_index, 3> corner;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3& x = sides.positions[triangle[i]];
+      corner[i] = surface->add_vertex(Kernel::Point_3(x[0], x[1], x[2]));
+    }
+    surface->add_face(corner[0], corner[1], corner[2]);
+  }
+  const double start = processorMs();
+  const auto tree = std::make_shared<Tree>(surface->faces_begin(), surface->faces_end(), *surface);
+  tree->build();
+  tree->accelerate_distance_queries();
+  Peer peer{"CGAL, vertices", processorMs() - start, {}};
+  peer.distance = peer.judged = [surface, tree](const Positions& frame) {
+    return leastOf(frame,
+                   [&](const Vec3& p) { return std::sqrt(tree->squared_distance(Kernel::Point_3(p[0], p[1], p[2]))); });
+  };
+  return peer;
+}
+
+/// Octomap's distance map tells of a voxel how far its middle is from the nearest occupied one's: of each vertex's.
+Peer distanceMapPeer(const Case& c) {
+  const auto tree = std::make_shared<octomap::OcTree>(c.map->resolution());
+  for (const OccupiedLeaf& leaf : c.map->leaves()) {
+    tree->updateNode(octomap::OcTreeKey(leaf.min.x, leaf.min.y, leaf.min.z), true, true);
+  }
+  tree->updateInnerOccupancy();
+  Eigen::AlignedBox3d box;
+  for (const Positions& frame : c.frames) {
+    for (const Vec3& p : frame) box.extend(p);
+  }
+  const auto point = [](const Vec3& p) {
+    return octomap::point3d(static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]));
+  };
+  box.extend(Vec3(0, 0, -c.map->resolution() / 2));
+  const double start = processorMs();
+  const auto map = std::make_shared<DynamicEDTOctomap>(1.0f, tree.get(), point(box.min()), point(box.max()), false);
+  map->update();
+  Peer peer{"dynamicEDT3D, vertices", processorMs() - start, {}};
+  peer.distance = peer.judged = [tree, map, point](const Positions& frame) {
+    return leastOf(frame, [&](const Vec3& p) { return map->getDistance(point(p)); });
+  };
+  return peer;
+}
+
+/// Its distance at the end of each step, its time, and the most by which it lies outside of our bounds.
+nlohmann::json beside(const Case& c, const Peer& peer) {
   Options options;
   options.clearance.wanted = true;
   options.clearance.max_m = 10;
@@ -119,22 +222,14 @@ nlohmann::json beside(const Case& c) {
   double worst_m = 0;
   for (std::size_t k = 0; k + 1 < c.frames.size(); ++k) {
     const double start = processorMs();
-    cloth->beginReplaceModel();
-    cloth->replaceSubModel(c.frames[k + 1]);
-    cloth->endReplaceModel(true);
-    fcl::DistanceResultd found;
-    fcl::distance<double>(cloth.get(), fcl::Transform3d::Identity(), table.get(), fcl::Transform3d::Identity(),
-                          fcl::DistanceRequestd(), found);
+    peer.distance(c.frames[k + 1]);
     ms.push_back(processorMs() - start);
-    // The error is that of a model made anew: what is refitted may be off.
-    fcl::DistanceResultd anew;
-    fcl::distance<double>(modelOf(c.frames[k + 1], triangles).get(), fcl::Transform3d::Identity(), table.get(),
-                          fcl::Transform3d::Identity(), fcl::DistanceRequestd(), anew);
+    const double theirs_m = peer.judged(c.frames[k + 1]);
     const ClearanceDistance ours = detector.run(stepOf(c, k)).clearances.back().at_end;
     if (ours.status != ClearanceStatus::MEASURED) throw std::runtime_error(c.name + ": no distance was measured");
-    worst_m = std::max({worst_m, ours.lower_m - anew.min_distance, anew.min_distance - ours.upper_m});
+    worst_m = std::max({worst_m, ours.lower_m - theirs_m, theirs_m - ours.upper_m});
   }
-  return {{"ms", spread(ms)}, {"outside_m", worst_m}};
+  return {{"name", peer.name}, {"ms", spread(ms)}, {"once_ms", peer.once_ms}, {"outside_m", worst_m}};
 }
 
 nlohmann::json measure(const Case& c, int repeat) {
@@ -165,7 +260,7 @@ nlohmann::json measure(const Case& c, int repeat) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("What distances cost, and FCL's beside them");
+  CLI::App app("What distances cost, and those of others beside them");
   std::string path;
   int repeat = 5;
   app.add_option("--out", path, "JSON file to write")->required();
@@ -177,7 +272,7 @@ int run(int argc, char** argv) {
     for (const Case& c : {hovering("400 vertices over 3,600 voxels" + how, 20, 0.05, 60, 0.02, bends),
                           hovering("20,000 triangles over 50,000 voxels" + how, 101, 0.01, 224, 0.005, bends)}) {
       nlohmann::json run = measure(c, repeat);
-      run["fcl"] = beside(c);
+      for (const Peer& peer : {fclPeer(c), cgalPeer(c), distanceMapPeer(c)}) run["peers"].push_back(beside(c, peer));
       out["runs"].push_back(run);
       Case folds = c;
       folds.name += ", and itself";

@@ -16,6 +16,7 @@
 #include "node/bag_replay.h"
 #include "node/robot_source.h"
 #include "report/report.h"
+#include "stream/quantile.h"
 
 namespace {
 
@@ -81,11 +82,13 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
   return text.str();
 }
 
-std::string promisesLine(const BagReplaySummary& summary) {
+/// Empty: there were none.
+std::string promisesInWords(const BagReplaySummary& summary) {
   if (summary.promises == 0) return "";
   std::ostringstream text;
-  text << "safe until: " << summary.promises << " promises, " << summary.promises_broken << " void"
-       << (summary.first_broken.empty() ? "" : "; the first: ") << summary.first_broken << '\n';
+  text << "safe until: " << summary.promises << " promises of " << quantile(summary.promised_s, 0.5)
+       << " s in the middle, " << summary.promises - summary.promises_broken << " kept, " << summary.promises_broken
+       << " void" << (summary.first_broken.empty() ? "" : "; the first: ") << summary.first_broken;
   return text.str();
 }
 
@@ -122,6 +125,7 @@ std::string mapUsed(const BagReplaySummary& summary) {
 void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySummary& summary, Report& report) {
   report.setEffects(summary.effects.decisions());
   report.setLeftOut(summary.left_out, config.monitorBodies());
+  report.setPromises(promisesInWords(summary));
   if (summary.look_ahead) report.setLookAhead(*summary.look_ahead, config.monitor.look_ahead_s);
   report.setCounters(summary.frames);
   std::string topics;
@@ -149,11 +153,13 @@ void describe(const Arguments& a, const MonitorConfig& config, const BagReplaySu
 /// Says what came of it; the exit status.
 int conclude(const Arguments& a, const BagReplaySummary& summary, const Report& report, bool answered,
              const std::string& of_study = "") {
+  const std::string promises = promisesInWords(summary);
   // Why it is not proved is said once: in the last line of the errors.
   std::cout << report.headline(false) << '\n'
             << "frames: " << summary.frames.received << " received, " << summary.frames.processed() << " processed, "
             << summary.frames.started() << " started a pair, " << summary.frames.skipped() << " skipped\n"
-            << lookAheadLine(summary) << promisesLine(summary) << of_study << "octomap: " << mapUsed(summary) << '\n'
+            << lookAheadLine(summary) << promises << (promises.empty() ? "" : "\n") << of_study
+            << "octomap: " << mapUsed(summary) << '\n'
             << "report: " << a.report << "/report.html\n";
   for (const std::string& sentence : summary.not_looked_at) std::cout << "note: " << sentence << '\n';
   const std::string unproved = report.unproved();

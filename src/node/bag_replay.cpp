@@ -150,6 +150,8 @@ struct BagReplay::Run {
     while (pipeline.nextOutcome(static_cast<std::int64_t>(at.toNSec()), outcome)) {
       const std::optional<Outcome> prediction = predict(outcome);
       if (summary.first_broken.empty()) summary.first_broken = pipeline.promises().broken();
+      const SafeUntil& promise = pipeline.promises().promise();
+      if (promise.isPromise()) summary.promised_s.push_back(promise.seconds());
       lacked_transform = lacked_transform || outcome.reason.find("no transform") != std::string::npos;
       sink(outcome, pipeline, summary, at);
       if (look_ahead && predictions) predictions(prediction ? *prediction : outcome, pipeline, summary, at);

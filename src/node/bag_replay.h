@@ -43,6 +43,7 @@ struct BagReplaySummary {
   std::vector<LeftOutPair> left_out;                ///< at the end
   std::optional<LookAheadSummary> look_ahead;       ///< where look_ahead_s is above 0
   std::uint64_t promises = 0, promises_broken = 0;  ///< of safe_until, and those that the next answer showed to be void
+  std::vector<double> promised_s;                   ///< for how long, of each
   std::string first_broken;                         ///< why the first of these was; empty: there is none
   double duration_s = 0;
 };

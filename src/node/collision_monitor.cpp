@@ -7,6 +7,7 @@
 #include <deformable_ccd/RemoveObject.h>
 #include <deformable_ccd/SetHold.h>
 #include <deformable_ccd/SetPhase.h>
+#include <std_msgs/Bool.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_msgs/TFMessage.h>
@@ -26,11 +27,35 @@ constexpr double SERVICE_TIMEOUT_S = 10;
 // Of the second in which the process is to end.
 constexpr std::chrono::milliseconds END_AFTER{700};
 
+/// `~state` and `~clear` of a node that cannot begin yet: until StateReporter publishes them.
+class EarlyState {
+ public:
+  explicit EarlyState(const ros::NodeHandle& private_node) : node_(private_node) {}
+  void say(const std::string& reason) {
+    if (!state_) {
+      state_ = node_.advertise<deformable_ccd::State>("state", TOPIC_QUEUE, true);
+      clear_ = node_.advertise<std_msgs::Bool>("clear", TOPIC_QUEUE, true);
+    }
+    Assurance assurance;
+    assurance.missing.push_back(reason);
+    deformable_ccd::State message = toState(Outcome(), "");
+    fillState(assurance, "", "", message);
+    message.header.stamp = ros::Time::now();
+    clear_.publish(std_msgs::Bool());
+    state_.publish(message);
+  }
+
+ private:
+  ros::NodeHandle node_;
+  ros::Publisher state_, clear_;
+};
+
 MonitorConfig configOf(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
-                       const std::function<bool()>& goes_on) {
+                       const std::function<bool()>& goes_on, EarlyState&& early) {
   XmlRpc::XmlRpcValue tree;
   private_node.getParam(private_node.getNamespace(), tree);
-  MonitorConfig config = readConfig(tree, "~", robotOfParameters(node, goes_on));
+  MonitorConfig config =
+      readConfig(tree, "~", robotOfParameters(node, goes_on, [&](const std::string& what) { early.say(what); }));
   for (const std::string& sentence : config.robot.missing) ROS_WARN_STREAM(sentence);
   for (const std::string& sentence : config.robot.remarks) ROS_WARN_STREAM("robot: " << sentence);
   takeRemappings(node, config);
@@ -327,7 +352,9 @@ void CollisionMonitor::Impl::endInTime() {
 
 CollisionMonitor::CollisionMonitor(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                                    const std::function<bool()>& goes_on)
-    : impl_(std::make_unique<Impl>(node, private_node, configOf(node, private_node, goes_on))) {
+    // The early state lives until the whole is made: its topics stay.
+    : impl_(
+          std::make_unique<Impl>(node, private_node, configOf(node, private_node, goes_on, EarlyState(private_node)))) {
   impl_->start();
 }
 

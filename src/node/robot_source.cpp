@@ -38,11 +38,14 @@ RobotText readFile(const std::string& name, const std::string& what) {
 /// Asks the parameter server until it has both or time is up.
 class ParameterTexts {
  public:
-  ParameterTexts(const ros::NodeHandle& node, double timeout_s, const std::function<bool()>& goes_on)
+  using Waits = std::function<void(const std::string&)>;
+  ParameterTexts(const ros::NodeHandle& node, double timeout_s, const std::function<bool()>& goes_on,
+                 const Waits& waits)
       : node_(node),
         timeout_s_(timeout_s),
         until_(Clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * timeout_s))),
-        goes_on_(goes_on) {}
+        goes_on_(goes_on),
+        waits_(waits) {}
 
   /// The parameter as robot_state_publisher and RViz find it: in the node's namespace, or in one around that.
   /// `held`: of a parameter, under its resolved name, what it holds.
@@ -54,7 +57,13 @@ class ParameterTexts {
       std::string resolved = node_.resolveName(name);
       bool told = false;
       while (!node_.searchParam(name, found) && goes_on_() && Clock::now() < until_) {
-        if (!std::exchange(told, true)) ROS_INFO_STREAM("waits for parameter " << resolved << ", " << what);
+        if (!std::exchange(told, true)) {
+          std::ostringstream text;
+          text << "waits for parameter " << resolved << ", " << what << ", for " << timeout_s_
+               << " s at most (robot/timeout_s)";
+          ROS_INFO_STREAM(text.str());
+          waits_(text.str());
+        }
         ros::WallDuration(LOOK_AGAIN_S).sleep();
       }
       if (!found.empty()) resolved = found;
@@ -79,13 +88,15 @@ class ParameterTexts {
   double timeout_s_;
   Clock::time_point until_;
   const std::function<bool()>& goes_on_;
+  const Waits& waits_;
 };
 
 }  // namespace
 
-RobotLoader robotOfParameters(const ros::NodeHandle& node, std::function<bool()> goes_on) {
-  return [node, goes_on = std::move(goes_on)](const RobotConfig& config, double tolerance_m) {
-    const ParameterTexts texts(node, config.timeout_s, goes_on);
+RobotLoader robotOfParameters(const ros::NodeHandle& node, std::function<bool()> goes_on,
+                              std::function<void(const std::string&)> waits) {
+  return [node, goes_on = std::move(goes_on), waits = std::move(waits)](const RobotConfig& config, double tolerance_m) {
+    const ParameterTexts texts(node, config.timeout_s, goes_on, waits);
     std::map<std::string, std::string> held;
     const RobotText description = texts.read(config.description, "a URDF", held);
     Robot robot = makeRobot(description, texts.read(config.semantic, "an SRDF", held), config, tolerance_m);

@@ -131,6 +131,7 @@ else { const all = R.clearance.curves, hue = k => COLOURS[1 + k % (COLOURS.lengt
   const note = document.getElementById('clearance_note');
   note.textContent = 'The smallest distance of each two partners in each step: a lower bound, and dashed an upper one, which is missing where they are further apart than clearance/max_m. A gap: nothing is known.';
   all.forEach((c, k) => { note.appendChild(document.createElement('i')).style.background = hue(k); note.append(who(c)); });
+  document.getElementById('promises').textContent = R.promises;
   if (R.clearance.left_out) note.append(` and ${R.clearance.left_out} more in clearance.csv`); }
 function frontPlot(id, all, xlabel, ylabel, least) {
   const H = 400, floor = H - 46, box = document.getElementById(id), points = all.filter(p => p.x > 0 && p.y !== null).map(p => ({ ...p, y: Math.max(p.y, least) }));

@@ -33,6 +33,8 @@ class Report {
   void setEffects(std::vector<EffectDecision> decisions) { effects_ = std::move(decisions); }
   /// Writes left_out.csv. Throws std::runtime_error naming the file.
   void setLeftOut(const std::vector<LeftOutPair>& pairs, const std::vector<Body>& bodies);
+  /// What became of the promises of ~safe_until, in words; empty: there were none.
+  void setPromises(std::string in_words) { promises_ = std::move(in_words); }
   void setLookAhead(const LookAheadSummary& summary, double horizon_s);
   /// AccuracyStudy::json().
   void setStudy(nlohmann::json study) { study_ = std::move(study); }
@@ -99,6 +101,7 @@ class Report {
   std::vector<EffectDecision> effects_;
   ContactLanes lanes_;
   ClearanceTable clearance_;
+  std::string promises_;
   PlayerData player_;
   nlohmann::json study_;
   std::vector<std::pair<std::string, std::string>> facts_;

@@ -175,6 +175,7 @@ nlohmann::json Report::json() const {
   j["study"] = study_;
   j["partners"] = lanes_.json();
   j["clearance"] = clearance_.json();
+  j["promises"] = promises_;
   j["bodies"] = heatJson();
   return j;
 }

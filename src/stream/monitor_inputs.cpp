@@ -1,6 +1,8 @@
 // What a step is made of: where every body is at both of its ends, reference frames, the map.
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -60,9 +62,13 @@ Eigen::AlignedBox3d boundsOfThoseThatMeetTheMap(const Step& step) {
   return bounds;
 }
 
-std::string unknown(const std::string& name) {
-  return "where " + name + " was is not known for all of this step (no transform, or more than " +
-         std::to_string(tolerance::MOST_POSES_A_STEP) + ")";
+/// at_ns: the first time of which it is not known.
+std::string unknown(const std::string& name, StampNs at_ns) {
+  std::ostringstream text;
+  text << "where " << name << " was is not known for all of this step (no transform of its frame at "
+       << at_ns / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0') << at_ns % 1'000'000'000
+       << " s, or more than " << tolerance::MOST_POSES_A_STEP << ")";
+  return text.str();
 }
 
 void addSentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
@@ -153,14 +159,14 @@ void Monitor::Impl::lookBetween(std::size_t b, Step& step) const {
   }
   const Eigen::AlignedBox3d bounds = seen.empty() ? Eigen::AlignedBox3d() : boundsOf(body);
   const Eigen::Isometry3d from_t0 = body.pose_t0.inverse();
-  bool known = true;
   for (const SeenPose& one : seen) {
-    known = known && one.pose.matrix().allFinite();
-    if (!known) break;
+    if (!one.pose.matrix().allFinite()) {
+      addSentence(step.off_path, unknown("body '" + body.name + "'", one.stamp_ns));
+      break;
+    }
     const Eigen::Isometry3d on_path = interpolate(body.pose_t0, body.pose_t1, fractionAt(one.stamp_ns));
     off_m = std::max(off_m, apart(one.pose * from_t0, on_path * from_t0, bounds));
   }
-  if (!known) addSentence(step.off_path, unknown("body '" + body.name + "'"));
   if (off_m <= options.detector.rigid_tolerance_m) return;
   std::ostringstream text;
   text << "body '" << body.name << "' was seen up to " << off_m << " m off the path of this step, in ";
@@ -180,21 +186,21 @@ void Monitor::Impl::lookAtHeld(Step& step) const {
     if (held_seen[b].empty() || (is_map ? !step.map.surface : stores[b].empty())) continue;
     const Eigen::Isometry3d held = is_map ? step.map.map_from_fixed : stores[b].newest().pose;
     double off_m = 0;
-    bool known = true;
+    std::optional<StampNs> unknown_at;
     Eigen::AlignedBox3d bounds;
     // The end of a step alone where it has no length, as that of a question has.
     const StampNs first_ns = std::min(step.start_ns + 1, step.stamp_ns);
     const auto end = held_seen[b].upper_bound(step.stamp_ns);
     for (auto one = held_seen[b].lower_bound(first_ns); one != end; ++one) {
-      known = known && one->second.matrix().allFinite();
-      if (!known || one->second.matrix() == held.matrix()) continue;
+      if (!unknown_at && !one->second.matrix().allFinite()) unknown_at = one->first;
+      if (unknown_at || one->second.matrix() == held.matrix()) continue;
       if (bounds.isEmpty()) bounds = is_map ? boundsOfThoseThatMeetTheMap(step) : boundsOf(step.bodies[b]);
       off_m = std::max(off_m, is_map ? apart(one->second, held, bounds)
                                      : apart(one->second * held.inverse(), Eigen::Isometry3d::Identity(), bounds));
     }
     const std::string name = is_map ? "the octomap's frame '" + step.map.frame_id + "'"
                                     : "the frame of the static body '" + bodies[b].name + "'";
-    if (!known) addSentence(step.off_path, unknown(name));
+    if (unknown_at) addSentence(step.off_path, unknown(name, *unknown_at));
     if (off_m <= options.detector.rigid_tolerance_m) continue;
     std::ostringstream text;
     text << name << " was seen up to " << off_m << " m from where it was at its stamp; set fixed_frame to "

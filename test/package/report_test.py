@@ -200,6 +200,7 @@ class ReportPageTest(unittest.TestCase):
         self.assertNotIn('id="clearance_part"', self.dom()[0])
         page = yaml.safe_load((SCENES / 'table_edge.yaml').read_text())
         page['monitor'].setdefault('effects', {})['clearance'] = 'on'
+        page['monitor']['max_speed_m_s'] = 2
         scene = self.folder / 'near.yaml'
         scene.write_text(yaml.safe_dump(page))
         self.report(scene, 40)
@@ -210,6 +211,7 @@ class ReportPageTest(unittest.TestCase):
         self.assertRegex(drawn, r'<polyline [^>]*stroke-dasharray="none"[^>]*><title>cloth with octomap')
         self.assertIn('distance [m]', drawn)
         self.assertRegex(body, r'id="clearance_note">[^<]*lower bound.*cloth with octomap')
+        self.assertRegex(body, r'id="promises">safe until: \d+ promises of [\d.]+ s in the middle, \d+ kept, \d+ void')
 
     @unittest.skipUnless(BROWSER, 'no Chromium is installed')
     def test_own_voxels(self):

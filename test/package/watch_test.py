@@ -14,7 +14,7 @@ import termios
 import threading
 import unittest
 
-from deformable_ccd.msg import State
+from deformable_ccd.msg import SafeUntil, State, StepStats
 
 from checkout import CHECKOUT, TOOLS
 from ros_process import SLOW, free_port, stop, wait_for
@@ -63,6 +63,20 @@ class NearestTest(unittest.TestCase):
             said, colour = self.lines_of(clearance_lower=lower, clearance_upper=upper, clearance_between='cloth and octomap')['nearest']
             self.assertEqual(said, 'cloth and octomap, ' + words)
             self.assertEqual(colour, 'yellow' if 'not known' in words else None)
+
+
+class PromisedTest(unittest.TestCase):
+    """The line of the promises of ~safe_until."""
+
+    def test_for_how_long_and_whether_they_were_kept(self):
+        promised, stats = runpy.run_path(str(WATCH))['promised'], StepStats(promises=92, promises_broken=5)
+        promise = SafeUntil(seconds=0.14, bodies=['cloth', 'octomap'])
+        self.assertEqual(promised(promise, stats), '140 ms from the frame on, by cloth and octomap; 87 kept, 5 void')
+        promise = SafeUntil(reason='something touches', broken="body 'cloth' was faster than 1 m/s")
+        self.assertEqual(promised(promise, stats),
+                         "no promise: something touches; 87 kept, 5 void; body 'cloth' was faster than 1 m/s")
+        promise = SafeUntil(seconds=2, bodies=['', ''])
+        self.assertEqual(promised(promise, stats), '2.0 s from the frame on; 87 kept, 5 void', 'no pair limits it')
 
 
 class WatchTest(unittest.TestCase):

@@ -295,6 +295,12 @@ struct Late : WithRobot {
   static void SetUpTestSuite() {
     ros::NodeHandle node;
     EXPECT_FALSE(ros::service::exists("/cell/late/reset", false)) << "it waits for its robot";
+    Probe<State> state{node, "/cell/late/state"};
+    EXPECT_TRUE(waitUntil([&] { return state.count() > 0; }));
+    EXPECT_NE(state.last().reason.find("waits for parameter /cell/late_description, a URDF, for 60 s at most"),
+              std::string::npos)
+        << state.last().reason;
+    EXPECT_FALSE(state.last().proved);
     std::string urdf;
     ASSERT_TRUE(node.getParam("robot_description", urdf));
     node.setParam("late_description", urdf);

@@ -112,20 +112,23 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const
   Cloth cloth(0, top_m + clears_m + HANGS_M);
   Positions frame = cloth.positions(), checked = frame;
   struct Command {
-    double at_s, scale;
+    double at_s, scale, stamp_s;
   };
   std::deque<Command> on_the_way;
   double gripper_m = 0, speed_m_s = 0, wanted = 0, gust_m_s2 = 0, answered_s = 0, near_m = 0, end_s = Loop::LONGEST_S;
+  double followed_s = 0;  // stamp of the frame that `wanted` is of
   ClosedLoopRun run;
   int tick = 0;
   for (double now_s = 0; now_s < end_s && !run.contact; now_s = ++tick * TICK_S) {
     while (!on_the_way.empty() && on_the_way.front().at_s <= now_s) {
       wanted = on_the_way.front().scale;
+      followed_s = on_the_way.front().stamp_s;
       on_the_way.pop_front();
     }
     // The arm knows nothing of the wall.
     const bool late = now_s - answered_s > Loop::REACTION_S;
     const double target_m_s = late ? 0 : wanted * Loop::FULL_SPEED_M_S;
+    if (!late && wanted > 0) run.oldest_s = std::max(run.oldest_s, now_s - followed_s);
     speed_m_s = std::clamp(target_m_s, speed_m_s - braking_m_s2 * TICK_S, speed_m_s + 1.0 * TICK_S);
     gripper_m += speed_m_s * TICK_S;
     gust_m_s2 = std::clamp(gust_m_s2 + uniform(random, -0.02, 0.02) * gusts_m_s2, -gusts_m_s2, gusts_m_s2);
@@ -153,7 +156,7 @@ ClosedLoopRun runClosedLoop(std::uint64_t seed, const std::function<double(const
     answered_s = now_s;
     // In their order: a later command overtakes no earlier one.
     const double at_s = now_s + uniform(random, 0.03, Loop::MOST_LATENCY_S);
-    on_the_way.push_back({on_the_way.empty() ? at_s : std::max(at_s, on_the_way.back().at_s), scale(seen)});
+    on_the_way.push_back({on_the_way.empty() ? at_s : std::max(at_s, on_the_way.back().at_s), scale(seen), now_s});
   }
   if (!run.arrived) run.mean_speed_m_s = gripper_m / (tick * TICK_S);
   return run;

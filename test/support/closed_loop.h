@@ -29,6 +29,7 @@ struct ClosedLoopRun {
   bool contact = false;       ///< the cloth touched the map, by exact detection of every piece of its way
   bool arrived = false;       ///< near the wall
   double mean_speed_m_s = 0;  ///< of the arm, over its way or until the run ended
+  double oldest_s = 0;        ///< of a scale that the arm followed, from its frame's stamp on: the latency, as measured
 };
 
 /// A cloth of 8 x 6 points hangs from a gripper that always wants to go along x at full speed: over a post, whose top
