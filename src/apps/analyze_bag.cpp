@@ -76,9 +76,9 @@ std::string lookAheadLine(const BagReplaySummary& summary) {
   if (!summary.look_ahead) return "";
   const LookAheadSummary& s = *summary.look_ahead;
   std::ostringstream text;
-  text << "look-ahead: " << s.compared << " predictions came true, median error " << s.median_error_s << " s, 95 % "
-       << s.p95_error_s << " s; " << s.not_observed << " not observed, " << s.not_predicted
-       << " contacts not predicted\n";
+  text << "look-ahead: " << s.compared << " predictions came true";
+  if (s.compared > 0) text << ", median error " << s.median_error_s << " s, 95 % " << s.p95_error_s << " s";
+  text << "; " << s.not_observed << " not observed, " << s.not_predicted << " contacts not predicted\n";
   return text.str();
 }
 
