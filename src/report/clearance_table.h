@@ -43,7 +43,6 @@ class ClearanceTable {
     void add(const Sample& sample);
     double nearest() const;
   };
-  void begin();
 
   std::string file_;
   std::ofstream rows_;
