@@ -134,6 +134,11 @@ TypeError
 ValueError
     A shape, an index or a number does not fit.)";
 
+py::object radiiArray(const std::shared_ptr<const std::vector<double>>& radii) {
+  if (!radii) return py::none();
+  return sharedArray(radii, py::dtype::of<double>(), {static_cast<py::ssize_t>(radii->size())});
+}
+
 template <class Class>
 void bindWhatItIs(Class& c) {
   const auto plain = [&](const char* name, auto Body::*field, const char* doc) {
@@ -169,20 +174,14 @@ void bindWhatItIs(Class& c) {
       "(n, 3) float64 [m], read-only: where it was fit; None: nowhere");
   c.def_property_readonly(
       "reference_radius_m",
-      [](const NamedBody& b) -> py::object {
+      [](const NamedBody& b) {
         const auto& reference = b.body.reference;
-        if (!reference || reference->radius_m.empty()) return py::none();
-        return sharedArray(std::shared_ptr<const std::vector<double>>(reference, &reference->radius_m),
-                           py::dtype::of<double>(), {static_cast<py::ssize_t>(reference->radius_m.size())});
+        if (!reference || reference->radius_m.empty()) return py::object(py::none());
+        return radiiArray(std::shared_ptr<const std::vector<double>>(reference, &reference->radius_m));
       },
       "(n,) float64 [m], read-only: the largest radius_m that neighbours are found for; None: none");
   c.def_property_readonly(
-      "radius_m",
-      [](const NamedBody& b) -> py::object {
-        if (!b.body.radius_m) return py::none();
-        return sharedArray(b.body.radius_m, py::dtype::of<double>(),
-                           {static_cast<py::ssize_t>(b.body.radius_m->size())});
-      },
+      "radius_m", [](const NamedBody& b) { return radiiArray(b.body.radius_m); },
       "(n,) float64 [m], read-only: how far off each position may be; None: they are exact");
   const auto pose = [&](const char* name, Eigen::Isometry3d Body::*field, const char* doc) {
     c.def_property_readonly(

@@ -24,18 +24,14 @@ struct Row {
 
 template <class T>
 void read(py::handle value, const std::string& name, T& out) {
-  if constexpr (std::is_same_v<T, bool>) {
-    try {
-      out = value.cast<bool>();
-    } catch (const py::cast_error&) {
+  try {
+    out = value.cast<T>();
+  } catch (const py::cast_error&) {
+    if constexpr (std::is_same_v<T, bool>) {
       refuseType(name, value, "True or False");
-    }
-  } else if constexpr (std::is_floating_point_v<T>) {
-    out = numberOf(value, name);
-  } else if constexpr (std::is_integral_v<T>) {
-    try {
-      out = value.cast<T>();
-    } catch (const py::cast_error&) {
+    } else if constexpr (std::is_floating_point_v<T>) {
+      refuseType(name, value, "a number");
+    } else if constexpr (std::is_integral_v<T>) {
       // So that math.inf is a limit that nothing reaches.
       const bool infinite = py::isinstance<py::float_>(value) && value.cast<double>() == HUGE_VAL;
       if (!infinite && py::isinstance<py::int_>(value)) {
@@ -43,11 +39,7 @@ void read(py::handle value, const std::string& name, T& out) {
       }
       if (!infinite) refuseType(name, value, "an integer");
       out = std::numeric_limits<T>::max();
-    }
-  } else {
-    try {
-      out = value.cast<T>();
-    } catch (const py::cast_error&) {
+    } else {
       refuseType(name, value, "a list of str");
     }
   }
@@ -210,11 +202,9 @@ const std::vector<Row>& rows() {
 }  // namespace
 
 double numberOf(py::handle value, const std::string& name) {
-  try {
-    return value.cast<double>();
-  } catch (const py::cast_error&) {
-    refuseType(name, value, "a number");
-  }
+  double number = 0;
+  read(value, name, number);
+  return number;
 }
 
 bool setOption(const std::string& name, py::handle value, const Bodies& bodies, Options& options) {

@@ -1,6 +1,7 @@
 // Outcome: what a step was answered, as numpy arrays that show the core's own memory.
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <string_view>
 
 #include "dccd/assurance.h"
@@ -226,26 +227,20 @@ template <class Class>
 void bindJudgement(Class& c) {
   const auto judged = [&](const char* name, auto valueOf, const char* doc) {
     c.def_property_readonly(
-        name, [valueOf](const Answer& a) { return valueOf(assuranceOf(a.outcome())); }, doc);
+        name, [valueOf](const Answer& a) { return std::invoke(valueOf, assuranceOf(a.outcome())); }, doc);
   };
-  judged(
-      "proved", [](const Assurance& a) { return a.proved; },
-      "bool: everything was shown: what is not in `contacts` does not touch, and the start state is known");
-  judged(
-      "missing", [](const Assurance& a) { return a.missing; },
-      "list of str: why it is not proved, a sentence each; empty where it is");
-  judged(
-      "excluded", [](const Assurance& a) { return a.excluded; },
-      "list of str: what was left out by choice, a sentence each; takes nothing from `proved`");
-  judged(
-      "expected", [](const Assurance& a) { return a.expected; },
-      "list of str: which contacts are expected, whether or not there are any, a sentence each");
+  judged("proved", &Assurance::proved,
+         "bool: everything was shown: what is not in `contacts` does not touch, and the start state is known");
+  judged("missing", &Assurance::missing, "list of str: why it is not proved, a sentence each; empty where it is");
+  judged("excluded", &Assurance::excluded,
+         "list of str: what was left out by choice, a sentence each; takes nothing from `proved`");
+  judged("expected", &Assurance::expected,
+         "list of str: which contacts are expected, whether or not there are any, a sentence each");
   judged(
       "touching", [](const Assurance& a) { return std::string(toString(a.touching)); },
       "str: NONE; NEW: something touches that did not when the step began; LASTING: it did; EXPECTED: all that "
       "touches is expected. What could not be ruled out counts as touching");
-  judged(
-      "clear", [](const Assurance& a) { return a.clear(); }, "bool: proved, and nothing touches");
+  judged("clear", &Assurance::clear, "bool: proved, and nothing touches");
   c.def("__str__", [](const Answer& a) { return describe(assuranceOf(a.outcome())); });
   c.def("__repr__", [](const Answer& a) {
     return "<dccd.Outcome " + std::string(toString(a.outcome().status)) + ": " +
@@ -257,52 +252,34 @@ template <class Class>
 void bindValues(Class& c) {
   const auto plain = [&](const char* name, auto valueOf, const char* doc) {
     c.def_property_readonly(
-        name, [valueOf](const Answer& a) { return valueOf(a.outcome()); }, doc);
+        name, [valueOf](const Answer& a) { return std::invoke(valueOf, a.outcome()); }, doc);
   };
   plain(
       "status", [](const Outcome& o) { return std::string(toString(o.status)); },
       "str: OK, PARTIAL (something is unchecked), DEADLINE (the budget ran out), TRUNCATED (there is more than the "
       "limits allow), NO_MAP; of a Stream also why there is no answer (FIRST_FRAME, GAP, TELEPORT ...)");
-  plain(
-      "reason", [](const Outcome& o) { return o.reason; }, "str: one sentence; empty where the status is OK");
-  plain(
-      "answered", [](const Outcome& o) { return o.answered; }, "bool: there is a result");
+  plain("reason", &Outcome::reason, "str: one sentence; empty where the status is OK");
+  plain("answered", &Outcome::answered, "bool: there is a result");
   c.def_property_readonly("body_names", &namesOf, "list of str: by the numbers in `bodies`");
   plain(
       "start_state", [](const Outcome& o) { return std::string(toString(o.start_state)); },
       "str: CLEAR, INTERSECTING (surfaces cross, or a body is inside of another one, when the step begins) or "
       "NOT_CHECKED");
-  plain(
-      "start_state_complete", [](const Outcome& o) { return o.start_state_complete; },
-      "bool: False: the budget ran out before all that can meet at the start was looked at");
-  plain(
-      "complete", [](const Outcome& o) { return o.complete; },
-      "bool: False: the budget or a limit ended the step early");
-  plain(
-      "unchecked_toc_lower", [](const Outcome& o) { return o.unchecked_toc_lower; },
-      "float: pairs were left out, none of which can touch before this; inf: none were");
-  plain(
-      "earliest_toc", [](const Outcome& o) { return o.earliest_toc; },
-      "float: nothing touches before this, undecided and unchecked pairs included; inf: nothing touches");
-  plain(
-      "earliest_unexpected_toc", [](const Outcome& o) { return o.earliest_unexpected_toc; },
-      "float: the same without what is expected");
-  plain(
-      "total_contacts", [](const Outcome& o) { return o.total_contacts; }, "int: before the cut to max_contacts");
-  plain(
-      "suppressed", [](const Outcome& o) { return o.suppressed; }, "int: initial contacts left out by choice");
-  plain(
-      "substeps", [](const Outcome& o) { return o.substeps; },
-      "int: parts that the step was cut into, for bodies that turn");
-  plain(
-      "excluded_voxels", [](const Outcome& o) { return o.excluded_voxels; },
-      "int: finest voxels taken out by exclude_boxes");
-  plain(
-      "start_ns", [](const Outcome& o) { return o.start_ns; }, "int: stamp of the step's start [ns], in a Stream");
-  plain(
-      "stamp_ns", [](const Outcome& o) { return o.stamp_ns; }, "int: stamp of the step's end [ns], in a Stream");
-  plain(
-      "sequence", [](const Outcome& o) { return o.sequence; }, "int: of the frames of a Stream's clock body, from 1");
+  plain("start_state_complete", &Outcome::start_state_complete,
+        "bool: False: the budget ran out before all that can meet at the start was looked at");
+  plain("complete", &Outcome::complete, "bool: False: the budget or a limit ended the step early");
+  plain("unchecked_toc_lower", &Outcome::unchecked_toc_lower,
+        "float: pairs were left out, none of which can touch before this; inf: none were");
+  plain("earliest_toc", &Outcome::earliest_toc,
+        "float: nothing touches before this, undecided and unchecked pairs included; inf: nothing touches");
+  plain("earliest_unexpected_toc", &Outcome::earliest_unexpected_toc, "float: the same without what is expected");
+  plain("total_contacts", &Outcome::total_contacts, "int: before the cut to max_contacts");
+  plain("suppressed", &Outcome::suppressed, "int: initial contacts left out by choice");
+  plain("substeps", &Outcome::substeps, "int: parts that the step was cut into, for bodies that turn");
+  plain("excluded_voxels", &Outcome::excluded_voxels, "int: finest voxels taken out by exclude_boxes");
+  plain("start_ns", &Outcome::start_ns, "int: stamp of the step's start [ns], in a Stream");
+  plain("stamp_ns", &Outcome::stamp_ns, "int: stamp of the step's end [ns], in a Stream");
+  plain("sequence", &Outcome::sequence, "int: of the frames of a Stream's clock body, from 1");
 }
 
 }  // namespace

@@ -114,18 +114,15 @@ class Stream {
   }
 
   void set(const std::string& name, py::handle value, MonitorOptions& options) const {
-    if (name == "clock_body") {
+    const std::map<std::string, double*> numbers{{"max_step_s", &options.store.max_step_s},
+                                                 {"max_vertex_step_m", &options.store.max_vertex_step_m},
+                                                 {"sync_timeout_s", &options.sync_timeout_s},
+                                                 {"look_ahead_s", &options.look_ahead_s},
+                                                 {"patch_gap_s", &options.patch_gap_s}};
+    if (const auto number = numbers.find(name); number != numbers.end()) {
+      *number->second = numberOf(value, name);
+    } else if (name == "clock_body") {
       options.clock_body = bodyOf(value, templates_);
-    } else if (name == "max_step_s") {
-      options.store.max_step_s = numberOf(value, name);
-    } else if (name == "max_vertex_step_m") {
-      options.store.max_vertex_step_m = numberOf(value, name);
-    } else if (name == "sync_timeout_s") {
-      options.sync_timeout_s = numberOf(value, name);
-    } else if (name == "look_ahead_s") {
-      options.look_ahead_s = numberOf(value, name);
-    } else if (name == "patch_gap_s") {
-      options.patch_gap_s = numberOf(value, name);
     } else if (!setOption(name, value, templates_, options.detector)) {
       refuseOption(name);
     }

@@ -104,20 +104,16 @@ struct Run {
     sum = StepStats();
     if (steps.size() > 1) history.clear();
     for (const Step& step : steps) {
-      once(step);
+      result = detect(step, options, history);
+      contacts.push_back(result.contacts);
+      sum += result.stats;
+      for (std::size_t s = 0; s < result.stats.stages.size(); ++s) {
+        times[toString(static_cast<Stage>(s))].ms.push_back(result.stats.stages[s].ms);
+      }
+      times["total"].ms.push_back(result.stats.total_ms);
       if (contacts.size() == 1 || assurance.proved) assurance = assuranceOf(result);
       progress.advance();
     }
-  }
-  void once(const Step& step) {
-    result = detect(step, options, history);
-    contacts.push_back(result.contacts);
-    sum += result.stats;
-    const StepStats& stats = result.stats;
-    for (std::size_t s = 0; s < stats.stages.size(); ++s) {
-      times[toString(static_cast<Stage>(s))].ms.push_back(stats.stages[s].ms);
-    }
-    times["total"].ms.push_back(stats.total_ms);
   }
 };
 

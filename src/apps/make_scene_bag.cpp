@@ -5,13 +5,33 @@
 #include <iostream>
 #include <string>
 
+#include <tf2/buffer_core.h>
 #include <CLI/CLI.hpp>
 
 #include "apps/decimal_options.h"
-#include "apps/make_scene_bag/monitor_check.h"
 #include "apps/make_scene_bag/physics/scene_file.h"
 #include "apps/make_scene_bag/recorder.h"
 #include "apps/make_scene_bag/scene_robot.h"
+#include "config/monitor_config.h"
+#include "node/monitor_pipeline.h"
+#include "node/robot_source.h"
+
+namespace {
+
+/// Holds a scene's `monitor` block to what the node and analyze_bag would say of it, before anything is recorded.
+void checkMonitorBlock(const dccd::scene::SceneSpec& spec, const std::string& scene_path) {
+  if (!spec.monitor.isSet()) return;
+  const dccd::MonitorConfig config = readConfig(spec.monitor, "monitor/", dccd::robotOfFiles());
+  try {
+    tf2::BufferCore transforms;
+    const dccd::TransformFeed feed(transforms);
+    const dccd::MonitorPipeline pipeline(config, feed);  // effects that are not to be had, files
+  } catch (const std::exception& error) {
+    throw std::runtime_error(scene_path + ": monitor: " + error.what());
+  }
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
@@ -25,9 +45,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(2, 1000000));
   app.add_option("--rate", options.rate_hz, "Frames a second instead of the scene's own number, over the same time")
       ->check(CLI::Range(0.1, 1000.0));
-  app.add_option("--seed", options.seed, "Seed of the start's and the tracker's noise")->capture_default_str();
+  app.add_option("--seed", options.seed, "Seed of the start's noise")->capture_default_str();
   app.add_option("--output", options.output, "Message type of every body, instead of the scene's own")
-      ->check(CLI::IsMember({"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"}));
+      ->check(CLI::IsMember(dccd::scene::MESH_OUTPUTS));
   app.add_flag("--full", options.full_octomap, "Write the octomap with log-odds instead of binary");
   app.add_option("--monitor-config", options.monitor_config_path,
                  "Also write the scene's parameters for the monitor here");
@@ -41,7 +61,7 @@ int main(int argc, char** argv) {
     }
     dccd::scene::SceneSpec spec = dccd::scene::readSceneFile(scene_path);
     dccd::addRobot(spec, scene_path);
-    dccd::checkMonitorBlock(spec, scene_path);
+    checkMonitorBlock(spec, scene_path);
     std::cout << dccd::recordScene(spec, bag_path, options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;

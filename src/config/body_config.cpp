@@ -11,8 +11,7 @@ double ownVoxelsOf(ParameterReader& reader, double fallback) {
     reader.choice("own_voxels_m", "auto", {"auto"});
     return ONE_VOXEL;
   }
-  if (!reader.has("own_voxels_m")) return fallback;
-  return reader.number("own_voxels_m", 0, LARGE);
+  return reader.number("own_voxels_m", fallback, 0, LARGE);
 }
 
 SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback) {
@@ -29,18 +28,6 @@ double separationOf(ParameterReader& reader, double fallback) {
 }
 
 namespace {
-
-TopologySource topologySource(ParameterReader& section) {
-  const std::string text = section.choice(
-      "source", "auto", {"auto", "message", "grid", "polyline", "file", "first_frame_weld", "depth_image"});
-  if (text == "message") return TopologySource::MESSAGE;
-  if (text == "grid") return TopologySource::GRID;
-  if (text == "polyline") return TopologySource::POLYLINE;
-  if (text == "file") return TopologySource::FILE;
-  if (text == "first_frame_weld") return TopologySource::FIRST_FRAME_WELD;
-  if (text == "depth_image") return TopologySource::DEPTH_IMAGE;
-  return TopologySource::AUTO;
-}
 
 void readDepthImage(ParameterReader& section, MeshInputConfig& input) {
   const bool is_image = input.source == TopologySource::DEPTH_IMAGE;
@@ -67,7 +54,8 @@ void readSets(ParameterReader section, BodyConfig& body) {
 void readTopology(ParameterReader section, BodyConfig& body) {
   MeshInputConfig& input = body.input;
   readSets(section.section("sets"), body);
-  input.source = topologySource(section);
+  input.source = choiceOf(section, "source", TopologySource::AUTO,
+                          {"auto", "message", "grid", "polyline", "file", "first_frame_weld", "depth_image"});
   input.rows = section.integer("rows", input.rows, 0, 100000);
   input.cols = section.integer("cols", input.cols, 0, 100000);
   body.topology_file = section.get("file", std::string());
@@ -109,9 +97,7 @@ void readUncertainty(ParameterReader section, BodyConfig& body) {
   }
 }
 
-BodyConfig readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic) {
-  BodyConfig body;
-  body.body.name = name;
+void readSource(ParameterReader& reader, const std::string& default_topic, BodyConfig& body) {
   body.topic_named = reader.has("topic");
   body.topic = reader.get("topic", default_topic);
   std::vector<std::string> types{"auto"};
@@ -127,7 +113,7 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
     if (marker.has("id")) body.input.marker_id = marker.integer("id", 0, -2147483647, 2147483647);
     marker.finish();
   }
-  if (reader.choice("motion", "stream", {"stream", "static"}) == "static") body.body.motion = BodyMotionKind::STATIC;
+  body.body.motion = choiceOf(reader, "motion", BodyMotionKind::STREAM, {"stream", "static"});
   body.body.vertex_mask = reader.indices("vertex_mask");
   if (body.isDepthImage()) {
     // No vertex of one cloud is a vertex of the next, so there is no path between two, nor a number to mask.
@@ -140,7 +126,6 @@ BodyConfig readBody(ParameterReader& reader, const std::string& name, const std:
   }
   if (reader.has("rigid")) readRigid(reader.section("rigid"), body);
   readUncertainty(reader.section("uncertainty"), body);
-  return body;
 }
 
 void readBodyEffects(ParameterReader& reader, const MonitorConfig& config, BodyConfig& body) {
@@ -180,11 +165,19 @@ void readBodySpeed(ParameterReader& reader, const MonitorConfig& config, BodyCon
       straight ? reader.number("max_acceleration_m_s2", config.max_acceleration_m_s2, 0, LARGE) : 0;
 }
 
+void readBody(ParameterReader& reader, const std::string& name, const std::string& default_topic,
+              MonitorConfig& config) {
+  BodyConfig& body = config.bodies.emplace_back();
+  body.body.name = name;
+  readSource(reader, default_topic, body);
+  readBodyEffects(reader, config, body);
+  readBodySpeed(reader, config, body);
+}
+
 std::vector<std::string> namesOfBodies(const MonitorConfig& config) {
   std::vector<std::string> names{"octomap", "self"};
   for (const BodyConfig& body : config.bodies) names.push_back(body.body.name);
-  names.insert(names.end(), config.robot.links.begin(), config.robot.links.end());
-  for (const auto& group : config.robot.groups) names.push_back("group " + group.first);
+  for (std::string& name : namesOf(config.robot)) names.push_back(std::move(name));
   return names;
 }
 
@@ -259,11 +252,8 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
   const std::string clock = reader.get("clock_body", std::string());
   const std::string default_topic = reader.get("default_topic", std::string("mesh"));  // no contradiction to bodies
   if (!reader.has("bodies")) {
-    BodyConfig body = readBody(reader, "mesh", default_topic);
-    if (body.isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
-    readBodyEffects(reader, config, body);
-    readBodySpeed(reader, config, body);
-    config.bodies.push_back(std::move(body));
+    readBody(reader, "mesh", default_topic, config);
+    if (config.bodies[0].isRigid()) reader.fail("rigid", "cannot be the only body; list bodies under ~bodies");
   } else {
     config.bodies_listed = true;
     if (reader.has("topic")) {
@@ -277,11 +267,8 @@ void readBodies(ParameterReader& reader, MonitorConfig& config) {
                      "the body itself; give it another one");
       }
       ParameterReader one = section.section(name);
-      BodyConfig body = readBody(one, name, name);
-      readBodyEffects(one, config, body);
-      readBodySpeed(one, config, body);
+      readBody(one, name, name, config);
       one.finish();
-      config.bodies.push_back(std::move(body));
     }
     if (config.bodies.empty()) reader.fail("bodies", "is empty");
   }

@@ -2,6 +2,7 @@
 // apart from.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "config/monitor_config.h"
@@ -11,6 +12,14 @@ namespace dccd {
 /// Limits of numbers that have none of their own.
 constexpr double LARGE = 1e9;
 constexpr int MANY = 1000000000;
+
+/// ParameterReader::choice() of an enumeration, whose values count the choices.
+template <class Enum>
+Enum choiceOf(ParameterReader& reader, const std::string& name, Enum fallback,
+              const std::vector<std::string>& choices) {
+  const std::string word = reader.choice(name, choices[static_cast<std::size_t>(fallback)], choices);
+  return static_cast<Enum>(std::find(choices.begin(), choices.end(), word) - choices.begin());
+}
 
 /// The map's parameters.
 void readMap(ParameterReader& reader, MonitorConfig& config);
@@ -28,6 +37,8 @@ SpeedBound speedBoundOf(ParameterReader& section, const SpeedBound& fallback);
 void checkSpeeds(const ParameterReader& reader, const MonitorConfig& config);
 /// Two bodies that an entry names under `between`, or a body and OBSTACLE_BODY, or a body twice.
 using Partners = std::array<std::uint16_t, 2>;
+/// Of the robot's links and groups, as parameters have them.
+std::vector<std::string> namesOf(const Robot& robot);
 /// All that it names: a robot's link or group stands for its bodies, "octomap" is the map, "self" the other one again.
 std::vector<Partners> readPartners(ParameterReader& entry, const MonitorConfig& config);
 /// The bodies, and which of them is the clock. After the separation that is for all of them.

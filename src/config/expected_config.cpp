@@ -1,5 +1,6 @@
 // expected_contacts: which contacts a task brings about, and in which of its phases.
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "config/body_config.h"
@@ -65,13 +66,9 @@ void readExpectedContacts(ParameterReader& reader, MonitorConfig& config) {
 }
 
 std::vector<std::string> MonitorConfig::phases() const {
-  std::vector<std::string> names;
-  for (const std::string& phase : expected_phases) {
-    if (!phase.empty()) names.push_back(phase);
-  }
-  std::sort(names.begin(), names.end());
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  return names;
+  std::set<std::string> names(expected_phases.begin(), expected_phases.end());
+  names.erase("");
+  return {names.begin(), names.end()};
 }
 
 std::string MonitorConfig::phasesInWords() const {

@@ -52,10 +52,7 @@ void readMap(ParameterReader& reader, MonitorConfig& config) {
   config.monitor.own_voxels_lag_s =
       reader.number("own_voxels_lag_s", config.monitor.own_voxels_lag_s, 0, tolerance::OWN_PATH_S);
   config.monitor.own_voxels_trust = reader.choice("own_voxels_doubt", "unproved", {"unproved", "trust"}) == "trust";
-  const std::string unknown = reader.choice("unknown_space", "free", {"free", "occupied", "report"});
-  config.unknown_space = unknown == "free"       ? UnknownSpace::FREE
-                         : unknown == "occupied" ? UnknownSpace::OCCUPIED
-                                                 : UnknownSpace::REPORT;
+  config.unknown_space = choiceOf(reader, "unknown_space", UnknownSpace::FREE, {"free", "occupied", "report"});
   const ParameterTree& box = reader.raw("unknown_box");
   if (box.isSet()) {
     const auto n = reader.numbers(box, "unknown_box", 6);

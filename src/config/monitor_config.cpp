@@ -92,8 +92,7 @@ void readThresholds(ParameterReader& reader, MonitorConfig& config) {
   config.transform_timeout_s = reader.number("transform_timeout_s", config.transform_timeout_s, 0, LARGE);
   config.answer_timeout_s = reader.number("answer_timeout_s", config.answer_timeout_s, 1e-3, LARGE);
   config.queue_size = reader.integer("queue_size", config.queue_size, 1, 100000);
-  config.queue_policy = reader.choice("queue_policy", "newest", {"newest", "oldest"}) == "newest" ? QueuePolicy::NEWEST
-                                                                                                  : QueuePolicy::OLDEST;
+  config.queue_policy = choiceOf(reader, "queue_policy", QueuePolicy::NEWEST, {"newest", "oldest"});
   config.simd_target = reader.get("simd_target", config.simd_target);
   config.record_steps = reader.integer("record_steps", config.record_steps, 0, 10000);
   config.record_folder = reader.get("record_folder", std::string());
@@ -123,10 +122,7 @@ void readLimits(ParameterReader& reader, MonitorConfig& config) {
 void readEffects(ParameterReader section, MonitorConfig& config) {
   for (int e = 0; e < static_cast<int>(Effect::COUNT); ++e) {
     const Effect effect = static_cast<Effect>(e);
-    const std::string text = section.choice(toString(effect), "auto", {"auto", "on", "off"});
-    config.effects[effect] = text == "on"    ? EffectSetting::ON
-                             : text == "off" ? EffectSetting::OFF
-                                             : EffectSetting::AUTO;
+    config.effects[effect] = choiceOf(section, toString(effect), EffectSetting::AUTO, {"auto", "on", "off"});
   }
   section.finish();
 }
@@ -161,13 +157,17 @@ void removeRigidBodies(MonitorConfig& config) {
     if (!body.isRigid()) kept.push_back(std::move(body));
   }
   config.bodies = std::move(kept);
+  /// Gives what names a body the new index; false where that body is gone.
+  const auto moves = [&](auto& names) {
+    if (names.body == OBSTACLE_BODY) return true;
+    names.body = moved_to[names.body];
+    return names.body != OBSTACLE_BODY;
+  };
   for (std::size_t b = 0; b < config.bodies.size(); ++b) {
     if (config.bodies[b].body.name == clock) config.monitor.clock_body = b;
     std::vector<SeparationFrom> separations;
-    for (const SeparationFrom& from : config.bodies[b].body.separations) {
-      const bool map = from.body == OBSTACLE_BODY;
-      if (!map && moved_to[from.body] == OBSTACLE_BODY) continue;
-      separations.push_back({map ? OBSTACLE_BODY : moved_to[from.body], from.separation_m});
+    for (SeparationFrom from : config.bodies[b].body.separations) {
+      if (moves(from)) separations.push_back(from);
     }
     config.bodies[b].body.separations = std::move(separations);
   }
@@ -175,13 +175,7 @@ void removeRigidBodies(MonitorConfig& config) {
   std::vector<std::size_t> entry;
   for (std::size_t e = 0; e < config.expected_contacts.size(); ++e) {
     Expectation& one = config.expected_contacts[e];
-    bool gone = false;
-    for (ExpectedPartner& partner : one.partners) {
-      if (partner.body == OBSTACLE_BODY) continue;
-      partner.body = moved_to[partner.body];
-      gone = gone || partner.body == OBSTACLE_BODY;
-    }
-    if (gone) continue;
+    if (!moves(one.partners[0]) || !moves(one.partners[1])) continue;
     expected.push_back(std::move(one));
     entry.push_back(config.expected_entry[e]);
   }

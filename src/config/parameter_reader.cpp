@@ -28,25 +28,9 @@ std::string notThis(const ParameterTree& value) {
 }  // namespace
 
 const char* kindName(const ParameterTree& value) {
-  switch (value.kind) {
-    case Kind::UNSET:
-      return "not set";
-    case Kind::BOOLEAN:
-      return "a boolean";
-    case Kind::INTEGER:
-      return "an integer";
-    case Kind::NUMBER:
-      return "a number";
-    case Kind::TEXT:
-      return "a string";
-    case Kind::LIST:
-      return "a list";
-    case Kind::SECTION:
-      return "a section";
-    case Kind::OTHER:
-      break;
-  }
-  return "of a type that is not used here";
+  static const char* const NAMES[] = {"not set",  "a boolean", "an integer", "a number",
+                                      "a string", "a list",    "a section",  "of a type that is not used here"};
+  return NAMES[static_cast<std::size_t>(value.kind)];
 }
 
 ParameterReader::ParameterReader(ParameterTree tree, std::string path)

@@ -80,8 +80,7 @@ void requireNames(const ParameterReader& reader, const RobotConfig& asked, const
     reader.fail("robot/links/" + link.first,
                 "is no link of the robot; nearest is '" + nearestName(link.first, robot.links) + "'");
   }
-  std::vector<std::string> known = robot.links;
-  for (const auto& group : robot.groups) known.push_back(GROUP + group.first);
+  const std::vector<std::string> known = namesOf(robot);
   for (const std::string& name : asked.leave_out) {
     if (contains(known, name) || (startsWith(name, GROUP) && !robot.semantic_known)) continue;
     reader.fail("robot/leave_out",
@@ -126,11 +125,10 @@ void addBodies(const RobotConfig& asked, const Robot& robot, MonitorConfig& conf
 
 /// robot/holds, once all bodies are there.
 void readHolds(const ParameterReader& reader, const RobotConfig& asked, MonitorConfig& config) {
-  std::vector<std::string> bodies, known = config.robot.links;
+  std::vector<std::string> bodies;
   for (const BodyConfig& body : config.bodies) {
     if (body.link.empty()) bodies.push_back(body.body.name);
   }
-  for (const auto& group : config.robot.groups) known.push_back(GROUP + group.first);
   for (const auto& [body, holders] : asked.holds) {
     const auto held = std::find(bodies.begin(), bodies.end(), body);
     if (held == bodies.end()) {
@@ -139,8 +137,8 @@ void readHolds(const ParameterReader& reader, const RobotConfig& asked, MonitorC
     for (const std::string& by : holders) {
       const auto found = bodiesNamed(by, config);
       if (!found) {
-        reader.fail("robot/holds/" + body,
-                    "names '" + by + "', which is no link and no group; nearest is '" + nearestName(by, known) + "'");
+        reader.fail("robot/holds/" + body, "names '" + by + "', which is no link and no group; nearest is '" +
+                                               nearestName(by, namesOf(config.robot)) + "'");
       }
       Hold hold{body, by, true, {}};
       for (const std::uint16_t other : *found) {
@@ -170,6 +168,12 @@ double RobotConfig::paddingOf(const std::string& link) const {
   return own == links.end() ? padding_m : own->second.padding_m.value_or(padding_m);
 }
 
+std::vector<std::string> namesOf(const Robot& robot) {
+  std::vector<std::string> all = robot.links;
+  for (const auto& group : robot.groups) all.push_back(GROUP + group.first);
+  return all;
+}
+
 void readRobot(ParameterReader& reader, const RobotLoader& load, MonitorConfig& config) {
   if (!reader.has("robot")) return;
   RobotConfig asked;
@@ -179,8 +183,7 @@ void readRobot(ParameterReader& reader, const RobotLoader& load, MonitorConfig& 
     asked = readRobotParameters(reader.section("robot"));
   }
   config.robot.named = true;
-  const auto rigid = config.effects.find(Effect::RIGID_BODIES);
-  if (rigid != config.effects.end() && rigid->second == EffectSetting::OFF) {
+  if (settingOf(config.effects, Effect::RIGID_BODIES) == EffectSetting::OFF) {
     config.robot_excluded.push_back("the robot by effects/rigid_bodies: off");
     return;
   }

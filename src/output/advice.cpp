@@ -10,12 +10,10 @@ namespace dccd {
 
 namespace {
 
-// A mesh that a robot handles is smaller, and one in millimetres is larger, whatever it is.
-using tolerance::LARGEST_PLAUSIBLE_M;
-// A grid read with rows and columns swapped has neighbours several times as far apart; a cloth that is merely crumpled
-// or sheared does not reach this.
-constexpr double SWAPPED_RATIO = tolerance::SWAPPED_GRID_RATIO;
-constexpr double SHUFFLED_RATIO = tolerance::SHUFFLED_RATIO;
+// LARGEST_PLAUSIBLE_M: a mesh that a robot handles is smaller, and one in millimetres is larger, whatever it is.
+// SWAPPED_GRID_RATIO: a grid read with rows and columns swapped has neighbours several times as far apart; a cloth that
+// is merely crumpled or sheared does not reach this.
+using tolerance::LARGEST_PLAUSIBLE_M, tolerance::SHUFFLED_RATIO, tolerance::SWAPPED_GRID_RATIO;
 constexpr std::size_t SHUFFLED_POINTS = 64, SHUFFLED_SAMPLES = 1024;
 
 double extentOf(const Positions& positions) {
@@ -49,31 +47,34 @@ double meanSpacing(const Positions& positions, std::size_t rows, std::size_t col
 }
 
 /// `what` has the positions, `mend` is to be done about them.
-void addSize(const std::string& what, const Positions& positions, const std::string& mend, std::ostringstream& text) {
+std::string sizeHint(const std::string& what, const Positions& positions, const std::string& mend) {
   const double extent = extentOf(positions);
-  if (extent <= LARGEST_PLAUSIBLE_M) return;
+  if (extent <= LARGEST_PLAUSIBLE_M) return {};
+  std::ostringstream text;
   text << what << " is " << extent << " m across; coordinates are in metres, are these millimetres? Then " << mend;
+  return text.str();
 }
 
-void addSwapped(const DecodedMesh& mesh, const MeshInputConfig& config, std::ostringstream& text) {
+std::string swappedHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
   const bool grid = config.source == TopologySource::GRID || config.source == TopologySource::AUTO;
   const std::size_t rows = config.rows, cols = config.cols;
-  if (!grid || rows == cols || rows * cols != mesh.positions.size()) return;
+  if (!grid || rows == cols || rows * cols != mesh.positions.size()) return {};
   const double given = meanSpacing(mesh.positions, rows, cols), swapped = meanSpacing(mesh.positions, cols, rows);
-  if (!(swapped < SWAPPED_RATIO * given)) return;
-  if (text.tellp() > 0) text << "; ";
+  if (!(swapped < SWAPPED_GRID_RATIO * given)) return {};
+  std::ostringstream text;
   text << "topology/rows and topology/cols look swapped: neighbours are " << given << " m apart as " << rows << " x "
        << cols << ", but " << swapped << " m as " << cols << " x " << rows << "; set rows: " << cols
        << ", cols: " << rows;
+  return text.str();
 }
 
 /// Neighbours on the mesh that are as far apart as any two of its points: a tracker that lists them in another order
 /// each time, or in one that the topology does not know. Points are paired by fixed strides, which no order of a mesh
 /// has.
-void addShuffled(const DecodedMesh& mesh, std::ostringstream& text) {
+std::string shuffledHint(const DecodedMesh& mesh) {
   const std::vector<Edge>& edges = mesh.topology->edges();
   const Positions& p = mesh.positions;
-  if (p.size() < SHUFFLED_POINTS || edges.empty()) return;
+  if (p.size() < SHUFFLED_POINTS || edges.empty()) return {};
   double near_m = 0, any_m = 0;
   std::size_t near = 0, any = 0;
   const auto add = [&](Index a, Index b, double& sum, std::size_t& count) {
@@ -88,13 +89,14 @@ void addShuffled(const DecodedMesh& mesh, std::ostringstream& text) {
     add(static_cast<Index>(i * 7919 % p.size()), static_cast<Index>((i * 104729 + p.size() / 2) % p.size()), any_m,
         any);
   }
-  if (near == 0 || any == 0) return;
+  if (near == 0 || any == 0) return {};
   near_m /= static_cast<double>(near);
   any_m /= static_cast<double>(any);
-  if (!(near_m > SHUFFLED_RATIO * any_m) || !(any_m > 0)) return;
-  text << (text.tellp() > 0 ? "; " : "") << "the points look shuffled: neighbours on the mesh are " << near_m
-       << " m apart on average, any two points " << any_m
-       << " m; publish them in the order of the topology, the same in each frame";
+  if (!(near_m > SHUFFLED_RATIO * any_m) || !(any_m > 0)) return {};
+  std::ostringstream text;
+  text << "the points look shuffled: neighbours on the mesh are " << near_m << " m apart on average, any two points "
+       << any_m << " m; publish them in the order of the topology, the same in each frame";
+  return text.str();
 }
 
 }  // namespace
@@ -127,8 +129,7 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
     case StepStatus::PARTIAL:
       if (reason.find("(no transform") == std::string::npos) return {};
       return "see whether its tf comes (rosrun tf tf_echo; for a robot robot_state_publisher and its joint states); "
-             "one "
-             "that comes late needs a larger transform_timeout_s";
+             "one that comes late needs a larger transform_timeout_s";
     case StepStatus::DEADLINE:
       return "raise step_budget_ms or num_threads, or send fewer vertices";
     case StepStatus::TRUNCATED:
@@ -142,29 +143,28 @@ std::string adviceFor(StepStatus status, const std::string& reason, const std::s
 }
 
 std::string meshHint(const DecodedMesh& mesh, const MeshInputConfig& config) {
-  std::ostringstream text;
-  addSize("the mesh", mesh.positions, "scale them in the publisher", text);
-  addSwapped(mesh, config, text);
-  addShuffled(mesh, text);
+  std::string text;
+  const auto add = [&](const std::string& hint) { text += (text.empty() || hint.empty() ? "" : "; ") + hint; };
+  add(sizeHint("the mesh", mesh.positions, "scale them in the publisher"));
+  add(swappedHint(mesh, config));
+  add(shuffledHint(mesh));
   if (mesh.unread_lists > 0) {
-    text << (text.tellp() > 0 ? "; " : "") << mesh.unread_lists << " further TRIANGLE_LIST "
-         << (mesh.unread_lists == 1 ? "marker is" : "markers are")
-         << " not read, so that nothing is proved; name the one that is the mesh by marker/namespace and marker/id";
+    add(std::to_string(mesh.unread_lists) + " further TRIANGLE_LIST " +
+        (mesh.unread_lists == 1 ? "marker is" : "markers are") +
+        " not read, so that nothing is proved; name the one that is the mesh by marker/namespace and marker/id");
   }
-  if (!mesh.row_step_remark.empty()) text << (text.tellp() > 0 ? "; " : "") << mesh.row_step_remark;
+  add(mesh.row_step_remark);
   if (mesh.stamp_ns == 0) {
-    text << (text.tellp() > 0 ? "; " : "")
-         << "messages carry no stamp, so that the time of receipt stands in for it, with "
-         << "all its jitter; set header.stamp in the publisher";
+    add("messages carry no stamp, so that the time of receipt stands in for it, with all its jitter; set header.stamp "
+        "in the publisher");
   }
-  return text.str();
+  return text;
 }
 
 std::string rigidHint(const std::string& file, const Positions& positions, double scale) {
-  std::ostringstream text, scaled;
-  scaled << "set rigid/scale: " << 0.001 * scale;
-  addSize("rigid/mesh " + file, positions, scaled.str(), text);
-  return text.str();
+  std::ostringstream mend;
+  mend << "set rigid/scale: " << 0.001 * scale;
+  return sizeHint("rigid/mesh " + file, positions, mend.str());
 }
 
 }  // namespace dccd

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <map>
 
+#include <tf2_eigen/tf2_eigen.h>
+
 #include "dccd/new_contacts.h"
 #include "output/patch_messages.h"
 
@@ -24,11 +26,7 @@ std_msgs::ColorRGBA color(double r, double g, double b, double a = 1) {
   return out;
 }
 
-geometry_msgs::Point point(const Vec3& p) {
-  geometry_msgs::Point out;
-  put(p, out);
-  return out;
-}
+geometry_msgs::Point point(const Vec3& p) { return tf2::toMsg(p); }
 
 Marker list(const Outcome& outcome, const std::string& frame, const std::string& ns, int type, double scale) {
   Marker marker;
@@ -88,13 +86,7 @@ Vec3 voxelMin(const VoxelKey& key, double resolution_m) {
 
 /// Points of it are in the map's frame.
 void placeInMap(const Outcome& outcome, Marker& marker) {
-  const Eigen::Isometry3d pose = outcome.step->map.map_from_fixed.inverse();
-  const Eigen::Quaterniond q(pose.linear());
-  marker.pose.position = point(pose.translation());
-  marker.pose.orientation.x = q.x();
-  marker.pose.orientation.y = q.y();
-  marker.pose.orientation.z = q.z();
-  marker.pose.orientation.w = q.w();
+  marker.pose = tf2::toMsg(outcome.step->map.map_from_fixed.inverse());
 }
 
 /// The list for leaves of this size: cubes a little smaller than the voxels, so that one shows beside the next.
@@ -161,6 +153,18 @@ void addOwn(const Outcome& outcome, const std::string& frame, MarkerArray& out) 
   out.markers.push_back(std::move(marker));
 }
 
+void addEdges(const Vec3& min, const Vec3& size, Marker& edges) {
+  for (int a = 0; a < 3; ++a) {
+    for (int side = 0; side < 4; ++side) {
+      Vec3 from = min;
+      from[(a + 1) % 3] += (side & 1) * size[(a + 1) % 3];
+      from[(a + 2) % 3] += (side >> 1) * size[(a + 2) % 3];
+      edges.points.push_back(point(from));
+      edges.points.push_back(point(from + size[a] * Vec3::Unit(a)));
+    }
+  }
+}
+
 /// Its edges, so that it hides nothing of what touches it; in the map's pose.
 void addVoxel(const Outcome& outcome, const Contact& contact, Marker& edges) {
   if (contact.body[1] != OBSTACLE_BODY) return;
@@ -172,15 +176,7 @@ void addVoxel(const Outcome& outcome, const Contact& contact, Marker& edges) {
     const geometry_msgs::Point& last = edges.points[edges.points.size() - 24];
     if (last.x == corner.x && last.y == corner.y && last.z == corner.z) return;
   }
-  for (int a = 0; a < 3; ++a) {
-    for (int side = 0; side < 4; ++side) {
-      Vec3 from = min;
-      from[(a + 1) % 3] += (side & 1) * edge;
-      from[(a + 2) % 3] += (side >> 1) * edge;
-      edges.points.push_back(point(from));
-      edges.points.push_back(point(from + edge * Vec3::Unit(a)));
-    }
-  }
+  addEdges(min, Vec3::Constant(edge), edges);
 }
 
 // RViz draws nothing on top of anything: contacts shine through.
@@ -280,16 +276,8 @@ void addSwept(const Outcome& outcome, const MarkerConfig& config, const std::str
     }
     Marker edges = list(outcome, frame, "swept/" + body.name, Marker::LINE_LIST, config.line_width_m);
     edges.color = color(0.5, 0.7, 1);
-    const Vec3 min = box.min - Vec3::Constant(separation_m), size = box.max + Vec3::Constant(separation_m) - min;
-    for (int a = 0; a < 3; ++a) {
-      for (int side = 0; side < 4; ++side) {
-        Vec3 from = min;
-        from[(a + 1) % 3] += (side & 1) * size[(a + 1) % 3];
-        from[(a + 2) % 3] += (side >> 1) * size[(a + 2) % 3];
-        edges.points.push_back(point(from));
-        edges.points.push_back(point(from + size[a] * Vec3::Unit(a)));
-      }
-    }
+    const Vec3 min = box.min - Vec3::Constant(separation_m);
+    addEdges(min, box.max + Vec3::Constant(separation_m) - min, edges);
     out.markers.push_back(std::move(edges));
   }
 }

@@ -90,8 +90,8 @@ bool crossesAsNews(const Outcome& outcome) {
 std::string summaryOf(const Outcome& outcome, double toc, const Contact* first, const std::vector<Body>& bodies) {
   if (!outcome.answered) return std::string("no answer: ") + toString(outcome.status);
   if (!std::isfinite(toc)) return noContact(outcome);
-  const std::string start = ", besides " + besides(outcome) + "starts " + toString(outcome.start_state);
-  const std::string rest = besides(outcome).empty() ? std::string(", starts ") + toString(outcome.start_state) : start;
+  const std::string more = besides(outcome);
+  const std::string rest = (more.empty() ? ", " : ", besides " + more) + "starts " + toString(outcome.start_state);
   char when[64];
   std::snprintf(when, sizeof when, "%.6f s into the step", toc * outcome.duration_s());
   if (!first && toc == 0 && crossesAsNews(outcome)) return "surfaces cross since before the step began" + rest;

@@ -47,8 +47,8 @@ void Outputs::publishResult(const Outcome& outcome, const std::vector<Body>& bod
   if (wantsDistances() && !(outcome.answered && outcome.clearances.empty())) {
     clearance_.publish(toClearanceArray(outcome, bodies, frame));
   }
-  if (patches_ && patches_.getNumSubscribers() > 0) patches_.publish(toPatchArray(outcome, bodies, frame));
-  if (events_ && events_.getNumSubscribers() > 0) {
+  if (patches_.getNumSubscribers() > 0) patches_.publish(toPatchArray(outcome, bodies, frame));
+  if (events_.getNumSubscribers() > 0) {
     for (const auto& event : toPatchEvents(outcome, bodies, frame)) events_.publish(event);
   }
 }
@@ -69,11 +69,11 @@ void Outputs::publishStats(const Outcome& outcome, StatsContext context, const s
 bool Outputs::wantsStats() const { return stats_.getNumSubscribers() > 0; }
 
 bool Outputs::wantsPrediction() const {
-  return (predicted_ && predicted_.getNumSubscribers() > 0) ||
-         (time_to_contact_ && (time_to_contact_.getNumSubscribers() > 0 || markers_.getNumSubscribers() > 0));
+  return predicted_.getNumSubscribers() > 0 || time_to_contact_.getNumSubscribers() > 0 ||
+         (time_to_contact_ && markers_.getNumSubscribers() > 0);
 }
 
-bool Outputs::wantsDistances() const { return clearance_ && clearance_.getNumSubscribers() > 0; }
+bool Outputs::wantsDistances() const { return clearance_.getNumSubscribers() > 0; }
 
 void Outputs::publishPrediction(const Outcome& prediction, double horizon_s, const std::vector<Body>& bodies,
                                 const MarkerConfig& markers, const std::string& frame) {

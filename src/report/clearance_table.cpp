@@ -75,23 +75,21 @@ double ClearanceTable::Curve::nearest() const {
   return nearest_m;
 }
 
-void ClearanceTable::begin() {
-  rows_.open(file_);
-  if (!rows_) throw std::runtime_error(file_ + ": cannot be written");
-  rows_ << std::setprecision(17) << "step,stamp_ns,body_0,body_1,expected";
-  writeNames(rows_, "end");
-  writeNames(rows_, "step");
-  rows_ << '\n';
-}
-
 void ClearanceTable::add(const Outcome& o, const std::vector<Body>& bodies, StampNs origin_ns) {
   const double t_s = secondsBetween(origin_ns, o.stamp_ns);
   if (!o.answered) {
     for (auto& [partners, curve] : curves_) curve.add({t_s, UNKNOWN, INFINITE});
   }
+  if (!o.clearances.empty() && !rows_.is_open()) {
+    rows_.open(file_);
+    if (!rows_) throw std::runtime_error(file_ + ": cannot be written");
+    rows_ << std::setprecision(17) << "step,stamp_ns,body_0,body_1,expected";
+    writeNames(rows_, "end");
+    writeNames(rows_, "step");
+    rows_ << '\n';
+  }
   double farther_m = UNKNOWN;
   for (const Clearance& c : o.clearances) {
-    if (!rows_.is_open()) begin();
     rows_ << o.sequence << ',' << o.stamp_ns << ',' << csvField(bodyName(c.body[0], bodies)) << ','
           << csvField(bodyName(c.body[1], bodies)) << ',' << c.expected;
     writeCells(rows_, c.at_end);

@@ -44,7 +44,6 @@ class ClearanceTable {
     void add(const Sample& sample);
     double nearest() const;
   };
-  void begin();
 
   std::string file_;
   std::ofstream rows_;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "report/contact_vertices.h"
+#include "report/words.h"
 #include "stream/quantile.h"
 
 namespace dccd {

@@ -80,7 +80,6 @@ void ContactLanes::add(const Outcome& o, const std::vector<Body>& bodies, StampN
   if (!o.answered) return;
   for (const Patch& p : o.patches) {
     const double from_s = p.is_new ? start_s + p.toc_lower * (end_s - start_s) : start_s;
-    lane(p.body, bodies).of_patches = true;
     extend(lane(p.body, bodies), p.id, {from_s, end_s, p.isExpected()}, start_s);
   }
   if (o.patches.empty()) {  // without the effect: a bar for all that touches between two partners

@@ -38,7 +38,6 @@ class ContactLanes {
     nlohmann::json events = nlohmann::json::array();
     nlohmann::json first;  // of the new contacts that are not expected; null until there is one
     std::size_t left_out = 0;
-    bool of_patches = false;  // else bars are of all that touches
   };
   using Partners = std::array<std::uint16_t, 2>;
   Lane& lane(const Partners& partners, const std::vector<Body>& bodies);

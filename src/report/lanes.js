@@ -3,7 +3,6 @@ const SPAN = (() => { const t = R.steps.map(s => s.t), low = Math.min(0, ...t.sl
   return [low, Math.max(high, low + 1e-9)]; })();
 // When something began, over the whole run.
 const byTime = t => early(Math.min(1, Math.max(0, (t - SPAN[0]) / (SPAN[1] - SPAN[0]))));
-const partners = p => p.names[0] === p.names[1] ? p.names[0] + ' with itself' : p.names.join(' with ');
 const EVENT_COLOUR = { BEGAN: '#1b7f5c', ENDED: '#5b6b7d', SPLIT: '#7a4fb5', MERGED: '#7a4fb5', UNEXPECTED: '#d0021b' };
 const EVENT_WORD = { BEGAN: 'began', ENDED: 'ended', SPLIT: 'split', MERGED: 'merged', UNEXPECTED: 'is no longer expected' };
 const lanes = { seek: () => {}, cursor: () => {} };

@@ -13,6 +13,7 @@ const number = x => x === null || x === undefined ? '–' : Number.isInteger(x) 
 // Three digits that mean something: 0.355, 11.2, 1,120.
 const short = x => (+x.toPrecision(3)).toLocaleString('en', { maximumFractionDigits: 6 });
 const bar = share => ({ share });
+const partners = p => p.names[0] === p.names[1] ? p.names[0] + ' with itself' : p.names.join(' with ');
 function table(id, head, rows) {
   const t = document.getElementById(id);
   if (!rows.length) { t.outerHTML = '<p class="note">None.</p>'; return; }
@@ -76,9 +77,9 @@ document.getElementById('headline').textContent = R.headline;
   else card('doubt', P.proved ? `${P.steps - P.proved} of ${steps(P.steps)} are not proved` : 'Nothing is proved', [P.unproved]);
   const unseen = P.not_looked_at.map(text => [text[0].toUpperCase() + text.slice(1) + '.']), mapless = /^(none|off)/.test(fact);
   if (fact) card(mapless || unseen.length ? 'doubt' : 'good', mapless ? 'No map was used' : 'The map was used', ...(mapless ? [] : [[fact]]), ...unseen);
-  const firsts = R.partners.filter(p => p.first).sort((p, q) => p.first.t - q.first.t), who = p => p.names[0] === p.names[1] ? p.names[0] + ' with itself' : p.names.join(' with ');
-  const lasting = R.partners.filter(p => !p.first && p.bars.length).map(p => [who(p) + (p.bars.every(b => b[3]) ? ': as expected' : ': since before it was looked at'), p.bars[0][1]]);
-  const answered = R.steps.some(s => s.answered), lines = firsts.map(p => [`${who(p)}: ${p.first.t.toFixed(3)} s after the start`, p.first.t]).concat(lasting);
+  const firsts = R.partners.filter(p => p.first).sort((p, q) => p.first.t - q.first.t);
+  const lasting = R.partners.filter(p => !p.first && p.bars.length).map(p => [partners(p) + (p.bars.every(b => b[3]) ? ': as expected' : ': since before it was looked at'), p.bars[0][1]]);
+  const answered = R.steps.some(s => s.answered), lines = firsts.map(p => [`${partners(p)}: ${p.first.t.toFixed(3)} s after the start`, p.first.t]).concat(lasting);
   card(lines.length ? '' : answered && !P.unproved ? 'good' : 'doubt', firsts.length ? 'First new contact' : lines.length ? 'No new contact' : answered ? 'Nothing was found to touch' : 'No answer',
     ...lines.slice(0, 6), ...(lines.length > 6 ? [[`${lines.length - 6} more pairs below`]] : [])); }
 { const t = table('facts', null, R.facts);  // what has many lines is folded under the first
@@ -122,7 +123,7 @@ document.getElementById('headline').textContent = R.headline;
 const COLOURS = ['#1c2430', '#2a6fb0', '#f0a030', '#3d9a50', '#8e5bb0', '#b71c1c', '#7a8794'];
 // Lower and upper bound of the distance of each two partners; a gap where nothing is known.
 if (!R.clearance.curves.length) document.getElementById('clearance_part').remove();
-else { const all = R.clearance.curves, hue = k => COLOURS[1 + k % (COLOURS.length - 1)], who = c => (c.names[0] === c.names[1] ? c.names[0] + ' with itself' : c.names.join(' with ')) + (c.expected ? ', expected' : '');
+else { const all = R.clearance.curves, hue = k => COLOURS[1 + k % (COLOURS.length - 1)], who = c => partners(c) + (c.expected ? ', expected' : '');
   const a = axes('clearance', 220, Math.max(1e-6, ...all.flatMap(c => c.samples.map(s => s[2] ?? s[1] ?? 0))), 'distance [m]');
   all.forEach((c, k) => [[2, '4 3'], [1, 'none']].forEach(([bound, dashes]) => { let run = [];
     const end = () => { if (run.length) el('title', {}, el('polyline', { points: run.join(' '), fill: 'none', stroke: hue(k), 'stroke-width': 1.5,
@@ -236,9 +237,9 @@ const longest = list => Math.max(1e-12, ...list);
     [e.name, e.running ? 'yes' : 'no', e.reason, e.in, e.out, e.ms, bar((e.ms || 0) / most)]));
   R.effects.forEach((e, i) => { if (!e.running) t.rows[i + 1].className = 'off'; }); }
 document.getElementById('effects_note').textContent =
-  `Each pair and each moment counts in one row alone: a pair that carries a distance in tracker_noise or else minimum_separation, no longer in self_collision, body_body or octomap. Bounds of bodies: ${R.bounds.bodies_refitted} times computed, ${R.bounds.bodies_kept} times kept from the step before.` +
+  `Each pair and each moment counts in one row alone: a pair that carries a distance in tracker_noise or else minimum_separation, no longer in self_collision, body_body or octomap. Bounds of bodies: ${R.step_counters.bodies_refitted} times computed, ${R.step_counters.bodies_kept} times kept from the step before.` +
   (R.left_out.pairs ? ` ${R.left_out.pairs} pairs are closer than the minimum separation in the reference frame and left out of it (left_out.csv); ` +
-    `they came up ${R.left_out.met} times.` : '') +
+    `they came up ${R.step_counters.left_out_met} times.` : '') +
   (R.unknown_fraction.max ? ` Of the swept space the map does not know ${number(100 * R.unknown_fraction.median)} % (median), at most ${number(100 * R.unknown_fraction.max)} %.` : '');
 { const l = R.look_ahead; if (l) table('look_ahead', ['horizon [s]', 'compared', 'median error [s]', '95 % error [s]', 'median of predicted - observed [s]', 'not observed', 'not predicted'],
   [[l.horizon_s, l.compared, l.median_error_s, l.p95_error_s, l.median_signed_error_s, l.not_observed, l.not_predicted]]);

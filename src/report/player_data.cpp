@@ -114,7 +114,7 @@ std::string PlayerData::detailsOf(const Outcome& o, StampNs origin_ns) const {
   for (const std::size_t i : order) {
     const Contact& c = o.contacts[i];
     nlohmann::json row = {static_cast<int>(c.kind), c.body[0], c.body[1], nlohmann::json::array()};
-    for (int k = 0; k < meshPoints(c); ++k) row[3].push_back(c.vertex[k]);
+    forContactVertices(c, [&](std::uint16_t, Index v) { row[3].push_back(v); });
     row.push_back((c.certainty == Certainty::CERTAIN ? 1 : 0) | (c.initial ? 2 : 0) | (c.leaving ? 4 : 0) |
                   (c.expected ? 8 : 0));
     row.push_back(c.toc_lower);
@@ -285,7 +285,7 @@ void PlayerData::add(const Outcome& o, const std::vector<Body>& bodies, StampNs 
   for (std::size_t b = names_.size(); b < bodies.size(); ++b) names_.push_back(bodies[b].name);
   const auto seconds = [&](StampNs ns) { return secondsBetween(origin_ns, ns); };
   addVoxels(o, seconds(o.start_ns));
-  const bool begins = !any_ || o.start_ns != end_ns_;  // after a seam the step's start is a frame of its own
+  const bool begins = end_ns_ != o.start_ns;  // after a seam the step's start is a frame of its own
   for (const bool at_start : {true, false}) {
     if (at_start && !begins) continue;
     ++seen_;
@@ -304,7 +304,6 @@ void PlayerData::add(const Outcome& o, const std::vector<Body>& bodies, StampNs 
       frame.places.push_back(placeOf(b, o.step->bodies[b], at_start));
     addFrame(std::move(frame));
   }
-  any_ = true;
   end_ns_ = o.stamp_ns;
 }
 

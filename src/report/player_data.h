@@ -84,8 +84,7 @@ class PlayerData {
   std::vector<Place> last_places_;  // of the newest frame, kept or not
   std::uint64_t stride_[2] = {1, 1};
   std::uint64_t count_[3] = {0, 0, 0};
-  StampNs end_ns_ = 0;
-  bool any_ = false;
+  std::optional<StampNs> end_ns_;  // of the newest step
   std::vector<Voxels> voxels_;
   std::size_t voxels_kept_ = 0, maps_left_out_ = 0;
   std::shared_ptr<const VoxelSurface> surface_;

@@ -9,7 +9,6 @@
 
 #include "dccd/assurance.h"
 #include "dccd/contact_fields.h"
-#include "report/contact_vertices.h"
 #include "report/flat_layout.h"
 #include "report/words.h"
 
@@ -121,7 +120,7 @@ void Report::writeContacts(const Outcome& outcome, const std::vector<Body>& bodi
 }
 
 void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodies) {
-  const Cells cells{patches_, bodies};
+  const Cells cells{patches_, bodies}, event_cells{events_, bodies};
   for (const Patch& p : outcome.patches) {
     patches_ << outcome.sequence << ',' << outcome.stamp_ns;
 #define DCCD_WRITE_CELLS(member, published) cells(p.member);
@@ -132,12 +131,12 @@ void Report::writePatches(const Outcome& outcome, const std::vector<Body>& bodie
   for (const PatchEvent& e : outcome.patch_events) {
     std::string others;
     for (const std::uint64_t id : e.others) others += (others.empty() ? "" : " ") + std::to_string(id);
-    events_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << toString(e.kind) << ',' << e.id << ',' << others
-            << ',' << csvField(bodyName(e.body[0], bodies)) << ',' << csvField(bodyName(e.body[1], bodies)) << ','
-            << toString(e.beginning) << ',' << e.expected;
+    events_ << outcome.sequence << ',' << outcome.stamp_ns << ',' << toString(e.kind) << ',' << e.id << ',' << others;
+    event_cells(e.body);
+    event_cells(e.beginning);
+    event_cells(e.expected);
     for (const StampNs when_ns : {e.from_ns, e.to_ns}) {
-      events_ << ',';
-      if (when_ns != UNKNOWN_NS) events_ << secondsBetween(origin_ns_, when_ns);
+      event_cells.writeIf(when_ns != UNKNOWN_NS, secondsBetween(origin_ns_, when_ns));
     }
     events_ << '\n';
   }
@@ -203,8 +202,7 @@ void Report::addTimes(const Outcome& o) {
 }
 
 void Report::add(const Outcome& o, const std::vector<Body>& bodies) {
-  if (!any_) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
-  any_ = true;
+  if (frames_ == 0) origin_ns_ = o.start_ns > 0 ? o.start_ns : o.stamp_ns;
   writeStep(o);
   addRow(o);
   addProof(o);

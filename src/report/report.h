@@ -78,7 +78,6 @@ class Report {
   std::string folder_;
   std::ofstream contacts_, steps_, patches_, events_, timing_;
   StampNs origin_ns_ = 0;
-  bool any_ = false;
   std::map<std::string, std::size_t> lasting_;  // steps without a contact in which something touched, by what it was
   /// Frames that are not proved, by status, or by the first sentence of what an OK one lacks: the reason of the first
   /// of them, and how many.

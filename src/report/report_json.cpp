@@ -168,8 +168,7 @@ nlohmann::json Report::json() const {
   }
   j["effects"] = effectsJson();
   for (const StepCounter& counter : STEP_COUNTERS) j["step_counters"][counter.name] = sum_.*counter.value;
-  j["bounds"] = {{"bodies_refitted", sum_.bodies_refitted}, {"bodies_kept", sum_.bodies_kept}};
-  j["left_out"] = {{"pairs", left_out_}, {"met", sum_.left_out_met}};
+  j["left_out"] = {{"pairs", left_out_}};
   j["unknown_fraction"] = {{"median", quantile(unknown_fraction_, 0.5)}, {"max", quantile(unknown_fraction_, 1)}};
   j["look_ahead"] = lookAheadJson();
   j["study"] = study_;

@@ -1,7 +1,5 @@
 #include "report/words.h"
 
-#include <algorithm>
-
 namespace dccd {
 
 std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies) {
@@ -15,14 +13,10 @@ std::string csvField(const std::string& text) {
   return quoted + '"';
 }
 
-int meshPoints(const Contact& c) {
-  return static_cast<int>(std::count_if(c.vertex.begin(), c.vertex.end(), [](Index v) { return v != NO_INDEX; }));
-}
-
 std::string contactInWords(const Contact& c, const std::vector<Body>& bodies) {
   std::string text = bodyName(c.body[0], bodies) + " meets " + bodyName(c.body[1], bodies) + " (" +
-                     factsOf(c.kind).words + (meshPoints(c) == 1 ? ", vertex" : ", vertices");
-  for (int i = 0; i < meshPoints(c); ++i) text += ' ' + std::to_string(c.vertex[i]);
+                     factsOf(c.kind).words + (c.vertex[1] == NO_INDEX ? ", vertex" : ", vertices");
+  forContactVertices(c, [&](std::uint16_t, Index v) { text += ' ' + std::to_string(v); });
   return text + (c.certainty == Certainty::CERTAIN ? ", certain" : ", undecided") + (c.initial ? ", initial" : "") +
          ")";
 }

@@ -1,4 +1,4 @@
-// Bodies and contacts in words, for the tables of the report.
+// Bodies and contacts in words, for the tables of the report, and the vertices of a contact.
 #pragma once
 
 #include <string>
@@ -13,8 +13,11 @@ namespace dccd {
 std::string bodyName(std::uint16_t body, const std::vector<Body>& bodies);
 /// A field of a table of comma-separated values: one that holds commas, quotes or line ends is quoted (RFC 4180).
 std::string csvField(const std::string& text);
-/// How many of the contact's vertices are set.
-int meshPoints(const Contact& contact);
+/// Calls visit(body, vertex) for every vertex of the features that touch; of the map's features there are none.
+template <class Visit>
+void forContactVertices(const Contact& contact, Visit visit) {
+  for (std::size_t i = 0; i < 4 && contact.vertex[i] != NO_INDEX; ++i) visit(contact.bodyOf(i), contact.vertex[i]);
+}
 /// "towel meets octomap (vertex against voxel face, vertex 12, certain)".
 std::string contactInWords(const Contact& contact, const std::vector<Body>& bodies);
 

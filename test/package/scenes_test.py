@@ -203,7 +203,7 @@ class MakeSceneBagTest(unittest.TestCase):
             (felt, '{topic: /felt}', '{topic: /felt, topology: {rows: 9, cols: 9}}',
              block + 'bodies/felt/topology/rows', 'write rows: 21, cols: 24'),
             (felt, 'frame: finger}}', 'frame: finger}, self_collision: true}', block + 'bodies/finger/self_collision',
-             'remove this line'),
+             'the body is rigid and cannot meet itself; remove it'),
             (table, 'octomap: auto,', 'octomap: auto, body_body: on,', 'effects/body_body is on',
              'effects/body_body: auto'),
         ]

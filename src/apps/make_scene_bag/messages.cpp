@@ -4,19 +4,14 @@
 #include <cstring>
 #include <utility>
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
+
 #include "apps/make_scene_bag/physics/shapes.h"
 #include "octomap/map_builder.h"
 
 namespace dccd {
 namespace {
-
-geometry_msgs::Point toPoint(const Vec3& p) {
-  geometry_msgs::Point point;
-  point.x = p[0];
-  point.y = p[1];
-  point.z = p[2];
-  return point;
-}
 
 /// Rows of `width` points; their coordinates follow each other as they are.
 template <class Point>
@@ -27,18 +22,9 @@ sensor_msgs::PointCloud2 pointCloud(const std_msgs::Header& header, const std::v
   message.header = header;
   message.height = static_cast<std::uint32_t>(points.size() / width);
   message.width = static_cast<std::uint32_t>(width);
-  for (int axis = 0; axis < 3; ++axis) {
-    sensor_msgs::PointField field;
-    field.name = std::string(1, static_cast<char>('x' + axis));
-    field.offset = static_cast<std::uint32_t>(axis * sizeof(Scalar));
-    field.datatype = sizeof(Scalar) == 8 ? sensor_msgs::PointField::FLOAT64 : sensor_msgs::PointField::FLOAT32;
-    field.count = 1;
-    message.fields.push_back(field);
-  }
-  message.point_step = 3 * sizeof(Scalar);
-  message.row_step = message.point_step * message.width;
   message.is_dense = true;
-  message.data.resize(points.size() * message.point_step);
+  const int type = sizeof(Scalar) == 8 ? sensor_msgs::PointField::FLOAT64 : sensor_msgs::PointField::FLOAT32;
+  sensor_msgs::PointCloud2Modifier(message).setPointCloud2Fields(3, "x", 1, type, "y", 1, type, "z", 1, type);
   for (std::size_t i = 0; i < points.size(); ++i) {
     std::memcpy(message.data.data() + i * message.point_step, points[i].data(), message.point_step);
   }
@@ -51,7 +37,7 @@ deformable_ccd::MeshStamped toMeshStamped(const std_msgs::Header& header, const 
                                           const std::vector<Face>& faces) {
   deformable_ccd::MeshStamped message;
   message.header = header;
-  for (const Vec3& p : positions) message.vertices.push_back(toPoint(p));
+  for (const Vec3& p : positions) message.vertices.push_back(tf2::toMsg(p));
   message.triangles.resize(faces.size());
   for (std::size_t f = 0; f < faces.size(); ++f) {
     std::copy(faces[f].begin(), faces[f].end(), message.triangles[f].vertex_indices.begin());
@@ -93,7 +79,7 @@ visualization_msgs::MarkerArray toMarkers(const std_msgs::Header& header, const 
   marker.color.a = 1.0f;
   marker.points.reserve(3 * faces.size());
   for (const Face& face : faces) {
-    for (const Index v : face) marker.points.push_back(toPoint(positions[v]));
+    for (const Index v : face) marker.points.push_back(tf2::toMsg(positions[v]));
   }
   visualization_msgs::MarkerArray message;
   message.markers.push_back(marker);
@@ -128,17 +114,9 @@ octomap_msgs::Octomap toOctomap(const std_msgs::Header& header, const scene::Obs
 
 geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child,
                                             const Eigen::Isometry3d& pose) {
-  geometry_msgs::TransformStamped message;
+  geometry_msgs::TransformStamped message = tf2::eigenToTransform(pose);
   message.header = header;
   message.child_frame_id = child;
-  const Eigen::Quaterniond q(pose.linear());
-  message.transform.translation.x = pose.translation()[0];
-  message.transform.translation.y = pose.translation()[1];
-  message.transform.translation.z = pose.translation()[2];
-  message.transform.rotation.x = q.x();
-  message.transform.rotation.y = q.y();
-  message.transform.rotation.z = q.z();
-  message.transform.rotation.w = q.w();
   return message;
 }
 

@@ -1,5 +1,6 @@
 #include "apps/make_scene_bag/recorder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -108,17 +109,13 @@ void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& a
                const std::vector<Face>& faces) {
   switch (body.output) {
     case scene::MeshOutput::MESH_STAMPED:
-      bag.write(body.topic, at.stamp, toMeshStamped(at, positions, faces));
-      return;
+      return bag.write(body.topic, at.stamp, toMeshStamped(at, positions, faces));
     case scene::MeshOutput::POINT_CLOUD_GRID:
-      bag.write(body.topic, at.stamp, toPointCloud(at, positions));
-      return;
+      return bag.write(body.topic, at.stamp, toPointCloud(at, positions));
     case scene::MeshOutput::POLYGON_MESH:
-      bag.write(body.topic, at.stamp, toPolygonMesh(at, positions, faces));
-      return;
+      return bag.write(body.topic, at.stamp, toPolygonMesh(at, positions, faces));
     case scene::MeshOutput::MARKER:
-      bag.write(body.topic, at.stamp, toMarkers(at, positions, faces));
-      return;
+      return bag.write(body.topic, at.stamp, toMarkers(at, positions, faces));
   }
 }
 
@@ -126,7 +123,7 @@ void writeBody(SceneBag& bag, const scene::Body& body, const std_msgs::Header& a
 class CameraRecorder {
  public:
   CameraRecorder(SceneBag& bag, const scene::SceneSpec& spec, bool binary)
-      : bag_(bag), spec_(spec), binary_(binary), camera_(spec), map_(optionsOf(spec)) {}
+      : bag_(bag), spec_(spec), binary_(binary), camera_(spec), map_({spec.obstacle->resolution_m}) {}
 
   /// Takes the clouds of the solids alone.
   void seeSolids(const ros::Time& start) {
@@ -148,11 +145,6 @@ class CameraRecorder {
   }
 
  private:
-  static CloudMapOptions optionsOf(const scene::SceneSpec& spec) {
-    CloudMapOptions options;  // octomap_server's
-    options.resolution_m = spec.obstacle->resolution_m;
-    return options;
-  }
   void take(const scene::SceneState& state, const ros::Time& stamp) {
     const scene::Camera& camera = *spec_.camera;
     const std::vector<Eigen::Vector3f> points = camera_.look(state);
@@ -190,11 +182,9 @@ void overrideRate(scene::SceneSpec& spec, double rate_hz) {
 
 void overrideOutput(scene::SceneSpec& spec, const std::string& output) {
   if (output.empty()) return;
+  const auto named = std::find(scene::MESH_OUTPUTS.begin(), scene::MESH_OUTPUTS.end(), output);
   for (scene::Body& body : spec.bodies) {
-    if (output == "mesh_stamped") body.output = scene::MeshOutput::MESH_STAMPED;
-    if (output == "point_cloud_grid") body.output = scene::MeshOutput::POINT_CLOUD_GRID;
-    if (output == "polygon_mesh") body.output = scene::MeshOutput::POLYGON_MESH;
-    if (output == "marker") body.output = scene::MeshOutput::MARKER;
+    body.output = static_cast<scene::MeshOutput>(named - scene::MESH_OUTPUTS.begin());
     if (body.shape.kind == scene::Shape::Kind::ROPE && body.output != scene::MeshOutput::POINT_CLOUD_GRID) {
       throw std::runtime_error("--output " + output + ": body '" + body.name +
                                "' is a rope and has no faces; use point_cloud_grid");
@@ -261,7 +251,7 @@ std::string recordScene(const scene::SceneSpec& scene_spec, const std::string& b
     }
     if (!transforms.transforms.empty()) bag.write("/tf", stamp, transforms);
     for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
-      writeBody(bag, spec.bodies[b], header(spec.bodies[b].frame, stamp, frame), simulation.observe(b), faces[b]);
+      writeBody(bag, spec.bodies[b], header(spec.bodies[b].frame, stamp, frame), simulation.positions(b), faces[b]);
     }
     if (camera) camera->see(simulation, stamp);
     progress.advance();

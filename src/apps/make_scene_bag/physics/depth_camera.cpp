@@ -72,9 +72,7 @@ Positions corners(const Vec3& min, const Vec3& max, const Eigen::Isometry3d& pos
 }  // namespace
 
 DepthCamera::DepthCamera(const SceneSpec& spec)
-    : bodies_(spec.bodies),
-      rigid_bodies_(spec.rigid_bodies),
-      links_(spec.robot ? spec.robot->links : std::vector<Link>()),
+    : spec_(spec),
       camera_(*spec.camera),
       from_fixed_(spec.camera->pose.inverse()),
       focal_px_(0.5 * spec.camera->width / std::tan(0.5 * spec.camera->field_of_view_rad)),
@@ -85,7 +83,7 @@ DepthCamera::DepthCamera(const SceneSpec& spec)
       directions_.push_back(way.normalized());
     }
   }
-  for (const Body& body : bodies_) faces_.push_back(shapeFaces(body.shape));
+  for (const Body& body : spec.bodies) faces_.push_back(shapeFaces(body.shape));
   background_.assign(directions_.size(), NOTHING);
   for (const Solid& solid : spec.obstacle->solids) drawSolid(background_, shrunk(solid, camera_.inset_m));
 }
@@ -175,16 +173,16 @@ std::vector<Eigen::Vector3f> DepthCamera::look(const SceneState& state) {
     Positions in_camera;
     for (const Vec3& p : state.bodies[b]) in_camera.push_back(from_fixed_ * p);
     if (faces_[b].empty()) {
-      drawRope(ranges, in_camera, bodies_[b].thickness_m);
+      drawRope(ranges, in_camera, spec_.bodies[b].thickness_m);
     } else {
       drawFaces(ranges, in_camera, faces_[b]);
     }
   }
   for (std::size_t r = 0; r < state.rigid_bodies.size(); ++r) {
-    drawBox(ranges, state.rigid_bodies[r], 0.5 * rigid_bodies_[r].size_m);
+    drawBox(ranges, state.rigid_bodies[r], 0.5 * spec_.rigid_bodies[r].size_m);
   }
   for (std::size_t l = 0; l < state.links.size(); ++l) {
-    for (const Surface& surface : links_[l].surfaces) {
+    for (const Surface& surface : spec_.robot->links[l].surfaces) {
       Positions in_camera;
       for (const Vec3& p : surface.vertices) in_camera.push_back(from_fixed_ * (state.links[l] * p));
       drawFaces(ranges, in_camera, surface.faces);

@@ -17,7 +17,7 @@ struct SceneState {
 
 class DepthCamera {
  public:
-  /// The scene must have a camera.
+  /// The scene must have a camera, and live as long as this.
   explicit DepthCamera(const SceneSpec& spec);
 
   /// The cloud, row by row, in the camera's optical frame; NaN where a ray meets nothing and where its pixel is lost.
@@ -38,10 +38,8 @@ class DepthCamera {
   double uniform();
   double gaussian();
 
-  std::vector<Body> bodies_;
-  std::vector<RigidBody> rigid_bodies_;
-  std::vector<Link> links_;
-  Camera camera_;
+  const SceneSpec& spec_;
+  const Camera& camera_;
   Eigen::Isometry3d from_fixed_;  // to the optical frame
   double focal_px_;
   std::vector<Vec3> directions_;          // of unit length, row by row

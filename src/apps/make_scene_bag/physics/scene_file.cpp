@@ -11,35 +11,19 @@ namespace {
 
 constexpr double LARGE = 1e6;  // beyond any scene, within what Bullet's solvers stay stable at
 
-Shape readSheet(ParameterReader map) {
+Shape readShape(ParameterReader map, Shape::Kind kind) {
   Shape shape;
-  shape.kind = Shape::Kind::SHEET;
-  shape.rows = map.integer("rows", 2, 1000);
-  shape.cols = map.integer("cols", 2, 1000);
-  shape.size_m = map.numbers("size_m", 2, 1e-3, 1e3);
-  shape.center_m = map.vector("center_m");
-  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
-  map.finish();
-  return shape;
-}
-
-Shape readTube(ParameterReader map) {
-  Shape shape;
-  shape.kind = Shape::Kind::TUBE;
-  shape.rows = map.integer("rows", 2, 1000);
-  shape.cols = map.integer("cols", 3, 1000);
-  shape.size_m = Vec3(map.number("radius_m", 1e-3, 1e3), map.number("length_m", 1e-3, 1e3), 0.0);
-  shape.center_m = map.vector("center_m");
-  shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
-  map.finish();
-  return shape;
-}
-
-Shape readRope(ParameterReader map) {
-  Shape shape;
-  shape.kind = Shape::Kind::ROPE;
-  shape.cols = map.integer("points", 2, 10000);
-  shape.size_m = Vec3(map.number("length_m", 1e-3, 1e3), 0.0, 0.0);
+  shape.kind = kind;
+  if (kind == Shape::Kind::ROPE) {
+    shape.cols = map.integer("points", 2, 10000);
+    shape.size_m = Vec3(map.number("length_m", 1e-3, 1e3), 0.0, 0.0);
+  } else {
+    const bool sheet = kind == Shape::Kind::SHEET;
+    shape.rows = map.integer("rows", 2, 1000);
+    shape.cols = map.integer("cols", sheet ? 2 : 3, 1000);
+    shape.size_m = sheet ? map.numbers("size_m", 2, 1e-3, 1e3)
+                         : Vec3(map.number("radius_m", 1e-3, 1e3), map.number("length_m", 1e-3, 1e3), 0.0);
+  }
   shape.center_m = map.vector("center_m");
   shape.rotation_rad = map.vector("rotation_rad", Vec3::Zero());
   map.finish();
@@ -93,31 +77,29 @@ Body readBody(ParameterReader map, const std::string& fixed_frame, std::optional
   body.name = map.text("name");
   body.topic = map.text("topic", "/" + body.name);
   body.frame = map.text("frame", fixed_frame);
-  const std::vector<std::string> outputs{"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"};
-  const std::string output = map.choice("output", outputs.front(), outputs);
-  body.output = static_cast<MeshOutput>(std::find(outputs.begin(), outputs.end(), output) - outputs.begin());
+  const std::string output = map.choice("output", MESH_OUTPUTS[0], MESH_OUTPUTS);
+  body.output =
+      static_cast<MeshOutput>(std::find(MESH_OUTPUTS.begin(), MESH_OUTPUTS.end(), output) - MESH_OUTPUTS.begin());
   const bool sheet = map.has("sheet"), tube = map.has("tube"), rope = map.has("rope");
   if (sheet + tube + rope != 1) map.fail("", "needs just one of sheet, tube, rope: the body's shape");
-  body.shape = sheet  ? readSheet(map.neededSection("sheet"))
-               : tube ? readTube(map.neededSection("tube"))
-                      : readRope(map.neededSection("rope"));
+  body.shape = sheet  ? readShape(map.section("sheet"), Shape::Kind::SHEET)
+               : tube ? readShape(map.section("tube"), Shape::Kind::TUBE)
+                      : readShape(map.section("rope"), Shape::Kind::ROPE);
   if (rope && body.output != MeshOutput::POINT_CLOUD_GRID)
     map.fail("output", "must be point_cloud_grid: a rope has no faces");
   body.mass_kg = map.number("mass_kg", 1e-6, LARGE);
   body.thickness_m = map.number("thickness_m", body.thickness_m, 1e-5, 1.0);
-  body.stretch_stiffness = map.number("stretch_stiffness", body.stretch_stiffness, 0.0, 1.0);
   body.damping = map.number("damping", 0.0, 0.0, 1.0);
   body.start_noise_m = map.number("start_noise_m", 0.0, 0.0, 1.0);
-  body.tracker_noise_m = map.number("tracker_noise_m", 0.0, 0.0, 1.0);
   if (map.has("bending")) {
     ParameterReader bending = map.section("bending");
-    body.bending = Bending{bending.number("stiffness", 0.0, 1.0)};
+    body.bending = bending.number("stiffness", 0.0, 1.0);
     bending.finish();
   }
   if (map.has("self_collision")) {
     if (rope) map.fail("self_collision", "needs faces, and a rope has none; leave it out");
     ParameterReader self_collision = map.section("self_collision");
-    body.self_collision = SelfCollision{self_collision.integer("clusters", SelfCollision{}.clusters, 2, 10000)};
+    body.self_collision = self_collision.integer("clusters", 64, 2, 10000);
     self_collision.finish();
   }
   if (map.has("friction")) body.friction = map.number("friction", 0.0, 1.0);
@@ -283,10 +265,6 @@ Wind readWind(ParameterReader map) {
 
 /// One body of the monitor's block, held against the body of the scene on its topic.
 void checkMonitorBody(ParameterReader map, const SceneSpec& spec) {
-  map.number("minimum_separation_m", 0.0, 0.0, LARGE);
-  if (map.has("rigid") && map.get("self_collision", false)) {
-    map.fail("self_collision", "has no meaning: the body is rigid and cannot meet itself; remove this line");
-  }
   ParameterReader topology = map.section("topology");
   if (!map.has("topic") || !topology.has("rows")) return;
   const int rows = topology.integer("rows", 2, 100000), cols = topology.integer("cols", 2, 100000);
@@ -300,11 +278,9 @@ void checkMonitorBody(ParameterReader map, const SceneSpec& spec) {
   }
 }
 
-/// The monitor reads its block itself; what contradicts the scene is refused before anything is recorded.
+/// What contradicts the scene. All else that is wrong with the block the monitor says that the tool makes of it.
 void checkMonitor(ParameterReader& scene, const SceneSpec& spec) {
-  ParameterReader monitor = scene.section("monitor");
-  monitor.number("minimum_separation_m", 0.0, 0.0, LARGE);
-  ParameterReader bodies = monitor.section("bodies");
+  ParameterReader bodies = scene.section("monitor").section("bodies");
   for (const std::string& name : bodies.names()) checkMonitorBody(bodies.section(name), spec);
 }
 

@@ -40,16 +40,10 @@ struct Gripper {
   double grasp_s = 0.0;  ///< with a link: physics has them until then
 };
 
-struct Bending {
-  double stiffness = 0.0;  ///< 0 to 1, Bullet's linear stiffness of the bending links
-};
-
-struct SelfCollision {
-  int clusters = 64;  ///< convex clusters the body is cut into; more are finer and slower
-};
-
 /// How a body's frames are published.
 enum class MeshOutput { MESH_STAMPED, POINT_CLOUD_GRID, POLYGON_MESH, MARKER };
+/// Their names.
+inline const std::vector<std::string> MESH_OUTPUTS{"mesh_stamped", "point_cloud_grid", "polygon_mesh", "marker"};
 
 struct Body {
   std::string name;
@@ -58,14 +52,12 @@ struct Body {
   MeshOutput output = MeshOutput::MESH_STAMPED;
   Shape shape;
   double mass_kg = 0.2;
-  double thickness_m = 0.004;      ///< distance that physics keeps between vertices and obstacles
-  double stretch_stiffness = 1.0;  ///< 0 to 1
-  double damping = 0.0;            ///< 0 to 1, share of the velocity lost in a step
-  double start_noise_m = 0.0;      ///< random offset of each vertex at the start: no two folds are alike
-  double tracker_noise_m = 0.0;    ///< random offset of each published coordinate
-  std::optional<Bending> bending;
-  std::optional<SelfCollision> self_collision;
-  std::optional<double> friction;  ///< 0 to 1
+  double thickness_m = 0.004;         ///< distance that physics keeps between vertices and obstacles
+  double damping = 0.0;               ///< 0 to 1, share of the velocity lost in a step
+  double start_noise_m = 0.0;         ///< random offset of each vertex at the start: no two folds are alike
+  std::optional<double> bending;      ///< 0 to 1, Bullet's linear stiffness of the bending links
+  std::optional<int> self_collision;  ///< convex clusters that the body is cut into; more are finer and slower
+  std::optional<double> friction;     ///< 0 to 1
   std::vector<Gripper> grippers;
 };
 

@@ -105,7 +105,6 @@ void Simulation::Impl::addBody(const Body& body) {
   soft.push_back(
       std::make_unique<btSoftBody>(&world.getWorldInfo(), static_cast<int>(nodes.size()), nodes.data(), nullptr));
   btSoftBody& result = *soft.back();
-  result.m_materials[0]->m_kLST = body.stretch_stiffness;
   if (body.shape.kind == Shape::Kind::ROPE) {
     for (int i = 0; i + 1 < body.shape.cols; ++i) result.appendLink(i, i + 1);
   }
@@ -150,12 +149,12 @@ void Simulation::Impl::addEffects(const Body& body, btSoftBody& result) {
   if (!spec.rigid_bodies.empty()) result.m_cfg.collisions |= btSoftBody::fCollision::SDF_RS;
   if (body.bending) {
     btSoftBody::Material* material = result.appendMaterial();
-    material->m_kLST = body.bending->stiffness;
+    material->m_kLST = *body.bending;
     result.generateBendingConstraints(2, material);
     effects.push_back(body.name + ": bending");
   }
   if (body.self_collision) {
-    result.generateClusters(body.self_collision->clusters);
+    result.generateClusters(*body.self_collision);
     result.m_cfg.collisions |= btSoftBody::fCollision::CL_SELF | btSoftBody::fCollision::CL_SS;
     effects.push_back(body.name + ": self-collision");
   }
@@ -289,15 +288,6 @@ Positions Simulation::positions(std::size_t body) const {
   Positions positions(static_cast<std::size_t>(soft.m_nodes.size()));
   for (int i = 0; i < soft.m_nodes.size(); ++i) positions[i] = fromBullet(soft.m_nodes[i].m_x);
   return positions;
-}
-
-Positions Simulation::observe(std::size_t body) {
-  Impl& impl = *impl_;
-  const double amplitude = impl.spec.bodies[body].tracker_noise_m;
-  Positions seen = positions(body);
-  if (amplitude == 0.0) return seen;
-  for (Vec3& p : seen) p += Vec3(impl.noise(amplitude), impl.noise(amplitude), impl.noise(amplitude));
-  return seen;
 }
 
 Eigen::Isometry3d Simulation::rigidPose(std::size_t rigid_body) const {

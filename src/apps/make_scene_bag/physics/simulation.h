@@ -23,8 +23,6 @@ class Simulation {
   double time_s() const;
   /// The vertices [m] of a body in the fixed frame.
   Positions positions(std::size_t body) const;
-  /// What a tracker publishes of a body: its vertices, tracker noise included where named.
-  Positions observe(std::size_t body);
   /// Pose of a rigid body's frame in the fixed frame.
   Eigen::Isometry3d rigidPose(std::size_t rigid_body) const;
 
