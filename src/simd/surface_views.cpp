@@ -1,7 +1,6 @@
 #include "simd/surface_views.h"
 
 #include "dccd/tolerances.h"
-#include "simd/cluster_bounds.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/surface_views.cpp"
@@ -95,23 +94,6 @@ void FacedViews(const double* HWY_RESTRICT vertices, const uint32_t* HWY_RESTRIC
   }
 }
 
-void SidesOf(const int16_t* bounds, uint32_t node, const uint32_t* others, size_t count, uint16_t* sides) {
-  const int16_t* HWY_RESTRICT low = bounds + size_t{node} * AOS_SIZE;
-  const int16_t* HWY_RESTRICT high = low + RECORD;
-  const hn::CappedTag<int16_t, RECORD> d;
-  for (size_t i = 0; i < count; ++i) {
-    const int16_t* HWY_RESTRICT other = bounds + size_t{others[i]} * AOS_SIZE;
-    uint32_t above = 0, below = 0;
-    for (size_t part = 0; part < RECORD; part += hn::Lanes(d)) {
-      above |= bitsOf(d, hn::Gt(hn::Load(d, other + part), hn::Load(d, high + part))) << part;
-      below |= bitsOf(d, hn::Lt(hn::Load(d, other + RECORD + part), hn::Load(d, low + part))) << part;
-    }
-    above &= above >> DIRECTIONS;
-    below &= below >> DIRECTIONS;
-    sides[i] = static_cast<uint16_t>((above & 0xff) | (below & 0xff) << DIRECTIONS);
-  }
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace simd
 }  // namespace dccd
@@ -121,15 +103,9 @@ HWY_AFTER_NAMESPACE();
 namespace dccd {
 namespace simd {
 HWY_EXPORT(FacedViews);
-HWY_EXPORT(SidesOf);
 
 void facedViews(const double* vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views) {
   HWY_DYNAMIC_DISPATCH(FacedViews)(vertices, groups, count, views);
-}
-
-void sidesOf(const std::int16_t* bounds, std::uint32_t node, const std::uint32_t* others, std::size_t count,
-             std::uint16_t* sides) {
-  HWY_DYNAMIC_DISPATCH(SidesOf)(bounds, node, others, count, sides);
 }
 
 }  // namespace simd

@@ -23,10 +23,5 @@ constexpr int VIEW_LINE[VIEW_LINES][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1}, {0,
 /// rounding of such numbers: with M the largest |difference| the sum of three components is off by at most 80u M^2.
 void facedViews(const double* vertices, const std::uint32_t* groups, std::size_t count, std::uint32_t* views);
 
-/// Sides of a node: bit d, node `other` is above it in direction d at t=0 and at t=1, bit 8 + d, it is below.
-/// bounds: of nodes, laid out as the bounds of groups (cluster_bounds.h). others, sides: count.
-void sidesOf(const std::int16_t* bounds, std::uint32_t node, const std::uint32_t* others, std::size_t count,
-             std::uint16_t* sides);
-
 }  // namespace simd
 }  // namespace dccd

@@ -49,11 +49,6 @@ PairMotion dropping(double x, double y, double z0, double z1) {
   return {{{{x, y, z0}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{x, y, z1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
 }
 
-/// An edge along x at height 0 and one along y that moves from z0 to z1 above its middle.
-PairMotion crossing(double z0, double z1) {
-  return {{{{-1, 0, 0}, {1, 0, 0}, {0, -1, z0}, {0, 1, z0}}, {{-1, 0, 0}, {1, 0, 0}, {0, -1, z1}, {0, 1, z1}}}};
-}
-
 // A pair at rest at exactly the minimum separation is in contact; the next larger distance may be; one beyond the
 // tolerance is not.
 TEST(Conservative, MinimumSeparationIsClosedAndTheToleranceIsKept) {

@@ -34,13 +34,6 @@ struct Waved {
   }
 };
 
-/// A body that moves is tested against itself, and so has bounds however far it is from the other one.
-Options tested() {
-  Options options;
-  options.unfolded_test = false;
-  return options;
-}
-
 TEST(BodiesAtRest, ARangeThatIsLeftIsWidenedAnew) {
   const Waved scene;
   Detector detector;
