@@ -55,7 +55,7 @@ Recorded record(const std::string& scene_file) {
   out.period_ns = std::llround(1e9 / spec.frame_rate_hz);
   scene::Simulation simulation(spec, 1);
   for (int i = 0; i < spec.frames; ++i) {
-    out.frames.push_back(simulation.observe(0));
+    out.frames.push_back(simulation.positions(0));
     simulation.step();
   }
   std::vector<OccupiedLeaf> leaves;
