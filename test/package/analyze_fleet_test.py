@@ -106,7 +106,7 @@ class FleetTest(FolderTestCase):
         folder = self.folder / name
         folder.mkdir()
         shutil.copy(str(FLEET / 'analyze_fleet'), str(folder / 'analyze_fleet'))
-        for file in ('Snakefile', 'profile', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
+        for file in ('Snakefile', 'profile', 'fleet_compare.py', 'fleet_job.py', 'fleet_tables.py', 'fleet_database.py', 'page.html', 'progress.py'):
             (folder / file).symlink_to(FLEET / file)
         (folder / 'analyze_bag').write_text('#!/bin/bash\n%s\nexec %s "$@"\n' % (script, TOOLS / 'analyze_bag'))
         (folder / 'analyze_bag').chmod(0o755)
