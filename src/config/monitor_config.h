@@ -122,12 +122,12 @@ struct MonitorConfig {
   void checkMapNames() const;
   /// The map is called for: a step without one lacks it. Else it is used when it is there.
   bool namesOctomap() const;
-  /// A separation or an uncertainty is asked for, so that only conservative will do.
   bool ownsVoxels() const {
     return std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& b) { return dccd::ownsVoxels(b.body); });
   }
   /// Free leaves of maps are asked for, too.
   bool needsKnownSpace() const { return unknown_space != UnknownSpace::FREE || ownsVoxels(); }
+  /// A separation or an uncertainty is asked for, so that only conservative will do.
   bool holdsDistance() const;
   /// Some body has a speed bound, and distances may be computed: ~safe_until is there.
   bool promises() const;
