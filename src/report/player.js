@@ -48,7 +48,7 @@ const player = (() => {
   controls.addEventListener('change', () => draw());
 
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
-  const COLOURS = [0x6fa8dc, 0x93c47d, 0xc9a0dc, 0x76c7c0, 0xd5c08a, 0x9aa9e0];
+  const COLOURS = [0x6fa8dc, 0x93c47d, 0xc9a0dc, 0x76c7c0, 0xd5c08a, 0x9aa9e0, 0xb5d36b, 0xd690b0, 0x5f9ea0, 0xbfa58f, 0xe3cdea, 0x4f9d69];
   const shown = D.bodies.map((body, b) => {
     const group = new THREE.Group(); scene.add(group);
     return { body, group, shape: -1, colour: COLOURS[b % COLOURS.length] };
