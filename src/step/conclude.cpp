@@ -220,9 +220,10 @@ std::uint64_t looseVertices(const Body& body) {
 double scaleDown(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 0.0); }
 double scaleUp(double toc, std::size_t i, std::size_t n) { return n == 1 ? toc : scale(toc, i, n, 2.0); }
 
-void leaveOut(double toc, Outcome& outcome) {
-  outcome.complete = false;
-  outcome.unchecked_toc_lower = std::min(outcome.unchecked_toc_lower, toc);
+void leaveOut(double toc, bool by_limit, Findings& found) {
+  found.complete = false;
+  found.cut = found.cut || by_limit;
+  found.unchecked_toc_lower = std::min(found.unchecked_toc_lower, toc);
 }
 
 void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& outcome) {
@@ -243,7 +244,7 @@ void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& out
     }
   }
   outcome.cut = outcome.cut || result.cut;
-  if (!result.complete) leaveOut(scaleDown(std::min(result.unchecked_toc_lower, 1.0), part, parts), outcome);
+  if (!result.complete) leaveOut(scaleDown(std::min(result.unchecked_toc_lower, 1.0), part, parts), false, outcome);
   outcome.stats += result.stats;
 }
 

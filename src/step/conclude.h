@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "step/history.h"
+#include "dccd/detect.h"
 
 namespace dccd {
 
@@ -12,8 +12,8 @@ namespace dccd {
 double scaleDown(double toc, std::size_t i, std::size_t n);
 double scaleUp(double toc, std::size_t i, std::size_t n);
 
-/// The budget left out what does not touch before toc.
-void leaveOut(double toc, Outcome& outcome);
+/// A limit of what may be found, or else the deadline, left out what does not touch before toc.
+void leaveOut(double toc, bool by_limit, Findings& found);
 /// Appends a part's contacts, the start state of the first one, the statistics.
 void addPart(std::size_t part, std::size_t parts, Findings& result, Outcome& outcome);
 /// Contacts of several parts into canonical order, a pair once.

@@ -1,8 +1,10 @@
-// A part of a step against the map.
+#include "step/map.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "dccd/tolerances.h"
+#include "obstacle/excluded_leaves.h"
 #include "step/history.h"
 #include "step/observer.h"
 
@@ -28,6 +30,38 @@ bool boundsReach(const SceneBody& body, const ObstacleMap& map, const Box& occup
   return true;
 }
 
+/// False: its bounds show that the body does not come near what is occupied in the part.
+bool reachesMap(std::size_t b, const Part& part) {
+  const SceneBody& body = part.scene.bodies()[b];
+  double distance_m = part.scene.separation(b, OBSTACLE_BODY);
+  if (body.uncertain) {
+    const std::vector<double>& radii = *part.step.bodies[b].radius_m;
+    distance_m += *std::max_element(radii.begin(), radii.end());
+  }
+  return boundsReach(body, part.step.map, part.prepared.map.surface->bounds(), distance_m);
+}
+
+/// The answer of the step before, where it is this part's, too; null: it is not, and is forgotten.
+const MapAnswer* takeAnswer(std::size_t b, const Part& part, std::vector<MapAnswer>& known) {
+  if (b >= known.size() || !part.options().keep_bounds) return nullptr;
+  MapAnswer& answer = known[b];
+  const bool same = part.scene.bodies()[b].unchanged && answer.map && answer.map == part.prepared.map.surface &&
+                    answer.pose == part.step.map.map_from_fixed.matrix();
+  if (!same) answer = MapAnswer();
+  return same ? &answer : nullptr;
+}
+
+/// What moves has other contacts in the next step: they are kept of what has not moved once already.
+void keepAnswer(std::size_t b, const Part& part, const std::vector<Contact>& contacts, std::size_t first,
+                std::uint64_t pairs, std::vector<MapAnswer>& known) {
+  if (!part.scene.bodies()[b].unchanged || !part.options().keep_bounds) return;
+  known.resize(part.scene.bodies().size());
+  known[b] = {part.prepared.map.surface,
+              part.step.map.map_from_fixed.matrix(),
+              {contacts.begin() + static_cast<std::ptrdiff_t>(first), contacts.end()},
+              pairs};
+}
+
 }  // namespace
 
 const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved) {
@@ -39,92 +73,95 @@ const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Posit
   return moved;
 }
 
-bool History::Impl::takeMapAnswer(std::size_t b, const Part& part, std::size_t room, ObstacleStats& total) {
-  if (b >= carried.map.size() || !options->keep_bounds) return false;
-  MapAnswer& known = carried.map[b];
-  const bool same = scene.bodies()[b].unchanged && known.map && known.map == map_reduced &&
-                    known.pose == part.step.map.map_from_fixed.matrix();
-  if (!same) known = MapAnswer();
-  if (!same || known.contacts.size() > room) return false;
-  result.contacts.insert(result.contacts.end(), known.contacts.begin(), known.contacts.end());
-  total.pairs_in += known.pairs;
-  ++result.stats.map_answers_kept;
-  return true;
+void ReducedMap::clear() noexcept {
+  given_ = surface = nullptr;
+  excluded_voxels = 0;
 }
 
-/// What moves has other contacts in the next step: they are kept of what has not moved once already.
-void History::Impl::keepMapAnswer(std::size_t b, const Part& part, std::size_t first, std::uint64_t pairs) {
-  if (!scene.bodies()[b].unchanged || !options->keep_bounds) return;
-  carried.map.resize(scene.bodies().size());
-  carried.map[b] = {map_reduced,
-                    part.step.map.map_from_fixed.matrix(),
-                    {result.contacts.begin() + static_cast<std::ptrdiff_t>(first), result.contacts.end()},
-                    pairs};
-}
-
-bool History::Impl::reachesMap(std::size_t b, const Part& part) const {
-  const SceneBody& body = scene.bodies()[b];
-  double distance_m = scene.separation(b, OBSTACLE_BODY);
-  if (body.uncertain) {
-    const std::vector<double>& radii = *part.step.bodies[b].radius_m;
-    distance_m += *std::max_element(radii.begin(), radii.end());
+void ReducedMap::set(const ObstacleMap& map, const std::vector<Box>& exclude_boxes) {
+  const bool same_pose = pose_.matrix() == map.map_from_fixed.matrix();
+  if (given_ == map.surface && (same_pose || exclude_boxes.empty())) return;
+  clear();
+  std::shared_ptr<const VoxelSurface> reduced = map.surface;
+  if (map.surface && !exclude_boxes.empty()) {
+    RemainingLeaves remaining =
+        leavesOutside(map.surface->leaves(), map.surface->resolution(), map.map_from_fixed.inverse(), exclude_boxes);
+    if (remaining.excluded_voxels > 0) {
+      reduced = VoxelSurface::build(map.surface->resolution(), std::move(remaining.leaves));
+    }
+    excluded_voxels = remaining.excluded_voxels;
   }
-  return boundsReach(body, part.step.map, map_reduced->bounds(), distance_m);
+  surface = std::move(reduced);
+  given_ = map.surface;
+  pose_ = map.map_from_fixed;
 }
 
 /// False where the deadline cut it.
-bool History::Impl::runMapOf(std::size_t b, const Part& part, ObstacleStats& total) {
-  const SceneBody& body = scene.bodies()[b];
+bool MapSearch::runBody(const Part& part, std::size_t b, std::vector<MapAnswer>& known, ObstacleStats& total,
+                        Findings& result) {
+  const SceneBody& body = part.scene.bodies()[b];
+  const double separation_m = part.scene.separation(b, OBSTACLE_BODY);
   const Deadline::Clock::time_point start = Deadline::Clock::now();
   const std::uint64_t in_before = total.pairs_in, out_before = result.contacts.size();
-  const Effect effect = body.uncertain                           ? Effect::TRACKER_NOISE
-                        : scene.separation(b, OBSTACLE_BODY) > 0 ? Effect::MINIMUM_SEPARATION
-                                                                 : Effect::OCTOMAP;
+  const Effect effect = body.uncertain     ? Effect::TRACKER_NOISE
+                        : separation_m > 0 ? Effect::MINIMUM_SEPARATION
+                                           : Effect::OCTOMAP;
   const auto count = [&] {
     result.stats[effect] += StageStats{total.pairs_in - in_before, result.contacts.size() - out_before, msSince(start)};
   };
   if (!reachesMap(b, part)) {
-    if (b < carried.map.size()) carried.map[b] = MapAnswer();  // of a map that it did reach
+    if (b < known.size()) known[b] = MapAnswer();  // of a map that it did reach
     count();
     return true;
   }
-  if (!obstacle_checks[b]) {
+  if (!checks_[b]) {
     ObstacleOptions o;
-    o.accuracy = options->accuracy;
-    o.minimum_separation_m = scene.separation(b, OBSTACLE_BODY);
-    obstacle_checks[b] = std::make_unique<ObstacleCheck>(o);
+    o.accuracy = part.options().accuracy;
+    o.minimum_separation_m = separation_m;
+    checks_[b] = std::make_unique<ObstacleCheck>(o);
   }
   const Body& moving = part.step.bodies[b];
-  ObstacleQuery query{*map_reduced, *body.setup.topology, inMapFrame(part.step.map.map_from_fixed, *moving.t0, map_t0),
-                      inMapFrame(part.step.map.map_from_fixed, *moving.t1, map_t1)};
+  const Eigen::Isometry3d& map_from_fixed = part.step.map.map_from_fixed;
+  ObstacleQuery query{*part.prepared.map.surface, *body.setup.topology, inMapFrame(map_from_fixed, *moving.t0, t0_),
+                      inMapFrame(map_from_fixed, *moving.t1, t1_)};
   query.body = static_cast<std::uint16_t>(b);
-  query.observer = observer;
+  query.observer = part.observer;
   if (body.masked) {
-    obstacle_active.assign(body.setup.topology->vertexCount(), 0);
-    for (std::size_t i = 0; i < body.usedCount(); ++i) obstacle_active[body.slot_vertex[i]] = body.active[i];
-    query.vertex_active = obstacle_active.data();
+    active_.assign(body.setup.topology->vertexCount(), 0);
+    for (std::size_t i = 0; i < body.usedCount(); ++i) active_[body.slot_vertex[i]] = body.active[i];
+    query.vertex_active = active_.data();
   }
   if (body.uncertain) query.vertex_radius_m = moving.radius_m->data();
-  if (found_limit != FoundLimit::NONE) query.most_found = found_limit - std::min(found_limit, result.contacts.size());
-  if (takeMapAnswer(b, part, query.most_found, total)) {
+  if (part.found_limit != FoundLimit::NONE) {
+    query.most_found = part.found_limit - std::min(part.found_limit, result.contacts.size());
+  }
+  const MapAnswer* answer = takeAnswer(b, part, known);
+  if (answer && answer->contacts.size() <= query.most_found) {
+    result.contacts.insert(result.contacts.end(), answer->contacts.begin(), answer->contacts.end());
+    total.pairs_in += answer->pairs;
+    ++result.stats.map_answers_kept;
     count();
     return true;
   }
-  query.deadline = part.deadline.movedBy(-per_hit * static_cast<std::int64_t>(result.contacts.size()));
-  const bool whole = obstacle_checks[b]->run(query, result.contacts, total);
-  if (obstacle_checks[b]->isFull()) result.cut = true;
-  if (whole && !obstacle_checks[b]->isFull()) keepMapAnswer(b, part, out_before, total.pairs_in - in_before);
+  query.deadline = part.deadline.movedBy(-part.per_hit * static_cast<std::int64_t>(result.contacts.size()));
+  const bool whole = checks_[b]->run(query, result.contacts, total);
+  if (checks_[b]->isFull()) {
+    result.cut = true;
+  } else if (whole) {
+    keepAnswer(b, part, result.contacts, out_before, total.pairs_in - in_before, known);
+  }
   count();
   return whole;
 }
 
-void History::Impl::runMap(const Part& part) {
+void MapSearch::run(const Part& part, std::vector<MapAnswer>& known, Findings& result) {
   const Deadline::Clock::time_point start = Deadline::Clock::now();
-  obstacle_checks.resize(scene.bodies().size());
+  const std::vector<SceneBody>& bodies = part.scene.bodies();
+  checks_.resize(bodies.size());
   ObstacleStats total;
   const std::size_t before = result.contacts.size();
-  for (std::size_t b = 0; b < scene.bodies().size(); ++b) {
-    if (!meetsMap(scene.bodies()[b].setup) || runMapOf(b, part, total)) continue;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!meetsMap(bodies[b].setup) || runBody(part, b, known, total, result)) continue;
     result.complete = false;
     result.unchecked_toc_lower = 0;
     result.start_state_complete = false;
@@ -141,7 +178,7 @@ void History::Impl::runMap(const Part& part) {
     result.stats.initial += c.initial;
     result.stats.leaving += c.leaving;
     result.stats.undecided += c.certainty == Certainty::UNDECIDED;
-    if (!c.initial || !checksStartState(part)) continue;
+    if (!c.initial || !part.checksStartState()) continue;
     result.start_state = StartState::INTERSECTING;
     if (c.kind != PairKind::VERTEX_VOXEL_FACE) continue;
     StartIntersection s;

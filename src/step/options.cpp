@@ -5,6 +5,7 @@
 
 #include "dccd/accuracy.h"
 #include "step/conclude.h"
+#include "step/expected_contacts.h"
 #include "step/option_rows.h"
 
 namespace dccd {

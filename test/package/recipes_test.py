@@ -37,17 +37,17 @@ RUNG = {
         ('{"exact", makeExactRung, false},\n', '{"exact", makeExactRung, false},\n    {"toy", makeToyRung, false},\n')],
 }
 EFFECT = {
-    'include/dccd/outcome.h': ('ROW(PATCHES, patches)\n', 'ROW(PATCHES, patches) \\\n  ROW(TOY, toy)\n'),
+    'include/dccd/outcome.h': ('ROW(CLEARANCE, clearance)\n', 'ROW(CLEARANCE, clearance) \\\n  ROW(TOY, toy)\n'),
     'src/step/effect_plan.cpp': [
         ('/// By Effect:', 'Finding toy(const EffectScene& scene) {\n'
                           '  return scene.bodies.size() > 1 ? wanted("toys like company") : notWanted("a toy is alone");\n}\n\n'
                           '/// By Effect:'),
-        (' patches,\n};', ' patches, toy,\n};')],
-    'src/step/detect.cpp': ('  if (options->patches) patches.list(outcome);\n',
-                            '  if (options->patches) patches.list(outcome);\n'
-                            '  if (options->toy) outcome.stats[Effect::TOY].in = step.bodies.size();\n'),
+        (' clearance,\n};', ' clearance, toy,\n};')],
+    'src/step/detect.cpp': ('  if (options.patches) patches.list(outcome);\n',
+                            '  if (options.patches) patches.list(outcome);\n'
+                            '  if (options.toy) outcome.stats[Effect::TOY].in = step.bodies.size();\n'),
     'include/dccd/detect.h': ('  bool patches = false;', '  bool toy = true;\n  bool patches = false;'),
-    'src/step/option_rows.h': [('expected, patches, excluded]', 'expected, toy, patches, excluded]'),
+    'src/step/option_rows.h': [('expected, patches, clearance, excluded]', 'expected, toy, patches, clearance, excluded]'),
                                ('recorded(patches)', 'recorded(toy), recorded(patches)')],
     'msg/StepStats.msg': ('float64 patches_ms\n', 'float64 patches_ms\nuint64 toy_in\nuint64 toy_out\nfloat64 toy_ms\n'),
 }
@@ -100,16 +100,15 @@ def recipe(kind):
     return set(re.findall(r'`((?:include|src|msg)/[\w./]+)`', text))
 
 
-def apply(edits, tree):
+def edited(edits):
+    """The files' texts with the edits, by name."""
+    texts = {}
     for name, changes in edits.items():
-        path = tree / name
         for before, after in changes if isinstance(changes, list) else [changes]:
-            if before is None:
-                path.write_text(after)
-                continue
-            text = path.read_text()
-            assert text.count(before) >= 1, '%s has no %r' % (name, before)
-            path.write_text(text.replace(before, after, 1))
+            text = '' if before is None else texts.get(name) or (CHECKOUT / name).read_text()
+            assert before is None or before in text, '%s has no %r' % (name, before)
+            texts[name] = text.replace(before, after, 1) if before else after
+    return texts
 
 
 class RecipesTest(unittest.TestCase):
@@ -120,6 +119,7 @@ class RecipesTest(unittest.TestCase):
             self.assertLessEqual(set(edits) - new, named, kind)
             self.assertLessEqual({str(pathlib.Path(name).parent) + '/' for name in new}, named, kind)
             self.assertLessEqual(len(edits), most)
+            self.assertEqual(set(edited(edits)), set(edits))
 
     @unittest.skipUnless(os.environ.get('DEFORMABLE_CCD_LONG'), 'builds the core anew: --long')
     def test_toys_are_built_and_seen(self):
@@ -129,8 +129,8 @@ class RecipesTest(unittest.TestCase):
                 to = tree / path.relative_to(CHECKOUT)
                 to.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(path, to)
-            apply(RUNG, tree)
-            apply(EFFECT, tree)
+            for name, text in {**edited(RUNG), **edited(EFFECT)}.items():
+                (tree / name).write_text(text)
             (tree / 'user.cpp').write_text(USER)
             build = tree / 'build'
             for command in (['cmake', '-S', str(tree), '-B', str(build), '-DDEFORMABLE_CCD_CORE_ONLY=ON', '-DDEFORMABLE_CCD_TESTS=OFF'],

@@ -6,6 +6,7 @@
 
 #include "obstacle/start_contact.h"
 #include "step/conclude.h"
+#include "step/map.h"
 #include "step/start/segment_triangle.h"
 
 namespace dccd {

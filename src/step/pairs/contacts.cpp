@@ -52,9 +52,7 @@ class InitialMarks {
   alignas(64) double positions_[4 * CAPACITY][8] = {};
 };
 
-}  // namespace
-
-void History::Impl::writeContact(PairKind kind, const Hit& hit, Contact& c) const {
+void writeContact(const SceneArrays& scene, PairKind kind, const Hit& hit, Contact& c) {
   c.kind = kind;
   c.toc_lower = hit.toc_lower;
   c.toc_upper = hit.toc_upper;
@@ -65,35 +63,38 @@ void History::Impl::writeContact(PairKind kind, const Hit& hit, Contact& c) cons
   scene.featureVertices(secondKind(kind), c.body[1], static_cast<Index>(hit.key), c.vertex.data() + first_size);
 }
 
-/// What is undecided when the deadline is over may be new: nothing is computed for it any more.
-void History::Impl::collect(const Step& step, const Deadline& deadline) {
+}  // namespace
+
+void PairSearch::collect(const Part& part, Findings& result) {
+  const SceneArrays& scene = part.scene;
+  const Threads& threads = part.prepared.threads;
   const Clock::time_point start = Clock::now();
-  for (const PairWorker& w : workers) {
+  for (const PairWorker& w : workers_) {
     result.stats += w.stats();
     result.unchecked_toc_lower = std::min(result.unchecked_toc_lower, w.uncheckedTocLower());
   }
   constexpr std::array<PairKind, 2> KINDS{PairKind::VERTEX_FACE, PairKind::EDGE_EDGE};
   std::size_t all = 0;
-  for (const PairWorker& w : workers) {
+  for (const PairWorker& w : workers_) {
     for (const PairKind kind : KINDS) all += w.hits(kind).size();
   }
-  parallel(2, all < HITS_TO_SHARE ? 2 : 1, [&](std::size_t first, std::size_t last) {
+  threads(2, all < HITS_TO_SHARE ? 2 : 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       std::vector<const std::vector<Hit>*> parts;
-      for (const PairWorker& w : workers) parts.push_back(&w.hits(KINDS[k]));
-      order[k].sort(std::move(parts));
+      for (const PairWorker& w : workers_) parts.push_back(&w.hits(KINDS[k]));
+      order_[k].sort(std::move(parts));
       if (KINDS[k] == PairKind::VERTEX_FACE) result.contacts.assign(all, Contact());  // there are fewer of these
     }
   });
   std::size_t base = 0;
   for (std::size_t k = 0; k < KINDS.size(); ++k) {
     const PairKind kind = KINDS[k];
-    const HitOrder& sorted = order[k];
-    parallel(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
-      InitialMarks marks(step);
+    const HitOrder& sorted = order_[k];
+    threads(sorted.size(), CONTACT_PIECE, [&](std::size_t first, std::size_t last) {
+      InitialMarks marks(part.step);
       bool late = false;
       for (std::size_t i = first; i < last; ++i) {
-        if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || deadline.isOver();
+        if (i % CONTACTS_PER_LOOK_AT_THE_CLOCK == 0) late = late || part.deadline.isOver();
         // Sorted by key, the hits lie anywhere in memory: the next ones are fetched while this one is written.
         if (i + HITS_AHEAD < last) {
           const Hit& next = sorted[i + HITS_AHEAD];
@@ -105,7 +106,7 @@ void History::Impl::collect(const Step& step, const Deadline& deadline) {
           scene.prefetchFeature(secondKind(kind), later.bodies & 0xffff, static_cast<Index>(later.key));
         }
         Contact& contact = result.contacts[base + i];
-        writeContact(kind, sorted[i], contact);
+        writeContact(scene, kind, sorted[i], contact);
         if (contact.toc_lower > 0 || (late && contact.certainty == Certainty::UNDECIDED)) continue;
         // Closer than a separation counts as meeting: of such pairs the time of contact itself is the answer.
         contact.initial = scene.separation(contact.body[0], contact.body[1]) > 0 || scene.uncertain();

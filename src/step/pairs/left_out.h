@@ -5,11 +5,16 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "culling/scene_arrays.h"
 
 namespace dccd {
+
+struct Options;
+struct Prepared;
+class PairSearch;
 
 /// A pair of features by their ranks, the first one's << 32 | the second one's, and how far they are apart in the
 /// reference frame [m].
@@ -46,6 +51,23 @@ class LeftOutOfBody {
     std::vector<double> distances_m;
   };
   Table tables_[2];  // by PairKind
+};
+
+/// All bodies' pairs.
+struct LeftOut {
+  std::vector<LeftOutOfBody> of_body;
+  std::vector<LeftOutPair> list;    ///< the same, in the order of the bodies, kinds, features
+  std::vector<double> distances_m;  ///< of each one of the list, in the reference frame
+
+  /// Those that a step without motion in the reference frames calls contacts: exactly those that would be contacts for
+  /// as long as the body keeps its shape. step: one of the bodies that the scene holds. The scene is left at rest.
+  void find(const Step& step, const Prepared& prepared, SceneArrays& scene, PairSearch& pairs);
+  /// Of a pair that only uncertainty leaves out it is not known whether it comes as near as that. A sentence a body.
+  void sayForNoise(const Step& step, const Options& options, const SceneArrays& scene,
+                   std::vector<std::string>& unproved) const;
+
+ private:
+  void add(std::size_t body, PairKind kind, const SceneArrays& scene, const PairSearch& pairs);
 };
 
 /// Distance of two features at rest [m], in double. Points as in Contact: VF vertex, face; EE edge, edge.

@@ -1,31 +1,68 @@
-// What meets, or is inside of something, where a step begins: when it is looked for, for how long, and what is kept of
-// it.
+#include "step/start/start.h"
+
+#include <functional>
+
 #include "step/history.h"
 
 namespace dccd {
+namespace {
 
 using Clock = Deadline::Clock;
 
-void History::Impl::runStartState(const Part& part, Clock::time_point begin, bool all_known) {
+/// By the step that this one begins at.
+bool isStartKnown(const Part& part) {
+  if (!part.begins_at) return false;
+  const Carried& before = part.begins_at->carried;
+  return !before.end.empty() && before.start_state.knowsEnd() && before.inside.knowsEnd();
+}
+
+/// What meets or is inside at t=0; with earliest_only one that meets is enough. False: the deadline ended it. The
+/// vertices come first, for they are few.
+bool listStart(const Part& part, const Deadline& deadline, const std::vector<Unfolded>& unfolded, Carried& carried,
+               Findings& result, std::vector<StartIntersection>& met) {
+  std::vector<StartIntersection> inside;
+  bool whole = false;
+  const Options& options = part.options();
+  if (isStartKnown(part)) {
+    History::Impl& before = *part.begins_at;
+    whole = before.carried.inside.listEnd(before.scene, deadline, inside);
+    whole = before.carried.start_state.listEnd(before.scene, deadline, met) && whole;
+  } else {
+    const Threads& threads = part.prepared.threads;
+    inside = carried.inside.run(part.scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
+    met = carried.start_state.run(part.scene, part.continues, deadline, result.stats,
+                                  {foundLimit(options, part.scene.bodies()), options.earliest_only, &unfolded},
+                                  threads.count(), std::cref(threads));
+    const bool is_enough = options.earliest_only && !met.empty();
+    if (carried.start_state.isCut() && !is_enough) result.cut = true;
+    whole = is_enough || (carried.inside.isWhole() && carried.start_state.isWhole());
+  }
+  met.insert(met.end(), inside.begin(), inside.end());
+  return whole;
+}
+
+}  // namespace
+
+bool searchesStart(const Part& part, const Carried& carried) {
+  return part.checksStartState() && !isStartKnown(part) && carried.start_state.needsTrees(part.continues);
+}
+
+void findStartState(const Part& part, bool all_known, const std::vector<Unfolded>& unfolded, Carried& carried,
+                    Findings& result) {
   const auto forget = [&] {
     carried.start_state.clear();
     carried.inside.clear();
   };
   // Edges alone have no inside, and do not cross but in a contact.
-  if (!checksStartState(part) || !(scene.hasFaces() || map_reduced)) return forget();
+  if (!part.checksStartState() || !(part.scene.hasFaces() || part.prepared.map.surface)) return forget();
   const Clock::time_point start = Clock::now();
   StepStats& stats = result.stats;
-  Deadline deadline = part.deadline;
-  if (!deadline.isNever()) {
-    // Later parts need as much time for their pairs; what is over that is shared.
-    const auto later = static_cast<Clock::rep>(part.count - part.index - 1);
-    const Clock::duration slack = deadline.at() - start - later * (start - begin);
-    // Contacts are still to be joined, counted and cut.
-    const auto concluding = per_hit * static_cast<std::int64_t>(result.contacts.size());
-    deadline = deadline.movedTo(start + slack / (later + 1) - concluding);
-  }
+  // Contacts are still to be joined, counted and cut.
+  const auto concluding = part.per_hit * static_cast<std::int64_t>(result.contacts.size());
+  const Deadline deadline = part.shareFrom(start).movedBy(-concluding);
   std::vector<StartIntersection> met;
-  result.start_state_complete = listStart(part, deadline, met) && result.start_state_complete;
+  result.start_state_complete =
+      listStart(part, deadline, unfolded, carried, result, met) && result.start_state_complete;
   if (!met.empty()) {
     result.start_state = StartState::INTERSECTING;
   } else if (!result.start_state_complete && result.start_state == StartState::CLEAR) {
@@ -36,49 +73,15 @@ void History::Impl::runStartState(const Part& part, Clock::time_point begin, boo
   } else {
     result.intersections.insert(result.intersections.begin(), met.begin(), met.end());
   }
-  if (isStartKnown()) {
+  if (isStartKnown(part)) {
     forget();
   } else {
     const bool complete = all_known && stats.unchecked_vertices == 0;
-    carried.start_state.remember(scene, result.contacts, complete);
-    carried.inside.remember(scene, result.contacts, complete);
+    carried.start_state.remember(part.scene, result.contacts, complete);
+    carried.inside.remember(part.scene, result.contacts, complete);
   }
   stats[Stage::START_STATE].ms += msSince(start);
   stats[Effect::START_STATE].ms = stats[Stage::START_STATE].ms;
-}
-
-/// What meets or is inside at t=0; with earliest_only one that meets is enough. False: the deadline ended it. The
-/// vertices come first, for they are few.
-bool History::Impl::listStart(const Part& part, const Deadline& deadline, std::vector<StartIntersection>& met) {
-  std::vector<StartIntersection> inside;
-  bool whole = false;
-  if (isStartKnown()) {
-    const SceneArrays& before = begins_at->scene;
-    whole = begins_at->carried.inside.listEnd(before, deadline, inside);
-    whole = begins_at->carried.start_state.listEnd(before, deadline, met) && whole;
-  } else {
-    inside = carried.inside.run(scene, part.continues, carried.start_state.beforeListing(deadline), result.stats);
-    met = carried.start_state.run(scene, part.continues, deadline, result.stats,
-                                  {foundLimit(), options->earliest_only, &unfolded},
-                                  static_cast<std::size_t>(options->num_threads),
-                                  [&](std::size_t n, std::size_t piece, const auto& f) { parallel(n, piece, f); });
-    const bool is_enough = options->earliest_only && !met.empty();
-    if (carried.start_state.isCut() && !is_enough) result.cut = true;
-    whole = is_enough || (carried.inside.isWhole() && carried.start_state.isWhole());
-  }
-  met.insert(met.end(), inside.begin(), inside.end());
-  return whole;
-}
-
-/// Of a step aside from all others only the first part is asked about: nothing is carried over from it.
-bool History::Impl::checksStartState(const Part& part) const {
-  return options->check_start_state && (part.index == 0 || !aside);
-}
-
-/// By the step that this one begins at.
-bool History::Impl::isStartKnown() const {
-  return begins_at && !begins_at->carried.end.empty() && begins_at->carried.start_state.knowsEnd() &&
-         begins_at->carried.inside.knowsEnd();
 }
 
 }  // namespace dccd

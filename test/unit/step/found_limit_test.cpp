@@ -219,6 +219,26 @@ TEST(FoundLimit, TheMapIsCutAsWell) {
   expectSameAnswer(again.run(step), cut);
 }
 
+// A first contact is looked for in two searches: what the first one found counts once, before the map's turn, too.
+TEST(FoundLimit, ALimitThatIsNotReachedLeavesTheMapItsShare) {
+  Step step = crumpled(3, 2, 40).motion();
+  std::vector<OccupiedLeaf> leaves;
+  for (std::uint16_t i = 0; i < 40; ++i) leaves.push_back({{static_cast<std::uint16_t>(32768 + i), 32768, 32768}, 1});
+  step.map.surface = VoxelSurface::build(1.0, leaves);
+  Options options;
+  options.earliest_only = true;
+  const Outcome full = runOnceWith(options, step);
+  const std::uint64_t by_pairs = full.stats[Stage::SORT].out, by_map = full.stats[Stage::OBSTACLE].out;
+  ASSERT_GT(by_pairs, 100u);
+  ASSERT_GT(by_map, 10u);
+  options.max_found = by_pairs + by_map;
+  const Outcome whole = runOnceWith(options, step);
+  EXPECT_FALSE(whole.cut);
+  expectSameAnswer(whole, full);
+  --options.max_found;
+  EXPECT_TRUE(runOnceWith(options, step).cut);
+}
+
 // A task that ended early is one behind the cut.
 TEST(FoundLimit, CutsInTheOrderOfTheTasks) {
   FoundLimit found;

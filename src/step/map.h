@@ -1,0 +1,57 @@
+// A part of a step against the map.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "dccd/outcome.h"
+#include "dccd/voxel_surface.h"
+
+namespace dccd {
+
+struct Part;
+
+/// `fixed` itself where the frames are the same, else `moved`, filled with the positions in the map's frame [m].
+const Positions& inMapFrame(const Eigen::Isometry3d& map_from_fixed, const Positions& fixed, Positions& moved);
+
+/// A step's map without what exclude_boxes leave out.
+struct ReducedMap {
+  std::shared_ptr<const VoxelSurface> surface;  ///< null: there is none
+  std::uint64_t excluded_voxels = 0;
+
+  /// Made anew where it is another map, or where it lies elsewhere under the boxes, which are the same until clear().
+  void set(const ObstacleMap& map, const std::vector<Box>& exclude_boxes);
+  void clear() noexcept;
+
+ private:
+  std::shared_ptr<const VoxelSurface> given_;
+  Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
+};
+
+/// The contacts of a body with the map, as long as neither changes.
+struct MapAnswer {
+  std::shared_ptr<const VoxelSurface> map;  ///< null: none
+  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
+  std::vector<Contact> contacts;
+  std::uint64_t pairs = 0;  ///< that were tested
+};
+
+class MapSearch {
+ public:
+  /// Options or bodies change.
+  void forget() { checks_.clear(); }
+  /// Adds what the bodies touch; known: of bodies that do not move it is taken from there, and kept there. Where the
+  /// deadline ends it, the result is not complete and its bound on what was left out is 0.
+  void run(const Part& part, std::vector<MapAnswer>& known, Findings& result);
+
+ private:
+  bool runBody(const Part& part, std::size_t body, std::vector<MapAnswer>& known, ObstacleStats& total,
+               Findings& result);
+
+  std::vector<std::unique_ptr<ObstacleCheck>> checks_;  // per body, once it came near
+  std::vector<std::uint8_t> active_;
+  Positions t0_, t1_;
+};
+
+}  // namespace dccd

@@ -1,0 +1,66 @@
+#include "step/pairs/self_tests.h"
+
+#include <functional>
+
+#include "step/history.h"
+#include "step/observer.h"
+
+namespace dccd {
+namespace {
+
+// A body whose vertices all move by exactly the same vector keeps its shape: what was apart at the end of the last step
+// stays apart. (A rotation is no such motion: straight vertex paths deform the body.)
+bool staysApart(const Part& part, std::size_t b, const std::vector<std::uint8_t>& apart) {
+  const SceneBody& body = part.scene.bodies()[b];
+  return part.continues && b < apart.size() && apart[b] && body.translates && !body.uncertain;
+}
+
+bool mayBeUnfolded(const Part& part, std::size_t b) {
+  const SceneBody& body = part.scene.bodies()[b];
+  // With a distance, not touching is not enough. Brute force is for comparisons, so nothing is culled there.
+  if (!part.options().unfolded_test || part.options().broad_phase == BroadPhase::BRUTE_FORCE) return false;
+  return part.scene.separation(b, b) == 0 && !body.uncertain && !body.masked;
+}
+
+}  // namespace
+
+void SelfTests::setBodies(const std::vector<SceneBody>& bodies) {
+  unfolded_.clear();
+  for (const SceneBody& body : bodies) unfolded_.emplace_back(body);
+}
+
+void SelfTests::choose(const Part& part, const std::vector<std::uint8_t>& apart, StepStats& stats) {
+  const std::vector<SceneBody>& bodies = part.scene.bodies();
+  tested_.assign(bodies.size(), 0);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!meetsItself(bodies[b].setup)) continue;
+    unfolded_[b].clear();
+    if (staysApart(part, b, apart)) {
+      if (part.observer) {
+        part.observer->onSelfLeftOut(b, "the whole body moves without turning, and was apart from itself before");
+      }
+      continue;
+    }
+    const Deadline::Clock::time_point start = Deadline::Clock::now();
+    const bool whole = certify(part, b, stats);
+    stats[Effect::SELF_COLLISION].ms += msSince(start);
+    tested_[b] = !whole;
+    if (whole && part.observer) {
+      part.observer->onSelfLeftOut(b, "the whole surface certainly does not fold onto itself in this step");
+    }
+  }
+}
+
+/// True: all of it is certified.
+bool SelfTests::certify(const Part& part, std::size_t b, StepStats& stats) {
+  if (!mayBeUnfolded(part, b)) return false;
+  Unfolded& unfolded = unfolded_[b];
+  unfolded.run(part.scene.bodies()[b], part.scene.vertices(), std::cref(part.prepared.threads));
+  const bool whole = unfolded.isWhole();
+  if (part.observer && !whole) unfolded.clear();  // it wants to see the pairs
+  stats.unfolded_bodies += whole;
+  stats.unfolded_parts += whole ? 0 : unfolded.partCount();
+  return whole;
+}
+
+}  // namespace dccd

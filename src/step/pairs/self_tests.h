@@ -1,0 +1,31 @@
+// Which bodies a part of a step tests against themselves, and what of them certainly does not fold.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "culling/unfolded.h"
+#include "dccd/outcome.h"
+
+namespace dccd {
+
+struct Part;
+
+class SelfTests {
+ public:
+  void setBodies(const std::vector<SceneBody>& bodies);
+  /// apart: Carried::apart.
+  void choose(const Part& part, const std::vector<std::uint8_t>& apart, StepStats& stats);
+
+  /// Per body: its pairs with itself are looked at, but for those in its unfolded parts.
+  const std::vector<std::uint8_t>& tested() const { return tested_; }
+  const std::vector<Unfolded>& unfolded() const { return unfolded_; }
+
+ private:
+  bool certify(const Part& part, std::size_t body, StepStats& stats);
+
+  std::vector<std::uint8_t> tested_;
+  std::vector<Unfolded> unfolded_;  // per body
+};
+
+}  // namespace dccd
