@@ -202,6 +202,7 @@ def write_first(folder, rows):
 TIERS = {
     "coincidence": "vertices of both features in one place at the start: a comparison of bits",
     "batch": "ordinary pairs: doubles with proved bounds, pairs as lanes",
+    "in a plane": "all in a plane across an axis, at the start or throughout: doubles with proved bounds",
     "axis motion": "motion along one axis: integers of one or two words",
     "simple times": "features at rest, contacts at times such as 1/2 and 1/3, motion along one axis: the same integers",
     "subdivision": "features that are apart while their polynomials vanish",
