@@ -35,6 +35,7 @@ enum LeftOut {
   NOTHING,
   COINCIDENCE,
   BATCH,
+  IN_PLANE,
   AXIS_MOTION,
   SIMPLE_TIMES,
   SUBDIVISION,
@@ -46,6 +47,7 @@ enum LeftOut {
 constexpr const char* NAMES[] = {"",
                                  "coincidence",
                                  "batch",
+                                 "in a plane",
                                  "axis motion",
                                  "simple times",
                                  "subdivision",
@@ -79,6 +81,7 @@ bool isOut(LeftOut tier) {
 namespace dccd {
 
 DCCD_TIER(Coincidence, "_ZN4dccd5exact19decideByCoincidence")
+DCCD_TIER(InPlane, "_ZN4dccd5exact13decideInPlane")
 DCCD_TIER(SimpleTime, "_ZN4dccd5exact18decideAtSimpleTime")
 DCCD_TIER(AlongAxis, "_ZN4dccd5exact15decideAlongAxis")
 DCCD_TIER(DoubleDouble, "_ZN4dccd5exact20decideByDoubleDouble")
@@ -94,6 +97,7 @@ DCCD_WRAPPED(void, Batch, "_ZN4dccd4simd10exactBatchERKNS0_10BatchInputERKNS0_11
              (const simd::BatchInput& input, const simd::BatchOutput& output))
 
 DCCD_LEFT_OUT(Coincidence, COINCIDENCE, exact::undecided(Tier::COINCIDENCE))
+DCCD_LEFT_OUT(InPlane, IN_PLANE, exact::undecided(Tier::DOUBLE_DOUBLE))
 DCCD_LEFT_OUT(SimpleTime, SIMPLE_TIMES, exact::undecided(Tier::FIXED_INTEGER))
 DCCD_LEFT_OUT(AlongAxis, AXIS_MOTION, exact::undecided(Tier::FIXED_INTEGER))
 DCCD_LEFT_OUT(DoubleDouble, DOUBLE_DOUBLE, exact::undecided(Tier::DOUBLE_DOUBLE))

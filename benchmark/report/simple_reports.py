@@ -202,6 +202,7 @@ def write_first(folder, rows):
 TIERS = {
     "coincidence": "vertices of both features in one place at the start: a comparison of bits",
     "batch": "ordinary pairs: doubles with proved bounds, pairs as lanes",
+    "in a plane": "all in a plane across an axis, at the start or throughout: doubles with proved bounds",
     "axis motion": "motion along one axis: integers of one or two words",
     "simple times": "features at rest, contacts at times such as 1/2 and 1/3, motion along one axis: the same integers",
     "subdivision": "features that are apart while their polynomials vanish",
@@ -254,16 +255,18 @@ def write_budget(folder, result):
 
 
 def write_culling(folder, result):
-    header = ["case", "triangles", "contacts", "certified", "parts", "pairs of clusters left out", "without, median ms", "with, median ms", "ratio (quartiles)"]
+    header = ["case", "triangles", "steps", "certified", "parts", "contacts", "pairs of clusters a step", "looked at", "without, median ms a step",
+              "with, median ms", "ratio (quartiles)"]
     rows = []
     for r in result["runs"]:
         q = r["ratio"]
-        rows.append([r["case"], str(r["triangles"]), str(r["contacts"]), "yes" if r["certified"] else "no", str(r["parts"]), str(r["pairs"]),
-                     "%.2f" % r["without_ms"]["median"], "%.2f" % r["with_ms"]["median"],
+        rows.append([r["case"], str(r["triangles"]), str(r["steps"]), str(r["certified"]), str(r["parts"]), str(r["contacts"]),
+                     "%.0f" % r["cluster_pairs"], "%.0f" % r["looked_at"],
+                     "%.3g" % r["without_ms"]["median"], "%.3g" % r["with_ms"]["median"],
                      "%.2f (%.2f to %.2f)" % (q["median"], q["quartile_1"], q["quartile_3"])])
     write_rows(os.path.join(folder, "culling.csv"), header, rows)
     return save(folder, "culling", "# Surfaces that do not fold\n\nThe step with and without the certificates of surfaces "
-                "that do not fold, runs in turn.\n\n" + table(header, rows))
+                "that do not fold, processor time of runs in turn.\n\n" + table(header, rows))
 
 
 def write_clearance(folder, result):

@@ -98,6 +98,7 @@ class SceneBenchmark {
         [this](const SceneBodies& scene, const Step& step) {
           triangles_ = scene.triangle_count;
           broad_phase_.setBodies(scene.bodies, step.vertices.data());
+          cones_.setBodies(scene, step);
         },
         [this](const Step& step) {
           for (Measurement& m : measurements_) {
@@ -122,10 +123,11 @@ class SceneBenchmark {
  private:
   void measure(const Step& step, Measurement& m) {
     records_.build(step.vertices.data(), step.vertices.size());
+    cones_.certify(step);
     const SweptBounds bounds = arguments_.bounds == "dop16" ? SweptBounds::DOP16 : SweptBounds::DOP18;
     broad_phase_.refit(step.vertices.data(), records_, nullptr, 0, bounds);
     for (std::size_t r = 0; r < arguments_.repeat; ++r) {
-      PipelineRunner runner(step, records_, arguments_.elementary_every);
+      PipelineRunner runner(step, records_, cones_, arguments_.elementary_every);
       broad_phase_.enumerate(TrianglePairs::HIERARCHY, runner);
       runner.finish();
       add(m.runs[r], runner.counts());
@@ -144,13 +146,14 @@ class SceneBenchmark {
       contacts[k] = step.has_truth ? step.true_contacts[k] : exactContacts(step, kind, runner.sample(kind));
       if (step.has_truth) m.true_contacts += contacts[k].size();
     }
-    const std::string lost = lostContacts(step, records_, contacts, m.checked);
+    const std::string lost = lostContacts(step, records_, cones_, contacts, m.checked);
     if (!lost.empty()) throw std::runtime_error("frame " + std::to_string(step.frame) + ": " + lost);
   }
 
   Arguments arguments_;
   std::vector<Measurement> measurements_;
   TriangleCandidates broad_phase_;
+  NormalCones cones_;
   PaperRecords records_;
   std::size_t triangles_ = 0;
 };

@@ -14,7 +14,22 @@ constexpr std::size_t BLOCK = std::size_t{1} << 18;  // pairs: 4 MiB, so that fi
 constexpr std::size_t CHUNK = 2048;
 constexpr std::size_t SAMPLE = 20000;
 
-Filter paper(PaperFilter filter) { return {filter, false}; }
+Filter paper(PaperFilter filter) { return {filter, Filter::Own::NONE}; }
+constexpr Filter FUSED{PaperFilter::COUNT, Filter::Own::FUSED}, CONES{PaperFilter::COUNT, Filter::Own::CONES};
+
+/// Pairs that a filter keeps; `places` has room for as many as come in.
+std::size_t keep(const Filter& filter, const Step& step, const PaperRecords& records, const NormalCones& cones,
+                 PairKind kind, const Quad* pairs, std::size_t count, std::vector<std::uint32_t>& places, Quad* out) {
+  if (count == 0) return 0;
+  if (filter.own == Filter::Own::CONES) return cones.keep(kind, pairs, count, out);
+  if (filter.own == Filter::Own::NONE) {
+    return filterPairs(filter.paper, kind, records, step.vertices.data(), pairs, count, out);
+  }
+  const std::size_t kept = simd::fusedFilter(step.vertices.data()->t0, pairs->data(), count,
+                                             kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, places.data());
+  for (std::size_t i = 0; i < kept; ++i) out[i] = pairs[places[i]];
+  return kept;
+}
 
 }  // namespace
 
@@ -28,7 +43,9 @@ const std::vector<Pipeline>& pipelines() {
       {"linear", {paper(PaperFilter::LINEAR)}, false},
       {"linear+planar", {paper(PaperFilter::LINEAR), paper(PaperFilter::PLANAR_PAPER)}, false},
       {"linear+planar_branch_free", {paper(PaperFilter::LINEAR), paper(PaperFilter::PLANAR_BRANCH_FREE)}, false},
-      {"linear+fused", {paper(PaperFilter::LINEAR), {PaperFilter::COUNT, true}}, false},
+      {"linear+fused", {paper(PaperFilter::LINEAR), FUSED}, false},
+      {"cones+linear+planar", {CONES, paper(PaperFilter::LINEAR), paper(PaperFilter::PLANAR_PAPER)}, false},
+      {"cones+linear+fused", {CONES, paper(PaperFilter::LINEAR), FUSED}, false},
   };
   return all;
 }
@@ -43,8 +60,9 @@ double PipelineCount::seconds() const {
   return sum;
 }
 
-PipelineRunner::PipelineRunner(const Step& step, const PaperRecords& records, std::size_t elementary_every)
-    : step_(step), records_(records), elementary_every_(elementary_every), chunk_(CHUNK), kept_(CHUNK) {
+PipelineRunner::PipelineRunner(const Step& step, const PaperRecords& records, const NormalCones& cones,
+                               std::size_t elementary_every)
+    : step_(step), records_(records), cones_(cones), elementary_every_(elementary_every), chunk_(CHUNK), kept_(CHUNK) {
   for (const Pipeline& p : pipelines()) {
     counts_.emplace_back();
     counts_.back().filters.resize(p.filters.size());
@@ -72,18 +90,6 @@ void PipelineRunner::runBlock(PairKind kind) {
   block.clear();
 }
 
-std::size_t PipelineRunner::runFilter(const Filter& filter, PairKind kind, const Quad* pairs, std::size_t count,
-                                      Quad* out) {
-  if (!filter.fused) {
-    return filterPairs(filter.paper, kind, records_, step_.vertices.data(), pairs, count, out);
-  }
-  if (count == 0) return 0;
-  const std::size_t kept = simd::fusedFilter(step_.vertices.data()->t0, pairs->data(), count,
-                                             kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, kept_.data());
-  for (std::size_t i = 0; i < kept; ++i) out[i] = pairs[kept_[i]];
-  return kept;
-}
-
 void PipelineRunner::runPipeline(std::size_t number, PairKind kind, const std::vector<Quad>& block) {
   const Pipeline& pipeline = pipelines()[number];
   PipelineCount& total = counts_[number];
@@ -94,7 +100,7 @@ void PipelineRunner::runPipeline(std::size_t number, PairKind kind, const std::v
       StageCount& stage = total.filters[f];
       stage.in += count;
       const Stopwatch watch;
-      count = runFilter(pipeline.filters[f], kind, pairs, count, chunk_.data());
+      count = keep(pipeline.filters[f], step_, records_, cones_, kind, pairs, count, kept_, chunk_.data());
       stage.seconds += watch.seconds();
       stage.out += count;
       pairs = chunk_.data();
@@ -113,24 +119,20 @@ void PipelineRunner::runPipeline(std::size_t number, PairKind kind, const std::v
   }
 }
 
-std::string lostContacts(const Step& step, const PaperRecords& records, const std::vector<Quad> (&contacts)[2],
-                         std::size_t& checked) {
+std::string lostContacts(const Step& step, const PaperRecords& records, const NormalCones& cones,
+                         const std::vector<Quad> (&contacts)[2], std::size_t& checked) {
+  std::vector<Filter> filters{FUSED, CONES};
+  for (int f = 0; f < static_cast<int>(PaperFilter::COUNT); ++f) filters.push_back(paper(static_cast<PaperFilter>(f)));
   for (PairKind kind : {PairKind::VERTEX_FACE, PairKind::EDGE_EDGE}) {
     const std::vector<Quad>& pairs = contacts[static_cast<std::size_t>(kind)];
     checked += pairs.size();
     std::vector<Quad> kept(pairs.size());
     std::vector<std::uint32_t> places(pairs.size());
-    for (int f = 0; f <= static_cast<int>(PaperFilter::COUNT); ++f) {
-      const auto filter = static_cast<PaperFilter>(f);
-      const bool fused = filter == PaperFilter::COUNT;
-      if (pairs.empty()) continue;
-      const std::size_t n =
-          fused ? simd::fusedFilter(step.vertices.data()->t0, pairs[0].data(), pairs.size(),
-                                    kind == PairKind::EDGE_EDGE, simd::FusedPlanes::ALL, places.data())
-                : filterPairs(filter, kind, records, step.vertices.data(), pairs.data(), pairs.size(), kept.data());
+    for (const Filter& filter : filters) {
+      const std::size_t n = keep(filter, step, records, cones, kind, pairs.data(), pairs.size(), places, kept.data());
       if (n == pairs.size()) continue;
-      return std::string(fused ? "fused" : toString(filter)) + " rejects " + std::to_string(pairs.size() - n) +
-             " true contacts (" + toString(kind) + ")";
+      return std::string(filter.name()) + " rejects " + std::to_string(pairs.size() - n) + " true contacts (" +
+             toString(kind) + ")";
     }
   }
   return {};

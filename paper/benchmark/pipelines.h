@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "paper/benchmark/normal_cones.h"
 #include "paper/paper_filters.h"
 #include "paper/triangle_candidates.h"
 #include "support/steps.h"
@@ -13,11 +14,14 @@
 namespace dccd {
 namespace benchmarks {
 
-/// A filter of the paper's form, or the step's own: the fused planar and non-penetration filter.
+/// A filter of the paper's form, or one of the step's own: the fused planar and non-penetration filter, normal cones.
 struct Filter {
+  enum class Own { NONE, FUSED, CONES };
   PaperFilter paper = PaperFilter::COUNT;
-  bool fused = false;
-  const char* name() const { return fused ? "fused" : toString(paper); }
+  Own own = Own::NONE;
+  const char* name() const {
+    return own == Own::FUSED ? "fused" : own == Own::CONES ? "normal_cones" : toString(paper);
+  }
 };
 
 struct StageCount {
@@ -48,7 +52,7 @@ const std::vector<Pipeline>& pipelines();
 class PipelineRunner : public PairSink {
  public:
   /// elementary_every: 1 tests every chunk of survivors, n every n-th; 0 none.
-  PipelineRunner(const Step& step, const PaperRecords& records, std::size_t elementary_every);
+  PipelineRunner(const Step& step, const PaperRecords& records, const NormalCones& cones, std::size_t elementary_every);
   void take(PairKind kind, Quad* pairs, std::size_t count) override;
   /// To be called after the last chunk.
   void finish();
@@ -60,10 +64,10 @@ class PipelineRunner : public PairSink {
  private:
   void runBlock(PairKind kind);
   void runPipeline(std::size_t number, PairKind kind, const std::vector<Quad>& block);
-  std::size_t runFilter(const Filter& filter, PairKind kind, const Quad* pairs, std::size_t count, Quad* out);
 
   const Step& step_;
   const PaperRecords& records_;
+  const NormalCones& cones_;
   std::size_t elementary_every_;
   std::vector<Quad> block_[2], sample_[2];
   std::vector<Quad> chunk_;
@@ -74,8 +78,8 @@ class PipelineRunner : public PairSink {
 };
 
 /// Pairs that are known to meet and that some filter rejects, as text; empty when there is none. `checked` counts them.
-std::string lostContacts(const Step& step, const PaperRecords& records, const std::vector<Quad> (&contacts)[2],
-                         std::size_t& checked);
+std::string lostContacts(const Step& step, const PaperRecords& records, const NormalCones& cones,
+                         const std::vector<Quad> (&contacts)[2], std::size_t& checked);
 
 /// Those of the pairs that the exact test calls contacts.
 std::vector<Quad> exactContacts(const Step& step, PairKind kind, const std::vector<Quad>& pairs);

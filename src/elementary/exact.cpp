@@ -13,6 +13,7 @@ namespace exact {
 
 ElementaryResult decideUncertain(PairKind kind, const PairMotion& pair, int toc_bits) {
   ElementaryResult result = decideByCoincidence(kind, pair, toc_bits);
+  if (result.verdict == Verdict::UNDECIDED) result = decideInPlane(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideAtSimpleTime(kind, pair, toc_bits);
   if (result.verdict == Verdict::UNDECIDED) result = decideBySubdivision(kind, pair);
   if (result.verdict == Verdict::UNDECIDED) result = decideByDoubleDouble(kind, pair, toc_bits);

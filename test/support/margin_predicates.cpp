@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "elementary/exact_tiers.h"
 #include "obstacle/axis_predicates.h"
 #include "obstacle/static_filters.h"
 #include "obstacle/voxel_surface_impl.h"
@@ -119,7 +120,17 @@ IsWrong judgeOrientation2d(const MarginInput& input) {
   const Rational truth = (exact(x[2]) - exact(x[0])) * (exact(x[5]) - exact(x[1])) -
                          (exact(x[3]) - exact(x[1])) * (exact(x[4]) - exact(x[0]));
   const int sign = signOf(truth);
-  return [x, sign] { return orientation2d(x[0], x[1], x[2], x[3], x[4], x[5]) != sign; };
+  // The edge of the first two, and one at rest from the last one away to the left: they meet unless that is left, too.
+  PairMotion edges = {};
+  for (auto& points : edges.x) {
+    for (int i = 0; i < 3; ++i) std::copy_n(&x[2 * i], 2, points[i]);
+    points[3][0] = x[4] - 0.25 * (x[3] - x[1]), points[3][1] = x[5] + 0.25 * (x[2] - x[0]);
+  }
+  return [x, sign, edges] {
+    if (orientation2d(x[0], x[1], x[2], x[3], x[4], x[5]) != sign) return true;
+    const Verdict verdict = exact::decideInPlane(PairKind::EDGE_EDGE, edges, 32).verdict;
+    return verdict != Verdict::UNDECIDED && (verdict == Verdict::CONTACT) != (sign <= 0);
+  };
 }
 
 MarginInput orientation3dInput(RandomSource& random) {
