@@ -48,9 +48,8 @@ std::vector<OccupiedLeaf> sorted(const std::vector<OccupiedLeaf>& leaves) {
   std::vector<CodedLeaf> order(leaves.size());
   for (std::size_t i = 0; i < leaves.size(); ++i) order[i] = {codeOf(leaves[i]), static_cast<std::uint32_t>(i)};
   std::vector<CodedLeaf> other(order.size());
-  constexpr int DIGIT = 12;
-  for (int shift = 0; shift < 48; shift += DIGIT) {  // the bits of a code
-    radixPass<DIGIT>(order, other, shift, [](const CodedLeaf& leaf) { return leaf.code; });
+  for (int shift = 0; shift < 48; shift += RADIX_BITS) {  // the bits of a code
+    radixPass(order, other, shift, [](const CodedLeaf& leaf) { return leaf.code; });
   }
   std::vector<OccupiedLeaf> list(leaves.size());
   for (std::size_t i = 0; i < order.size(); ++i) list[i] = leaves[order[i].index];

@@ -9,7 +9,6 @@
 namespace dccd {
 namespace {
 
-constexpr int DIGIT = 12;
 // Below this the passes over the buckets take longer than comparing; most steps of a stream find few or none.
 constexpr std::size_t FEW = 1024;
 
@@ -26,8 +25,8 @@ std::uint64_t lowest(int bits) { return (std::uint64_t{1} << bits) - 1; }
 template <class KeyOf>
 void HitOrder::sortBy(const KeyOf& keyOf, int key_bits) {
   for (std::uint64_t& word : words_) word = keyOf(hitAt(word)) << place_bits_ | (word & place_);
-  for (int shift = place_bits_; shift < place_bits_ + key_bits; shift += DIGIT) {
-    radixPass<DIGIT>(words_, other_, shift, [](std::uint64_t word) { return word; });
+  for (int shift = place_bits_; shift < place_bits_ + key_bits; shift += RADIX_BITS) {
+    radixPass(words_, other_, shift, [](std::uint64_t word) { return word; });
   }
 }
 
