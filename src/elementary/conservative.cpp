@@ -3,7 +3,6 @@
 // and every pair with a minimum separation, goes through conservative advancement. What that finds near without a
 // minimum separation the exact tiers decide.
 #include <algorithm>
-#include <cstring>
 
 #include "dccd/elementary.h"
 #include "dccd/tolerances.h"

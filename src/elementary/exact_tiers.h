@@ -2,7 +2,6 @@
 // one answers first changes nothing in the answer. Rounding must be to nearest, denormals on.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 #include "dccd/elementary.h"

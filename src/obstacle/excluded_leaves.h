@@ -1,7 +1,6 @@
 // What of a map is left when the voxels in some boxes are taken out of it.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -146,9 +145,7 @@ struct KnownSpace::Impl {
 
 std::shared_ptr<const KnownSpace> KnownSpace::build(double resolution_m,
                                                     const std::vector<OccupiedLeaf>& known_leaves) {
-  if (!isResolution(resolution_m)) {
-    throw std::invalid_argument(noResolution("resolution_m", resolution_m));
-  }
+  if (!isResolution(resolution_m)) throw std::invalid_argument(noResolution("resolution_m", resolution_m));
   return std::shared_ptr<const KnownSpace>(new KnownSpace(std::make_unique<Impl>(resolution_m, known_leaves)));
 }
 

@@ -98,8 +98,7 @@ inline std::vector<OccupiedLeaf> leavesWithout(const VoxelTree& tree, const Voxe
       const unsigned block = lowestBit(children);
       const std::uint32_t n = parent.childAt(block);
       const auto first = tree.leaves().begin() + nodes[n].first_leaf;
-      const auto end =
-          tree.leaves().begin() + (n + 1 < nodes.size() ? nodes[n + 1].first_leaf : tree.firstLeafOfLevel(1));
+      const auto end = tree.leaves().begin() + tree.leafEnd(n);
       if (beside.node && (beside.node->full >> block & 1)) continue;
       if (beside.node && (beside.node->child >> block & 1)) {
         std::for_each(first, end, cut);
@@ -112,7 +111,7 @@ inline std::vector<OccupiedLeaf> leavesWithout(const VoxelTree& tree, const Voxe
   const auto isBefore = [](const OccupiedLeaf& a, const OccupiedLeaf& b) {
     const int level = VoxelTree::levelOfSize(a.size), other = VoxelTree::levelOfSize(b.size);
     if (level != other) return level < other;
-    return mortonCode(a.min.x, a.min.y, a.min.z) < mortonCode(b.min.x, b.min.y, b.min.z);
+    return codeOf(a) < codeOf(b);
   };
   if (parts.empty()) return left;
   std::sort(parts.begin(), parts.end(), isBefore);

@@ -1,7 +1,6 @@
 // The voxel keys that each vertex may touch during the step, and unions of them for edges and faces.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <cstring>
 

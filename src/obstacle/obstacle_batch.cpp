@@ -77,13 +77,17 @@ ObstacleBatch::ObstacleBatch(PairKind kind, const Rung* test) : kind_(kind), tes
 
 void ObstacleBatch::clear(const Deadline& deadline) {
   deadline_ = deadline;
+  dropPairs();
+  releaseBurst(contacts_);
+  contacts_.clear();
+}
+
+void ObstacleBatch::dropPairs() {
   pairs_.clear();
   toc_bounds_.clear();
   points_.clear();
   separations_.clear();
   any_separation_ = false;
-  releaseBurst(contacts_);
-  contacts_.clear();
 }
 
 void ObstacleBatch::add(const ObstaclePair& pair, const VertexMotion* points, double toc_bound, double separation_m) {
@@ -110,11 +114,7 @@ void ObstacleBatch::flush() {
   for (std::size_t i = 0; i < count; ++i) {
     if (results_[i].verdict != Verdict::NO_CONTACT) append(i, results_[i]);
   }
-  pairs_.clear();
-  toc_bounds_.clear();
-  points_.clear();
-  separations_.clear();
-  any_separation_ = false;
+  dropPairs();
 }
 
 void ObstacleBatch::append(std::size_t index, const ElementaryResult& result) {

@@ -1,7 +1,6 @@
 // Pairs of a mesh feature and a feature of one leaf on their way through the elementary test, a chunk at a time.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "dccd/contact.h"
@@ -35,6 +34,7 @@ class ObstacleBatch {
   const std::vector<Contact>& contacts() const { return contacts_; }
 
  private:
+  void dropPairs();
   void append(std::size_t index, const ElementaryResult& result);
 
   static constexpr std::size_t CHUNK = 512;

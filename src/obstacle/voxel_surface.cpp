@@ -1,21 +1,12 @@
 #include "dccd/voxel_surface.h"
 
-#include <cmath>
 #include <stdexcept>
-#include <tuple>
 
 #include "dccd/next_surface.h"
 #include "obstacle/resolution.h"
 #include "obstacle/voxel_surface_impl.h"
 
 namespace dccd {
-namespace {
-
-void checkResolution(double resolution_m) {
-  if (!isResolution(resolution_m)) throw std::invalid_argument(noResolution("resolution_m", resolution_m));
-}
-
-}  // namespace
 
 VoxelSurface::Impl::Impl(double resolution, VoxelTree of, std::vector<FeatureMask> exposed)
     : resolution_m(resolution),
@@ -40,7 +31,7 @@ KeyBox VoxelSurface::Impl::keysOf(const double* lo, const double* hi) const {
 }
 
 std::shared_ptr<const VoxelSurface> VoxelSurface::build(double resolution_m, std::vector<OccupiedLeaf> leaves) {
-  checkResolution(resolution_m);
+  if (!isResolution(resolution_m)) throw std::invalid_argument(noResolution("resolution_m", resolution_m));
   VoxelTree tree(leaves);
   std::vector<FeatureMask> features = exposedFeatures(tree);
   return std::make_shared<const VoxelSurface>(

@@ -19,6 +19,14 @@ struct KeyBox {
   std::array<std::int32_t, 3> hi{-1, -1, -1};
 };
 
+/// In the order of these codes the leaves of a node follow each other.
+inline std::uint64_t codeOf(const OccupiedLeaf& leaf) { return mortonCode(leaf.min.x, leaf.min.y, leaf.min.z); }
+
+/// Whether both lie in the same node of the level. Most leaves follow one of which that is so, and need no code.
+inline bool shareNode(const OccupiedLeaf& a, const OccupiedLeaf& b, int level) {
+  return ((a.min.x ^ b.min.x) | (a.min.y ^ b.min.y) | (a.min.z ^ b.min.z)) >> (2 * (level + 1)) == 0;
+}
+
 class VoxelTree {
  public:
   static constexpr int LEVELS = 8;
@@ -80,6 +88,10 @@ class VoxelTree {
     return levels_[level].cells[node];
   }
   std::uint32_t firstLeafOfLevel(int level) const { return first_leaf_of_level_[level]; }
+  /// Leaves of a node of level 0: from its first one on, up to this.
+  std::uint32_t leafEnd(std::uint32_t node) const {
+    return node + 1 < levels_[0].nodes.size() ? levels_[0].nodes[node + 1].first_leaf : first_leaf_of_level_[1];
+  }
   std::size_t memoryBytes() const;
 
   /// The node of `level` >= 1 with these node coordinates, or NONE. Out of range coordinates give NONE.
@@ -118,17 +130,19 @@ class VoxelTree {
     int table_shift = 0;
   };
 
-  /// Leaves of a node of level 0: from its first one on, up to this.
-  std::uint32_t leafEnd(std::uint32_t node) const {
-    return node + 1 < levels_[0].nodes.size() ? levels_[0].nodes[node + 1].first_leaf : first_leaf_of_level_[1];
-  }
+  // voxel_tree_following.cpp
   bool takeLevels(std::vector<OccupiedLeaf>& leaves, bool small);
   std::uint32_t commonBlocks(const VoxelTree& before, std::uint32_t node, std::uint32_t& leaf) const;
   bool followBlocks(const VoxelTree& before, Change& change, std::vector<std::uint64_t>& prefixes);
   void placeBlocks(const VoxelTree& before, const std::vector<Node>& changed, const Change& change);
   bool followLarge(const VoxelTree& before, Change& change) const;
+
   /// False, and nothing is taken, where leaves do not come in Morton order, as a decoded map's do.
   bool takeSorted(const std::vector<OccupiedLeaf>& leaves);
+  /// counts: of the leaves of each level.
+  void setLevels(const std::array<std::uint32_t, LEVELS>& counts);
+  /// Sorts them by level, in their order; once the levels are set.
+  void takeByLevel(const std::vector<OccupiedLeaf>& leaves);
   std::size_t countNodes(int level, const std::vector<std::uint64_t>& prefixes) const;
   void buildLevel(int level, std::vector<std::uint64_t>& prefixes);
   void buildTable(Level& level);

@@ -129,6 +129,7 @@ void History::Impl::findClearance(const Part& part, Findings& result) {
   result.stats[Effect::CLEARANCE].ms = msSince(start);
 }
 
+/// False: the step was cut before its end.
 bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts, Deadline deadline, Outcome& outcome) {
   bool reached_end = true;
   if (parts == 1) {
@@ -136,7 +137,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
   } else {
     Step part = step;
     for (Body& body : part.bodies) body.t1 = body.t0;
-    for (std::size_t i = 0; reached_end && i < parts; ++i) {
+    for (std::size_t i = 0; i < parts; ++i) {
       if (i > 0 && (outcome.cut || deadline.isOver())) {
         // Of the rest all that is known is that it has not begun yet.
         leaveOut(scaleDown(0, i, parts), false, outcome);
@@ -152,7 +153,7 @@ bool History::Impl::runParts(const Step& step, bool continues, std::size_t parts
     }
     joinParts(outcome.contacts);
   }
-  // At the end of the last part that was done something else may be.
+  // Where a step was cut, nobody looked at its end.
   if (reached_end) {
     carried.end.clear();
     for (const Body& body : step.bodies) carried.end.push_back(body.t1);

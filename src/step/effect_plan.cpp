@@ -1,7 +1,6 @@
 #include "dccd/effect_plan.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <sstream>

@@ -1,6 +1,5 @@
 #include "step/expected_contacts.h"
 
-#include <algorithm>
 #include <stdexcept>
 
 namespace dccd {

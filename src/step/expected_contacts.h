@@ -2,7 +2,6 @@
 // marking looks at 32 expectations at once and allocates nothing.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "dccd/body.h"

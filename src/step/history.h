@@ -110,7 +110,7 @@ struct History::Impl {
   void findPatches(Outcome& outcome);
   void measureHits(std::size_t hits, const StepStats& stats);
 
-  /// Half as much again as a hit took, after the pairs, in the last steps with many.
+  /// One and a half times what a hit took after the pairs, in the last steps that had many.
   std::chrono::nanoseconds per_hit_{400};
   Deadline::Clock::time_point hits_done_;      // when the last part's pairs ended
   Deadline::Clock::duration patches_took_{0};  // in the last step

@@ -43,9 +43,8 @@ EFFECT = {
                           '  return scene.bodies.size() > 1 ? wanted("toys like company") : notWanted("a toy is alone");\n}\n\n'
                           '/// By Effect:'),
         (' clearance,\n};', ' clearance, toy,\n};')],
-    'src/step/detect.cpp': ('  if (options.patches) patches.list(outcome);\n',
-                            '  if (options.patches) patches.list(outcome);\n'
-                            '  if (options.toy) outcome.stats[Effect::TOY].in = step.bodies.size();\n'),
+    'src/step/detect.cpp': ('  outcome.stats.total_ms = ',
+                            '  if (options.toy) outcome.stats[Effect::TOY].in = step.bodies.size();\n  outcome.stats.total_ms = '),
     'include/dccd/detect.h': ('  bool patches = false;', '  bool toy = true;\n  bool patches = false;'),
     'src/step/option_rows.h': [('expected, patches, clearance, excluded]', 'expected, toy, patches, clearance, excluded]'),
                                ('recorded(patches)', 'recorded(toy), recorded(patches)')],

@@ -1,17 +1,14 @@
 #include "step/pairs/hit_order.h"
 
 #include <algorithm>
-#include <array>
 #include <tuple>
-#include <utility>
 
 #include "obstacle/burst.h"
+#include "obstacle/radix_sort.h"
 
 namespace dccd {
 namespace {
 
-constexpr int DIGIT = 12;
-constexpr std::size_t BUCKETS = std::size_t{1} << DIGIT;
 // Below this the passes over the buckets take longer than comparing; most steps of a stream find few or none.
 constexpr std::size_t FEW = 1024;
 
@@ -28,17 +25,8 @@ std::uint64_t lowest(int bits) { return (std::uint64_t{1} << bits) - 1; }
 template <class KeyOf>
 void HitOrder::sortBy(const KeyOf& keyOf, int key_bits) {
   for (std::uint64_t& word : words_) word = keyOf(hitAt(word)) << place_bits_ | (word & place_);
-  for (int shift = place_bits_; shift < place_bits_ + key_bits; shift += DIGIT) {
-    std::array<std::uint32_t, BUCKETS> next{};
-    for (const std::uint64_t word : words_) ++next[word >> shift & (BUCKETS - 1)];
-    std::uint32_t sum = 0;
-    for (std::uint32_t& n : next) {
-      const std::uint32_t count = n;
-      n = sum;
-      sum += count;
-    }
-    for (const std::uint64_t word : words_) other_[next[word >> shift & (BUCKETS - 1)]++] = word;
-    std::swap(words_, other_);
+  for (int shift = place_bits_; shift < place_bits_ + key_bits; shift += RADIX_BITS) {
+    radixPass(words_, other_, shift, [](std::uint64_t word) { return word; });
   }
 }
 

@@ -62,7 +62,8 @@ struct LeftOut {
   /// Those that a step without motion in the reference frames calls contacts: exactly those that would be contacts for
   /// as long as the body keeps its shape. step: one of the bodies that the scene holds. The scene is left at rest.
   void find(const Step& step, const Prepared& prepared, SceneArrays& scene, PairSearch& pairs);
-  /// Of a pair that only uncertainty leaves out it is not known whether it comes as near as that. A sentence a body.
+  /// Says of each body how many of its pairs are left out for its uncertainty alone: whether these come as near as that
+  /// is not known.
   void sayForNoise(const Step& step, const Options& options, const SceneArrays& scene,
                    std::vector<std::string>& unproved) const;
 

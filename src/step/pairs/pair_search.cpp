@@ -110,7 +110,7 @@ void PairSearch::addTasks(const Search& search, PairKind kind, std::size_t a, st
   }
 }
 
-/// What a deadline or a limit leaves over should be what can touch last; of equal ones what was found last.
+/// The pairs that can touch first come first: a deadline or a limit leaves out the last ones.
 void PairSearch::orderByBound(const TreePair& trees) {
   by_toc_.clear();
   for (std::uint32_t i = 0; 2 * i < found_groups_.size(); ++i) {
@@ -228,7 +228,7 @@ void PairSearch::runUntilFirst(Search& search, const SelfTests& self_tests, Scen
   runTasks(search);
 }
 
-/// Of what is over the limit all that is known is when the groups can meet.
+/// What was found beyond the limit is dropped: all that is known of it is when its groups can meet.
 void PairSearch::cutHits(const Search& search) {
   const std::vector<SceneBody>& bodies = search.context.scene->bodies();
   std::size_t listed = 0;

@@ -5,7 +5,7 @@
 
 #include "dccd/tolerances.h"
 #include "obstacle/burst.h"
-#include "step/radix_sort.h"
+#include "obstacle/radix_sort.h"
 
 namespace dccd {
 namespace {
