@@ -110,12 +110,14 @@ void CollisionMonitor::Impl::onMesh(std::size_t body, MeshMessage message) {
   if (pipeline.isStatic(body)) state.staticCame(config.bodies[body].body.name);  // after it, as of a map
 }
 
-void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) {
+void CollisionMonitor::Impl::onTransforms(const tf2_msgs::TFMessage& message, bool is_static) try {
   feed.add(message, is_static);
   for (const std::string& line : feed.takeComplaints()) ROS_WARN_STREAM((is_static ? "/tf_static: " : "/tf: ") << line);
+} catch (const std::exception& error) {
+  tellLost(is_static ? "/tf_static" : "/tf", error);
 }
 
-void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
+void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) try {
   map_publisher_seen = true;
   const std::int64_t now_ns = steadyNs();
   state.mapCame(now_ns);
@@ -126,15 +128,8 @@ void CollisionMonitor::Impl::onMap(const ShapeShifter::ConstPtr& message) {
                         now_ns);
   }
   maps->submit(bytesOf(*message), static_cast<StampNs>(ros::Time::now().toNSec()), now_ns);
-}
-
-/// Nothing may get out of a callback: the thread would end, and the process with it.
-void CollisionMonitor::Impl::guarded(const std::string& topic, const std::function<void()>& take) {
-  try {
-    take();
-  } catch (const std::exception& error) {
-    ROS_WARN_STREAM_THROTTLE(5, topic << ": a message was lost: " << error.what());
-  }
+} catch (const std::exception& error) {
+  tellLost(config.liveMapName(), error);
 }
 
 void CollisionMonitor::Impl::subscribe() {
@@ -148,20 +143,17 @@ void CollisionMonitor::Impl::subscribe() {
         input, config.bodies[b].topic, [this, b](MeshMessage message) { onMesh(b, std::move(message)); });
   }
   tf_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf", [&] { onTransforms(*m, false); }); },
+      "/tf", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { onTransforms(*m, false); },
       ros::VoidConstPtr(), hints);
   tf_static_subscriber = input.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", SUBSCRIBER_QUEUE,
-      [this](const tf2_msgs::TFMessageConstPtr& m) { guarded("/tf_static", [&] { onTransforms(*m, true); }); });
+      "/tf_static", SUBSCRIBER_QUEUE, [this](const tf2_msgs::TFMessageConstPtr& m) { onTransforms(*m, true); });
   ROS_INFO_STREAM("listens to " << inputsOf(node, config) << "; publishes under " << private_node.getNamespace());
   if (!pipeline.effects().mayUseMap()) return;
   maps = std::make_unique<MapLoader>(config, feed, [this] { queue.wake(); });
   if (config.takesMapFileAlone()) return maps->submitFile(config.octomap_file, steadyNs());
   if (!config.octomap_file.empty()) pipeline.setMap(loadMapFile(config.octomap_file, config), steadyNs());
-  map_subscriber = input.subscribe<ShapeShifter>(config.liveMapName(), 2, [this](const ShapeShifter::ConstPtr& m) {
-    guarded(config.liveMapName(), [&] { onMap(m); });
-  });
+  map_subscriber =
+      input.subscribe<ShapeShifter>(config.liveMapName(), 2, [this](const ShapeShifter::ConstPtr& m) { onMap(m); });
 }
 
 // --- service thread --------------------------------------------------------------------------------------------------

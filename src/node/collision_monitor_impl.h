@@ -83,7 +83,6 @@ struct CollisionMonitor::Impl {
 
   // Input thread.
   void subscribe();
-  void guarded(const std::string& topic, const std::function<void()>& take);
   void onMesh(std::size_t body, MeshMessage message);
   void onTransforms(const tf2_msgs::TFMessage& message, bool is_static);
   void onMap(const topic_tools::ShapeShifter::ConstPtr& message);

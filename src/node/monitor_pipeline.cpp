@@ -242,13 +242,6 @@ std::string MonitorPipeline::indexProblem(std::size_t body, const Topology& topo
   return found;
 }
 
-DecodedMesh MonitorPipeline::decode(std::size_t body, const MeshMessage& message) {
-  if (message.object.type) return decoders_[body].decode(message.object);
-  const std::string problem = meshTypeProblem(message.datatype, message.md5);
-  if (!problem.empty()) throw MeshError(StepStatus::BAD_MESSAGE, problem);
-  return decoders_[body].decode(message.datatype, message.bytes.data(), message.bytes.size());
-}
-
 void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
   finishing_ = false;
   Waiting waiting;
@@ -266,8 +259,11 @@ void MonitorPipeline::take(std::size_t body, const MeshMessage& message) {
            "there is not enough memory for this message of " + std::to_string(bytes) + " bytes");
   };
   if (message.no_memory > 0) return noMemory(message.no_memory);
+  const std::string type_problem = meshTypeProblem(message.datatype, message.md5);
+  if (!type_problem.empty()) return refuse(StepStatus::BAD_MESSAGE, type_problem);
   try {
-    waiting.mesh = decode(body, message);
+    waiting.mesh =
+        decoders_[body].decode(message.datatype, {message.bytes.data(), message.bytes.size()}, message.object);
     waiting.mesh.arrival_ns = message.arrival_ns;
     if (topology_filter_) {
       waiting.mesh.topology = topology_filter_(body, waiting.mesh.topology, waiting.mesh.positions);

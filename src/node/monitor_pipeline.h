@@ -192,8 +192,6 @@ class MonitorPipeline {
   std::set<std::string> setsNamed(std::size_t body) const;
   /// The vertices of the sets that expected_contacts names. Throws ParameterError.
   void findSets();
-  /// Throws MeshError.
-  DecodedMesh decode(std::size_t body, const MeshMessage& message);
   void skip(std::size_t body, StepStatus status, StampNs stamp_ns, std::int64_t arrival_ns, const std::string& reason);
   /// What of the body's vertex_mask and of its expected contacts the mesh has not; empty: it has all.
   std::string indexProblem(std::size_t body, const Topology& topology) const;
