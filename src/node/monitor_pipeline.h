@@ -18,6 +18,7 @@
 #include "input/transforms.h"
 #include "node/attach_request.h"
 #include "node/effects.h"
+#include "output/statement.h"
 
 namespace dccd {
 
@@ -111,6 +112,8 @@ class MonitorPipeline {
   /// What the last outcome promises, and what became of the promise before; nothing where the configuration has no
   /// bounds.
   const PromiseWatch& promises() const { return promises_; }
+  /// What may be said of the last outcome.
+  const Statement& statement() const { return statement_; }
   /// How fast bodies are assumed to be, by body.
   std::vector<SpeedBound> speedBounds() const { return config_.speedBounds(monitor_->bodies().size()); }
   std::uint64_t transformsUnusable() const { return transforms_.unusable(); }
@@ -157,6 +160,7 @@ class MonitorPipeline {
   TopologyFilter topology_filter_;
   std::vector<std::optional<Waiting>> waiting_;
   PromiseWatch promises_;
+  Statement statement_;
   std::vector<StampNs> widened_ns_;  // per body, its last frame that widen() has seen; 0: none
   std::vector<bool> placed_;         // a static body of which the monitor has a frame
   // By body; behind those of the configuration is what is attached, or a place for it, none with an empty mesh.
