@@ -225,10 +225,9 @@ class MonitorPipeline {
   std::size_t robotsVoxels(const Step& step);
   /// False: still waits.
   bool placeFrame(std::size_t body, std::int64_t now_ns);
-  /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one.
+  /// What the clock body's frame needs besides its own transform: rigid bodies, and no misplaced one. Once it is
+  /// overdue, links of a robot that have no transform stand in nobody's way any longer.
   bool placeOthers(std::int64_t now_ns, bool overdue, StepStatus& problem, std::string& reason);
-  /// may_lose_links: those of a robot that have no transform stand in nobody's way any longer.
-  bool placeRigid(StampNs stamp_ns, std::int64_t now_ns, bool may_lose_links, std::string& reason);
   /// Where it is at the stamp, and was since another one. False: nobody knows.
   bool placeOne(const Rigid& rigid, StampNs from_ns, StampNs stamp_ns, MeshFrame& frame, std::string& reason) const;
   void pushRigid(std::size_t body, MeshFrame frame, const std::string& lost, std::int64_t now_ns);
@@ -249,8 +248,6 @@ class MonitorPipeline {
                                      StampNs to_ns) const;
   /// A map came before the clock body's frame and has no place yet, but may find one soon.
   bool mapMayCome(std::int64_t now_ns) const;
-  /// Which transforms could not be used, to go after another reason.
-  std::string unusableTransforms() const;
 };
 
 }  // namespace dccd
